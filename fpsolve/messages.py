@@ -326,6 +326,10 @@ class Code(Enum):
         "rely on it from |p| = {first:.3g} on, as Λ(p) differs from it by more than {most:.0%} of its terms; the "
         "difference is largest at p = {p:.3g}, {rest:.3g}, which is {size:.0%}"
     )
+    LOAD_LEFT_OUT = (
+        "note: no perturbation theory, Eq. (37), beside these numbers: it leaves out a harmonic load, as {keys} with "
+        "sigma = 0 is"
+    )
     NO_SENSITIVITIES = "note: no sensitivities of {p:?Λ({p:g})¦{symbol}}: {reason}"
     UNUSED = "note: {keys}: in no rate and in no restitution, so that no result depends on it"
     NO_DERIVATIVE = "note: no sensitivities to {key}: the derivative of the system by it is not finite at {value:g}"

@@ -340,6 +340,8 @@ class Gradient:
         """∂Λ(p)/∂θ. Raises `NotConverged`, `NoSuchExponent`."""
         if p == 0:
             return dict.fromkeys(self._along, Estimate(0.0, 0.0, 0.0))
+        if abs(p) < SMALL_P:
+            return {key: _times(p, each) for key, each in self._by_small_p(p).items()}
         solver, along = held_by(self._solver, p, self._along)
         solution = solver.solution(p)
         around = Bordered(solution.pair)
@@ -384,17 +386,22 @@ class Gradient:
         if abs(p) >= SMALL_P:
             slopes: Slopes = {key: _times(1 / p, each) for key, each in self.moment(p).items()}
         else:
-            slopes = dict(self.lyapunov_exponent())
-            for key, each in (self.variance_rate() if p else {}).items():
-                slope, more = slopes[key], _times(0.5 * p, each)
-                errors = slope.error_estimate + more.error_estimate
-                slopes[key] = Estimate(slope.value + more.value, errors, max(slope.scale, more.scale))
+            slopes = self._by_small_p(p)
         lost = 2 * error / abs(slope_by_p) / max(abs(p), SMALL_P)
         found = {key: _times(-1 / slope_by_p, each) for key, each in slopes.items()}
         return {
             key: replace(each, error_estimate=each.error_estimate + lost * abs(each.value))
             for key, each in found.items()
         }
+
+    def _by_small_p(self, p: float) -> Slopes:
+        """∂/∂θ of Λ(p)/p from its derivatives at p = 0."""
+        slopes = dict(self.lyapunov_exponent())
+        for key, each in (self.variance_rate() if p else {}).items():
+            slope, more = slopes[key], _times(0.5 * p, each)
+            errors = slope.error_estimate + more.error_estimate
+            slopes[key] = Estimate(slope.value + more.value, errors, max(slope.scale, more.scale))
+        return slopes
 
     @cached_property
     def _at_zero(self) -> Mapping[str, Changed]:

@@ -57,6 +57,8 @@ TRIM = 0.8
 """A smaller space must have at most this share of the unknowns."""
 SMALL_P = 1e-2
 """For smaller |p| the discretisation is chosen at this one, as Λ and its error go to zero together."""
+NEGLIGIBLE_P = 1e-30
+"""Pairs at smaller |p| are those at p = 0, from which they differ by less than by rounding."""
 NEIGHBOURS = 6
 """How many known eigenfunctions those of another p are interpolated from."""
 FREE_STAGES = 4
@@ -159,6 +161,7 @@ class NearPlace:
         Raises:
             NotConverged: the mesh does not resolve the problem, or the budget does not suffice to find one.
         """
+        p = solved_p(p)
         if tolerance is None and p in self._failed:
             raise self._failed[p]
         allowed = tolerance or self.tolerance
@@ -679,6 +682,11 @@ def _places(pair: PrincipalPair) -> list[tuple[Place, bool]]:
     at, density = noise_marginal(pair)
     mean = float(at @ density / density.sum())
     return [(place, place.lower <= mean <= place.upper) for place in places]
+
+
+def solved_p(p: float) -> float:
+    """The p at which the pair for a p is solved."""
+    return p if abs(p) >= NEGLIGIBLE_P else 0.0
 
 
 def misplaced(mesh: CylinderMesh | None, pairs: Sequence[PrincipalPair]) -> tuple[Message, ...]:

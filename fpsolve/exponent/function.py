@@ -106,9 +106,10 @@ class MomentLyapunovFunction(Result):
             if self.is_converged or _nodes_needed(count, last, self.interpolation_error, self._allowed) > most:
                 break
         self._pairs = [self.solver.pair(float(p)) for p in self.nodes]
-        value, slope = (np.array([getattr(pair, name) for pair in self._pairs]) for name in ("value", "derivative"))
+        slope = np.array([pair.derivative for pair in self._pairs])
+        errors = np.abs(self.nodes) * self._errors
         if obstacle := broken_convexity(
-            self.nodes, value, slope, np.abs(self.nodes) * self._errors, lambda: self._slope_errors
+            self.nodes, self.nodes * self._values, slope, errors, lambda: self._slope_errors
         ):
             raise NotConverged(obstacle, remedy=self.solver.near.refinement)
 
@@ -233,10 +234,10 @@ class MomentLyapunovFunction(Result):
         for i in best_order(self.nodes):
             ratios[i] = self.solver.ratio(float(self.nodes[i]), tolerance)
             progress()
-        values, slopes, self._errors = ratios.T
+        self._values, slopes, self._errors = ratios.T
         basis, half = np.eye(2 * x.size), 0.5 * (self.interval[1] - self.interval[0])
         conditions = np.concatenate([chebval(x, basis).T, chebval(x, chebder(basis, axis=0)).T / x.size])
-        coefficients = np.linalg.solve(conditions, np.concatenate([values, slopes * half / x.size]))
+        coefficients = np.linalg.solve(conditions, np.concatenate([self._values, slopes * half / x.size]))
         self._series = Chebyshev(coefficients, domain=self.interval)
         self.interpolation_error = 2 * float(np.max(np.abs(self._series.coef[-3:])))
 

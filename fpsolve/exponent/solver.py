@@ -27,6 +27,7 @@ from fpsolve.exponent.adapt import (
     Tolerance,
     is_far_out,
     misplaced,
+    solved_p,
     widened,
 )
 from fpsolve.exponent.eigen import Bordered, PrincipalPair, second_derivative, slope_rounding
@@ -47,6 +48,8 @@ if TYPE_CHECKING:
 HARDLY_FINITE = 1e-6
 TINY_P = 1e-3
 """Below it Λ(p)/p is a mean of Λ′, as rounding is not proportional to p."""
+TINIEST_P = 1e-9
+"""For p < 0 of smaller size Λ(p)/p is that of p = 0 also where several classes, or places of the noise, compete."""
 
 _KINDS: Sequence[tuple[str, Any, str]] = (
     ("problem", Problem, "a Problem, made of an oscillator and a noise"),
@@ -260,6 +263,9 @@ class ExponentSolver:
         """
         point = real_number(p, "p")
         refuse_infinite(self.problem, point)
+        if -TINIEST_P < point < 0 and (len(self.classes) > 1 or grows_far_out(self.problem)):
+            point = 0.0
+        point = solved_p(point)
         if not self.classes:
             return self.place.solution(point, tolerance)
         if point < 0 and len(self.classes) > 1:
@@ -300,11 +306,8 @@ class ExponentSolver:
         points, found = real_numbers(p, "p", may_be_empty=True), []
         phases = self.problem.invariant_rays
         for number, (block, each) in enumerate(zip(self.problem.blocks, self.classes, strict=True)):
-            solutions = [each.solution(float(point)) for point in points]
-            value, error = (
-                np.array(column, dtype=float)
-                for column in ([one.pair.value for one in solutions], [one.error for one in solutions])
-            )
+            solved = [each.estimate(point, each.solution(point)) for point in points.tolist()]
+            value, error = (np.array([getattr(one, name) for one in solved]) for name in ("value", "error_estimate"))
             is_along = number < len(phases)
             phase = (phases[number] if is_along else phases[0]) if phases else None
             names = () if phases else block.names
@@ -331,23 +334,23 @@ class ExponentSolver:
             NoSuchExponent: Λ(p) is infinite for one of the p.
         """
         points = checked_moments(p, self.problem, may_be_empty=True)
-        solutions, failures = {}, []
+        rows, failures = dict[int, tuple[PrincipalPair, float, float]](), []
         for i in best_order(points):
+            p = float(points[i])
             try:
-                solution = self.solution(float(points[i]))
-                if points[i] != 0:  # where Λ = 0 has no scale
-                    checked(self.estimate(solution), self.near.refinement, solution.pair.p)
-                solutions[i] = solution
+                solution = self.solution(p)
+                estimate = self.estimate(p, solution)
+                if abs(p) >= TINIEST_P:  # else Λ has no scale
+                    checked(estimate, self.near.refinement, p)
+                rows[i] = solution.pair, estimate.value, estimate.error_estimate
             except NotConverged as failure:
-                failures.append(Failure(float(points[i]), failure.message))
+                failures.append(Failure(p, failure.message))
             progress()
-        pairs = tuple(solutions[i].pair for i in sorted(solutions))
-        found = np.array([pair.p for pair in pairs])
-        errors = np.array([solutions[i].error for i in sorted(solutions)])
-        value, slope = (np.array([getattr(pair, name) for pair in pairs]) for name in ("value", "derivative"))
-        value[found == 0], errors[found == 0] = 0.0, 0.0  # but for rounding, in every space
+        pairs = tuple(rows[i][0] for i in sorted(rows))
+        found, slope = points[sorted(rows)], np.array([pair.derivative for pair in pairs])
+        value, errors = np.array([rows[i][1:] for i in sorted(rows)]).reshape(-1, 2).T
         if grows_far_out(self.problem):
-            slope[found == 0] = np.minimum(slope[found == 0], 0.0)  # from the left, where Λ is finite
+            slope[np.abs(found) < TINIEST_P] = np.minimum(slope[np.abs(found) < TINIEST_P], 0.0)  # from the left
         return MomentLyapunov(
             p=found,
             value=value,
@@ -361,10 +364,20 @@ class ExponentSolver:
             notes=(*carried_far_out(self, pairs), *of_the_start(self, found)),
         )
 
-    def estimate(self, solution: Solution) -> Estimate:
-        """Λ(p) on the scale of the terms of Eq. (37) before they cancel."""
-        p = solution.pair.p
-        return Estimate(solution.pair.value, solution.error, self.scale(p), quantity=quantity.moment_at(p))
+    def estimate(self, p: float, solution: Solution) -> Estimate:
+        """Λ(p) on the scale of the terms of Eq. (37) before they cancel.
+
+        Near p = 0, where rounding is not proportional to p, it is that of Λ(p)/p.
+        """
+        value, error, has_kink = solution.pair.value, solution.error, grows_far_out(self.problem)
+        if p == 0:  # but for rounding, in every space
+            value, error = 0.0, 0.0
+        elif abs(p) < TINY_P and not (has_kink and is_far_out(solution.pair)):
+            ratio, error = self.ratio_alone(p)
+            if has_kink and ratio > 0:  # of rare paths: Λ(p) is convex, and it is at most some |p|
+                ratio, error = 0.0, ratio + self.scales.linear
+            value, error = p * ratio, abs(p) * error
+        return Estimate(value, error, self.scale(p), quantity=quantity.moment_at(p))
 
     def slope_error(self, p: float) -> float:
         """Estimate of |error of Λ′(p)|; NaN where none is known.
@@ -434,8 +447,8 @@ class ExponentSolver:
     def ratio(self, p: float, tolerance: Tolerance | None = None) -> tuple[float, float, float]:
         """Λ(p)/p, its derivative in p, and the error of the first; λ at p = 0."""
         value, error = self.ratio_alone(p, tolerance)
-        if abs(p) < TINY_P:
-            return value, 0.5 * second_derivative(self.near.solution(p * 0.5, tolerance).pair), error
+        if abs(p) < TINY_P:  # ∫₀¹ s Λ″(sp) ds, by one point of Gauss
+            return value, 0.5 * second_derivative(self.near.solution(p * 2 / 3, tolerance).pair), error
         return value, (self._nearest(p, tolerance).pair.derivative - value) / p, error
 
     def _nearest(self, p: float, tolerance: Tolerance | None) -> Solution:
@@ -448,11 +461,12 @@ class ExponentSolver:
 
         Near p = 0 it is the mean of Λ′ from 0 to p, by two points of Gauss; its error is that at p = ±`SMALL_P`.
         """
-        if abs(p) >= TINY_P:
+        if abs(p) >= TINY_P or (p <= -TINIEST_P and len(self.classes) > 1):
             solution = self._nearest(p, tolerance)
             return solution.pair.value / p, solution.error / abs(p)
         if self.classes:
-            return max(each.ratio_alone(p, tolerance) for each in self.classes)
+            value, error = max(each.ratio_alone(p, tolerance) for each in self.classes)
+            return value, error + (max(each.ratio_alone(0.0)[0] for each in self.classes) - value if p < 0 else 0.0)
         points = {p * (0.5 + shift) for shift in (-0.5 / math.sqrt(3), 0.5 / math.sqrt(3))}
         pairs = [self.near.solution(point, tolerance).pair for point in points]
         near = self.near.near_zero(p, tolerance)
@@ -472,7 +486,7 @@ def best_order(p: FloatArray) -> Any:
 
 def missed(solver: ExponentSolver, p: FloatArray, value: FloatArray, error: FloatArray) -> tuple[Message, ...]:
     """A warning about the p at which the estimated error exceeds rtol, or nothing."""
-    size = np.where(p == 0, math.inf, np.maximum(np.abs(value), solver.scales.moment(p)))
+    size = np.where(np.abs(p) < TINIEST_P, math.inf, np.maximum(np.abs(value), solver.scales.moment(p)))
     shares = error / size
     count = np.count_nonzero(shares > solver.rtol)
     if not count:

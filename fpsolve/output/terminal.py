@@ -596,7 +596,8 @@ def print_remarks(
     for each in found:
         for severity, kinds in groups.items():
             for message in map(message_of, each.remarks.get(severity, ())):
-                if message.code is Code.STRONG_NOISE and not (file and shows_perturbed_moments(case, len(found))):
+                is_on_theory = message.code in (Code.STRONG_NOISE, Code.LOAD_LEFT_OUT)
+                if is_on_theory and not (file and shows_perturbed_moments(case, len(found))):
                     continue
                 kinds.setdefault(message.kind, []).append((message, each.curve))
     for severity, kinds in groups.items():

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -54,6 +54,8 @@ FEW: Mapping[Estimator, int] = {"direct": 5000, "population": 1000}
 paths and a smaller mean, so that estimates near a lower bound would be too small."""
 DRIFT = 4.0
 """Standard errors by which two parts of the same estimate may differ."""
+_TINY = 1e-9
+"""|p| below which Λ(p) is λp, as ln E‖x‖^p is rounded."""
 _KEPT = 0.3
 """The share of effective paths that a long window of the direct estimator must leave."""
 _LEVELS = 12
@@ -227,11 +229,16 @@ def simulate(
         estimates, drifts = direct_estimates(plan, plain)
     else:
         estimates, drifts = population_estimates(plan, populations)
+    rate, error = float(exponents.mean()), standard_error(exponents)
+    estimates = [
+        replace(each, value=each.p * rate, standard_error=abs(each.p) * error) if 0 < abs(each.p) < _TINY else each
+        for each in estimates
+    ]
     stopped = [Message(Code.STOPPED, share=slices.mean() / plan.wanted)] if interrupted else []
     return MonteCarlo(
         estimates=tuple(estimates),
-        lyapunov_exponent=float(exponents.mean()),
-        lyapunov_exponent_error=standard_error(exponents),
+        lyapunov_exponent=rate,
+        lyapunov_exponent_error=error,
         variance_rate=float(variance_rates.mean()),
         variance_rate_error=standard_error(variance_rates),
         paths=plan.paths * BATCHES,
@@ -331,7 +338,7 @@ def _missing(plan: Plan, estimates: Sequence[MomentEstimate]) -> list[Message]:
 
 def _drift(plan: Plan, p: float, change: float, error: float) -> list[Message]:
     """That Λ(p) changes over the simulation, if it does."""
-    if not abs(change) > DRIFT * error > 0:
+    if abs(p) < _TINY or not abs(change) > DRIFT * error > 0:
         return []
     is_direct = plan.estimator == "direct"
     return [Message(Code.DRIFTING, p=p, size=abs(change) / error, most=DRIFT, is_direct=is_direct)]

@@ -7,12 +7,15 @@ S of Eq. (16),
 
 as −⟨L₁ L₀⁻¹ L₁ 1⟩ = p ∫₀^∞ C(t) ⟨(h ∂φ + p q)(φ) q(φ + ωt)⟩ dt and h is the quarter-turned wave of q. For the paper's
 oscillator q̄ = |q̂| = ½, and this is Eq. (37). White noise has S = s² at all ω. A `NonGaussianNoise` has the S of its
-Ornstein-Uhlenbeck reduction, as in the paper. The mean of a noise is put into the drift of order 0.
+Ornstein-Uhlenbeck reduction, as in the paper. The mean of a noise is put into the drift of order 0. A harmonic load has
+S = 0 at all other frequencies than its own, and so no part in Λ₂, also where it pumps: there the theory does not apply.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -118,8 +121,22 @@ def second_order(problem: Problem) -> SecondOrder:
     """ε²Λ₂(p) of a problem.
 
     Raises:
-        NoPerturbationTheory: the order 0 does not rotate, or the order 1 is not linear in the noise.
+        NoPerturbationTheory: the order 0 does not rotate, the order 1 is not linear in the noise, or a load is harmonic.
     """
+    if loads := harmonic_loads(problem):
+        raise NoPerturbationTheory(f"perturbation theory leaves out a harmonic load, which {' and '.join(loads)} is")
+    return _of_random_noise(problem)
+
+
+def harmonic_loads(problem: Problem) -> Sequence[str]:
+    """The sections of a case, such as "noise", of the noises of which only the start is random."""
+    named = zip([*problem.sections][1:], problem.noise.parts.values(), strict=True)
+    return [section for section, noise in named if not noise.is_random]
+
+
+@kept(8)
+def _of_random_noise(problem: Problem) -> SecondOrder:
+    """ε²Λ₂(p) without what harmonic loads change."""
     system, noises = problem.motion, problem.noise.parts
     if problem.dimension > 2:
         raise NoPerturbationTheory("perturbation theory is for two variables only")
@@ -148,7 +165,7 @@ def second_order(problem: Problem) -> SecondOrder:
     of_noise = []
     for name, matrix in driven.items():
         noise, q = problem.named_noise(name), _growth(matrix, frame)
-        at_rest, at_twice = noise.spectral_density(0.0), noise.spectral_density(2 * omega)
+        at_rest, at_twice = (noise.spectral_density(each) if noise.is_random else 0.0 for each in (0.0, 2 * omega))
         most = 2 * noise.standard_deviation / system.epsilon  # that of ½S, as ln ‖x‖ grows at ε|q̂||ξ| at most
         if noise.has_peak and not max(q.amplitude * at_twice, abs(q.mean) * at_rest) <= most:
             raise NoPerturbationTheory(
@@ -193,10 +210,12 @@ def perturbed_moments(problem: Problem, p: FloatArray) -> FloatArray:
 
 
 def weak_noise_note(problem: Problem, p: FloatArray, value: FloatArray) -> Message | None:
-    """On Eq. (37) where the orders ε⁴ and above, Λ − ε²Λ₂, are not small against its terms before they cancel.
+    """On Eq. (37) where the orders ε⁴ and above, Λ − ε²Λ₂, are not small against its terms, or it leaves out a load.
 
     Eq. (37) is a parabola, convex for every p; what limits it is the p from which on this criterion is broken.
     """
+    if problem.dimension == 2 and (loads := harmonic_loads(problem)):
+        return Message(Code.LOAD_LEFT_OUT, keys=loads)
     theory = second_order_or_none(problem)
     if theory is None:
         return None
@@ -266,7 +285,9 @@ def scale_of(problem: Problem) -> Scale:
         driven += 0.5 * q * max(h, q)
     driven += sum(each.rate * each.strength * min(1.0, each.strength) for each in problem.impulses)
     sizes = Scale(float(np.max(np.abs(np.linalg.eigvals(steady).real))) + jumps + driven, driven)
-    theory = second_order_or_none(problem)
+    theory = None
+    with suppress(NoPerturbationTheory):
+        theory = _of_random_noise(problem)
     found = theory.scale if theory and theory.scale.moment(2.0) <= sizes.moment(2.0) else sizes
     return replace(found, linear=found.linear or found.quadratic or problem.unit_rate)  # λ may be 0 exactly
 

@@ -6,11 +6,15 @@ import numpy as np
 import pytest
 from numpy.polynomial.hermite_e import hermegauss
 
+from fpsolve.arrays import identity
 from fpsolve.exponent.fields import fields
 from fpsolve.exponent.solver import ExponentSolver
+from fpsolve.messages import Code
+from fpsolve.model import Bounded, CoefficientMatrix, PlaneSystem, White
 from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
 from fpsolve.model.problem import Problem
 from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
+from fpsolve.theory.perturbation import perturbed_moments, scale_of, weak_noise_note
 from tests.oracles import perturbation
 
 OU = OrnsteinUhlenbeck(alpha=1.7, sigma=0.9)
@@ -104,3 +108,21 @@ def test_eigenfunction_tends_to_1_plus_epsilon_T1(p):
         errors.append(np.max(np.abs(values - 1 - epsilon * t1)))
     orders = np.log2(np.array(errors[:-1]) / errors[1:])
     np.testing.assert_allclose(orders, 2, atol=0.15)
+
+
+@pytest.mark.parametrize("detuning", [0.0, 1e-15, 0.3])
+def test_no_theory_stands_beside_a_harmonic_load(detuning):
+    """Its S is 0 at all frequencies but one, as if it did not pump; the note names it, and not strong noise."""
+    terms = [
+        CoefficientMatrix(0, ((0.0, 1.0), (-1.69, -0.2))),
+        *(CoefficientMatrix(1, ((0.0, 0.0), (-1.0, 0.0)), identity, name) for name in ("pump", "sway")),
+    ]
+    pumped = Problem(PlaneSystem(terms), {"pump": Bounded(0.5, 2.6 + detuning, 0.0), "sway": White(s=0.1)})
+    p, value = np.array([1.0, 2.0]), np.array([0.3, 0.6])
+    assert np.all(np.isnan(perturbed_moments(pumped, p)))
+    note = weak_noise_note(pumped, p, value)
+    assert note.code is Code.LOAD_LEFT_OUT and "noise.pump with sigma = 0 is" in str(note)
+    random = Problem(PlaneSystem(terms), {"pump": Bounded(0.5, 2.6, 2.0), "sway": White(s=0.1)})
+    assert np.all(np.isfinite(perturbed_moments(random, p)))
+    assert weak_noise_note(random, p, value).code is Code.STRONG_NOISE
+    assert scale_of(pumped).moment(2.0) < 3 * scale_of(random).moment(2.0)

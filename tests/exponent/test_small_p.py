@@ -1,0 +1,101 @@
+"""Λ(p) next to p = 0: it is λp + ½Λ″(0)p² there, with errors that fall with p, and no p is lost."""
+
+import numpy as np
+import pytest
+
+from fpsolve import NonGaussianNoise, OrnsteinUhlenbeck, PlaneSystem, Problem, VibroImpactOscillator
+from fpsolve.analysis import rate_function
+from fpsolve.analysis.sensitivity import sensitivities
+from fpsolve.arrays import identity
+from fpsolve.exponent import ExponentSolver, moment_lyapunov
+from fpsolve.exponent.solver import TINY_P
+from fpsolve.model import CoefficientMatrix, White
+from fpsolve.simulation import simulate
+from tests.analysis.test_growth import STRONG, uniform
+from tests.exponent.test_modes import problem, random_system
+from tests.growth_paths import SHEAR
+
+TINY = np.array([-2.2e-16, 1e-9, -1e-12, 5e-324, -1e-300, -1e-9, 0.0, 3e-7])
+UNIT = OrnsteinUhlenbeck(alpha=1.0, sigma=1.0)
+RAY = Problem(PlaneSystem([CoefficientMatrix(0, ((-1, 1), (0, -2))), CoefficientMatrix(1, np.eye(2), identity)]), UNIT)
+HEAVY = NonGaussianNoise(D0=1.0, tau0=0.5, r0=1.1)
+"""With algebraic tails."""
+
+
+def oscillator(c1):
+    return VibroImpactOscillator(omega=1.0, restitution=0.8, c1=c1, epsilon=0.1)
+
+
+@pytest.mark.parametrize(
+    "system",
+    [uniform(), SHEAR, STRONG, RAY, Problem(oscillator(-0.2), HEAVY), problem(White(s=1.0), *random_system(0, 3))],
+    ids=["uniform", "white", "strong", "classes", "algebraic tails", "three variables"],
+)
+def test_all_p_next_to_zero_are_given(system):
+    p = TINY[TINY <= 0] if system.has_algebraic_tails else TINY
+    solver = ExponentSolver(system, rtol=system.wanted(None))
+    exponent, found = solver.lyapunov_exponent(), moment_lyapunov(system, np.append(p, -0.1))
+    assert found.p.tolist() == [*p, -0.1]
+    assert np.array_equal(found.value[:-1][p == 0], [0.0])
+    bend = np.abs(p) * (abs(found.value[-1] + 0.1 * exponent.value) / 0.01)  # at least ½Λ″(0)
+    off = np.abs(found.value[:-1] - exponent.value * p)
+    assert np.all(off <= found.error_estimate[:-1] + np.abs(p) * (exponent.error_estimate + 2 * bend) + 5e-324)
+    assert np.all(found.error_estimate[:-1] <= np.abs(p) * (1e-5 * abs(exponent.value) + bend))
+
+
+@pytest.mark.slow
+def test_four_variables():
+    system = problem(White(s=1.0))
+    exponent = ExponentSolver(system, rtol=system.wanted(None)).lyapunov_exponent()
+    found = moment_lyapunov(system, [-2.2e-16, 1e-9])
+    np.testing.assert_allclose(found.value, exponent.value * found.p, rtol=1e-5)
+
+
+def test_rare_paths_leave_the_sign_of_a_tiny_moment_open():
+    """λ > 0, so that rare paths far out carry Λ(p) for p < 0: it is between λp and some |p|."""
+    found = moment_lyapunov(Problem(oscillator(0.1), HEAVY), [-2.2e-16, -1e-12])
+    assert np.all(np.abs(found.value) + found.error_estimate <= 0.1 * np.abs(found.p))
+    assert np.all(found.error_estimate > 0)
+
+
+@pytest.mark.parametrize("count", [7, 25])
+def test_a_range_with_a_rounded_zero(count):
+    """Solved one by one, and interpolated."""
+    p = np.linspace(-2, 0.4, count)
+    near = np.argmin(np.abs(p))
+    assert 0 < abs(p[near]) < 1e-15
+    found, exact = moment_lyapunov(uniform(), p), -0.1 * p + 0.5 * p**2
+    assert found.p.size == count
+    assert np.all(np.abs(found.value - exact) <= found.error_estimate)
+    assert found.value[near] == pytest.approx(-0.1 * p[near], rel=1e-7)
+
+
+@pytest.mark.parametrize("system", [SHEAR, STRONG], ids=["white", "strong"])
+def test_ratios_and_rates_on_both_sides_of_the_smallest_p(system):
+    """Against a polynomial through Λ(p)/p at larger p."""
+    solver, x = ExponentSolver(system, rtol=1e-10), 0.3 * np.cos(np.pi * (np.arange(14) + 0.5) / 14)
+    exact = np.polynomial.Chebyshev.fit(x, [solver.pair(p).value / p for p in x], 13)
+    slope = exact.deriv()
+    p = TINY_P * np.array([-1.001, -0.999, -0.3, 0.01, 0.999, 1.001])
+    for each, (ratio, by_p, error) in zip(p, map(ExponentSolver(system).ratio, p), strict=True):
+        assert abs(ratio - exact(each)) <= error
+        assert by_p == pytest.approx(slope(each), rel=5e-7)
+    found = rate_function(system, exact(p) + p * slope(p))
+    assert np.all(np.abs(found.value - p**2 * slope(p)) <= found.error_estimate)
+
+
+def test_sensitivities_next_to_zero_are_those_of_the_exponent():
+    found = sensitivities(STRONG, [1e-9, -2.2e-16])
+    for p, moments in zip(found.p, found.moments, strict=True):
+        for key, exponent in found.indices["lyapunov_exponent"].items():
+            doubt = moments[key].error_estimate + abs(p) * exponent.error_estimate
+            assert moments[key].value == pytest.approx(p * exponent.value, rel=1e-7, abs=doubt)
+            assert doubt < 1e-6 * abs(p)
+
+
+def test_simulated_moments_next_to_zero():
+    found = simulate(STRONG, [-2.2e-16, 1e-12, 5e-324], paths=64, time=100.0, seed=1)
+    for each in found.estimates:
+        assert each.value == each.p * found.lyapunov_exponent
+        assert each.standard_error == abs(each.p) * found.lyapunov_exponent_error
+    assert not any(message.code.name == "DRIFTING" for message in found.warnings)
