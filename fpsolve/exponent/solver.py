@@ -386,7 +386,7 @@ class ExponentSolver:
         discretisation changes.
         """
         with suppress(NotConverged):
-            if p == 0:
+            if abs(p) < TINIEST_P:
                 return self.ratio_alone(0.0)[1]
             if self.classes:
                 return float(np.max([each.slope_error(p) for each in self.classes]))

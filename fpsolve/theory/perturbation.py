@@ -121,7 +121,8 @@ def second_order(problem: Problem) -> SecondOrder:
     """ε²Λ₂(p) of a problem.
 
     Raises:
-        NoPerturbationTheory: the order 0 does not rotate, the order 1 is not linear in the noise, or a load is harmonic.
+        NoPerturbationTheory: the order 0 does not rotate, the order 1 is not linear in the noise; or there is a
+            harmonic load.
     """
     if loads := harmonic_loads(problem):
         raise NoPerturbationTheory(f"perturbation theory leaves out a harmonic load, which {' and '.join(loads)} is")

@@ -121,7 +121,8 @@ def test_no_theory_stands_beside_a_harmonic_load(detuning):
     p, value = np.array([1.0, 2.0]), np.array([0.3, 0.6])
     assert np.all(np.isnan(perturbed_moments(pumped, p)))
     note = weak_noise_note(pumped, p, value)
-    assert note.code is Code.LOAD_LEFT_OUT and "noise.pump with sigma = 0 is" in str(note)
+    assert note.code is Code.LOAD_LEFT_OUT
+    assert "noise.pump with sigma = 0 is" in str(note)
     random = Problem(PlaneSystem(terms), {"pump": Bounded(0.5, 2.6, 2.0), "sway": White(s=0.1)})
     assert np.all(np.isfinite(perturbed_moments(random, p)))
     assert weak_noise_note(random, p, value).code is Code.STRONG_NOISE
