@@ -398,6 +398,7 @@ class ExponentSolver:
                 return 2 * abs(finer.derivative - solution.pair.derivative) + slope_rounding(solution.pair)
         return math.nan
 
+    @one_number("λ")
     def lyapunov_exponent(self) -> Estimate:
         """λ = Λ′(0), Eq. (2); for algebraic tails the rate of almost every path. Raises `NotConverged`."""
         value, error = self.ratio_alone(0.0)
