@@ -1,12 +1,20 @@
 """Signals that end work, and those that wait."""
 
+import os
 import signal
+import subprocess
+import sys
 import threading
 import time
+from contextvars import ContextVar
 
 import pytest
 
-from fpsolve.signals import ended_by_signals, signals_held
+from fpsolve.signals import ended_by_signals, left_at_signals, signals_held
+from tests.conftest import heed_signals, sampled
+
+SECONDS = 2.0
+"""In which every run ends."""
 
 
 @pytest.fixture
@@ -81,3 +89,81 @@ def test_ignored_signals_and_other_threads_are_left_alone():
             assert signal.getsignal(signal.SIGTERM) is signal.SIG_IGN
     finally:
         signal.signal(signal.SIGTERM, former)
+
+
+@pytest.mark.usefixtures("_interrupts")
+def test_a_call_that_obeys_no_signal_is_left():
+    """A held lock takes the place of a library."""
+    held, started = threading.Lock(), time.monotonic()
+    held.acquire()
+    threading.Timer(0.2, lambda: signal.pthread_kill(threading.main_thread().ident, signal.SIGINT)).start()
+    with pytest.raises(KeyboardInterrupt):
+        left_at_signals(lambda: held.acquire(timeout=60))
+    assert time.monotonic() - started < SECONDS
+    held.release()
+
+
+def test_what_is_called_in_another_thread_is_as_here():
+    name = ContextVar("name", default="")
+    name.set("here")
+    assert left_at_signals(lambda: (name.get(), threading.current_thread().name)) != ("here", "MainThread")
+    assert left_at_signals(name.get) == "here"
+    with pytest.raises(ZeroDivisionError):
+        left_at_signals(lambda: 1 / 0)
+    found = []
+    thread = threading.Thread(target=lambda: found.append(left_at_signals(threading.current_thread)))
+    thread.start()
+    thread.join()
+    assert found == [thread]
+
+
+LONG = """
+import threading, time
+import numpy as np
+import fpsolve.cli, fpsolve.__main__
+from fpsolve.fem.factors import factorised
+from fpsolve.fem.axis import KroneckerSum
+
+def run():
+    rng = np.random.default_rng(1)
+    operator = KroneckerSum([(rng.standard_normal((80, 80)), rng.standard_normal((100, 100)))])
+    print("begun", flush=True)
+    try:
+        factorised(operator, is_full=True)
+    except KeyboardInterrupt:
+        print("kept", flush=True)
+        return 130
+    return 0
+
+fpsolve.cli.main = run
+fpsolve.__main__.main()
+"""
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
+def test_an_interrupt_leaves_a_long_factorisation():
+    """Of 8,000 unknowns, some 20 s; before, LAPACK went on to its end. What runs on is no harm as the process ends."""
+    command = [sys.executable, "-c", LONG]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, preexec_fn=heed_signals) as process:
+        assert process.stdout.readline() == "begun\n"
+        time.sleep(1.5)
+        process.send_signal(signal.SIGINT)
+        started = time.monotonic()
+        out, _ = process.communicate(timeout=60)
+    assert time.monotonic() - started < SECONDS
+    assert (process.returncode, out) == (130, "kept\n")
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
+@pytest.mark.parametrize("delay", sampled(0.02, 0.2, *(0.1 * k for k in range(3, 12)), keep=2))
+def test_an_interrupt_of_the_first_second_says_no_more_than_that(delay, tmp_path):
+    """While modules are imported, after Python itself and this package have begun; before, there was a traceback."""
+    code = "from fpsolve.__main__ import main; print('begun', flush=True); main()"
+    command = [sys.executable, "-c", code, "design", "--help"]
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    with subprocess.Popen(command, text=True, preexec_fn=heed_signals, cwd=tmp_path, **pipes) as process:
+        assert process.stdout.readline() == "begun\n"
+        time.sleep(delay)
+        process.send_signal(signal.SIGINT)
+        _, said = process.communicate(timeout=60)
+    assert (process.returncode, said) in {(130, "interrupted\n"), (0, "")}
