@@ -13,13 +13,15 @@ def main() -> NoReturn:
     if former is signal.default_int_handler:  # and not ignored, as it is in the background of a shell
         signal.signal(signal.SIGINT, _interrupted)
     from fpsolve.cli import main as run
-    from fpsolve.signals import end_process
+    from fpsolve.signals import end_process, is_interrupt
 
     try:
         signal.signal(signal.SIGINT, former)
         code = run()
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # as it is all done
-    except KeyboardInterrupt:  # before the command line caught it, or after
+    except BaseException as failure:
+        if not is_interrupt(failure):
+            raise
         _interrupted()
     end_process(code)
 

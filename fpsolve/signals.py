@@ -18,10 +18,9 @@ REPEAT_SECONDS = 0.02
 """After which an interrupt that Python lost comes again."""
 LOOK_SECONDS = 0.1
 """How often a main thread looks for signals that waits for another one, where the system does not wake it."""
-INTERRUPTED = 130
-"""The exit code after Ctrl-C."""
+SIGNALLED, INTERRUPTED = 128, 130
+"""What exit codes after signals are above, and that after Ctrl-C."""
 Result = TypeVar("Result")
-_left: list[threading.Thread] = []
 
 
 @contextmanager
@@ -135,7 +134,6 @@ def left_at_signals(function: Callable[[], Result]) -> Result:
         while not done.wait(LOOK_SECONDS):
             pass
     except BaseException:
-        _left.append(thread)
         ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread.ident or 0), ctypes.py_object(SystemExit))
         raise
     if failures:
@@ -143,12 +141,19 @@ def left_at_signals(function: Callable[[], Result]) -> Result:
     return found.pop()
 
 
-def end_process(code: int) -> NoReturn:
-    """End this process; at once after an interrupt, as calls that are left would crash as their library is unloaded.
+def is_interrupt(failure: BaseException | None) -> bool:
+    """Whether an exception is an interrupt, or the disguise that a class or a module gives one that meets its import."""
+    while failure is not None and not isinstance(failure, KeyboardInterrupt):
+        failure = failure.__cause__ or failure.__context__
+    return failure is not None
 
-    Python would also make another end of one that has passed through `eval`.
+
+def end_process(code: int) -> NoReturn:
+    """End this process; at once after a signal, as calls that are left would crash as their library is unloaded.
+
+    Python would take its time, and make another end of an interrupt that has passed through `eval`.
     """
-    if code == INTERRUPTED or any(thread.is_alive() for thread in _left):
+    if code > SIGNALLED:
         for stream in filter(None, (sys.stdout, sys.stderr)):
             stream.flush()
         os._exit(code)

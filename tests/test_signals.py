@@ -10,7 +10,7 @@ from contextvars import ContextVar
 
 import pytest
 
-from fpsolve.signals import ended_by_signals, left_at_signals, signals_held
+from fpsolve.signals import ended_by_signals, is_interrupt, left_at_signals, signals_held
 from tests.conftest import heed_signals, sampled
 
 SECONDS = 2.0
@@ -115,6 +115,19 @@ def test_what_is_called_in_another_thread_is_as_here():
     thread.start()
     thread.join()
     assert found == [thread]
+
+
+def test_an_interrupt_is_known_in_disguise():
+    """Python makes a RuntimeError of one within `__set_name__`; before, a traceback ended such a run."""
+
+    class Interrupted:
+        def __set_name__(self, owner, name):
+            raise KeyboardInterrupt
+
+    with pytest.raises((RuntimeError, KeyboardInterrupt)) as told:
+        type("Owner", (), {"name": Interrupted()})
+    assert is_interrupt(told.value)
+    assert not is_interrupt(RuntimeError())
 
 
 LONG = """

@@ -39,6 +39,7 @@ from fpsolve.exponent.solver import ExponentSolver, InvariantClass, MomentLyapun
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import Code, Message, Remedy, Severity, message_of
 from fpsolve.model.problem import Problem
+from fpsolve.signals import is_interrupt
 from fpsolve.study.response import CurveResponse, Grid, solve_response
 from fpsolve.study.results import Comparison, CurveResult, MomentColumns, Solved
 from fpsolve.theory.far import heavy_tail_note
@@ -534,7 +535,9 @@ def solved(curve: Curve, order: Order, numerics: Numerics, progress: Callable[[]
 
 
 def _fault(failure: Exception) -> Message:
-    """What is said of a fault of fpsolve."""
+    """What is said of a fault of fpsolve. Raises `KeyboardInterrupt` where it is an interrupt in disguise."""
+    if is_interrupt(failure):
+        raise KeyboardInterrupt from failure
     last = traceback.extract_tb(failure.__traceback__)[-1]
     said = {"kind": type(failure).__name__, "text": str(failure)}
     return Message(Code.FAULT, **said, file=Path(last.filename).name, line=last.lineno)
