@@ -142,7 +142,7 @@ def left_at_signals(function: Callable[[], Result]) -> Result:
 
 
 def is_interrupt(failure: BaseException | None) -> bool:
-    """Whether an exception is an interrupt, or the disguise that a class or a module gives one that meets its import."""
+    """Whether an exception is an interrupt, or the disguise that a class or a module gives to one in its import."""
     while failure is not None and not isinstance(failure, KeyboardInterrupt):
         failure = failure.__cause__ or failure.__context__
     return failure is not None
