@@ -16,15 +16,17 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
 from itertools import combinations_with_replacement
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 import scipy.linalg
 from scipy import sparse
 from scipy.linalg import eigh_tridiagonal
+from scipy.linalg.lapack import dgetrf, dgetrs
 from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigs, splu
 
 from fpsolve.arrays import Coefficient, FloatArray, dense, one
@@ -44,8 +46,12 @@ NEARER, NEAREST, SETTLED, MOST_STEPS, MOST_POLISHES = 0.15, 1e-3, 1e-7, 60, 5
 """The share of σ − Λ that the next σ keeps, and the last one; what Λ may still change, over it; steps at most."""
 KRYLOV, ROUGH, MOST_RESTARTS = 16, 1e-2, 200
 """Vectors of one search by Arnoldi's method, its tolerance, and how often it begins again at most."""
+STEP = 1e-5
+"""Of a parameter, by which H is differentiated."""
 NEGATIVE = 1e-6
 """Of the largest number, by which one may be negative that should not be."""
+DENSE = 200
+"""Equations up to which matrices are not sparse."""
 MOST_DEGREES = 160
 """Of functions of one noise: with twice as many points the weights of a rule underflow."""
 REMEDY = "compare with `fpsolve simulate`"
@@ -179,23 +185,6 @@ def moved(matrix: Any, p: int) -> Any:
     return sparse.csr_array((sizes * a[i, j], (rows, columns)), shape=2 * (len(alphas),))
 
 
-class EvenMoment(NamedTuple):
-    """Λ(p) of an even p.
-
-    Attributes:
-        value, error: of Λ(p).
-        size: number of the equations.
-        moments: of √(p!/α!) x^α, the right vector in the mean over the noise, in the order of α of `_ladder`.
-        polynomial: the coefficients of T at the same, in the mean over the noise.
-    """
-
-    value: float
-    error: float
-    size: int
-    moments: FloatArray
-    polynomial: FloatArray
-
-
 def hierarchy_exponent(problem: Problem, p: float) -> tuple[float, float]:
     """Λ(p) of an even p by the equations of the moments, and its error.
 
@@ -214,18 +203,18 @@ def even_moment(problem: Problem, p: float, tolerance: float | None = None, most
     """
     refuse_open_hierarchy(problem, p)
     equations = _Equations(problem, int(p))
-    counts, before = [FIRST] * len(equations.noises), None
+    counts, before = [FIRST] * len(equations.noises), cast(EvenMoment | None, None)
     while True:
-        level = equations.at(counts, most)
+        level = equations.moment(counts, most)
         if level is None:
             break
-        allowed = TOLERANCE * level.size if tolerance is None else tolerance
+        allowed = TOLERANCE * level.scale if tolerance is None else tolerance
         truncation = sum(map(abs, level.effects))
         is_settled = not any(level.effects) or (
             before and abs(before.value - level.value) <= before.error + level.error
         )
         if is_settled and level.is_positive and truncation + level.rounding <= max(allowed, 2 * level.rounding):
-            return level.moment
+            return level
         before = level
         worst = max(map(abs, level.effects), default=0.0)
         counts = [
@@ -234,12 +223,12 @@ def even_moment(problem: Problem, p: float, tolerance: float | None = None, most
         ]
         if not worst:
             break
-    if before is None or tolerance is not None or not before.is_positive or before.error > MEANINGLESS * before.size:
+    if before is None or tolerance is not None or not before.is_positive or before.error > MEANINGLESS * before.scale:
         raise NoHierarchy(
             f"got p = {p:g}; {most} equations, or {MOST_DEGREES} functions of each noise, are too few for moments "
             f"under noise so strong or slow; use a smaller p, or {REMEDY}"
         )
-    return before.moment
+    return before
 
 
 def refuse_open_hierarchy(problem: Problem, p: float) -> None:
@@ -266,56 +255,79 @@ def refuse_open_hierarchy(problem: Problem, p: float) -> None:
 
 
 @dataclass(frozen=True, eq=False)
-class _Level:
-    """The rightmost eigenpair with some functions of the noises.
+class EvenMoment:
+    """Λ(p) of an even p, the rightmost eigenvalue with some functions of the noises.
 
     Attributes:
+        equations: what it is the eigenvalue of.
+        counts: the degrees of the functions of each noise are below these.
         eigenvalue: without the next functions.
         effects: what the next functions of each noise change in it.
-        size: of the terms that it is the sum of.
-        right, left: in the mean over the noise.
+        scale: of the terms that it is the sum of.
+        x, y: the right and the left vector, yᵀx = 1.
+        moments: of √(p!/α!) x^α, |α| = p, the right vector in the mean over the noise.
+        polynomial: the coefficients of T at the same, in the mean over the noise.
     """
 
-    problem: Problem
-    p: int
+    equations: _Equations
+    counts: Sequence[int]
     eigenvalue: float
     effects: Sequence[float]
-    size: float
-    count: int
-    right: FloatArray
-    left: FloatArray
+    scale: float
+    x: FloatArray
+    y: FloatArray
+    moments: FloatArray
+    polynomial: FloatArray
 
     @property
     def value(self) -> float:
+        """Λ(p), per unit time."""
         return self.eigenvalue + sum(self.effects)
 
     @property
     def rounding(self) -> float:
-        return ROUNDING * self.size
+        """A bound of what rounding changes."""
+        return ROUNDING * self.scale
 
     @property
     def error(self) -> float:
+        """Estimate of |error of `value`|."""
         return sum(map(abs, self.effects)) + self.rounding
 
-    @property
-    def moment(self) -> EvenMoment:
-        return EvenMoment(self.value, self.error, self.count, self.right, self.left)
+    def slope(self, key: str) -> float:
+        """∂Λ(p)/∂θ of a parameter such as "noise.alpha": ⟨y, ∂H/∂θ x⟩ by differences of H.
+
+        Raises:
+            ValueError: there is no such parameter.
+        """
+        problem = self.equations.problem
+        at = float(problem.values[key])
+        step = STEP * (abs(at) or 1.0)
+        for offsets, weights in ((1, -1), (0.5, -0.5)), ((0, -1, -2), (1.5, -2.0, 0.5)), ((0, 1, 2), (-1.5, 2.0, -0.5)):
+            with suppress(ValueError, NoHierarchy):
+                near = [problem.at({key: at + step * offset}) for offset in offsets]
+                changed = [_Equations(each, self.equations.p, self.equations.units).at(self.counts) for each in near]
+                return sum(w * float(self.y @ (h @ self.x)) for w, h in zip(weights, changed, strict=True)) / step
+        raise ValueError(f"got {key}; Λ(p) has no slope by it")
 
     @cached_property
     def is_positive(self) -> bool:
         """Whether E x^α are moments, and T is positive, as far as it is seen: both but for a common sign."""
-        form, t = _moment_form(self.right, self.problem.dimension, self.p), self._polynomial_values()
+        form, t = (
+            _moment_form(self.moments, self.equations.problem.dimension, self.equations.p),
+            self._polynomial_values(),
+        )
         return _has_one_sign(np.asarray(np.linalg.eigvalsh(form))) and _has_one_sign(t)
 
     def _polynomial_values(self) -> FloatArray:
         """T at some directions; of p = 2 the eigenvalues of its matrix."""
-        n = self.problem.dimension
-        if self.p == 2:
-            return np.asarray(np.linalg.eigvalsh(_moment_form(self.left, n, 2)))
+        n, p = self.equations.problem.dimension, self.equations.p
+        if p == 2:
+            return np.asarray(np.linalg.eigvalsh(_moment_form(self.polynomial, n, 2)))
         x = np.random.default_rng(0).standard_normal((200, n))
         x /= np.linalg.norm(x, axis=1)[:, None]
-        alphas, _ = _ladder(n, self.p)
-        return np.prod(x[:, None] ** alphas, axis=2) @ (self.left * np.sqrt(_multinomials(alphas)))
+        alphas, _ = _ladder(n, p)
+        return np.prod(x[:, None] ** alphas, axis=2) @ (self.polynomial * np.sqrt(_multinomials(alphas)))
 
 
 def _has_one_sign(values: FloatArray) -> bool:
@@ -341,87 +353,101 @@ def _moment_form(moments: FloatArray, n: int, p: int) -> FloatArray:
 
 
 class _Equations:
-    """H of a problem and an even p, with any number of functions of each noise."""
+    """H of a problem and an even p, with any number of functions of each noise.
 
-    def __init__(self, problem: Problem, p: int) -> None:
+    Args:
+        problem: the problem.
+        p: even.
+        units: of the functions of the state; None for those in which H is balanced.
+
+    Raises:
+        NoHierarchy: numbers in it are beyond floating-point numbers.
+    """
+
+    def __init__(self, problem: Problem, p: int, units: FloatArray | None = None) -> None:
         self.problem, self.p = problem, p
-        self.named = problem.coloured.parts
-        self.noises = list(self.named.values())
-        motion = problem.motion
-        names = list(self.named)
-        self.terms = []
-        for term in motion.terms:
-            at = names.index(term.noise) if term.noise in self.named else 0
-            self.terms.append((moved(motion.epsilon**term.order * np.array(term.matrix), p), term.g, at))
-        self.rest = 0.0 * moved(np.eye(problem.dimension), p)
-        for each in problem.diffusions:
-            k = moved(motion.epsilon**each.order * np.array(each.matrix), p)
-            self.rest = self.rest + 0.5 * k @ k
-        for impulse in problem.impulses:
+        named = problem.coloured.parts
+        self.noises, names = list(named.values()), list(named)
+        drift, diffusions = problem.noise.motion(problem.system)
+        terms = []
+        for term in drift.terms:
+            k = moved(drift.epsilon**term.order * np.array(term.matrix), p)
+            terms.append((k, term.g, names.index(term.noise) if term.noise in named else 0))
+        rest = 0.0 * moved(np.eye(problem.dimension), p)
+        for each in diffusions:
+            k = moved(drift.epsilon**each.order * np.array(each.matrix), p)
+            rest = rest + 0.5 * k @ k
+        for impulse in problem.noise.impulses(problem.system):
             gain = scipy.linalg.expm(moved(np.array(impulse.exponent), p).toarray())
-            self.rest = self.rest + sparse.csr_array(impulse.rate * (gain - np.eye(len(gain))))
-        total = abs(self.rest).toarray()
-        for k, g, at in self.terms:
-            xi = self.noises[at].reached
-            size = min(self.noises[at].standard_deviation, xi.max() - xi.min())
-            total += abs(k).toarray() * float(
-                np.max(np.abs(g(self.noises[at].mean + size * np.array([-1.0, 0.0, 1.0]))))
-            )
-        _, (self.scale, _) = scipy.linalg.matrix_balance(total, permute=False, separate=True)
-        down, up = sparse.diags_array(1 / self.scale), sparse.diags_array(self.scale)
-        self.terms = [(down @ k @ up, g, at) for k, g, at in self.terms]
-        self.rest = down @ self.rest @ up
+            rest = rest + sparse.csr_array(impulse.rate * (gain - np.eye(len(gain))))
+        sizes = abs(rest).toarray()
+        for k, g, at in terms:
+            noise = self.noises[at]
+            z = np.array([-1.0, 0.0, 1.0]) * (0.0 if noise.is_white else noise.standard_deviation)
+            sizes += abs(k).toarray() * float(np.max(np.abs(g(noise.mean + z))))
+        if not np.isfinite(sizes).all():
+            raise NoHierarchy(f"got p = {p}; the equations of its moments are beyond floating-point numbers")
+        if units is None:
+            _, (units, _) = scipy.linalg.matrix_balance(sizes, permute=False, separate=True)
+        self.units = units
+        down, up = sparse.diags_array(1 / units), sparse.diags_array(units)
+        self._terms, self._rest = [(down @ k @ up, g, at) for k, g, at in terms], down @ rest @ up
 
-    def at(self, counts: Sequence[int], most: int) -> _Level | None:
-        """With functions of degrees below these; None where they are too many."""
+    def at(self, counts: Sequence[int]) -> Any:
+        """H with functions of degrees below these."""
+        return self._with(self._axes(counts))
+
+    def moment(self, counts: Sequence[int], most: int) -> EvenMoment | None:
+        """Λ(p) with functions of degrees below these; None where they are too many."""
         if max(counts) > MOST_DEGREES:
             return None
-        axes = [FUNCTIONS[noise.basis](noise, count + NEXT) for noise, count in zip(self.noises, counts, strict=True)]
-        shape = [each.degrees.size for each in axes]
-        n = self.rest.shape[0]
+        axes, n = self._axes([count + NEXT for count in counts]), self.units.size
         is_old = [each.degrees < count for each, count in zip(axes, counts, strict=True)]
         if n * math.prod(int(each.sum()) for each in is_old) > most:
             return None
-        ones = [sparse.eye_array(size) for size in shape]
-
-        def product(of_state: Any, of_noise: Any = None, at: int = 0) -> Any:
-            for k, each in enumerate(ones):
-                of_state = sparse.kron(
-                    of_state, each if of_noise is None or k != at else _sparse(of_noise).T, format="csr"
-                )
-            return of_state
-
-        h = product(self.rest)
-        for k, axis in enumerate(axes):
-            h = h + product(sparse.eye_array(n), axis.generator, k)
-        for k, g, at in self.terms:
-            h = h + product(k, axes[at].mass(g) if g != one else None, at)
-        old = np.flatnonzero(_outer([np.ones(n, dtype=bool), *is_old]))
-        new = [
-            np.flatnonzero(
-                _outer([np.ones(n, dtype=bool), *(~each if k == j else each for k, each in enumerate(is_old))])
-            )
-            for j in range(len(axes))
-        ]
-        own = h[old][:, old].tocsc()
+        h, state = self._with(axes), np.ones(n, dtype=bool)
+        old = np.flatnonzero(_outer([state, *is_old]))
+        own = h[old][:, old]
         mean, law = (
             _outer([np.ones(1), *(getattr(axis, name)[each] for axis, each in zip(axes, is_old, strict=True))])
             for name in ("unit", "law")
         )
         form = _start(self.problem.dimension, self.p)
-        eigenvalue, x, y = _rightmost(own, np.kron(form / self.scale, law), np.kron(form * self.scale, mean))
-        weight = float(y @ x)
+        eigenvalue, x, y = _rightmost(own, np.kron(form / self.units, law), np.kron(form * self.units, mean))
+        scale = float(np.abs(y) @ (abs(own) @ np.abs(x)))
         effects = []
-        for each in new:
-            if not each.size:
-                effects.append(0.0)
-                continue
-            here = h[each]
-            factors = splu((eigenvalue * sparse.eye_array(each.size) - here[:, each]).tocsc())
-            effects.append(float((h[old][:, each].T @ y) @ factors.solve(here[:, old] @ x)) / weight)
-        size = float(np.abs(y) @ (abs(own) @ np.abs(x))) / abs(weight) if weight else math.inf
-        right, left = x.reshape(n, -1) @ mean * self.scale, y.reshape(n, -1) @ law / self.scale
-        return _Level(self.problem, self.p, eigenvalue, effects, size, len(old), right, left)
+        for k in range(len(axes)):
+            new = np.flatnonzero(_outer([state, *(~each if k == j else each for j, each in enumerate(is_old))]))
+            effect = 0.0
+            if new.size:
+                changed = _solver(h[new][:, new], eigenvalue)(h[new][:, old] @ x)
+                effect = float(y @ (h[old][:, new] @ changed))
+            effects.append(effect)
+        moments, polynomial = x.reshape(n, -1) @ mean * self.units, y.reshape(n, -1) @ law / self.units
+        return EvenMoment(self, tuple(counts), eigenvalue, effects, scale, x, y, moments, polynomial)
+
+    def _axes(self, counts: Sequence[int]) -> list[Functions]:
+        return [FUNCTIONS[noise.basis](noise, count) for noise, count in zip(self.noises, counts, strict=True)]
+
+    def _with(self, axes: Sequence[Functions]) -> Any:
+        """H; sparse where it is large."""
+        shape = [self.units.size, *(each.degrees.size for each in axes)]
+        is_small = math.prod(shape) <= DENSE
+        kron, arrayed = (np.kron, dense) if is_small else (partial(sparse.kron, format="csr"), sparse.csr_array)
+        ones = [arrayed(sparse.eye_array(size)) for size in shape]
+
+        def product(of_state: Any, of_noise: Any = None, at: int = 0) -> Any:
+            found = arrayed(of_state)
+            for k, each in enumerate(ones[1:]):
+                found = kron(found, each if of_noise is None or k != at else arrayed(_clean(of_noise).T))
+            return found
+
+        h = product(self._rest)
+        for k, axis in enumerate(axes):
+            h = h + product(ones[0], axis.generator, k)
+        for k, g, at in self._terms:
+            h = h + product(k, axes[at].mass(g) if g != one else None, at)
+        return h
 
 
 def _outer(factors: Sequence[Any]) -> Any:
@@ -432,10 +458,21 @@ def _outer(factors: Sequence[Any]) -> Any:
     return found
 
 
-def _sparse(matrix: Any) -> Any:
+def _clean(matrix: Any) -> FloatArray:
     """Without what rounding leaves of zeros."""
     full = dense(matrix)
-    return sparse.csr_array(np.where(np.abs(full) > 1e-15 * np.max(np.abs(full), initial=0.0), full, 0.0))
+    return np.where(np.abs(full) > 1e-15 * np.max(np.abs(full), initial=0.0), full, 0.0)
+
+
+def _solver(h: Any, sigma: float) -> Callable[..., FloatArray]:
+    """(σ − h)⁻¹ of a vector, or its transpose for trans = 1. Raises `RuntimeError` where it is singular."""
+    if isinstance(h, np.ndarray):
+        lu, pivots, singular = dgetrf(sigma * np.eye(len(h)) - h)
+        if singular:
+            raise RuntimeError("singular")
+        return lambda x, trans=0: dgetrs(lu, pivots, x, trans=trans)[0]
+    factors = splu((sigma * sparse.eye_array(h.shape[0]) - h).tocsc())
+    return lambda x, trans=0: np.asarray(factors.solve(x, "T" if trans else "N"))
 
 
 @lru_cache(maxsize=32)
@@ -451,14 +488,13 @@ def _start(n: int, p: int) -> FloatArray:
 
 def _rightmost(h: Any, *starts: FloatArray) -> tuple[float, FloatArray, FloatArray]:
     """The rightmost eigenvalue of a generator of positive forms, and its right and left vectors, from positive ones."""
-    unit, diagonal = sparse.eye_array(h.shape[0], format="csc"), h.diagonal()
-    beside = abs(h - sparse.diags_array(diagonal))
-    bound = min(float(np.max(diagonal + beside.sum(axis=axis))) for axis in (0, 1))
-    sigma = bound + 0.1 * max(float(np.max(np.abs(h.data), initial=0.0)) * 1e-3, abs(bound), sys.float_info.min)
+    diagonal, sizes = h.diagonal(), abs(h)
+    bound = min(float(np.max(diagonal - np.abs(diagonal) + sizes.sum(axis=axis))) for axis in (0, 1))
+    sigma = bound + 0.1 * max(1e-3 * float(sizes.max()), abs(bound), sys.float_info.min)
     value = -math.inf
     x = starts[0]
     for _ in range(MOST_STEPS):
-        last, (share, x) = value, _largest(splu(sigma * unit - h).solve, x)
+        last, (share, x) = value, _largest(_solver(h, sigma), x)
         value = sigma - 1 / share
         if abs(value - last) <= SETTLED * (sigma - value):
             break
@@ -466,18 +502,18 @@ def _rightmost(h: Any, *starts: FloatArray) -> tuple[float, FloatArray, FloatArr
     x, y, sigma = *starts, value + NEAREST * (sigma - value)
     for _ in range(MOST_POLISHES):
         try:
-            factors = splu(sigma * unit - h)
+            solve = _solver(h, sigma)
         except RuntimeError:  # it is an eigenvalue to the last digit
             break
         for _ in range(2):
-            x, y = factors.solve(x), factors.solve(y, "T")
+            x, y = solve(x), solve(y, 1)
             x, y = x / np.linalg.norm(x), y / np.linalg.norm(y)
         last, value = value, float(y @ (h @ x)) / float(y @ x)
-        rounding = ROUNDING * float(np.abs(y) @ (abs(h) @ np.abs(x))) / abs(float(y @ x))
+        rounding = ROUNDING * float(np.abs(y) @ (sizes @ np.abs(x))) / abs(float(y @ x))
         if abs(value - last) <= 0.1 * rounding:
             break
         sigma = value + 1e-3 * rounding
-    return value, x, y
+    return value, x, y / float(y @ x)
 
 
 def _largest(solve: Callable[[FloatArray], FloatArray], x: FloatArray) -> tuple[float, FloatArray]:
