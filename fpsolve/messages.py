@@ -190,6 +190,10 @@ class Code(Enum):
         "failure: the computed Λ(p) is not convex between p = {p:g} and p = {other:g}, while the exponent is: a wrong "
         "eigenvalue was found"
     )
+    NOT_PRINCIPAL = (
+        "failure: the eigenvalue {value:.10g} at p = {p:g} is not the principal one: by the equations of the moments "
+        "Λ({other:g}) is {expected:.10g}, and Λ is convex"
+    )
     KINKED = (
         "failure: Λ(p) is not smooth in p: for some p the noise carries the moment far out in its algebraic tails; use "
         "moment_lyapunov, which solves each p by itself"

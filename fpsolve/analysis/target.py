@@ -115,7 +115,7 @@ class Distance:
         self.solves += 1
         try:
             refuse_infinite(problem, p)
-            solver = self._solver(problem, is_alone=True)
+            solver = self._solver(problem)
             value, error, slopes = ratio_with_slopes(solver, p, self.keys)
             self._starts = solver.near.known
         finally:
@@ -130,12 +130,12 @@ class Distance:
         error = abs(sample.error)
         value, scale = self.target.level + sample.value, sample.scale
         if self.target.kind == "stability_index":
-            ratio, slope, error = self._solver(self.at(sample.at), is_alone=False).ratio(self.target.value)
+            ratio, slope, error = self._solver(self.at(sample.at)).ratio(self.target.value)
             value, error, scale = self.target.value - ratio / slope, error / slope, 1.0
         return Estimate(value, error, scale, quantity=self.target.quantity)
 
-    def _solver(self, problem: Problem, *, is_alone: bool) -> ExponentSolver:
-        own: Any = {"rtol": self._rtol, "budget": self._budget, "is_alone": is_alone}
+    def _solver(self, problem: Problem) -> ExponentSolver:
+        own: Any = {"rtol": self._rtol, "budget": self._budget}
         return ExponentSolver(problem, starts=self._starts, **own)
 
 

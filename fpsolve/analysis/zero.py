@@ -20,7 +20,6 @@ from fpsolve.errors import FpsolveError, NoSuchExponent, NotConverged
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.eigen import Bordered
 from fpsolve.exponent.error import Solution
-from fpsolve.exponent.modes import EVEN
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.faults import told_in_words
@@ -186,7 +185,7 @@ def check_axes(problem: Problem, x: Axis, y: Axis) -> None:
 
 def line_rtol(problem: Problem, zero: Zero) -> float:
     """Of F on a line, relative to its scale: coarser beyond the plane, except for moments with closed equations."""
-    return RTOL if problem.dimension == 2 or zero.p in EVEN else RTOL_BEYOND_PLANE
+    return RTOL if problem.dimension == 2 or (zero.p > 0 and zero.p % 2 == 0) else RTOL_BEYOND_PLANE
 
 
 @one_number("Λ({0:g})/{0:g} and its slopes")
@@ -199,6 +198,8 @@ def ratio_with_slopes(solver: ExponentSolver, p: float, keys: Sequence[str]) -> 
             `held_by`.
     """
     value, error = solver.ratio_alone(p)
+    if solver.problem.dimension > 2 and (known := solver.even(p)):
+        return value, error, np.array([known.slope(key) for key in keys]) / p
     if value > 0 > p and solver.problem.has_algebraic_tails:
         near = solver.near.solution(p).pair
         if solver.solution(p, lambda at, value: max(solver.tolerance(at, value), 1e-3 * abs(value))).pair is not near:
@@ -304,7 +305,7 @@ class ZeroField:
         """F from a solve. Raises as `ratio_with_slopes`."""
         p = self._zero.p
         refuse_infinite(problem, p)
-        own: Any = {"rtol": rtol or self._rtol, "budget": self._budget, "is_alone": True}
+        own: Any = {"rtol": rtol or self._rtol, "budget": self._budget}
         place, known = self._before
         is_near = rtol is None and bool(np.linalg.norm(at - place) <= NEAR)
         solver = ExponentSolver(problem, starts=known if is_near else {}, **own)

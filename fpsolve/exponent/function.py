@@ -45,6 +45,8 @@ SHOWN = 201
 LEVELS = (3, 5, 9, 17, 33, 65)
 """Numbers of nodes tried; each has the nodes of the one before, and new ones between them."""
 
+SLOPE_SHARE = 1e-3
+"""Of what a tangent rises, by which it may lie too high, as slopes have errors."""
 FEW_MOMENTS = 9
 """Up to so many p are solved one by one."""
 
@@ -107,10 +109,8 @@ class MomentLyapunovFunction(Result):
                 break
         self._pairs = [self.solver.pair(float(p)) for p in self.nodes]
         slope = np.array([pair.derivative for pair in self._pairs])
-        errors = np.abs(self.nodes) * self._errors
-        if obstacle := broken_convexity(
-            self.nodes, self.nodes * self._values, slope, errors, lambda: self._slope_errors
-        ):
+        columns = self.nodes, self.nodes * self._values, slope, np.abs(self.nodes) * self._errors
+        if obstacle := broken_convexity(*columns, lambda: self._slope_errors) or contradiction(self.solver, *columns):
             raise NotConverged(obstacle, remedy=self.solver.near.refinement)
 
     def __call__(self, p: ArrayLike) -> FloatArray:
@@ -286,6 +286,7 @@ def broken_convexity(
     value = np.where(p == 0, 0.0, value)  # but for rounding
     others, away = np.append(value, 0.0), np.append(p, 0.0)[None] - p[:, None]
     above = others[None] - (value[:, None] + slope[:, None] * away)
+    above = np.where(np.isfinite(above), above, math.inf)  # where no slope is known
     slack = 10 * (errors[:, None] + np.append(errors, 0.0)[None]) + 1e-6 * np.abs(others[None])
     if np.any(above < -slack):
         steep = np.nan_to_num(slope_errors(), nan=1e300)
@@ -294,6 +295,25 @@ def broken_convexity(
     if not above[i, j] < -slack[i, j]:
         return None
     return Message(Code.NOT_CONVEX, p=p[i], other=np.append(p, 0.0)[j])
+
+
+def contradiction(
+    solver: ExponentSolver, p: FloatArray, value: FloatArray, slope: FloatArray, errors: FloatArray
+) -> Message | None:
+    """Where a point lies on the wrong side of the chord from Λ(0) = 0 to an even moment, or its tangent above that.
+
+    The even moments are Λ(2) and those of the p themselves, by equations that know no directions, see `even`.
+    """
+    for q in sorted({2.0, *p[(p > 0) & (p % 2 == 0)].tolist()} if p.size else ()):
+        if not (known := solver.even(q)):
+            continue
+        slack = np.array([solver.doubt(error, known) for error in errors]) * np.maximum(1.0, np.abs(p) / q)
+        above, rise = value - p / q * known.value, slope * (q - p)
+        is_wrong = np.where((p > 0) & (p < q), above, -above) > slack
+        is_wrong |= value + rise - known.value > slack + SLOPE_SHARE * np.abs(rise)
+        for i in np.flatnonzero(is_wrong):
+            return Message(Code.NOT_PRINCIPAL, p=p[i], value=value[i], other=q, expected=known.value)
+    return None
 
 
 @one_number("δ_p")
@@ -335,6 +355,9 @@ def nonzero_root(
         if abs(new - p) <= max(least, 0.1 * error / slope) or 0 < high - low <= 10 * least:
             found = Estimate(p, error / slope + abs(new - p), scale=1.0, quantity=STABILITY_INDEX)
             if found.relative_error <= solver.rtol or tolerance or solver.mesh is not None or solver.classes:
+                curve = (np.array([number]) for number in (p, p * ratio, ratio + p * slope, abs(p) * error))
+                if obstacle := contradiction(solver, *curve):
+                    raise NotConverged(obstacle, remedy=solver.near.refinement)
                 return checked(found, solver.near.refinement)
             tolerance = partial(_share_of, PRECISE * solver.rtol * slope * max(1.0, abs(p)))
             low, high = max(ends[0], low - 2 * found.error_estimate), min(ends[1], high + 2 * found.error_estimate)
@@ -439,7 +462,9 @@ def _one_by_one(solver: ExponentSolver, p: FloatArray, progress: Callable[[], No
     """Λ(0) = 0 needs no solve; where its eigenpair failed, Λ′ and residual are NaN."""
     result = solver.moments(p, progress=progress)
     columns = result.p, result.value, result.derivative, result.error_estimate
-    obstacle = None if result.failures else broken_convexity(*columns, lambda: result.derivative_error)
+    obstacle = None
+    if not result.failures:
+        obstacle = broken_convexity(*columns, lambda: result.derivative_error) or contradiction(solver, *columns)
     if obstacle:
         return replace(result, failures=(Failure(None, message_of(obstacle).advising(solver.near.refinement)),))
     failures = tuple(failure for failure in result.failures if failure.p != 0)

@@ -24,7 +24,7 @@ import scipy.linalg
 from fpsolve.arrays import FloatArray, finite, one
 from fpsolve.errors import MeshError, NotConverged, SingularMatrix
 from fpsolve.exponent.adapt import SHARE, NearPlace, _Search
-from fpsolve.exponent.eigen import PrincipalPair, principal_pair, rightmost_pair
+from fpsolve.exponent.eigen import PrincipalPair, principal_pair
 from fpsolve.exponent.error import Solution, mode_effects
 from fpsolve.fem.discretisation import Discretisation, ModeEffects, Polynomials, first_part
 from fpsolve.fem.harmonics import HarmonicCells
@@ -32,8 +32,6 @@ from fpsolve.fem.sphere import Coordinates, SphereCells, SphereGenerator, group_
 from fpsolve.model.problem import Problem
 
 FIRST_WAVES, FIRST_DEGREE = 2, 6
-EVEN = (2.0, 4.0)
-"""The p whose moments have equations of their own: T is a polynomial of the degree p in the state."""
 LARGEST_STEP = 1.0
 """Of p, from one pair to the next one on the coarsest space."""
 ROUND = 0.6
@@ -186,27 +184,10 @@ def _told(pair: PrincipalPair, finer: SphereGenerator, axis: int, new: Any) -> f
 
 @dataclass(frozen=True, eq=False)
 class SpherePlace(NearPlace):
-    """Λ(p) of a system of dimension 3 or 4; arguments as in `NearPlace`.
+    """Λ(p) of a system of dimension 3 or 4; arguments as in `NearPlace`."""
 
-    Attributes:
-        is_alone: whether nobody asks for Λ′(p) beside Λ(p). Harmonics up to an even p then have T and the derivatives
-            of Λ(p) by parameters exactly, but T* only as far as it acts on polynomials of the degree p. These have no
-            eigenvalue to the right of Λ(p), as the mean of a positive polynomial stays positive.
-        cells: the coarsest functions of directions; None lets the layer choose.
-    """
-
-    is_alone: bool = False
-    cells: SphereCells | HarmonicCells | None = None
-    _even: dict[int, SpherePlace] = field(init=False, default_factory=dict)
     _levels: list[SphereGenerator] = field(init=False, default_factory=list)
     _pairs: list[PrincipalPair] = field(init=False, default_factory=list)
-
-    def _of_even_p(self, p: int) -> SpherePlace:
-        """On harmonics up to the degree p, whose products with r^p are all polynomials of that degree."""
-        if p not in self._even:
-            coordinates, *_ = modal_coordinates(self.problem)
-            self._even[p] = replace(self, is_alone=False, cells=HarmonicCells(coordinates, p))
-        return self._even[p]
 
     def fits(self, generator: Any, q: float, p: float) -> bool:
         """False: every p has waves of its own."""
@@ -217,11 +198,9 @@ class SpherePlace(NearPlace):
 
     def searched(self, search: _Search, start: Solution | None) -> Solution:
         """From the coarsest space on."""
-        if self.is_alone and search.p in EVEN:
-            return self._of_even_p(int(search.p)).searched(search, start)
         if not self._levels:
             parts = tuple(first_part(noise, -math.log10(self.rtol)) for noise in self.problem.coloured.parts.values())
-            self._begin(Discretisation(self.cells or first_cells(self.problem), parts))
+            self._begin(Discretisation(first_cells(self.problem), parts))
         steps = list[PrincipalPair]()
         pair: PrincipalPair | None = None
         enough: Solution | None = None
@@ -263,7 +242,7 @@ class SpherePlace(NearPlace):
             if solution.error <= allowed:
                 slopes, enough, more = [each.derivative for each in steps[-2:]], enough or solution, more - 1
                 is_settled = len(slopes) > 1 and np.ptp(slopes) <= SETTLED_SLOPE * abs(slopes[-1])
-                if self.is_alone or self.cells or is_settled or not more:
+                if is_settled or not more:
                     return solution
             search.note(solution, solution.error, allowed)
 
@@ -303,7 +282,7 @@ class SpherePlace(NearPlace):
 
     def _begin(self, chosen: Discretisation) -> None:
         """Other elements and functions of the noise, the waves from the coarsest on."""
-        cells = replace(chosen.phase, waves=self.cells.waves if self.cells else FIRST_WAVES)
+        cells = replace(chosen.phase, waves=FIRST_WAVES)
         self._levels[:] = [SphereGenerator(self.problem, replace(chosen, phase=cells))]
 
     def _chosen(self, level: int) -> Discretisation:
@@ -335,8 +314,6 @@ class SpherePlace(NearPlace):
         generator, p = self._generator(level), search.p
         if coarse is not None:
             return principal_pair(generator, p, start=coarse)
-        if self.cells:
-            return rightmost_pair(generator, p)
         near = [pair for pair in self._pairs if pair.generator is generator]
         if not near:
             near = [principal_pair(generator, 0.0)]

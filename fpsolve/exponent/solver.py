@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from fpsolve.arrays import FloatArray, real_number, real_numbers, shown
 from fpsolve.budget import one_number
 from fpsolve.data import Result, dataset
-from fpsolve.errors import NoSuchExponent, NotConverged
+from fpsolve.errors import NoHierarchy, NoSuchExponent, NotConverged
 from fpsolve.exponent.adapt import (
     WIDER,
     AllPlaces,
@@ -40,12 +40,17 @@ from fpsolve.messages import ALMOST_EVERY, Code, Message, Remedy
 from fpsolve.model import quantity
 from fpsolve.model.problem import Problem, checked_moments, refuse_infinite
 from fpsolve.theory.far import far_places, grows_far_out, log_tail, variance_tail
+from fpsolve.theory.moments import EvenMoment, even_moment
 from fpsolve.theory.perturbation import Scale, scale_of
 
 if TYPE_CHECKING:
     import xarray
 
 HARDLY_FINITE = 1e-6
+MOST_EQUATIONS = 8000
+"""Of even moments."""
+SURELY, ROUNDED = 10.0, 1e-6
+"""Of the errors of two values, and of the values themselves, from which on they contradict each other."""
 TINY_P = 1e-3
 """Below it Λ(p)/p is a mean of Λ′, as rounding is not proportional to p."""
 TINIEST_P = 1e-9
@@ -95,7 +100,8 @@ class MomentLyapunov(Result):
     Attributes:
         p: the moments, shape (n,), in the order asked for, without those that failed.
         value: Λ(p), per unit time, shape (n,).
-        derivative: Λ′(p), shape (n,); NaN at p = 0 where λ did not converge, as Λ(0) = 0 needs no solve.
+        derivative: Λ′(p), shape (n,); NaN where only the value is known: at p = 0, as Λ(0) = 0 needs no solve, and at
+            even p of three and four variables, whose moments have equations of their own, where elements failed.
         error_estimate: estimate of |error of `value`|, from the highest modes, the ends of a noise interval and the
             bound of rounding, at least half a unit in the last place of the value, shape (n,).
         residual: backward error of the eigenpairs, shape (n,); NaN where there is none.
@@ -170,7 +176,6 @@ class ExponentSolver:
         rtol: |error| ≤ rtol·max(|Λ|, the terms of Eq. (37) before they cancel).
         budget: what the choice of a discretisation may cost.
         starts: solutions of a problem with parameters close by, by their p, see `NearPlace`.
-        is_alone: whether no derivative by p is asked for, which saves time for more than two variables and p = 2, 4.
 
     Raises:
         NoSuchExponent: the variance of the noise is infinite.
@@ -184,7 +189,7 @@ class ExponentSolver:
     rtol: float = 1e-8
     budget: Budget = field(default_factory=Budget)
     starts: Mapping[float, Solution] = field(default_factory=dict, repr=False)
-    is_alone: bool = field(default=False, repr=False)
+    _even: dict[float, EvenMoment | None] = field(init=False, repr=False, default_factory=dict)
 
     def __post_init__(self) -> None:
         for name, kind, words in _KINDS:
@@ -209,7 +214,7 @@ class ExponentSolver:
         if self.problem.dimension > 2:
             from fpsolve.exponent.modes import SpherePlace  # with scikit-fem, which takes long to import
 
-            return SpherePlace(self.problem, is_alone=self.is_alone, **self._own)
+            return SpherePlace(self.problem, **self._own)
         return NearPlace(self.problem, mesh=self.mesh, starts=self.starts, **self._own)
 
     @property
@@ -238,9 +243,7 @@ class ExponentSolver:
     @cached_property
     def classes(self) -> tuple[ExponentSolver, ...]:
         """Those of the `classes` of the problem, which has no positive eigenfunction where there are several."""
-        return tuple(
-            ExponentSolver(each, self.mesh, is_alone=self.is_alone, **self._usual) for each in self.problem.classes
-        )
+        return tuple(ExponentSolver(each, self.mesh, **self._usual) for each in self.problem.classes)
 
     @property
     def _usual(self) -> dict[str, Any]:
@@ -267,11 +270,35 @@ class ExponentSolver:
             point = 0.0
         point = solved_p(point)
         if not self.classes:
-            return self.place.solution(point, tolerance)
+            found = self.place.solution(point, tolerance)
+            if (known := self.even(point)) and abs(found.pair.value - known.value) > self.doubt(found.error, known):
+                told = {"p": point, "value": found.pair.value, "other": point, "expected": known.value}
+                raise NotConverged(Message(Code.NOT_PRINCIPAL, **told), remedy=self.near.refinement)
+            return found
         if point < 0 and len(self.classes) > 1:
             return self._joint(point, tolerance)[0]
-        found = [each.solution(point, tolerance) for each in self.classes]
-        return max(found, key=lambda each: each.pair.value if point else each.pair.derivative)
+        of_each = [each.solution(point, tolerance) for each in self.classes]
+        return max(of_each, key=lambda each: each.pair.value if point else each.pair.derivative)
+
+    def even(self, p: float) -> EvenMoment | None:
+        """Λ(p) of an even p > 0 by the equations of the moments; None where these do not close, or are too many.
+
+        In the plane it is the witness under noise of several dimensions and under chains, where other pairs may be
+        positive, too; under other noise it would take as long as elements do, and is None.
+        """
+        noise = self.problem.coloured
+        is_simple = len(noise.parts) == 1 and noise.basis != "pairs" and (noise.is_white or not noise.has_states)
+        if p <= 0 or p % 2 or (is_simple and self.problem.dimension == 2) or self.classes:
+            return None
+        if p not in self._even:
+            self._even[p] = None
+            with suppress(NoHierarchy), one_thread():
+                self._even[p] = even_moment(self.problem, p, 0.1 * self.tolerance(p, 0.0), MOST_EQUATIONS)
+        return self._even[p]
+
+    def doubt(self, error: float, known: EvenMoment) -> float:
+        """The difference beyond which a value with this error contradicts an even moment."""
+        return SURELY * (error + known.error) + ROUNDED * abs(known.value)
 
     def leading(self, p: float) -> ExponentSolver:
         """The one of the classes whose Λ(p), or for p = 0 whose λ, that of the problem is; itself without classes.
@@ -334,21 +361,26 @@ class ExponentSolver:
             NoSuchExponent: Λ(p) is infinite for one of the p.
         """
         points = checked_moments(p, self.problem, may_be_empty=True)
-        rows, failures = dict[int, tuple[PrincipalPair, float, float]](), []
+        rows: dict[int, tuple[float, float, float, float]] = {}
+        solved, failures = dict[int, PrincipalPair](), []
         for i in best_order(points):
             p = float(points[i])
+            known = self.even(p) if self.problem.dimension > 2 else None
+            if known:
+                rows[i] = known.value, known.error, math.nan, math.nan
             try:
                 solution = self.solution(p)
                 estimate = self.estimate(p, solution)
-                if abs(p) >= TINIEST_P:  # else Λ has no scale
+                if abs(p) >= TINIEST_P and not known:  # else Λ has no scale
                     checked(estimate, self.near.refinement, p)
-                rows[i] = solution.pair, estimate.value, estimate.error_estimate
+                of_value = rows[i][:2] if known else (estimate.value, estimate.error_estimate)
+                solved[i], rows[i] = solution.pair, (*of_value, solution.pair.derivative, solution.pair.residual)
             except NotConverged as failure:
-                failures.append(Failure(p, failure.message))
+                if not known:
+                    failures.append(Failure(p, failure.message))
             progress()
-        pairs = tuple(rows[i][0] for i in sorted(rows))
-        found, slope = points[sorted(rows)], np.array([pair.derivative for pair in pairs])
-        value, errors = np.array([rows[i][1:] for i in sorted(rows)]).reshape(-1, 2).T
+        pairs, found = tuple(solved[i] for i in sorted(solved)), points[sorted(rows)]
+        value, errors, slope, residual = np.array([rows[i] for i in sorted(rows)]).reshape(-1, 4).T
         if grows_far_out(self.problem):
             slope[np.abs(found) < TINIEST_P] = np.minimum(slope[np.abs(found) < TINIEST_P], 0.0)  # from the left
         return MomentLyapunov(
@@ -356,7 +388,7 @@ class ExponentSolver:
             value=value,
             derivative=slope,
             error_estimate=errors,
-            residual=np.array([pair.residual for pair in pairs]),
+            residual=residual,
             solver=self,
             warnings=(*missed(self, found, value, errors), *misplaced(self.mesh, pairs)),
             failures=tuple(failures),
@@ -462,6 +494,8 @@ class ExponentSolver:
 
         Near p = 0 it is the mean of Λ′ from 0 to p, by two points of Gauss; its error is that at p = ±`SMALL_P`.
         """
+        if self.problem.dimension > 2 and (known := self.even(p)):
+            return known.value / p, known.error / p
         if abs(p) >= TINY_P or (p <= -TINIEST_P and len(self.classes) > 1):
             solution = self._nearest(p, tolerance)
             return solution.pair.value / p, solution.error / abs(p)

@@ -306,6 +306,8 @@ class EvenMoment:
         for offsets, weights in ((1, -1), (0.5, -0.5)), ((0, -1, -2), (1.5, -2.0, 0.5)), ((0, 1, 2), (-1.5, 2.0, -0.5)):
             with suppress(ValueError, NoHierarchy):
                 near = [problem.at({key: at + step * offset}) for offset in offsets]
+                for each in near:
+                    refuse_open_hierarchy(each, self.equations.p)
                 changed = [_Equations(each, self.equations.p, self.equations.units).at(self.counts) for each in near]
                 return sum(w * float(self.y @ (h @ self.x)) for w, h in zip(weights, changed, strict=True)) / step
         raise ValueError(f"got {key}; Λ(p) has no slope by it")

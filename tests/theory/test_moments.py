@@ -247,3 +247,25 @@ def test_the_command_refuses_what_does_not_close(
     path.write_text(CASE, encoding="utf-8")
     assert main(["check", "--hierarchy", str(path), "--set", override]) == BAD_INPUT
     assert words in " ".join(capsys.readouterr().err.split())
+
+
+def test_slopes_by_parameters(rng):
+    """Against differences of Λ(2); that of r₀ at its largest value, and that by a noise which moves others."""
+    free, matrix = rng.standard_normal((2, 3, 3))
+    cases = [
+        (driven(free, matrix, OrnsteinUhlenbeck(1.0, 0.7)), ("noise.alpha", "noise.sigma")),
+        (driven(FREE, STIFFNESS, NonGaussianNoise(0.3, 0.7, 0.5)), ("noise.r0", "noise.tau0")),
+        (Problem(ParametricOscillator(1.0, 0.1), Filter(*NODE_FILTER)), ("system.damping", "noise.omega", "noise.c1")),
+    ]
+    for problem, keys in cases:
+        found = even_moment(problem, 2)
+        for key in keys:
+            at, step = problem.values[key], 1e-4 * problem.values[key]
+            ahead, behind = (even_moment(problem.at({key: at + each}), 2).value for each in (step, -step))
+            assert found.slope(key) == pytest.approx((ahead - behind) / (2 * step), rel=1e-5, abs=1e-9)
+    last = Problem(ParametricOscillator(1.0, 0.1), NonGaussianNoise(0.3, 0.7, 1.0))
+    before = even_moment(last.at({"noise.r0": 1 - 1e-4}), 2).value
+    found = even_moment(last, 2)
+    assert found.slope("noise.r0") == pytest.approx((found.value - before) / 1e-4, rel=1e-3)
+    with pytest.raises(KeyError):
+        found.slope("noise.none")
