@@ -18,8 +18,8 @@ from scipy.sparse.linalg import ArpackError, LinearOperator, eigs, eigsh, splu
 
 DENSE = 350
 """Functions up to which all eigenvalues are computed."""
-MOST = 14_000
-"""Functions beyond which no larger size is tried."""
+MOST, MOST_IN_BAND = 14_000, 40_000
+"""Functions beyond which no larger size is tried, of moments and of Fourier series."""
 CLOSE = 1e-11
 """Of the size of Λ: where two sizes differ by less, the larger one counts."""
 
@@ -250,7 +250,7 @@ def rightmost(matrix, near=None):
         shift = 1e-2 + 1.05 * float(eigsh(half, 1, which="LA", v0=start, tol=1e-2, return_eigenvectors=False)[0])
     else:
         shift = near + 0.05 * (1 + abs(near))
-    while True:
+    for _ in range(8):
         factors = splu((matrix - shift * sparse.eye_array(count)).tocsc(), permc_spec=order)
         inverse = LinearOperator(matrix.shape, factors.solve, dtype=float)
         found, right = eigs(inverse, 6, v0=start, tol=1e-12)
@@ -259,6 +259,8 @@ def rightmost(matrix, near=None):
         if values[k].real < shift and abs(values[k] - shift) <= np.min(np.abs(values - shift)) * (1 + 1e-9):
             break
         shift = max(shift, values[k].real) + 0.5 * (1 + abs(shift))
+    else:
+        raise ArithmeticError("no shift to the right of the spectrum")
     transposed = LinearOperator(matrix.shape, lambda x: factors.solve(x, trans="T"), dtype=float)
     other, left = eigs(transposed, 2, v0=start, tol=1e-8)
     j = int(np.argmin(np.abs(shift + 1 / other - values[k])))
@@ -268,8 +270,8 @@ def rightmost(matrix, near=None):
 
 SIZES = {0: (1,), 1: (10, 20, 40, 80, 160), 2: (6, 9, 14, 21, 32, 44)}
 """Functions of a noise, by how many dimensions all noises have together."""
-MODES = (16, 32, 64, 96, 128, 256)
-FEWER = {0: (1,), 1: (8, 16, 28, 44, 64), 2: (5, 8, 12, 16)}
+MODES = (16, 32, 64, 128, 256, 512)
+FEWER = {0: (1,), 1: (8, 14, 22, 32, 42, 50), 2: (5, 8, 12, 16)}
 """Beside the modes of a Fourier series."""
 
 
@@ -287,43 +289,69 @@ def fourier_exponent(system: Planar, p, dimensions):
 def lyapunov_exponent(system: Planar, dimensions):
     """λ = ⟨u*, (dL/dp) 1⟩ with u*L(0) = 0, ⟨u*, 1⟩ = 1, and how far it may be off."""
     system, sizes = system.balanced(), FEWER[dimensions]
-    last, found, off = math.nan, math.nan, math.inf
+    values = Limit(1e-3 * float(np.linalg.norm(system.drift)))
     for i, modes in enumerate(MODES):
         total, slope, one = system.generator(0.0, modes, sizes[min(i, len(sizes) - 1)])
-        if total.shape[0] > MOST:
+        if total.shape[0] > MOST_IN_BAND or values.is_settled:
             break
-        at, size_of = int(np.argmax(np.abs(one))), float(np.abs(total).max())
-        kept = sparse.diags_array((np.arange(one.size) != at).astype(float))
-        last_row = sparse.csr_array((one * size_of, (np.full(one.size, at), np.arange(one.size))), shape=total.shape)
-        rows = kept @ total.T + last_row
-        right = np.zeros(one.size)
-        right[at] = size_of
-        found = float(splu(sparse.csc_array(rows)).solve(right) @ (slope @ one))
-        size = abs(found) + 1e-3 * float(np.linalg.norm(system.drift))
-        off = abs(found - last) + 1e-14 * size
-        if off <= CLOSE * size:
-            break
-        last = found
-    return found, off
+        at, size, count = int(np.argmax(np.abs(one))), float(np.abs(total).max()), one.size
+        # one of the equations follows from the others, and ⟨u*, 1⟩ = 1 stands in its place
+        kept = sparse.diags_array((np.arange(count) != at).astype(float))
+        row = sparse.csr_array((one * size, (np.full(count, at), np.arange(count))), shape=total.shape)
+        left = splu(sparse.csc_array(kept @ total.T + row)).solve(size * np.eye(1, count, at)[0])
+        values.add(float(left @ (slope @ one)))
+    return values.last, values.doubt
 
 
 def _settled(system, p, sizes):
-    """Λ(p) by larger and larger sizes until two agree, and their difference with the rounding."""
-    last, value, off = math.nan, math.nan, math.inf
+    """Λ(p) by larger and larger sizes until two agree, and how far it may be off."""
+    values, is_band = Limit(1e-3 * float(np.linalg.norm(system.drift)), is_closed=len(sizes) == 1), sizes[0][0] > 8
     for modes, size in sizes:
         matrix, _, _ = system.generator(p, modes, size)
-        if matrix.shape[0] > MOST:
+        if matrix.shape[0] > (MOST_IN_BAND if is_band else MOST) or values.is_settled:
             break
         try:
-            found, rounding = rightmost(matrix, None if math.isnan(last) else last)
-        except (ArpackError, RuntimeError):  # not found, or singular
+            found, rounding = rightmost(matrix, values.last if values.found else None)
+        except (ArithmeticError, ArpackError, RuntimeError):  # not found, or singular
             continue
-        if abs(found.imag) > 1e-7 * (abs(found) + float(np.linalg.norm(system.drift))):
-            continue  # too few functions yet: Λ is real
-        value = found.real
-        unit = abs(value) + 1e-3 * float(np.linalg.norm(system.drift))
-        off = (abs(value - last) if len(sizes) > 1 else 0.0) + 10 * rounding
-        if off - 10 * rounding <= CLOSE * unit:
-            break
-        last = value
-    return value, off
+        if abs(found.imag) <= 1e-7 * (abs(found) + 1e3 * values.least):  # else too few functions: Λ is real
+            values.add(found.real, 10 * rounding)
+    return values.last, values.doubt
+
+
+class Limit:
+    """Values by more and more functions."""
+
+    def __init__(self, least, is_closed=False):
+        self.least, self.is_closed, self.found, self.rounding = least, is_closed, [], 0.0
+
+    def add(self, value, rounding=0.0):
+        self.found.append(value)
+        self.rounding = rounding
+
+    @property
+    def last(self):
+        return self.found[-1] if self.found else math.nan
+
+    @property
+    def is_settled(self):
+        return len(self.found) > 1 and self._truncation <= CLOSE * (abs(self.last) + self.least)
+
+    @property
+    def doubt(self):
+        return self._truncation + self.rounding
+
+    @property
+    def _truncation(self):
+        """The last change, or all that are to come where changes fall like a geometric series; ∞ where they do not."""
+        if self.is_closed and self.found:
+            return 0.0
+        if len(self.found) < 2:
+            return math.inf
+        *earlier, change = np.abs(np.diff(self.found))
+        if change <= CLOSE * (abs(self.last) + self.least):
+            return float(change)
+        if not earlier:
+            return math.inf
+        share = change / max(earlier[-1], change)
+        return float(change * max(1.0, share / (1 - share))) if share < 0.7 else math.inf
