@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fpsolve.arrays import FloatArray, real_number, real_numbers, shown
-from fpsolve.budget import one_number
+from fpsolve.budget import counted, one_number
 from fpsolve.data import Result, dataset
 from fpsolve.errors import NoHierarchy, NoSuchExponent, NotConverged
 from fpsolve.exponent.adapt import (
@@ -291,9 +291,10 @@ class ExponentSolver:
         if p <= 0 or p % 2 or (is_simple and self.problem.dimension == 2) or self.classes:
             return None
         if p not in self._even:
-            self._even[p] = None
-            with suppress(NoHierarchy), one_thread():
-                self._even[p] = even_moment(self.problem, p, 0.1 * self.tolerance(p, 0.0), MOST_EQUATIONS)
+            found = None
+            with suppress(NoHierarchy), one_thread(), counted(self.budget.countdown(f"Λ({p:g})")):
+                found = even_moment(self.problem, p, 0.1 * self.tolerance(p, 0.0), MOST_EQUATIONS)
+            self._even[p] = found
         return self._even[p]
 
     def doubt(self, error: float, known: EvenMoment) -> float:

@@ -30,9 +30,11 @@ from scipy.linalg.lapack import dgetrf, dgetrs
 from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigs, splu
 
 from fpsolve.arrays import Coefficient, FloatArray, dense, one
+from fpsolve.budget import charge
 from fpsolve.errors import NoHierarchy
 from fpsolve.model.noise import Noise
 from fpsolve.model.problem import Problem
+from fpsolve.signals import left_at_signals
 
 MOST, MOST_MOMENTS = 20_000, 1000
 """Equations at most, and moments for each function of the noise."""
@@ -54,6 +56,8 @@ DENSE = 200
 """Equations up to which matrices are not sparse."""
 MOST_DEGREES = 160
 """Of functions of one noise: with twice as many points the weights of a rule underflow."""
+SECONDS_PER_ENTRY, BYTES_PER_ENTRY, MANY_ENTRIES = 4e-6, 250, 1e5
+"""Of a sparse matrix that is factorised, and from how many on it is where a signal can leave it."""
 REMEDY = "compare with `fpsolve simulate`"
 MORE_POINTS = 16
 """Of a quadrature rule, beyond two for each function."""
@@ -473,7 +477,9 @@ def _solver(h: Any, sigma: float) -> Callable[..., FloatArray]:
         if singular:
             raise RuntimeError("singular")
         return lambda x, trans=0: dgetrs(lu, pivots, x, trans=trans)[0]
-    factors = splu((sigma * sparse.eye_array(h.shape[0]) - h).tocsc())
+    matrix = (sigma * sparse.eye_array(h.shape[0]) - h).tocsc()
+    charge(SECONDS_PER_ENTRY * matrix.nnz, 1e-9 * BYTES_PER_ENTRY * matrix.nnz, h.shape[0])
+    factors = left_at_signals(partial(splu, matrix)) if matrix.nnz > MANY_ENTRIES else splu(matrix)
     return lambda x, trans=0: np.asarray(factors.solve(x, "T" if trans else "N"))
 
 
