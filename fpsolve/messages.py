@@ -254,6 +254,8 @@ class Code(Enum):
         "note: Λ(p) has no root p ≠ 0 in [{low:g}, {high:g}]{is_bounded:?, and may have none at all: with bounded "
         "noise P(sup ‖x‖ > A) may fall faster than any power of A}"
     )
+    UNFINISHED = "failure: not everything is solved yet; the same command goes on"
+    NO_ROOT_REACHED = "note: no δ_p was found in [{low:g}, {high:g}]; beyond, {reason}"
     EXCURSION_OPEN = (
         "note: λ = {value:.3g} cannot be distinguished from 0 within its error, {error:.1g}, so that nothing is known "
         "of P(sup ‖x‖ ≥ A)"

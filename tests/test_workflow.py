@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 from contextlib import nullcontext
+from dataclasses import replace
 from importlib.metadata import version
 from types import SimpleNamespace
 
@@ -19,7 +20,7 @@ import xarray
 import fpsolve
 from fpsolve.analysis import stationary_density, tilted_density
 from fpsolve.case.remedies import CASE_WORDS
-from fpsolve.errors import CaseError, NotConverged, OutputError
+from fpsolve.errors import CaseError, FpsolveError, NotConverged, OutputError
 from fpsolve.exponent.fields import UNRESOLVED
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.files import alone
@@ -265,7 +266,7 @@ def test_what_fails_for_small_p_is_said_once(tmp_path, small):
     row = {"p": 0.0, "value": 0.0, "perturbation": 0.0, "error_estimate": 0.0}
     row |= dict.fromkeys(["derivative", "derivative_error", "residual"])
     assert curve["moments"] == ([] if small else [row])
-    assert curve["warnings"][0].startswith("no δ_p, λ, Λ″(0), N, R_c, r_c: ")
+    assert curve["warnings"][0].startswith("no λ, δ_p, Λ″(0), N, R_c, r_c: ")
     assert curve["warnings"][0].endswith("there is no Λ(0.001)") == bool(small)
     with (tmp_path / "out/test/moments.csv").open(newline="", encoding="utf-8") as file:
         assert [row["derivative"] for row in csv.DictReader(file)] == [""] * (not small)
@@ -705,3 +706,110 @@ def test_sensitivities_are_written(tmp_path):
             assert row[key] == pytest.approx(expected[key].value, rel=1e-6)
             assert 0 <= error[key] < 1e-6 * max(abs(row[key]), expected[key].scale)
     assert {"test/sensitivities.png", "test/sensitivities.pdf"} <= files(tmp_path)
+
+
+GROWING = ["vary={}", "output.eigenfunctions=[]", "moments.p=[-1.0, 0.5, 1.0, 1.5, 2.0, 3.0]"]
+
+
+def table(folder):
+    with (folder / "moments.csv").open(newline="", encoding="utf-8") as file:
+        return {float(row["p"]): row for row in csv.DictReader(file)}
+
+
+@pytest.mark.parametrize("sets", [GROWING, [*GROWING, "moments.p={start=-2.0, stop=6.0, num=33}"]])
+@pytest.mark.parametrize("at", [1, 2, 3])
+def test_an_interrupted_curve_keeps_its_moments_and_goes_on(tmp_path, monkeypatch, sets, at):
+    """Those that are solved are in the table, and no p is solved twice; interpolated ones within their errors."""
+    case = write(tmp_path, TEXT, sets)
+    whole = fpsolve.run(case, tmp_path / "whole")[0]
+    solution, asked = ExponentSolver.solution, list[float]()
+
+    def interrupted(self, p, tolerance=None):
+        if p not in asked:
+            if len(asked) == at:
+                raise KeyboardInterrupt
+            asked.append(p)
+        return solution(self, p, tolerance)
+
+    monkeypatch.setattr(ExponentSolver, "solution", interrupted)
+    with pytest.raises(KeyboardInterrupt, match="after 0 of 1 curve; what was done is kept in"):
+        fpsolve.run(case, tmp_path / "out")
+    folder = tmp_path / "out/test"
+    kept = table(folder)
+    assert kept.keys() == set(asked)
+    summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    assert (summary["complete"], summary["done"]) == (False, 0)
+    assert summary["curves"][0]["status"] == "partly"
+    assert "not everything is solved yet; the same command goes on" in summary["curves"][0]["warnings"]
+    again = list[float]()
+    monkeypatch.setattr(ExponentSolver, "solution", lambda self, p, t=None: again.append(p) or solution(self, p, t))
+    [result] = fpsolve.run(case, tmp_path / "out")
+    assert not (set(again) - {0.0}) & set(asked)
+    np.testing.assert_array_equal(result.moments.p, whole.moments.p)
+    apart = np.abs(result.moments.value - whole.moments.value)
+    assert np.all(apart <= result.moments.error_estimate + whole.moments.error_estimate)
+    assert np.all(np.isfinite(result.moments.derivative_error))
+    assert (result.failures, result.status) == ((), whole.status)
+    assert json.loads((folder / "summary.json").read_text(encoding="utf-8"))["complete"]
+
+
+@pytest.mark.parametrize("name", ["stability_index", "critical_impact_factor"])
+def test_an_interrupted_curve_keeps_its_indices(tmp_path, monkeypatch, name):
+    """λ comes before δ_p, and what was found is not sought again."""
+    case, order = write(tmp_path, TEXT, [*GROWING, "moments.p=[2.0]"]), list[str]()
+    index = solve.INDICES[name]
+
+    def interrupting(*_):
+        raise KeyboardInterrupt
+
+    def noting(each):
+        return replace(each, solve=lambda *arguments: order.append(each.name) or each.solve(*arguments))
+
+    indices = {each.name: noting(each) for each in solve.INDICES.values()}
+    monkeypatch.setattr(solve, "INDICES", {**indices, name: replace(index, solve=interrupting)})
+    with pytest.raises(KeyboardInterrupt):
+        fpsolve.run(case, tmp_path / "out")
+    before = order.copy()
+    assert before[0] == "lyapunov_exponent"
+    with (tmp_path / "out/test/curves.csv").open(newline="", encoding="utf-8") as file:
+        [row] = csv.DictReader(file)
+    assert all(row[each] for each in before)
+    assert not row[name]
+    order.clear()
+    monkeypatch.setattr(solve, "INDICES", indices)
+    [result] = fpsolve.run(case, tmp_path / "out")
+    assert order[0] == name
+    assert not set(order) & set(before)
+    assert all(result.estimates[each] for each in (*before, *order))
+
+
+@pytest.mark.parametrize("failure", [ZeroDivisionError("x"), MemoryError(), FpsolveError("no")])
+def test_a_quantity_that_fails_takes_no_other_with_it(tmp_path, monkeypatch, failure):
+    def fails(*_, **__):
+        raise failure
+
+    case = write(tmp_path, TEXT, [*GROWING, "moments.p=[2.0]", 'output.quantities="all"'])
+    for name in ("solve_sensitivities", "solve_excursion", "solve_response", "settled_directions"):
+        monkeypatch.setattr(solve, name, fails)
+    monkeypatch.setattr(ExponentSolver, "variance_rate", fails)
+    monkeypatch.setattr(ExponentSolver, "by_class", fails)
+    with pytest.raises(NotConverged) as caught:
+        fpsolve.run(case, tmp_path / "out")
+    [result] = caught.value.partial
+    assert result.moments.p.tolist() == [2.0]
+    found = {name for name, each in result.estimates.items() if each}
+    assert found == {*result.estimates} - {"variance_rate"}
+    assert result.status.name == "PARTLY"
+
+
+def test_each_moment_is_in_the_table_as_soon_as_it_is_solved(tmp_path, monkeypatch):
+    """With nothing waiting for a second."""
+    monkeypatch.setattr(solve, "SOON", 0.0)
+    monkeypatch.setattr("fpsolve.workflow.sets.REST", 0)
+    case, seen = write(tmp_path, TEXT, GROWING), list[int]()
+
+    def progress():
+        seen.append(len(table(tmp_path / "out/test")))
+
+    fpsolve.run(case, tmp_path / "out", progress=progress)
+    assert seen == [0, 1, 2, 3, 4, 5]

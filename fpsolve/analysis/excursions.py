@@ -248,7 +248,7 @@ def check_start(problem: Problem, phi: Any, xi: Any) -> None:
 
 def _without_index(reason: Message) -> Message:
     """What it means that Λ(p) has no other root than 0, λ < 0."""
-    if reason.code is Code.NO_ROOT:
+    if reason.code in (Code.NO_ROOT, Code.NO_ROOT_REACHED):
         return Message(Code.EXCURSION_BEYOND, high=reason.data["high"])
     return Message(Code.EXCURSION_NO_INDEX, reason=reason)
 

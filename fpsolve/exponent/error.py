@@ -14,7 +14,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from html import escape
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -112,6 +112,16 @@ class Absent:
     def _repr_html_(self) -> str:
         """What a notebook shows: the whole reason."""
         return f"<p>{escape(str(self))}</p>"
+
+
+class Moment(NamedTuple):
+    """Λ(p) of one p as a record holds it: without its eigenfunctions."""
+
+    value: float
+    derivative: float
+    derivative_error: float
+    error: float
+    residual: float
 
 
 @dataclass(frozen=True)

@@ -16,14 +16,14 @@ from numpy.polynomial.chebyshev import chebder, chebval
 from numpy.typing import ArrayLike
 
 from fpsolve.arrays import FloatArray, real_array, real_numbers
-from fpsolve.budget import one_number
+from fpsolve.budget import OverBudget, one_number, under_way
 from fpsolve.data import Result, dataset
 from fpsolve.errors import NotConverged
 from fpsolve.exponent.adapt import Budget, Tolerance, misplaced
-from fpsolve.exponent.error import MEANINGLESS, Absent, Estimate, Failure, checked
-from fpsolve.exponent.solver import ExponentSolver, MomentLyapunov, best_order, missed, of_the_start
+from fpsolve.exponent.error import MEANINGLESS, Absent, Estimate, Failure, Moment, checked
+from fpsolve.exponent.solver import TINY_P, ExponentSolver, MomentLyapunov, best_order, missed, of_the_start
 from fpsolve.fem.mesh import CylinderMesh
-from fpsolve.messages import Code, Message, message_of
+from fpsolve.messages import Code, Message, Remedy, message_of
 from fpsolve.model.problem import Problem, checked_moments, of_problem, of_problem_too
 from fpsolve.model.quantity import DERIVATIVE, MOMENT, SECOND_DERIVATIVE, STABILITY_INDEX, P, moment_at
 from fpsolve.theory.far import grows_far_out
@@ -34,6 +34,10 @@ if TYPE_CHECKING:
 SEARCH_INTERVAL: tuple[float, float] = (-20.0, 20.0)
 LEAST_SLOPE = 1e-100
 MOST_STEPS = 100
+ROUGH = 0.1
+"""Error, over |Λ(p)|, at an end of the interval, where the sign alone counts."""
+MOST_RETREATS = 3
+"""From p of which Λ(p) is not resolved, halfway to those of which it is."""
 PRECISE = 0.5
 """Of what rtol allows δ_p, for the error of the last Λ(p)/p."""
 SHARE = 0.4
@@ -67,6 +71,7 @@ class MomentLyapunovFunction(Result):
         among: p to choose the nodes from, so that those solved are of use; None for the best ones.
         solver: one of the same problem, to go on with; it decides the mesh, rtol and the budget.
         progress: called after each solve.
+        known: Λ(p) of an earlier run, by p; it takes each that is solved.
 
     Attributes:
         nodes: the p that were solved, increasing, shape (n + 1,).
@@ -92,6 +97,7 @@ class MomentLyapunovFunction(Result):
         among: FloatArray | None = None,
         solver: ExponentSolver | None = None,
         progress: Callable[[], None] = lambda: None,
+        known: dict[float, Moment] | None = None,
     ) -> None:
         low, high = (float(end) for end in checked_moments(list(interval), problem))
         if not low < high:
@@ -100,6 +106,7 @@ class MomentLyapunovFunction(Result):
             raise NotConverged(Message(Code.KINKED))
         self.interval = low, high
         self.solver = solver or ExponentSolver(problem, mesh, rtol=problem.wanted(rtol), budget=budget or Budget())
+        self._known, self._is_kept = {} if known is None else known, known is not None
         self.interpolation_error, self._among, self._allowed = math.inf, among, SHARE * self._tolerance(1.0, 0.0)
         most = LEVELS[-1] if among is None else max(FEW_NODES, 3 * among.size // 10)
         for count in LEVELS if among is None or self._is_hopeful(most) else ():
@@ -107,8 +114,7 @@ class MomentLyapunovFunction(Result):
             self._interpolate(count, progress, self._tolerance)
             if self.is_converged or _nodes_needed(count, last, self.interpolation_error, self._allowed) > most:
                 break
-        self._pairs = [self.solver.pair(float(p)) for p in self.nodes]
-        slope = np.array([pair.derivative for pair in self._pairs])
+        slope = np.array([self._known[p].derivative for p in self.nodes.tolist()])
         columns = self.nodes, self.nodes * self._values, slope, np.abs(self.nodes) * self._errors
         if obstacle := broken_convexity(*columns, lambda: self._slope_errors) or contradiction(self.solver, *columns):
             raise NotConverged(obstacle, remedy=self.solver.near.refinement)
@@ -169,13 +175,17 @@ class MomentLyapunovFunction(Result):
             value=value,
             derivative=self.derivative(points),
             error_estimate=error,
-            residual=np.full(points.size, max(pair.residual for pair in self._pairs)),
+            residual=np.full(points.size, max(self._known[p].residual for p in self.nodes.tolist())),
             solver=self.solver,
-            warnings=(*missed(self.solver, points, value, error), *misplaced(self.solver.mesh, self._pairs)),
+            warnings=(*missed(self.solver, points, value, error), *self._misplaced()),
             function=self,
             root=self.root(),
             notes=of_the_start(self.solver, points),
         )
+
+    def _misplaced(self) -> tuple[Message, ...]:
+        mesh = self.solver.mesh
+        return misplaced(mesh, [] if mesh is None else [self.solver.pair(float(p)) for p in self.nodes])
 
     def root(self) -> float | None:
         """Where Λ(p)/p changes its sign in the interval, or None."""
@@ -232,7 +242,7 @@ class MomentLyapunovFunction(Result):
         x, self.nodes = _nodes(count, self.interval, self._among)
         ratios = np.empty((x.size, 3))
         for i in best_order(self.nodes):
-            ratios[i] = self.solver.ratio(float(self.nodes[i]), tolerance)
+            ratios[i] = self._ratio(float(self.nodes[i]), tolerance)
             progress()
         self._values, slopes, self._errors = ratios.T
         basis, half = np.eye(2 * x.size), 0.5 * (self.interval[1] - self.interval[0])
@@ -240,6 +250,19 @@ class MomentLyapunovFunction(Result):
         coefficients = np.linalg.solve(conditions, np.concatenate([self._values, slopes * half / x.size]))
         self._series = Chebyshev(coefficients, domain=self.interval)
         self.interpolation_error = 2 * float(np.max(np.abs(self._series.coef[-3:])))
+
+    def _ratio(self, p: float, tolerance: Tolerance | None) -> tuple[float, float, float]:
+        """Λ(p)/p, its slope and its error, of an earlier run where that is as accurate."""
+        row, allowed = self._known.get(p), tolerance or self.solver.tolerance
+        if row and self.solver.goes_on and abs(p) >= TINY_P and row.error <= allowed(p, row.value):
+            self.solver.take(p, row)
+            value = row.value / p
+            return value, (row.derivative - value) / p, row.error / abs(p)
+        value, slope, error = self.solver.ratio(p, tolerance)
+        pair = self.solver.pair(p)
+        of_slope = self.solver.slope_error(p) if self._is_kept else math.nan
+        self._known[p] = Moment(p * value, pair.derivative, of_slope, abs(p) * error, pair.residual)
+        return value, slope, error
 
     @property
     def is_converged(self) -> bool:
@@ -323,10 +346,11 @@ def nonzero_root(
     """δ_p, the non-zero root of Λ(p), or why Λ has none in the interval, as for noise with algebraic tails.
 
     Λ is convex, so Λ(p)/p increases and has one root at most: a Newton iteration on it, which halves the bracket where
-    its steps do not, as where Λ(p)/p bends from flat to steep. The last solve is as accurate as δ_p is to be.
+    its steps do not, as where Λ(p)/p bends from flat to steep. The last solve is as accurate as δ_p is to be. Where
+    Λ(p) is not resolved far out it is looked for as far as it is.
 
     Raises:
-        NotConverged: some p on the way is not resolved.
+        NotConverged: no p on the way is resolved, or not one between two at which Λ(p)/p has other signs.
     """
     if not solver.problem.is_driven:
         return Absent(Message(Code.NOT_DRIVEN))
@@ -339,13 +363,30 @@ def nonzero_root(
         if known := [each for each in roots if each]:
             return min(known, key=lambda each: each.value)
         return Absent(Message(Code.NO_ROOT, low=ends[0], high=ends[1], is_bounded=noise.is_bounded))
+    steps, tolerance, tried, signed, beyond = [high - low] * 2, None, set[float](), set[float](), list[Message]()
     if guess is None:
-        ratio, slope, _ = solver.ratio(0.0)
+        ratio, slope, error = solver.ratio(0.0)
         guess = -ratio / slope if slope > 0 else math.copysign(1.0, -ratio)
-    p, tried, steps, tolerance = min(max(guess, low), high), set(), [high - low] * 2, None
+        if abs(ratio) > 2 * error and low < 0 < high:
+            low, high = (0.0, high) if ratio < 0 else (low, 0.0)
+            tried, signed = {0.0}, {0.0}
+    p = min(max(guess, low), high)
     for _ in range(MOST_STEPS):
         tried.add(p)
-        ratio, slope, error = _precise_ratio(solver, p, tolerance)
+        try:
+            is_rough = p in ends and solver.mesh is None and not solver.classes and tolerance is None
+            ratio, slope, error = _rough_ratio(solver, p) if is_rough else _precise_ratio(solver, p, tolerance)
+        except (NotConverged, OverBudget) as failure:
+            if len(sides := signed & {low, high}) != 1 or not low < high:
+                raise
+            beyond.append(_not_resolved(p, failure))
+            if len(beyond) > MOST_RETREATS:
+                return _none_within_reach(ends, low in signed, sides.pop(), beyond[0])
+            [inner] = sides
+            low, high = (low, p) if p > inner else (p, high)
+            p = 0.5 * (inner + p)
+            continue
+        signed.add(p)
         if solver.classes:  # Λ(p)/p may be constant
             slope = max(slope, LEAST_SLOPE)
         if not slope > 0:
@@ -366,12 +407,36 @@ def nonzero_root(
         if low == high:
             return Absent(Message(Code.NO_ROOT, low=ends[0], high=ends[1], is_bounded=noise.is_bounded))
         if not low < new < high:
+            if beyond and len(sides := signed & {low, high}) == 1:
+                return _none_within_reach(ends, low in signed, sides.pop(), beyond[0])
             new = next((end for end in (low, high) if end not in tried), 0.5 * (low + high))
         elif abs(new - p) > 0.5 * steps[-2]:
             new = 0.5 * (low + high)
         steps.append(abs(new - p))
         p = new
     raise NotConverged(Message(Code.INDEX_UNSETTLED, p=p), remedy=solver.near.refinement)
+
+
+def _rough_ratio(solver: ExponentSolver, p: float) -> tuple[float, float, float]:
+    """Λ(p)/p, its slope and error, which tell the sign; as `_precise_ratio` does where that is not enough."""
+    ratio, slope, error = solver.ratio(p, lambda p, value: max(ROUGH * abs(value), solver.tolerance(p, value)))
+    return (ratio, slope, error) if abs(ratio) > 2 * error and slope > 0 else _precise_ratio(solver, p, None)
+
+
+def _not_resolved(p: float, failure: NotConverged | OverBudget) -> Message:
+    """Why Λ(p) is not. Raises `OverBudget` where that is of more than δ_p."""
+    if isinstance(failure, NotConverged):
+        return failure.message
+    if failure.countdown is not under_way():
+        raise failure
+    told = Message(Code.NUMBER_SPENT, symbol=moment_at(p).symbol, reason=failure.reason)
+    return NotConverged(told, remedy=Remedy.BUDGET).message
+
+
+def _none_within_reach(ends: tuple[float, ...], is_below: bool, p: float, reason: Message) -> Absent:
+    """That Λ has no root up to p, where the sign of Λ(p)/p is known, or down to it."""
+    low, high = (ends[0], p) if is_below else (p, ends[1])
+    return Absent(Message(Code.NO_ROOT_REACHED, low=low, high=high, reason=reason))
 
 
 def _precise_ratio(solver: ExponentSolver, p: float, tolerance: Tolerance | None) -> tuple[float, float, float]:
@@ -420,7 +485,11 @@ def moment_lyapunov(
 
 
 def solve_moments(
-    solver: ExponentSolver, p: ArrayLike, *, progress: Callable[[], None] = lambda: None
+    solver: ExponentSolver,
+    p: ArrayLike,
+    *,
+    progress: Callable[[], None] = lambda: None,
+    known: dict[float, Moment] | None = None,
 ) -> MomentLyapunov:
     """Λ at several p, by interpolation where that saves solves; what did not converge is in its `failures`.
 
@@ -428,6 +497,7 @@ def solve_moments(
         solver: of the problem.
         p: one moment, or an array of shape (n,), which here may be empty; equal ones are solved once.
         progress: called once for each p, whatever the number of solves.
+        known: Λ(p) of an earlier run, by p; it takes each p that is solved before `progress` is called.
 
     Raises:
         NoSuchExponent: Λ(p) is infinite for one of the p.
@@ -442,9 +512,11 @@ def solve_moments(
     if points.size > FEW_MOMENTS and not (grows_far_out(solver.problem) or solver.classes):
         ends = float(points.min()), float(points.max())
         with suppress(NotConverged):
-            function = MomentLyapunovFunction(solver.problem, ends, solver=solver, among=points, progress=report)
+            function = MomentLyapunovFunction(
+                solver.problem, ends, solver=solver, among=points, progress=report, known=known
+            )
             result = function.moments(points) if function.is_converged else None
-    result = result or _one_by_one(solver, points, report)
+    result = result or _one_by_one(solver, points, report, known)
     for each in reports:
         each()
     return result if points.size == asked.size else _at(result, asked)
@@ -458,9 +530,11 @@ def _at(result: MomentLyapunov, p: FloatArray) -> MomentLyapunov:
     return replace(result, **{name: getattr(result, name)[index] for name in names})
 
 
-def _one_by_one(solver: ExponentSolver, p: FloatArray, progress: Callable[[], None]) -> MomentLyapunov:
+def _one_by_one(
+    solver: ExponentSolver, p: FloatArray, progress: Callable[[], None], known: dict[float, Moment] | None
+) -> MomentLyapunov:
     """Λ(0) = 0 needs no solve; where its eigenpair failed, Λ′ and residual are NaN."""
-    result = solver.moments(p, progress=progress)
+    result = solver.moments(p, progress=progress, known=known)
     columns = result.p, result.value, result.derivative, result.error_estimate
     obstacle = None
     if not result.failures:

@@ -31,7 +31,7 @@ from fpsolve.exponent.adapt import (
     widened,
 )
 from fpsolve.exponent.eigen import Bordered, PrincipalPair, second_derivative, slope_rounding
-from fpsolve.exponent.error import Estimate, Failure, Solution, checked, slope_error
+from fpsolve.exponent.error import Estimate, Failure, Moment, Solution, checked, slope_error
 from fpsolve.exponent.fields import noise_marginal
 from fpsolve.exponent.joint import joint_solution
 from fpsolve.fem.factors import one_thread
@@ -189,6 +189,7 @@ class ExponentSolver:
     rtol: float = 1e-8
     budget: Budget = field(default_factory=Budget)
     starts: Mapping[float, Solution] = field(default_factory=dict, repr=False)
+    slope_errors: dict[float, float] = field(init=False, default_factory=dict, repr=False)
     _even: dict[float, EvenMoment | None] = field(init=False, repr=False, default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -355,33 +356,62 @@ class ExponentSolver:
         """The largest error allowed of a value of Λ(p)."""
         return tolerated(self.rtol, self.scales, p, value)
 
-    def moments(self, p: ArrayLike, *, progress: Callable[[], None] = lambda: None) -> MomentLyapunov:
+    @property
+    def goes_on(self) -> bool:
+        """Whether numbers of an earlier run do in place of eigenpairs, which others need for their messages."""
+        return self.mesh is None and not (self.problem.noise.has_algebraic_tails or self.classes)
+
+    def take(self, p: float, row: Moment) -> None:
+        """Have the error of Λ′(p), which takes an eigenpair, from an earlier run."""
+        if not math.isnan(row.derivative_error):
+            self.slope_errors.setdefault(p, row.derivative_error)
+
+    def moments(
+        self,
+        p: ArrayLike,
+        *,
+        progress: Callable[[], None] = lambda: None,
+        known: dict[float, Moment] | None = None,
+    ) -> MomentLyapunov:
         """Λ(p) at several p; `progress` is called after each, also after one that fails.
+
+        Args:
+            p: the moments.
+            progress: called after each.
+            known: those of an earlier run, by their p; it takes each that is solved.
 
         Raises:
             NoSuchExponent: Λ(p) is infinite for one of the p.
         """
         points = checked_moments(p, self.problem, may_be_empty=True)
-        rows: dict[int, tuple[float, float, float, float]] = {}
-        solved, failures = dict[int, PrincipalPair](), []
+        is_kept, known = known is not None, {} if known is None else known
+        rows, solved, failures = dict[int, Moment](), dict[int, PrincipalPair](), list[Failure]()
         for i in best_order(points):
-            p = float(points[i])
-            known = self.even(p) if self.problem.dimension > 2 else None
-            if known:
-                rows[i] = known.value, known.error, math.nan, math.nan
+            point = float(points[i])
+            if self.goes_on and point in known and not math.isnan(known[point].derivative):
+                rows[i] = known[point]
+                self.take(point, rows[i])
+                progress()
+                continue
+            even = self.even(point) if self.problem.dimension > 2 else None
+            if even:
+                rows[i] = known[point] = Moment(even.value, math.nan, math.nan, even.error, math.nan)
             try:
-                solution = self.solution(p)
-                estimate = self.estimate(p, solution)
-                if abs(p) >= TINIEST_P and not known:  # else Λ has no scale
-                    checked(estimate, self.near.refinement, p)
-                of_value = rows[i][:2] if known else (estimate.value, estimate.error_estimate)
-                solved[i], rows[i] = solution.pair, (*of_value, solution.pair.derivative, solution.pair.residual)
+                solution = self.solution(point)
+                estimate, pair = self.estimate(point, solution), solution.pair
+                if abs(point) >= TINIEST_P and not even:  # else Λ has no scale
+                    checked(estimate, self.near.refinement, point)
+                number, error = (even.value, even.error) if even else (estimate.value, estimate.error_estimate)
+                solved[i] = pair
+                rows[i] = known[point] = Moment(number, pair.derivative, math.nan, error, pair.residual)
+                if is_kept:
+                    known[point] = rows[i]._replace(derivative_error=self.slope_error(point))
             except NotConverged as failure:
-                if not known:
-                    failures.append(Failure(p, failure.message))
+                if not even:
+                    failures.append(Failure(point, failure.message))
             progress()
         pairs, found = tuple(solved[i] for i in sorted(solved)), points[sorted(rows)]
-        value, errors, slope, residual = np.array([rows[i] for i in sorted(rows)]).reshape(-1, 4).T
+        value, slope, _, errors, residuals = np.array([rows[i] for i in sorted(rows)]).reshape(-1, 5).T
         if grows_far_out(self.problem):
             slope[np.abs(found) < TINIEST_P] = np.minimum(slope[np.abs(found) < TINIEST_P], 0.0)  # from the left
         return MomentLyapunov(
@@ -389,7 +419,7 @@ class ExponentSolver:
             value=value,
             derivative=slope,
             error_estimate=errors,
-            residual=residual,
+            residual=residuals,
             solver=self,
             warnings=(*missed(self, found, value, errors), *misplaced(self.mesh, pairs)),
             failures=tuple(failures),
@@ -418,18 +448,24 @@ class ExponentSolver:
         It is from the highest modes, see `error.slope_error`; where these do not tell, twice what a finer
         discretisation changes.
         """
-        with suppress(NotConverged):
-            if abs(p) < TINIEST_P:
-                return self.ratio_alone(0.0)[1]
-            if self.classes:
-                return float(np.max([each.slope_error(p) for each in self.classes]))
-            solution = self.solution(p)
-            with one_thread():
-                if solution.modes_tell:
-                    return slope_error(solution.pair)
-                finer = self.near.finer_pair(solution.pair, widened(solution.pair.generator).enriched())
-                return 2 * abs(finer.derivative - solution.pair.derivative) + slope_rounding(solution.pair)
-        return math.nan
+        if p not in self.slope_errors:
+            self.slope_errors[p] = math.nan
+            with suppress(NotConverged):
+                self.slope_errors[p] = self._slope_error(p)
+        return self.slope_errors[p]
+
+    @one_number("Λ′({:g})")
+    def _slope_error(self, p: float) -> float:
+        if abs(p) < TINIEST_P:
+            return self.ratio_alone(0.0)[1]
+        if self.classes:
+            return float(np.max([each.slope_error(p) for each in self.classes]))
+        solution = self.solution(p)
+        with one_thread():
+            if solution.modes_tell:
+                return slope_error(solution.pair)
+            finer = self.near.finer_pair(solution.pair, widened(solution.pair.generator).enriched())
+            return 2 * abs(finer.derivative - solution.pair.derivative) + slope_rounding(solution.pair)
 
     @one_number("λ")
     def lyapunov_exponent(self) -> Estimate:

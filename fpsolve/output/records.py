@@ -252,6 +252,12 @@ def key_of(curve: Curve, wanted: Wanted, numerics: Numerics) -> str:
     )
 
 
+def growing_key(curve: Curve, numerics: Numerics) -> str:
+    """What the numbers of a curve are found by that is not finished; they do not depend on the budget."""
+    mesh = numerics.mesh and codec(CylinderMesh).plain(numerics.mesh)
+    return _digest(CurveResult, **_of_curve(curve), numerics=[numerics.rtol, mesh])
+
+
 def simulation_key(curve: Curve, orders: Sequence[float], setting: MonteCarloSection) -> str:
     settings = setting.model_dump(mode="json")
     return _digest(SimulatedCurve, **_of_curve(curve), orders=list(orders), setting=settings)

@@ -70,13 +70,16 @@ def _packages() -> dict[str, str]:
     return {name: version(name) for name in ("numpy", "scipy", "scikit-fem")}
 
 
-def write_results(case: Case, results: Sequence[CurveResult], folder: Path, facts: Mapping[str, Any]) -> None:
+def write_results(
+    case: Case, results: Sequence[CurveResult], folder: Path, facts: Mapping[str, Any], finished: int | None = None
+) -> None:
     """summary.json, which says whether all curves of the case are there, moments.csv and curves.csv, in one go.
 
     Of many curves summary.json has the state, the messages and what no other table has; see `MOST_SUMMARISED`.
 
     Args:
         facts: on the run, see `facts_of`.
+        finished: how many of them are; all if None.
     """
     has_moments, names = MOMENT.name in case.asked, columns_of(case)
     indices = [column.name for each in asked(case) for column in (each, each.error())]
@@ -91,7 +94,7 @@ def write_results(case: Case, results: Sequence[CurveResult], folder: Path, fact
         by_moment, by_curve = csv.writer(moments), csv.writer(curves)
         by_moment.writerow([*case.vary.keys, *names, *more])
         by_curve.writerow([*case.vary.keys, *indices, *settled, *ends, "p_solved", "p_failed", "status", "seconds"])
-        summary.write(_beginning(case, results, facts, held=is_short))
+        summary.write(_beginning(case, len(results) if finished is None else finished, facts, held=is_short))
         for number, result in enumerate(results):
             varied, done, rows = result.curve.varied.values(), result.moments, _rows(result, names)
             summary.write(_entry(case, number, _short_summary(case, result) if is_short else _summary(case, result)))
@@ -115,13 +118,13 @@ def whole_summary(case: Case, results: Sequence[CurveResult], facts: Mapping[str
         facts: on the run, see `facts_of`.
     """
     entries = (_entry(case, number, _summary(case, result)) for number, result in enumerate(results))
-    lines = "".join([_beginning(case, results, facts), *entries, _END]).splitlines()
+    lines = "".join([_beginning(case, len(results), facts), *entries, _END]).splitlines()
     return " ".join(line.strip() for line in lines)
 
 
-def _beginning(case: Case, results: Sequence[CurveResult], facts: Mapping[str, Any], *, held: bool = False) -> str:
+def _beginning(case: Case, done: int, facts: Mapping[str, Any], *, held: bool = False) -> str:
     """What summary.json has before its curves; with the parameters that these have in common, if they are held."""
-    state = {"complete": len(results) == case.planned, "planned": case.planned, "done": len(results)}
+    state = {"complete": done == case.planned, "planned": case.planned, "done": done}
     common = {"parameters": dict(case.held)} if held else {}
     start = json.dumps({**head(case), **state, **facts, **common}, indent=1, ensure_ascii=False)
     return start.removesuffix("\n}") + ',\n "curves": ['

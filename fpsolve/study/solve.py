@@ -9,29 +9,28 @@ from __future__ import annotations
 import math
 import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
-from time import process_time
+from time import monotonic, process_time
 from typing import Any, TypeVar
 
 import numpy as np
 
 from fpsolve.analysis.density import negative_share, stationary_density
 from fpsolve.analysis.directions import SettledDirections, negative_part, settled_directions
-from fpsolve.analysis.excursions import SYMBOL, Excursion, Start, StartOfNoise, solve_excursion
-from fpsolve.analysis.sensitivity import DIFFERENTIATED, solve_sensitivities
+from fpsolve.analysis.excursions import SYMBOL, Start, StartOfNoise, solve_excursion
+from fpsolve.analysis.sensitivity import DIFFERENTIATED, Sensitivities, solve_sensitivities
 from fpsolve.arrays import FloatArray
 from fpsolve.budget import counted
 from fpsolve.case.case import MOST_DRAWN, Case, Curve
 from fpsolve.case.kinds import varying
 from fpsolve.case.sections import EXCURSIONS, RESPONSE, SENSITIVITIES, Varied
-from fpsolve.errors import FpsolveError, NoDerivative, NoSuchExponent, NotConverged
+from fpsolve.errors import FpsolveError, NoSuchExponent, NotConverged
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.eigen import PrincipalPair
-from fpsolve.exponent.error import Absent, Estimate, Failure
+from fpsolve.exponent.error import Absent, Estimate, Failure, Moment
 from fpsolve.exponent.fields import MOST_NEGATIVE, UNRESOLVED
 from fpsolve.exponent.function import solve_moments
 from fpsolve.exponent.quantities import BY_JUMP, INDICES, LYAPUNOV_EXPONENT, MOMENT, STABILITY_INDEX
@@ -40,12 +39,17 @@ from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import Code, Message, Remedy, Severity, message_of
 from fpsolve.model.problem import Problem
 from fpsolve.signals import is_interrupt
-from fpsolve.study.response import CurveResponse, Grid, solve_response
+from fpsolve.study.response import Grid, solve_response
 from fpsolve.study.results import Comparison, CurveResult, MomentColumns, Solved
 from fpsolve.theory.far import heavy_tail_note
 from fpsolve.theory.perturbation import perturbed_moments, weak_noise_note
 
 Kept = TypeVar("Kept")
+Found = TypeVar("Found")
+PARTS = ("excursion", "response", "sensitivities")
+"""Attributes of a result that an interrupted run keeps, beside Λ(p) and the indices."""
+SOON = 1.0
+"""Seconds after which what is known of a curve is kept."""
 BATCHES, MOST_SETS = 256, 64
 """About so many batches has a case, unless these are larger than that."""
 
@@ -155,47 +159,173 @@ def compare(case: Case, results: Sequence[CurveResult]) -> list[Comparison]:
     return found
 
 
+class Draft:
+    """What is known of a curve while others of its quantities are solved; it is kept as it grows.
+
+    Args:
+        curve: the parameter set.
+        earlier: what an interrupted run knew of it.
+        keep: takes what is known, now and then.
+
+    Attributes:
+        known: Λ(p), by p.
+        columns: of all moments, once they are solved.
+        estimates: the indices that were found, by name.
+        parts: other attributes of a result.
+    """
+
+    def __init__(self, curve: Curve, earlier: CurveResult | None, keep: Callable[[CurveResult], None]) -> None:
+        self.curve, self._keep, self._kept_at = curve, keep, monotonic()
+        self.known, self.estimates = dict[float, Moment](), dict[str, Estimate | None]()
+        self.parts: dict[str, Any] = {}
+        self.columns: MomentColumns | None = None
+        self.seconds, self._started = 0.0, process_time()
+        if earlier is not None:
+            names = ("value", "derivative", "derivative_error", "error_estimate", "residual")
+            rows = zip(*(getattr(earlier.moments, name).tolist() for name in names), strict=True)
+            self.known = {p: Moment(*row) for p, row in zip(earlier.moments.p.tolist(), rows, strict=True)}
+            self.estimates = {name: each for name, each in earlier.estimates.items() if each}
+            self.parts = {name: found for name in PARTS if (found := getattr(earlier, name)) is not None}
+            self.seconds = earlier.seconds
+
+    def spent(self) -> float:
+        """Seconds of the processor, with those of earlier runs."""
+        return self.seconds + process_time() - self._started
+
+    def index(self, name: str, solve: Callable[[], Estimate | Absent]) -> Estimate | Absent:
+        """An index, solved where it is not known yet."""
+        if known := self.estimates.get(name):
+            return known
+        found = solve()
+        if found:
+            self.estimates[name] = found
+            self.grow()
+        return found
+
+    def part(self, name: str, solve: Callable[[], Found]) -> tuple[Found | None, Message | None]:
+        """Another attribute of a result, solved where it is not known yet; or why it is missing, without it."""
+        if name in self.parts:
+            return self.parts[name], None
+        found, reason = _tried(solve)
+        if found is not None:
+            self.parts[name] = found
+            self.grow()
+        return found, reason
+
+    def grow(self) -> None:
+        """Keep what is known, if that was not done just now."""
+        if monotonic() - self._kept_at >= SOON:
+            self.keep()
+
+    def keep(self) -> None:
+        """Keep what is known."""
+        columns = self.columns
+        if columns is None:
+            p = np.array(sorted(self.known))
+            rows = np.array([self.known[each] for each in p.tolist()]).reshape(-1, len(Moment._fields))
+            value, slope, slope_error, error, residual = np.where(np.isinf(rows), np.nan, rows).T
+            theory = perturbed_moments(self.curve.problem, p)
+            columns = MomentColumns(p, value, slope, error, slope_error, residual, theory, np.zeros(0))
+        estimates = {name: self.estimates.get(name) for name in INDICES}
+        failures = (Failure(None, Message(Code.UNFINISHED)),)
+        self._keep(CurveResult(self.curve, columns, estimates, failures=failures, seconds=self.spent(), **self.parts))
+        self._kept_at = monotonic()
+
+
+def _tried(solve: Callable[[], Found]) -> tuple[Found | None, Message | None]:
+    """What is solved, or why it is missing, which takes nothing else with it."""
+    try:
+        return solve(), None
+    except FpsolveError as failure:
+        return None, failure.message
+    except MemoryError:
+        return None, Message(Code.NO_MEMORY, remedy=Remedy.MEMORY)
+    except OSError:
+        raise
+    except Exception as failure:
+        return None, _fault(failure)
+
+
 def solve_curve(
-    curve: Curve, wanted: Wanted, numerics: Numerics, progress: Callable[[], None] = lambda: None
+    curve: Curve,
+    wanted: Wanted,
+    numerics: Numerics,
+    progress: Callable[[], None] = lambda: None,
+    earlier: CurveResult | None = None,
+    keep: Callable[[CurveResult], None] = lambda _: None,
 ) -> Solved:
-    """Solve one parameter set; what did not converge is in its `failures`.
+    """Solve one parameter set: Λ(p) first, then λ, δ_p and the others; what did not converge is in its `failures`.
 
     Args:
         curve: the parameter set.
         wanted: what is asked of it.
         numerics: how it is solved.
         progress: called after each moment.
+        earlier: what an interrupted run knew of it, which is not solved again.
+        keep: takes what is known as it grows, every `SOON` seconds at most, and when the work is interrupted.
     """
-    started = process_time()
-    solver = numerics.solver(curve)
-    found = solve_moments(solver, wanted.p, progress=progress)
-    tries = {name: (INDICES[name].symbol, partial(INDICES[name].solve, solver, found.root)) for name in wanted.indices}
+    draft = Draft(curve, earlier, keep)
+    try:
+        return _solve(draft, wanted, numerics, progress)
+    except KeyboardInterrupt:
+        draft.keep()
+        raise
+
+
+def _solve(draft: Draft, wanted: Wanted, numerics: Numerics, progress: Callable[[], None]) -> Solved:
+    """The same, into a draft."""
+    curve, solver = draft.curve, numerics.solver(draft.curve)
+
+    def advance() -> None:
+        progress()
+        draft.grow()
+
+    found = solve_moments(solver, wanted.p, progress=advance, known=draft.known)
+    draft.columns = columns = MomentColumns(
+        p=found.p,
+        value=found.value,
+        derivative=found.derivative,
+        error_estimate=found.error_estimate,
+        derivative_error=found.derivative_error,
+        residual=found.residual,
+        perturbation=perturbed_moments(curve.problem, found.p),  # Eq. (37)
+        rare=found.rare,
+    )
+    draft.grow()
+    tries = {
+        name: (INDICES[name].symbol, partial(draft.index, name, partial(INDICES[name].solve, solver, found.root)))
+        for name in wanted.indices
+    }
     estimates, missing = _solve_indices(tries, found)
     jumps, more = _solve_jumps(solver, wanted.indices, found)
-    classes = _solve_classes(solver, found.p)
+    classes = _tried(lambda: solver.by_class(found.p))[0] or ()
     missing = [each for each in missing if wanted.is_stated or not each.tells_of(Code.NOT_ONE_RAY)] + more
-    rare, told_of_it = _solve_excursion(solver, wanted, found, estimates[STABILITY_INDEX.name])
-    missing += told_of_it
-    response, told_of_it = _solve_response(curve.problem, wanted, numerics.budget, found)
-    missing += told_of_it
+    index = estimates[STABILITY_INDEX.name]
+    root = None if index is None else index.value
+    rare, response, slopes, refused = None, None, None, list[Message]()
+    if wanted.start is not None:
+        phi, xi = wanted.start
+        rare, reason = draft.part("excursion", lambda: solve_excursion(solver, phi=phi, xi=xi, root=root))
+        missing += _missing(SYMBOL, reason, found)
+    if wanted.response is not None:
+        rtol, grid = wanted.response, wanted.grid
+        response, reason = draft.part("response", lambda: solve_response(curve.problem, rtol, grid, numerics.budget))
+        missing += _missing(RESPONSE, reason, found)
+    if wanted.differentiated is not None:
+        p = np.array([p for p in wanted.differentiated if np.any(found.p == p)])
+        names = [name for name in DIFFERENTIATED if estimates[name] is not None]
+
+        def differentiate() -> Sensitivities:
+            return solve_sensitivities(solver, p, curve.problem.derivatives(), indices=names, root=root)
+
+        slopes, reason = draft.part("sensitivities", differentiate)
+        is_refused = reason is not None and reason.code is Code.NOISE_REFUSED
+        refused = [reason] if reason and is_refused else []
+        missing += [] if is_refused else _missing(SENSITIVITIES, reason, found)
     of = {each: [message for message in missing if message.severity is each] for each in Severity}
-    theory = perturbed_moments(curve.problem, found.p)  # Eq. (37)
     pairs, stationary, undrawn = _functions(solver, without_failed(wanted, found.failures))
     directions, unsettled = _directions(solver, without_failed(wanted, found.failures))
     undrawn += unsettled
-    slopes, refused = None, list[Message]()
-    if wanted.differentiated is not None:
-        try:
-            along = curve.problem.derivatives()
-            slopes = solve_sensitivities(
-                solver,
-                np.array([p for p in wanted.differentiated if np.any(found.p == p)]),
-                along,
-                indices=[name for name in DIFFERENTIATED if estimates[name] is not None],
-                root=None if (index := estimates[STABILITY_INDEX.name]) is None else index.value,
-            )
-        except NoDerivative as failure:
-            refused = [failure.message]
     exponent = estimates[LYAPUNOV_EXPONENT.name]
     notes = (
         heavy_tail_note(curve.problem, None if exponent is None else exponent.value),
@@ -234,16 +364,7 @@ def solve_curve(
     limits = (*of[Severity.WARNING], *imprecise, *undrawn, *unresolved, *refused)
     result = CurveResult(
         curve=curve,
-        moments=MomentColumns(
-            p=found.p,
-            value=found.value,
-            derivative=found.derivative,
-            error_estimate=found.error_estimate,
-            derivative_error=found.derivative_error,
-            residual=found.residual,
-            perturbation=theory,
-            rare=found.rare,
-        ),
+        moments=columns,
         estimates=estimates,
         discretisation=_discretisation(solver),
         jumps=jumps,
@@ -254,7 +375,7 @@ def solve_curve(
         response=response,
         notes=tuple(note for note in notes if note is not None),
         failures=found.failures or tuple(Failure(None, message) for message in of[Severity.FAILURE]),
-        seconds=process_time() - started,
+        seconds=draft.spent(),
     )
     told = (*(failure.reason for failure in result.failures), *result.warnings, *result.notes)
     is_passing = any(each.tells_of(code) for each in told for code in (Code.NO_MEMORY, Code.FAULT))
@@ -278,10 +399,7 @@ def _functions(
         return (), None, []
 
     def pair(p: float) -> PrincipalPair | None:
-        try:
-            return solver.pair(p)
-        except NotConverged:
-            return None
+        return _tried(lambda: solver.pair(p))[0]
 
     pairs, stationary = tuple(filter(None, map(pair, wanted.shown))), pair(0.0) if wanted.draws else None
     try:
@@ -297,16 +415,17 @@ def _directions(solver: ExponentSolver, wanted: Wanted) -> tuple[tuple[SettledDi
     """Of more than two variables what is wanted over directions, of the p that converge; what is beyond the budget."""
     found, missing = list[SettledDirections](), list[Message]()
     for p in sorted({*wanted.shown, 0.0} if wanted.density else wanted.shown) if solver.problem.dimension > 2 else ():
-        try:
-            pair = solver.pair(p)
-        except NotConverged:
-            continue
-        try:
-            with counted(solver.budget.countdown(f"the density of directions at p = {p:g}")):
-                found.append(settled_directions(pair))
-        except NotConverged as failure:
-            missing.append(Message(Code.INDEX_MISSING, symbols=["density of directions"], reason=failure.message))
+        pair, _ = _tried(partial(solver.pair, p))
+        each, reason = (None, None) if pair is None else _tried(partial(_directions_at, solver, pair))
+        found += [each] if each else []
+        if reason:
+            missing.append(Message(Code.INDEX_MISSING, symbols=["density of directions"], reason=reason))
     return tuple(found), missing
+
+
+def _directions_at(solver: ExponentSolver, pair: PrincipalPair) -> SettledDirections:
+    with counted(solver.budget.countdown(f"the density of directions at p = {pair.p:g}")):
+        return settled_directions(pair)
 
 
 def _unclear(found: SettledDirections) -> Iterator[Message]:
@@ -324,7 +443,7 @@ def _unclear(found: SettledDirections) -> Iterator[Message]:
 def _solve_indices(
     tries: Mapping[str, tuple[str, Callable[[], Estimate | Absent]]], moments: MomentLyapunov
 ) -> tuple[dict[str, Estimate | None], list[Message]]:
-    """Indices, δ_p first, None for those not asked for; why others did not converge, are infinite, or do not exist.
+    """Indices, None for those not asked for; why others did not converge, are infinite, or do not exist.
 
     Args:
         tries: by names of `INDICES` what messages call each, and what solves it.
@@ -333,8 +452,7 @@ def _solve_indices(
     estimates: dict[str, Estimate | None] = dict.fromkeys(INDICES)
     unsolved = {each.reason: Message(Code.NO_MOMENT, p=each.p) for each in moments.failures if each.p is not None}
     missing: dict[tuple[Code, Message], list[str]] = {}
-    for name in sorted(tries, key=lambda name: name != STABILITY_INDEX.name):
-        symbol, solve = tries[name]
+    for name, (symbol, solve) in tries.items():
         try:
             found = solve()
         except NotConverged as failure:
@@ -344,6 +462,10 @@ def _solve_indices(
             code, reason = Code.INDEX_MISSING, failure.message
         except MemoryError:
             code, reason = Code.INDEX_FAILED, Message(Code.NO_MEMORY, remedy=Remedy.MEMORY)
+        except OSError:
+            raise
+        except Exception as failure:  # the others are there already
+            code, reason = Code.INDEX_FAILED, _fault(failure)
         else:
             if found:
                 estimates[name] = found
@@ -357,44 +479,11 @@ def _solve_indices(
     return estimates, [Message(code, symbols=symbols, reason=reason) for (code, reason), symbols in missing.items()]
 
 
-def _solve_excursion(
-    solver: ExponentSolver, wanted: Wanted, moments: MomentLyapunov, index: Estimate | None
-) -> tuple[Excursion | None, list[Message]]:
-    """Bounds of excursions, or why they are missing; nothing where they are not wanted."""
-    if wanted.start is None:
-        return None, []
-    phi, xi = wanted.start
-    try:
-        return solve_excursion(solver, phi=phi, xi=xi, root=None if index is None else index.value), []
-    except (NotConverged, NoSuchExponent) as failure:
-        reason = failure.message
-    except MemoryError:
-        reason = Message(Code.NO_MEMORY, remedy=Remedy.MEMORY)
-    code = Code.INDEX_MISSING if moments.failures else Code.INDEX_FAILED
-    return None, [Message(code, symbols=[SYMBOL], reason=reason)]
-
-
-def _solve_response(
-    problem: Problem, wanted: Wanted, budget: Budget, moments: MomentLyapunov
-) -> tuple[CurveResponse | None, list[Message]]:
-    """The stationary response, or why there is none; nothing where it is not wanted."""
-    if wanted.response is None:
-        return None, []
-    try:
-        return solve_response(problem, wanted.response, wanted.grid, budget), []
-    except FpsolveError as failure:
-        reason = failure.message
-    except MemoryError:
-        reason = Message(Code.NO_MEMORY, remedy=Remedy.MEMORY)
-    except OSError:
-        raise
-    except Exception as failure:  # the others are there already
-        reason = _fault(failure)
-    if reason.severity is Severity.NOTE:
-        return None, [reason]
-    return None, [
-        Message(Code.INDEX_MISSING if moments.failures else Code.INDEX_FAILED, symbols=[RESPONSE], reason=reason)
-    ]
+def _missing(symbol: str, reason: Message | None, moments: MomentLyapunov) -> list[Message]:
+    """What is said of a quantity that is missing, if it is."""
+    if reason is None or reason.severity is Severity.NOTE:
+        return [reason] if reason else []
+    return [Message(Code.INDEX_MISSING if moments.failures else Code.INDEX_FAILED, symbols=[symbol], reason=reason)]
 
 
 def _solve_jumps(
@@ -410,13 +499,6 @@ def _solve_jumps(
         told.append({name: found[name] for name in wanted})
         messages += missing
     return tuple(told), messages
-
-
-def _solve_classes(solver: ExponentSolver, p: FloatArray) -> tuple[InvariantClass, ...]:
-    """λ and Λ(p) of the classes of the problem, where they converge."""
-    with suppress(NotConverged, NoSuchExponent):
-        return solver.by_class(p)
-    return ()
 
 
 def _told_of(problem: Problem, classes: Sequence[InvariantClass]) -> Message | None:
@@ -458,12 +540,14 @@ class Order:
         number, varied: of the curve.
         wanted: what of it.
         is_known: whether there is a record, so that only its eigenfunctions are to be drawn.
+        earlier: what an interrupted run knew of it.
     """
 
     number: int
     varied: Varied
     wanted: Wanted
     is_known: bool = False
+    earlier: CurveResult | None = None
 
 
 def solve_batch(
@@ -472,6 +556,7 @@ def solve_batch(
     numerics: Numerics,
     keep: Callable[[Order, Curve, Solved], Kept],
     progress: Callable[[], None] = lambda: None,
+    grow: Callable[[CurveResult], None] = lambda _: None,
 ) -> list[Kept]:
     """The task: solves some sets, and hands each to `keep` before the next is begun.
 
@@ -481,11 +566,12 @@ def solve_batch(
         numerics: how they are solved.
         keep: takes an order, its curve and what was found, and returns what the caller needs to know; it pickles.
         progress: called after each moment; only where the task stays in this process.
+        grow: takes what is known of a set that is not finished.
     """
     kept, of_values = list[Kept](), varying(problem)
     for order in batch:
         curve = Curve(of_values(order.varied), order.varied, order.number)
-        kept.append(keep(order, curve, solved(curve, order, numerics, progress)))
+        kept.append(keep(order, curve, solved(curve, order, numerics, progress, grow)))
     return kept
 
 
@@ -510,7 +596,13 @@ def batches(case: Case, order: Callable[[int, Varied], Order | None]) -> Iterato
             yield found
 
 
-def solved(curve: Curve, order: Order, numerics: Numerics, progress: Callable[[], None] = lambda: None) -> Solved:
+def solved(
+    curve: Curve,
+    order: Order,
+    numerics: Numerics,
+    progress: Callable[[], None] = lambda: None,
+    grow: Callable[[CurveResult], None] = lambda _: None,
+) -> Solved:
     """What is wanted of a set; where that cannot be found, a result that says why, unless its numbers are known."""
     wanted = order.wanted
     if order.is_known:
@@ -523,7 +615,7 @@ def solved(curve: Curve, order: Order, numerics: Numerics, progress: Callable[[]
         except Exception:  # its numbers stay as they are
             return Solved(None, (), None)
     try:
-        return solve_curve(curve, wanted, numerics, progress)
+        return solve_curve(curve, wanted, numerics, progress, order.earlier, grow)
     except FpsolveError as failure:
         return Solved(failed(curve, failure.message), (), None)
     except MemoryError:

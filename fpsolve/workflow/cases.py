@@ -178,7 +178,7 @@ def run_case(
                     results=sweep.results,
                     simulated=simulated,
                     samples=samples,
-                    complete=is_whole and len(sweep.results) == case.planned,
+                    complete=is_whole and sweep.done == case.planned,
                 )
 
         told = saying_if_interrupted(lambda: f"; what was {'done' if simulated else 'solved'} is kept in {folder}")
@@ -350,7 +350,9 @@ def _solve(case: Case, folder: Path, pool: Pool, watch: Watch, *, is_fresh: bool
     with saying_if_interrupted(lambda: " before the first curve"), writable(folder):
         sweep = Sweep(case, folder, is_fresh=is_fresh)
     with (
-        saying_if_interrupted(lambda: kept(len(sweep.results), of_curves(case), folder)),
+        saying_if_interrupted(
+            lambda: kept(sweep.done, of_curves(case), folder, is_more=len(sweep.results) > sweep.done)
+        ),
         writable(folder),
     ):
         try:
@@ -358,6 +360,7 @@ def _solve(case: Case, folder: Path, pool: Pool, watch: Watch, *, is_fresh: bool
                 sweep.solve(pool, progress)
         except KeyboardInterrupt:
             sweep.find()
+            sweep.find_unfinished()
             sweep.write_all()
             raise
         with watch.bar(Phase(case.name, "tables")), signals_held():

@@ -25,7 +25,7 @@ REPORT = r"report\.html"
 CHART, PROVEN, DESIGNED = r"chart\.(csv|json|png|pdf)", r"proof\.json", r"design\.(json|toml)"
 """Patterns of the names of the files that a run writes, a simulation, a chart, proofs, and a design."""
 _UNFINISHED = rf"(eigenfunctions(-\d+)?/)?{TEMPORARY}"
-_FOLDERS = r"records|records/(solved|simulated)|eigenfunctions(-\d+)?"
+_FOLDERS = r"records|records/(solved|simulated|unfinished)|eigenfunctions(-\d+)?"
 _TABLES = {SOLVED: r"summary\.json", SIMULATED: r"monte_carlo(-\d+)?\.json", CHART: r"chart\.json"}
 _TABLES |= {PROVEN: PROVEN, DESIGNED: r"design\.json"}
 """Of each kind of files those that state the parameters."""
@@ -67,9 +67,9 @@ def saying_if_interrupted(what_is_kept: Callable[[], str], again: str = AGAIN) -
         raise KeyboardInterrupt(f"interrupted{what_is_kept()}; {again}") from None
 
 
-def kept(done: int, of: str, folder: Path | None = None) -> str:
-    """How much was done of what, and where that is, if it is kept."""
-    return f" after {done} {of}" + (f"; what was done is kept in {folder}" if done and folder else "")
+def kept(done: int, of: str, folder: Path | None = None, *, is_more: bool = False) -> str:
+    """How much was done of what, and where that is, if it is kept, or a part of the next."""
+    return f" after {done} {of}" + (f"; what was done is kept in {folder}" if (done or is_more) and folder else "")
 
 
 def of_curves(case: Case) -> str:

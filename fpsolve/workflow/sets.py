@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterable, Iterator
 from contextlib import nullcontext
+from dataclasses import replace
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
@@ -22,8 +23,11 @@ from fpsolve.output.records import (
     Records,
     Results,
     append,
+    fits,
+    growing_key,
     key_of,
     record_of,
+    result_of,
     simulated_of,
     simulation_fits,
     simulation_key,
@@ -39,7 +43,7 @@ from fpsolve.workflow.progress import MOMENTS, SETS, Advance, Phase
 Found = tuple[int, Address | CurveResult | None, bool]
 """The number of a curve, its numbers where they are new, and whether some of these are missing."""
 Orders = tuple[Order, ...]
-SOLVED_RECORDS, SIMULATED_RECORDS = "records/solved", "records/simulated"
+SOLVED_RECORDS, SIMULATED_RECORDS, GROWING_RECORDS = "records/solved", "records/simulated", "records/unfinished"
 REST = 50
 """Tables are rewritten when so many times as long has gone by as the last time took, so that all of it costs little."""
 
@@ -53,6 +57,11 @@ def keep(folder: Path, numerics: Numerics, order: Order, curve: Curve, solved: S
         return curve.number, result, is_failed
     key = key_of(curve, order.wanted, numerics)
     return curve.number, append(folder / SOLVED_RECORDS, key, record_of(result)), is_failed
+
+
+def grow(folder: Path, numerics: Numerics, result: CurveResult) -> None:
+    """Write what is known of a set that is not finished, of which the last record counts."""
+    append(folder / GROWING_RECORDS, growing_key(result.curve, numerics), record_of(result))
 
 
 class _Kept:
@@ -86,7 +95,10 @@ class Sweep(_Kept):
         self.started, self._clock = datetime.now(UTC), monotonic()
         self.numerics, self.first, self.further = Numerics.of(case), everything(case, 1), everything(case, 2)
         self.results, self.facts = Results(case, self.records), dict[str, Any]()
-        self._settled, self._due = 0, 0.0
+        self.growing = Records(self.folder / GROWING_RECORDS)
+        if is_fresh:
+            self.growing.remove()
+        self._settled, self._due, self._unfinished = 0, 0.0, set[int]()
         self._steps_each = max(self.first.p.size, 1) if case.planned == 1 else 1
         self.find()
         self.known = len(self.results)
@@ -98,12 +110,44 @@ class Sweep(_Kept):
             return Phase(self.case.name, "solving", self.case.planned, SETS)
         return Phase(self.case.name, "solving", self._steps_each, MOMENTS)
 
+    @property
+    def done(self) -> int:
+        """How many sets are finished."""
+        return len(self.results) - len(self._unfinished)
+
     def find(self) -> None:
         """Look for the records of all sets, also those that a worker has finished without reporting them."""
         for curve in self.looked_through():
             wanted = self._wanted(curve.number)
             if self.results.find(curve, key_of(curve, wanted, self.numerics)):
+                self._unfinished.discard(curve.number)
                 self._settled += not wanted.draws
+        self.growing.look()
+
+    def find_unfinished(self) -> None:
+        """Look for what is known of the sets that were being solved."""
+        for curve in self.case.curves() if self.growing.look().are_there else ():
+            if not self.results.has(curve.number) and (found := self._known_of(curve)):
+                self._unfinished.add(curve.number)
+                self.results.add(curve.number, found)
+
+    def _known_of(self, curve: Curve) -> CurveResult | None:
+        """What an interrupted run knew of a set; None where there is nothing that can be read."""
+        if (address := self.growing.address(growing_key(curve, self.numerics))) is None:
+            return None
+        try:
+            found = result_of(self.growing.read(address), curve)
+        except (OSError, ValueError):
+            return None
+        return found if fits(found, found.moments.p.tolist()) else None
+
+    def _grow(self, result: CurveResult) -> None:
+        """Keep what is known of the only set, and show it in the tables."""
+        grow(self.folder, self.numerics, result)
+        self._unfinished.add(1)
+        self.results.add(1, result)
+        if monotonic() >= self._due:
+            self.write_tables()
 
     def solve(self, pool: Pool, progress: Advance) -> None:
         """Solve what is not known yet; tables are written at the beginning, and as they grow."""
@@ -113,7 +157,8 @@ class Sweep(_Kept):
             progress(self._settled * self._steps_each, known=True)
         queue = _Queue(batches(self.case, self._order))
         kept = partial(keep, self.folder, self.numerics)
-        task = partial(solve_batch, problem=self.case.problem, numerics=self.numerics, keep=kept)
+        growing = self._grow if is_alone else partial(grow, self.folder, self.numerics)
+        task = partial(solve_batch, problem=self.case.problem, numerics=self.numerics, keep=kept, grow=growing)
         if is_alone:
             task = partial(task, progress=progress)
         with serial() if is_alone else pool as workers:
@@ -122,6 +167,7 @@ class Sweep(_Kept):
                     if isinstance(found, Address):
                         self.records.expect(found)
                     if found is not None:
+                        self._unfinished.discard(number)
                         self.results.add(number, found)
                     is_reported = is_alone and not self.known  # p by p
                     progress(0 if is_reported else self._steps_each, failed=int(is_failed))
@@ -130,7 +176,7 @@ class Sweep(_Kept):
 
     def write_tables(self) -> None:
         started, self.facts = monotonic(), facts_of(self.case, self.started, monotonic() - self._clock)
-        write_results(self.case, self.results, self.folder, self.facts)
+        write_results(self.case, self.results, self.folder, self.facts, self.done)
         self._due = monotonic() + REST * (monotonic() - started)
 
     def write_all(self) -> None:
@@ -148,7 +194,8 @@ class Sweep(_Kept):
     def _order(self, number: int, varied: Varied) -> Order | None:
         wanted = self._wanted(number)
         if not self.results.has(number):
-            return Order(number, varied, wanted)
+            order = Order(number, varied, wanted)
+            return replace(order, earlier=self._known_of(self._curve(order))) if self.growing.are_there else order
         if not wanted.draws:
             return None
         return Order(number, varied, without_failed(wanted, self.results.of(number).failures), is_known=True)

@@ -12,9 +12,11 @@ from fpsolve.exponent.error import Absent, Estimate
 from fpsolve.exponent.function import MomentLyapunovFunction, moment_lyapunov, nonzero_root
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem.mesh import make_mesh
+from fpsolve.messages import Code, Message
 from fpsolve.model.noises.non_gaussian import NonGaussianNoise
 from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
 from fpsolve.model.problem import Problem
+from fpsolve.model.systems.parametric import ParametricOscillator
 from fpsolve.model.systems.plane_system import PlaneSystem
 from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
 from tests.conftest import FIG1, FIG1_NOISE, UNIT_NOISE, oracle_arguments
@@ -210,6 +212,29 @@ def test_without_a_stability_index_within_the_interval_there_is_a_reason():
     oscillator = VibroImpactOscillator(omega=10.0, restitution=0.5, c1=-1.0, epsilon=0.1)
     index = nonzero_root(ExponentSolver(Problem(oscillator, OrnsteinUhlenbeck(alpha=1.0, sigma=0.3))))
     assert index == Absent("Λ(p) has no root p ≠ 0 in [-20, 20]")
+
+
+@pytest.mark.parametrize("reach", [0.3, 4.0, 8.0, 10.0, 19.0])
+def test_stability_index_is_looked_for_as_far_as_the_moments_are_resolved(monkeypatch, reach):
+    """Here it is 8.70683; beyond its reach Λ(p) is not solved, which is no failure of δ_p, and no root is made up."""
+    solver = ExponentSolver(Problem(ParametricOscillator(stiffness=1.0, damping=0.2), OrnsteinUhlenbeck(1.0, 0.5)))
+    ratio = ExponentSolver.ratio
+
+    def within_reach(self, p, tolerance=None):
+        if abs(p) > reach:
+            raise NotConverged(Message(Code.NOT_CONVERGED, p=p, reason="far out"))
+        return ratio(self, p, tolerance)
+
+    monkeypatch.setattr(ExponentSolver, "ratio", within_reach)
+    index = nonzero_root(solver)
+    if index:
+        assert reach > 8.70683
+        assert index.value == pytest.approx(8.70683239, abs=1e-6)
+        return
+    told = index.reason
+    assert (told.code, told.data["low"]) == (Code.NO_ROOT_REACHED, -20.0)
+    assert 0 <= told.data["high"] <= min(reach, 8.70683)
+    assert f"no δ_p was found in [-20, {told.data['high']:g}]; beyond, Λ(" in told
 
 
 @pytest.mark.parametrize("epsilon", [1e-2, 1e-4, 1e-5])

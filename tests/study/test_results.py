@@ -80,7 +80,7 @@ def test_what_did_not_converge_is_printed_once(case, tmp_path, capsys):
     assert "┃" not in printed.out
     said = " ".join(printed.err.split())
     assert said.count("Λ(p) near p = 0 follows from Λ(0.01)") == 1
-    assert "no δ_p, λ, Λ″(0), N, R_c, r_c: Λ(p) near p = 0 follows from Λ(0.01): Λ(0.01) did not converge" in said
+    assert "no λ, δ_p, Λ″(0), N, R_c, r_c: Λ(p) near p = 0 follows from Λ(0.01): Λ(0.01) did not converge" in said
     assert "[mesh]" not in said  # there is none
 
 
