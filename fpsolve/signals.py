@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import ctypes
 import os
 import signal
@@ -11,6 +12,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import copy_context
 from functools import partial
+from queue import SimpleQueue
 from typing import Any, NoReturn, TypeVar
 
 ENDING = ("SIGHUP", "SIGTERM")
@@ -110,6 +112,11 @@ def _interrupts_repeated(received: list[int]) -> Iterator[None]:
             timer.join()  # what it has sent already still meets the handlers of the body
 
 
+_away: list[threading.Thread] = []
+"""The thread that long calls are made in, once there is one."""
+_calls: SimpleQueue[Any] = SimpleQueue()
+
+
 def left_at_signals(function: Callable[[], Result]) -> Result:
     """What a long call of a library returns; a signal that ends work leaves it, as libraries obey none.
 
@@ -128,17 +135,45 @@ def left_at_signals(function: Callable[[], Result]) -> Result:
         finally:
             done.set()
 
-    thread = threading.Thread(target=call, daemon=True)
-    thread.start()
+    if not (_away and _away[0].is_alive()):
+        _away[:] = [threading.Thread(target=_call_away, daemon=True)]
+        _away[0].start()
+        atexit.register(_end_thread, _away[0])
+    _calls.put(call)
     try:
         while not done.wait(LOOK_SECONDS):
             pass
     except BaseException:
+        thread = _away.pop()
         ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread.ident or 0), ctypes.py_object(SystemExit))
         raise
     if failures:
         raise failures.pop()
     return found.pop()
+
+
+def _call_away() -> None:
+    while (call := _calls.get()) is not None:
+        if callable(call):
+            call()
+        del call  # what is no call ends here
+
+
+def _end_thread(thread: threading.Thread) -> None:
+    """End it before Python does, which would report what SuperLU leaves behind there."""
+    if thread in _away:
+        _calls.put(None)
+        thread.join()
+
+
+def is_away() -> bool:
+    """Whether this is the thread that long calls are made in."""
+    return threading.current_thread() in _away
+
+
+def end_away(thing: object) -> None:
+    """Let a thing end in that thread, if nothing else holds it."""
+    _calls.put(thing)
 
 
 def is_interrupt(failure: BaseException | None) -> bool:

@@ -23,7 +23,7 @@ from fpsolve.fem.axis import KroneckerSum
 from fpsolve.fem.dense import DenseFactors, Factors
 from fpsolve.fem.refined import RefinedFactors
 from fpsolve.fem.rings import Ring, RingFactors, ring_gigabytes, ring_seconds
-from fpsolve.signals import left_at_signals
+from fpsolve.signals import end_away, is_away, left_at_signals
 
 MAX_DENSE_UNKNOWNS = 350
 """Below it one dense matrix is the fastest."""
@@ -60,9 +60,22 @@ def _pools() -> ThreadpoolController:
     return ThreadpoolController()
 
 
-def sparse_lu(matrix: Any, **options: Any) -> Any:
+class SparseLU:
+    """SuperLU's factors; they end in the thread that made them, as scipy frees their memory in no other."""
+
+    def __init__(self, matrix: Any, **options: Any) -> None:
+        self._lu, self._is_away = splu(matrix, **options), is_away()
+        self.solve = self._lu.solve
+
+    def __del__(self) -> None:
+        if getattr(self, "_is_away", False):
+            del self.solve
+            end_away(self.__dict__.pop("_lu"))
+
+
+def sparse_lu(matrix: Any, **options: Any) -> SparseLU:
     """SuperLU's factors, ordered for a symmetric pattern. Raises `SingularMatrix`."""
-    factorise = partial(splu, matrix, permc_spec="MMD_AT_PLUS_A", **options)
+    factorise = partial(SparseLU, matrix, permc_spec="MMD_AT_PLUS_A", **options)
     try:
         return left_at_signals(factorise) if matrix.nnz > MANY_ENTRIES else factorise()
     except RuntimeError as failure:

@@ -30,6 +30,7 @@ class NoPaths(Noise):
     """Something that looks like a noise."""
 
     level: float = 1.0
+    standard_deviation = correlation_time = 1.0
 
     def spectral_density(self, omega):
         return self.level
