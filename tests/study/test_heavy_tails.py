@@ -29,7 +29,7 @@ def path(tmp_path_factory):
 def test_every_result_says_it(path, tmp_path, capsys):
     assert main(["run", str(path), "--out", str(tmp_path)]) == 0
     printed = capsys.readouterr()
-    assert "δ_p = none " in printed.out
+    assert "δ_p = none\n" in printed.out
     said = " ".join(printed.err.split())
     assert "Λ(p) > 0 for every p ≠ 0" in said
     assert "λ is the growth rate of almost every path" in said
