@@ -13,7 +13,6 @@ import numpy as np
 from scipy.linalg.blas import dgemm
 from scipy.sparse import identity
 from scipy.sparse.csgraph import connected_components, reverse_cuthill_mckee, shortest_path
-from scipy.sparse.linalg import splu
 from threadpoolctl import ThreadpoolController
 
 from fpsolve.arrays import FloatArray
@@ -23,7 +22,8 @@ from fpsolve.fem.axis import KroneckerSum
 from fpsolve.fem.dense import DenseFactors, Factors
 from fpsolve.fem.refined import RefinedFactors
 from fpsolve.fem.rings import Ring, RingFactors, ring_gigabytes, ring_seconds
-from fpsolve.signals import end_away, is_away, left_at_signals
+from fpsolve.signals import left_at_signals
+from fpsolve.superlu import sparse_lu
 
 MAX_DENSE_UNKNOWNS = 350
 """Below it one dense matrix is the fastest."""
@@ -33,8 +33,8 @@ MAX_THICK_BLOCK = 2000
 """The same with two noises, where SuperLU fills in more; then the last noise is the one with the most functions."""
 MAX_LEVEL = 0.2
 """Share of the functions of the last axis that one level may have."""
-LONG, MANY_ENTRIES = 0.5, 1e6
-"""Seconds of a factorisation, and entries of a sparse matrix, from which on it runs where it can be left."""
+LONG = 0.5
+"""Seconds of a factorisation from which on it runs where it can be left."""
 PLANE_SECONDS, PLANE_BYTES = 3e-7, 90.0
 """Of SuperLU for two axes, for an entry of the matrix."""
 FRONT_SECONDS, FRONT_BYTES = 2.5e-10, 24.0
@@ -58,28 +58,6 @@ def one_thread() -> Any:
 @cache
 def _pools() -> ThreadpoolController:
     return ThreadpoolController()
-
-
-class SparseLU:
-    """SuperLU's factors; they end in the thread that made them, as scipy frees their memory in no other."""
-
-    def __init__(self, matrix: Any, **options: Any) -> None:
-        self._lu, self._is_away = splu(matrix, **options), is_away()
-        self.solve = self._lu.solve
-
-    def __del__(self) -> None:
-        if getattr(self, "_is_away", False):
-            del self.solve
-            end_away(self.__dict__.pop("_lu"))
-
-
-def sparse_lu(matrix: Any, **options: Any) -> SparseLU:
-    """SuperLU's factors, ordered for a symmetric pattern. Raises `SingularMatrix`."""
-    factorise = partial(SparseLU, matrix, permc_spec="MMD_AT_PLUS_A", **options)
-    try:
-        return left_at_signals(factorise) if matrix.nnz > MANY_ENTRIES else factorise()
-    except RuntimeError as failure:
-        raise SingularMatrix(*failure.args) from failure
 
 
 class Plan(NamedTuple):

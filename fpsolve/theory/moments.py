@@ -27,14 +27,14 @@ import scipy.linalg
 from scipy import sparse
 from scipy.linalg import eigh_tridiagonal
 from scipy.linalg.lapack import dgetrf, dgetrs
-from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigs, splu
+from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigs
 
 from fpsolve.arrays import Coefficient, FloatArray, dense, one
 from fpsolve.budget import charge
-from fpsolve.errors import NoHierarchy
+from fpsolve.errors import NoHierarchy, SingularMatrix
 from fpsolve.model.noise import Noise
 from fpsolve.model.problem import Problem
-from fpsolve.signals import left_at_signals
+from fpsolve.superlu import sparse_lu
 
 MOST, MOST_MOMENTS = 20_000, 1000
 """Equations at most, and moments for each function of the noise."""
@@ -471,15 +471,15 @@ def _clean(matrix: Any) -> FloatArray:
 
 
 def _solver(h: Any, sigma: float) -> Callable[..., FloatArray]:
-    """(σ − h)⁻¹ of a vector, or its transpose for trans = 1. Raises `RuntimeError` where it is singular."""
+    """(σ − h)⁻¹ of a vector, or its transpose for trans = 1. Raises `SingularMatrix`."""
     if isinstance(h, np.ndarray):
         lu, pivots, singular = dgetrf(sigma * np.eye(len(h)) - h)
         if singular:
-            raise RuntimeError("singular")
+            raise SingularMatrix("singular")
         return lambda x, trans=0: dgetrs(lu, pivots, x, trans=trans)[0]
     matrix = (sigma * sparse.eye_array(h.shape[0]) - h).tocsc()
     charge(SECONDS_PER_ENTRY * matrix.nnz, 1e-9 * BYTES_PER_ENTRY * matrix.nnz, h.shape[0])
-    factors = left_at_signals(partial(splu, matrix)) if matrix.nnz > MANY_ENTRIES else splu(matrix)
+    factors = sparse_lu(matrix, permc_spec="COLAMD", many=MANY_ENTRIES)
     return lambda x, trans=0: np.asarray(factors.solve(x, "T" if trans else "N"))
 
 
@@ -511,7 +511,7 @@ def _rightmost(h: Any, *starts: FloatArray) -> tuple[float, FloatArray, FloatArr
     for _ in range(MOST_POLISHES):
         try:
             solve = _solver(h, sigma)
-        except RuntimeError:  # it is an eigenvalue to the last digit
+        except SingularMatrix:  # it is an eigenvalue to the last digit
             break
         for _ in range(2):
             x, y = solve(x), solve(y, 1)
