@@ -94,11 +94,12 @@ def test_parts_of_a_number_are_counted_with_it():
 
 
 PEAK = """
-import json, math, resource, sys
+import json, math, sys
 from fpsolve.budget import Countdown
 from fpsolve.errors import NotConverged
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.solver import ExponentSolver
+from tests.benchmarks.measure import peak_memory
 from tests.test_budget import LARGE
 make, p, rtol = LARGE[sys.argv[1]]
 solver, said = ExponentSolver(make(), rtol=rtol, budget=Budget(memory=float(sys.argv[2]))), ""
@@ -107,7 +108,7 @@ with Countdown(math.inf).running() as whole:
         solver.variance_rate() if p is None else solver.solution(p)
     except NotConverged as failure:
         said = str(failure)
-print(json.dumps([resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6, whole.peak, said]))
+print(json.dumps([peak_memory() / 1e3, whole.peak, said]))
 """
 
 

@@ -345,12 +345,12 @@ def test_a_folder_in_use_exits_2(case, tmp_path, capsys):
 def test_an_interrupted_run_says_what_is_kept(case, tmp_path, capsys, monkeypatch, number, message):
     original = solve.solve_curve
 
-    def interrupted(curve, wanted, numerics, _):
+    def interrupted(curve, wanted, numerics, _, *more):
         def progress():
             if curve.number == number:
                 raise KeyboardInterrupt
 
-        return original(curve, wanted, numerics, progress)
+        return original(curve, wanted, numerics, progress, *more)
 
     monkeypatch.setattr(solve, "solve_curve", interrupted)
     assert main(["run", case, "--jobs", "1"]) == INTERRUPTED
