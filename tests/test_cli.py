@@ -338,7 +338,7 @@ def test_a_folder_in_use_exits_2(case, tmp_path, capsys):
 @pytest.mark.parametrize(
     ("number", "message"),
     [
-        (1, "interrupted after 0 of 2 curves; run it again to go on"),
+        (1, "interrupted after 0 of 2 curves; what was done is kept in results/test; run it again to go on"),
         (2, "interrupted after 1 of 2 curves; what was done is kept in results/test; run it again to go on"),
     ],
 )
