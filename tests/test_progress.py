@@ -6,6 +6,8 @@ import re
 import pytest
 from rich.console import Console
 
+from fpsolve.budget import charge
+from fpsolve.exponent.adapt import Budget
 from fpsolve.workflow.progress import MOMENTS, PERCENT, POINTS, SETS, SILENT, Bars, Phase, counted, seconds_left
 
 SOLVING = Phase("case", "solving", 400, SETS)
@@ -151,3 +153,34 @@ def test_nothing_is_seen_of_silent_phases(capsys):
     with SILENT.bar(SOLVING) as advance:
         advance(400, failed=3, known=True)
     assert capsys.readouterr() == ("", "")
+
+
+def spend(number=3):
+    """Some factorisations of Λ″(0)."""
+    with Budget(seconds=60.0).countdown("Λ″(0)").running():
+        for _ in range(number):
+            charge(13.0, unknowns=12_400)
+
+
+def test_a_file_is_told_what_a_long_number_waits_for(clock):
+    bars = Bars(console(), clock)
+    with bars.bar(Phase("mathieu", "solving", 11, MOMENTS)):
+        spend()  # a short one is not told
+        assert bars.console.file.getvalue() == ""
+        clock.now += 12
+        spend(3)
+    assert bars.console.file.getvalue() == "mathieu, solving: Λ″(0), 12,400 unknowns, 13 s of 60 s\n"
+    spend()
+    assert bars.console.file.getvalue().count("\n") == 1
+
+
+@pytest.mark.parametrize("width", [60, 80, 120, 150])
+def test_a_terminal_shows_what_a_number_waits_for(clock, width, monkeypatch):
+    screen = console(width, force_terminal=True, color_system=None, legacy_windows=False)
+    bars = Bars(screen, clock)
+    with bars.bar(Phase("mathieu", "solving", 11, MOMENTS)):
+        spend()
+        bars._display.refresh()
+    shown = screen.file.getvalue()
+    assert ("Λ″(0), 12,400 unknowns, 39 s of 60 s" in shown) == (width > 60)
+    assert max(map(len, re.split(r"[\r\n]", shown))) <= width + 20

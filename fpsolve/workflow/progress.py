@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, ProgressColumn, Task
 from rich.table import Column
 from rich.text import Text
 
+from fpsolve.budget import Countdown, watched
 from fpsolve.case.case import Case
 from fpsolve.messages import Message
 from fpsolve.study.results import CurveResult, SimulatedCurve
@@ -24,8 +26,8 @@ LINE_SECONDS, LINE_SHARE = 10.0, 0.1
 """A line in a file comes after as long at least, and as far."""
 KNOWN_SECONDS, KNOWN_SHARE, KNOWN_STEPS = 5.0, 0.05, 8
 """A time to go is shown after as long, as far, and as many steps: the first ones are slow, and processes start then."""
-ROOMY = 80
-"""Columns of a terminal from which on there is room for the name of the case."""
+ROOMY, LONGEST_WAIT = 80, 50
+"""Columns of a terminal from which on there is room for the name of the case, and more for a long bar."""
 
 
 @dataclass(frozen=True)
@@ -92,7 +94,8 @@ class Bars:
         is_roomy = self.console.width >= ROOMY
         self._display = Progress(
             _TextColumn(lambda task: f"{task.fields['phase'].case}, " * is_roomy + task.description),
-            BarColumn(bar_width=20 if is_roomy else 4),
+            _TextColumn(lambda task: task.fields["waits"], "dim"),
+            BarColumn(bar_width=20 if self.console.width >= ROOMY + LONGEST_WAIT else 4),
             _TextColumn(counted),
             _TextColumn(timed, "cyan"),
             console=self.console,
@@ -108,7 +111,8 @@ class Bars:
     def bar(self, phase: Phase) -> Iterator[Advance]:
         """Shows a phase as long as the body lasts, and those before it."""
         display = self._display
-        number = display.add_task(phase.name, total=phase.total, phase=phase, known=0, failed=0, marks=[(0.0, 0.0)])
+        fields: dict[str, Any] = {"phase": phase, "known": 0, "failed": 0, "marks": [(0.0, 0.0)], "waits": ""}
+        number = display.add_task(phase.name, total=phase.total, **fields)
         task = display.tasks[-1]
         printed, printed_at = 0, self.clock()
 
@@ -129,17 +133,34 @@ class Bars:
                 print(f"{phase.case}, {phase.name}: {counted(task)}{left}", file=self.console.file, flush=True)
                 printed, printed_at = int(task.completed), self.clock()
 
+        def wait(countdown: Countdown) -> None:
+            nonlocal printed_at
+            if not countdown.name or not math.isfinite(countdown.seconds):
+                return
+            text = waiting(countdown)
+            display.update(number, waits=text)
+            if not self.is_live and self.clock() - printed_at >= LINE_SECONDS:
+                print(f"{phase.case}, {phase.name}: {text}", file=self.console.file, flush=True)
+                printed_at = self.clock()
+
         if self.is_live and not self._open:
             display.start()
         self._open += 1
         try:
-            yield advance
+            with watched(wait):
+                yield advance
         finally:
+            display.update(number, waits="")
             display.stop_task(number)
             display.update(number, total=task.completed or 1, completed=task.completed or not phase.unit)
             self._open -= 1
             if self.is_live and not self._open:
                 display.stop()
+
+
+def waiting(countdown: Countdown) -> str:
+    """What is solved, and what it waits for: "Λ″(0), 12,400 unknowns, 40 s of 60 s"."""
+    return f"{countdown.name}, {countdown.unknowns:,} unknowns, {countdown.spent:.0f} s of {countdown.seconds:g} s"
 
 
 def counted(task: Task) -> str:
