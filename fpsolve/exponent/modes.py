@@ -21,8 +21,8 @@ from typing import Any
 import numpy as np
 import scipy.linalg
 
-from fpsolve.arrays import FloatArray, finite, one
-from fpsolve.errors import MeshError, NotConverged, SingularMatrix
+from fpsolve.arrays import FloatArray
+from fpsolve.errors import MeshError, NoHierarchy, NotConverged, SingularMatrix
 from fpsolve.exponent.adapt import SHARE, NearPlace, _Search
 from fpsolve.exponent.eigen import PrincipalPair, principal_pair
 from fpsolve.exponent.error import Solution, mode_effects
@@ -30,6 +30,7 @@ from fpsolve.fem.discretisation import Discretisation, ModeEffects, Polynomials,
 from fpsolve.fem.harmonics import HarmonicCells
 from fpsolve.fem.sphere import Coordinates, SphereCells, SphereGenerator, group_dimensions
 from fpsolve.model.problem import Problem
+from fpsolve.theory.moments import even_moment, moment_form
 
 FIRST_WAVES, FIRST_DEGREE = 2, 6
 LARGEST_STEP = 1.0
@@ -50,51 +51,23 @@ LEFT = 0.5
 """The same, over what two degrees more changed in the corrected value, or will change in the other, see `left_of`."""
 MEASURED = 3.0
 """What is left after elements or polynomials of the noise, over what two degrees more of them change."""
-DIGITS = 10.0
 
 
 def second_moments(problem: Problem) -> tuple[float, FloatArray, FloatArray]:
-    """Λ(2), Q of E‖x‖² and the second moments E xxᵀ, by their equations in polynomials of the noise.
+    """Λ(2), Q of E‖x‖² and the second moments E xxᵀ, in the mean over the noise, in the coordinates of the motion.
 
-    With T = Σ xᵀQ_k x f_k(ξ) the generator is Σ (Aᵀ ⊕ Aᵀ) ⊗ Ξ_g + 1 ⊗ L_ξ + ½(Bᵀ ⊕ Bᵀ)²; Q is the mean over ξ of the
-    right eigenvector, E xxᵀ that of the left one, both without a scale.
+    Both matrices are without a scale, and 1 where noise is too strong or slow for the equations of the moments.
     """
-    motion, named = problem.motion, problem.coloured.parts
-    axes = [first_part(noise, DIGITS).axis(noise, 0.0) for noise in named.values()]
-    ones = [np.asarray(axis.matrix(one)) for axis in axes]
     unit = np.eye(problem.dimension)
-
-    def both(matrix: Any, order: int) -> FloatArray:
-        a = motion.epsilon**order * np.array(matrix).T
-        return np.kron(a, unit) + np.kron(unit, a)
-
-    def product(of_state: FloatArray, of_noise: Any = None, at: int = 0) -> FloatArray:
-        factors = [of_noise if k == at and of_noise is not None else each for k, each in enumerate(ones)]
-        for each in factors:
-            of_state = np.kron(of_state, np.asarray(each))
-        return of_state
-
-    names, size = list(named), problem.dimension**2
-    total = 0.0 * product(np.eye(size))
-    for k, axis in enumerate(axes):
-        total = total + product(np.eye(size), axis.matrix(None), k)
-    for term in motion.terms:
-        at = names.index(term.noise) if term.noise in named else 0
-        total = total + product(both(term.matrix, term.order), axes[at].matrix(term.g), at)
-    for each in problem.diffusions:
-        square = both(each.matrix, each.order)
-        total = total + product(0.5 * square @ square)
-    values, lefts, rights = scipy.linalg.eig(finite(total), finite(product(np.eye(size))), left=True)
-    best = int(np.argmax(values.real))
-    mean: FloatArray = np.ones(1)
-    for axis, weight in zip(axes, ones, strict=True):
-        mean = np.asarray(np.kron(mean, weight @ axis.constant))
-
-    def of_state(vectors: Any) -> FloatArray:
-        q = (vectors[:, best].real.reshape(size, -1) @ mean).reshape(unit.shape)
-        return np.asarray(0.5 * (q + q.T) * np.sign(np.trace(q)))
-
-    return float(values[best].real), of_state(rights), of_state(lefts)
+    try:
+        found = even_moment(problem, 2)
+    except NoHierarchy:
+        return math.nan, unit, unit
+    q, moments = (moment_form(each, problem.dimension, 2) for each in (found.polynomial, found.moments))
+    frame = unit if problem.frame is None else np.array(problem.frame.matrix)
+    inverse = np.linalg.inv(frame)
+    q, moments = frame.T @ q @ frame, inverse @ moments @ inverse.T
+    return found.value, q * np.sign(np.trace(q)), moments * np.sign(np.trace(moments))
 
 
 def modal_coordinates(problem: Problem) -> tuple[Coordinates, float, tuple[float, float]]:

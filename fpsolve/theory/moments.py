@@ -320,7 +320,7 @@ class EvenMoment:
     def is_positive(self) -> bool:
         """Whether E x^α are moments, and T is positive, as far as it is seen: both but for a common sign."""
         form, t = (
-            _moment_form(self.moments, self.equations.problem.dimension, self.equations.p),
+            moment_form(self.moments, self.equations.problem.dimension, self.equations.p),
             self._polynomial_values(),
         )
         return _has_one_sign(np.asarray(np.linalg.eigvalsh(form))) and _has_one_sign(t)
@@ -329,7 +329,7 @@ class EvenMoment:
         """T at some directions; of p = 2 the eigenvalues of its matrix."""
         n, p = self.equations.problem.dimension, self.equations.p
         if p == 2:
-            return np.asarray(np.linalg.eigvalsh(_moment_form(self.polynomial, n, 2)))
+            return np.asarray(np.linalg.eigvalsh(moment_form(self.polynomial, n, 2)))
         x = np.random.default_rng(0).standard_normal((200, n))
         x /= np.linalg.norm(x, axis=1)[:, None]
         alphas, _ = _ladder(n, p)
@@ -348,7 +348,7 @@ def _multinomials(alphas: Any) -> FloatArray:
     return np.asarray(np.exp(gammaln(alphas.sum(axis=1) + 1) - gammaln(alphas + 1).sum(axis=1)))
 
 
-def _moment_form(moments: FloatArray, n: int, p: int) -> FloatArray:
+def moment_form(moments: FloatArray, n: int, p: int) -> FloatArray:
     """E x^(α + β), |α| = |β| = p/2, in the units of the functions of order p/2."""
     alphas, _ = _ladder(n, p)
     halves, _ = _ladder(n, p // 2)
