@@ -514,13 +514,12 @@ def _rightmost(h: Any, *starts: FloatArray) -> tuple[float, FloatArray, FloatArr
         except SingularMatrix:  # it is an eigenvalue to the last digit
             break
         for _ in range(2):
-            x, y = solve(x), solve(y, 1)
-            x, y = x / np.linalg.norm(x), y / np.linalg.norm(y)
+            x, y = (each / np.max(np.abs(each)) for each in (solve(x), solve(y, 1)))
         last, value = value, float(y @ (h @ x)) / float(y @ x)
         rounding = ROUNDING * float(np.abs(y) @ (sizes @ np.abs(x))) / abs(float(y @ x))
         if abs(value - last) <= 0.1 * rounding:
             break
-        sigma = value + 1e-3 * rounding
+        sigma = value + max(1e-3 * rounding, ROUNDING**2 * float(sizes.max()))
     return value, x, y / float(y @ x)
 
 
