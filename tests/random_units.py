@@ -40,7 +40,7 @@ from fpsolve.model.noise import Noise
 
 SYSTEMS, MOST = 300, 1.5
 ORDERS = (1.0, 2.0)
-OWN_SECONDS, SECONDS = 20.0, 60.0
+OWN_SECONDS, SECONDS = 10.0, 30.0
 RTOL, RTOL_OF_MANY = 1e-7, 1e-3
 """In the plane, and where there are more than two variables, or two of a filter."""
 DIGITS = 2.0**-12
