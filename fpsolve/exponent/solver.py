@@ -293,7 +293,8 @@ class ExponentSolver:
             return None
         if p not in self._even:
             found = None
-            with suppress(NoHierarchy, NotConverged, ArithmeticError), one_thread(), counted(self.budget.countdown(f"Λ({p:g})")):
+            countdown = self.budget.countdown(f"Λ({p:g})")
+            with suppress(NoHierarchy, NotConverged, ArithmeticError), one_thread(), counted(countdown):
                 found = even_moment(self.problem, p, 0.1 * self.tolerance(p, 0.0), MOST_EQUATIONS)
             self._even[p] = found
         return self._even[p]
