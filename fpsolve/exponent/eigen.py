@@ -219,20 +219,6 @@ def spectrum(generator: Generator, p: float, k: int = 10) -> Any:
     return values[np.lexsort((values.imag, -values.real))][:k]
 
 
-def rightmost_pair(generator: Generator, p: float) -> PrincipalPair:
-    """The pair of the rightmost eigenvalue, for spaces in which no other lies further to the right than Λ(p)."""
-    charge(SECONDS_OF_CUBE * generator.size**3, 64e-9 * generator.size**2, generator.size)
-    root, matrix = _standard(generator, p)
-    values, vectors = left_at_signals(partial(np.linalg.eig, matrix))  # that of SciPy holds the lock of Python
-    best = int(np.argmax(values.real))
-    right = vectors[:, best].real
-    shifted = matrix.T - (values[best].real + 1e-6 * generator.unit_rate) * np.eye(right.size)
-    left = np.linalg.solve(shifted, right / np.linalg.norm(right))
-    x, y = (scipy.linalg.solve_triangular(root, each, lower=True, trans="T") for each in (right, left))
-    pencil = generator.at(p)
-    return _pair(generator, pencil, rayleigh_iteration(pencil, x, y, generator.unit_rate))
-
-
 def _standard(generator: Generator, p: float) -> tuple[FloatArray, FloatArray]:
     """The Cholesky factor C of the mass matrix, and C⁻¹ L(p) C⁻ᵀ, dense."""
     root = scipy.linalg.cholesky(finite(generator.space(p).mass.toarray()), lower=True)
