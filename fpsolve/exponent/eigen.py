@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property, partial, reduce
+from functools import cached_property, reduce
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,7 +22,6 @@ import scipy.linalg
 from scipy.sparse.linalg import ArpackError, ArpackNoConvergence, LinearOperator, eigs
 
 from fpsolve.arrays import FloatArray, dense, finite, one
-from fpsolve.budget import charge
 from fpsolve.data import brief
 from fpsolve.errors import NotConverged, NumericalFailure, SingularMatrix
 from fpsolve.exponent.fields import EigenfunctionPlot
@@ -32,7 +31,6 @@ from fpsolve.fem.factors import one_thread
 from fpsolve.fem.generator import Generator, Pencil
 from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.problem import Problem
-from fpsolve.signals import left_at_signals
 from fpsolve.theory.frozen import eigenvalues_at, frozen_noise
 
 BACKWARD_ERROR_GOAL, BACKWARD_ERROR_OF_RATE = 1e-14, 1e-7
