@@ -253,7 +253,7 @@ def rightmost(matrix, near=None):
     for _ in range(8):
         factors = splu((matrix - shift * sparse.eye_array(count)).tocsc(), permc_spec=order)
         inverse = LinearOperator(matrix.shape, factors.solve, dtype=float)
-        found, right = eigs(inverse, 6, v0=start, tol=1e-12)
+        found, right = eigs(inverse, 4, v0=start, tol=1e-11, ncv=40, maxiter=100)
         values = shift + 1 / found
         k = int(np.argmax(values.real))
         if values[k].real < shift and abs(values[k] - shift) <= np.min(np.abs(values - shift)) * (1 + 1e-9):
@@ -262,7 +262,7 @@ def rightmost(matrix, near=None):
     else:
         raise ArithmeticError("no shift to the right of the spectrum")
     transposed = LinearOperator(matrix.shape, lambda x: factors.solve(x, trans="T"), dtype=float)
-    other, left = eigs(transposed, 2, v0=start, tol=1e-8)
+    other, left = eigs(transposed, 2, v0=start, tol=1e-6, ncv=40, maxiter=100)
     j = int(np.argmin(np.abs(shift + 1 / other - values[k])))
     angle = abs(left[:, j] @ right[:, k])
     return complex(values[k]), 2e-16 * norm / max(float(angle), 1e-16)
@@ -335,7 +335,11 @@ class Limit:
 
     @property
     def is_settled(self):
-        return len(self.found) > 1 and self._truncation <= CLOSE * (abs(self.last) + self.least)
+        return len(self.found) > 1 and self._truncation <= self._close
+
+    @property
+    def _close(self):
+        return max(CLOSE * (abs(self.last) + self.least), self.rounding)
 
     @property
     def doubt(self):
@@ -349,7 +353,7 @@ class Limit:
         if len(self.found) < 2:
             return math.inf
         *earlier, change = np.abs(np.diff(self.found))
-        if change <= CLOSE * (abs(self.last) + self.least):
+        if change <= self._close:
             return float(change)
         if not earlier:
             return math.inf
