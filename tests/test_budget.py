@@ -171,11 +171,11 @@ def test_the_peak_of_memory_is_foreseen(name):
 @pytest.mark.parametrize("name", sampled(*LARGE))
 def test_what_is_foreseen_above_the_memory_is_refused_before_it_is_allocated(name):
     """Before, 5 GB were reached where 2.4 were promised."""
-    largest, foreseen, said = peak(name, memory=0.3)
-    assert "GB of memory, more than budget.memory = 0.3" in said
+    largest, foreseen, said = peak(name, memory=0.2)
+    assert "GB of memory, more than budget.memory = 0.2" in said
     assert said.endswith("use a larger rtol or a larger budget")
-    assert foreseen <= 0.3
-    assert largest <= 1.25 * 0.3
+    assert foreseen <= 0.2
+    assert largest <= 1.25 * 0.2
 
 
 @pytest.mark.parametrize("memory", [0.0, -1.0, math.inf, math.nan, "8"])
