@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from decimal import Decimal
@@ -33,7 +33,7 @@ ORDERS = "moments.p"
 Literals = Mapping[float, str]
 """Decimals by their floats."""
 Answer = Enclosure | IndexEnclosure | ExcursionEnclosure
-Question = Callable[[], Answer]
+Question = partial[Any]
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,30 +3,80 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
+from hashlib import sha256
 from pathlib import Path
 from time import monotonic
 from typing import TYPE_CHECKING
 
+from pydantic import TypeAdapter
+
+from fpsolve import __version__
 from fpsolve.case.case import Case
 from fpsolve.files import writable
 from fpsolve.output.proofs import write_proof
+from fpsolve.output.records import Records, append
 from fpsolve.pool import Pool, serial
-from fpsolve.proofs.certificate import MalformedProof
+from fpsolve.proofs.certificate import NOTHING, Enclosure, MalformedProof, enclosure_of
 from fpsolve.proofs.claims import Claims, claims_from
+from fpsolve.proofs.verify import objection
 from fpsolve.reading import Unreadable, Words, read_text
-from fpsolve.study.prove import Answer, CurveProof, Plan, answer, refuse_unprovable_case
-from fpsolve.workflow.folders import ANEW, PROVEN, kept, own_folder, saying_if_interrupted
+from fpsolve.study.prove import Answer, CurveProof, Plan, Question, answer, refuse_unprovable_case
+from fpsolve.workflow.folders import PROVEN, kept, own_folder, saying_if_interrupted
 from fpsolve.workflow.progress import BOUNDS, SILENT, Phase, Watch
 from fpsolve.workflow.reports import facts_since, shown_at_the_end, write_report
 
 if TYPE_CHECKING:
     from fpsolve.output.report import Reporter
 
+PROVEN_RECORDS = "records/proven"
+ENCLOSURES = TypeAdapter(Enclosure)
 EVERY = 30.0
 """Seconds after which the curves that are done are written, so that a run that is killed keeps them."""
 _WORDS = Words("the proof", "a proof", "proof.json", "JSON", "make one with `fpsolve prove`")
+
+
+class Kept:
+    """Bounds on Λ(p) and λ that an earlier run has proven, each verified anew from its certificate.
+
+    Args:
+        folder: of their records.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.records, self._known = Records(folder).look(), dict[str, Enclosure | None]()
+
+    def find(self, question: Question) -> Enclosure | None:
+        """What was proven, if it was, and follows."""
+        if (key := self._key(question)) not in self._known:
+            self._known[key] = self._read(key)
+        return self._known[key]
+
+    def add(self, question: Question, found: Answer) -> None:
+        """Keep what was proven."""
+        if isinstance(found, Enclosure):
+            append(self.records.folder, self._key(question), {"enclosure": ENCLOSURES.dump_python(found)})
+
+    def _read(self, key: str) -> Enclosure | None:
+        if (address := self.records.address(key)) is None:
+            return None
+        try:
+            found = ENCLOSURES.validate_python(self.records.read(address)["enclosure"])
+        except (OSError, ValueError, LookupError, TypeError):
+            return None
+        if found.certificate is None:
+            return found if found == replace(NOTHING, wanted=found.wanted) else None
+        whole = enclosure_of(found.certificate)
+        is_same = (whole.lower, whole.upper) == (found.lower, found.upper)
+        return found if is_same and not objection(found.certificate) else None
+
+    @staticmethod
+    def _key(question: Question) -> str:
+        """From the function and its arguments; the problem among these follows from what is stated."""
+        _, *asked = question.args
+        told = [__version__, question.func.__name__, *map(repr, asked), repr(question.keywords)]
+        return sha256("\n".join(told).encode()).hexdigest()
 
 
 @dataclass(frozen=True)
@@ -82,16 +132,22 @@ def prove_case(
 
     with (
         own_folder(case, out, (PROVEN,)) as folder,
-        saying_if_interrupted(lambda: kept(len(answers), f"of {plan.total} bounds", folder), ANEW),
+        saying_if_interrupted(lambda: kept(len(answers), f"of {plan.total} bounds", folder)),
         watch.bar(Phase(case.name, "proving", plan.total, BOUNDS)) as progress,
         pool or serial() as workers,
     ):
         written = monotonic()
         with shown_at_the_end(show):
             try:
-                for found in workers.map(answer, plan.questions()):
+                kept_bounds = Kept(folder / PROVEN_RECORDS)
+                fresh = workers.map(answer, (each for each in plan.questions() if kept_bounds.find(each) is None))
+                for question in plan.questions():
+                    found: Answer | None = kept_bounds.find(question)
+                    is_known = found is not None
+                    if found is None:
+                        kept_bounds.add(question, found := next(fresh))
                     answers.append(found)
-                    progress(failed=not found.is_proven)
+                    progress(failed=not found.is_proven, known=is_known)
                     if monotonic() - written > EVERY and len(answers) % plan.each == 0:
                         write()
                         written = monotonic()

@@ -20,8 +20,11 @@ from fpsolve.cli import BAD_INPUT, NOT_CONVERGED, main
 from fpsolve.model.noises.non_gaussian import NonGaussianNoise
 from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
 from fpsolve.output.proofs import print_proofs
+from fpsolve.output.records import Records, append
 from fpsolve.proofs.certificate import Certificate, Enclosure
+from fpsolve.study import prove as study
 from fpsolve.study.prove import CurveProof, Plan
+from fpsolve.workflow.proofs import check_proof, prove_case
 from tests.conftest import sampled, started
 from tests.oracles import fourier_hermite
 from tests.proofs.case import CASE
@@ -276,6 +279,46 @@ def test_what_an_interrupted_run_has_proven_is_kept(case, tmp_path, kind, code):
     assert zero["certificate"] is not None
     assert second == {"p": 2.0, "lower": None, "upper": None, "certificate": None}
     assert main(["prove", "--check", "results/proven/proof.json"]) == 0
+
+
+def forged(record):
+    """Closer bounds than follow."""
+    record["enclosure"]["upper"] -= 1e-3
+
+
+@pytest.mark.parametrize("change", [None, forged, lambda record: record.clear()])
+def test_an_interrupted_run_goes_on_with_the_bounds_that_follow(case, tmp_path, monkeypatch, change):
+    """What is proven is not proven again, but verified; δ_p and what was forged are."""
+    sets = ["moments.p=[0.0, 1.0, 2.0]", "output={ quantities = ['moment', 'lyapunov_exponent'] }", "figure.mark=[]"]
+    loaded, asked = load_case(case, sets), []
+    prove_one = study.prove_bounds
+
+    def interrupted(problem, stated, p, width, *, budget):
+        if len(asked) == 2:
+            raise KeyboardInterrupt
+        asked.append(p)
+        return prove_one(problem, stated, p, width, budget=budget)
+
+    interrupted.__name__ = "prove_bounds"
+    monkeypatch.setattr(study, "prove_bounds", interrupted)
+    with pytest.raises(KeyboardInterrupt, match="run it again to go on"):
+        prove_case(loaded, tmp_path, width=1e-2)
+    if change is not None:
+        [path] = (tmp_path / "proven/records/proven").glob("*.jsonl")
+        records = Records(path.parent).look()
+        places = [(key, records.read(place)) for key, place in records._addresses.items()]
+        for key, record in places:
+            change(record)
+            append(path.parent, key, record)
+    first, asked[:] = asked.copy(), []
+    monkeypatch.setattr(study, "prove_bounds", lambda *args, **more: asked.append(args[2]) or prove_one(*args, **more))
+    study.prove_bounds.__name__ = "prove_bounds"
+    [proof] = prove_case(loaded, tmp_path, width=1e-2)
+    assert first == ["0.0", "1.0"]
+    assert asked == (["2.0", None] if change is None else ["0.0", "1.0", "2.0", None])
+    assert all(found.is_proven for _, found in proof.moments)
+    assert proof.exponent.is_proven
+    assert not check_proof(tmp_path / "proven/proof.json").objections
 
 
 ORACLE = VibroImpactOscillator(omega=1.3, restitution=1.0, c1=-0.2, epsilon=0.6)
