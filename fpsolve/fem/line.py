@@ -17,8 +17,8 @@ from scipy.special import beta, roots_jacobi
 
 from fpsolve.arrays import Coefficient, FloatArray, one
 from fpsolve.errors import MeshError
-from fpsolve.fem.polynomials import EXTRA_POINTS, Rule, gauss_legendre
 from fpsolve.messages import Code, Message
+from fpsolve.polynomials import EXTRA_POINTS, Rule, gauss_legendre
 
 
 @lru_cache(maxsize=512)

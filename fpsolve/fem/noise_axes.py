@@ -20,8 +20,8 @@ import numpy as np
 from fpsolve.arrays import Coefficient, FloatArray, dense, one
 from fpsolve.fem.axis import Axis
 from fpsolve.fem.phase import MAX_DENSE_UNKNOWNS
-from fpsolve.fem.polynomials import Polynomials, gegenbauer, hermite, logarithm, stieltjes
 from fpsolve.model.noise import Noise, NoiseDerivative
+from fpsolve.polynomials import Polynomials, gegenbauer, hermite, logarithm, stieltjes
 
 FAR = 50.0
 """Noise units beyond which OU noise does not come."""

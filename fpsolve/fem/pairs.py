@@ -17,8 +17,8 @@ import scipy.sparse
 
 from fpsolve.arrays import Coefficient, FloatArray, one
 from fpsolve.fem.noise_axes import FAR, MORE_POINTS, STEP, NoiseAxis, Samples, form
-from fpsolve.fem.polynomials import hermite
 from fpsolve.model.noise import NoiseDerivative
+from fpsolve.polynomials import hermite
 
 
 class PairAxis(NoiseAxis):

@@ -14,9 +14,9 @@ from fpsolve.arrays import FloatArray, one
 from fpsolve.errors import MeshError
 from fpsolve.fem.axis import Axis
 from fpsolve.fem.mesh import TOLERANCE, vertices_at
-from fpsolve.fem.polynomials import gauss_legendre, legendre, orthonormal
 from fpsolve.fem.rings import Ring
 from fpsolve.model.plane import CoefficientMatrix, Harmonics, Impulse, ImpulseDerivative, changed_exponential
+from fpsolve.polynomials import gauss_legendre, legendre, orthonormal
 
 PENALTY = 2.0
 """η of the interior penalty method times size/(degree + 1)²."""

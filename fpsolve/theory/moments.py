@@ -34,6 +34,7 @@ from fpsolve.budget import charge
 from fpsolve.errors import NoHierarchy, SingularMatrix
 from fpsolve.model.noise import Noise
 from fpsolve.model.problem import Problem
+from fpsolve.polynomials import gegenbauer, hermite
 from fpsolve.superlu import sparse_lu
 
 MOST, MOST_MOMENTS = 20_000, 1000
@@ -87,23 +88,11 @@ def _polynomials(noise: Noise, count: int) -> Functions:
     """Those orthonormal in P_s, by a rule of Gauss for e^(−z²/2), or for (1 − z²)^a on a bounded support."""
     is_bounded = math.isfinite(noise.half_width)
     size, middle = (noise.half_width, 0.0) if is_bounded else (noise.standard_deviation, noise.mean)
-    k = np.arange(1.0, 2 * count + MORE_POINTS)
-    if is_bounded:
-        c = noise.end_exponent + 0.5
-        b = np.append(
-            math.sqrt(0.5 / (1 + c)), 0.5 * np.sqrt(k[1:] * (k[1:] + 2 * c - 1) / ((k[1:] - 1 + c) * (k[1:] + c)))
-        )
-    else:
-        b = np.sqrt(k)
-    z = eigh_tridiagonal(np.zeros(b.size + 1), b, eigvals_only=True)
-    values, slopes = np.zeros((2, b.size + 1, z.size))
-    values[0] = 1.0
-    for i in range(b.size):
-        back = (b[i - 1] * values[i - 1], b[i - 1] * slopes[i - 1]) if i else (0.0, 0.0)
-        values[i + 1] = (z * values[i] - back[0]) / b[i]
-        slopes[i + 1] = (values[i] + z * slopes[i] - back[1]) / b[i]
-    weights = 1 / np.sum(values**2, axis=0)
-    values, slopes, xi = values[:count].T, slopes[:count].T, middle + size * z
+    points = 2 * count + MORE_POINTS
+    pure = gegenbauer(points, noise.end_exponent) if is_bounded else hermite(points)
+    z, weights = pure.rule()
+    values, slopes = (each[:, :count] for each in pure.at(z))
+    xi = middle + size * z
     logs = noise.log_density(xi) - (noise.end_exponent * np.log1p(-(z**2)) if is_bounded else -0.5 * z**2)
     if np.ptp(logs) > PURE:
         weights = weights * np.exp(logs - logs.max())

@@ -8,10 +8,10 @@ import pytest
 from fpsolve.arrays import one
 from fpsolve.fem.line import LineSpace
 from fpsolve.fem.noise_axes import CellAxis, PolynomialAxis
-from fpsolve.fem.polynomials import gegenbauer, hermite, stieltjes
 from fpsolve.model.noise import Noise, NoiseDerivative
 from fpsolve.model.noises.non_gaussian import NonGaussianNoise
 from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
+from fpsolve.polynomials import gegenbauer, hermite, stieltjes
 
 OU = OrnsteinUhlenbeck(alpha=1.3, sigma=0.8)
 BOUNDED = [NonGaussianNoise(D0=0.8, tau0=0.7, r0=r0) for r0 in (-3.0, 0.0, 0.7, 0.99)]
