@@ -57,8 +57,6 @@ SLOW = 1e-2
 MAX_DENSE_UNKNOWNS = 4000
 LARGEST_NORM = 1e150
 """Of L(p): vectors of this size have lengths."""
-SECONDS_OF_CUBE = 2e-9
-"""Of all eigenvalues of a dense matrix with their vectors, times the third power of its size."""
 SURVEYED_UNKNOWNS = 600
 """Up to so many, a chain is checked by all eigenvalues."""
 
@@ -258,13 +256,14 @@ def _from_the_right(pencil: Pencil, generator: Generator) -> tuple[FloatArray, F
     space, value = pencil.space, math.inf
     right = left = _simplest(pencil, generator)[0]
     shift = pencil.numerical_abscissa + 0.1 * generator.unit_rate
-    for _ in range(MAX_SHIFTS):
+    for step in range(MAX_SHIFTS):
+        if step:
+            shift = value + STEP * (shift - value)
         factor: Any = None  # there is room for the next ones
         factor, last = pencil.factorised(shift), value
         right, value = _nearest(lambda v, lu=factor: -lu.solve(space.weighed(v)), right, shift, pencil.p)
         if abs(value - last) <= NEAR_ENOUGH * (shift - value):
             break
-        shift = value + STEP * (shift - value)
     left, _ = _nearest(lambda v: -factor.solve(space.weighed(v), transposed=True), left, shift, pencil.p, value)
     return right, left, value, 0.5 * (shift - value)
 
