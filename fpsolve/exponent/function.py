@@ -334,7 +334,8 @@ def contradiction(
         above, rise = value - p / q * known.value, slope * (q - p)
         is_wrong = np.where((p > 0) & (p < q), above, -above) > slack
         is_wrong |= value + rise - known.value > slack + SLOPE_SHARE * np.abs(rise)
-        for i in np.flatnonzero(is_wrong):
+        if np.any(is_wrong):
+            i = int(np.argmax(is_wrong))
             return Message(Code.NOT_PRINCIPAL, p=p[i], value=value[i], other=q, expected=known.value)
     return None
 

@@ -134,11 +134,6 @@ class CurveResult(Result):
         return {"value": found.value, "error_estimate": found.error_estimate, "perturbation": theory}
 
     @property
-    def is_unfinished(self) -> bool:
-        """Whether it is what was known when it was kept, while others were being solved."""
-        return any(failure.reason.code is Code.UNFINISHED for failure in self.failures)
-
-    @property
     def status(self) -> Status:
         """Whether all that was asked for is there, within rtol."""
         if self.failures:
