@@ -344,11 +344,11 @@ def test_an_interruption_keeps_the_finished_curves(case, tmp_path, monkeypatch):
 @pytest.mark.parametrize("name", ["write_results", "write_curves", "write_dataset"])
 def test_tables_are_whole_where_an_interruption_comes_as_they_are_written(case, tmp_path, monkeypatch, name):
     """All sets are solved, and the tables tell of them."""
-    writes = getattr(sets, name)
+    writes, signals = getattr(sets, name), [signal.SIGINT]
 
     def interrupted(*arguments):
-        if name != "write_results" or arguments[4] == 2:  # there are tables of fewer finished sets
-            signal.raise_signal(signal.SIGINT)
+        if signals and (name != "write_results" or arguments[4] == 2):  # there are tables of fewer finished sets
+            signal.raise_signal(signals.pop())
         return writes(*arguments)
 
     monkeypatch.setattr(sets, name, interrupted)
