@@ -122,10 +122,15 @@ def watched(watch: Callable[[Countdown], object]) -> Iterator[None]:
 
 
 def charge(seconds: float, gigabytes: float = 0.0, unknowns: int = 0) -> None:
-    """Count what comes next for every number under way. Raises `OverBudget` where it is too much for one of them."""
+    """Count what comes next for every number under way, a factorisation if it has unknowns.
+
+    Raises:
+        OverBudget: it is too much for one of them.
+    """
     if not (running := _running.get()):
         return
-    seconds += OVERHEAD_SECONDS + SOLVE_SECONDS * gigabytes
+    if unknowns:
+        seconds += OVERHEAD_SECONDS + SOLVE_SECONDS * gigabytes
     peak = gigabytes + (resident() if gigabytes > SMALL else 0.0)
     for each in running:
         if peak > each.memory:
@@ -134,7 +139,7 @@ def charge(seconds: float, gigabytes: float = 0.0, unknowns: int = 0) -> None:
             raise OverBudget(each, Message(Code.SECONDS_SPENT, seconds=each.spent + seconds, most=each.seconds))
     for each in running:
         each.spent, each.peak, each.unknowns = each.spent + seconds, max(each.peak, peak), unknowns or each.unknowns
-    if watch := _watch.get():
+    if unknowns and (watch := _watch.get()):
         watch(under_way() or running[0])
 
 

@@ -57,6 +57,10 @@ SLOW = 1e-2
 MAX_DENSE_UNKNOWNS = 4000
 LARGEST_NORM = 1e150
 """Of L(p): vectors of this size have lengths."""
+SECONDS_OF_SOLVE = 2.5e-7
+"""With factors, for an unknown."""
+SECONDS_OF_CUBE = 2e-9
+"""Of all eigenvalues of a dense matrix with their vectors, times the third power of its size."""
 SURVEYED_UNKNOWNS = 600
 """Up to so many, a chain is checked by all eigenvalues."""
 
@@ -272,7 +276,12 @@ def _nearest(
     resolvent: Any, start: FloatArray, shift: float, p: float, value: float | None = None
 ) -> tuple[FloatArray, float]:
     """The real eigenvalue nearest to a shift, or to a value, and before it its eigenvector, by Arnoldi iteration."""
-    operator = LinearOperator((start.size, start.size), matvec=resolvent, dtype=float)
+
+    def solved(vector: FloatArray) -> FloatArray:
+        charge(SECONDS_OF_SOLVE * start.size)
+        return np.asarray(resolvent(vector))
+
+    operator = LinearOperator((start.size, start.size), matvec=solved, dtype=float)
     count = min(NEIGHBOURS, start.size - 2)
     mixed = start + 1e-8 * np.linalg.norm(start) * np.sin(np.arange(start.size))  # beyond spaces that L keeps to itself
     try:
