@@ -17,7 +17,7 @@ import zlib
 from base64 import b64decode, b64encode
 from bisect import insort
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass, replace
 from errno import ENOSPC
 from functools import cache, lru_cache
 from pathlib import Path
@@ -28,6 +28,9 @@ from typing import Any, Literal, NamedTuple, get_args, get_origin, get_type_hint
 
 import numpy as np
 
+from fpsolve.analysis.continuation import Trace
+from fpsolve.analysis.scan import Scan
+from fpsolve.analysis.stability import Boundary
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case, Curve
 from fpsolve.case.kinds import varying
@@ -41,6 +44,7 @@ from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import Message, message_of
 from fpsolve.model.kinds import source_of, version_of
 from fpsolve.model.quantity import ResponseQuantities
+from fpsolve.study.chart import charted
 from fpsolve.study.response import CurveResponse
 from fpsolve.study.results import CurveResult, SimulatedCurve
 from fpsolve.study.solve import Numerics, Wanted, everything
@@ -67,6 +71,15 @@ class Address:
     file: str
     start: int
     size: int
+
+
+@dataclass(frozen=True, eq=False)
+class Line:
+    """What is recorded of a finished line of a chart, see `Boundary`."""
+
+    traces: tuple[Trace, ...]
+    scan: Scan
+    seconds: float
 
 
 class Records:
@@ -263,6 +276,25 @@ def simulation_key(curve: Curve, orders: Sequence[float], setting: MonteCarloSec
     return _digest(SimulatedCurve, **_of_curve(curve), orders=list(orders), setting=settings)
 
 
+def line_key(case: Case, line: Boundary) -> str:
+    """What the record of a line of a chart is found by."""
+    frame = [repr(each) for each in (line.zero, line.x, line.y, line.step, line.budget)]
+    return _digest(Line, **_of_curve(case.curve({})), frame=frame, nodes=charted(case).nodes)
+
+
+def line_of(record: Record, line: Boundary) -> Boundary:
+    """A finished line from its record, with what it was begun with. Raises `ValueError` where that has another form."""
+    found = Line(**_made(Line, record))
+    samples = [point.sample for trace in found.traces for point in trace.points]
+    count = found.scan.nodes.size
+    shapes = found.scan.nodes.shape, found.scan.values.shape, found.scan.gradients.shape
+    is_whole = shapes == ((count,), (count, count), (count, count, 2)) and all(trace.points for trace in found.traces)
+    is_whole &= all(each.at.shape == each.gradient.shape == (2,) and np.isfinite(each.at).all() for each in samples)
+    if not is_whole:
+        raise ValueError("this is no record of a line")
+    return replace(line, traces=found.traces, scan=found.scan, seconds=found.seconds, complete=True)
+
+
 def _of_curve(curve: Curve) -> dict[str, Any]:
     """The parameters, and the system and the noise as they are written, with versions and files of others' kinds."""
     kinds = []
@@ -272,7 +304,7 @@ def _of_curve(curve: Curve) -> dict[str, Any]:
     return {"parameters": dict(curve.parameters), "kinds": kinds}
 
 
-def record_of(result: CurveResult | SimulatedCurve) -> Record:
+def record_of(result: CurveResult | SimulatedCurve | Line) -> Record:
     kind: Any = type(result)
     return {name: each.plain(getattr(result, name)) for name, each in _recorded(kind).items()}
 
@@ -404,7 +436,7 @@ class Codec(NamedTuple):
 @cache
 def codec(kind: Any) -> Codec:
     """For the values of an attribute with an annotation."""
-    origin, parts, is_row = get_origin(kind), get_args(kind), is_dataclass(kind)
+    origin, parts, is_row = get_origin(kind), get_args(kind), is_dataclass(kind) or hasattr(kind, "_fields")
     if kind in _SIMPLE:
         return _SIMPLE[kind]
     if is_row:
@@ -460,13 +492,14 @@ def codec(kind: Any) -> Codec:
 @cache
 def _recorded(kind: Any) -> Mapping[str, Codec]:
     """For each attribute of a dataclass but a curve; what needs numba is imported for simulations only."""
-    names = {}
+    late: dict[str, Any] = {}
     if kind is SimulatedCurve:
         from fpsolve.simulation import MonteCarlo, Response
 
-        names = {"MonteCarlo": MonteCarlo, "Response": Response}
-    hints = get_type_hints(kind, localns=names)
-    return {each.name: codec(hints[each.name]) for each in fields(kind) if each.name != "curve"}
+        late = {"MonteCarlo": MonteCarlo, "Response": Response}
+    hints = get_type_hints(kind, localns=late)
+    names = getattr(kind, "_fields", None) or [each.name for each in fields(kind)]
+    return {name: codec(hints[name]) for name in names if name != "curve"}
 
 
 def _checked(data: Any, kind: Any) -> Any:

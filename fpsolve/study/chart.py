@@ -92,6 +92,7 @@ def solve_chart(
     progress: Callable[[], None] = lambda: None,
     stepped: Callable[[], None] = lambda: None,
     map: Map = map,
+    known: Callable[[Boundary], Boundary | None] = lambda _: None,
 ) -> Iterator[Chart]:
     """What there is so far, after each scan, branch and line, and in the end the whole chart.
 
@@ -101,6 +102,7 @@ def solve_chart(
         stepped: called once for each point that is traced.
         map: computes the rows of all scans, as the builtin does or in other processes, while branches are traced here.
             It calls `progress` itself for the `Steps` of other processes, or they are told row by row.
+        known: gives a line that an earlier run has finished.
     """
     frame = charted(case)
     x, y = frame.x.axis, frame.y.axis
@@ -109,9 +111,15 @@ def solve_chart(
     chart = Chart((), _closed_forms(problem, frame.zero, (x, y)))
     scan = empty_scan(frame.nodes) if frame.nodes else None
     begun = [Boundary(zero, x, y, problem, scan=scan, budget=case.budget) for zero in frame.zero]
-    rows = iter(map(partial(scan_row, told=Steps(progress)), [row for line in begun for row in line.rows()]))
-    for each in begun:
+    finished = [known(line) for line in begun]
+    tasks = [row for line, earlier in zip(begun, finished, strict=True) if earlier is None for row in line.rows()]
+    rows = iter(map(partial(scan_row, told=Steps(progress)), tasks))
+    for each, earlier in zip(begun, finished, strict=True):
         done = chart.lines
+        if earlier is not None:
+            chart = replace(chart, lines=(*done, earlier))
+            yield chart
+            continue
         for line in each.solve(rows, progress, stepped):
             chart = replace(chart, lines=(*done, line))
             yield chart

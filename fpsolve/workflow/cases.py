@@ -46,7 +46,7 @@ from fpsolve.workflow.folders import (
 )
 from fpsolve.workflow.progress import NODES, PERCENT, POINTS, SETS, SILENT, SOLVES, Phase, Watch, ignore
 from fpsolve.workflow.reports import facts_since, shown_at_the_end, write_report
-from fpsolve.workflow.sets import Simulations, Sweep
+from fpsolve.workflow.sets import Lines, Simulations, Sweep
 
 if TYPE_CHECKING:
     from fpsolve.output.report import Reporter
@@ -253,7 +253,7 @@ def chart_case(
     """Trace the lines of the chart of a case, and write chart.csv, .json, .png and .pdf into `out`/<name of the case>/.
 
     The tables are written again after every branch. What an earlier chart wrote there is removed first, and what was
-    solved or simulated with other parameters.
+    solved or simulated with other parameters; but lines that it has finished are not traced again.
 
     Args:
         pool: who scans the plane; this process if none is given.
@@ -281,16 +281,18 @@ def chart_case(
 
     with (
         own_folder(case, out, (CHART,)) as folder,
-        saying_if_interrupted(traced, ANEW),
+        saying_if_interrupted(traced),
         watch.bar(Phase(case.name, "scan", chart_work(case), NODES)) as progress,
         watch.bar(Phase(case.name, "lines", unit=POINTS)) as stepped,
         writable(folder),
         pool or serial() as workers,
     ):
         rows = partial(workers.map, stepped=progress)
+        lines = Lines(case, folder)
         with shown_at_the_end(show):
-            for chart in solve_chart(case, progress=progress, stepped=stepped, map=rows):
+            for chart in solve_chart(case, progress=progress, stepped=stepped, map=rows, known=lines.find):
                 write_chart(case, chart, folder)
+                lines.keep(chart.lines[-1])
     return chart
 
 

@@ -15,17 +15,22 @@ from pathlib import Path
 from time import monotonic
 from typing import Any, ClassVar
 
+from fpsolve.analysis.stability import Boundary
+from fpsolve.analysis.zero import Zero
 from fpsolve.case.case import Case, Curve
 from fpsolve.case.sections import Varied
 from fpsolve.output.datasets import write_dataset
 from fpsolve.output.records import (
     Address,
+    Line,
     Records,
     Results,
     append,
     fits,
     growing_key,
     key_of,
+    line_key,
+    line_of,
     record_of,
     result_of,
     simulated_of,
@@ -44,6 +49,7 @@ Found = tuple[int, Address | CurveResult | None, bool]
 """The number of a curve, its numbers where they are new, and whether some of these are missing."""
 Orders = tuple[Order, ...]
 SOLVED_RECORDS, SIMULATED_RECORDS, GROWING_RECORDS = "records/solved", "records/simulated", "records/unfinished"
+LINE_RECORDS = "records/charted"
 REST = 50
 """Tables are rewritten when so many times as long has gone by as the last time took, so that all of it costs little."""
 
@@ -224,6 +230,30 @@ class _Queue(Iterator[Orders]):
 
     def __next__(self) -> Orders:
         return self.again.popleft() if self.again else next(self.source)
+
+
+class Lines:
+    """The lines of a chart, of which an earlier run may have finished some."""
+
+    def __init__(self, case: Case, folder: Path) -> None:
+        self.case, self.records, self._kept = case, Records(folder.resolve() / LINE_RECORDS).look(), set[Zero]()
+
+    def find(self, line: Boundary) -> Boundary | None:
+        """A line as it was finished, if it was; otherwise None."""
+        try:
+            address = self.records.address(line_key(self.case, line))
+            found = None if address is None else line_of(self.records.read(address), line)
+        except (OSError, ValueError):
+            return None
+        self._kept |= {line.zero} if found else set()
+        return found
+
+    def keep(self, line: Boundary) -> None:
+        """Keep a line once it is finished."""
+        if line.complete and line.scan is not None and line.zero not in self._kept:
+            record = record_of(Line(line.traces, line.scan, line.seconds))
+            append(self.records.folder, line_key(self.case, line), record)
+            self._kept.add(line.zero)
 
 
 class Simulations(_Kept):

@@ -158,6 +158,31 @@ def test_interrupted_it_keeps_what_is_traced(path, tmp_path, capsys):
 
 
 @pytest.mark.slow
+def test_an_interrupted_chart_goes_on_with_the_lines_that_are_finished(path, tmp_path):
+    """To the last bit what is drawn without an interrupt; the first line is not scanned again."""
+    case, scanned = load_case(path), []
+    chart_case(case, tmp_path / "whole")
+    calls = iter(range(10_000))
+
+    def until(most):
+        def progress(count=1, **_):
+            scanned.append(count)
+            if next(calls) == most:
+                raise KeyboardInterrupt
+
+        return Watch(bar=lambda phase: nullcontext(progress if phase.total else lambda: None))
+
+    with pytest.raises(KeyboardInterrupt, match="run it again to go on"):
+        chart_case(case, tmp_path / "out", watch=until(60))
+    scanned.clear()
+    chart = chart_case(case, tmp_path / "out", watch=until(9_000))
+    assert sum(scanned) == chart_work(case) * 2 // 3
+    assert chart.complete
+    for name in ("chart.csv", "chart.json"):
+        assert (tmp_path / "out/plane" / name).read_bytes() == (tmp_path / "whole/plane" / name).read_bytes()
+
+
+@pytest.mark.slow
 def test_a_phase_for_the_scans_and_one_for_the_points(path, tmp_path):
     counts, totals = {}, {}
 
