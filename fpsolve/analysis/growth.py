@@ -1,34 +1,38 @@
-"""Growth in finite time: the rate function I(s) of s_t = (1/t) ln ‖x(t)‖, and the law of s_t with its prefactor.
+"""Growth in finite time: the rate function I(s) of s_t = (1/t) ln ‖x(t)‖, and the law of s_t for a start.
 
 I(s) = sup_p (ps − Λ(p)) is reached where Λ′(p) = s, which Newton's method finds: Λ″ is known. P(s_t ≈ s) ~ e^{−tI(s)}.
 
-For a start at the phase φ₀, with ‖x(0)‖ = 1 and ξ₀ in its stationary law,
+For a start at the phase φ₀, with ‖x(0)‖ = 1 and ξ₀ in its stationary law, the operator L(p) moves the constant 1 on:
 
-    E‖x(t)‖^p = C(p) e^{Λ(p)t} + Σₖ aₖ e^{Λₖt},    C(p) = E T(φ₀, ξ₀) ⟨T*, 1⟩/⟨T*, T⟩,
+    K(p) = ln E‖x(t)‖^p = ln E [e^{tL(p)} 1](φ₀, ξ₀) → Λ(p)t + ln C(p),    C(p) = E T(φ₀, ξ₀) ⟨T*, 1⟩/⟨T*, T⟩.
 
-Λₖ the other eigenvalues. From the first part the saddle point p of ps − Λ(p), where w = ±√(2I), u = p√Λ″, gives the
-density of s_t, and P(s_t ≥ s) uniformly in s (R. Lugannani, S. Rice, Adv. Appl. Probab. 12, 1980; for the factor C/p
-beside the exponential N. Bleistein, Comm. Pure Appl. Math. 19, 1966):
+On the functions that Λ(p) is solved with e^{tL} is exact but for rounding, by Arnoldi's method with (L − γ)⁻¹ (J. van
+den Eshof, M. Hochbruck, SIAM J. Sci. Comput. 27, 2006), so that K has the memory of the start. At several p it gives a
+Chebyshev series, and from this the saddle point K′(p) = ts with u = p√K″, w = ±√(2(pK′ − K)) and λₙ = K⁽ⁿ⁾/K″^½ⁿ gives
+the density of s_t, and P(s_t ≥ s) uniformly in s (R. Lugannani, S. Rice, Adv. Appl. Probab. 12, 1980; the next terms by
+H. E. Daniels, Int. Stat. Rev. 55, 1987):
 
-    √(t/2πΛ″) C e^{−tI} [1 + a(C)/t],    Φ̄(√t w) + φ(√t w)/√t [C/u − 1/w + ((C/u) a(C/p) + 1/w³)/t],
-    a(G) = Λ⁗/8Λ″² − 5Λ‴²/24Λ″³ + (G′/G) Λ‴/2Λ″² − (G″/G)/2Λ″.
+    t e^{K − pK′}/√(2πK″) [1 + a],    Φ̄(w) + φ(w) [1/u − 1/w + (a/u − λ₃/2u² − 1/u³ + 1/w³)],    a = λ₄/8 − 5λ₃²/24.
 
-The error is estimated by the terms with a(G), of one order more; as these change their sign, also by (A/t)², A being
-a(C) with absolute values for its parts; by the errors of C and I; and by the aₖ nearest to Λ.
+The error is estimated by these next terms; as they change their sign, also by those of one order more,
+
+    (24|λ₆| + 168|λ₃λ₅| + 105λ₄² + 630λ₃²|λ₄| + 385λ₃⁴)/1152;
+
+and by what a finer discretisation, fewer Arnoldi vectors and the last coefficients of the series change.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import scipy.linalg
+from numpy.polynomial.polynomial import polyfit, polyval
 from numpy.typing import ArrayLike
-from scipy.sparse.linalg import ArpackError, LinearOperator, eigs
+from scipy.optimize import brentq
 from scipy.stats import norm
 
 from fpsolve.arrays import FloatArray, real_number, real_numbers, shown
@@ -36,10 +40,11 @@ from fpsolve.budget import counted, one_number
 from fpsolve.data import Quantity, Result, dataset
 from fpsolve.errors import NoSuchExponent, NotConverged
 from fpsolve.exponent.adapt import Budget, widened
-from fpsolve.exponent.eigen import PrincipalPair, second_derivative
+from fpsolve.exponent.eigen import PrincipalPair, length, second_derivative
 from fpsolve.exponent.function import SEARCH_INTERVAL
 from fpsolve.exponent.solver import TINY_P, ExponentSolver
 from fpsolve.fem.axis import TensorSpace
+from fpsolve.fem.generator import Generator
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import Code, Message
 from fpsolve.model.problem import Problem, of_problem
@@ -65,12 +70,20 @@ MOST_STEPS, MOST_RETREATS = 60, 6
 """Of Newton's method, and of the way back from a p that is not solved."""
 CLOSE = 1e-9
 """Steps in p with which the search ends, relative to the larger of 1 and |p|."""
-STEP = 0.02
-"""In p, for the derivatives of Λ″ and ln C."""
-CENTRE = np.array([-0.4, -0.2, 0.2, 0.4])
-"""p through which the terms of P are interpolated around p = 0, where poles of theirs cancel."""
-MODES = 6
-"""Eigenvalues nearest to Λ that are looked at."""
+CENTRE = np.array([-3, -2, -1, 1, 2, 3]) / 3
+"""p through which the terms of P are interpolated around p = 0, where their poles cancel, in shares of a distance."""
+AROUND = 0.6
+"""This distance, times √K″."""
+VECTORS, FEWER = 80, 10
+"""Of Arnoldi's method for e^{tL}, and how many less tell its error."""
+POLE = 10.0
+"""γ − Λ, times t."""
+LEVELS, DIGITS = (9, 17, 33, 65), 1e-9
+"""Numbers of p in a Chebyshev series, and the share of its largest coefficient down to which it goes."""
+MOST_FINER, FINE = 8, 1e-8
+"""Discretisations of e^{tL}, and the change from one to the next with which K is settled."""
+MOST_WIDER = 5
+"""How often an interval of p is widened for a saddle point."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -146,7 +159,7 @@ class GrowthLaw(Result):
     def to_xarray(self) -> xarray.Dataset:
         """P(s_t ≥ s), P(s_t ≤ s) and the density over t and s, with errors; C, p and I over s, the width over t."""
         of_law = replace(
-            PROBABILITY.error(), comment="from the next order in 1/t, those of C and I, and other eigenvalues"
+            PROBABILITY.error(), comment="from the next order of the saddle point, and a finer discretisation"
         )
         numbers: dict[Quantity, Any] = {
             PROBABILITY: self.above,
@@ -238,26 +251,13 @@ def growth_law(
         raise NoSuchExponent(Message(Code.NO_PREFACTOR))
     slopes = Slopes(solver, interval)
     rate = _found(slopes, real_numbers(s, "s"))
-    around = [_Saddle(slopes, p, phase) for p in rate.p.tolist()]
-    fits = list[np.polynomial.Polynomial]()
-    if np.any(np.abs(rate.p) < CENTRE[2]):
-        values = np.array([_Saddle(slopes, p, phase).terms for p in CENTRE.tolist()])
-        fits = [np.polynomial.Polynomial.fit(CENTRE, column, CENTRE.size - 1) for column in values.T]
-    shape = times.size, rate.growth.size
-    density, density_error, above, below, error = (np.empty(shape) for _ in range(5))
-    for i, saddle in enumerate(around):
-        exponent, wave = float(rate.value[i]), math.copysign(math.sqrt(2 * rate.value[i]), saddle.p)
-        first, further = [float(fit(saddle.p)) for fit in fits] if abs(saddle.p) < CENTRE[2] else saddle.terms
-        root = np.sqrt(times)
-        relative = saddle.error + times * rate.error_estimate[i] + saddle.remainder(times) + (saddle.size / times) ** 2
-        height = np.sqrt(times / (2 * math.pi * saddle.curvature)) * saddle.prefactor * np.exp(-times * exponent)
-        density[:, i] = np.maximum(height * (1 + saddle.next_density / times), 0.0)
-        density_error[:, i] = height * (np.abs(saddle.next_density) / times + relative)
-        bell = norm.pdf(root * wave) / root
-        change = bell * further / times
-        for side, where in ((1, above), (-1, below)):
-            where[:, i] = np.clip(norm.sf(side * root * wave) + side * (bell * first + change), 0.0, 1.0)
-        error[:, i] = np.abs(change) + relative * np.minimum(above[:, i], below[:, i])
+    pairs = [slopes.at(p).pair for p in rate.p.tolist()]
+    factors, finer = (
+        np.array([math.nan if each is None else prefactor(each, phase) for each in of])
+        for of in (pairs, [finer_or_none(solver, pair) for pair in pairs])
+    )
+    rows = [laws(slopes, phase, time, rate.growth, rate.p) for time in times.tolist()]
+    density, density_error, above, below, error = np.moveaxis(rows, 2, 0)
     return GrowthLaw(
         time=times,
         growth=rate.growth,
@@ -267,8 +267,8 @@ def growth_law(
         below=below,
         probability_error=error,
         width=np.sqrt(solver.variance_rate().value / times),
-        prefactor=np.array([each.prefactor for each in around]),
-        prefactor_error=np.array([each.prefactor * each.error for each in around]),
+        prefactor=factors,
+        prefactor_error=np.abs(finer - factors),
         rate=rate,
         start=phase,
     )
@@ -389,67 +389,189 @@ def _found(slopes: Slopes, s: FloatArray) -> RateFunction:
     return result
 
 
-class _Saddle:
-    """What the law needs at a saddle point, for a start at a phase.
+class _Cumulants:
+    """K(p) = ln E‖x(t)‖^p for a start at a phase, at one t, as a Chebyshev series on an interval.
 
     Args:
         slopes: Λ.
-        p: the saddle point.
         start: φ₀.
+        time: t.
+        low, high: the interval, 0 inside.
+
+    Attributes:
+        lost: about the error of K′(p); NaN where a finer discretisation, which tells it, is not to be had.
+
+    Raises:
+        NotConverged: some p of the interval is not solved.
     """
 
-    def __init__(self, slopes: Slopes, p: float, start: float) -> None:
-        self.p, self._start, self._solver = p, start, slopes.solver
-        own, below, above = (slopes.at(each) for each in (p, p - STEP, p + STEP))
-        self.pair, self.curvature, self._own = own.pair, own.curvature, own
-        logs = [math.log(prefactor(each.pair, start)) for each in (below, own, above)]
-        self.prefactor = math.exp(logs[1])
-        third = (above.curvature - below.curvature) / (2 * STEP)
-        fourth = (above.curvature - 2 * own.curvature + below.curvature) / STEP**2
-        self._skew, self._excess = third / own.curvature**1.5, fourth / own.curvature**2
-        first = (logs[2] - logs[0]) / (2 * STEP)
-        self._first, self._second = first, (logs[2] - 2 * logs[1] + logs[0]) / STEP**2 + first**2
+    def __init__(self, slopes: Slopes, start: float, time: float, low: float, high: float) -> None:
+        self._solver, self._start, self.time = slopes.solver, start, time
+        for count in LEVELS:
+            p = 0.5 * (low + high) - 0.5 * (high - low) * np.cos(np.pi * np.arange(count) / (count - 1))
+            values, errors = np.array([self._at(each) for each in p.tolist()]).T
+            noise = float(np.max(errors))
+            series = np.polynomial.Chebyshev.fit(p, values, count - 1, domain=[low, high])
+            left = float(np.max(np.abs(series.coef[-3:])))
+            if left <= max(3 * noise, DIGITS * float(np.max(np.abs(series.coef)))):
+                break
+        kept = np.flatnonzero(np.abs(series.coef) > noise)  # derivatives magnify the others
+        degree = max(int(kept.max(initial=0)), 6)
+        self.series = series.truncate(degree + 1)
+        self.lost = max(left, noise) * degree**2 / (0.5 * (high - low))
+        self._derivatives = [self.series, *(self.series.deriv(n) for n in range(1, 7))]
+        self.slopes = float(self._derivatives[1](low)) / time, float(self._derivatives[1](high)) / time
+        self._low, self._high = low, high
+
+    def _at(self, p: float) -> tuple[float, float]:
+        """K(p) and its error, from ever finer discretisations: for small t it has layers that T has not."""
+        solution = self._solver.near.solution(p)
+        generator, last = solution.pair.generator, math.inf
+        with counted(self._solver.budget.countdown(f"E‖x({self.time:g})‖^{p:g}")):
+            for _ in range(MOST_FINER):
+                found, fewer = log_moment(solution.pair, self._start, self.time, generator)
+                change, last = abs(found - last), found
+                chosen = widened(generator).enriched()
+                if change <= FINE or chosen.size > self._solver.budget.unknowns:
+                    break
+                generator = type(generator)(generator.problem, chosen)
+        return found, (change if math.isfinite(change) else math.nan) + abs(found - fewer) + self.time * solution.error
+
+    def saddle(self, p: float) -> _Saddle:
+        """K and its derivatives at p."""
+        return _Saddle(p, *(float(each(p)) for each in self._derivatives))
+
+    def where(self, s: float) -> _Saddle:
+        """The p with K′(p) = ts. Raises `NotConverged`."""
+        if not self.slopes[0] < s < self.slopes[1]:
+            side = int(s > self.slopes[0])
+            raise NotConverged(
+                Message(Code.GROWTH_BEYOND, s=s, p=(self._low, self._high)[side], slope=self.slopes[side])
+            )
+        gap = self._derivatives[1] - self.time * s
+        return self.saddle(float(brentq(gap, self._low, self._high, xtol=CLOSE * (self._high - self._low))))
+
+    def law(self, s: float) -> tuple[float, ...]:
+        """The density at s, its error, P(s_t ≥ s), P(s_t ≤ s), and the error of both."""
+        here, doubt = self.where(s), 0.0
+        first, further, wave = here.terms
+        reach = min(AROUND / math.sqrt(here.curvature), -self._low, self._high)
+        if abs(here.p) < CENTRE[3] * reach:
+            p, values = reach * CENTRE, np.array([self.saddle(each).terms for each in (reach * CENTRE).tolist()])
+            rows = [
+                polyval(here.p, polyfit(p[each], values[each], degree)).tolist()
+                for each, degree in ((slice(None), 5), (slice(1, -1), 3))
+            ]
+            (first, further, wave), fewer = rows
+            doubt = abs(first - fewer[0]) + abs(further - fewer[1]) + abs(here.p * (wave - fewer[2]))
+        w = wave * here.p
+        bell, lost = float(norm.pdf(w)), self.lost / math.sqrt(here.curvature)
+        sides = [float(norm.sf(side * w)) + side * bell * (first + further) for side in (1, -1)]
+        above, below = (min(max(each, 0.0), 1.0) for each in sides)
+        height = self.time * math.exp(here.value - here.p * here.slope) / math.sqrt(2 * math.pi * here.curvature)
+        relative = abs(here.next) + here.beyond + lost * (1 + abs(here.p) * math.sqrt(here.curvature))
+        error = bell * (abs(further) + doubt + lost) + here.beyond * min(above, below)
+        return max(height * (1 + here.next), 0.0), height * relative, above, below, error
+
+
+@dataclass(frozen=True)
+class _Saddle:
+    """K at one p and its six derivatives there."""
+
+    p: float
+    value: float
+    slope: float
+    curvature: float
+    third: float
+    fourth: float
+    fifth: float
+    sixth: float
 
     @property
-    def next_density(self) -> float:
-        """a(C)."""
-        return sum(self._next(self._first, self._second))
+    def w(self) -> float:
+        """±√(2(pK′ − K))."""
+        return math.copysign(math.sqrt(max(2 * (self.p * self.slope - self.value), 0.0)), self.p)
+
+    def ratio(self, n: int) -> float:
+        """λₙ."""
+        return (self.third, self.fourth, self.fifth, self.sixth)[n - 3] / self.curvature ** (0.5 * n)
 
     @property
-    def size(self) -> float:
-        """A."""
-        return sum(map(abs, self._next(self._first, self._second)))
+    def next(self) -> float:
+        """a."""
+        return self.ratio(4) / 8 - 5 * self.ratio(3) ** 2 / 24
 
-    @cached_property
-    def terms(self) -> tuple[float, float]:
-        """C/u − 1/w, and (C/u) a(C/p) + 1/w³."""
-        p, own = self.p, self._own
-        u, w = p * math.sqrt(self.curvature), math.copysign(math.sqrt(2 * p**2 * own.ratio_slope), p)
-        of_quotient = self._next(self._first - 1 / p, self._second - 2 * self._first / p + 2 / p**2)
-        return self.prefactor / u - 1 / w, self.prefactor / u * sum(of_quotient) + 1 / w**3
+    @property
+    def beyond(self) -> float:
+        """The absolute values of the terms of the order after that."""
+        third, fourth, fifth, sixth = (abs(self.ratio(n)) for n in (3, 4, 5, 6))
+        terms = 24 * sixth, 168 * third * fifth, 105 * fourth**2, 630 * third**2 * fourth, 385 * third**4
+        return sum(terms) / 1152
 
-    def _next(self, first: float, second: float) -> tuple[float, ...]:
-        """The parts of a(G) from G′/G and G″/G."""
-        mixed = first / math.sqrt(self.curvature) * self._skew / 2
-        return self._excess / 8, -5 * self._skew**2 / 24, mixed, -second / (2 * self.curvature)
+    @property
+    def terms(self) -> tuple[float, float, float]:
+        """1/u − 1/w, a/u − λ₃/2u² − 1/u³ + 1/w³, and w/p; NaN at p = 0."""
+        u, w = self.p * math.sqrt(self.curvature), self.w
+        if not u * w:
+            return math.nan, math.nan, math.nan
+        return 1 / u - 1 / w, self.next / u - self.ratio(3) / (2 * u**2) - 1 / u**3 + 1 / w**3, w / self.p
 
-    @cached_property
-    def error(self) -> float:
-        """The relative error of C, from a finer discretisation."""
-        if self.p == 0:
-            return 0.0
-        finer = self._solver.near.finer_pair(self.pair, widened(self.pair.generator).enriched())
-        return abs(prefactor(finer, self._start) / self.prefactor - 1)
 
-    @cached_property
-    def _others(self) -> Sequence[tuple[float, float]]:
-        """Of eigenvalues near Λ how far they are from it, and |aₖ|/C."""
-        with counted(self._solver.budget.countdown(f"the eigenvalues next to Λ({self.p:g})")):
-            return others(self.pair, self._start) if self.p else ()
+def laws(slopes: Slopes, start: float, time: float, s: FloatArray, p: FloatArray) -> FloatArray:
+    """`_Cumulants.law` at several s, shape (n, 5), from p near the saddle points. Raises `NotConverged`."""
+    margin = (AROUND + 0.1) / math.sqrt(time * slopes.at(0.0).curvature)
+    ends = min(p.min(), 0.0), max(p.max(), 0.0)
+    for _ in range(MOST_WIDER):
+        low, high = max(ends[0] - margin, slopes.low), min(ends[1] + margin, slopes.high)
+        found = _Cumulants(slopes, start, time, low, high)
+        if found.slopes[0] < s.min() and s.max() < found.slopes[1]:
+            break
+        margin *= 2
+    return np.array([found.law(each) for each in s.tolist()])
 
-    def remainder(self, t: FloatArray) -> FloatArray:
-        """Σ |aₖ|/C e^{−(Λ − Re Λₖ)t} over these."""
-        return sum((size * np.exp(-gap * t) for gap, size in self._others), np.zeros_like(t))
+
+def log_moment(
+    pair: PrincipalPair, start: float, time: float, generator: Generator | None = None
+) -> tuple[float, float]:
+    """ln E‖x(t)‖^p for a start at a phase, the noise being in its stationary law, and the same by fewer vectors.
+
+    It is that of another generator than that of the pair, if one is given.
+
+    With R = (L − γM)⁻¹M e^{tL}M⁻¹ = R⁻¹e^{t(γ + R⁻¹)} (L − γM)⁻¹, and R on Arnoldi's vectors is a small matrix H.
+    """
+    generator = generator or pair.generator
+    space, first, last = generator.space(pair.p), *_ends(generator, pair.p, start)
+    pole = POLE / time
+    factor = generator.at(pair.p).factorised(pair.value + pole)
+    vector = factor.solve(last)
+    size, most = length(vector), min(VECTORS, space.size)
+    basis, small = np.zeros((most + 1, space.size)), np.zeros((most + 1, most))
+    basis[0] = vector / size
+    for k in range(most):
+        vector = factor.solve(space.weighed(basis[k]))
+        scale = length(vector)
+        for _ in range(2):  # once more for what rounding leaves
+            parts = basis[: k + 1] @ vector
+            small[: k + 1, k] += parts
+            vector = vector - parts @ basis[: k + 1]
+        small[k + 1, k] = length(vector)
+        if small[k + 1, k] <= 1e-13 * scale:
+            most = k + 1
+            break
+        basis[k + 1] = vector / small[k + 1, k]
+    logs = []
+    for count in (most, max(most - FEWER, 1) if most == VECTORS else most):
+        inverse = np.linalg.inv(small[:count, :count])
+        moved = scipy.linalg.expm(time * (pole * np.eye(count) + inverse))[:, 0]
+        logs.append(pair.value * time + math.log(size * float((basis[:count] @ first) @ (inverse @ moved))))
+    return logs[0], logs[1]
+
+
+def finer_or_none(solver: ExponentSolver, pair: PrincipalPair) -> PrincipalPair | None:
+    """The pair on a finer discretisation, where it is to be had."""
+    with suppress(NotConverged):
+        return solver.near.finer_pair(pair, widened(pair.generator).enriched())
+    return None
 
 
 def prefactor(pair: PrincipalPair, start: float) -> float:
@@ -457,53 +579,20 @@ def prefactor(pair: PrincipalPair, start: float) -> float:
 
     It is in the coordinates of the problem, whatever those are in which the pair was solved.
     """
-    first, last = _ends(pair, start)
+    first, last = _ends(pair.generator, pair.p, start)
     norm = pair.left @ pair.space.weighed(pair.right)
     return float((first @ pair.right) * (last @ pair.left) / norm)
 
 
-def others(pair: PrincipalPair, start: float) -> Sequence[tuple[float, float]]:
-    """Of the eigenvalues Λₖ nearest to Λ Λ − Re Λₖ and |aₖ|/C; nothing where they are not found."""
-    space, pencil = pair.space, pair.generator.at(pair.p)
-    count = min(MODES, space.size - 2)
-    if count < 1:
-        return ()
-    shift = pair.value + 0.1 * pair.generator.unit_rate
-    factor = pencil.factorised(shift)
-
-    def found(transposed: bool) -> tuple[Any, Any]:
-        operator = LinearOperator(
-            (space.size, space.size),
-            lambda x: factor.solve(space.weighed(x.ravel()), transposed=transposed),
-            dtype=float,
-        )
-        values, vectors = eigs(operator, count, v0=pair.left if transposed else pair.right, tol=1e-6)
-        return shift + 1 / values, vectors
-
-    try:
-        (values, right), (lefts, left) = found(False), found(True)
-    except (ArpackError, RuntimeError):
-        return ()
-    first, last = _ends(pair, start)
-    rows, own = list[tuple[float, float]](), prefactor(pair, start)
-    for k, value in enumerate(values):
-        if abs(value - pair.value) <= 1e-6 * pair.generator.unit_rate:
-            continue
-        x, y = right[:, k], left[:, int(np.argmin(np.abs(lefts - value)))]
-        overlap = y @ (space.weighed(x.real) + 1j * space.weighed(x.imag))
-        rows.append((pair.value - float(value.real), float(abs((first @ x) * (last @ y) / overlap)) / own))
-    return rows
-
-
-def _ends(pair: PrincipalPair, start: float) -> tuple[FloatArray, FloatArray]:
+def _ends(generator: Generator, p: float, start: float) -> tuple[FloatArray, FloatArray]:
     """The coefficients of the mean of T over the start, and of ⟨T*, 1⟩, shape (size,) each."""
-    space, frame = pair.space, pair.generator.problem.frame
+    space, frame = generator.space(p), generator.problem.frame
     phi, at, own, weights = space.phi, np.array([start]), 1.0, None
     if frame is not None:
-        own = float(frame.length(at)[0]) ** pair.p
+        own = float(frame.length(at)[0]) ** p
         at = frame.phase(at)
         points, weights = phi.finer_rule(frame.parts)
-        weights = weights * frame.length(frame.own_phase(points)) ** -pair.p
+        weights = weights * frame.length(frame.own_phase(points)) ** -p
     table = phi.values if weights is None else phi.at(points)
     last = table.T @ (phi.weights if weights is None else weights)
     first = own * np.ravel(phi.at(phi.lines[0] + np.mod(at - phi.lines[0], phi.span)).T @ np.ones(1))
