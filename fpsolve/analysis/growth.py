@@ -256,7 +256,7 @@ def growth_law(
         np.array([math.nan if each is None else prefactor(each, phase) for each in of])
         for of in (pairs, [finer_or_none(solver, pair) for pair in pairs])
     )
-    rows = [laws(slopes, phase, time, rate.growth, rate.p) for time in times.tolist()]
+    rows = np.array([laws(slopes, phase, time, rate.growth, rate.p) for time in times.tolist()])
     density, density_error, above, below, error = np.moveaxis(rows, 2, 0)
     return GrowthLaw(
         time=times,
@@ -458,11 +458,8 @@ class _Cumulants:
         reach = min(AROUND / math.sqrt(here.curvature), -self._low, self._high)
         if abs(here.p) < CENTRE[3] * reach:
             p, values = reach * CENTRE, np.array([self.saddle(each).terms for each in (reach * CENTRE).tolist()])
-            rows = [
-                polyval(here.p, polyfit(p[each], values[each], degree)).tolist()
-                for each, degree in ((slice(None), 5), (slice(1, -1), 3))
-            ]
-            (first, further, wave), fewer = rows
+            fits = polyfit(p, values, 5), polyfit(p[1:-1], values[1:-1], 3)
+            (first, further, wave), fewer = (np.asarray(polyval(here.p, each)).tolist() for each in fits)
             doubt = abs(first - fewer[0]) + abs(further - fewer[1]) + abs(here.p * (wave - fewer[2]))
         w = wave * here.p
         bell, lost = float(norm.pdf(w)), self.lost / math.sqrt(here.curvature)
@@ -540,7 +537,7 @@ def log_moment(
     With R = (L − γM)⁻¹M e^{tL}M⁻¹ = R⁻¹e^{t(γ + R⁻¹)} (L − γM)⁻¹, and R on Arnoldi's vectors is a small matrix H.
     """
     generator = generator or pair.generator
-    space, first, last = generator.space(pair.p), *_ends(generator, pair.p, start)
+    space, (first, last) = generator.space(pair.p), _ends(generator, pair.p, start)
     pole = POLE / time
     factor = generator.at(pair.p).factorised(pair.value + pole)
     vector = factor.solve(last)
