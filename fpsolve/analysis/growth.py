@@ -78,11 +78,11 @@ VECTORS, FEWER = 80, 10
 """Of Arnoldi's method for e^{tL}, and how many less tell its error."""
 POLE = 10.0
 """γ − Λ, times t."""
-LEVELS, DIGITS = (9, 17, 33, 65), 1e-9
+LEVELS, DIGITS = (9, 17, 33, 65), 1e-7
 """Numbers of p in a Chebyshev series, and the share of its largest coefficient down to which it goes."""
 MOST_FINER, FINE = 8, 1e-8
 """Discretisations of e^{tL}, and the change from one to the next with which K is settled."""
-MOST_WIDER = 5
+MOST_WIDER = 8
 """How often an interval of p is widened for a saddle point."""
 
 
@@ -390,26 +390,34 @@ def _found(slopes: Slopes, s: FloatArray) -> RateFunction:
 
 
 class _Cumulants:
-    """K(p) = ln E‖x(t)‖^p for a start at a phase, at one t, as a Chebyshev series on an interval.
+    """K(p) = ln E‖x(t)‖^p for a start at a phase, at one t, and its Chebyshev series on an interval.
 
     Args:
         slopes: Λ.
         start: φ₀.
         time: t.
-        low, high: the interval, 0 inside.
 
     Attributes:
         lost: about the error of K′(p); NaN where a finer discretisation, which tells it, is not to be had.
-
-    Raises:
-        NotConverged: some p of the interval is not solved.
     """
 
-    def __init__(self, slopes: Slopes, start: float, time: float, low: float, high: float) -> None:
+    def __init__(self, slopes: Slopes, start: float, time: float) -> None:
         self._solver, self._start, self.time = slopes.solver, start, time
+        self._known = {0.0: (0.0, 0.0)}
+
+    def holds(self, s: FloatArray, low: float, high: float) -> bool:
+        """Whether K′ = ts has its roots in an interval: K is convex, so that its chords tell."""
+        step = 0.1 * min(-low, high)
+        first, last = (self.at(each + step)[0] - self.at(each)[0] for each in (low, high - step))
+        return bool(first < step * self.time * s.min() and step * self.time * s.max() < last)
+
+    def fit(self, low: float, high: float) -> None:
+        """Make the series on an interval. Raises `NotConverged`."""
+        most = LEVELS[-1] - 1
+        nodes = 0.5 * (low + high) - 0.5 * (high - low) * np.cos(np.pi * np.arange(most + 1) / most)
         for count in LEVELS:
-            p = 0.5 * (low + high) - 0.5 * (high - low) * np.cos(np.pi * np.arange(count) / (count - 1))
-            values, errors = np.array([self._at(each) for each in p.tolist()]).T
+            p = nodes[:: most // (count - 1)]
+            values, errors = np.array([self.at(each) for each in p.tolist()]).T
             noise = float(np.max(errors))
             series = np.polynomial.Chebyshev.fit(p, values, count - 1, domain=[low, high])
             left = float(np.max(np.abs(series.coef[-3:])))
@@ -420,11 +428,13 @@ class _Cumulants:
         self.series = series.truncate(degree + 1)
         self.lost = max(left, noise) * degree**2 / (0.5 * (high - low))
         self._derivatives = [self.series, *(self.series.deriv(n) for n in range(1, 7))]
-        self.slopes = float(self._derivatives[1](low)) / time, float(self._derivatives[1](high)) / time
+        self.slopes = float(self._derivatives[1](low)) / self.time, float(self._derivatives[1](high)) / self.time
         self._low, self._high = low, high
 
-    def _at(self, p: float) -> tuple[float, float]:
+    def at(self, p: float) -> tuple[float, float]:
         """K(p) and its error, from ever finer discretisations: for small t it has layers that T has not."""
+        if p in self._known:
+            return self._known[p]
         solution = self._solver.near.solution(p)
         generator, last = solution.pair.generator, math.inf
         with counted(self._solver.budget.countdown(f"E‖x({self.time:g})‖^{p:g}")):
@@ -435,7 +445,9 @@ class _Cumulants:
                 if change <= FINE or chosen.size > self._solver.budget.unknowns:
                     break
                 generator = type(generator)(generator.problem, chosen)
-        return found, (change if math.isfinite(change) else math.nan) + abs(found - fewer) + self.time * solution.error
+        error = (change if math.isfinite(change) else math.nan) + abs(found - fewer) + self.time * solution.error
+        self._known[p] = found, error
+        return self._known[p]
 
     def saddle(self, p: float) -> _Saddle:
         """K and its derivatives at p."""
@@ -517,13 +529,13 @@ class _Saddle:
 def laws(slopes: Slopes, start: float, time: float, s: FloatArray, p: FloatArray) -> FloatArray:
     """`_Cumulants.law` at several s, shape (n, 5), from p near the saddle points. Raises `NotConverged`."""
     margin = (AROUND + 0.1) / math.sqrt(time * slopes.at(0.0).curvature)
-    ends = min(p.min(), 0.0), max(p.max(), 0.0)
+    ends, found = (min(p.min(), 0.0), max(p.max(), 0.0)), _Cumulants(slopes, start, time)
     for _ in range(MOST_WIDER):
         low, high = max(ends[0] - margin, slopes.low), min(ends[1] + margin, slopes.high)
-        found = _Cumulants(slopes, start, time, low, high)
-        if found.slopes[0] < s.min() and s.max() < found.slopes[1]:
+        if found.holds(s, low, high):
             break
-        margin *= 2
+        margin *= 1.5
+    found.fit(low, high)
     return np.array([found.law(each) for each in s.tolist()])
 
 
