@@ -18,7 +18,7 @@ from scipy.sparse.linalg import ArpackError, LinearOperator, eigs, eigsh, splu
 
 DENSE = 350
 """Functions up to which all eigenvalues are computed."""
-MOST, MOST_IN_BAND = 14_000, 40_000
+MOST, MOST_IN_BAND = 30_000, 40_000
 """Functions beyond which no larger size is tried, of moments and of Fourier series."""
 CLOSE = 1e-11
 """Of the size of Λ: where two sizes differ by less, the larger one counts."""
@@ -268,7 +268,7 @@ def rightmost(matrix, near=None):
     return complex(values[k]), 2e-16 * norm / max(float(angle), 1e-16)
 
 
-SIZES = {0: (1,), 1: (10, 20, 40, 80, 160), 2: (6, 9, 14, 21, 32, 44)}
+SIZES = {0: (1,), 1: (10, 20, 40, 80, 160), 2: (6, 9, 14, 21, 32, 44, 62, 88)}
 """Functions of a noise, by how many dimensions all noises have together."""
 MODES = (16, 32, 64, 128, 256, 512)
 FEWER = {0: (1,), 1: (8, 14, 22, 32, 42, 50), 2: (5, 8, 12, 16)}
