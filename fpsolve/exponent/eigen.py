@@ -60,8 +60,6 @@ LARGEST_NORM = 1e150
 """Of L(p): vectors of this size have lengths."""
 SECONDS_OF_SOLVE = 2.5e-7
 """With factors, for an unknown."""
-SECONDS_OF_CUBE = 2e-9
-"""Of all eigenvalues of a dense matrix with their vectors, times the third power of its size."""
 SURVEYED_UNKNOWNS = 600
 """Up to so many, a chain is checked by all eigenvalues."""
 
