@@ -139,7 +139,7 @@ class Bars:
                 return
             text = waiting(countdown)
             display.update(number, waits=text)
-            if not self.is_live and self.clock() - printed_at >= LINE_SECONDS:
+            if not self.is_live and phase.total and self.clock() - printed_at >= LINE_SECONDS:
                 print(f"{phase.case}, {phase.name}: {text}", file=self.console.file, flush=True)
                 printed_at = self.clock()
 

@@ -72,7 +72,7 @@ def solver_at(path, x, y):
 
 
 def test_all_files_are_written(folder):
-    assert {path.name for path in folder.iterdir()} == {"chart.csv", "chart.json", "chart.png", "chart.pdf"}
+    assert {path.name for path in folder.iterdir()} == {"chart.csv", "chart.json", "chart.png", "chart.pdf", "records"}
     assert (folder / "chart.png").read_bytes()[1:4] == b"PNG"
 
 
