@@ -479,7 +479,7 @@ class _Cumulants:
         above, below = (min(max(each, 0.0), 1.0) for each in sides)
         height = self.time * math.exp(here.value - here.p * here.slope) / math.sqrt(2 * math.pi * here.curvature)
         relative = abs(here.next) + here.beyond + lost * (1 + abs(here.p) * math.sqrt(here.curvature))
-        error = bell * (abs(further) + doubt + lost) + here.beyond * min(above, below)
+        error = min(bell * (abs(further) + doubt + lost) + here.beyond * min(above, below), 1.0)
         return max(height * (1 + here.next), 0.0), height * relative, above, below, error
 
 

@@ -349,9 +349,11 @@ class Gradient:
         values = {key: each.value for key, each in changed.items()}
         if solution.modes_tell:
             errors = changes_of_errors(solution, around, changed)
-            return _with_errors(values, {key: float(np.sum(np.abs(each))) for key, each in errors.items()})
+            sizes = {key: float(np.sum(np.abs(each))) for key, each in errors.items()}
+            return _with_errors(values, sizes, solution.error / solver.scale(p))
         finer = solver.near.finer_pair(solution.pair, widened(solution.pair.generator).enriched())
-        return _compared(values, {key: each.value for key, each in _changed(Bordered(finer), along).items()})
+        share = abs(finer.value - solution.pair.value) / solver.scale(p)
+        return _compared(values, {key: each.value for key, each in _changed(Bordered(finer), along).items()}, share)
 
     @one_number("∂λ/∂θ")
     def lyapunov_exponent(self) -> dict[str, Estimate]:
@@ -360,21 +362,21 @@ class Gradient:
         near = solver.near.near_zero(0.0)
         values = {key: each.slope for key, each in self._at_zero.items()}
         if not near.modes_tell:
-            return _compared(values, {key: each.slope for key, each in self._finer_at_zero.items()})
+            share = solver.ratio_alone(0.0)[1] / solver.scales.linear
+            return _compared(values, {key: each.slope for key, each in self._finer_at_zero.items()}, share)
         around = Bordered(near.pair)
         errors = changes_of_errors(near, around, _changed(around, along))
-        return _with_errors(
-            values, {key: float(np.sum(np.abs(each))) / abs(near.pair.p) for key, each in errors.items()}
-        )
+        sizes = {key: float(np.sum(np.abs(each))) / abs(near.pair.p) for key, each in errors.items()}
+        return _with_errors(values, sizes, near.error / solver.scale(near.pair.p))
 
     @one_number("∂Λ″(0)/∂θ")
     def variance_rate(self) -> Slopes:
         """∂Λ″(0)/∂θ. Raises `NotConverged`, `NoSuchExponent`."""
-        self._solver.variance_rate()
+        rate = self._solver.variance_rate()
         coarse, fine = (
             {key: each.curvature for key, each in at.items()} for at in (self._at_zero, self._finer_at_zero)
         )
-        return _compared(coarse, fine)
+        return _compared(coarse, fine, rate.relative_error)
 
     @one_number("∂δ_p/∂θ")
     def root(self, p: float) -> Slopes:
@@ -436,22 +438,21 @@ def changes_of_errors(solution: Solution, around: Bordered, changed: Mapping[str
     return found
 
 
-def _with_errors(values: Slopes, errors: Mapping[str, float]) -> dict[str, Estimate]:
+def _with_errors(values: Slopes, errors: Mapping[str, float], share: float) -> dict[str, Estimate]:
     """Derivatives with errors of about these sizes.
 
-    That of one parameter may be small by chance, or fall slowly: twice as much counts, and by the scale of each what is
-    usual among all.
+    That of one parameter may be small by chance, or fall slowly: twice as much counts, and of the scale of each the
+    share that the error of what is derived has of its own scale, as both are of one pair.
     """
-    usual = np.median([abs(errors[key]) / each.scale for key, each in values.items() if each.scale] or [0.0])
     return {
-        key: replace(each, error_estimate=each.error_estimate + 2 * abs(errors[key]) + float(usual) * each.scale)
+        key: replace(each, error_estimate=each.error_estimate + 2 * abs(errors[key]) + share * each.scale)
         for key, each in values.items()
     }
 
 
-def _compared(coarse: Slopes, fine: Slopes) -> dict[str, Estimate]:
+def _compared(coarse: Slopes, fine: Slopes, share: float) -> dict[str, Estimate]:
     """The finer ones, their errors from how far both are apart."""
-    return _with_errors(fine, {key: each.value - coarse[key].value for key, each in fine.items()})
+    return _with_errors(fine, {key: each.value - coarse[key].value for key, each in fine.items()}, share)
 
 
 def _summed(parts: Sequence[Any], norm: float) -> Estimate:

@@ -22,7 +22,7 @@ from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem.generator import Generator
 from fpsolve.model.plane import CoefficientMatrix
 from fpsolve.model.systems.vibro_impact import DAMPING
-from tests.conftest import sampled
+from tests.conftest import FIG1, FIG1_NOISE, sampled
 from tests.oracles import moment_hierarchy, phase_fraction
 from tests.random_sensitivities import RTOL, central, drawn, heavy_tailed, problem_of
 
@@ -285,3 +285,21 @@ def test_no_larger_discretisation_than_that_of_the_moment(monkeypatch):
     size = max(made)
     solve_sensitivities(solver, np.array([2.0]), problem.derivatives(), indices=["lyapunov_exponent"])
     assert max(made) == size
+
+
+def test_the_error_of_a_derivative_does_not_depend_on_others():
+    """It is an estimate from what was computed for it, not from those of other parameters."""
+    problem = Problem(FIG1, FIG1_NOISE)
+    along = problem.derivatives()
+
+    def solved(keys):
+        solver = ExponentSolver(problem)
+        return solve_sensitivities(solver, np.array([1.5]), {key: along[key] for key in keys})
+
+    everything = solved(along)
+    for key in list(along)[::3]:
+        alone = solved([key])
+        for some, of_all in zip(
+            (*alone.moments, *alone.indices.values()), (*everything.moments, *everything.indices.values()), strict=True
+        ):
+            assert some[key].error_estimate == pytest.approx(of_all[key].error_estimate, rel=1e-3)
