@@ -34,6 +34,8 @@ if TYPE_CHECKING:
 SEARCH_INTERVAL: tuple[float, float] = (-20.0, 20.0)
 LEAST_SLOPE = 1e-100
 MOST_STEPS = 100
+OUTWARD = 4.0
+"""The first p at most; others are at most twice as far out as the one before, as Λ(p) costs more there."""
 ROUGH = 0.1
 """Error, over |Λ(p)|, at an end of the interval, where the sign alone counts."""
 MOST_RETREATS = 3
@@ -368,6 +370,7 @@ def nonzero_root(
     if guess is None:
         ratio, slope, error = solver.ratio(0.0)
         guess = -ratio / slope if slope > 0 else math.copysign(1.0, -ratio)
+        guess = min(max(guess, -OUTWARD), OUTWARD)
         if abs(ratio) > 2 * error and low < 0 < high:
             low, high = (0.0, high) if ratio < 0 else (low, 0.0)
             tried, signed = {0.0}, {0.0}
@@ -407,6 +410,8 @@ def nonzero_root(
         low, high = (p, high) if ratio < 0 else (low, p)
         if low == high:
             return Absent(Message(Code.NO_ROOT, low=ends[0], high=ends[1], is_bounded=noise.is_bounded))
+        farthest = max(OUTWARD, 2 * abs(p))
+        new = min(max(new, -farthest), farthest)
         if not low < new < high:
             if beyond and len(sides := signed & {low, high}) == 1:
                 return _none_within_reach(ends, low in signed, sides.pop(), beyond[0])
