@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import shutil
 import signal
 import socket
@@ -245,6 +246,18 @@ def children(process):
                 line = (path.parent / "cmdline").read_text()
                 found += [int(path.parent.name)] if "spawn_main" in line else []
     return found
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="finds processes as Linux tells them")
+def test_signals_of_a_terminal_reach_no_worker(place):
+    process = begun(place, "masked", "--jobs", "2")
+    wait_for_records(place, "masked", 1, process)
+    masks = [re.search(r"SigBlk:\s*(\w+)", Path(f"/proc/{each}/status").read_text()) for each in children(process)]
+    process.kill()
+    process.communicate(timeout=60)
+    assert len(masks) == 2
+    assert all(int(mask[1], 16) >> (kind - 1) & 1 for mask in masks for kind in (signal.SIGINT, signal.SIGHUP))
 
 
 @pytest.mark.slow
