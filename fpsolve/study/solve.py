@@ -71,6 +71,7 @@ class Wanted:
         start: φ₀ and ξ₀ of excursions; None where these are not wanted.
         response: rtol of the stationary response; None where that is not wanted.
         grid: of its density; None where numbers are enough.
+        slopes: whether Λ′(p) has an error, which may cost more than Λ(p).
         is_stated: whether a case names what it wants, so that what there is not is told of.
     """
 
@@ -82,6 +83,7 @@ class Wanted:
     start: tuple[Start, StartOfNoise] | None = None
     response: float | None = None
     grid: Grid | None = None
+    slopes: bool = True
     is_stated: bool = True
 
     @property
@@ -137,6 +139,7 @@ def expected(case: Case, varied: Varied) -> Wanted:
         p,
         tuple(name for name in INDICES if any(each.quantity == name for each in chosen)),
         response=case.response.rtol if any(each.of_response for each in chosen) else None,
+        slopes=False,
     )
 
 
@@ -280,13 +283,13 @@ def _solve(draft: Draft, wanted: Wanted, numerics: Numerics, progress: Callable[
         progress()
         draft.grow()
 
-    found = solve_moments(solver, wanted.p, progress=advance, known=draft.known)
+    found = solve_moments(solver, wanted.p, progress=advance, known=draft.known if wanted.slopes else None)
     draft.columns = columns = MomentColumns(
         p=found.p,
         value=found.value,
         derivative=found.derivative,
         error_estimate=found.error_estimate,
-        derivative_error=found.derivative_error,
+        derivative_error=found.derivative_error if wanted.slopes else np.full(found.p.shape, np.nan),
         residual=found.residual,
         perturbation=perturbed_moments(curve.problem, found.p),  # Eq. (37)
         rare=found.rare,
