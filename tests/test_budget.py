@@ -150,6 +150,8 @@ LARGE = {
     "chain, two modes": (lambda: modes(chain(30)), 1.0, 1e-4),
 }
 """Problems that take much memory: what makes them, p (None for Λ″(0)), and rtol."""
+LONG = "slow strong OU", "two OU", "its Λ″(0)", "OU, two modes"
+"""Those that take half a minute each: `pytest tests/benchmarks/test_memory.py`."""
 
 
 def peak(name, memory=12.0):
@@ -159,12 +161,17 @@ def peak(name, memory=12.0):
     return json.loads(done.stdout)
 
 
-@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="sizes of Linux")
-@pytest.mark.parametrize("name", sampled(*LARGE))
-def test_the_peak_of_memory_is_foreseen(name):
+def assert_peak_is_foreseen(name):
     largest, foreseen, _ = peak(name)
     assert largest <= 1.25 * foreseen
     assert foreseen <= 2 * largest
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="sizes of Linux")
+@pytest.mark.parametrize("name", [name for name in LARGE if name not in LONG])
+def test_the_peak_of_memory_is_foreseen(name):
+    assert_peak_is_foreseen(name)
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="sizes of Linux")

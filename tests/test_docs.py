@@ -17,6 +17,7 @@ from fpsolve.study.solve import Numerics, everything, solve_curve
 ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")), *sorted((ROOT / "docs").glob("[!g]*/*.md"))]
 PAGES += sorted((ROOT / "docs/guide").glob("*.md"))
+LONG = "guide/response", "guide/charts"
 
 
 def blocks(page, language):
@@ -24,7 +25,9 @@ def blocks(page, language):
 
 
 def named(pages, language):
-    return [pytest.param(page, id=f"{page.parent.name}/{page.stem}") for page in pages if blocks(page, language)]
+    """Pages that have such blocks; those that take some seconds are slow."""
+    known = {page: f"{page.parent.name}/{page.stem}" for page in pages if blocks(page, language)}
+    return [pytest.param(page, id=name, marks=[pytest.mark.slow] * (name in LONG)) for page, name in known.items()]
 
 
 @pytest.mark.parametrize("page", named(PAGES, "python"))

@@ -525,6 +525,7 @@ def test_newton_s_method_goes_on_while_it_gains_a_digit_a_step(height):
     assert correct(steep(), np.array([0.5, 0.58]), np.array([1.0, 0.0])) is None
 
 
+@pytest.mark.slow
 def test_zeros_of_a_scan_are_told_apart_by_a_coarse_function():
     """The scan of a steep F shows zeros off its line, which cost coarse values; a branch costs one way to its start."""
     fine, coarse = [], []

@@ -71,6 +71,7 @@ def test_isotropic_systems_in_any_coordinates(n, p):
     assert error(enriched(enriched(pair))) < 0.01 * first
 
 
+@pytest.mark.slow
 def test_uniform_densities_of_the_pictures():
     """1/(4π) per unit of the sphere, and sin 2η/(2π) over η and θ₁ − θ₂."""
     three, four = (stationary_density(ExponentSolver(turning(n, np.eye(n))).pair(0.0)) for n in (3, 4))
@@ -91,6 +92,7 @@ def moments_of(p_matrix):
     return vectors[:, np.argmax(values.real)].real
 
 
+@pytest.mark.slow
 def test_second_moments_of_both_eigenfunctions():
     """At p = 2 T is zᵀQz, and ∫ T* eeᵀ dσ is proportional to E zzᵀ/‖E zzᵀ‖; both from Kronecker squares."""
     pair = enriched(ExponentSolver(problem(White(s=1.0)), rtol=1e-8).pair(2.0))
@@ -108,6 +110,7 @@ def test_second_moments_of_both_eigenfunctions():
     assert fields.is_resolved
 
 
+@pytest.mark.slow
 def test_coordinates_of_a_user():
     """The frequencies are found of two modes, of matrices, and where the rates are divided by them already."""
     modes = ModalSystem.of(

@@ -148,30 +148,22 @@ def test_the_law_within_one_turn_remembers_the_start():
     assert abs(found.above[0, 0] - 0.5546438) <= found.probability_error[0, 0] < 3e-3
 
 
-@pytest.mark.parametrize("seed", sampled(0, 1, *range(2, 36), keep=2))
+@pytest.mark.parametrize("seed", sampled(*range(0, 36, 4)))
 def test_random_oscillators_at_one_to_four_turns(seed):
+    """All are in `python -m tests.random_growth`."""
     _, found, error, share, deviation = random_growth.compared(seed, 20_000)
     assert np.all(np.abs(found - share) <= 1.5 * error + 3.5 * deviation)
-    assert error.max() < 0.05
-
-
-def test_simulated_paths_have_this_law():
-    """At three times, where at least a hundred paths are expected on either side of s."""
-    rows = compared(simulated(20_000, seed=1, step=0.04))
-    for time, found, error, share, deviation in rows:
-        expected = found * 20_000
-        seen = (expected >= 100) & (expected <= 19_900)
-        assert np.count_nonzero(seen) >= 4, time
-        assert np.all(np.abs(share - found)[seen] <= (4 * deviation + error)[seen]), time
 
 
 @pytest.mark.slow
 def test_many_simulated_paths_have_this_law():
+    """At three times, where at least a hundred paths are expected on either side of s."""
     for time, found, error, share, deviation in compared(simulated(200_000, seed=2, step=0.01)):
         seen = np.minimum(found, 1 - found) * 200_000 >= 100
         assert np.all(np.abs(share - found)[seen] <= (4 * deviation + error)[seen]), time
 
 
+@pytest.mark.slow
 def test_chance_to_be_above_the_start_under_impacts():
     """Weak noise remembers the phase of its start for long, which the error tells."""
     found = growth_law(Problem(FIG1, FIG1_NOISE), [10.0, 1e4], [0.0, 0.002])

@@ -159,6 +159,7 @@ def test_a_mesh_that_leaves_the_faster_place_out_is_warned_of():
     assert moment_lyapunov(oscillator, noise, 9.0).warnings == ()
 
 
+@pytest.mark.slow
 def test_wide_cells_of_algebraic_tails_can_be_extended():
     oscillator = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=0.5)
     noise = NonGaussianNoise(D0=0.5, tau0=1.0, r0=1.4)

@@ -68,6 +68,7 @@ def by_differences(case, p, value, phases=128):
         *sampled(
             (problem(0.5, 1.0, 1.1, 0.1), -0.1, 0.004209),
             (problem(0.5, 1.0, 1.1, 0.2, restitution=0.8, c1=0.1), -0.5, None),
+            keep=0,
         )
     ],
 )
@@ -314,7 +315,7 @@ def test_what_is_not_positive_is_no_value_of_heavy_tails(departure):
         moment_lyapunov(problem(0.5, 1.0, 1 + departure, 0.1, restitution=0.8, c1=1.0), -0.5)
 
 
-@pytest.mark.parametrize("seed", sampled(10, 8, 94))
+@pytest.mark.parametrize("seed", sampled(10, 8, 94, keep=0))
 def test_random_sets_next_to_gaussian_noise(seed):
     """A hundred, up to r₀ = 1.6: `python -m tests.random_heavy_tails`."""
     found = random_heavy_tails.outcome(seed)

@@ -245,6 +245,7 @@ def test_what_is_refused():
         CoefficientMatrix(0, np.eye(5).tolist())
 
 
+@pytest.mark.slow
 def test_flutter_of_a_bridge_deck():
     """Λ(2) = 0 over wind and turbulence, by the moment hierarchy at its points; it begins where the deck flutters."""
     case = load_case(Path(__file__).parents[2] / "cases/systems/flutter.toml")

@@ -38,6 +38,7 @@ def test_slopes_of_an_oscillator(noise, p):
     assert found.derivative[0] == pytest.approx(slope, abs=1.5 * found.derivative_error[0] + rounding + 1e-7)
 
 
+@pytest.mark.slow
 def test_slopes_at_even_moments_of_three_variables():
     """Harmonics of degree 2 have Λ(2), and a slope of 0.516."""
     found = moment_lyapunov(THREE, 2.0)

@@ -142,6 +142,7 @@ def test_a_harmonic_load_and_white_noise(damping, mu, expected):
     assert abs(exponent.value - phase_circle.lyapunov_exponent(made, 60)) < exponent.error_estimate + 1e-12 < 1e-9
 
 
+@pytest.mark.slow
 def test_sensitivities_to_a_harmonic_load():
     problem, white = stochastic_mathieu(0.05, 0.4, 1.9), [[0.0, 0.0], [-0.3, 0.0]]
     [found] = sensitivities(problem, 2.0).moments

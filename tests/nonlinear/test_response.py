@@ -159,6 +159,7 @@ def test_weak_noise_makes_a_gamma_law():
     assert variance == pytest.approx(2, abs=0.2)
 
 
+@pytest.mark.slow
 def test_hump_and_crater():
     """Near rest ρ(a) ~ a^(−δ_p − 1), and the labels say which density vanishes there."""
     for c1, hump, crater in ((0.02, False, False), (0.12, True, False), (0.4, True, True)):

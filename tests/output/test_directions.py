@@ -42,6 +42,7 @@ def modes(tmp_path_factory):
     return case, run(case, folder), folder / "coupled"
 
 
+@pytest.mark.slow
 def test_files_of_two_modes(modes):
     """The netCDF file and those for ParaView hold the same; the rule of the file integrates all densities to 1."""
     _, [result], folder = modes
@@ -68,6 +69,7 @@ def test_files_of_two_modes(modes):
     np.testing.assert_array_equal(density["stationary_density"], found.stationary_density.values.ravel())
 
 
+@pytest.mark.slow
 def test_figure_of_two_modes(modes, tmp_path):
     case, results, folder = modes
     drawn = load_case(case.path, [*STATED[:-1], STATED[-1].replace("false", "true")])
@@ -76,6 +78,7 @@ def test_figure_of_two_modes(modes, tmp_path):
     assert not (folder / "densities.png").exists()  # as the case wants no figures
 
 
+@pytest.mark.slow
 def test_files_are_removed_with_other_parameters(modes):
     case, _, folder = modes
     other = load_case(case.path, ["expect=[]", "moments.p=[2.0]", "output={quantities=['moment'], figure=false}"])

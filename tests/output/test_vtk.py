@@ -326,6 +326,7 @@ def test_density_file(tmp_path, solver):
     np.testing.assert_allclose(grid["xi_marginal"], UNIT_NOISE.density(grid.points[:, 1]), atol=1e-10)
 
 
+@pytest.mark.slow
 def test_meshio_reads_what_has_been_written(tmp_path):
     """Eigenfunctions, densities over directions and of responses: the same numbers as VTK reads, and the parameters."""
     run(load_case(ROOT / "cases/minimal.toml", ["expect=[]", ALL, NO_FIGURE]), tmp_path)

@@ -36,6 +36,7 @@ def weak():
     )
 
 
+@pytest.mark.slow
 def test_mean_square_of_the_amplitude(weak):
     """⟨A²⟩ = λ/κ up to ε²."""
     oscillator, response = weak
