@@ -64,6 +64,19 @@ def test_a_budget_ends_a_number_and_never_changes_it(name):
         assert share < 0.9 or str(told.value).startswith((name, "Λ"))
 
 
+def test_what_has_ended_the_exponent_is_not_spent_again_on_the_index():
+    """δ_p begins with λ; before, it took as long once more, and ended alike."""
+    solver, whole = ExponentSolver(PROBLEM), Countdown(math.inf)
+    with whole.running():
+        solver.lyapunov_exponent()
+    solver, again = ExponentSolver(PROBLEM, budget=Budget(seconds=0.5 * whole.spent)), Countdown(math.inf)
+    with pytest.raises(NotConverged, match=r"^λ did not converge"):
+        solver.lyapunov_exponent()
+    with again.running(), pytest.raises(NotConverged, match=r"^λ did not converge"):
+        nonzero_root(solver)
+    assert again.spent == 0
+
+
 def test_what_is_foreseen_does_not_depend_on_clocks(monkeypatch):
     """Before, a busy machine ended searches that an idle one went on with."""
     spent = []

@@ -368,6 +368,8 @@ def nonzero_root(
         return Absent(Message(Code.NO_ROOT, low=ends[0], high=ends[1], is_bounded=noise.is_bounded))
     steps, tolerance, tried, signed, beyond = [high - low] * 2, None, set[float](), set[float](), list[Message]()
     if guess is None:
+        if "λ" in solver.spent:  # where this begins
+            raise NotConverged(solver.spent["λ"])
         ratio, slope, error = solver.ratio(0.0)
         guess = -ratio / slope if slope > 0 else math.copysign(1.0, -ratio)
         guess = min(max(guess, -OUTWARD), OUTWARD)

@@ -177,6 +177,10 @@ class ExponentSolver:
         budget: what the choice of a discretisation may cost.
         starts: solutions of a problem with parameters close by, by their p, see `NearPlace`.
 
+    Attributes:
+        slope_errors: of Λ′(p), by p.
+        spent: numbers that the budget has ended, by their symbols.
+
     Raises:
         NoSuchExponent: the variance of the noise is infinite.
         TypeError: an argument is of another kind.
@@ -190,6 +194,7 @@ class ExponentSolver:
     budget: Budget = field(default_factory=Budget)
     starts: Mapping[float, Solution] = field(default_factory=dict, repr=False)
     slope_errors: dict[float, float] = field(init=False, default_factory=dict, repr=False)
+    spent: dict[str, Message] = field(init=False, default_factory=dict, repr=False)
     _even: dict[float, EvenMoment | None] = field(init=False, repr=False, default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -468,10 +473,15 @@ class ExponentSolver:
             finer = self.near.finer_pair(solution.pair, widened(solution.pair.generator).enriched())
             return 2 * abs(finer.derivative - solution.pair.derivative) + slope_rounding(solution.pair)
 
-    @one_number("λ")
     def lyapunov_exponent(self) -> Estimate:
         """λ = Λ′(0), Eq. (2); for algebraic tails the rate of almost every path. Raises `NotConverged`."""
-        value, error = self.ratio_alone(0.0)
+        try:
+            with counted(self.budget.countdown("λ")):
+                value, error = self.ratio_alone(0.0)
+        except NotConverged as failure:
+            if failure.reason.code is Code.NUMBER_SPENT:
+                self.spent["λ"] = failure.message
+            raise
         meaning = ALMOST_EVERY if grows_far_out(self.problem) else ""
         found = Estimate(value, error, self.scales.linear, meaning, quantity.LYAPUNOV_EXPONENT)
         return checked(found, self.near.refinement)
