@@ -2,10 +2,10 @@
 
 `VibroImpactOscillator` is the system of the paper. `PlaneSystem.of_equations` states others as equations.
 
->>> from fpsolve import NonGaussianNoise, VibroImpactOscillator, moment_lyapunov
+>>> from fpsolve import NonGaussianNoise, Problem, VibroImpactOscillator, moment_lyapunov
 >>> oscillator = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=0.1)
 >>> noise = NonGaussianNoise(D0=1.0, tau0=0.5, r0=0.95).ou_reduction()
->>> result = moment_lyapunov(oscillator, noise, 2.0)
+>>> result = moment_lyapunov(Problem(oscillator, noise), 2.0)
 >>> print(f"{result.value[0]:.10f}")
 0.0141631437
 """

@@ -89,11 +89,17 @@ def rows(
         oscillator = VibroImpactOscillator(
             omega=1.0, restitution=restitution, c1=0.1, epsilon=epsilon, impact="restitution"
         )
-        exact = moment_lyapunov(oscillator, noise, ORDERS, rtol=1e-7).value
+        exact = moment_lyapunov(Problem(oscillator, noise), ORDERS, rtol=1e-7).value
         time, h = transients * transient(oscillator, noise), step(oscillator, noise)
         for estimator in ("direct", "population"):
             found = simulate(
-                oscillator, noise, ORDERS, estimator=estimator, paths=paths, time=time, step=h, seed=next(seeds)
+                Problem(oscillator, noise),
+                ORDERS,
+                estimator=estimator,
+                paths=paths,
+                time=time,
+                step=h,
+                seed=next(seeds),
             )
             for p, value, estimate in zip(ORDERS, exact, found.estimates, strict=True):
                 yield Row(epsilon, restitution, name, p, float(value), estimate)
@@ -103,7 +109,7 @@ def scatter(estimator: str, paths: int, time: float, seeds: int) -> Iterator[tup
     """Of λ and of each Λ(p): its name, the estimates of all seeds beside their standard errors, and what is right."""
     orders = [1.0] if estimator == "population" else [-1.0, 0.5, 1.0]
     runs = [
-        simulate(MODERATE, REDUCED, orders, estimator=estimator, paths=paths, time=time, seed=seed)
+        simulate(Problem(MODERATE, REDUCED), orders, estimator=estimator, paths=paths, time=time, seed=seed)
         for seed in range(seeds)
     ]
     exponent = ExponentSolver(Problem(MODERATE, REDUCED)).lyapunov_exponent().value
@@ -131,7 +137,9 @@ def biases(
     [value] = exact(STRONG, noise, [p])
     with patch.object(estimators, "obstacles", lambda *_, **__: {}):
         for step in steps:
-            found = simulate(STRONG, noise, [p], estimator="population", paths=paths, time=time, step=step, seed=4)
+            found = simulate(
+                Problem(STRONG, noise), [p], estimator="population", paths=paths, time=time, step=step, seed=4
+            )
             [estimate] = found.estimates
             yield estimate.value / value - 1, estimate.standard_error / abs(value)
 

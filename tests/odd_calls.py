@@ -33,6 +33,7 @@ from fpsolve.model.faults import ParameterError
 from fpsolve.model.noises.markov_chain import MarkovChain
 from fpsolve.model.noises.sine_wiener import SineWiener
 from fpsolve.model.plane import CoefficientMatrix, Jump
+from fpsolve.model.problem import Problem
 from tests.solving import case_text
 
 LIMIT = 60
@@ -75,18 +76,18 @@ OSCILLATOR = fpsolve.VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, e
 NOISE = fpsolve.OrnsteinUhlenbeck(alpha=2.0, sigma=2.0)
 NUMERICS = {"rtol": 1e-3, "mesh": None, "budget": Budget(unknowns=2000, seconds=2.0)}
 FRAME = {"x": Axis("oscillator.omega", 0.8, 1.2), "y": Axis("oscillator.c1", -0.1, 0.1)}
-HALVES = {"oscillator": OSCILLATOR, "noise": NOISE}
+PROBLEM = {"problem": fpsolve.Problem(OSCILLATOR, NOISE)}
 
 
 def solved_plane(**options: Any) -> Any:
     """Λ(2) of a system of the plane, one term of which is made of the options."""
     system = fpsolve.PlaneSystem([CoefficientMatrix(0, ROTATION), CoefficientMatrix(**options)])
-    return fpsolve.moment_lyapunov(system, NOISE, 2.0, **NUMERICS)
+    return fpsolve.moment_lyapunov(Problem(system, NOISE), 2.0, **NUMERICS)
 
 
 def solved_chain(**options: Any) -> Any:
     """λ with telegraph noise."""
-    return fpsolve.lyapunov_exponent(OSCILLATOR, MarkovChain.telegraph(**options), **NUMERICS)
+    return fpsolve.lyapunov_exponent(Problem(OSCILLATOR, MarkovChain.telegraph(**options)), **NUMERICS)
 
 
 def written_mesh(path: Any) -> None:
@@ -126,17 +127,17 @@ CALLS: dict[str, tuple[Callable[..., Any], Mapping[str, Any]]] = {
     "Problem.at": (fpsolve.Problem(OSCILLATOR, NOISE).at, {"values": {"noise.sigma": 1.0}}),
     "Budget": (Budget, {"unknowns": 2000, "seconds": 2.0}),
     "Axis": (Axis, {"key": "oscillator.omega", "start": 0.5, "stop": 2.0, "scale": "linear", "at": (1.0,)}),
-    "moment_lyapunov": (fpsolve.moment_lyapunov, {**HALVES, "p": [1.0, 2.0], **NUMERICS}),
-    "lyapunov_exponent": (fpsolve.lyapunov_exponent, {**HALVES, **NUMERICS}),
-    "stability_index": (fpsolve.stability_index, {**HALVES, **NUMERICS}),
-    "sensitivities": (fpsolve.sensitivities, {**HALVES, "p": [1.0], **NUMERICS}),
-    "MomentLyapunovFunction": (fpsolve.MomentLyapunovFunction, {**HALVES, "interval": (-1.0, 2.0), **NUMERICS}),
-    "ExponentSolver": (fpsolve.ExponentSolver, {"problem": fpsolve.Problem(OSCILLATOR, NOISE), **NUMERICS}),
-    "boundary": (fpsolve.boundary, {**HALVES, "zero": "lyapunov_exponent", **FRAME, "nodes": 2, "step": 0.05}),
-    "prove": (fpsolve.prove, {**HALVES, "p": 2.0, "width": 1e-3}),
+    "moment_lyapunov": (fpsolve.moment_lyapunov, {**PROBLEM, "p": [1.0, 2.0], **NUMERICS}),
+    "lyapunov_exponent": (fpsolve.lyapunov_exponent, {**PROBLEM, **NUMERICS}),
+    "stability_index": (fpsolve.stability_index, {**PROBLEM, **NUMERICS}),
+    "sensitivities": (fpsolve.sensitivities, {**PROBLEM, "p": [1.0], **NUMERICS}),
+    "MomentLyapunovFunction": (fpsolve.MomentLyapunovFunction, {**PROBLEM, "interval": (-1.0, 2.0), **NUMERICS}),
+    "ExponentSolver": (fpsolve.ExponentSolver, {**PROBLEM, **NUMERICS}),
+    "boundary": (fpsolve.boundary, {**PROBLEM, "zero": "lyapunov_exponent", **FRAME, "nodes": 2, "step": 0.05}),
+    "prove": (fpsolve.prove, {**PROBLEM, "p": 2.0, "width": 1e-3}),
     "simulate": (
         fpsolve.simulate,
-        {**HALVES, "p": [1.0], "estimator": "direct", "paths": 64, "time": 20.0, "step": 0.05, "seed": 1},
+        {**PROBLEM, "p": [1.0], "estimator": "direct", "paths": 64, "time": 20.0, "step": 0.05, "seed": 1},
     ),
     "make_mesh": (
         fpsolve.make_mesh,

@@ -103,18 +103,18 @@ def curve(p, *indices):
 
 @pytest.fixture(scope="module")
 def results(fig1_solver):
-    moments = fpsolve.moment_lyapunov(FIG1, REDUCED, [2.0, -1.0, 0.0])
+    moments = fpsolve.moment_lyapunov(Problem(FIG1, REDUCED), [2.0, -1.0, 0.0])
     empty = {name: np.zeros(0) for name in ("p", "value", "derivative", "error_estimate", "residual")}
     estimates = MomentEstimate(1.0, 0.004, 1e-4, "direct", 6000.0), MomentEstimate(9.0, None, None, "direct", 3.0)
-    slopes = fpsolve.sensitivities(FIG1, REDUCED, [1.0, 2.0])
-    line = fpsolve.boundary(FIG1, REDUCED, {"moment": 2.0}, *FRAME, nodes=5)
+    slopes = fpsolve.sensitivities(Problem(FIG1, REDUCED), [1.0, 2.0])
+    line = fpsolve.boundary(Problem(FIG1, REDUCED), {"moment": 2.0}, *FRAME, nodes=5)
     found = {
         "moments": moments,
-        "one moment": fpsolve.moment_lyapunov(FIG1, REDUCED, 2.0),
+        "one moment": fpsolve.moment_lyapunov(Problem(FIG1, REDUCED), 2.0),
         "no moment": replace(moments, failures=(Failure(9.0, "it is too large"),), **empty),
-        "function": fpsolve.MomentLyapunovFunction(FIG1, REDUCED, (-1.0, 2.0)),
+        "function": fpsolve.MomentLyapunovFunction(Problem(FIG1, REDUCED), (-1.0, 2.0)),
         "lyapunov_exponent": fig1_solver.lyapunov_exponent(),
-        "stability_index": fpsolve.stability_index(FIG1, REDUCED),
+        "stability_index": fpsolve.stability_index(Problem(FIG1, REDUCED)),
         "slope": slopes.moments[1]["noise.D0"],
         "number": Estimate(1.0, 0.1, 2.0, meaning="a number"),
         "tilted": fpsolve.tilted_density(moments.pairs[0]),
@@ -126,16 +126,18 @@ def results(fig1_solver):
         "simulation": simulated(estimates),
         "no estimate": simulated(()),
         "response": response(),
-        "stationary response": stationary_response(SETTLING, OrnsteinUhlenbeck(alpha=2.0, sigma=0.9), rtol=0.1),
+        "stationary response": stationary_response(
+            Problem(SETTLING, OrnsteinUhlenbeck(alpha=2.0, sigma=0.9)), rtol=0.1
+        ),
         "curve": curve([-1.0, 2.0], "lyapunov_exponent"),
         "indices of a curve": curve([], "lyapunov_exponent", "stability_index"),
         "directions": fpsolve.tilted_density(ExponentSolver(TURNING, rtol=1e-3).pair(1.0)),
-        "design": design(FIG1, REDUCED, "moment(2) = 0.02", Axis("oscillator.c1", -2.0, 2.0)),
-        "uncertainty": uncertainty(FIG1, REDUCED, {"noise.D0": 0.05}, [1.0, 2.0]),
-        "rate function": rate_function(FIG1, REDUCED, [0.01, 0.02]),
-        "growth law": growth_law(FIG1, REDUCED, [50.0, 100.0], [0.01, 0.02]),
-        "series": perturbation_series(FIG1, REDUCED, [1.0, 2.0], order=4),
-        "excursion": excursion(ParametricOscillator(stiffness=1.0, damping=0.08), Telegraph(a=0.8, k=1.0)),
+        "design": design(Problem(FIG1, REDUCED), "moment(2) = 0.02", Axis("oscillator.c1", -2.0, 2.0)),
+        "uncertainty": uncertainty(Problem(FIG1, REDUCED), {"noise.D0": 0.05}, [1.0, 2.0]),
+        "rate function": rate_function(Problem(FIG1, REDUCED), [0.01, 0.02]),
+        "growth law": growth_law(Problem(FIG1, REDUCED), [50.0, 100.0], [0.01, 0.02]),
+        "series": perturbation_series(Problem(FIG1, REDUCED), [1.0, 2.0], order=4),
+        "excursion": excursion(Problem(ParametricOscillator(stiffness=1.0, damping=0.08), Telegraph(a=0.8, k=1.0))),
     }
     assert set(found) == set(MAIN)
     return found
@@ -231,7 +233,7 @@ def test_numbers_of_moments(results):
 
 
 def test_rare_moments_are_marked():
-    result = fpsolve.moment_lyapunov(FIG1, replace(FIG1_NOISE, r0=1.1), [-0.5, 0.0])
+    result = fpsolve.moment_lyapunov(Problem(FIG1, replace(FIG1_NOISE, r0=1.1)), [-0.5, 0.0])
     assert result.rare.size == 1
     same(result.to_xarray(), "rare", np.isin(result.p, result.rare))
 
@@ -328,7 +330,7 @@ def test_numbers_of_a_simulation(results):
 
 def test_simulations_know_their_parameters():
     noise = FIG1_NOISE.ou_reduction()
-    found = fpsolve.simulate(FIG1, noise, [1.0], paths=32, time=30.0)
+    found = fpsolve.simulate(Problem(FIG1, noise), [1.0], paths=32, time=30.0)
     assert found.parameters == Problem(FIG1, noise).values
     assert found == replace(found, parameters={})
     assert hash(found) == hash(replace(found, parameters={}))

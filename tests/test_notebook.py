@@ -9,18 +9,19 @@ preprocessors = pytest.importorskip("nbconvert.preprocessors", reason="no nbconv
 pytest.importorskip("ipykernel", reason="notebooks need ipykernel: pip install -e '.[test]'")
 
 START = """
-from fpsolve import NonGaussianNoise, VibroImpactOscillator, moment_lyapunov, sensitivities, stability_index
+from fpsolve import NonGaussianNoise, Problem, VibroImpactOscillator, moment_lyapunov, sensitivities, stability_index
 from fpsolve import tilted_density
 from fpsolve.exponent import ExponentSolver
 oscillator = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=0.1)
 noise = NonGaussianNoise(D0=1.0, tau0=0.5, r0=0.95).ou_reduction()
-result = moment_lyapunov(oscillator, noise, [0.0, 1.0, 2.0])
+problem = Problem(oscillator, noise)
+result = moment_lyapunov(problem, [0.0, 1.0, 2.0])
 """
 SHOWN = {
     "result": "moment_error",
-    "stability_index(oscillator, noise)": "stability_index_error",
+    "stability_index(problem)": "stability_index_error",
     "tilted_density(result.pairs[2])": "density",
-    "sensitivities(oscillator, noise, 2.0)": "moment_by_theta",
+    "sensitivities(problem, 2.0)": "moment_by_theta",
 }
 """Cells, and what is in their HTML."""
 DRAWN = ("result.plot()", "result.pairs[2].plot()", "tilted_density(result.pairs[2]).plot()")

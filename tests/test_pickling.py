@@ -54,13 +54,13 @@ def test_assembling_again_keeps_no_memory(strong_pair):
 
 def test_results_pickle():
     noise = FIG1_NOISE.ou_reduction()
-    result = moment_lyapunov(FIG1, noise, [1.0, 2.0])
+    result = moment_lyapunov(Problem(FIG1, noise), [1.0, 2.0])
     again = copied(result)
     assert np.array_equal(again.value, result.value)
     assert again.pairs[0].generator is again.pairs[1].generator
     solver = copied(ExponentSolver(Problem(FIG1, noise)))
     assert solver.solution(2.0).pair.value == pytest.approx(result.value[1], rel=1e-10)
-    function = MomentLyapunovFunction(FIG1, noise, (-1.0, 2.0))
+    function = MomentLyapunovFunction(Problem(FIG1, noise), (-1.0, 2.0))
     assert copied(function)(0.7) == function(0.7)
 
 
@@ -69,7 +69,7 @@ def test_errors_pickle():
     assert str(error) == "a.toml:3: noise.D0: missing"
     assert error.faults == (Fault("noise.D0", 3, "missing"),)
     with pytest.raises(NotConverged) as caught:
-        moment_lyapunov(STRONG, UNIT_NOISE, [1.0, 40.0], mesh=make_mesh(phi_degree=6, xi_degree=6))
+        moment_lyapunov(Problem(STRONG, UNIT_NOISE), [1.0, 40.0], mesh=make_mesh(phi_degree=6, xi_degree=6))
     error = copied(caught.value)
     assert str(error) == str(caught.value)
     assert np.array_equal(error.partial.p, caught.value.partial.p)

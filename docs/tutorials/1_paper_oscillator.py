@@ -19,6 +19,7 @@ import numpy as np
 from fpsolve import (
     MomentLyapunovFunction,
     NonGaussianNoise,
+    Problem,
     VibroImpactOscillator,
     lyapunov_exponent,
     moment_lyapunov,
@@ -33,24 +34,25 @@ from fpsolve import (
 # and ``D0`` are in 1/time, ``tau0`` is in time.
 oscillator = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=0.1)
 noise = NonGaussianNoise(D0=1.0, tau0=0.5, r0=0.95)
+problem = Problem(oscillator, noise)
 
 # %%
 # One moment
 # ----------
 # The mean of :math:`\|x\|^p` grows like :math:`e^{\Lambda(p) t}`. Here is the second moment. Every number comes with an
 # estimate of its error.
-second = moment_lyapunov(oscillator, noise, 2.0)
+second = moment_lyapunov(problem, 2.0)
 print(second.value[0], "+-", second.error_estimate[0])
 
 # %%
 # It is positive: the mean square grows. Almost every single path grows or decays by the largest Lyapunov exponent,
 # :math:`\lambda = \Lambda'(0)`.
-print("lambda =", lyapunov_exponent(oscillator, noise))
+print("lambda =", lyapunov_exponent(problem))
 
 # %%
 # The noise has two treatments. ``noise`` is the bounded noise of Eq. (7). ``noise.ou_reduction()`` is the
 # Ornstein-Uhlenbeck noise that the paper puts in its place, Eqs. (12)-(15). This is the error of the reduction:
-reduced = moment_lyapunov(oscillator, noise.ou_reduction(), 2.0)
+reduced = moment_lyapunov(Problem(oscillator, noise.ou_reduction()), 2.0)
 print(f"{reduced.value[0]:.10f} reduced, {second.value[0]:.10f} exact")
 print(f"the reduction is off by {(reduced.value[0] / second.value[0] - 1):.1%}")
 
@@ -59,7 +61,7 @@ print(f"the reduction is off by {(reduced.value[0] / second.value[0] - 1):.1%}")
 # -----------
 # :math:`\Lambda` is a convex function of :math:`p` with :math:`\Lambda(0) = 0`. ``MomentLyapunovFunction`` makes it a
 # Python function. This takes nine solves, however many points you evaluate.
-exponent = MomentLyapunovFunction(oscillator, noise, (-2.0, 6.0))
+exponent = MomentLyapunovFunction(problem, (-2.0, 6.0))
 p = np.linspace(-2, 6, 201)
 figure, axes = plt.subplots(layout="constrained")
 axes.plot(p, exponent(p))
@@ -69,7 +71,7 @@ axes.set(xlabel="$p$", ylabel=r"$\Lambda(p)$ in 1/time", title="Moment Lyapunov 
 # %%
 # The other zero is the stability index :math:`\delta_p`. It is negative here, as :math:`\lambda > 0`: almost every
 # path grows, and only moments of an order between :math:`\delta_p` and 0 decay.
-print("delta_p =", stability_index(oscillator, noise))
+print("delta_p =", stability_index(problem))
 
 # %%
 # The paths that carry the second moment

@@ -40,10 +40,10 @@ from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.function import nonzero_root
-from fpsolve.exponent.solver import ExponentSolver
+from fpsolve.exponent.solver import ExponentSolver, solver_of
 from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.plane import Harmonics, growth_rate
-from fpsolve.model.problem import Problem, of_problem
+from fpsolve.model.problem import Problem
 from fpsolve.model.quantity import LEAST_PROBABLE, LEVEL, MOST_PROBABLE, UPCROSSINGS
 
 if TYPE_CHECKING:
@@ -159,7 +159,6 @@ class Excursion(Result):
         return "P(sup ‖x‖ ≥ A) A^{:.6g} from {:.4g} to {:.4g}".format(self.stability_index.value, *ends)
 
 
-@of_problem
 def excursion(
     problem: Problem,
     *,
@@ -173,7 +172,7 @@ def excursion(
     ‖x‖ is √(x₁² + x₂²) in the variables of the system, `problem.system.states`.
 
     Args:
-        oscillator, noise: a motion and its noise; or one `Problem` of both, in their place or as `problem`.
+        problem: a motion and its noise.
         phi: φ₀ of the start x₀ = (cos φ₀, −sin φ₀), just after a jump if there is one on this ray; or "uniform".
         xi: ξ₀; or "stationary".
         rtol, budget: as for `moment_lyapunov`.
@@ -182,7 +181,7 @@ def excursion(
         ValueError: there is no such start.
         NotConverged: λ, δ_p or T is not resolved within the budget.
     """
-    solver = ExponentSolver(problem, rtol=problem.wanted(rtol), budget=budget or Budget())
+    solver = solver_of(problem, rtol=rtol, budget=budget)
     return solve_excursion(solver, phi=phi, xi=xi)
 
 

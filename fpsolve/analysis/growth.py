@@ -42,12 +42,12 @@ from fpsolve.errors import NoSuchExponent, NotConverged
 from fpsolve.exponent.adapt import Budget, widened
 from fpsolve.exponent.eigen import PrincipalPair, length, second_derivative
 from fpsolve.exponent.function import SEARCH_INTERVAL
-from fpsolve.exponent.solver import TINY_P, ExponentSolver
+from fpsolve.exponent.solver import TINY_P, ExponentSolver, solver_of
 from fpsolve.fem.axis import TensorSpace
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import Code, Message
-from fpsolve.model.problem import Problem, of_problem
+from fpsolve.model.problem import Problem
 from fpsolve.model.quantity import (
     BELOW,
     GROWTH,
@@ -188,7 +188,6 @@ class GrowthLaw(Result):
         return f"at {self.time.size} t and {self.growth.size} s"
 
 
-@of_problem
 def rate_function(
     problem: Problem,
     s: ArrayLike,
@@ -201,7 +200,7 @@ def rate_function(
     """The rate function I(s) = sup_p (ps − Λ(p)) of (1/t) ln ‖x(t)‖: P(s_t ≈ s) ~ e^{−tI(s)}.
 
     Args:
-        oscillator, noise: a motion and its noise; or one `Problem` of both, in their place or as `problem`.
+        problem: a motion and its noise.
         s: one growth rate, or an array of shape (n,), per unit time.
         interval: the p among which p(s) is sought.
         rtol, mesh, budget: as for `moment_lyapunov`.
@@ -212,11 +211,10 @@ def rate_function(
         NotConverged: some s are not reached by Λ′ in the interval, or some p are not resolved; `partial` is the result
             for the others.
     """
-    solver = ExponentSolver(problem, mesh, rtol=problem.wanted(rtol), budget=budget or Budget())
+    solver = solver_of(problem, mesh, rtol, budget)
     return _found(Slopes(solver, interval), real_numbers(s, "s"))
 
 
-@of_problem
 def growth_law(
     problem: Problem,
     t: ArrayLike,
@@ -231,7 +229,7 @@ def growth_law(
     """The density of s_t = (1/t) ln ‖x(t)‖ and P(s_t ≥ s), from T and T* at the saddle points p(s), with their errors.
 
     Args:
-        oscillator, noise: a motion and its noise; or one `Problem` of both, in their place or as `problem`.
+        problem: a motion and its noise.
         t: one time, or an array of shape (m,); t > 0.
         s: one growth rate, or an array of shape (n,), per unit time.
         start: the phase φ₀ at t = 0, in radians; 0 is the first variable displaced alone. On the ray of a jump it is
@@ -246,7 +244,7 @@ def growth_law(
     times, phase = real_numbers(t, "t"), real_number(start, "start")
     if not np.all(times > 0):
         raise ValueError(f"got t = {shown(t)}; must be positive")
-    solver = ExponentSolver(problem, mesh, rtol=problem.wanted(rtol), budget=budget or Budget())
+    solver = solver_of(problem, mesh, rtol, budget)
     if problem.dimension > 2 or any(each.basis == "pairs" for each in problem.coloured.parts.values()):
         raise NoSuchExponent(Message(Code.NO_PREFACTOR))
     slopes = Slopes(solver, interval)

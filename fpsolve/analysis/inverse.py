@@ -38,7 +38,7 @@ from fpsolve.errors import FpsolveError, NoSuchExponent, NotConverged
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.error import Absent, Estimate
 from fpsolve.messages import Code, Message
-from fpsolve.model.problem import Problem, of_problem
+from fpsolve.model.problem import Problem, checked_problem
 from fpsolve.model.quantity import Quantity
 
 if TYPE_CHECKING:
@@ -102,7 +102,6 @@ class Design(Result):
         return f"{self.target} at {', '.join(f'{key} = {each}' for key, each in self.values.items())}"
 
 
-@of_problem
 def design(
     problem: Problem,
     target: str,
@@ -119,8 +118,7 @@ def design(
     the values of the problem.
 
     Args:
-        oscillator, noise: a motion and its noise, where the search starts; or one `Problem` of both, in their place or
-            as `problem`.
+        problem: a motion and its noise, where the search starts.
         target: such as "stability_index = 1", "lyapunov_exponent = -0.01" or "moment(2) = 0".
         by: the parameters by their keys, each with its range as an `Axis`; of a key alone that is from half to twice
             its value.
@@ -166,7 +164,7 @@ def design(
 def axes_of(problem: Problem, by: str | Axis | Sequence[str | Axis]) -> tuple[Axis, ...]:
     """The parameters of a design with their ranges. Raises `ValueError`."""
     stated = [by] if isinstance(by, str | Axis) else list(by)
-    known, found = problem.differentiable, list[Axis]()
+    known, found = checked_problem(problem).differentiable, list[Axis]()
     if not 0 < len(stated) <= MOST_PARAMETERS:
         raise ValueError(f"got {len(stated)} parameters; must be 1 to {MOST_PARAMETERS}")
     for each in stated:

@@ -33,13 +33,13 @@ from fpsolve.exponent.adapt import Budget, widened
 from fpsolve.exponent.eigen import Bordered
 from fpsolve.exponent.error import Estimate, MissingModes, Solution
 from fpsolve.exponent.function import nonzero_root
-from fpsolve.exponent.solver import ExponentSolver
+from fpsolve.exponent.solver import ExponentSolver, solver_of
 from fpsolve.fem.axis import KroneckerSum
 from fpsolve.fem.factors import one_thread
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.noise import Noise
-from fpsolve.model.problem import ParameterDerivative, Problem, checked_moments, of_problem, with_original
+from fpsolve.model.problem import ParameterDerivative, Problem, checked_moments, with_original
 from fpsolve.model.quantity import (
     LYAPUNOV_EXPONENT,
     MOMENT,
@@ -203,7 +203,6 @@ class Changed:
         return self._operators[k]
 
 
-@of_problem
 def sensitivities(
     problem: Problem,
     p: ArrayLike = (),
@@ -219,7 +218,7 @@ def sensitivities(
     For noise of Eq. (7) with r₀ = 1 ∂/∂r₀ is the derivative from below, as Λ is infinite, or another, above.
 
     Args:
-        oscillator, noise: a motion and its noise; or one `Problem` of both, in their place or as `problem`.
+        problem: a motion and its noise.
         p: one moment, or an array of shape (n,); none by default.
         original: deprecated, as `ReducedNoise` has the parameters of the noise of Eq. (7).
         rtol, mesh, budget: as for `moment_lyapunov`.
@@ -230,7 +229,7 @@ def sensitivities(
         NoSuchExponent: Λ(p) is infinite for one of the p.
     """
     problem = with_original(problem, original)
-    solver = ExponentSolver(problem, mesh, rtol=problem.wanted(rtol), budget=budget or Budget())
+    solver = solver_of(problem, mesh, rtol, budget)
     points = checked_moments(p, problem, may_be_empty=True)
     return solve_sensitivities(solver, points, problem.derivatives(), progress=progress)
 

@@ -26,8 +26,8 @@ from fpsolve.data import Result, dataset
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.error import Absent, Estimate
 from fpsolve.exponent.function import nonzero_root
-from fpsolve.exponent.solver import ExponentSolver
-from fpsolve.model.problem import Problem, checked_moments, of_problem
+from fpsolve.exponent.solver import solver_of
+from fpsolve.model.problem import Problem, checked_moments, checked_problem
 from fpsolve.model.quantity import LYAPUNOV_EXPONENT, MOMENT, STABILITY_INDEX, P, Quantity
 
 if TYPE_CHECKING:
@@ -149,7 +149,7 @@ def laws_of(problem: Problem, uncertain: Mapping[str, Any]) -> dict[str, Law]:
     Raises:
         ValueError: a key is none of a parameter by which Λ can be differentiated, or a deviation is 0 or none.
     """
-    known, found = problem.differentiable, dict[str, Law]()
+    known, found = checked_problem(problem).differentiable, dict[str, Law]()
     for key, stated in uncertain.items():
         if key not in known:
             raise ValueError(f"got {shown(key)} as a parameter; must be one of {', '.join(known) or 'none'}")
@@ -237,7 +237,6 @@ def interval_end(quantity: Quantity, part: str) -> Quantity:
     return Quantity(**{**plain, "name": f"{quantity.name}_{part}", "words": words})
 
 
-@of_problem
 def uncertainty(
     problem: Problem,
     uncertain: Mapping[str, Any],
@@ -249,7 +248,7 @@ def uncertainty(
     """How far λ, δ_p and Λ(p) spread, to first order, where parameters are uncertain.
 
     Args:
-        oscillator, noise: a motion and its noise; or one `Problem` of both, in their place or as `problem`.
+        problem: a motion and its noise.
         uncertain: for the keys of parameters a share of the value, such as 0.05, or {"sd": 0.02}: the standard
             deviation of a normal law, which is cut at the range of the parameter.
         p: one moment, or an array of shape (n,); none by default.
@@ -261,7 +260,7 @@ def uncertainty(
         NotConverged: Λ(p) was not solved for one of the p.
     """
     laws = laws_of(problem, uncertain)
-    solver = ExponentSolver(problem, rtol=problem.wanted(rtol), budget=budget or Budget())
+    solver = solver_of(problem, rtol=rtol, budget=budget)
     points = checked_moments(p, problem, may_be_empty=True)
     values: dict[str, Callable[[], Estimate | Absent]] = {
         LYAPUNOV_EXPONENT.name: solver.lyapunov_exponent,

@@ -27,7 +27,7 @@ from fpsolve.drawing import add_legend, coloured, label_axes, scale_axis
 from fpsolve.exponent.adapt import Budget
 from fpsolve.messages import Code, Message
 from fpsolve.model.noise import Noise
-from fpsolve.model.problem import Problem, of_problem, with_original
+from fpsolve.model.problem import Problem, with_original
 from fpsolve.model.quantity import POINTS
 from fpsolve.pool import Steps
 
@@ -303,7 +303,6 @@ class Boundary(Result):
         return f"{self.zero.equation}: {branches} over {self.x.key} and {self.y.key}"
 
 
-@of_problem
 def boundary(
     problem: Problem,
     zero: str | Mapping[str, float],
@@ -319,8 +318,7 @@ def boundary(
     """The line λ = 0, Λ(p) = 0 or δ_p = v in a frame of two parameters.
 
     Args:
-        oscillator, noise: a motion and its noise, whose other parameters are held; or one `Problem` of both, in their
-            place or as `problem`.
+        problem: a motion and its noise, whose other parameters are held.
         zero: "lyapunov_exponent", {"moment": p} or {"stability_index": v}.
         x, y: the frame.
         original: deprecated, as `ReducedNoise` has the parameters of the noise of Eq. (7).

@@ -24,7 +24,7 @@ from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.faults import told_in_words
 from fpsolve.model.parameters import STRICT
-from fpsolve.model.problem import Problem, refuse_infinite
+from fpsolve.model.problem import Problem, checked_problem, refuse_infinite
 
 RTOL, RTOL_BEYOND_PLANE = 1e-10, 1e-4
 """Of F, relative to its scale."""
@@ -165,7 +165,7 @@ def said(failure: ValueError) -> str:
 
 def check_axes(problem: Problem, x: Axis, y: Axis) -> None:
     """Refuse axes that span no frame. Raises `ValueError`."""
-    known = problem.differentiable
+    known = checked_problem(problem).differentiable
     for axis in (x, y):
         if not isinstance(axis, Axis):
             raise ValueError(f"got {shown(axis)} as an axis; must be an Axis")

@@ -21,10 +21,10 @@ from fpsolve.data import Result, dataset
 from fpsolve.errors import NotConverged
 from fpsolve.exponent.adapt import Budget, Tolerance, misplaced
 from fpsolve.exponent.error import MEANINGLESS, Absent, Estimate, Failure, Moment, checked
-from fpsolve.exponent.solver import TINY_P, ExponentSolver, MomentLyapunov, best_order, missed, of_the_start
+from fpsolve.exponent.solver import TINY_P, ExponentSolver, MomentLyapunov, best_order, missed, of_the_start, solver_of
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import Code, Message, Remedy, message_of
-from fpsolve.model.problem import Problem, checked_moments, of_problem, of_problem_too
+from fpsolve.model.problem import Problem, checked_moments
 from fpsolve.model.quantity import DERIVATIVE, MOMENT, SECOND_DERIVATIVE, STABILITY_INDEX, P, moment_at
 from fpsolve.theory.far import grows_far_out
 
@@ -64,7 +64,7 @@ class MomentLyapunovFunction(Result):
     Λ′ = ⟨T*, L′T⟩. There are as many points as rtol needs: the last coefficients of the Chebyshev series are the error.
 
     Args:
-        oscillator, noise: a motion and its noise; or one `Problem` of both, in their place or as `problem`.
+        problem: a motion and its noise.
         interval: the smallest and the largest p.
         mesh: a mesh for all p; None chooses one for each p that meets rtol.
         rtol: |error| ≤ rtol·max(|Λ|, the terms of Eq. (37) before they cancel); None is 1e-8, under two noises
@@ -87,7 +87,6 @@ class MomentLyapunovFunction(Result):
             has algebraic tails, and Λ(p) a kink.
     """
 
-    @of_problem_too
     def __init__(
         self,
         problem: Problem,
@@ -107,7 +106,7 @@ class MomentLyapunovFunction(Result):
         if grows_far_out(problem):
             raise NotConverged(Message(Code.KINKED))
         self.interval = low, high
-        self.solver = solver or ExponentSolver(problem, mesh, rtol=problem.wanted(rtol), budget=budget or Budget())
+        self.solver = solver or solver_of(problem, mesh, rtol, budget)
         self._known, self._is_kept = {} if known is None else known, known is not None
         self.interpolation_error, self._among, self._allowed = math.inf, among, SHARE * self._tolerance(1.0, 0.0)
         most = LEVELS[-1] if among is None else max(FEW_NODES, 3 * among.size // 10)
@@ -459,7 +458,6 @@ def _share_of(most: float, p: float, value: float) -> float:
     return most * abs(p)
 
 
-@of_problem
 def moment_lyapunov(
     problem: Problem,
     p: ArrayLike,
@@ -471,7 +469,7 @@ def moment_lyapunov(
     """The moment Lyapunov exponent Λ(p) = lim (1/t) ln E‖x(t)‖^p, Eq. (1), as the principal eigenvalue of Eq. (19).
 
     Args:
-        oscillator, noise: a motion and its noise; or one `Problem` of both, in their place or as `problem`.
+        problem: a motion and its noise.
         p: one moment, or an array of shape (n,).
         rtol: |error| ≤ rtol·max(|Λ|, the terms of Eq. (37) before they cancel); None is 1e-8, under two noises
             that are not white 1e-6, for more than two variables 1e-5.
@@ -485,7 +483,7 @@ def moment_lyapunov(
         NoSuchExponent: Λ(p) is infinite.
         NotConverged: some p are not resolved on the mesh, or within the budget; `partial` is the result for the others.
     """
-    solver = ExponentSolver(problem, mesh, rtol=problem.wanted(rtol), budget=budget or Budget())
+    solver = solver_of(problem, mesh, rtol, budget)
     result = solve_moments(solver, real_numbers(p, "p"))
     if result.failures:
         raise NotConverged(Message(Code.SEVERAL, reasons=[failure.reason for failure in result.failures]), result)

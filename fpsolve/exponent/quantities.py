@@ -36,11 +36,11 @@ from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.error import Absent, Estimate, checked
 from fpsolve.exponent.function import SEARCH_INTERVAL, nonzero_root
-from fpsolve.exponent.solver import ExponentSolver
+from fpsolve.exponent.solver import ExponentSolver, solver_of
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import Code, Message
 from fpsolve.model import quantity
-from fpsolve.model.problem import ParameterDerivative, Problem, of_problem
+from fpsolve.model.problem import ParameterDerivative, Problem
 from fpsolve.model.quantity import MOMENT as MOMENT
 from fpsolve.model.quantity import Quantity as Quantity
 from fpsolve.theory.perturbation import second_order_or_none
@@ -166,7 +166,6 @@ def _critical_log_factor(solver: ExponentSolver, jump: int | None) -> Estimate |
     return Estimate(own - change, error + _EPS * size, size)
 
 
-@of_problem
 def lyapunov_exponent(
     problem: Problem, *, rtol: float | None = None, mesh: CylinderMesh | None = None, budget: Budget | None = None
 ) -> Estimate:
@@ -175,17 +174,16 @@ def lyapunov_exponent(
     For noise with algebraic tails a positive λ is not Λ′(0), see `theory.far_places`; `meaning` says so.
 
     Args:
-        oscillator, noise: a motion and its noise; or one `Problem` of both, in their place or as `problem`.
+        problem: a motion and its noise.
         rtol, mesh, budget: as for `moment_lyapunov`.
 
     Raises:
         ValueError: rtol is not positive.
         NotConverged: it is not resolved on the mesh, or within the budget.
     """
-    return ExponentSolver(problem, mesh, rtol=problem.wanted(rtol), budget=budget or Budget()).lyapunov_exponent()
+    return solver_of(problem, mesh, rtol, budget).lyapunov_exponent()
 
 
-@of_problem
 def stability_index(
     problem: Problem, *, rtol: float | None = None, mesh: CylinderMesh | None = None, budget: Budget | None = None
 ) -> Estimate | Absent:
@@ -194,14 +192,14 @@ def stability_index(
     For noise with algebraic tails there is none: Λ(p) > 0 for every p ≠ 0, see `theory.far_places`.
 
     Args:
-        oscillator, noise: a motion and its noise; or one `Problem` of both, in their place or as `problem`.
+        problem: a motion and its noise.
         rtol, mesh, budget: as for `moment_lyapunov`.
 
     Raises:
         ValueError: rtol is not positive.
         NotConverged: some p on the way to it is not resolved on the mesh, or within the budget.
     """
-    return nonzero_root(ExponentSolver(problem, mesh, rtol=problem.wanted(rtol), budget=budget or Budget()))
+    return nonzero_root(solver_of(problem, mesh, rtol, budget))
 
 
 @dataclass(frozen=True)

@@ -38,7 +38,7 @@ from fpsolve.errors import NoPerturbationTheory
 from fpsolve.fem.discretisation import first_part
 from fpsolve.model.frame import is_free
 from fpsolve.model.plane import CoefficientMatrix, Harmonics, matrix_at, rotating_coordinates, stretching, turning
-from fpsolve.model.problem import Problem, of_problem
+from fpsolve.model.problem import Problem, checked_problem
 from fpsolve.model.quantity import COEFFICIENT, ORDER, P
 
 if TYPE_CHECKING:
@@ -164,7 +164,6 @@ class PerturbationSeries(Result):
         return np.abs(self.terms(epsilon))
 
 
-@of_problem
 def perturbation_series(problem: Problem, p: ArrayLike, *, order: int = 6, rtol: float = 1e-8) -> PerturbationSeries:
     """Λₙ(p) of Λ(p) = Σ εⁿ Λₙ(p), from the terms of the problem keyed by the order of ε, n = 0 to `order`.
 
@@ -172,7 +171,7 @@ def perturbation_series(problem: Problem, p: ArrayLike, *, order: int = 6, rtol:
     The series is asymptotic: it has a best order for each ε, see `PerturbationSeries`.
 
     Args:
-        oscillator, noise: a motion and its noise; or one `Problem` of both, in their place or as `problem`.
+        problem: a motion and its noise.
         p: one moment, or an array of shape (n,).
         order: the highest one, 1 to `MOST_ORDERS`.
         rtol: what the error of a coefficient may be, relative to the largest one at some p of the same order; where
@@ -205,7 +204,7 @@ def perturbation_series(problem: Problem, p: ArrayLike, *, order: int = 6, rtol:
 
 def _refuse(problem: Problem) -> None:
     """Raises `NoPerturbationTheory`."""
-    if problem.dimension > 2:
+    if checked_problem(problem).dimension > 2:
         raise NoPerturbationTheory("perturbation theory is for two variables only")
     if problem.impulses:
         raise NoPerturbationTheory("perturbation theory is for weak noise, not for impulses")

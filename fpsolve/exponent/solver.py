@@ -38,7 +38,7 @@ from fpsolve.fem.factors import one_thread
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import ALMOST_EVERY, Code, Message, Remedy
 from fpsolve.model import quantity
-from fpsolve.model.problem import Problem, checked_moments, refuse_infinite
+from fpsolve.model.problem import Problem, checked_moments, checked_problem, refuse_infinite
 from fpsolve.theory.far import far_places, grows_far_out, log_tail, variance_tail
 from fpsolve.theory.moments import EvenMoment, even_moment
 from fpsolve.theory.perturbation import Scale, scale_of
@@ -57,7 +57,6 @@ TINIEST_P = 1e-9
 """For p < 0 of smaller size Λ(p)/p is that of p = 0 also where several classes, or places of the noise, compete."""
 
 _KINDS: Sequence[tuple[str, Any, str]] = (
-    ("problem", Problem, "a Problem, made of an oscillator and a noise"),
     ("mesh", CylinderMesh | None, "a CylinderMesh, or None"),
     ("budget", Budget, "a Budget"),
     ("rtol", Real, "a number such as 1e-8"),
@@ -198,6 +197,7 @@ class ExponentSolver:
     _even: dict[float, EvenMoment | None] = field(init=False, repr=False, default_factory=dict)
 
     def __post_init__(self) -> None:
+        checked_problem(self.problem)
         for name, kind, words in _KINDS:
             if not isinstance(getattr(self, name), kind) or getattr(self, name) is True:
                 raise TypeError(f"got {name} = {shown(getattr(self, name))}; must be {words}")
@@ -555,6 +555,14 @@ class ExponentSolver:
         near = self.near.near_zero(p, tolerance)
         error = near.error / abs(near.pair.p) + slope_rounding(pairs[0])
         return float(np.mean([pair.derivative for pair in pairs])) + near.pair.correction / near.pair.p, error
+
+
+def solver_of(
+    problem: Problem, mesh: CylinderMesh | None = None, rtol: float | None = None, budget: Budget | None = None
+) -> ExponentSolver:
+    """A solver of a problem, with what is usual for it in place of each None. Raises as `ExponentSolver`."""
+    rtol = checked_problem(problem).usual_rtol if rtol is None else rtol
+    return ExponentSolver(problem, mesh, rtol=rtol, budget=budget or Budget())
 
 
 def tolerated(rtol: float, scales: Scale, p: float, value: float) -> float:

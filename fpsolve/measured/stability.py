@@ -12,7 +12,7 @@ from fpsolve.analysis.sensitivity import solve_sensitivities
 from fpsolve.analysis.spreads import Spread
 from fpsolve.errors import NotConverged
 from fpsolve.exponent.error import Estimate
-from fpsolve.exponent.solver import ExponentSolver
+from fpsolve.exponent.solver import solver_of
 from fpsolve.measured.fit import NoiseFit
 from fpsolve.messages import Code
 from fpsolve.model.problem import Problem
@@ -52,10 +52,9 @@ def verdict(
         ValueError: the problem has another noise.
         NotConverged: λ, Λ(2) or a derivative was not solved.
     """
+    solver = solver_of(problem, rtol=rtol)
     if problem.noise != fit.noise:
         raise ValueError("the noise of the problem is not that of the fit; make it of fit.noise, or of fit.scaled(...)")
-    rtol = problem.usual_rtol if rtol is None else rtol
-    solver = ExponentSolver(problem, rtol=rtol)
     exponent = solver.lyapunov_exponent()
     progress()
     moment = solver.solution(2.0)

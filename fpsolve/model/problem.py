@@ -8,9 +8,8 @@ from collections import Counter
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache, wraps
-from inspect import signature
 from textwrap import wrap
-from typing import Any, Concatenate, ParamSpec, Protocol, TypeVar, overload
+from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -46,7 +45,7 @@ from fpsolve.model.quantity import NOISE, Quantity
 from fpsolve.model.subsystem import ROUNDED, Subsystem, components, couplings, hidden_blocks, reached, subsystems
 
 P = ParamSpec("P")
-R_co = TypeVar("R_co", covariant=True)
+R = TypeVar("R")
 RATE = "1/time"
 """The unit of ξ for which those of parameters of noises are stated."""
 PHASES = 360
@@ -106,7 +105,7 @@ class Problem:
             object.__setattr__(self, "noise", noises_of(self.noise))
         for half, kind, needed in ((self.system, "motion", System), (self.noise, "noise", Noise)):
             if not isinstance(half, needed):
-                raise TypeError(f"got {shown(half)} as a {kind}; the first arguments must be a system and a noise")
+                raise TypeError(f"got {shown(half)} as a {kind}; must be a system and a noise: Problem(system, noise)")
         wanted, given = self.system.noise_sections, self.noise.parts
         if len(wanted) > 1 or len(given) > 1:
             names = self.system.driven_by
@@ -163,10 +162,6 @@ class Problem:
         if self.dimension > 2:
             return RTOL_BEYOND_PLANE
         return RTOL_OF_SEVERAL if len(self.coloured.parts) > 1 else RTOL
-
-    def wanted(self, rtol: float | None) -> float:
-        """A relative error that is given, or the usual one."""
-        return self.usual_rtol if rtol is None else rtol
 
     @property
     def is_on_cylinder(self) -> bool:
@@ -640,6 +635,14 @@ def with_original(problem: Problem, original: Any) -> Problem:
     return Problem(problem.system, reduced)
 
 
+def checked_problem(problem: object) -> Problem:
+    """What is given as a problem. Raises `TypeError` for anything else, such as a system alone."""
+    if isinstance(problem, Problem):
+        return problem
+    remedy = "must be a Problem, made of a system and a noise: Problem(system, noise)"
+    raise TypeError(f"got problem = {shown(problem)}; {remedy}")
+
+
 def refuse_infinite(problem: Problem, p: float) -> None:
     """Refuse a p for which E‖x‖^p is infinite, or not known.
 
@@ -658,60 +661,20 @@ def refuse_infinite(problem: Problem, p: float) -> None:
 def checked_moments(p: ArrayLike, problem: Problem, *, may_be_empty: bool = False) -> FloatArray:
     """p as an array of shape (n,), every one finite and with a finite Λ(p). Raises `ValueError`, `NoSuchExponent`."""
     points = real_numbers(p, "p", may_be_empty=may_be_empty)
+    checked_problem(problem)
     for point in points:
         refuse_infinite(problem, float(point))
     return points
 
 
-class OfProblem(Protocol[P, R_co]):
-    """A function of a `Problem`, or of its two halves."""
-
-    @overload
-    def __call__(self, problem: Problem, /, *args: P.args, **kwargs: P.kwargs) -> R_co: ...
-
-    @overload
-    def __call__(self, oscillator: System, noise: Noise, /, *args: P.args, **kwargs: P.kwargs) -> R_co: ...
-
-
-def of_problem(function: Callable[Concatenate[Problem, P], R_co]) -> OfProblem[P, R_co]:
-    """Let a function whose first argument is a problem also take (oscillator, noise) there, by name or place."""
-
-    @wraps(function)
-    def with_pair(*args: Any, **kwargs: Any) -> R_co:
-        return function(*problem_first(args, kwargs), **kwargs)
-
-    return _signed(with_pair, 0)
-
-
-def of_problem_too(method: Callable[..., None]) -> Callable[..., None]:
-    """The same for a method, such as `__init__`."""
-
-    @wraps(method)
-    def with_pair(self: Any, *args: Any, **kwargs: Any) -> None:
-        method(self, *problem_first(args, kwargs), **kwargs)
-
-    return _signed(with_pair, 1)
-
-
-def _signed(function: Any, at: int) -> Any:
-    """The function, of which `help` shows (oscillator, noise) in place of a problem, as every example writes it."""
-    made = signature(function)
-    old = [*made.parameters.values()]
-    halves = [
-        old[at].replace(name=name, annotation=kind) for name, kind in (("oscillator", "System"), ("noise", "Noise"))
-    ]
-    function.__signature__ = made.replace(parameters=[*old[:at], *halves, *old[at + 1 :]])
-    return function
-
-
-def kept(most: int) -> Callable[[Callable[P, R_co]], Callable[P, R_co]]:
+def kept(most: int) -> Callable[[Callable[P, R]], Callable[P, R]]:
     """Keep so many values of a function of problems; none where the user's own motion or noise cannot be hashed."""
 
-    def keeping(function: Callable[P, R_co]) -> Callable[P, R_co]:
+    def keeping(function: Callable[P, R]) -> Callable[P, R]:
         known: Any = lru_cache(most)(function)
 
         @wraps(function)
-        def value(*args: P.args, **kwargs: P.kwargs) -> R_co:
+        def value(*args: P.args, **kwargs: P.kwargs) -> R:
             try:
                 return known(*args, **kwargs)
             except TypeError:
@@ -720,23 +683,3 @@ def kept(most: int) -> Callable[[Callable[P, R_co]], Callable[P, R_co]]:
         return value
 
     return keeping
-
-
-def problem_first(args: tuple[Any, ...], kwargs: dict[str, Any]) -> tuple[Any, ...]:
-    """Arguments with the problem made of the first two, if it is not the first; keywords that were used are removed.
-
-    Raises:
-        TypeError: there is neither a problem nor a motion and a noise.
-    """
-    if is_named := "problem" in kwargs:
-        args = (kwargs.pop("problem"), *args)
-    if args and isinstance(args[0], Problem):
-        return args
-    if is_named:
-        raise TypeError(f"got problem = {shown(args[0])}; must be a Problem, made of an oscillator and a noise")
-    halves = list(args[:2])
-    for name in ("oscillator", "noise")[len(halves) :]:
-        if name not in kwargs:
-            raise TypeError(f"{name} is missing; the first arguments must be a system and a noise, or a Problem")
-        halves.append(kwargs.pop(name))
-    return (Problem(*halves), *args[2:])

@@ -25,7 +25,7 @@ from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.quantities import lyapunov_exponent, stability_index
 from fpsolve.messages import Code, Message
-from fpsolve.model.problem import Problem, of_problem
+from fpsolve.model.problem import Problem, checked_problem
 from fpsolve.model.quantity import IMPACT_RATE
 from fpsolve.model.settling import no_response
 from fpsolve.nonlinear.adapt import Search, Settled
@@ -208,12 +208,11 @@ class StationaryResponse(Result, NearRest):
         return f"mean amplitude {self.means['amplitude']}, {self.unknowns} unknowns"
 
 
-@of_problem
 def stationary_response(problem: Problem, *, rtol: float = 1e-6, budget: Budget | None = None) -> StationaryResponse:
     """Solve the Fokker-Planck equation of a system with cubic terms, as of an oscillator with c₂ or c₃ > 0, and λ > 0.
 
     Args:
-        oscillator, noise: the system and its noise; or one `Problem` of both, in their place or as `problem`.
+        problem: the system and its noise.
         rtol: how large the error estimate of every mean may be, relative to the mean, 1e-10 to 0.1.
         budget: what it may cost, and λ and δ_p of the linear system before it.
 
@@ -242,7 +241,7 @@ def stationary_response(problem: Problem, *, rtol: float = 1e-6, budget: Budget 
 
 def _linear(problem: Problem, budget: Budget) -> tuple[float, float]:
     """λ and δ_p of the linear system. Raises `FpsolveError` where there is no stationary response."""
-    reason = no_response(problem)
+    reason = no_response(checked_problem(problem))
     if reason is None and problem.coloured.has_algebraic_tails:
         reason = Message(Code.RESPONSE_TAILS)
     if reason is None and (rays := problem.invariant_rays):

@@ -11,7 +11,7 @@ from fpsolve.errors import NotConverged
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.function import nonzero_root
 from fpsolve.exponent.solver import ExponentSolver
-from fpsolve.model.problem import Problem, of_problem
+from fpsolve.model.problem import Problem
 from fpsolve.proofs.balls import precision
 from fpsolve.proofs.bounds import LOWER, UPPER
 from fpsolve.proofs.certificate import NOTHING, Enclosure, around, enclosure_of, trivial
@@ -96,7 +96,6 @@ class ExcursionEnclosure:
 NO_EXCURSION = ExcursionEnclosure(None, None)
 
 
-@of_problem
 def prove(
     problem: Problem,
     p: float,
@@ -111,12 +110,13 @@ def prove(
     the finite elements nor the eigenvalue iteration are trusted. See `fpsolve.proofs.verify` for the theorem.
 
     >>> oscillator = VibroImpactOscillator(omega=1.0, restitution=1.0, c1=0.1, epsilon=0.1)
-    >>> found = prove(oscillator, NonGaussianNoise(D0=1.0, tau0=0.5, r0=0.95), 2.0)
+    >>> noise = NonGaussianNoise(D0=1.0, tau0=0.5, r0=0.95)
+    >>> found = prove(Problem(oscillator, noise), 2.0)
     >>> found.lower < 0.0142930811487 < found.upper  # the exact value, from the moment hierarchy
     True
 
     Args:
-        oscillator, noise: the motion and its noise, or one `Problem` of both, in their place or as `problem`. Bounds
+        problem: a motion and its noise. Bounds
             hold for the decimals that parameters are printed as; for systems besides `VibroImpactOscillator` and
             `ParametricOscillator`, and for a `MarkovChain`, for the exact binary values of matrices, ln R, states and
             rates, and for a phase of a jump within 1e-12 of a multiple of π/4 for that multiple. A coefficient that is
@@ -138,7 +138,6 @@ def prove(
     return prove_bounds(problem, statement_of(problem), repr(float(p)), width, budget or Budget(), progress)
 
 
-@of_problem
 def prove_lyapunov_exponent(
     problem: Problem,
     *,
@@ -150,7 +149,6 @@ def prove_lyapunov_exponent(
     return prove_bounds(problem, statement_of(problem), None, width, budget or Budget(), progress)
 
 
-@of_problem
 def prove_stability_index(
     problem: Problem, *, budget: Budget | None = None, progress: Callable[[], None] = lambda: None
 ) -> IndexEnclosure:
@@ -158,7 +156,6 @@ def prove_stability_index(
     return prove_index(problem, statement_of(problem), budget or Budget(), progress)
 
 
-@of_problem
 def prove_excursion(
     problem: Problem, *, budget: Budget | None = None, progress: Callable[[], None] = lambda: None
 ) -> ExcursionEnclosure:

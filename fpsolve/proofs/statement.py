@@ -29,7 +29,7 @@ from fpsolve.model.kinds import is_ours, kind_classes
 from fpsolve.model.noise import Noise
 from fpsolve.model.parameters import Parametrised
 from fpsolve.model.plane import System
-from fpsolve.model.problem import Problem
+from fpsolve.model.problem import Problem, checked_problem
 from fpsolve.proofs.balls import Balls, ball, each
 from fpsolve.proofs.records import ChainRecord, MotionRecord
 
@@ -139,6 +139,7 @@ def statement_of(problem: Problem, stated: Parameters | None = None) -> Statemen
         TypeError: no proof is known for such a system with such a noise.
         ValueError: the phase may pass the ray of a jump both ways.
     """
+    checked_problem(problem)
     if stated is None:
         stated = {key: str(value) for key, value in linear_values(problem).items()}
     system, noise = problem.system, problem.noise

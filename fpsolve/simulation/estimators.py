@@ -27,7 +27,7 @@ from fpsolve.data import Result, dataset
 from fpsolve.drawing import draw_dots, finish, label_axes
 from fpsolve.errors import NotConverged
 from fpsolve.messages import Code, Message
-from fpsolve.model.problem import Problem, of_problem
+from fpsolve.model.problem import Problem
 from fpsolve.model.quantity import EFFECTIVE_PATHS, IMPACTS, LYAPUNOV_EXPONENT, MOMENT, VARIANCE_RATE, P
 from fpsolve.simulation.batches import PlainBatch, Plan, Population, advance_all, standard_error
 from fpsolve.simulation.coefficients import coefficients
@@ -145,7 +145,6 @@ class MonteCarlo(Result):
         return f"{rate}, Λ(p) at {len(self.estimates)} p, {self.paths} paths"
 
 
-@of_problem
 def simulate(
     problem: Problem,
     p: float | Sequence[float],
@@ -164,8 +163,7 @@ def simulate(
     none, and KeyboardInterrupt is raised.
 
     Args:
-        oscillator, noise: any linear motion of two to four variables, an oscillator without its c₂ and c₃, and its
-            noise; or one `Problem` of both, in their place or as `problem`.
+        problem: any linear motion of two to four variables, an oscillator without its c₂ and c₃, and its noise.
         p: orders of the moments, one or several.
         estimator: "direct", cheap and for moderate p; or "population", one simulation for each p.
         paths: how many; a multiple of 32 is used.

@@ -17,7 +17,7 @@ from fpsolve.errors import FpsolveError
 from fpsolve.messages import Code, Message
 from fpsolve.model.frame import amplitude_frame
 from fpsolve.model.plane import Jump, System, angular_frequency, matrix_at
-from fpsolve.model.problem import Problem, of_problem
+from fpsolve.model.problem import Problem
 from fpsolve.model.quantity import IMPACT_RATE, OSCILLATOR_RESPONSE, ResponseQuantities
 from fpsolve.model.settling import no_response
 from fpsolve.simulation.batches import STEP_SECONDS, advance_all, standard_error
@@ -156,7 +156,6 @@ class _Batch:
         )  # fmt: skip
 
 
-@of_problem
 def simulated_response(
     problem: Problem,
     exponent: float,
@@ -171,7 +170,7 @@ def simulated_response(
     """Simulate a system with cubic terms, as of an oscillator with c₂ or c₃ > 0, until it is stationary, and then on.
 
     Args:
-        oscillator, noise: the system and its noise; or one `Problem` of both, in their place or as `problem`.
+        problem: the system and its noise.
         exponent, variance_rate: λ > 0 and Λ″(0) of the linear system. ln A forgets its start in 1/λ, or, where it
             wanders more than it drifts, in 2Λ″(0)/λ².
         paths, time, step, seed: as for `simulate`; the time is at least 20 times that.

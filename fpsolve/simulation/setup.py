@@ -12,7 +12,7 @@ from fpsolve.arrays import FloatArray, is_whole, real_numbers, shown
 from fpsolve.errors import FpsolveError
 from fpsolve.model.noise import Noise
 from fpsolve.model.plane import System, affine, written_coefficient
-from fpsolve.model.problem import Problem, refuse_infinite
+from fpsolve.model.problem import Problem, checked_problem, refuse_infinite
 from fpsolve.simulation.coefficients import coefficients
 
 Estimator = Literal["direct", "population"]
@@ -35,7 +35,7 @@ def simulated_parts(problem: Problem) -> tuple[System, Noise]:
     Raises:
         FpsolveError: they cannot.
     """
-    system, noise = problem.system, problem.noise
+    system, noise = checked_problem(problem).system, problem.noise
     if not noise.is_simulated:
         need = f"noise that states a step of its paths, but this is a {type(noise).__name__}"
         raise FpsolveError(f"simulation is for {need}; use the finite elements")

@@ -159,7 +159,7 @@ def test_a_finer_solve_is_within_the_errors():
     """The paper's oscillator, whose noise ends: what rtol = 1e-6 says encloses what 1e-11 says."""
     oscillator = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=-1.0, epsilon=0.3)
     noise = NonGaussianNoise(D0=1.0, tau0=0.5, r0=0.9)
-    rough, fine = (excursion(oscillator, noise, rtol=rtol) for rtol in (1e-5, 1e-10))
+    rough, fine = (excursion(Problem(oscillator, noise), rtol=rtol) for rtol in (1e-5, 1e-10))
     for name in ("lower", "upper", "upcrossings"):
         one, other = getattr(rough, name), getattr(fine, name)
         assert abs(one.value - other.value) <= one.error_estimate + other.error_estimate

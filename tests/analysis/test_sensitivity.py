@@ -99,7 +99,7 @@ def test_noise_of_its_own_parameters():
     """Λ(p) of Ornstein-Uhlenbeck noise by α₀ and σ₀; ε σ₀ is one parameter where c₁ = 0 and r = 1."""
     oscillator = VibroImpactOscillator(omega=1.3, restitution=1.0, c1=0.0, epsilon=0.8)
     noise = OrnsteinUhlenbeck(alpha=0.9, sigma=1.1)
-    [found] = sensitivities(oscillator, noise, 2.0, rtol=RTOL).moments
+    [found] = sensitivities(Problem(oscillator, noise), 2.0, rtol=RTOL).moments
     assert found.keys() >= {"noise.alpha", "noise.sigma"}
     by_epsilon = found["oscillator.epsilon"].value * oscillator.epsilon
     assert found["noise.sigma"].value * noise.sigma == pytest.approx(by_epsilon, rel=1e-8)
@@ -122,7 +122,7 @@ def test_damping_of_the_exact_moment():
     """Without walls Λ(−2) = −ε²c₁ + ε²S(0)/2, exactly."""
     oscillator = VibroImpactOscillator(omega=1.0, restitution=1.0, c1=0.3, epsilon=0.7)
     noise = OrnsteinUhlenbeck(alpha=0.8, sigma=0.9)
-    [found] = sensitivities(oscillator, noise, -2.0, rtol=RTOL).moments
+    [found] = sensitivities(Problem(oscillator, noise), -2.0, rtol=RTOL).moments
     at_rest = noise.spectral_density(0.0)
     expected = {
         "oscillator.omega": 0.0,
@@ -152,7 +152,7 @@ def test_against_the_moment_hierarchy():
         total += np.kron(force, moment_hierarchy.rates_of_monomials(DAMPING, 2))
         return float(np.max(np.linalg.eigvals(total).real))
 
-    [found] = sensitivities(*parts(theta), 2.0, rtol=RTOL).moments
+    [found] = sensitivities(Problem(*parts(theta)), 2.0, rtol=RTOL).moments
     for key, estimate in found.items():
         name = key.partition(".")[2]
         if name in theta:  # the restitution is not in these equations
@@ -208,7 +208,7 @@ def test_a_small_stability_index():
     def index(at):
         return nonzero_root(ExponentSolver(Problem(VibroImpactOscillator(**at), noise), rtol=1e-10)).value
 
-    found = sensitivities(VibroImpactOscillator(**theta), noise, rtol=1e-10).indices["stability_index"]
+    found = sensitivities(Problem(VibroImpactOscillator(**theta), noise), rtol=1e-10).indices["stability_index"]
     assert abs(index(theta)) < SMALL_P
     h = 1e-4 * abs(c1)
     expected = (index(theta | {"c1": c1 + h}) - index(theta | {"c1": c1 - h})) / (2 * h)
@@ -226,7 +226,7 @@ def test_a_motion_of_ones_own():
         return ExponentSolver(Problem(system, noise), rtol=RTOL).pair(2.0).value
 
     system = PlaneSystem([CoefficientMatrix(0, rotation), CoefficientMatrix(1, stiffness, identity)], epsilon=0.6)
-    [found] = sensitivities(system, noise, 2.0, rtol=RTOL).moments
+    [found] = sensitivities(Problem(system, noise), 2.0, rtol=RTOL).moments
     expected = (value(0.6 + 1e-4) - value(0.6 - 1e-4)) / 2e-4
     assert found["system.epsilon"].value == pytest.approx(expected, rel=1e-6)
 

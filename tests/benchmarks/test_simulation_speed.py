@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from fpsolve.model.noises.non_gaussian import NonGaussianNoise
+from fpsolve.model.problem import Problem
 from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
 from fpsolve.simulation.estimators import simulate
 
@@ -21,7 +22,7 @@ PEER_PATHS = 2000
 @pytest.mark.parametrize("name", NOISES)
 def test_path_steps_a_second(benchmark, name):
     """At least 3e7, with estimates of two moments; compilation, which a cache keeps, is apart."""
-    simulate(OSCILLATOR, NOISES[name], [1.0, 2.0], paths=64, time=30.0)
+    simulate(Problem(OSCILLATOR, NOISES[name]), [1.0, 2.0], paths=64, time=30.0)
     found = benchmark.pedantic(
         simulate, args=(OSCILLATOR, NOISES[name], [1.0, 2.0]), kwargs={"paths": PATHS, "time": 400.0}, rounds=3
     )
@@ -32,7 +33,7 @@ def test_path_steps_a_second(benchmark, name):
 
 def test_against_numpy(benchmark):
     """Faster than NumPy on whole arrays that makes an Euler step and seeks no impacts."""
-    simulate(OSCILLATOR, NOISES["reduced"], [], paths=64, time=30.0)
+    simulate(Problem(OSCILLATOR, NOISES["reduced"]), [], paths=64, time=30.0)
     found = benchmark.pedantic(
         simulate, args=(OSCILLATOR, NOISES["reduced"], []), kwargs={"paths": PATHS, "time": 200.0}, rounds=3
     )

@@ -33,7 +33,7 @@ NO_LOSS = {"omega": 1.0, "restitution": 1.0, "c1": 0.0}
 @pytest.mark.parametrize("p", [-1.5, 2.0, 5.5])
 def test_every_tolerance_is_met(p, rtol):
     oracle = fourier_hermite.moment_lyapunov(**oracle_arguments(FIG1, WEAK_NOISE), p=p, harmonics=10, hermite=30)
-    result = moment_lyapunov(FIG1, WEAK_NOISE, p, rtol=rtol)
+    result = moment_lyapunov(Problem(FIG1, WEAK_NOISE), p, rtol=rtol)
     scale = max(abs(oracle), perturbation.moment_scale(FIG1, WEAK_NOISE, p))
     rounding = 1e-15 * FIG1.omega  # of the oracle, which is read off a matrix of this size
     assert abs(result.value[0] - oracle) <= rtol * scale + rounding
@@ -43,7 +43,7 @@ def test_every_tolerance_is_met(p, rtol):
 
 def test_tighter_tolerances_cost_more_unknowns_but_not_many_more():
     sizes = [
-        moment_lyapunov(FIG1, WEAK_NOISE, 2.0, rtol=rtol).pairs[0].space.size
+        moment_lyapunov(Problem(FIG1, WEAK_NOISE), 2.0, rtol=rtol).pairs[0].space.size
         for rtol in (1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
     ]
     assert sizes == sorted(sizes)
@@ -56,7 +56,7 @@ def test_no_digits_are_lost_in_weak_noise(p):
     constants = []
     for epsilon in (1e-2, 1e-3, 1e-4):
         oscillator = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=epsilon)
-        value = moment_lyapunov(oscillator, WEAK_NOISE, p, rtol=1e-11).value[0]
+        value = moment_lyapunov(Problem(oscillator, WEAK_NOISE), p, rtol=1e-11).value[0]
         constants.append((value - perturbation.moment_exponent(oscillator, WEAK_NOISE, p)) / epsilon**4)
     np.testing.assert_allclose(constants, constants[1], rtol=0.01)
 
@@ -73,7 +73,7 @@ def test_no_digits_are_lost_in_weak_noise(p):
 )
 def test_cases_that_fool_a_search_near_the_guess(epsilon, p, value):
     """α = σ = ω = 1; the values are from Fourier-Hermite computations with up to 24 000 modes."""
-    result = moment_lyapunov(VibroImpactOscillator(**NO_LOSS, epsilon=epsilon), UNIT_NOISE, p, rtol=1e-9)
+    result = moment_lyapunov(Problem(VibroImpactOscillator(**NO_LOSS, epsilon=epsilon), UNIT_NOISE), p, rtol=1e-9)
     assert result.value[0] == pytest.approx(value, rel=1e-9)
 
 
@@ -83,7 +83,7 @@ def test_identity_at_p_minus_2_for_any_noise(epsilon, c1):
     """Λ(−2) = −ε²c₁ + ε²σ²/(2α²) without impact."""
     noise = OrnsteinUhlenbeck(alpha=1.3, sigma=0.8)
     oscillator = VibroImpactOscillator(omega=1.7, restitution=1.0, c1=c1, epsilon=epsilon)
-    value = moment_lyapunov(oscillator, noise, -2.0, rtol=1e-9).value[0]
+    value = moment_lyapunov(Problem(oscillator, noise), -2.0, rtol=1e-9).value[0]
     expected = epsilon**2 * (noise.sigma**2 / (2 * noise.alpha**2) - c1)
     assert value == pytest.approx(expected, rel=1e-9)
 
@@ -96,11 +96,11 @@ def test_fast_noise_tends_to_white_noise(tau0):
     roots = np.roots([1.0, -2.5 * kappa, kappa**2 + 4.0, -4 * kappa])
     white = roots[np.abs(roots.imag) < 1e-12].real.max()
     assert white == pytest.approx(0.25198400004, abs=1e-11)
-    result = moment_lyapunov(VibroImpactOscillator(**NO_LOSS, epsilon=1.0), noise, 2.0)
+    result = moment_lyapunov(Problem(VibroImpactOscillator(**NO_LOSS, epsilon=1.0), noise), 2.0)
     assert result.value[0] == pytest.approx(white, abs=tau0 + 1e-10)
     if tau0 < 1e-4:  # the distance is of first order in τ₀
         slower = OrnsteinUhlenbeck(alpha=0.1 / tau0, sigma=math.sqrt(kappa) * 0.1 / tau0)
-        distance = moment_lyapunov(VibroImpactOscillator(**NO_LOSS, epsilon=1.0), slower, 2.0).value[0] - white
+        distance = moment_lyapunov(Problem(VibroImpactOscillator(**NO_LOSS, epsilon=1.0), slower), 2.0).value[0] - white
         assert distance / (result.value[0] - white) == pytest.approx(10, rel=0.2)
 
 
@@ -117,9 +117,9 @@ def test_the_tilt_changes_nothing_but_the_cost(tilt):
 def test_slow_noise_is_followed_a_hundred_units_away():
     oscillator = VibroImpactOscillator(omega=3.0, restitution=0.9, c1=0.1, epsilon=1.0)
     noise = NonGaussianNoise(D0=1.0, tau0=20.0, r0=1.0).ou_reduction()
-    result = moment_lyapunov(oscillator, noise, 10.0)
+    result = moment_lyapunov(Problem(oscillator, noise), 10.0)
     assert result.pairs[0].space.xi.points[0] > 37  # where P_s has underflown
-    finer = moment_lyapunov(oscillator, noise, 10.0, rtol=1e-10)
+    finer = moment_lyapunov(Problem(oscillator, noise), 10.0, rtol=1e-10)
     assert result.value[0] == pytest.approx(finer.value[0], rel=1e-8)
     # to leading order ξ is held where p G(ξ) − ξ²/(4 D₀) is largest, G being the rate of the faster real mode
     xi = np.linspace(50, 200, 4001) * noise.standard_deviation
@@ -143,8 +143,8 @@ def test_of_two_places_that_slow_noise_may_hold_the_faster_counts(tau0, p, D0, v
     """
     oscillator = VibroImpactOscillator(**NO_LOSS, epsilon=math.sqrt(0.1))
     noise = NonGaussianNoise(D0=D0, tau0=tau0, r0=1.0).ou_reduction()
-    assert moment_lyapunov(oscillator, noise, p).value[0] == pytest.approx(value, rel=3e-7)
-    along = moment_lyapunov(oscillator, noise, [p - 6, p - 3, p])
+    assert moment_lyapunov(Problem(oscillator, noise), p).value[0] == pytest.approx(value, rel=3e-7)
+    along = moment_lyapunov(Problem(oscillator, noise), [p - 6, p - 3, p])
     assert along.value[-1] == pytest.approx(value, rel=3e-7)
 
 
@@ -153,18 +153,18 @@ def test_a_mesh_that_leaves_the_faster_place_out_is_warned_of():
     oscillator = VibroImpactOscillator(**NO_LOSS, epsilon=math.sqrt(0.1))
     noise = NonGaussianNoise(D0=1.3, tau0=20.0, r0=1.0).ou_reduction()
     mesh = make_mesh(phi_cells=4, phi_degree=10, xi_cells=12, xi_degree=12, xi_min=-6, xi_max=18)
-    result = moment_lyapunov(oscillator, noise, 9.0, mesh=mesh)
+    result = moment_lyapunov(Problem(oscillator, noise), 9.0, mesh=mesh)
     assert result.value[0] < 3
     assert any("Λ(9) may be larger: slow noise may carry the moment near 3" in text for text in result.warnings)
-    assert moment_lyapunov(oscillator, noise, 9.0).warnings == ()
+    assert moment_lyapunov(Problem(oscillator, noise), 9.0).warnings == ()
 
 
 @pytest.mark.slow
 def test_wide_cells_of_algebraic_tails_can_be_extended():
     oscillator = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=0.5)
     noise = NonGaussianNoise(D0=0.5, tau0=1.0, r0=1.4)
-    result = moment_lyapunov(oscillator, noise, -0.01, rtol=1e-4)
-    finer = moment_lyapunov(oscillator, noise, -0.01, rtol=1e-5)
+    result = moment_lyapunov(Problem(oscillator, noise), -0.01, rtol=1e-4)
+    finer = moment_lyapunov(Problem(oscillator, noise), -0.01, rtol=1e-5)
     assert abs(result.value[0] - finer.value[0]) <= 3 * result.error_estimate[0]
 
 
@@ -173,18 +173,18 @@ def test_algebraic_tails_are_followed():
     """r₀ = 1.1: the truncation at 4 to 12 noise units that hides Λ(1) = ∞ settles for p = −0.9."""
     noise = NonGaussianNoise(D0=0.5, tau0=1.0, r0=1.1)
     oscillator = VibroImpactOscillator(**NO_LOSS, epsilon=0.5)
-    result = moment_lyapunov(oscillator, noise, -0.9)
+    result = moment_lyapunov(Problem(oscillator, noise), -0.9)
     assert result.value[0] == pytest.approx(0.0328459, abs=5e-8)
     wide = make_mesh(phi_cells=6, phi_degree=12, xi_cells=14, xi_degree=10, xi_min=-80, xi_max=80, grading=8.0)
-    fixed = moment_lyapunov(oscillator, noise, -0.9, mesh=wide)
+    fixed = moment_lyapunov(Problem(oscillator, noise), -0.9, mesh=wide)
     assert abs(fixed.value[0] - result.value[0]) <= 3 * (fixed.error_estimate[0] + result.error_estimate[0])
     with pytest.raises(NoSuchExponent, match=r"Λ\(1\) is infinite: for r0 > 1 the noise has algebraic tails"):
-        moment_lyapunov(oscillator, noise, 1.0)
+        moment_lyapunov(Problem(oscillator, noise), 1.0)
 
 
 def test_truncation_bounds_what_a_cut_changes():
     oscillator = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=0.3)
-    full = moment_lyapunov(oscillator, WEAK_NOISE, 3.0, rtol=1e-12).value[0]
+    full = moment_lyapunov(Problem(oscillator, WEAK_NOISE), 3.0, rtol=1e-12).value[0]
     for upper in (4.0, 5.0, 6.0):
         mesh = make_mesh(phi_cells=2, phi_degree=14, xi_cells=6, xi_degree=12, xi_min=-8.0, xi_max=upper)
         pair = principal_pair(Generator(Problem(oscillator, WEAK_NOISE), mesh), 3.0)
@@ -200,7 +200,7 @@ def test_cells_that_reach_the_ends_of_the_noise_cut_nothing_off():
     mesh = make_mesh(phi_cells=2, phi_degree=10, xi_cells=4, xi_degree=8, xi_min=-end, xi_max=end)
     pair = principal_pair(Generator(Problem(oscillator, noise), mesh), 3.0)
     assert truncation(pair) == (0.0, 0.0)
-    assert pair.value == pytest.approx(moment_lyapunov(oscillator, noise, 3.0).value[0], rel=1e-5)
+    assert pair.value == pytest.approx(moment_lyapunov(Problem(oscillator, noise), 3.0).value[0], rel=1e-5)
 
 
 def test_while_nothing_is_resolved_the_axis_that_lacks_most_is_doubled():
@@ -246,7 +246,7 @@ def test_a_budget_holds(noise, p, monkeypatch):
     monkeypatch.setattr(budget, "OVERHEAD_SECONDS", 1.0)
     oscillator = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.5, epsilon=0.1)
     with pytest.raises(NotConverged, match=r"more than budget.seconds = 6"):
-        moment_lyapunov(oscillator, noise, p, budget=Budget(seconds=6.0))
+        moment_lyapunov(Problem(oscillator, noise), p, budget=Budget(seconds=6.0))
     assert 4 <= count[0] <= 6
 
 
@@ -255,17 +255,17 @@ def test_a_chain_of_which_all_states_are_neighbours_is_foreseen_to_take_long():
     np.fill_diagonal(rates, 0.0)
     chain = MarkovChain(states=np.linspace(-1, 1, 60), rates=rates)
     with pytest.raises(NotConverged, match=r"the next mesh needs some .* more than budget.seconds = 0.05; no mesh"):
-        moment_lyapunov(FIG1, chain, 2.0, budget=Budget(seconds=0.05))
+        moment_lyapunov(Problem(FIG1, chain), 2.0, budget=Budget(seconds=0.05))
 
 
 def test_p_of_any_size_ends_at_once_without_a_warning():
     with pytest.raises(NotConverged, match=r"Λ\(1e\+300\) is beyond floating-point numbers"):
-        moment_lyapunov(FIG1, WEAK_NOISE, 1e300)
+        moment_lyapunov(Problem(FIG1, WEAK_NOISE), 1e300)
 
 
 def test_a_tolerance_below_rounding_is_refused():
     with pytest.raises(NotConverged, match=r"rounding alone may change it by .*; use a larger rtol") as told:
-        moment_lyapunov(FIG1, WEAK_NOISE, 2.0, rtol=1e-17)
+        moment_lyapunov(Problem(FIG1, WEAK_NOISE), 2.0, rtol=1e-17)
     assert "budget" not in str(told.value)
 
 
@@ -281,7 +281,7 @@ def test_no_cells_are_asked_for_where_the_mesh_is_chosen():
     with pytest.raises(
         NotConverged, match=r"was not found on this mesh: .*; use a larger rtol or a larger budget$"
     ) as said:
-        moment_lyapunov(oscillator, noise, -3.0, rtol=1e-4, budget=Budget(unknowns=200))
+        moment_lyapunov(Problem(oscillator, noise), -3.0, rtol=1e-4, budget=Budget(unknowns=200))
     assert "use more cells" not in str(said.value)
 
 

@@ -28,12 +28,12 @@ WEAK_NOISE = FIG1_NOISE.ou_reduction()
 
 @pytest.fixture(scope="module")
 def weak():
-    return MomentLyapunovFunction(FIG1, WEAK_NOISE, (-2.0, 6.0))
+    return MomentLyapunovFunction(Problem(FIG1, WEAK_NOISE), (-2.0, 6.0))
 
 
 @pytest.fixture(scope="module")
 def strong():
-    return MomentLyapunovFunction(STRONG, UNIT_NOISE, (-1.5, 3.0), rtol=1e-7)
+    return MomentLyapunovFunction(Problem(STRONG, UNIT_NOISE), (-1.5, 3.0), rtol=1e-7)
 
 
 @pytest.mark.parametrize("p", [-1.83, -0.4, 1.1, 3.3, 5.9])
@@ -106,16 +106,16 @@ def test_arguments_outside_the_interval_are_refused(weak):
     with pytest.raises(ValueError, match=r"p must lie in \[-2, 6\]"):
         weak(6.5)
     with pytest.raises(ValueError, match="its ends must increase"):
-        MomentLyapunovFunction(FIG1, WEAK_NOISE, (2.0, 2.0))
+        MomentLyapunovFunction(Problem(FIG1, WEAK_NOISE), (2.0, 2.0))
 
 
 def test_infinite_moments_in_the_interval_are_refused():
     with pytest.raises(NoSuchExponent, match=r"Λ\(1\) is infinite"):
-        MomentLyapunovFunction(FIG1, NonGaussianNoise(D0=0.5, tau0=1.0, r0=1.1), (-0.5, 1.0))
+        MomentLyapunovFunction(Problem(FIG1, NonGaussianNoise(D0=0.5, tau0=1.0, r0=1.1)), (-0.5, 1.0))
 
 
 def test_an_interval_on_one_side_of_zero():
-    function = MomentLyapunovFunction(FIG1, WEAK_NOISE, (1.0, 3.0))
+    function = MomentLyapunovFunction(Problem(FIG1, WEAK_NOISE), (1.0, 3.0))
     assert function.root() is None
     assert function.stability_index().value == pytest.approx(-0.3629121344, rel=1e-6)
 
@@ -132,12 +132,12 @@ def test_a_wrong_eigenvalue_breaks_convexity(monkeypatch):
 
     monkeypatch.setattr(ExponentSolver, "ratio", fooled)
     with pytest.raises(NotConverged, match=r"Λ\(p\) is not convex .*; use a smaller rtol$"):
-        MomentLyapunovFunction(FIG1, WEAK_NOISE, (1.9, 2.1), solver=solver)
+        MomentLyapunovFunction(Problem(FIG1, WEAK_NOISE), (1.9, 2.1), solver=solver)
 
 
 @pytest.mark.parametrize("interval", [(-2.0, 2.0), (0.0, 4.0), (-1.0, 0.0)])
 def test_zero_as_a_node_is_no_fault(interval):
-    function = MomentLyapunovFunction(FIG1, WEAK_NOISE, interval, rtol=1e-6)
+    function = MomentLyapunovFunction(Problem(FIG1, WEAK_NOISE), interval, rtol=1e-6)
     assert np.any(function.nodes == 0)
 
 
@@ -156,7 +156,7 @@ def test_no_error_is_below_the_rounding_of_its_number(value):
 
 
 def test_no_error_of_a_moment_is_below_its_rounding():
-    found = moment_lyapunov(FIG1, FIG1_NOISE, [0.0, 2.0], rtol=1e-6)
+    found = moment_lyapunov(Problem(FIG1, FIG1_NOISE), [0.0, 2.0], rtol=1e-6)
     fewer = replace(found, error_estimate=np.zeros(2))
     assert fewer.error_estimate.tolist() == [0.0, 0.5 * math.ulp(found.value[1])]
 
@@ -172,16 +172,16 @@ def test_moments_one_by_one_are_checked_for_convexity(monkeypatch):
 
     monkeypatch.setattr(ExponentSolver, "solution", fooled)
     with pytest.raises(NotConverged, match=r"Λ\(p\) is not convex .*; use a smaller rtol$") as caught:
-        moment_lyapunov(FIG1, WEAK_NOISE, [1.9, 2.0, 2.1])
+        moment_lyapunov(Problem(FIG1, WEAK_NOISE), [1.9, 2.0, 2.1])
     np.testing.assert_array_equal(caught.value.partial.p, [1.9, 2.0, 2.1])
 
 
 def test_a_coarse_mesh_gives_a_coarse_function_with_honest_errors():
     oscillator = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=0.3)
     coarse = MomentLyapunovFunction(
-        oscillator, WEAK_NOISE, (-1.0, 3.0), make_mesh(phi_cells=1, phi_degree=6, xi_cells=2, xi_degree=8)
+        Problem(oscillator, WEAK_NOISE), (-1.0, 3.0), make_mesh(phi_cells=1, phi_degree=6, xi_cells=2, xi_degree=8)
     )
-    fine = MomentLyapunovFunction(oscillator, WEAK_NOISE, (-1.0, 3.0), rtol=1e-10)
+    fine = MomentLyapunovFunction(Problem(oscillator, WEAK_NOISE), (-1.0, 3.0), rtol=1e-10)
     p = np.linspace(-1, 3, 50)
     assert np.all(np.abs(coarse(p) - fine(p)) <= 3 * coarse.error_estimate(p) + 1e-12)
     assert coarse.moments(p).warnings

@@ -141,7 +141,7 @@ def test_sensitivity_to_what_the_impulses_multiply():
         return [CoefficientMatrix(0, FREE), CoefficientMatrix(1, [[0.0, 0.0], [-c, 0.0]], identity)]
 
     law = 0.9, (1.0, -0.5), (0.5, 0.5), 2
-    [found] = sensitivities(PlaneSystem.of(spring, c=0.8), Poisson(rate=0.9, sizes=(1.0, -0.5)), 2.0).moments
+    [found] = sensitivities(Problem(PlaneSystem.of(spring, c=0.8), Poisson(rate=0.9, sizes=(1.0, -0.5))), 2.0).moments
     ahead, behind = (
         moment_hierarchy.impulses_exponent(FREE, [[0.0, 0.0], [-c, 0.0]], *law) for c in (0.8 + 1e-4, 0.8 - 1e-4)
     )

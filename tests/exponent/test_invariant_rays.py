@@ -71,7 +71,7 @@ def test_index():
 def test_one_number_for_all_rays():
     """ẋ = (−0.1 + ξ) x has no phase to speak of, and Λ(p) for negative p too."""
     both = system(((-0.1, 0.0), (0.0, -0.1)), ((1.0, 0.0), (0.0, 1.0)))
-    found = moment_lyapunov(both, NOISES["OU"], [-2.0, 2.0])
+    found = moment_lyapunov(Problem(both, NOISES["OU"]), [-2.0, 2.0])
     np.testing.assert_allclose(found.value, [scalar(NOISES["OU"], p, -0.1, 1.0) for p in (-2.0, 2.0)], atol=1e-9)
 
 
@@ -140,14 +140,17 @@ def test_classes_have_names():
     own, blocks = SYSTEMS["triangular"]
     p = np.array([-0.5, 2.0])
     across, along = blocks  # (0, 1) spans what is invariant
-    found = moment_lyapunov(own, NOISES["OU"], p)
+    found = moment_lyapunov(Problem(own, NOISES["OU"]), p)
     assert [each.is_along for each in found.classes] == [True, False]
     for each, block in zip(found.classes, (along, across), strict=True):
         assert each.phase == pytest.approx(math.pi / 2)
         assert each.lyapunov_exponent.value == pytest.approx(block[0], abs=1e-9)
         np.testing.assert_allclose(each.value, [scalar(NOISES["OU"], one, *block) for one in p], atol=1e-9)
     assert (
-        moment_lyapunov(system(((0.0, 1.0), (-1.0, 0.0)), ((0.0, 0.0), (-1.0, 0.0))), NOISES["OU"], 1.0).classes == ()
+        moment_lyapunov(
+            Problem(system(((0.0, 1.0), (-1.0, 0.0)), ((0.0, 0.0), (-1.0, 0.0))), NOISES["OU"]), 1.0
+        ).classes
+        == ()
     )
     both = ExponentSolver(Problem(SYSTEMS["diagonal"][0], NOISES["OU"])).by_class([])
     assert [(each.phase, each.is_along) for each in both] == [(0.0, True), (pytest.approx(math.pi / 2), True)]
@@ -180,9 +183,9 @@ def test_derivatives_are_those_of_the_larger_rate():
 def test_refused():
     own, _ = SYSTEMS["triangular"]
     with pytest.raises(NoSuchExponent, match=r"never leaves the ray at phi = 1\.5708, .* choose p >= -1"):
-        moment_lyapunov(own, NOISES["OU"], -1.5)
+        moment_lyapunov(Problem(own, NOISES["OU"]), -1.5)
     with pytest.raises(NoSuchExponent, match="remove the jumps"):
-        moment_lyapunov(PlaneSystem(own.terms, [Jump(math.pi / 2, -0.1)]), NOISES["OU"], 1.0)
+        moment_lyapunov(Problem(PlaneSystem(own.terms, [Jump(math.pi / 2, -0.1)]), NOISES["OU"]), 1.0)
     with pytest.raises(NotConverged, match="no positive eigenfunction"):
         ExponentSolver(Problem(own, NOISES["OU"])).pair(1.0)
 

@@ -46,7 +46,7 @@ def test_the_moment_zero_needs_no_solve():
 
 def test_what_is_raised_is_the_result_with_its_failures():
     with pytest.raises(NotConverged) as caught:
-        moment_lyapunov(STRONG, WEAK_NOISE, [6.0, -5.0, 0.0], mesh=HOPELESS)
+        moment_lyapunov(Problem(STRONG, WEAK_NOISE), [6.0, -5.0, 0.0], mesh=HOPELESS)
     failures = caught.value.partial.failures
     assert [failure.p for failure in failures] == [6.0, -5.0]
     assert str(caught.value) == "\n".join(failure.reason for failure in failures)
@@ -87,7 +87,7 @@ NO_NUMBERS = [
 @pytest.mark.parametrize("p", NO_NUMBERS, ids=repr)
 def test_what_is_no_order_of_a_moment_is_refused_in_one_sentence(p):
     with pytest.raises(ValueError, match=r"^p must be a finite number or a non-empty list of finite numbers, got .+$"):
-        moment_lyapunov(FIG1, WEAK_NOISE, p)
+        moment_lyapunov(Problem(FIG1, WEAK_NOISE), p)
 
 
 @pytest.mark.parametrize("p", [[[1], [1, 2]], "2", [[1.0, 2.0]]], ids=repr)
@@ -107,7 +107,7 @@ def test_a_pair_is_of_one_number(p):
 
 @pytest.mark.parametrize("p", [1, (1.0,), np.float32(1), np.array(1), range(1, 2), [Fraction(1)], Decimal(1)], ids=repr)
 def test_all_real_numbers_are_orders_of_moments(p):
-    assert moment_lyapunov(FIG1, WEAK_NOISE, p).value == moment_lyapunov(FIG1, WEAK_NOISE, 1.0).value
+    assert moment_lyapunov(Problem(FIG1, WEAK_NOISE), p).value == moment_lyapunov(Problem(FIG1, WEAK_NOISE), 1.0).value
 
 
 @pytest.mark.parametrize("p", [[2.0, -1.0, 2.0, 0.5], np.resize([3.0, -2.0, 0.5, 1.5, -0.5, 2.5, 1.0], 40)])

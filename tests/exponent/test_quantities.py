@@ -34,13 +34,14 @@ def test_every_index_is_solved_and_approximated(name, fig1_solver):
 
 @pytest.mark.parametrize("solve", [fpsolve.lyapunov_exponent, fpsolve.stability_index])
 def test_public_functions(solve, fig1_solver):
-    found, again = solve(FIG1, WEAK_NOISE), solve(Problem(FIG1, WEAK_NOISE), rtol=1e-6)
+    problem = Problem(FIG1, WEAK_NOISE)
+    found, again = solve(problem), solve(problem, rtol=1e-6)
     assert found.value == pytest.approx(INDICES[solve.__name__].solve(fig1_solver, None).value, rel=1e-7)
     assert abs(again.value - found.value) <= 2 * (again.error_estimate + found.error_estimate)
     with pytest.raises(ValueError, match="rtol"):
-        solve(FIG1, WEAK_NOISE, rtol=-1.0)
+        solve(problem, rtol=-1.0)
 
 
 def test_there_may_be_no_stability_index():
     oscillator = VibroImpactOscillator(omega=10.0, restitution=0.5, c1=-1.0, epsilon=0.1)
-    assert not fpsolve.stability_index(oscillator, OrnsteinUhlenbeck(alpha=1.0, sigma=0.3))
+    assert not fpsolve.stability_index(Problem(oscillator, OrnsteinUhlenbeck(alpha=1.0, sigma=0.3)))

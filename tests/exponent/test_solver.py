@@ -45,7 +45,7 @@ def test_exact_noise_against_gegenbauer_polynomials(r0, p):
         D0=0.8, tau0=0.7, r0=r0, omega=1.4, epsilon=0.3, c1=-0.2,
         log_R=oscillator.log_impact_factor, p=p, harmonics=12, gegenbauer=36,
     )  # fmt: skip
-    result = moment_lyapunov(oscillator, noise, p)
+    result = moment_lyapunov(Problem(oscillator, noise), p)
     error = abs(result.value[0] - oracle)
     assert error <= 3 * result.error_estimate[0] + 1e-12
     assert error <= 1e-8 * max(abs(oracle), perturbation.moment_scale(oscillator, noise, p))
@@ -58,7 +58,7 @@ def test_weak_noise_against_fourier_hermite(p, law):
     oscillator = VibroImpactOscillator(omega=2.0, restitution=0.7, c1=0.2, epsilon=0.15, impact=law)
     noise = OrnsteinUhlenbeck(alpha=1.5, sigma=1.2)
     oracle = fourier_hermite.moment_lyapunov(**oracle_arguments(oscillator, noise), p=p, harmonics=8, hermite=24)
-    result = moment_lyapunov(oscillator, noise, p)
+    result = moment_lyapunov(Problem(oscillator, noise), p)
     assert not result.warnings
     error = abs(result.value[0] - oracle)
     assert error <= 1e-8 * perturbation.moment_scale(oscillator, noise, p)
@@ -169,7 +169,7 @@ def test_derivatives_match_differences_of_values(fig1_solver):
 
 def test_convexity_along_p():
     p = np.linspace(-4, 8, 49)
-    result = moment_lyapunov(FIG1, FIG1_NOISE.ou_reduction(), p)
+    result = moment_lyapunov(Problem(FIG1, FIG1_NOISE.ou_reduction()), p)
     assert np.all(np.diff(result.value, 2) > 0)
     assert np.all(np.diff(result.derivative) > 0)
 
@@ -177,13 +177,13 @@ def test_convexity_along_p():
 def test_result_keeps_the_order_asked_for_and_does_not_depend_on_it():
     noise = FIG1_NOISE.ou_reduction()
     p = [3.0, -1.0, 0.0, 3.0]
-    result = moment_lyapunov(FIG1, noise, p)
+    result = moment_lyapunov(Problem(FIG1, noise), p)
     np.testing.assert_array_equal(result.p, p)
-    alone = np.array([moment_lyapunov(FIG1, noise, k).value[0] for k in p])
+    alone = np.array([moment_lyapunov(Problem(FIG1, noise), k).value[0] for k in p])
     assert np.all(np.abs(result.value - alone) <= 1e-8 * perturbation.moment_scale(FIG1, noise, p) + 1e-15)
-    again = moment_lyapunov(FIG1, noise, p)
+    again = moment_lyapunov(Problem(FIG1, noise), p)
     np.testing.assert_array_equal(result.value, again.value)
-    backwards = moment_lyapunov(FIG1, noise, p[::-1])
+    backwards = moment_lyapunov(Problem(FIG1, noise), p[::-1])
     np.testing.assert_array_equal(result.value, backwards.value[::-1])
 
 
@@ -193,8 +193,8 @@ def test_steps_in_p_do_not_lead_to_another_eigenvalue():
     oscillator = VibroImpactOscillator(omega=10.0, restitution=0.8, c1=0.1, epsilon=0.1)
     noise = NonGaussianNoise(D0=1.0, tau0=20.0, r0=0.95).ou_reduction()
     mesh = make_mesh(phi_cells=2, phi_degree=12, xi_cells=24, xi_degree=8, xi_min=-8, xi_max=24)
-    stepped = moment_lyapunov(oscillator, noise, [0.0, 5.0, 10.0, 15.0], mesh=mesh)
-    alone = moment_lyapunov(oscillator, noise, 15.0, mesh=mesh)
+    stepped = moment_lyapunov(Problem(oscillator, noise), [0.0, 5.0, 10.0, 15.0], mesh=mesh)
+    alone = moment_lyapunov(Problem(oscillator, noise), 15.0, mesh=mesh)
     assert stepped.value[-1] == pytest.approx(alone.value[0], rel=1e-10)
     oracle = fourier_hermite.moment_lyapunov(**oracle_arguments(oscillator, noise), p=15.0, harmonics=8, hermite=200)
     assert alone.value[0] == pytest.approx(oracle, rel=1e-7)
@@ -217,7 +217,7 @@ def test_errors_of_algebraic_tails_are_seen():
 
 def test_errors_of_a_lopsided_mesh_are_seen():
     with pytest.raises(NotConverged, match=r"use more cells .* a wider noise interval"):
-        moment_lyapunov(FIG1, FIG1_NOISE.ou_reduction(), 2.0, mesh=make_mesh(xi_min=-0.01))
+        moment_lyapunov(Problem(FIG1, FIG1_NOISE.ou_reduction()), 2.0, mesh=make_mesh(xi_min=-0.01))
 
 
 def test_indices_without_meaning_are_refused():
@@ -230,13 +230,13 @@ def test_indices_without_meaning_are_refused():
 
 def test_numbers_beyond_floating_point_are_refused():
     with pytest.raises(NotConverged, match="beyond floating-point numbers"):
-        moment_lyapunov(FIG1, FIG1_NOISE.ou_reduction(), -1e6)
+        moment_lyapunov(Problem(FIG1, FIG1_NOISE.ou_reduction()), -1e6)
 
 
 def test_unresolved_mesh_is_said():
     oscillator = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=0.3)
     mesh = make_mesh(phi_cells=1, phi_degree=4, xi_cells=2, xi_degree=5)
-    result = moment_lyapunov(oscillator, FIG1_NOISE.ou_reduction(), [0.0, 2.0], mesh=mesh)
+    result = moment_lyapunov(Problem(oscillator, FIG1_NOISE.ou_reduction()), [0.0, 2.0], mesh=mesh)
     oracle = fourier_hermite.moment_lyapunov(
         **oracle_arguments(oscillator, FIG1_NOISE.ou_reduction()), p=2.0, harmonics=12, hermite=40
     )
@@ -248,7 +248,7 @@ def test_hopeless_mesh_raises_and_keeps_what_was_finished():
     oscillator = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=1.0)
     mesh = make_mesh(phi_cells=1, phi_degree=2, xi_cells=2, xi_degree=3)
     with pytest.raises(NotConverged, match=r"(?s)p = 6|Λ\(6\).*use more cells") as caught:
-        moment_lyapunov(oscillator, FIG1_NOISE.ou_reduction(), [6.0, 0.0], mesh=mesh)
+        moment_lyapunov(Problem(oscillator, FIG1_NOISE.ou_reduction()), [6.0, 0.0], mesh=mesh)
     np.testing.assert_array_equal(caught.value.partial.p, [0.0])
 
 
@@ -256,24 +256,23 @@ def test_hopeless_mesh_raises_and_keeps_what_was_finished():
 def test_infinite_moments_of_algebraic_tails_are_refused(p):
     noise = NonGaussianNoise(D0=0.5, tau0=1.0, r0=1.1)
     with pytest.raises(NoSuchExponent, match=rf"Λ\({p:g}\) is infinite.*choose p in \[-1, 0\]"):
-        moment_lyapunov(FIG1, noise, [0.0, p])
+        moment_lyapunov(Problem(FIG1, noise), [0.0, p])
 
 
 def test_infinite_variance_is_refused():
     with pytest.raises(NoSuchExponent, match="infinite variance"):
-        moment_lyapunov(FIG1, NonGaussianNoise(D0=0.5, tau0=1.0, r0=2.0), 0.0)
+        moment_lyapunov(Problem(FIG1, NonGaussianNoise(D0=0.5, tau0=1.0, r0=2.0)), 0.0)
 
 
 @pytest.mark.parametrize("p", [math.nan, math.inf, [], [[1.0]]])
 def test_bad_p_is_refused(p):
     with pytest.raises(ValueError, match="p must be a finite number or a non-empty list"):
-        moment_lyapunov(FIG1, UNIT_NOISE, p)
+        moment_lyapunov(Problem(FIG1, UNIT_NOISE), p)
 
 
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"problem": "x"}, "got problem = 'x'; must be a Problem, made of an oscillator and a noise"),
         ({"mesh": "x"}, "got mesh = 'x'; must be a CylinderMesh, or None"),
         ({"budget": "x"}, "got budget = 'x'; must be a Budget"),
         ({"rtol": "x"}, "got rtol = 'x'; must be a number such as 1e-8"),

@@ -78,7 +78,7 @@ def test_the_default_mesh_file_is_the_default_mesh():
 @pytest.mark.parametrize(("name", "tolerance"), [("coarse", 3e-5), ("default", 1e-11), ("fine", 5e-13)])
 def test_mesh_files_keep_what_the_readme_says_of_them(name, tolerance):
     noise = FIG1_NOISE.ou_reduction()
-    result = moment_lyapunov(FIG1, noise, [2.0, 6.0], mesh=read_mesh(f"meshes/{name}.vtu"))
+    result = moment_lyapunov(Problem(FIG1, noise), [2.0, 6.0], mesh=read_mesh(f"meshes/{name}.vtu"))
     arguments = oracle_arguments(FIG1, noise)
     exact = [fourier_hermite.moment_lyapunov(**arguments, p=p, harmonics=8, hermite=32) for p in (2.0, 6.0)]
     errors = np.abs(result.value - exact)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from pydantic.dataclasses import dataclass
 
-from fpsolve import PlaneSystem, sensitivities
+from fpsolve import PlaneSystem, Problem, sensitivities
 from fpsolve.errors import NoDerivative
 from fpsolve.model import (
     Bounded,
@@ -179,7 +179,7 @@ def test_of_several_noises_each_is_checked():
 def test_a_wrong_derivative_gives_no_sensitivity():
     """With end_exponent alone it would be a number with a small error, and wrong."""
     system = PlaneSystem.of_equations(("x", "v"), ("v", "-x - 0.2*v - xi*x"))
-    assert sensitivities(system, Beta(), 2.0).moments[0]["noise.a"].value < 0  # less noise
+    assert sensitivities(Problem(system, Beta()), 2.0).moments[0]["noise.a"].value < 0  # less noise
     wrong = type("Changed", (Beta,), {"derivative": lambda self, name: NoiseDerivative(end_exponent=1.0)})()
     with pytest.raises(NoDerivative, match=r'no sensitivities under beta noise: derivative\("a"\)\.log_density at xi'):
-        sensitivities(system, wrong, 2.0)
+        sensitivities(Problem(system, wrong), 2.0)

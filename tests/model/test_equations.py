@@ -68,8 +68,8 @@ def test_equations_take_as_long_as_the_oscillator():
         for system in paper_and_equations(ImpactLaw.DELTA, float(epsilon)):
             started = time.process_time()
             at = system.at({"c1": 0.2})
-            moment_lyapunov(at, NOISE, np.linspace(-1, 4, 5))
-            sensitivities(at, NOISE, 2.0)
+            moment_lyapunov(Problem(at, NOISE), np.linspace(-1, 4, 5))
+            sensitivities(Problem(at, NOISE), 2.0)
             seconds[type(system)].append(time.process_time() - started)
     ours, mine = (np.sort(each)[:3].mean() for each in seconds.values())
     assert mine <= 1.2 * ours
@@ -161,9 +161,9 @@ def test_the_velocity_itself_as_a_variable():
     plain = PlaneSystem.of_equations(
         ("x", "v"), MATHIEU, {"omega": 3.0, "zeta": 0.05}, walls=[{"at": "x=0", "restitution": 0.9}]
     )
-    values = [moment_lyapunov(system, NOISE, [-1.0, 2.0], rtol=1e-9).value for system in (scaled, plain)]
+    values = [moment_lyapunov(Problem(system, NOISE), [-1.0, 2.0], rtol=1e-9).value for system in (scaled, plain)]
     np.testing.assert_allclose(*values, rtol=1e-8)
-    [one], [other] = (sensitivities(system, NOISE, 2.0).moments for system in (scaled, plain))
+    [one], [other] = (sensitivities(Problem(system, NOISE), 2.0).moments for system in (scaled, plain))
     for key, slope in one.items():
         assert other[key].value == pytest.approx(slope.value, rel=1e-6)
 
@@ -175,7 +175,7 @@ def test_wall_where_the_second_variable_is_zero():
         walls=[{"at": "x = 0", "restitution": "1 - loss"}],
     )  # fmt: skip
     assert other.jumps[0].phase == 0.0
-    values = [moment_lyapunov(system, NOISE, [2.0]).value[0] for system in (WALLED, other)]
+    values = [moment_lyapunov(Problem(system, NOISE), [2.0]).value[0] for system in (WALLED, other)]
     assert values[0] == pytest.approx(values[1], rel=1e-9)
 
 
@@ -244,7 +244,9 @@ def test_charts_in_its_own_parameters():
     """ẍ + 2ζẋ + (1 + ξ)x under weak, fast noise: λ = 0 at ζ = S(2)/8, which Eq. (39) says here."""
     system = PlaneSystem.of_equations(("x", "v"), ("v", "-x - 2*zeta*v - size*xi*x"), {"zeta": 0.01, "size": 0.1})
     noise = OrnsteinUhlenbeck(alpha=5.0, sigma=5.0)
-    line = boundary(system, noise, "lyapunov_exponent", Axis("system.size", 0.05, 0.1), Axis("system.zeta", 1e-4, 1e-2))
+    line = boundary(
+        Problem(system, noise), "lyapunov_exponent", Axis("system.size", 0.05, 0.1), Axis("system.zeta", 1e-4, 1e-2)
+    )
     [branch] = line.branches
     expected = branch.x**2 * noise.spectral_density(2.0) / 8
     np.testing.assert_allclose(branch.y, expected, rtol=0.02)

@@ -56,10 +56,10 @@ def driven(g, matrix=STIFFNESS):
     ids=["lambda", "partial", "object", "u"],
 )
 def test_any_callable_is_the_coefficient_that_it_computes(g):
-    expected = moment_lyapunov(driven(Linear()), NOISE, [1.0, 2.0])
-    found = moment_lyapunov(driven(g), NOISE, [1.0, 2.0])
+    expected = moment_lyapunov(Problem(driven(Linear()), NOISE), [1.0, 2.0])
+    found = moment_lyapunov(Problem(driven(g), NOISE), [1.0, 2.0])
     np.testing.assert_allclose(found.value, expected.value, rtol=1e-14)
-    [slopes], [others] = (sensitivities(driven(each), NOISE, 2.0).moments for each in (g, Linear()))
+    [slopes], [others] = (sensitivities(Problem(driven(each), NOISE), 2.0).moments for each in (g, Linear()))
     assert slopes["noise.sigma"].value == pytest.approx(others["noise.sigma"].value, rel=1e-12)
     assert second_order(Problem(driven(g), NOISE)) == second_order(Problem(driven(Linear()), NOISE))
     if "lambda" not in repr(g):
@@ -150,12 +150,12 @@ def test_derivatives_by_named_parameters():
 
 def test_sensitivities_to_named_parameters_are_differences():
     theta = {"omega": 1.3, "damping": 0.4, "loss": 0.1}
-    [found] = sensitivities(PlaneSystem.of(pendulum, **theta), NOISE, 1.5).moments
+    [found] = sensitivities(Problem(PlaneSystem.of(pendulum, **theta), NOISE), 1.5).moments
     for name, h in dict.fromkeys(theta, 1e-4).items():
         ahead, behind = (
-            moment_lyapunov(PlaneSystem.of(pendulum, **{**theta, name: theta[name] + d}), NOISE, 1.5, rtol=1e-11).value[
-                0
-            ]
+            moment_lyapunov(
+                Problem(PlaneSystem.of(pendulum, **{**theta, name: theta[name] + d}), NOISE), 1.5, rtol=1e-11
+            ).value[0]
             for d in (h, -h)
         )
         assert found[f"system.{name}"].value == pytest.approx((ahead - behind) / (2 * h), rel=1e-6)
@@ -168,7 +168,10 @@ def test_terms_that_carry_their_parameters():
         ("s", CoefficientMatrix(1, STIFFNESS, Linear())),
     ]
     system = PlaneSystem.of_terms(terms, c=0.2, s=1.0, epsilon=0.3)
-    assert moment_lyapunov(system, NOISE, 2.0).value[0] == moment_lyapunov(driven(Linear()), NOISE, 2.0).value[0]
+    assert (
+        moment_lyapunov(Problem(system, NOISE), 2.0).value[0]
+        == moment_lyapunov(Problem(driven(Linear()), NOISE), 2.0).value[0]
+    )
     assert system.at({"c": 0.5}).terms[1].matrix == ((0.0, 0.0), (0.0, -0.5))
     assert dict(system.at({"epsilon": 0.1}).values) == {"epsilon": 0.1, "c": 0.2, "s": 1.0}
     assert pickle.loads(pickle.dumps(system)) == system

@@ -79,7 +79,7 @@ def test_one_mode_is_an_oscillator():
     ours = Problem(
         ModalSystem.of([["m"]], [["2*m"]], [["0.2*m"]], stiffness_noise=[["m"]], parameters={"m": 3.0}), noise
     )
-    plain = moment_lyapunov(ParametricOscillator(stiffness=2.0, damping=0.1), noise, 2.0)
+    plain = moment_lyapunov(Problem(ParametricOscillator(stiffness=2.0, damping=0.1), noise), 2.0)
     assert moment_lyapunov(ours, 2.0).value[0] == pytest.approx(plain.value[0], rel=1e-12)
     assert abs(sensitivities(ours, 2.0).moments[0]["system.m"].value) < 1e-10
 

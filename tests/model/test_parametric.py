@@ -57,7 +57,7 @@ def test_even_moments(noise, stiffness, damping):
 @pytest.mark.parametrize("stiffness", [1.0, 0.0, -1.0])
 def test_white_noise_and_a_wall(stiffness):
     """λ in Airy functions."""
-    found = lyapunov_exponent(ParametricOscillator(stiffness, 0.1, 0.8), White(s=0.5), rtol=1e-10)
+    found = lyapunov_exponent(Problem(ParametricOscillator(stiffness, 0.1, 0.8), White(s=0.5)), rtol=1e-10)
     assert found.value == pytest.approx(closed_forms.white_stiffness(stiffness, 0.5, 0.1, 0.8), abs=1e-10)
 
 
@@ -74,7 +74,9 @@ def test_telegraph_noise_and_a_wall():
 
 def test_no_noise_is_left_where_it_is_weak():
     """Λ(p) = −pb + p (ω/π) ln R, ω² = k − b²."""
-    found = moment_lyapunov(ParametricOscillator(2.0, 0.3, 0.7), Telegraph(a=1e-9, k=1.0), [1.0, 3.0], rtol=1e-10)
+    found = moment_lyapunov(
+        Problem(ParametricOscillator(2.0, 0.3, 0.7), Telegraph(a=1e-9, k=1.0)), [1.0, 3.0], rtol=1e-10
+    )
     rate = -0.3 + math.sqrt(2.0 - 0.09) / math.pi * math.log(0.7)
     np.testing.assert_allclose(found.value, [rate, 3 * rate], rtol=1e-9)
 
@@ -83,14 +85,14 @@ def test_no_noise_is_left_where_it_is_weak():
 def test_sensitivities_are_differences(noise):
     """By the hierarchy without a wall; by λ = λ₀ + N ln R with one."""
     theta = {"stiffness": 1.3, "damping": 0.1}
-    [found] = sensitivities(ParametricOscillator(**theta), noise, 2.0).moments
+    [found] = sensitivities(Problem(ParametricOscillator(**theta), noise), 2.0).moments
     assert {*found} == {*(f"system.{name}" for name in (*theta, "restitution")), *(f"noise.{name}" for name in
                         noise.values if name != "interpretation")}  # fmt: skip
     for name, value in theta.items():
         ahead, behind = (hierarchy(ParametricOscillator(**{**theta, name: value + h}), noise, 2) for h in (1e-4, -1e-4))
         assert found[f"system.{name}"].value == pytest.approx((ahead - behind) / 2e-4, rel=1e-6)
     if isinstance(noise, White):
-        [wall] = sensitivities(ParametricOscillator(**theta, restitution=0.8), noise, 1e-7).moments
+        [wall] = sensitivities(Problem(ParametricOscillator(**theta, restitution=0.8), noise), 1e-7).moments
         rate = closed_forms.white_stiffness(1.3, 0.7, 0.1, math.e) - closed_forms.white_stiffness(1.3, 0.7, 0.1)
         assert wall["system.restitution"].value / 1e-7 == pytest.approx(rate / 0.8, rel=1e-6)
 

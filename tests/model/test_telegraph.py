@@ -85,7 +85,7 @@ def test_sensitivities_to_states_and_rates_of_any_chain():
         ring = Ring(theta)
         return moment_hierarchy.moment_lyapunov(matrices(ring.states), ring.rates, 2)
 
-    [found] = sensitivities(PlaneSystem.of(spring, stiffness=1.0, damping=0.1), Ring(0.3), 2.0).moments
+    [found] = sensitivities(Problem(PlaneSystem.of(spring, stiffness=1.0, damping=0.1), Ring(0.3)), 2.0).moments
     assert found["noise.theta"].value == pytest.approx((at(0.3 + 1e-4) - at(0.3 - 1e-4)) / 2e-4, rel=1e-6)
 
 

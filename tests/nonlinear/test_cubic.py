@@ -53,17 +53,17 @@ def closeness(mean, value):
 
 @pytest.fixture(scope="module")
 def bouncing():
-    return stationary_response(VibroImpactOscillator(**OSCILLATOR, restitution=0.9), NOISE, rtol=0.1)
+    return stationary_response(Problem(VibroImpactOscillator(**OSCILLATOR, restitution=0.9), NOISE), rtol=0.1)
 
 
 @pytest.fixture(scope="module")
 def swinging():
-    return stationary_response(duffing(), NOISE, rtol=0.1)
+    return stationary_response(Problem(duffing(), NOISE), rtol=0.1)
 
 
 @pytest.mark.slow
 def test_equations_have_the_response_of_the_oscillator(bouncing):
-    found = stationary_response(written("delta"), NOISE, rtol=0.1)
+    found = stationary_response(Problem(written("delta"), NOISE), rtol=0.1)
     assert [*found.means] == ["amplitude", "amplitude_squared", "amplitude_fourth", "x_squared", "v_squared"]
     for name, mean in found.means.items():
         assert closeness(mean, bouncing.means[name].value) < 1e-9
@@ -72,7 +72,7 @@ def test_equations_have_the_response_of_the_oscillator(bouncing):
 
 def test_the_order_of_the_variables_is_free(bouncing):
     """With (v, x) the wall is at the second variable, and the phase falls; the functions are the same."""
-    found = stationary_response(written("delta", ("v", "x")), NOISE, rtol=0.1)
+    found = stationary_response(Problem(written("delta", ("v", "x")), NOISE), rtol=0.1)
     for name in ("x_squared", "v_squared"):
         assert closeness(found.means[name], bouncing.means[name].value) < 1e-9
     assert closeness(found.impact_rate, bouncing.impact_rate.value) < 1e-9
@@ -84,8 +84,8 @@ def test_the_order_of_the_variables_is_free(bouncing):
 @pytest.mark.slow
 def test_without_a_wall_it_is_that_of_an_elastic_one():
     """With R = 1 the wall only turns the side on which x is."""
-    elastic = stationary_response(VibroImpactOscillator(**OSCILLATOR, restitution=1.0), NOISE, rtol=0.1)
-    found = stationary_response(written(), NOISE, rtol=0.1)
+    elastic = stationary_response(Problem(VibroImpactOscillator(**OSCILLATOR, restitution=1.0), NOISE), rtol=0.1)
+    found = stationary_response(Problem(written(), NOISE), rtol=0.1)
     for name, mean in found.means.items():
         assert closeness(mean, elastic.means[name].value) < 1e-9
     x, v = np.array([0.2, 0.7, 1.0]), np.array([-0.5, 0.0, 0.9])
@@ -130,7 +130,7 @@ def test_rates_of_change_of_moments_vanish(swinging):
 @pytest.mark.parametrize("s", [7.0, 1e25, 1e-25])
 def test_units_of_the_amplitude(swinging, s):
     """With x = sy terms of degree 3 are multiplied by s², and means divided by powers of s."""
-    found = stationary_response(duffing(**{name: s**2 * DUFFING[name] for name in "kcd"}), NOISE, rtol=0.1)
+    found = stationary_response(Problem(duffing(**{name: s**2 * DUFFING[name] for name in "kcd"}), NOISE), rtol=0.1)
     for name, power in (("amplitude", 1), ("amplitude_squared", 2), ("amplitude_fourth", 4), ("x_squared", 2)):
         assert found.means[name].value * s**power == pytest.approx(swinging.means[name].value, rel=1e-10)
     a = np.array([0.5, 1.5])
@@ -150,7 +150,9 @@ def test_white_noise_is_approached(k):
     system = equations("-omega**2*x - k*x**3 + D*v - d*v**3 + xi*v", omega=omega, k=k, D=D, d=d)
     far = []
     for tau in (0.02, 0.01):
-        means = stationary_response(system, OrnsteinUhlenbeck(1 / tau, math.sqrt(2 * D) / tau), rtol=1e-3).means
+        means = stationary_response(
+            Problem(system, OrnsteinUhlenbeck(1 / tau, math.sqrt(2 * D) / tau)), rtol=1e-3
+        ).means
         far.append([means["x_squared"].value - square, means["v_squared"].value - D / d])
     assert np.log2(np.divide(*far)) == pytest.approx([1, 2], abs=0.12)
 
@@ -158,7 +160,7 @@ def test_white_noise_is_approached(k):
 @pytest.mark.slow
 def test_a_slow_tail_is_in_the_error():
     """Damping −v³ alone leaves large x where the noise moves them: E a⁴ is carried far out. Values of tests.oracles."""
-    means = stationary_response(equations("-x + 0.1*v - v**3 - xi*x"), NOISE, rtol=0.1).means
+    means = stationary_response(Problem(equations("-x + 0.1*v - v**3 - xi*x"), NOISE), rtol=0.1).means
     for name, value, deviation in (
         ("x_squared", 0.158042, 1.8e-4),
         ("v_squared", 0.125910, 9e-5),
@@ -179,7 +181,7 @@ def test_a_slow_tail_is_in_the_error():
 )
 def test_what_has_no_response_is_refused(force, parameters, words):
     with pytest.raises(FpsolveError, match=words):
-        stationary_response(equations(force, **parameters), NOISE, rtol=0.1)
+        stationary_response(Problem(equations(force, **parameters), NOISE), rtol=0.1)
 
 
 @pytest.mark.parametrize(
@@ -203,7 +205,7 @@ def test_whether_large_amplitudes_come_down(force, falls):
 def test_rays_that_are_never_left():
     system = PlaneSystem.of_equations(("x", "y"), ("x + xi*x - x**3", "-y + xi*y - y**3"))
     with pytest.raises(FpsolveError, match="the phase never leaves φ = 0"):
-        stationary_response(system, NOISE, rtol=0.1)
+        stationary_response(Problem(system, NOISE), rtol=0.1)
 
 
 @dataclass(frozen=True)
@@ -224,7 +226,7 @@ def test_noise_may_be_the_only_linear_term(cubic):
     """It is refused by name, not by a fault: no phase of it is left, or large amplitudes grow."""
     system = PlaneSystem.of_equations(("x", "y"), (f"xi*x - {cubic}", "-xi*y - y**3"))
     with pytest.raises(FpsolveError, match=r"never leaves|do not bring"):
-        stationary_response(system, NOISE, rtol=0.1)
+        stationary_response(Problem(system, NOISE), rtol=0.1)
 
 
 @dataclass(frozen=True)
@@ -243,18 +245,18 @@ def test_other_walls_are_refused(phases):
     """Two of them, and one that the cubic terms move the phase across."""
     system = Stiff(tuple(Jump(phase, -0.1) for phase in phases))
     with pytest.raises(FpsolveError, match="for one wall at most"):
-        stationary_response(system, NOISE, rtol=0.1)
+        stationary_response(Problem(system, NOISE), rtol=0.1)
     with pytest.raises(FpsolveError, match="for one wall at most"):
-        simulated_response(system, NOISE, 0.1, 0.1, paths=32, time=1.0, step=0.1, seed=0)
+        simulated_response(Problem(system, NOISE), 0.1, 0.1, paths=32, time=1.0, step=0.1, seed=0)
 
 
 @pytest.mark.slow
 def test_a_system_of_its_own_kind_has_a_response():
     """A class that states cubic terms, and the same as equations."""
-    own = stationary_response(Walled((Jump(math.pi / 2, -0.1),)), NOISE, rtol=0.1)
+    own = stationary_response(Problem(Walled((Jump(math.pi / 2, -0.1),)), NOISE), rtol=0.1)
     wall = {"at": "x = 0", "restitution": "exp(-0.1)"}
     system = PlaneSystem.of_equations(("x", "v"), ("v", "-x + 0.1*v - x**2*v - xi*x"), walls=[wall])
-    written = stationary_response(system, NOISE, rtol=0.1)
+    written = stationary_response(Problem(system, NOISE), rtol=0.1)
     assert [*own.means][-2:] == ["x₁_squared", "x₂_squared"]
     for one, other in zip(own.means.values(), written.means.values(), strict=True):
         assert closeness(one, other.value) < 1e-12

@@ -25,7 +25,7 @@ def noise_of(D0, tau0):
 
 
 def response(system, D0, tau0, rtol):
-    return stationary_response(VibroImpactOscillator(**system), noise_of(D0, tau0), rtol=rtol)
+    return stationary_response(Problem(VibroImpactOscillator(**system), noise_of(D0, tau0)), rtol=rtol)
 
 
 def agrees(mean, value, doubt=0.0):
@@ -107,7 +107,9 @@ def test_what_has_no_response_is_refused():
     with pytest.raises(FpsolveError, match="comes to rest"):
         response({**SMOOTH, "c1": -0.4}, 0.01, 0.5, 1e-2)
     with pytest.raises(FpsolveError, match="algebraic tails"):
-        stationary_response(VibroImpactOscillator(**SMOOTH), NonGaussianNoise(D0=0.1, tau0=0.5, r0=1.1), rtol=1e-2)
+        stationary_response(
+            Problem(VibroImpactOscillator(**SMOOTH), NonGaussianNoise(D0=0.1, tau0=0.5, r0=1.1)), rtol=1e-2
+        )
 
 
 @pytest.mark.slow

@@ -67,8 +67,9 @@ def proven(name):
     """A proof as an entry of proof.json."""
     motion, numbers, treatment, p, width = PROOFS[name]
     noise = fpsolve.NonGaussianNoise(*numbers) if treatment else fpsolve.OrnsteinUhlenbeck(*numbers)
-    problem = fpsolve.VibroImpactOscillator(**motion), noise.ou_reduction() if treatment == "reduced" else noise
-    found = prove_lyapunov_exponent(*problem, width=width) if p is None else prove(*problem, p, width=width)
+    noise = noise.ou_reduction() if treatment == "reduced" else noise
+    problem = fpsolve.Problem(fpsolve.VibroImpactOscillator(**motion), noise)
+    found = prove_lyapunov_exponent(problem, width=width) if p is None else prove(problem, p, width=width)
     assert found.is_met
     certificate = found.certificate.model_dump(mode="json")
     return json.dumps({"p": p, "lower": found.lower, "upper": found.upper, "certificate": certificate})

@@ -10,6 +10,7 @@ import fpsolve
 from fpsolve.arrays import identity
 from fpsolve.errors import NoSuchExponent
 from fpsolve.model import CoefficientMatrix, Jump, MarkovChain, ParametricOscillator, SineWiener, Telegraph, White
+from fpsolve.model.problem import Problem
 from fpsolve.proofs import objection, prove, prove_lyapunov_exponent, search
 from fpsolve.proofs.certificate import Certificate
 from tests import random_proofs
@@ -42,7 +43,11 @@ def driven_velocity(*jumps):
 
 def bounds(system, noise, p, **options):
     """Bounds of Λ(p), or of λ, which are verified once more."""
-    found = prove_lyapunov_exponent(system, noise, **options) if p is None else prove(system, noise, p, **options)
+    found = (
+        prove_lyapunov_exponent(Problem(system, noise), **options)
+        if p is None
+        else prove(Problem(system, noise), p, **options)
+    )
     assert not objection(found.certificate)
     return found
 
@@ -225,7 +230,7 @@ ALONG = Jump(math.pi / 2, math.log(0.8))
 )
 def test_what_cannot_be_proven_is_refused_by_name(system, noise, failure, words):
     with pytest.raises(failure, match=re.escape(words)):
-        prove(system, noise, 1.0)
+        prove(Problem(system, noise), 1.0)
 
 
 @pytest.mark.parametrize(
@@ -251,7 +256,7 @@ def test_a_certificate_states_the_exact_values_of_floats():
     assert sine.certificate.chain is None
     assert sine.certificate.parameters["noise.sigma"] == "1.0"
     assert Certificate.model_validate(stated) == chain.certificate
-    old = prove(fpsolve.VibroImpactOscillator(1.0, 0.8, 0.1, 0.1), Telegraph(0.5, 1.0), 2.0).certificate
+    old = prove(Problem(fpsolve.VibroImpactOscillator(1.0, 0.8, 0.1, 0.1), Telegraph(0.5, 1.0)), 2.0).certificate
     assert not {"motion", "chain"} & old.model_dump(mode="json").keys()
 
 
@@ -269,4 +274,4 @@ def test_trials_stay_within_what_a_certificate_may_hold(monkeypatch):
     found = bounds(SADDLE, Telegraph(0.5, 2.0), None)
     assert len(found.certificate.cosine) <= 40
     assert not found.is_met
-    assert found.lower < fpsolve.lyapunov_exponent(SADDLE, Telegraph(0.5, 2.0)).value < found.upper
+    assert found.lower < fpsolve.lyapunov_exponent(Problem(SADDLE, Telegraph(0.5, 2.0))).value < found.upper

@@ -13,6 +13,7 @@ import pytest
 import fpsolve
 from fpsolve.model import Jump, MarkovChain, ParametricOscillator, SineWiener, Telegraph, White
 from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeckByIntensity
+from fpsolve.model.problem import Problem
 from fpsolve.proofs import prove, prove_lyapunov_exponent
 from fpsolve.proofs.claims import Bound, MomentBound
 from tests.conftest import sampled
@@ -44,7 +45,11 @@ QUICK = sampled(*PROOFS, keep=5)
 def proven(name):
     """A proof as an entry of proof.json."""
     system, noise, p, width = PROOFS[name]
-    found = prove_lyapunov_exponent(system, noise, width=width) if p is None else prove(system, noise, p, width=width)
+    found = (
+        prove_lyapunov_exponent(Problem(system, noise), width=width)
+        if p is None
+        else prove(Problem(system, noise), p, width=width)
+    )
     assert found.is_met
     certificate = found.certificate.model_dump(mode="json")
     return json.dumps({"p": p, "lower": found.lower, "upper": found.upper, "certificate": certificate})
@@ -262,7 +267,7 @@ def test_statements_that_make_no_sense(name, change, reason):
 
 def test_gaussian_noise_by_its_intensity():
     """The parameters D₀ and τ₀ tell α = 1/τ₀ and the standard deviation √(D₀/τ₀)."""
-    found = prove(spring(0.1, 2.0), OrnsteinUhlenbeckByIntensity(D0=0.005, tau0=0.5), 2.0, width=1e-3)
+    found = prove(Problem(spring(0.1, 2.0), OrnsteinUhlenbeckByIntensity(D0=0.005, tau0=0.5)), 2.0, width=1e-3)
     certificate = found.certificate.model_dump(mode="json")
     entry = {"p": 2.0, "lower": found.lower, "upper": found.upper, "certificate": certificate}
     assert is_taken(entry)

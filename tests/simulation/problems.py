@@ -2,6 +2,7 @@
 
 from fpsolve.exponent.function import moment_lyapunov
 from fpsolve.model.noises.non_gaussian import NonGaussianNoise
+from fpsolve.model.problem import Problem
 from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
 
 MODERATE = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=0.5, impact="restitution")
@@ -12,4 +13,4 @@ REDUCED = NOISE.ou_reduction()
 
 def exact(oscillator, noise, p):
     """Λ(p) by the finite elements."""
-    return moment_lyapunov(oscillator, noise, p, rtol=1e-8).value
+    return moment_lyapunov(Problem(oscillator, noise), p, rtol=1e-8).value

@@ -2,6 +2,7 @@
 
 import pytest
 
+from fpsolve.model.problem import Problem
 from fpsolve.simulation.estimators import simulate
 from tests.simulation.problems import REDUCED, STRONG, exact
 
@@ -10,10 +11,10 @@ from tests.simulation.problems import REDUCED, STRONG, exact
 def test_population_succeeds_where_the_direct_estimator_fails():
     """Λ(4) at ε = 1 to 1 %."""
     reference = exact(STRONG, REDUCED, [4.0])[0]
-    direct = simulate(STRONG, REDUCED, [4.0], paths=1024, seed=1)
+    direct = simulate(Problem(STRONG, REDUCED), [4.0], paths=1024, seed=1)
     assert direct.estimates[0].value is None
     assert any("no estimate of Λ(p) at p = 4:" in text and "where 5000 are needed" in text for text in direct.warnings)
-    population = simulate(STRONG, REDUCED, [4.0], estimator="population", paths=4096, seed=1)
+    population = simulate(Problem(STRONG, REDUCED), [4.0], estimator="population", paths=4096, seed=1)
     assert not population.warnings
     assert population.estimates[0].value == pytest.approx(reference, rel=1e-2)
     assert population.estimates[0].standard_error < 2e-3 * reference
@@ -23,6 +24,6 @@ def test_population_succeeds_where_the_direct_estimator_fails():
 def test_an_eighth_of_the_default_paths():
     """A moment of strong noise is good to 2e-3."""
     reference = exact(STRONG, REDUCED, [1.0])[0]
-    estimate = simulate(STRONG, REDUCED, [1.0], estimator="population", paths=4096).estimates[0]
+    estimate = simulate(Problem(STRONG, REDUCED), [1.0], estimator="population", paths=4096).estimates[0]
     assert estimate.standard_error < 2e-3 * reference
     assert abs(estimate.value - reference) < 4 * estimate.standard_error

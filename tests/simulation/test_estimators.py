@@ -30,20 +30,20 @@ def test_algebraic_tails(estimator, paths, most):
     oscillator = VibroImpactOscillator(omega=1.0, restitution=1.0, c1=0.0, epsilon=0.5)
     reference = exact(oscillator, noise, [-0.4])[0]
     step = cheap_step(oscillator, noise)
-    found = simulate(oscillator, noise, [-0.9, -0.4], estimator=estimator, paths=paths, step=step, seed=6)
+    found = simulate(Problem(oscillator, noise), [-0.9, -0.4], estimator=estimator, paths=paths, step=step, seed=6)
     assert found.estimates[0].value is None
     assert any("no estimate of Λ(p) at p = -0.9: ‖x‖^p has infinite variance" in text for text in found.warnings)
     assert found.estimates[1].value == pytest.approx(reference, abs=4 * found.estimates[1].standard_error)
     assert found.estimates[1].standard_error < most
     with pytest.raises(NoSuchExponent, match="infinite"):
-        simulate(oscillator, noise, [1.0])
+        simulate(Problem(oscillator, noise), [1.0])
 
 
 @pytest.mark.slow
 def test_slow_noise_carries_a_moment_in_two_places():
     """Λ(2) = 1.129 where the oscillator does not turn, 0.496 where it does: no population passes between them."""
     noise = NonGaussianNoise(D0=0.5, tau0=20.0, r0=1.0)
-    found = simulate(STRONG, noise, [2.0], estimator="population", paths=8192, time=330.0, seed=1)
+    found = simulate(Problem(STRONG, noise), [2.0], estimator="population", paths=8192, time=330.0, seed=1)
     estimate = found.estimates[0]
     assert estimate.value == pytest.approx(exact(STRONG, noise, [2.0])[0], abs=4 * estimate.standard_error)
     assert estimate.standard_error < 1e-3
@@ -53,7 +53,7 @@ def test_slow_noise_carries_a_moment_in_two_places():
 @pytest.mark.parametrize("paths", sampled(2048, 8192))
 def test_variance_rate(paths):
     """Λ″(0) from the variance of ln‖x‖."""
-    found = simulate(MODERATE, REDUCED, [], paths=paths, seed=2)
+    found = simulate(Problem(MODERATE, REDUCED), [], paths=paths, seed=2)
     reference = ExponentSolver(Problem(MODERATE, REDUCED)).variance_rate().value
     assert found.variance_rate == pytest.approx(reference, abs=4 * found.variance_rate_error + 0.02 * reference)
 
@@ -62,20 +62,20 @@ def test_variance_rate(paths):
 def test_identity_without_impact():
     """Λ(−2) = −ε²c₁ + ε²σ²/(2α²) for Ornstein-Uhlenbeck noise and r = 1."""
     oscillator = VibroImpactOscillator(omega=1.0, restitution=1.0, c1=0.2, epsilon=0.7)
-    found = simulate(oscillator, UNIT_NOISE, [-2.0], estimator="population", paths=8192, seed=8).estimates[0]
+    found = simulate(Problem(oscillator, UNIT_NOISE), [-2.0], estimator="population", paths=8192, seed=8).estimates[0]
     assert found.value == pytest.approx(0.49 * (0.5 - 0.2), abs=4 * found.standard_error)
     assert found.standard_error < 2e-3
 
 
 def test_moment_of_order_zero():
     for estimator in ("direct", "population"):
-        found = simulate(FIG1, REDUCED, [0.0], estimator=estimator, paths=320, time=40.0).estimates[0]
+        found = simulate(Problem(FIG1, REDUCED), [0.0], estimator=estimator, paths=320, time=40.0).estimates[0]
         assert abs(found.value) < 1e-12
         assert found.standard_error < 1e-12
 
 
 def small(seed, estimator="direct", orders=(-1.0, 1.0)):
-    return simulate(MODERATE, NOISE, list(orders), estimator=estimator, paths=640, time=60.0, seed=seed)
+    return simulate(Problem(MODERATE, NOISE), list(orders), estimator=estimator, paths=640, time=60.0, seed=seed)
 
 
 @pytest.mark.parametrize("estimator", sampled("direct", "population"))
@@ -98,7 +98,7 @@ def test_one_run_serves_all_orders():
 def test_memory_does_not_grow_with_time():
     def peak(time):
         tracemalloc.start()
-        simulate(MODERATE, REDUCED, [1.0], paths=3200, time=time)
+        simulate(Problem(MODERATE, REDUCED), [1.0], paths=3200, time=time)
         size = tracemalloc.get_traced_memory()[1]
         tracemalloc.stop()
         return size
@@ -116,8 +116,10 @@ def test_an_interrupt_keeps_what_is_done(estimator):
         if len(calls) == 50:
             raise KeyboardInterrupt
 
-    found = simulate(MODERATE, REDUCED, [1.0], estimator=estimator, paths=4096, time=400.0, seed=1, progress=progress)
-    whole = simulate(MODERATE, REDUCED, [1.0], estimator=estimator, paths=4096, time=400.0, seed=1)
+    found = simulate(
+        Problem(MODERATE, REDUCED), [1.0], estimator=estimator, paths=4096, time=400.0, seed=1, progress=progress
+    )
+    whole = simulate(Problem(MODERATE, REDUCED), [1.0], estimator=estimator, paths=4096, time=400.0, seed=1)
     assert found.interrupted
     assert 100 < found.time < 300
     assert "stopped early" in found.warnings[-1]
@@ -132,7 +134,7 @@ def test_an_interrupt_before_there_is_anything():
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        simulate(MODERATE, REDUCED, [1.0], paths=64, time=20.0, progress=progress)
+        simulate(Problem(MODERATE, REDUCED), [1.0], paths=64, time=20.0, progress=progress)
 
 
 def test_drift_is_noticed(monkeypatch):
@@ -140,7 +142,7 @@ def test_drift_is_noticed(monkeypatch):
     slow = OrnsteinUhlenbeck(alpha=0.05, sigma=0.1)
     monkeypatch.setattr(estimators, "transient", lambda *_: 2.0)
     monkeypatch.setattr(estimators, "obstacles", lambda *_, **__: {})
-    found = simulate(MODERATE, slow, [1.0], paths=8192, time=16.0, seed=2)
+    found = simulate(Problem(MODERATE, slow), [1.0], paths=8192, time=16.0, seed=2)
     assert any("still drifts" in text for text in found.warnings)
 
 
@@ -164,17 +166,17 @@ def test_drift_is_noticed(monkeypatch):
         ({"p": ["2"]}, "^p must be a finite number or a list of finite numbers, got"),
         ({"p": [[1.0], [1.0, 2.0]]}, "^p must be a finite number or a list of finite numbers, got"),
         ({"p": np.ma.array([1.0, 2.0], mask=[False, True])}, "p must be a finite number"),
-        ({"noise": NonGaussianNoise(D0=0.5, tau0=1.0, r0=1.8)}, "must be finite"),
+        ({"problem": Problem(MODERATE, NonGaussianNoise(D0=0.5, tau0=1.0, r0=1.8))}, "must be finite"),
     ],
 )
 def test_bad_settings_are_refused(change, words):
     with pytest.raises(ValueError, match=words):
-        simulate(**({"oscillator": MODERATE, "noise": NOISE, "p": [1.0]} | change))
+        simulate(**({"problem": Problem(MODERATE, NOISE), "p": [1.0]} | change))
 
 
 def test_a_single_order_may_stand_without_a_list():
     settings = {"paths": 64, "time": 2 * transient(MODERATE, NOISE), "seed": 1}
-    assert simulate(MODERATE, NOISE, 0.5, **settings) == simulate(MODERATE, NOISE, [0.5], **settings)
+    assert simulate(Problem(MODERATE, NOISE), 0.5, **settings) == simulate(Problem(MODERATE, NOISE), [0.5], **settings)
 
 
 def test_damping_too_small_for_a_number_limits_no_step():
@@ -185,11 +187,11 @@ def test_damping_too_small_for_a_number_limits_no_step():
 def test_the_largest_good_step_is_named_and_good():
     largest, _ = largest_step(MODERATE, NOISE)
     with pytest.raises(ValueError, match=f"<= {largest:.4g}"):
-        simulate(MODERATE, NOISE, [1.0], step=1.01 * largest)
-    found = simulate(MODERATE, NOISE, [1.0], step=largest, paths=64, time=2 * transient(MODERATE, NOISE))
+        simulate(Problem(MODERATE, NOISE), [1.0], step=1.01 * largest)
+    found = simulate(Problem(MODERATE, NOISE), [1.0], step=largest, paths=64, time=2 * transient(MODERATE, NOISE))
     assert found.step == largest
 
 
 def test_noise_that_is_too_fast_is_refused():
     with pytest.raises(ValueError, match="takes"):
-        simulate(MODERATE, NonGaussianNoise(D0=0.5, tau0=1e-7, r0=0.9), [1.0])
+        simulate(Problem(MODERATE, NonGaussianNoise(D0=0.5, tau0=1e-7, r0=0.9)), [1.0])

@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
-from fpsolve import OrnsteinUhlenbeck, PlaneSystem, simulate
+from fpsolve import OrnsteinUhlenbeck, PlaneSystem, Problem, simulate
 from fpsolve.arrays import identity
 from fpsolve.model import CoefficientMatrix, Jump, MarkovChain, ParametricOscillator, White
 from fpsolve.simulation.coefficients import coefficients
@@ -170,7 +170,7 @@ VELOCITY = plane([[0.0, 1.0], [-1.0, 0.1]], ((0.0, 0.0), (0.0, 1.0)), (WALL,))
     ),
 )
 def test_agrees_with_closed_forms(system, noise, exponent, moments):
-    found = simulate(system, noise, list(moments), paths=8192, time=32 * transient(system, noise), seed=2)
+    found = simulate(Problem(system, noise), list(moments), paths=8192, time=32 * transient(system, noise), seed=2)
     assert abs(found.lyapunov_exponent - exponent) < 4 * found.lyapunov_exponent_error
     assert found.lyapunov_exponent_error < 1e-3
     for estimate, value in zip(found.estimates, moments.values(), strict=True):
@@ -184,7 +184,7 @@ def test_agrees_with_a_moment_hierarchy():
     system, noise = parametric(0.1), OrnsteinUhlenbeck(alpha=1.0, sigma=0.5)
     steady, driven = (np.array(term.matrix) for term in system.terms)
     value = moment_hierarchy.ornstein_uhlenbeck_exponent(steady, driven, noise.alpha, noise.standard_deviation, 2, 60)
-    estimate = simulate(system, noise, [2.0], estimator="population", paths=16384, seed=3).estimates[0]
+    estimate = simulate(Problem(system, noise), [2.0], estimator="population", paths=16384, seed=3).estimates[0]
     assert abs(estimate.value - value) < 4 * estimate.standard_error
     assert estimate.standard_error < 1e-3
 
@@ -195,7 +195,7 @@ def test_an_oscillator_written_as_matrices_gives_the_same_numbers(estimator):
     written = PlaneSystem(FIG1.terms, FIG1.jumps, FIG1.epsilon)
     settings = {"estimator": estimator, "paths": 640, "time": 20.0, "seed": 4}
     noise = FIG1_NOISE.ou_reduction()
-    one, other = (simulate(system, noise, [1.0], **settings) for system in (FIG1, written))
+    one, other = (simulate(Problem(system, noise), [1.0], **settings) for system in (FIG1, written))
     assert (one.step, one.impacts, one.lyapunov_exponent) == (other.step, other.impacts, other.lyapunov_exponent)
     assert one.estimates == other.estimates
     assert one.impacts == pytest.approx(640 * one.time / math.pi, rel=0.02)
@@ -219,7 +219,7 @@ def test_a_phase_that_noise_hardly_disturbs():
     mean = steady + (noise.probabilities @ states) * driven
     known = coefficients(PlaneSystem(terms), noise)
     assert known.half_turn == pytest.approx(math.pi / abs(np.linalg.eigvals(mean)[0].imag), rel=1e-12)
-    made = simulate(PlaneSystem(terms), noise, 2.0, estimator="population", paths=4096, time=100.0, seed=1)
+    made = simulate(Problem(PlaneSystem(terms), noise), 2.0, estimator="population", paths=4096, time=100.0, seed=1)
     expected = moment_hierarchy.moment_lyapunov([steady + xi * driven for xi in states], rates, 2)
     [found] = made.estimates
     assert found.value == pytest.approx(expected, abs=4 * found.standard_error)
@@ -229,7 +229,7 @@ def test_a_phase_that_noise_hardly_disturbs():
 def test_a_function_of_a_chain_is_simulated():
     """g(ξ) = ξ³ of states ±½ is ξ/4."""
     one, other = (
-        simulate(PlaneSystem([CoefficientMatrix(0, A0.tolist()), term]), chain, [1.0], paths=64, time=60.0)
+        simulate(Problem(PlaneSystem([CoefficientMatrix(0, A0.tolist()), term]), chain), [1.0], paths=64, time=60.0)
         for chain in [MarkovChain.telegraph(0.5, 1.0)]
         for term in (
             CoefficientMatrix(1, A1.tolist(), lambda xi: xi**3),

@@ -32,7 +32,7 @@ def weak():
     exponent, s_square, _ = averaged(oscillator)
     step = default_step(oscillator, NOISE)
     return oscillator, simulated_response(
-        oscillator, NOISE, exponent, s_square, paths=1024, time=100.0, step=step, seed=1
+        Problem(oscillator, NOISE), exponent, s_square, paths=1024, time=100.0, step=step, seed=1
     )
 
 
@@ -82,7 +82,7 @@ def test_energy_is_that_of_x_and_v(weak):
 
 def test_seed_decides_whatever_the_threads(weak, monkeypatch):
     oscillator, _ = weak
-    arguments, found = (oscillator, NOISE, 0.05, 0.01), []
+    arguments, found = (Problem(oscillator, NOISE), 0.05, 0.01), []
     for threads, seed in ((1, 1), (2, 1), (2, 2)):
         monkeypatch.setattr(batches, "processors", lambda threads=threads: threads)
         found.append(simulated_response(*arguments, paths=32, time=50.0, step=0.1, seed=seed))

@@ -42,7 +42,7 @@ def test_weak_noise_needs_no_note_and_strong_noise_gets_its_size():
     p = np.array([-1.0, 0.0, 1.0, 2.0])
     weak, strong = FIG1, VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=0.6)
     noise = FIG1_NOISE.ou_reduction()
-    values = [moment_lyapunov(oscillator, noise, p, rtol=1e-6).value for oscillator in (weak, strong)]
+    values = [moment_lyapunov(Problem(oscillator, noise), p, rtol=1e-6).value for oscillator in (weak, strong)]
     assert weak_noise_note(Problem(weak, noise), p, values[0]) is None
     note = weak_noise_note(Problem(strong, noise), p, values[1])
     rest = values[1] - perturbation.moment_exponent(strong, noise, p)
