@@ -12,7 +12,6 @@ from typing import Any
 from unicodedata import category
 
 ALMOST_EVERY = "growth rate of almost every path (Furstenberg-Khasminskii)"
-_RARE = "Λ(p) > 0 for every p ≠ 0, as in the end rare paths whose noise stays far out carry the moments"
 
 
 class Severity(StrEnum):
@@ -63,9 +62,10 @@ class Code(Enum):
     PLACED = "failure: {place}: {reason}"
     SEVERAL = "failure: {reasons}"
 
-    INFINITE = (
-        "failure: Λ({p:g}) is infinite: for r0 > 1 the noise has algebraic tails, and a truncated domain would only "
-        "hide this; choose p in [{low:g}, {high:g}], r0 <= 1, {remedy}"
+    TAILS = (
+        "failure: {what} is not computed: for r0 > 1 the noise has algebraic tails, so that Λ(p) is infinite for p > 0 "
+        "and p < -1, and between is carried by paths far out, which a truncated domain does not hold; take λ, or "
+        "choose r0 <= 1, {remedy}"
     )
     INVARIANT_RAY = (
         "failure: Λ({p:g}) is not known: the phase never leaves the ray at phi = {phase:.6g}, whatever the noise does"
@@ -121,16 +121,9 @@ class Code(Enum):
     INFINITE_VARIANCE = (
         "failure: the noise has infinite variance, and its standard deviation is the unit of the mesh; choose r0 < 5/3"
     )
-    NO_VARIANCE_RATE = (
-        "failure: Λ″(0) does not exist: with algebraic tails of the noise the variance of ln ‖x‖ grows faster than time"
-    )
-    RARE_NOWHERE_ZERO = (
-        "failure: rare paths, whose noise stays far out in its tails, carry Λ({p:g}), which is zero nowhere; choose "
-        "r0 <= 1, {remedy}"
-    )
     NO_BOUND = (
-        "failure: got {key} = {value}; for r0 > 1 the noise of Eq. (7) has algebraic tails: Λ(p) is finite for -1 <= p "
-        "<= 0 only, and no trial function is known to prove a bound there; choose r0 <= 1, {remedy}"
+        "failure: got {key} = {value}; for r0 > 1 the noise of Eq. (7) has algebraic tails: Λ(p) is infinite for p > 0 "
+        "and p < -1, and no trial function is known to prove a bound of λ, or between; choose r0 <= 1, {remedy}"
     )
 
     UNDERFLOW = "failure: P_s underflows in a cell of the noise; use a narrower interval"
@@ -146,17 +139,8 @@ class Code(Enum):
     NOT_CONVERGED = "failure: Λ({p:g}) did not converge: {reason}"
     NOT_SOLVED = "failure: Λ({p:g}) cannot be solved ({reason})"
     OUT_OF_RANGE = "failure: Λ({p:g}) is beyond floating-point numbers ({reason})"
-    FAR_OUT = "failure: {reason}; rare paths, with noise far out in its tails, carry this moment"
     NEAR_ZERO = "failure: Λ(p) near p = 0 follows from Λ({p:g}): {reason}"
     NOT_FINER = "failure: p = {p:g} did not converge on a finer mesh: {reason}"
-    HELD_BEYOND = (
-        "failure: Λ({p:g}) did not converge: it is at least {rate:.3g}, the growth rate of paths whose noise stays "
-        "beyond {z:g} standard deviations, and these have no eigenfunction"
-    )
-    HELD_TOO_FAR = (
-        "failure: Λ({p:g}) did not converge: it is positive, as paths grow whose noise stays beyond {z:g} standard "
-        "deviations; all other paths give {value:.3g}"
-    )
     NO_EIGENVALUE = (
         "failure: the principal eigenvalue at p = {p:g} was not found on this mesh: its backward error is "
         "{residual:.1e} (at most {limit:g}), and {size:.1e} of T or T*, whichever is more positive, has the wrong sign "
@@ -194,10 +178,6 @@ class Code(Enum):
         "failure: the eigenvalue {value:.10g} at p = {p:g} is not the principal one: by the equations of the moments "
         "Λ({other:g}) is {expected:.10g}, and Λ is convex"
     )
-    KINKED = (
-        "failure: Λ(p) is not smooth in p: for some p the noise carries the moment far out in its algebraic tails; use "
-        "moment_lyapunov, which solves each p by itself"
-    )
     NOT_INCREASING = "failure: Λ(p)/p does not increase at p = {p:g}, while it must, as Λ is convex"
     GROWTH_BEYOND = (
         "failure: the growth rate s = {s:.6g} is not reached: Λ′ is {slope:.6g} at p = {p:g}, the end of the interval; "
@@ -208,8 +188,8 @@ class Code(Enum):
         "not solved: {reason}; choose s on this side of {slope:.6g}"
     )
     NO_RATE_FUNCTION = (
-        "failure: there is no rate function to compute: Λ(p) has a kink, as the noise has algebraic tails, or the "
-        "phase never leaves a ray; take Λ(p) itself"
+        "failure: there is no rate function to compute: Λ(p) has a kink, as the phase never leaves a ray; take Λ(p) "
+        "itself"
     )
     NO_PREFACTOR = (
         "failure: the law of growth in finite time is for two variables, and not for filtered noise; take rate_function"
@@ -227,8 +207,7 @@ class Code(Enum):
         "{remedy:?{remedy}, or use a larger rtol¦use a larger rtol to accept it, or a smaller one to refine its mesh}"
     )
     CARRIED_ELSEWHERE = (
-        "warning: Λ({p:g}) may be larger: {has_tails:?noise with heavy tails¦slow noise} may carry the moment near "
-        "{z:.3g} standard deviations"
+        "warning: Λ({p:g}) may be larger: slow noise may carry the moment near {z:.3g} standard deviations"
     )
     UNREADABLE = (
         "warning: {name} at p = {p:g} is not resolved: {size:.0%} of it has the wrong sign; this hardly affects Λ, but "
@@ -248,7 +227,6 @@ class Code(Enum):
     INDEX_MISSING = "warning: no {symbols}: {reason}"
     INDEX_ABSENT = "note: no {symbols}: {reason}"
     NO_MOMENT = "failure: there is no Λ({p:g})"
-    NO_INDEX = f"note: {_RARE}"
     NOT_DRIVEN = "note: no noise moves the state, so that Λ(p) is λ p and has no other root"
     NO_ROOT = (
         "note: Λ(p) has no root p ≠ 0 in [{low:g}, {high:g}]{is_bounded:?, and may have none at all: with bounded "
@@ -290,18 +268,6 @@ class Code(Enum):
     ALWAYS_STABLE = "note: almost surely stable for every {symbol} in (0, 1], as λ without loss is {value:.3g}"
     ALWAYS_UNSTABLE = "note: unstable for every {symbol} in (0, 1]: λ = 0 would need {symbol} = {value:.3g}"
 
-    RARE_PATHS = (
-        "note: at p = {p:g} rare paths carry the moment{first:?; at p = {first:g} these are paths¦: paths} with noise "
-        "around {z:.3g} standard deviations, of probability 1e-{decades:.0f}{near:?; up to times of about {wait:.1g} "
-        "they hardly count, and E‖x‖^p grows at the rate {near:.3g}}"
-    )
-    HEAVY_TAILS = (
-        f"note: algebraic tails: {_RARE}; there is no stability index, and λ is the {ALMOST_EVERY}"
-        "{is_no_slope:?, not Λ′(0)}"
-    )
-    UNSEEN_TAILS = (
-        f"note: algebraic tails: {_RARE}; a simulation shows Λ(p) without these paths, and λ is the {ALMOST_EVERY}"
-    )
     NOISE_MISFIT = (
         "warning: near {name} the measured density is {relative:+.1%} off the fitted one, with a standard error of "
         "{error:.1%}; take another kind of noise, or more terms"
@@ -340,8 +306,8 @@ class Code(Enum):
     UNUSED = "note: {keys}: in no rate and in no restitution, so that no result depends on it"
     NO_DERIVATIVE = "note: no sensitivities to {key}: the derivative of the system by it is not finite at {value:g}"
     ONE_SIDED = (
-        "note: the sensitivities to {key} = {value:g} are derivatives from below: above this value Λ is infinite, or "
-        "rare paths carry it"
+        "note: the sensitivities to {key} = {value:g} are derivatives from below: above this value the noise has "
+        "algebraic tails"
     )
 
     NO_PROBLEM = "failure: no such problem: {reason}"
@@ -385,10 +351,6 @@ class Code(Enum):
         "warning: no sensitivities under {kind} noise: {reason}; correct its class until `check_noise` finds no fault"
     )
 
-    NO_PATH_VARIANCE = (
-        "warning: no estimate of Λ(p) at p = {p:g}: ‖x‖^p has infinite variance, as for r0 > 1 the moment of order 2p "
-        "is infinite; use the finite elements"
-    )
     FEW_PATHS = (
         "warning: no estimate of Λ(p) at p = {p:g}: too few effective {is_direct:?windows¦paths} carry the mean, "
         '{low:.0f}{high:? to {high:.0f}} where {needed} are needed; use {is_direct:?estimator = "population", or more '
@@ -428,8 +390,8 @@ class Code(Enum):
         "chains; take coloured noise with a short memory for white noise"
     )
     RESPONSE_TAILS = (
-        "note: no stationary density by finite elements: for r0 > 1 the noise has algebraic tails and there is no δ_p, "
-        "which tells the density near rest; use r0 <= 1, or simulate the response"
+        "note: no stationary density by finite elements: for r0 > 1 the noise has algebraic tails and δ_p, which tells "
+        "the density near rest, is not computed; use r0 <= 1, or simulate the response"
     )
     RESPONSE_DIES = (
         "note: no stationary response: λ = {value:.6g} ± {error:.1g} is not positive, so that almost every path comes "

@@ -316,8 +316,11 @@ def test_not_converged_exits_3_with_the_partial_results(case, capsys):
 
 
 def test_infinite_moments_exit_2(case, tmp_path, capsys):
-    assert main(["run", case, "--set", "noise.treatment='exact'", "--set", "noise.r0=1.1"]) == BAD_INPUT
-    assert "Λ(2) is infinite" in capsys.readouterr().err
+    assert (
+        main(["run", case, "--set", "noise.treatment='exact'", "--set", "noise.r0=1.1", "--set", "vary={}"])
+        == BAD_INPUT
+    )
+    assert "Λ(2) is not computed" in capsys.readouterr().err
     assert not (tmp_path / "results").exists()
 
 

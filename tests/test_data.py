@@ -232,12 +232,6 @@ def test_numbers_of_moments(results):
     assert results["no moment"].to_xarray().attrs["failures"] == "it is too large"
 
 
-def test_rare_moments_are_marked():
-    result = fpsolve.moment_lyapunov(Problem(FIG1, replace(FIG1_NOISE, r0=1.1)), [-0.5, 0.0])
-    assert result.rare.size == 1
-    same(result.to_xarray(), "rare", np.isin(result.p, result.rare))
-
-
 def test_numbers_of_a_function(results):
     function = results["function"]
     p = np.array([0.5, 1.5])

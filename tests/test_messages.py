@@ -80,7 +80,7 @@ def test_numbers_of_any_kind_survive_a_record():
     "failure",
     [
         NotConverged(Message(Code.NO_ARNOLDI, p=2.0), {"a": 1}, Remedy.DEGREES),
-        NoSuchExponent(Message(Code.INFINITE, p=9.0, low=-1.0, high=0.0, remedy=Remedy.REDUCTION)),
+        NoSuchExponent(Message(Code.TAILS, what="Λ(9)", remedy=Remedy.REDUCTION)),
         MeshError("no", Remedy.MESH_FILE),
         OutputError("nowhere"),
         FpsolveError("a text"),
@@ -105,7 +105,7 @@ def test_what_differs_in_numbers_only_is_of_one_kind():
         "code": Message(Code.NOT_SOLVED, **one.data),
     }
     assert {name for name, other in others.items() if other.kind == one.kind} == {"numbers"}
-    assert Message(Code.RARE_PATHS, p=[1.0]).kind == Message(Code.RARE_PATHS, p=[1.0, 2.0]).kind
+    assert Message(Code.FEW_PATHS, p=[1.0]).kind == Message(Code.FEW_PATHS, p=[1.0, 2.0]).kind
     assert Message(Code.INDEX_FAILED, symbols=["λ"]).kind != Message(Code.INDEX_FAILED, symbols=["λ", "N"]).kind
 
 

@@ -16,6 +16,7 @@ from fpsolve.drawing import QUARTERS, add_legend, coloured, draw_plane, label_ax
 from fpsolve.errors import NotConverged
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.fields import MOST_NEGATIVE, fields
+from fpsolve.fem.mesh import vertices_at
 from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.plane import growth_rate, phase_speed
 from fpsolve.model.quantity import NOISE, PHASE, density_unit
@@ -154,7 +155,8 @@ def furstenberg_khasminskii(pair: PrincipalPair) -> float:
     growth = space.turns * float(space.phi.weights @ (rate * density) @ at.measure)
     table = space.table(pair.left)
     for jump in system.jumps:
-        vertices, speed = space.phi.vertices_at(jump.phase), float(phase_speed(system, np.ravel(at.xi)[0])(jump.phase))
+        vertices = vertices_at(space.phi.lines, jump.phase)
+        speed = float(phase_speed(system, np.ravel(at.xi)[0])(jump.phase))
         density = np.sum((space.phi.left_trace if speed > 0 else space.phi.right_trace)[vertices] @ table, axis=0)
         passages = abs(speed) * float(density @ (space.xi.matrix(one) @ space.xi.constant))
         growth += space.turns * jump.log_factor * passages

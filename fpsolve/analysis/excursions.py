@@ -43,7 +43,7 @@ from fpsolve.exponent.function import nonzero_root
 from fpsolve.exponent.solver import ExponentSolver, solver_of
 from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.plane import Harmonics, growth_rate
-from fpsolve.model.problem import Problem
+from fpsolve.model.problem import Problem, refuse_tails
 from fpsolve.model.quantity import LEAST_PROBABLE, LEVEL, MOST_PROBABLE, UPCROSSINGS
 
 if TYPE_CHECKING:
@@ -202,6 +202,7 @@ def solve_excursion(
         )
     if exponent.value > 0:
         return replace(found, is_certain=True)
+    refuse_tails(problem, SYMBOL)
     index = nonzero_root(solver, guess=root)
     if not index:
         return replace(found, notes=(_without_index(index.reason),))

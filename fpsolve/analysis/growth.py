@@ -47,7 +47,7 @@ from fpsolve.fem.axis import TensorSpace
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import Code, Message
-from fpsolve.model.problem import Problem
+from fpsolve.model.problem import Problem, refuse_tails
 from fpsolve.model.quantity import (
     BELOW,
     GROWTH,
@@ -60,7 +60,6 @@ from fpsolve.model.quantity import (
     TIME,
     WIDTH,
 )
-from fpsolve.theory.far import grows_far_out
 
 if TYPE_CHECKING:
     import xarray
@@ -305,12 +304,13 @@ class Slopes:
         interval: the p that are looked at, those for which Λ is finite.
 
     Raises:
-        NoSuchExponent: Λ has kinks.
+        NoSuchExponent: Λ has kinks, or the noise has algebraic tails.
         ValueError: the interval does not have 0 inside.
     """
 
     def __init__(self, solver: ExponentSolver, interval: tuple[float, float]) -> None:
-        if grows_far_out(solver.problem) or len(solver.classes) > 1:
+        refuse_tails(solver.problem, "the law of growth")
+        if len(solver.classes) > 1:
             raise NoSuchExponent(Message(Code.NO_RATE_FUNCTION))
         low, high = (real_number(each, "interval") for each in interval)
         if not low < 0 < high:

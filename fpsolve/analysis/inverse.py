@@ -363,7 +363,7 @@ def _is_none(reason: Message) -> bool:
     return reason.tells_of(Code.NO_PROBLEM) or reason.code in _INFINITE
 
 
-_INFINITE = (Code.INFINITE, Code.INFINITE_VARIANCE, Code.RARE_NOWHERE_ZERO)
+_INFINITE = (Code.TAILS, Code.INFINITE_VARIANCE)
 
 
 def _nearest(distance: Distance, axes: Sequence[Axis], units: FloatArray) -> Sample | Absent:

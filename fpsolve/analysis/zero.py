@@ -16,12 +16,12 @@ from fpsolve.analysis.scan import Sample
 from fpsolve.analysis.sensitivity import SMALL_P, Changed, held_by
 from fpsolve.arrays import FloatArray, real_number, shown
 from fpsolve.budget import Countdown, OverBudget, one_number
-from fpsolve.errors import FpsolveError, NoSuchExponent, NotConverged
+from fpsolve.errors import FpsolveError, NotConverged
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.eigen import Bordered
 from fpsolve.exponent.error import Solution
 from fpsolve.exponent.solver import ExponentSolver
-from fpsolve.messages import Code, Message, Remedy
+from fpsolve.messages import Code, Message
 from fpsolve.model.faults import told_in_words
 from fpsolve.model.parameters import STRICT
 from fpsolve.model.problem import Problem, checked_problem, refuse_infinite
@@ -194,16 +194,11 @@ def ratio_with_slopes(solver: ExponentSolver, p: float, keys: Sequence[str]) -> 
 
     Raises:
         NotConverged: it is not resolved, or see `held_by`.
-        NoSuchExponent: Λ(p) < 0 is not the largest eigenvalue, as rare paths far out in algebraic tails grow, or see
-            `held_by`.
+        NoSuchExponent: see `held_by`.
     """
     value, error = solver.ratio_alone(p)
     if solver.problem.dimension > 2 and (known := solver.even(p)):
         return value, error, np.array([known.slope(key) for key in keys]) / p
-    if value > 0 > p and solver.problem.has_algebraic_tails:
-        near = solver.near.solution(p).pair
-        if solver.solution(p, lambda at, value: max(solver.tolerance(at, value), 1e-3 * abs(value))).pair is not near:
-            raise NoSuchExponent(Message(Code.RARE_NOWHERE_ZERO, p=p, remedy=Remedy.REDUCTION))
     held, by_key = held_by(solver, p, {key: solver.problem.derivative(key) for key in keys})
     along = [by_key[key] for key in keys]
     around = Bordered(held.near.solution(p).pair) if abs(p) >= SMALL_P else held.around_zero

@@ -55,8 +55,8 @@ _MODERATE = "parameters and p must have moderate sizes; bring the extreme ones n
 
 
 def _of_moments(moments: Moments, valid: Known, context: Known) -> Iterator[Refusal]:
-    is_varied = context.get("varies", False)  # then the curves decide which moments exist
-    found = _unsolvable({**valid, "moments": moments}, Vary(), with_existence=not is_varied)
+    is_varied = context.get("varies", False)  # then each curve has those that exist
+    found = _unsolvable({**valid, "moments": moments}, Vary(), with_moments=not is_varied)
     return (((), None, text) for _, text in islice(found, 1))
 
 
@@ -72,14 +72,14 @@ def _of_vary(vary: Vary, valid: Known, context: Known) -> Iterator[Refusal]:
         yield from (((), None, text) for _, text in islice(_unsolvable(valid, vary), 1))
 
 
-def _unsolvable(valid: Known, vary: Vary, *, with_existence: bool = True) -> Iterator[tuple[int, str]]:
-    """The places of sets that contradict themselves or overflow, or whose moments are infinite, with the reasons."""
+def _unsolvable(valid: Known, vary: Vary, *, with_moments: bool = False) -> Iterator[tuple[int, str]]:
+    """The places of sets that contradict themselves or overflow, or of which some Λ(p) is not computed, and why."""
     problem = problem_of(valid)
     if problem is None or "moments" not in valid:
         return
     p, at = valid["moments"].values, varying(problem)
     for place, varied in enumerate(vary.sets()):
-        reason = _obstacle(at, varied, p, with_existence=with_existence)
+        reason = _obstacle(at, varied, p, with_moments=with_moments)
         if reason:
             yield place, _with(varied) + reason
 
@@ -88,8 +88,8 @@ def _with(varied: Varied) -> str:
     return f"with {assignments(varied)}: " if varied else ""
 
 
-def _obstacle(at: Callable[[Varied], Problem], varied: Varied, p: FloatArray, *, with_existence: bool = True) -> str:
-    """Why there is no such curve, or why some Λ(p) of it is infinite, or nothing."""
+def _obstacle(at: Callable[[Varied], Problem], varied: Varied, p: FloatArray, *, with_moments: bool = True) -> str:
+    """Why there is no such curve, or why some Λ(p) of it is not computed, or nothing."""
     extremes = [float(p.max()), float(p.min())]
     try:
         problem = at(varied)
@@ -106,7 +106,7 @@ def _obstacle(at: Callable[[Varied], Problem], varied: Varied, p: FloatArray, *,
     if not np.all(np.isfinite(sizes)):
         return f"Eqs. (37)-(38) or R^p overflow; {_MODERATE}"
     try:
-        for extreme in extremes if with_existence else ():
+        for extreme in extremes if with_moments else ():
             refuse_infinite(problem, extreme)
     except NoSuchExponent as error:
         return error.message.words(CASE_WORDS)
@@ -300,8 +300,8 @@ def _of_chart(chart: ChartSection | None, valid: Known, context: Known) -> Itera
                 stops = {name: axis.stop for name, axis in zip("xy", axes, strict=True) if axis.key == key}
                 highest = max(float(problem.values[key]), *stops.values())
                 text = (
-                    f"{key} reaches {highest:g} in the frame; for {limit} > {most:g} Λ(p) is infinite, or rare paths "
-                    f"carry it, and there is no line of stability; let the axis end at {most:g}, or {remedy}"
+                    f"{key} reaches {highest:g} in the frame; for {limit} > {most:g} the noise has algebraic tails, "
+                    f"for which there are no charts; let the axis end at {most:g}, or {remedy}"
                 )
                 yield (next(iter(stops)), "stop") if stops else (), highest, text
                 return

@@ -1,7 +1,7 @@
-"""Λ(p) around one place of the noise: the discretisation is chosen for each p, each solve goes on from the nearest p.
+"""Λ(p): the discretisation is chosen for each p, each solve goes on from the nearest p.
 
-A discretisation is refined until Λ(p) meets a tolerance, or the budget is spent. Noise may carry a moment in another
-place than the one that was found: then both are solved.
+A discretisation is refined until Λ(p) meets a tolerance, or the budget is spent. Slow noise may carry a moment in
+another place than the one that was found: then both are solved.
 """
 
 from __future__ import annotations
@@ -9,48 +9,39 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, field, replace
-from functools import cached_property, partial
-from typing import Annotated, ClassVar, NoReturn
+from functools import cached_property
+from typing import Annotated, NoReturn
 
 import numpy as np
 from pydantic.dataclasses import dataclass as pydantic_dataclass
 
-from fpsolve.arrays import FloatArray
-from fpsolve.budget import Countdown, OverBudget, counted, half_the_memory, one_number, under_way
+from fpsolve.budget import Countdown, OverBudget, counted, half_the_memory, under_way
 from fpsolve.errors import FpsolveError, MeshError, NotConverged, SingularMatrix
 from fpsolve.exponent.eigen import BACKWARD_ERROR_LIMIT, PrincipalPair, principal_pair
 from fpsolve.exponent.error import Solution, mode_effects
 from fpsolve.exponent.fields import noise_marginal
 from fpsolve.fem.discretisation import (
     MOST_DEGREE,
-    SPLIT_DEGREE,
     Cells,
     Discretisation,
     ModeEffects,
-    NoisePart,
     PhaseCells,
     Polynomials,
     first_part,
 )
 from fpsolve.fem.factors import MAX_DENSE_UNKNOWNS, one_thread
-from fpsolve.fem.generator import Generator, is_closed
+from fpsolve.fem.generator import Generator
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.faults import told_in_words
-from fpsolve.model.noise import Noise
 from fpsolve.model.parameters import STRICT, parameter
 from fpsolve.model.plane import System, Xi, phase_speed
 from fpsolve.model.problem import Problem
-from fpsolve.theory.far import Place, far_places, grows_far_out, outlook
-from fpsolve.theory.frozen import FURTHEST, frozen_noise, steady_places
+from fpsolve.theory.frozen import frozen_noise, steady_places
 
-LOOSE = 1e-3
-"""Share of the rates within which a place is solved before it is compared with others."""
 MAX_STAGES = 30
 WORTH_A_TRY = MAX_DENSE_UNKNOWNS
 """Unknowns of a system that takes less time than finding another one."""
-MOST_RESCALING = 0.1
-"""Of ln |p|, on which the place far out depends, for one discretisation."""
 MOST_TILT_AWAY = 0.7
 """How far the tilt of a space may be from the best one at another p."""
 TRIM = 0.8
@@ -69,11 +60,10 @@ ALONE = 0.5
 """The same for one that serves no other p."""
 MOST_GAIN = 1e-3
 """Of an error in one stage with cells of the noise: beyond, its fall is foreseen badly, and every unknown costs."""
-FEWEST_CELLS, FALL_PER_CELL = 4, 8.0
-"""Of a first discretisation of a place far out, and of ln P_s in one of its cells."""
-MARGIN = 0.6
-"""Of the innermost z of a place far out, down to which the phase should rest where it is solved on an arc."""
 WIDER = 4.0
+"""Factor by which the interval of noise with algebraic tails is wider where it tells the error of a narrower one."""
+REACH = 12.0
+"""Standard deviations on both sides, up to which the first cells of noise with algebraic tails are."""
 COMPARABLE = 0.6
 """Paths that hold the noise elsewhere are looked at if they grow at this share of Λ (less by the rest, for Λ < 0)."""
 SURELY_SEEN = 1e-6
@@ -124,7 +114,7 @@ class Budget:
 
 @dataclass(frozen=True, eq=False)
 class NearPlace:
-    """The eigenvalue around the place of the noise that is nearest to ξ = 0, for all but algebraic tails Λ(p).
+    """Λ(p) of a problem that is solved as a whole, for any number of p.
 
     Args:
         problem: a motion and its noise.
@@ -137,9 +127,6 @@ class NearPlace:
     Attributes:
         known: what was solved, by p.
     """
-
-    small_p: ClassVar[float] = SMALL_P
-    is_far: ClassVar[bool] = False
 
     problem: Problem
     _: KW_ONLY
@@ -226,17 +213,12 @@ class NearPlace:
 
     def near_zero(self, p: float, tolerance: Tolerance | None = None) -> Solution:
         """The solution at ±`SMALL_P` that a smaller p goes with."""
-        side = p or (-1.0 if self.problem.coloured.has_algebraic_tails else 1.0)  # where Λ is finite
+        side = p or (-1.0 if self.problem.coloured.has_algebraic_tails else 1.0)  # on which Λ is finite
         q = math.copysign(SMALL_P, side)
         try:
             return self.solution(q, tolerance)
         except NotConverged as failure:
             raise NotConverged(Message(Code.NEAR_ZERO, p=q, reason=failure.message), failure.partial) from failure
-
-    def loose(self, p: float, places: Sequence[Place]) -> Solution:
-        """That at p, to compare with other places: where one outdoes it, its eigenvalue is no exact one."""
-        best = max((place.rate for place in places), default=0.0)
-        return self.solution(p, lambda _, value: max(self.tolerance(p, value), LOOSE * max(abs(value), best)))
 
     def searched(self, search: _Search, start: Solution | None) -> Solution:
         """A solution within a tolerance from a first discretisation, or from a solution that does not suffice.
@@ -260,7 +242,7 @@ class NearPlace:
     def meets(self, solution: Solution, tolerance: Tolerance) -> bool:
         """Whether an error is within a tolerance; for small p, where Λ has no scale, always."""
         pair = solution.pair
-        return abs(pair.p) < self.small_p or solution.error <= tolerance(pair.p, pair.value)
+        return abs(pair.p) < SMALL_P or solution.error <= tolerance(pair.p, pair.value)
 
     def trimmed(self, solution: Solution, tolerance: Tolerance) -> Discretisation:
         """The discretisation of a solution, or a much smaller one that would do."""
@@ -279,69 +261,6 @@ class NearPlace:
             return True
         away = abs(frozen.tilt(frozen.center(p)) - part.slope * p) if self.problem.coloured.may_tilt else 0.0
         return away <= MOST_TILT_AWAY
-
-
-class FarPlaces(NearPlace):
-    """The largest eigenvalue of the places far out of algebraic tails, at p for which there is one.
-
-    Paths that leave the interval of the noise are killed, which makes Λ(p) smaller, but by no more than the tolerance.
-    """
-
-    small_p, is_far = 0.0, True
-
-    def solution(self, p: float, tolerance: Tolerance | None = None) -> Solution:
-        try:
-            return super().solution(p, tolerance)
-        except NotConverged as failure:
-            raise NotConverged(Message(Code.FAR_OUT, reason=failure.message), failure.partial) from failure
-
-    def searched(self, search: _Search, start: Solution | None) -> Solution:
-        places = far_places(self.problem, search.p)
-        enough = comparable(max(place.rate for place in places))
-        wanted = [place for place in places if place.rate > enough]
-        if start is not None and len(wanted) == 1:
-            return search.run(start)
-        found = (search.run(first_far(self.problem, place, self.rtol)) for place in wanted)
-        return max(found, key=lambda each: each.pair.value)
-
-    def fits(self, generator: Generator, q: float, p: float) -> bool:
-        if generator.chosen.is_killed:
-            return abs(math.log(p / q)) < MOST_RESCALING
-        return super().fits(generator, q, p)
-
-
-@dataclass(frozen=True, eq=False)
-class AllPlaces:
-    """Λ(p) of noise with algebraic tails, the larger of the eigenvalues near ξ = 0 and far out.
-
-    Attributes:
-        near, far: what is solved for each.
-    """
-
-    near: NearPlace
-    far: FarPlaces
-
-    @property
-    def budget(self) -> Budget:
-        """What both may cost together."""
-        return self.near.budget
-
-    @one_number("Λ({:g})")
-    def solution(self, p: float, tolerance: Tolerance | None = None) -> Solution:
-        """That of the larger eigenvalue. Raises `NotConverged`."""
-        if p == 0:
-            return self.near.solution(p, tolerance)
-        elsewhere = outlook(self.near.problem, p)
-        elsewhere.refuse(p, elsewhere.highest)
-        near = self.near.loose(p, elsewhere.places)
-        elsewhere.refuse(p, max(near.pair.value + near.error, *(place.rate for place in elsewhere.places), 0.0))
-        far = self.far.solution(p, tolerance) if other_places(near.pair) else None
-        if far is None or far.pair.value - far.error < near.pair.value + 10 * near.error:
-            near = self.near.solution(p, tolerance)
-        found = max((each for each in (near, far) if each), key=lambda each: each.pair.value)
-        if found.pair.value + found.error < 0 and grows_far_out(self.near.problem):
-            raise NotConverged(Message(Code.HELD_TOO_FAR, p=p, z=FURTHEST, value=found.pair.value))
-        return found
 
 
 @dataclass
@@ -379,7 +298,7 @@ class _Search:
             coarse, fine = self.place.given
             pair = self.tried(coarse).pair
             return Solution(pair, self.place.pair_on(fine, self.p, pair))
-        if abs(self.p) < self.place.small_p:
+        if abs(self.p) < SMALL_P:
             return self.tried(self.place.near_zero(self.p, self.tolerance).pair.generator)
         start = None
         for attempt in (self.from_start, self.from_nearest):
@@ -433,12 +352,9 @@ class _Search:
         elif nearest == self.p:
             return known
         try:
-            solution = self.tried(generator) if self.place.fits(generator, nearest, self.p) else None
+            return self.tried(generator) if self.place.fits(generator, nearest, self.p) else None
         except NotConverged:
             return None
-        if solution is None or (nearest != self.p and not self.place.is_far and is_far_out(solution.pair)):
-            return None  # its interval may reach a place far out, which at this p is not the nearest to ξ = 0
-        return solution
 
     def tried(self, generator: Generator) -> Solution:
         """The solution with a generator, from those around p, or from the nearest one."""
@@ -515,6 +431,11 @@ class _Search:
 def first(problem: Problem, p: float, rtol: float, center: float | None = None) -> Discretisation:
     """A first discretisation, small, for a tilted density around some z; None for where slow noise carries it."""
     noise, system, digits = problem.coloured, problem.motion, -math.log10(rtol)
+    if noise.basis == "cells":  # around ξ = 0, their lines on both sides, further apart further out
+        steps = np.concatenate([[0.0], 3.0 * 1.5 ** np.arange(60)])
+        side = np.append(steps[steps < 0.8 * REACH], REACH)
+        phase = _phase(system, noise.standard_deviation * np.array([-2.0, 2.0]), digits)
+        return Discretisation(phase, (Cells.of_degree(np.concatenate([-side[:0:-1], side]), round(2 + digits / 2)),))
     frozen = frozen_noise(problem)
     if frozen is None:  # the noise has states, or a state of its own, or there are several
         parts = tuple(first_part(each, digits) for each in noise.parts.values())
@@ -529,57 +450,8 @@ def first(problem: Problem, p: float, rtol: float, center: float | None = None) 
     unit, center = noise.standard_deviation, frozen.center(p) if center is None else center
     end = noise.half_width / unit
     phase = _phase(system, unit * np.clip(center + np.array([-2.0, 2.0]), -end, end), digits)
-    part: NoisePart
-    if noise.basis == "cells":  # their lines on both sides, further apart further out
-        steps = np.concatenate([[0.0], 3.0 * 1.5 ** np.arange(60)])
-        side = np.append(steps[steps < 0.8 * (12.0 + abs(center))], 12.0 + abs(center))
-        part = Cells.of_degree(np.concatenate([-side[:0:-1], side]), round(2 + digits / 2))
-    else:
-        slope = frozen.tilt(center) / p if noise.may_tilt else 0.0
-        part = Polynomials(round(digits / 2) + (3 if math.isinf(end) else 5), slope)
-    return Discretisation(phase, (part,))
-
-
-def first_far(problem: Problem, place: Place, rtol: float) -> Discretisation:
-    """A first discretisation, with cells even in ln |ξ|, for a place far out."""
-    digits, unit = -math.log10(rtol), problem.coloured.standard_deviation
-    fall = abs(np.subtract(*_log_density(problem.coloured, np.array([place.lower, place.upper]))))
-    cells = max(FEWEST_CELLS, math.ceil(fall / FALL_PER_CELL))
-    lines = place.lower * np.exp(math.log(place.upper / place.lower) * np.linspace(0, 1, cells + 1))
-    part = Cells.of_degree(lines, round(2 + digits / 2), is_killed=True)
-    phase = _resting(problem, lines, digits)
-    if phase is None or _resting(problem, np.append(lines, MARGIN * lines[-1]), digits) is None:
-        phase = _phase(problem.motion, unit * lines[[0, -1]], digits)
-    return Discretisation(phase, (part,))
-
-
-def _resting(problem: Problem, z: FloatArray, digits: float) -> PhaseCells | None:
-    """An arc around all phases where the phase rests for one of the z and paths come to; None where it does not rest.
-
-    T is smooth there. Elsewhere it has thin peaks beside the other phases at rest, which paths leave.
-    """
-    system, unit = problem.motion, problem.coloured.standard_deviation
-    speed = phase_speed(system, unit * z)
-    if np.any(np.abs(speed.mean) >= speed.amplitude):
-        return None
-    middle, half = np.unwrap(np.arctan2(speed.sine, speed.cosine)) / 2, np.arccos(-speed.mean / speed.amplitude) / 2
-    (lower, upper), (left, least) = ((np.min(each), np.max(each)) for each in (middle + half, middle - half))
-    width, below, above = upper - lower, np.mod(lower - least, math.pi), np.mod(left - upper, math.pi)
-    ends = np.array([lower - min(width, 0.5 * below), upper + min(width, 0.5 * above)])
-    rays = np.array([jump.phase for jump in system.jumps])
-    if np.any(np.mod(rays - ends[0], math.pi) <= np.ptp(ends)) or not is_closed(problem, ends, unit * z):
-        return None
-    return PhaseCells(ends, np.array([round(np.clip(digits - 2, 4, MOST_DEGREE))]))
-
-
-def _closed(problem: Problem, chosen: Discretisation) -> Discretisation:
-    """The same on an arc, or on the half circle, that no path leaves while the noise is in its cells."""
-    phase, lines, unit = chosen.phase, chosen.noise.lines, problem.coloured.standard_deviation
-    if not phase.is_arc or is_closed(problem, phase.lines[[0, -1]], unit * lines):
-        return chosen
-    if chosen.is_killed and (arc := _resting(problem, lines, 0.0)):
-        return replace(chosen, phase=replace(arc, degrees=np.array([np.max(phase.degrees)])))
-    return replace(chosen, phase=_phase(problem.motion, unit * lines[[0, -1]], SPLIT_DEGREE + 2))
+    slope = frozen.tilt(center) / p if noise.may_tilt else 0.0
+    return Discretisation(phase, (Polynomials(round(digits / 2) + (3 if math.isinf(end) else 5), slope),))
 
 
 def _phase(system: System, xi: Xi, digits: float, is_smooth: bool = False) -> PhaseCells:
@@ -607,13 +479,10 @@ def effects_of(failure: Exception) -> Sequence[ModeEffects | None]:
 
 
 def widened(generator: Generator) -> Discretisation:
-    """That of a generator on an interval `WIDER` times as wide, or far out a cell wider, for algebraic tails."""
-    chosen, lines, noise = generator.chosen, generator.chosen.noise.lines, generator.problem.coloured
-    if not (lines.size and noise.has_algebraic_tails):
+    """That of a generator, on an interval `WIDER` times as wide for algebraic tails."""
+    chosen, lines = generator.chosen, generator.chosen.noise.lines
+    if not (lines.size and generator.problem.coloured.has_algebraic_tails):
         return chosen
-    if chosen.is_killed:
-        cells = chosen.noise.reaching((math.e, math.e), partial(_log_density, noise))
-        return _closed(generator.problem, chosen.with_noise(cells))
     steps = WIDER ** np.linspace(0, 1, 4)[1:]
     wide = np.concatenate([(lines[0] * steps)[::-1], lines, lines[-1] * steps])
     return chosen.with_noise(chosen.noise.on(wide))
@@ -622,12 +491,11 @@ def widened(generator: Generator) -> Discretisation:
 def refined(solution: Solution, tolerance: float, stages: int) -> Discretisation:
     """A discretisation on which every cell should lack no more than its share of the tolerance."""
     pair, share = solution.pair, SHARE * tolerance
-    chosen, noise = pair.generator.chosen, pair.generator.problem.coloured
+    chosen = pair.generator.chosen
     new = chosen.refined(solution.effects, share, stages < FREE_STAGES)
     if chosen.noise.lines.size:
         lower, upper = solution.truncation
-        new = new.with_noise(new.noise.reaching((lower / share, upper / share), partial(_log_density, noise)))
-        new = _closed(pair.generator.problem, new)
+        new = new.with_noise(new.noise.reaching(lower > share, upper > share))
     return new if new.size > chosen.size or solution.error_by_modes <= tolerance else new.raised()
 
 
@@ -636,23 +504,18 @@ def _bases(problem: Problem) -> list[str]:
     return [noise.basis for noise in problem.coloured.parts.values()]
 
 
-def _log_density(noise: Noise, z: FloatArray) -> FloatArray:
-    """ln P_s of a diffusion."""
-    return noise.log_density(noise.standard_deviation * z)
-
-
 def other_center(pair: PrincipalPair) -> float | None:
     """Another z, far from the tilted density of a pair, where paths that hold the noise grow about as fast, or None.
 
     Between two such places slow noise hardly ever passes: each has its own pair with T > 0 as far as that can be
-    told, and only the larger eigenvalue is Λ. For algebraic tails see `other_places`.
+    told, and only the larger eigenvalue is Λ.
     """
     frozen, noise = frozen_noise(pair.generator.problem), pair.generator.problem.coloured
     if noise.basis == "pairs":
         z, rate = steady_places(pair.generator.problem, pair.p)
         far = (np.abs(z - pair.space.xi.center) > 5) & (rate > comparable(pair.value))
         return float(z[far][0]) if np.any(far) else None
-    if frozen is None or noise.has_algebraic_tails:
+    if frozen is None:
         return None
     z, rate = frozen.peaks(pair.p)
     if z.size < 2:
@@ -662,26 +525,6 @@ def other_center(pair: PrincipalPair) -> float | None:
     width = math.sqrt(float((at - mean) ** 2 @ density / density.sum()))
     far = (np.abs(z - mean) > 3 * width + 2) & (rate > comparable(pair.value))
     return float(z[far][np.argmax(rate[far])]) if np.any(far) else None
-
-
-def other_places(pair: PrincipalPair) -> list[Place]:
-    """The other places of algebraic tails where paths that hold the noise grow about as fast as that of a pair."""
-    return [each for each, holds in _places(pair) if not holds and each.rate > comparable(pair.value)]
-
-
-def is_far_out(pair: PrincipalPair) -> bool:
-    """Whether a pair is that of a place far out in algebraic tails, whatever found it."""
-    return any(holds for _, holds in _places(pair))
-
-
-def _places(pair: PrincipalPair) -> list[tuple[Place, bool]]:
-    """The places of algebraic tails, and whether the tilted density of a pair lies there."""
-    places = far_places(pair.generator.problem, pair.p)
-    if not places:
-        return []
-    at, density = noise_marginal(pair)
-    mean = float(at @ density / density.sum())
-    return [(place, place.lower <= mean <= place.upper) for place in places]
 
 
 def solved_p(p: float) -> float:
@@ -694,12 +537,8 @@ def misplaced(mesh: CylinderMesh | None, pairs: Sequence[PrincipalPair]) -> tupl
     if mesh is None:  # then both places have been looked at
         return ()
     for pair in pairs:
-        places, z = other_places(pair), other_center(pair)
-        if places:
-            z = math.sqrt(places[0].lower * places[0].upper) * math.copysign(1, places[0].lower)
-        if z is not None:
-            has_tails = pair.generator.problem.coloured.has_algebraic_tails
-            return (Message(Code.CARRIED_ELSEWHERE, p=pair.p, has_tails=has_tails, z=z, remedy=Remedy.REACH),)
+        if (z := other_center(pair)) is not None:
+            return (Message(Code.CARRIED_ELSEWHERE, p=pair.p, z=z, remedy=Remedy.REACH),)
     return ()
 
 

@@ -21,7 +21,7 @@ import numpy as np
 import scipy.linalg
 from scipy.sparse.linalg import ArpackError, ArpackNoConvergence, LinearOperator, eigs
 
-from fpsolve.arrays import FloatArray, dense, finite, one
+from fpsolve.arrays import FloatArray, finite, one
 from fpsolve.budget import charge
 from fpsolve.data import brief
 from fpsolve.errors import NotConverged, NumericalFailure, SingularMatrix
@@ -32,7 +32,7 @@ from fpsolve.fem.factors import one_thread
 from fpsolve.fem.generator import Generator, Pencil
 from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.problem import Problem
-from fpsolve.theory.frozen import eigenvalues_at, frozen_noise
+from fpsolve.theory.frozen import frozen_noise
 
 BACKWARD_ERROR_GOAL, BACKWARD_ERROR_OF_RATE = 1e-14, 1e-7
 """Of the norm of L, and of ω."""
@@ -139,7 +139,9 @@ def principal_pair(
         return pair
 
     def from_a_start() -> PrincipalPair | None:
-        x, y = _carried(pairs, pencil, generator) if pairs else _simplest(pencil, generator)
+        x = y = pencil.space.constant  # of weak noise, Eqs. (26) and (28)
+        if pairs:
+            x, y = _carried(pairs, pencil, generator)
         pair = solved(x, y)
         goes_on = bool(pairs) and _share(pencil.space, pair, x, y) > MOSTLY
         is_told = goes_on or not is_doubtful or math.isfinite(tangents)
@@ -238,17 +240,6 @@ def _carried(pairs: Sequence[PrincipalPair], pencil: Pencil, generator: Generato
     return weights @ [pair.right for pair in kept], weights @ [pair.left for pair in kept]
 
 
-def _simplest(pencil: Pencil, generator: Generator) -> tuple[FloatArray, FloatArray]:
-    """T = T*/P_s = 1 of weak noise, Eqs. (26) and (28); where paths are killed those of noise that rests."""
-    p, space = pencil.p, pencil.space
-    if not generator.chosen.is_killed:
-        return space.constant, space.constant
-    resting = space.xi.mass(lambda xi: p * eigenvalues_at(generator.problem, xi)[0])
-    _, vectors = scipy.linalg.eigh(finite(dense(space.xi.matrix(None) + resting)), dense(space.xi.matrix(one)))
-    vector = space.product([space.phi.constant, vectors[:, -1]])
-    return vector, vector
-
-
 def _from_the_right(pencil: Pencil, generator: Generator) -> tuple[FloatArray, FloatArray, float, float]:
     """Vectors T and T*, and the value, of the rightmost real eigenvalue, seen from the right; and its error at most.
 
@@ -257,7 +248,7 @@ def _from_the_right(pencil: Pencil, generator: Generator) -> tuple[FloatArray, F
     the distance. Complex pairs that come of the truncation may be nearer; they are passed over.
     """
     space, value = pencil.space, math.inf
-    right = left = _simplest(pencil, generator)[0]
+    right = left = space.constant
     shift = pencil.numerical_abscissa + 0.1 * generator.unit_rate
     for step in range(MAX_SHIFTS):
         if step:
@@ -362,8 +353,6 @@ def _pair(generator: Generator, pencil: Pencil, found: Iterate) -> PrincipalPair
     x = found.x * ((constant @ weight) / (weight @ found.x))
     y = found.y * (norm / (found.y @ space.weighed(x)))
     rounding = _EPS * float(abs(y) @ (abs(operator) @ abs(x))) / norm
-    if generator.chosen.is_killed:
-        rounding += _rounding_of_entries(generator, pencil, x, y) / norm
     if generator.keeps_constants:
         forcing, total = generator.matrix(p, orders=slice(1, None)), weight @ x
         of_noise = _of_noises(space)
@@ -419,29 +408,6 @@ def _sign_defects(space: TensorSpace, x: FloatArray, y: FloatArray) -> tuple[flo
         return max(float(np.sum(size[negative]) / np.sum(size)) for size in sizes)
 
     return share(right), share(left)
-
-
-def _rounding_of_entries(generator: Generator, pencil: Pencil, x: FloatArray, y: FloatArray) -> float:
-    """Bound on the effect of the rounding of matrix entries: far out the mean and the wave of q cancel in them.
-
-    In each cell of φ the entries of ∫ q u v and ∫ h u′ v are right to about eps, also those that are much smaller.
-    """
-    space, p = pencil.space, abs(pencil.p)
-    right, left = (_summed(space, v) for v in (x, y))
-    steepness = space.phi.modes**2 / np.diff(space.phi.lines)[space.phi.cells]
-    slopes = _summed(space, x * np.repeat(steepness, space.xi.size))
-    total = 0.0
-    for term in generator.problem.motion.terms:
-        size = generator.problem.motion.epsilon**term.order
-        q, h = (size * (abs(each.mean) + each.amplitude) for each in (term.q, term.h))
-        total += float(np.sum(left * ((p * q * right + h * slopes) @ abs(space.xi.matrix(term.g)))))
-    return _EPS * total
-
-
-def _summed(space: TensorSpace, coefficients: FloatArray) -> FloatArray:
-    """Sums of absolute values over the functions of each cell of φ, shape (cells, xi.size)."""
-    starts = np.flatnonzero(np.diff(space.phi.cells, prepend=-1))
-    return np.add.reduceat(np.abs(space.table(coefficients)), starts, axis=0)
 
 
 class Bordered:

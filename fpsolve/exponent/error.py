@@ -361,16 +361,12 @@ def truncation(pair: PrincipalPair) -> tuple[float, float]:
 
 
 def _end_effect(pair: PrincipalPair, lines: FloatArray) -> float:
-    """½σ² P_s |∂T| T* at the first of two lines; the slope is the largest between them, as no flux makes it 0 there.
-
-    Where paths are killed T and T* are 0 at the end, and ½σ² P_s |∂T ∂T*| times the last cell bounds what it hides.
-    """
+    """½σ² P_s |∂T| T* at the first of two lines; the slope is the largest between them, as no flux makes it 0 there."""
     space, xi = pair.space, pair.space.xi
     if xi.unit * abs(lines[0]) >= xi.noise.half_width * (1 - 1e-12):  # nothing is cut off, and P_s may be infinite
         return 0.0
     z = lines[0] + (lines[1] - lines[0]) * np.linspace(0, 1, 9)
     right, left = (xi.values_at(z) @ space.table(v).T for v in (pair.right, pair.left))
-    adjoint = left[1] * (lines[1] - lines[0]) / (z[1] - z[0]) if xi.is_killed else left[0]
-    slope = np.max(np.abs(np.diff(right @ adjoint) / np.diff(z)))
+    slope = np.max(np.abs(np.diff(right @ left[0]) / np.diff(z)))
     norm = pair.left @ space.weighed(pair.right)
     return float(xi.rate(z[:1])[0] * xi.weight(z[:1])[0] * slope / abs(norm))

@@ -84,11 +84,7 @@ def fields(pair: PrincipalPair, phi: FloatArray, at_phi: Any, at_xi: Samples) ->
     right, left = (space.evaluate(v, at_phi, at_xi.values) for v in (pair.right, pair.left))
     factor = at_xi.factor / mean * stretch[:, None]
     of_phi = at_xi.weight * density[:, None]
-    known = np.ones(len(right), dtype=bool)
-    if space.phi.is_arc:
-        known = np.asarray(abs(at_phi).sum(axis=1)).ravel() > 0
-    of_right = np.where(known[:, None], right * factor, math.nan)
-    return Fields(of_right, left * of_phi / factor, right * left * of_phi)
+    return Fields(right * factor, left * of_phi / factor, right * left * of_phi)
 
 
 def xi_marginal(pair: PrincipalPair, at_xi: Samples) -> FloatArray:
@@ -132,7 +128,7 @@ class Nodes:
         order = min(MAX_ORDER, max(degrees))
         frame = pair.generator.problem.frame
         lines_of_phi = space.phi.lines if frame is None else frame.own_phase(space.phi.lines)
-        starts = np.sort(np.mod(lines_of_phi if space.phi.is_arc else lines_of_phi[:-1], space.phi.span))
+        starts = np.sort(np.mod(lines_of_phi[:-1], space.phi.span))
         starts = np.concatenate([starts + k * space.phi.span for k in range(space.phi.turns)])
         breaks = np.concatenate([[0.0], starts[(starts > 1e-9) & (starts < 2 * math.pi - 1e-9)], [2 * math.pi]])
         phi = _nodes(breaks, order, finer * _parts(degrees[0], order))

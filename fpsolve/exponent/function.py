@@ -24,9 +24,8 @@ from fpsolve.exponent.error import MEANINGLESS, Absent, Estimate, Failure, Momen
 from fpsolve.exponent.solver import TINY_P, ExponentSolver, MomentLyapunov, best_order, missed, of_the_start, solver_of
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import Code, Message, Remedy, message_of
-from fpsolve.model.problem import Problem, checked_moments
+from fpsolve.model.problem import Problem, checked_moments, tails_refused
 from fpsolve.model.quantity import DERIVATIVE, MOMENT, SECOND_DERIVATIVE, STABILITY_INDEX, P, moment_at
-from fpsolve.theory.far import grows_far_out
 
 if TYPE_CHECKING:
     import xarray
@@ -82,9 +81,8 @@ class MomentLyapunovFunction(Result):
 
     Raises:
         ValueError: the interval is empty or not finite.
-        NoSuchExponent: Λ(p) is infinite in the interval.
-        NotConverged: some p failed, or Λ(p) is not convex, so that a wrong eigenvalue is among the values; or the noise
-            has algebraic tails, and Λ(p) a kink.
+        NoSuchExponent: Λ(p) is infinite in the interval, or the noise has algebraic tails.
+        NotConverged: some p failed, or Λ(p) is not convex, so that a wrong eigenvalue is among the values.
     """
 
     def __init__(
@@ -103,8 +101,6 @@ class MomentLyapunovFunction(Result):
         low, high = (float(end) for end in checked_moments(list(interval), problem))
         if not low < high:
             raise ValueError(f"the interval of p is {interval}; its ends must increase")
-        if grows_far_out(problem):
-            raise NotConverged(Message(Code.KINKED))
         self.interval = low, high
         self.solver = solver or solver_of(problem, mesh, rtol, budget)
         self._known, self._is_kept = {} if known is None else known, known is not None
@@ -345,7 +341,7 @@ def contradiction(
 def nonzero_root(
     solver: ExponentSolver, interval: tuple[float, float] = SEARCH_INTERVAL, guess: float | None = None
 ) -> Estimate | Absent:
-    """δ_p, the non-zero root of Λ(p), or why Λ has none in the interval, as for noise with algebraic tails.
+    """δ_p, the non-zero root of Λ(p), or why Λ has none in the interval.
 
     Λ is convex, so Λ(p)/p increases and has one root at most: a Newton iteration on it, which halves the bracket where
     its steps do not, as where Λ(p)/p bends from flat to steep. The last solve is as accurate as δ_p is to be. Where
@@ -356,8 +352,8 @@ def nonzero_root(
     """
     if not solver.problem.is_driven:
         return Absent(Message(Code.NOT_DRIVEN))
-    if grows_far_out(solver.problem):
-        return Absent(Message(Code.NO_INDEX))
+    if told := tails_refused(solver.problem, STABILITY_INDEX.symbol):
+        return Absent(told)
     noise = solver.problem.noise
     ends = low, high = tuple(float(end) for end in np.clip(interval, *solver.problem.moments))
     if solver.classes and solver.lyapunov_exponent().value < 0:  # p > 0, where Λ(p) is the largest of theirs
@@ -515,7 +511,7 @@ def solve_moments(
         next(reports, lambda: None)()
 
     result = None
-    if points.size > FEW_MOMENTS and not (grows_far_out(solver.problem) or solver.classes):
+    if points.size > FEW_MOMENTS and not solver.classes:
         ends = float(points.min()), float(points.max())
         with suppress(NotConverged):
             function = MomentLyapunovFunction(

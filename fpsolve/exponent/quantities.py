@@ -171,7 +171,7 @@ def lyapunov_exponent(
 ) -> Estimate:
     """The largest Lyapunov exponent λ = Λ′(0), Eq. (2): how fast almost every path grows.
 
-    For noise with algebraic tails a positive λ is not Λ′(0), see `theory.far_places`; `meaning` says so.
+    For noise with algebraic tails there is no Λ′(0); `meaning` says so.
 
     Args:
         problem: a motion and its noise.
@@ -188,8 +188,6 @@ def stability_index(
     problem: Problem, *, rtol: float | None = None, mesh: CylinderMesh | None = None, budget: Budget | None = None
 ) -> Estimate | Absent:
     """The stability index δ_p, the non-zero root of Λ(p), or why there is none from -20 to 20.
-
-    For noise with algebraic tails there is none: Λ(p) > 0 for every p ≠ 0, see `theory.far_places`.
 
     Args:
         problem: a motion and its noise.

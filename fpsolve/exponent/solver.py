@@ -19,34 +19,27 @@ from fpsolve.budget import counted, one_number
 from fpsolve.data import Result, dataset
 from fpsolve.errors import NoHierarchy, NoSuchExponent, NotConverged
 from fpsolve.exponent.adapt import (
-    WIDER,
-    AllPlaces,
     Budget,
-    FarPlaces,
     NearPlace,
     Tolerance,
-    is_far_out,
     misplaced,
     solved_p,
     widened,
 )
 from fpsolve.exponent.eigen import Bordered, PrincipalPair, second_derivative, slope_rounding
 from fpsolve.exponent.error import Estimate, Failure, Moment, Solution, checked, slope_error
-from fpsolve.exponent.fields import noise_marginal
 from fpsolve.exponent.joint import joint_solution
 from fpsolve.fem.factors import one_thread
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import ALMOST_EVERY, Code, Message, Remedy
 from fpsolve.model import quantity
-from fpsolve.model.problem import Problem, checked_moments, checked_problem, refuse_infinite
-from fpsolve.theory.far import far_places, grows_far_out, log_tail, variance_tail
+from fpsolve.model.problem import Problem, checked_moments, checked_problem, refuse_infinite, refuse_tails
 from fpsolve.theory.moments import EvenMoment, even_moment
 from fpsolve.theory.perturbation import Scale, scale_of
 
 if TYPE_CHECKING:
     import xarray
 
-HARDLY_FINITE = 1e-6
 MOST_EQUATIONS = 8000
 """Of even moments."""
 SURELY, ROUNDED = 10.0, 1e-6
@@ -54,7 +47,7 @@ SURELY, ROUNDED = 10.0, 1e-6
 TINY_P = 1e-3
 """Below it Λ(p)/p is a mean of Λ′, as rounding is not proportional to p."""
 TINIEST_P = 1e-9
-"""For p < 0 of smaller size Λ(p)/p is that of p = 0 also where several classes, or places of the noise, compete."""
+"""For p < 0 of smaller size Λ(p)/p is that of p = 0 also where several classes compete."""
 
 _KINDS: Sequence[tuple[str, Any, str]] = (
     ("mesh", CylinderMesh | None, "a CylinderMesh, or None"),
@@ -99,8 +92,9 @@ class MomentLyapunov(Result):
     Attributes:
         p: the moments, shape (n,), in the order asked for, without those that failed.
         value: Λ(p), per unit time, shape (n,).
-        derivative: Λ′(p), shape (n,); NaN where only the value is known: at p = 0, as Λ(0) = 0 needs no solve, and at
-            even p of three and four variables, whose moments have equations of their own, where elements failed.
+        derivative: Λ′(p), shape (n,); NaN where only the value is known: at p = 0, as Λ(0) = 0 needs no solve, and
+            algebraic tails leave it no slope; and at even p of three and four variables, whose moments have equations
+            of their own, where elements failed.
         error_estimate: estimate of |error of `value`|, from the highest modes, the ends of a noise interval and the
             bound of rounding, at least half a unit in the last place of the value, shape (n,).
         residual: backward error of the eigenpairs, shape (n,); NaN where there is none.
@@ -109,7 +103,6 @@ class MomentLyapunov(Result):
         function: of which these are values; None where each p was solved.
         root: where Λ(p)/p changes its sign, near δ_p; None where that is not among the p, or Λ was not interpolated.
         failures: why some p are missing, or none is to be trusted.
-        rare: the p at which rare paths, far out in the algebraic tails of the noise, carry the moment, shape (k,).
         notes: on them.
     """
 
@@ -123,7 +116,6 @@ class MomentLyapunov(Result):
     function: Any = field(default=None, repr=False)
     root: float | None = None
     failures: tuple[Failure, ...] = ()
-    rare: FloatArray = field(default_factory=lambda: np.zeros(0))
     notes: tuple[Message, ...] = ()
 
     def __post_init__(self) -> None:
@@ -152,7 +144,6 @@ class MomentLyapunov(Result):
         """Λ(p), Λ′(p), their errors and residuals over p."""
         columns = ("value", "error_estimate", "derivative", "derivative_error", "residual")
         numbers = {quantity.MOMENTS[name]: getattr(self, name) for name in columns}
-        numbers[quantity.RARE] = np.isin(self.p, self.rare)
         failures, values = [each.reason for each in self.failures], self.solver.problem.values
         more = {"warnings": self.warnings, "notes": self.notes, "failures": failures}
         title, places = quantity.MOMENT.words, {quantity.P: self.p}
@@ -214,8 +205,8 @@ class ExponentSolver:
 
     @cached_property
     def near(self) -> NearPlace:
-        """Λ(p) around the place nearest to ξ = 0, for all noise but that of algebraic tails the only one."""
-        if self.classes:  # near p = 0
+        """What solves Λ(p); of several classes that of the one with the largest λ."""
+        if self.classes:
             return max(self.classes, key=lambda each: each.lyapunov_exponent().value).near
         if self.problem.dimension > 2:
             from fpsolve.exponent.modes import SpherePlace  # with scikit-fem, which takes long to import
@@ -227,16 +218,6 @@ class ExponentSolver:
     def _own(self) -> dict[str, Any]:
         tolerance = partial(tolerated, self.rtol, self.scales)  # not a method: a cycle would keep matrices for long
         return {"rtol": self.rtol, "budget": self.budget, "tolerance": tolerance}
-
-    @cached_property
-    def place(self) -> NearPlace | AllPlaces:
-        """Where Λ(p) is sought: near ξ = 0, and far out where the noise has algebraic tails.
-
-        On a given mesh only the first is; `misplaced` warns of others.
-        """
-        if self.mesh is not None or not self.problem.has_algebraic_tails:
-            return self.near
-        return AllPlaces(self.near, FarPlaces(self.problem, **self._own))
 
     def pair(self, p: float) -> PrincipalPair:
         """The principal eigenpair at p. Raises `NotConverged`, `NoSuchExponent`."""
@@ -272,11 +253,11 @@ class ExponentSolver:
         """
         point = real_number(p, "p")
         refuse_infinite(self.problem, point)
-        if -TINIEST_P < point < 0 and (len(self.classes) > 1 or grows_far_out(self.problem)):
+        if -TINIEST_P < point < 0 and len(self.classes) > 1:
             point = 0.0
         point = solved_p(point)
         if not self.classes:
-            found = self.place.solution(point, tolerance)
+            found = self.near.solution(point, tolerance)
             if (known := self.even(point)) and abs(found.pair.value - known.value) > self.doubt(found.error, known):
                 told = {"p": point, "value": found.pair.value, "other": point, "expected": known.value}
                 raise NotConverged(Message(Code.NOT_PRINCIPAL, **told), remedy=self.near.refinement)
@@ -418,8 +399,8 @@ class ExponentSolver:
             progress()
         pairs, found = tuple(solved[i] for i in sorted(solved)), points[sorted(rows)]
         value, slope, _, errors, residuals = np.array([rows[i] for i in sorted(rows)]).reshape(-1, 5).T
-        if grows_far_out(self.problem):
-            slope[np.abs(found) < TINIEST_P] = np.minimum(slope[np.abs(found) < TINIEST_P], 0.0)  # from the left
+        if self.problem.has_algebraic_tails:
+            slope = np.full_like(slope, math.nan)  # of p = 0, beside which there is no Λ(p)
         return MomentLyapunov(
             p=found,
             value=value,
@@ -429,8 +410,7 @@ class ExponentSolver:
             solver=self,
             warnings=(*missed(self, found, value, errors), *misplaced(self.mesh, pairs)),
             failures=tuple(failures),
-            rare=np.array([pair.p for pair in pairs if is_far_out(pair)]),
-            notes=(*carried_far_out(self, pairs), *of_the_start(self, found)),
+            notes=of_the_start(self, found),
         )
 
     def estimate(self, p: float, solution: Solution) -> Estimate:
@@ -438,13 +418,11 @@ class ExponentSolver:
 
         Near p = 0, where rounding is not proportional to p, it is that of Λ(p)/p.
         """
-        value, error, has_kink = solution.pair.value, solution.error, grows_far_out(self.problem)
+        value, error = solution.pair.value, solution.error
         if p == 0:  # but for rounding, in every space
             value, error = 0.0, 0.0
-        elif abs(p) < TINY_P and not (has_kink and is_far_out(solution.pair)):
+        elif abs(p) < TINY_P:
             ratio, error = self.ratio_alone(p)
-            if has_kink and ratio > 0:  # of rare paths: Λ(p) is convex, and it is at most some |p|
-                ratio, error = 0.0, ratio + self.scales.linear
             value, error = p * ratio, abs(p) * error
         return Estimate(value, error, self.scale(p), quantity=quantity.moment_at(p))
 
@@ -474,7 +452,7 @@ class ExponentSolver:
             return 2 * abs(finer.derivative - solution.pair.derivative) + slope_rounding(solution.pair)
 
     def lyapunov_exponent(self) -> Estimate:
-        """λ = Λ′(0), Eq. (2); for algebraic tails the rate of almost every path. Raises `NotConverged`."""
+        """λ, Eq. (2), the growth rate of almost every path: Λ′(0) but for algebraic tails. Raises `NotConverged`."""
         try:
             with counted(self.budget.countdown("λ")):
                 value, error = self.ratio_alone(0.0)
@@ -482,7 +460,7 @@ class ExponentSolver:
             if failure.reason.code is Code.NUMBER_SPENT:
                 self.spent["λ"] = failure.message
             raise
-        meaning = ALMOST_EVERY if grows_far_out(self.problem) else ""
+        meaning = ALMOST_EVERY if self.problem.has_algebraic_tails else ""
         found = Estimate(value, error, self.scales.linear, meaning, quantity.LYAPUNOV_EXPONENT)
         return checked(found, self.near.refinement)
 
@@ -490,11 +468,10 @@ class ExponentSolver:
     def variance_rate(self) -> Estimate:
         """Λ″(0), the asymptotic growth rate of the variance of ln ‖x‖.
 
-        Its error is the difference from that of a finer discretisation, for algebraic tails of a wider one, and what is
-        left by how that falls.
+        Its error is the difference from that of a finer discretisation.
 
         Raises:
-            NoSuchExponent: the variance grows faster than t.
+            NoSuchExponent: it does not exist, or the noise has algebraic tails.
             NotConverged: it is not resolved.
         """
         if not self.problem.is_driven:
@@ -503,14 +480,11 @@ class ExponentSolver:
             rates = sorted((each.lyapunov_exponent() for each in self.classes), key=lambda each: -each.value)
             if rates[0].value - rates[1].value <= rates[0].error_estimate + rates[1].error_estimate:
                 raise NoSuchExponent(Message(Code.NO_COMMON_RATE, value=rates[0].value))
-        tail = variance_tail(self.problem)
-        if tail < HARDLY_FINITE:
-            raise NoSuchExponent(Message(Code.NO_VARIANCE_RATE))
+        refuse_tails(self.problem, quantity.VARIANCE_RATE.symbol)
         scale = 2 * self.scales.quadratic
         value, better = self.around_zero.second_derivative, self.finer_around_zero.second_derivative
         rounding = 10 * sys.float_info.epsilon * max(scale, abs(better))
-        beyond = max(1.0, 1 / math.expm1(tail * math.log(WIDER)))  # what is left, over what the wider one has added
-        error = beyond * abs(better - value) + rounding
+        error = abs(better - value) + rounding
         return checked(Estimate(better, error, scale, quantity=quantity.VARIANCE_RATE), self.near.refinement)
 
     @cached_property
@@ -520,7 +494,7 @@ class ExponentSolver:
 
     @cached_property
     def finer_around_zero(self) -> Bordered:
-        """That of a finer and wider discretisation. Raises `NotConverged`."""
+        """That of a finer discretisation, for algebraic tails of a wider one. Raises `NotConverged`."""
         pair = self.around_zero.pair
         return Bordered(self.near.finer_pair(pair, widened(pair.generator).enriched()))
 
@@ -595,18 +569,3 @@ def of_the_start(solver: ExponentSolver, p: FloatArray) -> tuple[Message, ...]:
     are equal at p = −1.
     """
     return (Message(Code.START_MATTERS),) if np.any(p < -1) and solver.problem.has_cones else ()
-
-
-def carried_far_out(solver: ExponentSolver, pairs: Sequence[PrincipalPair]) -> tuple[Message, ...]:
-    """At which p rare paths carry the moment, and from when on at the first of them, or nothing."""
-    far = [pair for pair in pairs if is_far_out(pair)]
-    if not far:
-        return ()
-    nears = [solver.near.loose(pair.p, far_places(solver.problem, pair.p)).pair for pair in far]
-    pair, near = next((each for each in zip(far, nears, strict=True) if not is_far_out(each[1])), (far[0], None))
-    z, density = noise_marginal(pair)
-    mean = float(z @ density / density.sum())
-    rarity = -log_tail(solver.problem, mean)
-    wait = {"near": near.value, "wait": rarity / (pair.value - near.value)} if near else {}  # else near is that far out
-    first, decades = pair.p if len(far) > 1 else None, rarity / math.log(10)
-    return (Message(Code.RARE_PATHS, p=[each.p for each in far], first=first, z=mean, decades=decades, **wait),)

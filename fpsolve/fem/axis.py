@@ -30,7 +30,6 @@ class Axis:
         nested: the matrix to coefficients of modes whose sums by degree are all functions of a lower degree; None where
             they are that already.
         unit: ∫ u v; None where it is the identity, or for noise.
-        is_arc: whether the axis is a part of the half circle only, see `PhaseAxis`.
         is_full: whether every function is coupled to most others.
         ladders: cells, modes and `nested` of every direction, for which errors are estimated.
         turns: how often the axis fits on the full circle; 1 for noise.
@@ -48,7 +47,7 @@ class Axis:
     levels: Any = None
     unit: Any = None
     ring: Any = None
-    is_arc = is_full = False
+    is_full = False
     turns, slowest = 1, 0.0
 
     def __init__(self) -> None:

@@ -7,7 +7,7 @@ higher degree and smaller cells.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import Any, ClassVar, Literal
@@ -17,7 +17,7 @@ import numpy as np
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import MeshError
 from fpsolve.fem.circle import CircleAxis
-from fpsolve.fem.mesh import MAX_DEGREE, TOLERANCE, CylinderMesh, halved
+from fpsolve.fem.mesh import MAX_DEGREE, CylinderMesh, halved
 from fpsolve.fem.noise_axes import CellAxis, NoiseAxis, PolynomialAxis, StateAxis
 from fpsolve.fem.pairs import PairAxis
 from fpsolve.fem.phase import PhaseAxis
@@ -34,10 +34,6 @@ SPARE = 1.0
 """Degrees beyond what seems to be enough that a cell keeps where none should be made coarser."""
 LITTLE = 1e-2
 """Share of the largest effect of an axis below which others are left as they are, while nothing is resolved."""
-LEAST_RATIO, LARGEST_RATIO = 1.1, 1.4
-"""Of the z of two lines for a place far out, where cells are added: that of the innermost cell between these."""
-OPEN, OPENED = 3.0, np.array([1.0, 2.5, 5.0, 10.0])
-"""z from which on paths may come and go, and lines that then are added on both sides."""
 MOST_SHARED = 100
 """Functions of φ that are kept for the next problem."""
 NO_LINES = np.zeros(0)
@@ -114,11 +110,6 @@ class PhaseCells:
     degrees: Any
 
     @property
-    def is_arc(self) -> bool:
-        """Whether they are on a part of the half circle only."""
-        return bool(np.ptp(self.lines) < math.pi * (1 - TOLERANCE))
-
-    @property
     def size(self) -> int:
         """Number of unknowns."""
         return int(np.sum(self.degrees + 1))
@@ -153,7 +144,6 @@ class NoisePart:
         lines: the vertices of cells in z; none for others.
         degree: of cells; 0 for others.
         slope: s/p of the factor exp(s z) that goes with polynomials.
-        is_killed: whether paths that leave the cells are killed.
         dimension: of the state of the noise.
     """
 
@@ -162,7 +152,6 @@ class NoisePart:
     lines: FloatArray
     degree: int
     slope: float
-    is_killed: bool
 
     @property
     def size(self) -> int:
@@ -202,7 +191,7 @@ class Polynomials(NoisePart):
     count: int
     slope: float = 0.0
 
-    kind, lines, degree, is_killed = "polynomials", NO_LINES, 0, False
+    kind, lines, degree = "polynomials", NO_LINES, 0
 
     @property
     def size(self) -> int:
@@ -233,19 +222,17 @@ class Cells(NoisePart):
     Attributes:
         lines: the vertices, shape (n + 1,).
         degrees: of the elements in each cell, shape (n,).
-        is_killed: whether T = 0 at the ends, as paths that leave are killed.
     """
 
     lines: FloatArray
     degrees: Any
-    is_killed: bool = False
 
     kind, slope = "cells", 0.0
 
     @classmethod
-    def of_degree(cls, lines: FloatArray, degree: int, is_killed: bool = False) -> Cells:
+    def of_degree(cls, lines: FloatArray, degree: int) -> Cells:
         """With one degree in all of them."""
-        return cls(lines, np.full(lines.size - 1, degree), is_killed)
+        return cls(lines, np.full(lines.size - 1, degree))
 
     @property
     def degree(self) -> int:  # type: ignore[override]
@@ -253,63 +240,33 @@ class Cells(NoisePart):
 
     @property
     def size(self) -> int:
-        return int(np.sum(self.degrees)) + 1 - 2 * self.is_killed
+        return int(np.sum(self.degrees)) + 1
 
     def axis(self, noise: Noise, p: float) -> CellAxis:
-        return CellAxis(noise, self.lines, self.degrees, self.is_killed)
+        return CellAxis(noise, self.lines, self.degrees)
 
     def enriched(self) -> Cells:
         return self.doubled() if self.degree + 2 > MAX_DEGREE else replace(self, degrees=self.degrees + 2)
 
     def doubled(self) -> Cells:
-        return Cells(halved(self.lines), np.repeat(self.degrees, 2), self.is_killed)
+        return Cells(halved(self.lines), np.repeat(self.degrees, 2))
 
     def raised(self) -> Cells:
         return replace(self, degrees=np.minimum(self.degrees + 1, MAX_DEGREE))
 
     def refined(self, effects: ModeEffects, share: float, may_coarsen: bool) -> Cells:
-        lines, degrees = _split(self.lines, effects, share, may_coarsen)
-        if self.is_killed:  # T falls by many orders of magnitude in a cell at an end, and must not oscillate there
-            degrees = np.maximum(degrees, np.min(self.degrees))
-        return Cells(lines, degrees, self.is_killed)
+        return Cells(*_split(self.lines, effects, share, may_coarsen))
 
-    def on(self, lines: FloatArray, is_killed: bool | None = None) -> Cells:
+    def on(self, lines: FloatArray) -> Cells:
         """Those between other lines, each with the degree of the cell that its middle is in, or is next to."""
         middles = 0.5 * (lines[:-1] + lines[1:])
         own = np.clip(np.searchsorted(self.lines, middles) - 1, 0, self.degrees.size - 1)
-        return Cells(lines, self.degrees[own], self.is_killed if is_killed is None else is_killed)
+        return Cells(lines, self.degrees[own])
 
-    def opened(self) -> Cells:
-        """With cells that reach to ξ = 0 and beyond, from where paths return."""
-        side = math.copysign(1.0, self.lines[0])
-        lines = np.sort(side * self.lines)
-        lines = np.concatenate([-OPENED[::-1], [0.0], OPENED[0.8 * lines[0] > OPENED], lines])
-        return self.on(np.sort(side * lines), is_killed=False)
-
-    def reaching(self, excess: tuple[float, float], log_density: Callable[[FloatArray], FloatArray]) -> Cells:
-        """With further cells at each end whose effect exceeds its share, by these factors.
-
-        Where paths are killed, in a place far out, the effect of that falls like 1/P_s inwards, outwards faster; close
-        to ξ = 0 they are no longer killed, and return freely.
-        """
-        if not self.is_killed:
-            below = [1.6 * self.lines[0]] if excess[0] > 1 else []
-            above = [1.6 * self.lines[-1]] if excess[1] > 1 else []
-            return self.on(np.concatenate([below, self.lines, above]))
-        side = math.copysign(1.0, self.lines[0])
-        lines = np.sort(side * self.lines)
-        inner, outer = excess if side > 0 else excess[::-1]
-        if outer > 1:
-            lines = np.append(lines, 1.6 * lines[-1])
-        if inner > 1:
-            ratio = min(max(lines[1] / lines[0], LEAST_RATIO), LARGEST_RATIO)
-            steps = lines[0] / ratio ** np.arange(1, 200)
-            gain = log_density(side * steps) - log_density(side * lines[:1])
-            enough = int(np.argmax(gain > math.log(inner))) + 1 if math.log(inner) < gain[-1] else steps.size
-            if steps[enough - 1] < OPEN:
-                return self.on(np.sort(side * lines)).opened()
-            lines = np.concatenate([steps[:enough][::-1], lines])
-        return self.on(np.sort(side * lines))
+    def reaching(self, below: bool, above: bool) -> Cells:
+        """With one more cell at the ends whose effect exceeds its share."""
+        lower, upper = [1.6 * self.lines[0]] if below else [], [1.6 * self.lines[-1]] if above else []
+        return self.on(np.concatenate([lower, self.lines, upper]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -322,7 +279,7 @@ class States(NoisePart):
 
     count: int
 
-    kind, lines, degree, slope, is_killed = "states", NO_LINES, 0, 0.0, False
+    kind, lines, degree, slope = "states", NO_LINES, 0, 0.0
     dimension = 0
 
     @property
@@ -436,11 +393,6 @@ class Discretisation:
     def is_tilted(self) -> bool:
         """Whether the functions move with p."""
         return any(part.slope for part in self.noises)
-
-    @cached_property
-    def is_killed(self) -> bool:
-        """Whether paths that leave an interval of a noise are killed."""
-        return any(part.is_killed for part in self.noises)
 
     def enriched(self) -> Discretisation:
         """A finer one: two degrees more each way; where there are none left, cells are halved."""

@@ -12,18 +12,14 @@ from typing import Any
 import numpy as np
 import scipy.linalg
 
-from fpsolve.arrays import FloatArray, dense, one
-from fpsolve.errors import MeshError
+from fpsolve.arrays import dense, one
 from fpsolve.fem.axis import KroneckerSum, TensorSpace, along
 from fpsolve.fem.dense import Factors
 from fpsolve.fem.discretisation import Discretisation
 from fpsolve.fem.factors import factorised
-from fpsolve.fem.mesh import CylinderMesh
+from fpsolve.fem.mesh import CylinderMesh, vertices_at
 from fpsolve.fem.rings import Ring
 from fpsolve.fem.terms import ALL_ORDERS, Term, Terms, TermSum, power_of_epsilon
-from fpsolve.model.plane import (
-    phase_speed,
-)
 from fpsolve.model.problem import ParameterDerivative, Problem
 
 KEPT_SPACES = 16
@@ -88,15 +84,6 @@ class Pencil:
         return factorised(self.matrix.shifted(shift), self.levels, is_full=self.space.phi.is_full, ring=self.ring)
 
 
-def is_closed(problem: Problem, ends: FloatArray, support: FloatArray) -> bool:
-    """Whether no path leaves an arc of the phase, while a noise is between the extremes of its support."""
-    if problem.diffusions or problem.impulses:
-        return False
-    xi = np.linspace(float(np.min(support)), float(np.max(support)), SAMPLES)
-    lower, upper = phase_speed(problem.motion, xi[:, None])(ends).T
-    return bool(np.all(lower > 0) and np.all(upper < 0))
-
-
 class Generator:
     """L(p) in weak form; `print` lists its terms.
 
@@ -105,8 +92,7 @@ class Generator:
         chosen: on the half circle (its principal eigenvalue is that of the full circle) or the full circle.
 
     Raises:
-        MeshError: there is no φ-line at a jump, paths leave an arc, or a cell's polynomials in the noise cannot be told
-            apart.
+        MeshError: there is no φ-line at a jump, or a cell's polynomials in the noise cannot be told apart.
     """
 
     def __init__(self, problem: Problem, chosen: Discretisation | CylinderMesh) -> None:
@@ -121,10 +107,8 @@ class Generator:
         self._changes: dict[ParameterDerivative, tuple[Term, ...]] = {}
         self._last: Pencil | None = None
         for jump in problem.motion.jumps:
-            self.phi.vertices_at(jump.phase)
-        space = self.space(0.0)  # refuses a mesh that cannot be used
-        if self.phi.is_arc and not is_closed(problem, chosen.phase.lines[[0, -1]], space.xi.support):
-            raise MeshError("paths leave the arc of the phase")
+            vertices_at(self.phi.lines, jump.phase)
+        self.space(0.0)  # refuses a mesh that cannot be used
 
     def __reduce__(self) -> tuple[Any, ...]:
         """What it is made of; the matrices are assembled again when they are needed."""
@@ -218,9 +202,7 @@ class Generator:
 
     @cached_property
     def keeps_constants(self) -> bool:
-        """Whether ⟨P_s, L₀T⟩ = 0 for every T: no path is killed, and the order 0 only rotates uniformly."""
-        if self.chosen.is_killed:
-            return False
+        """Whether ⟨P_s, L₀T⟩ = 0 for every T: the order 0 only rotates uniformly."""
         free = [term for term in self.problem.motion.terms if term.order == 0]
         is_weak = all(each.order for each in self.problem.diffusions) and not self.problem.impulses
         return is_weak and all(term.h.amplitude == 0 and term.q.vanishes for term in free)

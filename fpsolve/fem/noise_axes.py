@@ -259,33 +259,26 @@ class CellAxis(LineAxis):
         noise: the noise.
         lines: vertices in z, within the support of the noise.
         degrees: of the elements in each cell.
-        is_killed: whether paths that leave the interval are killed: T = 0 at its ends. Otherwise they are reflected.
 
     Attributes:
-        line: the elements, in the weight P_s, or a multiple of it where paths are killed.
+        line: the elements, in the weight P_s.
 
     Raises:
         MeshError: a cell's polynomials cannot be told apart under the weight.
     """
 
-    def __init__(self, noise: Noise, lines: FloatArray, degrees: Any, is_killed: bool = False) -> None:
+    def __init__(self, noise: Noise, lines: FloatArray, degrees: Any) -> None:
         from fpsolve.fem.line import LineSpace  # scikit-fem takes a while to import
 
         super().__init__(noise)
-        self.is_killed = is_killed
-        if is_killed:  # far out P_s underflows
-            self._log_weight = float(np.max(noise.log_density(self.unit * lines)))
         end, exponent = noise.half_width / self.unit, noise.end_exponent
         reaches = (lines[0] <= -end * (1 - 1e-12), lines[-1] >= end * (1 - 1e-12))
         ends = (exponent * reaches[0], exponent * reaches[1])
         self.line = LineSpace(lines, degrees, self.weight, end_exponents=ends)
-        kept = self.line.kept.copy()
-        if is_killed:
-            kept[self.line.ends] = False
-        self._inner = np.flatnonzero(kept)
+        self._inner = np.flatnonzero(self.line.kept)
         self.points, self.measure, self.values = self.line.points, self.line.measure, self.line.values[:, self._inner]
         self.size, self.cells, self.modes = self._inner.size, self.line.cells[self._inner], self.line.modes[self._inner]
-        self.constant = self.line.constant()[self._inner]  # where paths are killed it falls to 0 at the ends
+        self.constant = self.line.constant()[self._inner]
         self.support = self.unit * lines[[0, -1]]
 
     def mass(self, g: Coefficient = one) -> Any:
@@ -314,7 +307,7 @@ class CellAxis(LineAxis):
         return self.line.at(z)[:, self._inner]
 
     def _form(self, matrix: Any) -> Any:
-        """Without the functions at killed ends; sparse where it is large."""
+        """Of the functions that are kept; sparse where it is large."""
         inner = matrix[self._inner][:, self._inner]
         return inner.toarray() if inner.shape[0] <= MAX_DENSE_UNKNOWNS else inner
 

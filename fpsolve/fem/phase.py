@@ -11,9 +11,7 @@ import numpy as np
 from scipy.sparse import csr_matrix, diags, issparse
 
 from fpsolve.arrays import FloatArray, one
-from fpsolve.errors import MeshError
 from fpsolve.fem.axis import Axis
-from fpsolve.fem.mesh import TOLERANCE, vertices_at
 from fpsolve.fem.rings import Ring
 from fpsolve.model.plane import CoefficientMatrix, Harmonics, Impulse, ImpulseDerivative, changed_exponential
 from fpsolve.polynomials import gauss_legendre, legendre, orthonormal
@@ -31,19 +29,14 @@ MAX_DENSE_UNKNOWNS = 600
 class PhaseAxis(Axis):
     """Discontinuous elements on the circle or half circle; in each cell the basis is orthonormal, by degree.
 
-    Or on an arc of the half circle that no path leaves, between the rays of jumps: T on it does not depend on what it
-    is elsewhere.
-
     Args:
-        lines: the ends of the cells, shape (m + 1,); but for an arc the first and the last are one.
+        lines: the ends of the cells, shape (m + 1,); the first and the last are one.
         degrees: the degree in each cell, from 1 on, shape (m,).
 
     Attributes:
         points, weights: a quadrature rule, shape (n,).
-        span: π or 2π; for an arc that of the half circle.
-        is_arc: whether it is one.
-        vertices: φ of what is between two cells: lines[:-1], for an arc lines[1:-1].
-        left_trace, right_trace: T(φⱼ⁻) and T(φⱼ⁺) at the vertices, shape (vertices, size); the left trace at the seam
+        span: π or 2π.
+        left_trace, right_trace: T(φⱼ⁻) and T(φⱼ⁺) at lines[:-1], shape (m, size); the left trace at the seam
             comes from the last cell.
         jump: T(φⱼ⁺) − T(φⱼ⁻).
     """
@@ -62,27 +55,14 @@ class PhaseAxis(Axis):
         self._local_weights = weights
         self.points, self.weights = self._grid.ravel(), (self._sizes[:, None] * weights).ravel()
         self.constant = np.where(self.modes == 0, np.sqrt(self._sizes)[self.cells], 0.0)
-        length = float(self.lines[-1] - self.lines[0])
-        self.is_arc = length < math.pi * (1 - TOLERANCE)
-        self.span = math.pi if self.is_arc else length
+        self.span = float(self.lines[-1] - self.lines[0])
         self.turns = round(2 * math.pi / self.span)
-        self.vertices = self.lines[1:-1] if self.is_arc else self.lines[:-1]
         self.right_trace, self.left_trace = (
-            self._scattered(np.arange(kept.shape[0]) + shift, self._table.ends[side] / np.sqrt(self._sizes)[:, None])[
-                int(self.is_arc) :
-            ]
+            self._scattered(np.arange(kept.shape[0]) + shift, self._table.ends[side] / np.sqrt(self._sizes)[:, None])
             for side, shift in ((0, 0), (1, 1))
         )
         self.jump = self.right_trace - self.left_trace
         self._strikes: dict[Impulse, tuple[Any, ...]] = {}
-
-    def vertices_at(self, phase: float) -> Any:
-        """The indices of the vertices at φ and φ + π; an arc has none. Raises `MeshError` where one is missing."""
-        if not self.is_arc:
-            return vertices_at(self.lines, phase)
-        if np.mod(phase - self.lines[0], math.pi) <= self.lines[-1] - self.lines[0]:
-            raise MeshError("an arc of the phase has the ray of a jump in it")
-        return np.zeros(0, dtype=int)
 
     def mass(self, f: Any = one) -> Any:
         """∫ f u v of `Harmonics` f, or of 1."""
@@ -177,10 +157,8 @@ class PhaseAxis(Axis):
         return (cuts[:-1, None] + sizes * local).ravel(), middles, (sizes * weights).ravel()
 
     @cached_property
-    def ring(self) -> Ring | None:
-        """The cells, as long as nothing but their end values couples them; None for an arc."""
-        if self.is_arc:
-            return None
+    def ring(self) -> Ring:
+        """The cells, as long as nothing but their end values couples them."""
         kept = self._pairs[:, :, 0]
         ends = (self._table.ends[:, None] / np.sqrt(self._sizes)[:, None]).transpose(1, 2, 0)
         return Ring(np.where(kept, self._number, -1), np.where(kept[:, :, None], ends, 0.0))
@@ -201,18 +179,13 @@ class PhaseAxis(Axis):
         """Values at points of the domain, as rows of E with u(φ) = E @ coefficients, shape (len(φ), size).
 
         A point on a line between cells is seen from the cell that holds its entry of `inside`, without it from the
-        cell above. Beyond an arc all functions are 0.
+        cell above.
         """
-        if self.is_arc:  # which may begin in another half circle
-            phi = self.lines[0] + np.mod(phi - self.lines[0], math.pi)
-            inside = phi if inside is None else self.lines[0] + np.mod(inside - self.lines[0], math.pi)
         where = np.searchsorted(self.lines, phi if inside is None else inside, side="right") - 1
         cell = np.clip(where, 0, self._sizes.size - 1)
         local = np.clip((phi - self.lines[cell]) / self._sizes[cell], 0, 1)
         values = legendre(local, int(self.degrees.max())) / np.sqrt(self._sizes[cell])[:, None]
         kept = np.arange(values.shape[1]) <= self.degrees[cell, None]
-        if self.is_arc:
-            kept &= (where == cell)[:, None]
         return self._matrix(values[kept], np.nonzero(kept)[0], self._number[cell][kept], (phi.size, self.size))
 
     def finer_rule(self, parts: int) -> tuple[FloatArray, FloatArray]:

@@ -26,6 +26,7 @@ import numpy as np
 
 from fpsolve.arrays import Coefficient, FloatArray, one
 from fpsolve.fem.axis import KroneckerSum, TensorSpace
+from fpsolve.fem.mesh import vertices_at
 from fpsolve.fem.phase import by_rows
 from fpsolve.model.plane import (
     CoefficientMatrix,
@@ -191,13 +192,13 @@ class Terms(NoiseTerms):
         system = self.system = problem.motion
         self._diffusions, self.phi, self.noises = problem.diffusions, space.phi, space.axes[1:]
         self._impulses = problem.impulses
-        self._vertices, self._jump = self.phi.vertices, self.phi.jump
+        self._vertices, self._jump = self.phi.lines[:-1], self.phi.jump
         self._ends = problem.at_values([axis.support for axis in self.noises])
         speed = self._speed_at_ends(self._vertices)
         # where θ = |v|
         is_exact = np.full(self._vertices.size, all(axis.is_local for axis in self.noises))
         for ray in system.jumps:
-            is_exact[self.phi.vertices_at(ray.phase)] = True
+            is_exact[vertices_at(self.phi.lines, ray.phase)] = True
         # the sign of v at those of these vertices where it is the same for all ξ, otherwise 0
         direction = np.where(is_exact, 1.0 * np.all(speed > 0, axis=0) - np.all(speed < 0, axis=0), 0.0)
         self._is_exact, self._two_way = is_exact, np.flatnonzero(is_exact & (direction == 0))
@@ -314,7 +315,10 @@ class Terms(NoiseTerms):
 
     def _load(self, ray: Jump) -> tuple[float, Any]:
         """dφ/dt at the ray of a jump, and its load: w(φ⁻) T(φ⁺) where the phase runs forward, else w(φ⁺) T(φ⁻)."""
-        at, speed = self.phi.vertices_at(ray.phase), float(np.mean(phase_speed(self.system, self._ends)(ray.phase)))
+        at, speed = (
+            vertices_at(self.phi.lines, ray.phase),
+            float(np.mean(phase_speed(self.system, self._ends)(ray.phase))),
+        )
         left, right = self.phi.left_trace[at], self.phi.right_trace[at]
         return speed, left.T @ right if speed > 0 else right.T @ left
 

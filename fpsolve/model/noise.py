@@ -16,8 +16,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fpsolve.arrays import Coefficient, FloatArray, nothing
-from fpsolve.errors import NoSuchExponent
-from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.exact import ExactLaw
 from fpsolve.model.parameters import Parametrised
 from fpsolve.model.plane import CoefficientMatrix, Impulse, ImpulseDerivative, System
@@ -109,14 +107,9 @@ class Noise(Parametrised):
         return 0.0
 
     @property
-    def moments(self) -> tuple[float, float]:
-        """The smallest and the largest p for which Λ(p) of a system linear in ξ is finite."""
-        return -math.inf, math.inf
-
-    @property
     def has_algebraic_tails(self) -> bool:
-        """Whether P_s falls off like a power of ξ, so that some moments are infinite."""
-        return math.isfinite(self.moments[1])
+        """Whether P_s falls off like a power of ξ: moments far out are infinite, and no Λ(p), p ≠ 0, is computed."""
+        return False
 
     @property
     def basis(self) -> Literal["polynomials", "cells", "states", "waves", "pairs"]:
@@ -302,12 +295,6 @@ class Noise(Parametrised):
             NoSuchExponent: no bound can be proven for these parameters.
         """
         return None
-
-    def check_existence(self, p: float) -> None:
-        """Check that E‖x‖^p is finite. Raises `NoSuchExponent` for a p outside `moments`."""
-        low, high = self.moments
-        if not low <= p <= high:
-            raise NoSuchExponent(Message(Code.INFINITE, p=p, low=low, high=high, remedy=Remedy.REDUCTION))
 
 
 class Memoryless(Noise):

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from fpsolve.arrays import FloatArray, real_numbers, shown
 from fpsolve.data import plain_unit, written
 from fpsolve.errors import NoSuchExponent
-from fpsolve.messages import Code, Message
+from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.checks import refuse_wrong_derivative
 from fpsolve.model.frame import Frame, own_frame
 from fpsolve.model.noise import Noise, NoiseDerivative
@@ -41,7 +41,7 @@ from fpsolve.model.plane import (
     phase_speed,
     turning,
 )
-from fpsolve.model.quantity import NOISE, Quantity
+from fpsolve.model.quantity import NOISE, Quantity, moment_at
 from fpsolve.model.subsystem import ROUNDED, Subsystem, components, couplings, hidden_blocks, reached, subsystems
 
 P = ParamSpec("P")
@@ -448,14 +448,15 @@ class Problem:
 
     @property
     def has_algebraic_tails(self) -> bool:
-        """Whether some moments are infinite as the noise has such tails."""
+        """Whether the noise that moves the state has such tails, so that no Λ(p), p ≠ 0, is computed."""
         return self.noise.has_algebraic_tails and self.is_driven
 
     @property
     def moments(self) -> tuple[float, float]:
-        """The p for which Λ(p) is finite and known, as a closed interval."""
-        low, high = self.noise.moments if self.is_driven else (-math.inf, math.inf)
-        return (max(low, -1.0), high) if len(self.blocks) > len(self.invariant_rays) > 0 else (low, high)
+        """The p for which Λ(p) is computed, as a closed interval."""
+        if self.has_algebraic_tails:
+            return 0.0, 0.0
+        return (-1.0 if len(self.blocks) > len(self.invariant_rays) > 0 else -math.inf), math.inf
 
     @property
     def halves(self) -> tuple[Parametrised, ...]:
@@ -643,15 +644,31 @@ def checked_problem(problem: object) -> Problem:
     raise TypeError(f"got problem = {shown(problem)}; {remedy}")
 
 
+def tails_refused(problem: Problem, what: str) -> Message | None:
+    """Why a quantity other than λ and what is at p = 0 is not computed for noise with algebraic tails; None for others.
+
+    Args:
+        problem: a motion and its noise.
+        what: the symbol of the quantity, or its name.
+    """
+    return Message(Code.TAILS, what=what, remedy=Remedy.REDUCTION) if problem.has_algebraic_tails else None
+
+
+def refuse_tails(problem: Problem, what: str) -> None:
+    """Refuse such a quantity. Raises `NoSuchExponent`."""
+    if told := tails_refused(problem, what):
+        raise NoSuchExponent(told)
+
+
 def refuse_infinite(problem: Problem, p: float) -> None:
-    """Refuse a p for which E‖x‖^p is infinite, or not known.
+    """Refuse a p for which E‖x‖^p is infinite, or Λ(p) not computed.
 
     Raises:
         NoSuchExponent: p is not among the `moments` of the problem, or the phase never leaves the ray of a jump.
     """
-    noise, system = problem.noise, problem.motion
-    if problem.is_driven:
-        noise.check_existence(p)
+    if p:
+        refuse_tails(problem, moment_at(p).symbol)
+    system = problem.motion
     if problem.invariant_rays:
         has_jumps = any(jump.log_factor for jump in system.jumps)
         if has_jumps or p < problem.moments[0]:

@@ -86,7 +86,6 @@ EFFECTIVE_PATHS = Quantity(
 IMPACTS = Quantity("impacts", "impacts", "number of impacts of the paths without weights")
 STATUS = Quantity("status", "status", "status of the parameter set")
 SECONDS = Quantity("seconds", "seconds", "processor time", unit="s")
-RARE = Quantity("rare", "rare", "whether rare paths carry the moment", dims=("p",))
 LYAPUNOV_EXPONENT = Quantity(
     "lyapunov_exponent", "λ", "largest Lyapunov exponent", r"$\lambda$", "1/time", (), "(2)", "(39)", _MODES
 )

@@ -76,7 +76,6 @@ class Series:
     Attributes:
         varied: the parameters that tell it from the others.
         simulated: x, y and the standard errors of y from a simulation, shape (3, n).
-        rare: which of the x have moments that rare paths carry, shape (n,).
         root: the stability index, which is marked on the zero line; None where there is none among the x.
         slope: λ, which is marked as the tangent at 0; None where it is not.
     """
@@ -87,7 +86,6 @@ class Series:
     line_x: FloatArray = field(default_factory=lambda: np.zeros(0))
     line_y: FloatArray = field(default_factory=lambda: np.zeros(0))
     simulated: FloatArray | None = None
-    rare: Any = False
     root: float | None = None
     slope: float | None = None
 
@@ -311,7 +309,6 @@ def _moment_series(case: Case, result: CurveResult, sample: SimulatedCurve | Non
         line,
         perturbed_moments(result.curve.problem, line),
         _columns([(each.p, each.value, each.standard_error) for each in estimates if each.value is not None]),
-        np.isin(p, result.moments.rare) if result.moments.rare.size else False,
         root=root if root is not None and first <= root <= last else None,
         slope=slope if first <= 0 <= last else None,
     )
@@ -330,7 +327,7 @@ def _rates(result: CurveResult, *, with_theory: bool) -> Series:
 
 def _over_parameter(case: Case, pairs: Sequence[Pair]) -> list[Series]:
     """A number over the parameter: one series for each set of the other parameters that vary."""
-    key, p = case.figure.x, case.figure.moment
+    key = case.figure.x
     groups: dict[tuple[tuple[str, Value], ...], list[Pair]] = {}
     for pair in pairs:
         others = tuple((name, value) for name, value in pair[0].curve.key if name != key)
@@ -350,7 +347,6 @@ def _over_parameter(case: Case, pairs: Sequence[Pair]) -> list[Series]:
                 line,
                 np.array([_theory(case, case.curve({**dict(others), key: float(each)}).problem) for each in line]),
                 _columns([(at, *dot) for at, dot in dots if dot]),
-                np.array([p in result.moments.rare for result, _ in group]),
             )
         )
     return found
@@ -399,8 +395,6 @@ def draw_series(axes: Any, case: Case, series: Sequence[Series], equation: str) 
     label_axes(axes, over.attributes, setting.quantity.timed(case.units.time).attributes)
     mark_zero(axes)
     colours = (_draw_few if is_few else _draw_many)(axes, case, series, equation)
-    if any(np.any(item.rare) for item in series):
-        axes.plot([], [], "o", label="carried by rare paths", markersize=points(7 if is_few else 4), **_GREY)
     if simulated := [item.simulated for item in series if item.simulated is not None]:
         size, line, cap = (5, 1.1, 4) if is_few else (3, 0.8, 0)
         style: dict[str, Any] = {"marker": ".", "color": "black", "markeredgewidth": points(1), "zorder": 5}
@@ -430,9 +424,6 @@ def _draw_few(axes: Any, case: Case, series: Sequence[Series], equation: str) ->
         hollow: dict[str, Any] = {"marker": marker, "color": colour, "markerfacecolor": "none"}
         axes.plot(item.line_x, item.line_y, color=colour, linestyle=line)
         axes.plot(item.x, item.y, linestyle="none", markevery=item.every, **hollow)
-        if np.any(item.rare):
-            chosen = np.broadcast_to(item.rare, item.x.shape) & (np.arange(item.x.size) % item.every == 0)
-            axes.plot(item.x[chosen], item.y[chosen], marker, color=colour)
         axes.plot([], [], linestyle=line, label=legend(item.varied, case.about), **hollow)
     words = "finite elements (not all marked)" if any(item.every > 1 for item in series) else "finite elements"
     axes.plot([], [], "o", markerfacecolor="none", label=words, **_GREY)
@@ -470,10 +461,9 @@ def _draw_many(axes: Any, case: Case, series: Sequence[Series], equation: str) -
         name = f", {legend(dict(kind), case.about)}" if len(kinds) > 1 else ""
         axes.plot([], [], linestyle=line, label=f"finite elements{name}{others}", **_GREY)
 
-    # dots: curves that have but one point, and the points that rare paths carry
+    # dots: curves that have but one point
     known = [np.isfinite(item.y) for item in series]
-    far = [np.broadcast_to(item.rare, item.x.shape).astype(bool) for item in series]
-    dots = [(i, at) for i, at in enumerate(known) if at.sum() == 1] + [(i, at) for i, at in enumerate(far) if at.any()]
+    dots = [(i, at) for i, at in enumerate(known) if at.sum() == 1]
     if dots:
         x, y = (np.concatenate([getattr(series[i], side)[at] for i, at in dots]) for side in "xy")
         colour = np.repeat(colours[[i for i, _ in dots]], [at.sum() for _, at in dots], axis=0)

@@ -339,11 +339,11 @@ def fits(result: CurveResult, asked: Sequence[float]) -> bool:
         indices += [*response.numbers.values(), response.balance]
     is_whole = (
         all(each.shape == found.p.shape for each in columns[:-1])
-        and found.p.ndim == found.rare.ndim == 1
+        and found.p.ndim == 1
         and not any(np.isinf(each).any() for each in columns)
         and bool(np.isfinite(found.value).all())
         and len(set(p)) == len(p)
-        and {*p, *found.rare.tolist()} <= set(asked) <= (solved if None not in solved else {*asked})
+        and {*p} <= set(asked) <= (solved if None not in solved else {*asked})
         and result.estimates.keys() == INDICES.keys()
         and len(result.jumps) in (0, len(result.curve.problem.system.jumps))
         and all(each.keys() <= BY_JUMP.keys() for each in result.jumps)

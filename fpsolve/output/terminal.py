@@ -40,7 +40,6 @@ from fpsolve.output.tables import asked, in_case_words
 from fpsolve.study.chart import Chart, charted
 from fpsolve.study.results import Comparison, CurveResult, SimulatedCurve, Status
 from fpsolve.study.uncertain import Sampled, Samples, Spreads, spreads_of
-from fpsolve.theory.far import grows_far_out
 
 SUMMARY, MONTE_CARLO = "summary.json", "monte_carlo*.json"
 STYLES = {
@@ -127,7 +126,9 @@ def index_text(index: Index, result: CurveResult, most: int = 17) -> str:
     unsolved = {Code.INDEX_FAILED, Code.INDEX_MISSING} if result.failures else {Code.INDEX_FAILED}
     if any(each.code in unsolved and index.symbol in each.data["symbols"] for each in told):
         return "not solved"
-    return "none" if index == CRITICAL_RESTITUTION or grows_far_out(result.curve.problem) else "none found"
+    if result.curve.problem.has_algebraic_tails and index in (STABILITY_INDEX, VARIANCE_RATE):
+        return "not computed"
+    return "none" if index == CRITICAL_RESTITUTION else "none found"
 
 
 def _quantities(case: Case) -> list[_Shown]:

@@ -310,28 +310,19 @@ def _estimate(plan: Plan, p: float, found: tuple[float, float], effective: float
     if p == 0:
         return MomentEstimate(0.0, 0.0, 0.0, plan.estimator, effective)
     is_finite = bool(np.all(np.isfinite(found))) and math.isfinite(effective)
-    if is_finite and effective >= FEW[plan.estimator] and _has_variance(plan, p):
+    if is_finite and effective >= FEW[plan.estimator]:
         return MomentEstimate(float(p), *found, plan.estimator, effective)
     return MomentEstimate(float(p), None, None, plan.estimator, effective if is_finite else 0.0)
 
 
-def _has_variance(plan: Plan, p: float) -> bool:
-    """Whether E‖x‖^2p is finite."""
-    return plan.noise.moments[0] <= 2 * p <= plan.noise.moments[1]
-
-
 def _missing(plan: Plan, estimates: Sequence[MomentEstimate]) -> list[Message]:
-    """Why some p have no estimate, in a warning for each reason."""
-    warnings, is_direct = [], plan.estimator == "direct"
-    none = [estimate for estimate in estimates if estimate.value is None]
-    wild, few = ([each for each in none if _has_variance(plan, each.p) == has] for has in (False, True))
-    if wild:
-        warnings.append(Message(Code.NO_PATH_VARIANCE, p=[each.p for each in wild]))
-    if few:
-        low, high = (pick(each.effective_paths for each in few) for pick in (min, max))
-        found = {"p": [each.p for each in few], "low": low, "high": None if low == high else high}
-        warnings.append(Message(Code.FEW_PATHS, **found, needed=FEW[plan.estimator], is_direct=is_direct))
-    return warnings
+    """Why some p have no estimate, in one warning."""
+    few = [estimate for estimate in estimates if estimate.value is None]
+    if not few:
+        return []
+    low, high = (pick(each.effective_paths for each in few) for pick in (min, max))
+    found = {"p": [each.p for each in few], "low": low, "high": None if low == high else high}
+    return [Message(Code.FEW_PATHS, **found, needed=FEW[plan.estimator], is_direct=plan.estimator == "direct")]
 
 
 def _drift(plan: Plan, p: float, change: float, error: float) -> list[Message]:

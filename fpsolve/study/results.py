@@ -39,7 +39,6 @@ class MomentColumns:
         p: the moments.
         value, derivative, error_estimate, derivative_error, residual: as in `MomentLyapunov`.
         perturbation: Eq. (37) at the same p.
-        rare: the p at which rare paths carry the moment, shape (k,).
     """
 
     p: FloatArray
@@ -49,7 +48,6 @@ class MomentColumns:
     derivative_error: FloatArray
     residual: FloatArray
     perturbation: FloatArray
-    rare: FloatArray
 
     @property
     def rate_function(self) -> FloatArray:

@@ -11,7 +11,6 @@ from fpsolve.messages import Code, Message
 from fpsolve.pool import processors
 from fpsolve.simulation.setup import PROGRESS_STEPS, obstacles, simulated_parts
 from fpsolve.study.results import SimulatedCurve
-from fpsolve.theory.far import simulated_tail_note
 
 SIGNIFICANT = 3.0
 """Standard errors by which λ must exceed 0 before a stationary response is sought."""
@@ -97,11 +96,9 @@ def simulate_curve(
         curve.problem, orders, estimator=setting.estimator,
         paths=setting.paths, time=setting.time, step=setting.step, seed=setting.seed, progress=progress,
     )  # fmt: skip
-    note = simulated_tail_note(curve.problem) if any(each.p for each in result.estimates) else None
-    noted = result.warnings if note is None else (*result.warnings, note)
     if not curve.problem.system.is_nonlinear or result.interrupted:
-        return SimulatedCurve(curve, result, None, noted, result.interrupted)
-    value, error = result.lyapunov_exponent, result.lyapunov_exponent_error
+        return SimulatedCurve(curve, result, None, result.warnings, result.interrupted)
+    value, error, noted = result.lyapunov_exponent, result.lyapunov_exponent_error, result.warnings
     try:
         if value <= SIGNIFICANT * error:
             for _ in range(2 * PROGRESS_STEPS):

@@ -33,15 +33,14 @@ from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.error import Absent, Estimate, Failure, Moment
 from fpsolve.exponent.fields import MOST_NEGATIVE, UNRESOLVED
 from fpsolve.exponent.function import solve_moments
-from fpsolve.exponent.quantities import BY_JUMP, INDICES, LYAPUNOV_EXPONENT, MOMENT, STABILITY_INDEX
+from fpsolve.exponent.quantities import BY_JUMP, INDICES, MOMENT, STABILITY_INDEX
 from fpsolve.exponent.solver import ExponentSolver, InvariantClass, MomentLyapunov
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import Code, Message, Remedy, Severity, message_of
-from fpsolve.model.problem import Problem
+from fpsolve.model.problem import Problem, refuse_infinite
 from fpsolve.signals import is_interrupt
 from fpsolve.study.response import Grid, solve_response
 from fpsolve.study.results import Comparison, CurveResult, MomentColumns, Solved
-from fpsolve.theory.far import heavy_tail_note
 from fpsolve.theory.perturbation import perturbed_moments, weak_noise_note
 
 Kept = TypeVar("Kept")
@@ -228,7 +227,7 @@ class Draft:
             rows = np.array([self.known[each] for each in p.tolist()]).reshape(-1, len(Moment._fields))
             value, slope, slope_error, error, residual = np.where(np.isinf(rows), np.nan, rows).T
             theory = perturbed_moments(self.curve.problem, p)
-            columns = MomentColumns(p, value, slope, error, slope_error, residual, theory, np.zeros(0))
+            columns = MomentColumns(p, value, slope, error, slope_error, residual, theory)
         estimates = {name: self.estimates.get(name) for name in INDICES}
         failures = (Failure(None, Message(Code.UNFINISHED)),)
         self._keep(CurveResult(self.curve, columns, estimates, failures=failures, seconds=self.spent(), **self.parts))
@@ -283,7 +282,12 @@ def _solve(draft: Draft, wanted: Wanted, numerics: Numerics, progress: Callable[
         progress()
         draft.grow()
 
-    found = solve_moments(solver, wanted.p, progress=advance, known=draft.known if wanted.slopes else None)
+    refused = _refused(curve.problem, wanted.p)
+    for _ in refused:
+        advance()
+    computed = [p for p in wanted.p.tolist() if p not in refused]
+    found = solve_moments(solver, computed, progress=advance, known=draft.known if wanted.slopes else None)
+    found = replace(found, failures=(*(Failure(p, reason) for p, reason in refused.items()), *found.failures))
     draft.columns = columns = MomentColumns(
         p=found.p,
         value=found.value,
@@ -292,7 +296,6 @@ def _solve(draft: Draft, wanted: Wanted, numerics: Numerics, progress: Callable[
         derivative_error=found.derivative_error if wanted.slopes else np.full(found.p.shape, np.nan),
         residual=found.residual,
         perturbation=perturbed_moments(curve.problem, found.p),  # Eq. (37)
-        rare=found.rare,
     )
     draft.grow()
     tries = {
@@ -305,7 +308,7 @@ def _solve(draft: Draft, wanted: Wanted, numerics: Numerics, progress: Callable[
     missing = [each for each in missing if wanted.is_stated or not each.tells_of(Code.NOT_ONE_RAY)] + more
     index = estimates[STABILITY_INDEX.name]
     root = None if index is None else index.value
-    rare, response, slopes, refused = None, None, None, list[Message]()
+    rare, response, slopes, faulty = None, None, None, list[Message]()
     if wanted.start is not None:
         phi, xi = wanted.start
         rare, reason = draft.part("excursion", lambda: solve_excursion(solver, phi=phi, xi=xi, root=root))
@@ -322,16 +325,14 @@ def _solve(draft: Draft, wanted: Wanted, numerics: Numerics, progress: Callable[
             return solve_sensitivities(solver, p, curve.problem.derivatives(), indices=names, root=root)
 
         slopes, reason = draft.part("sensitivities", differentiate)
-        is_refused = reason is not None and reason.code is Code.NOISE_REFUSED
-        refused = [reason] if reason and is_refused else []
-        missing += [] if is_refused else _missing(SENSITIVITIES, reason, found)
+        is_faulty = reason is not None and reason.code is Code.NOISE_REFUSED
+        faulty = [reason] if reason and is_faulty else []
+        missing += [] if is_faulty else _missing(SENSITIVITIES, reason, found)
     of = {each: [message for message in missing if message.severity is each] for each in Severity}
     pairs, stationary, undrawn = _functions(solver, without_failed(wanted, found.failures))
     directions, unsettled = _directions(solver, without_failed(wanted, found.failures))
     undrawn += unsettled
-    exponent = estimates[LYAPUNOV_EXPONENT.name]
     notes = (
-        heavy_tail_note(curve.problem, None if exponent is None else exponent.value),
         *found.notes,
         *curve.problem.remarks,
         _told_of(curve.problem, classes),
@@ -364,7 +365,7 @@ def _solve(draft: Draft, wanted: Wanted, numerics: Numerics, progress: Callable[
         for name, estimate in estimates.items()
         if estimate and estimate.relative_error > numerics.rtol
     ]
-    limits = (*of[Severity.WARNING], *imprecise, *undrawn, *unresolved, *refused)
+    limits = (*of[Severity.WARNING], *imprecise, *undrawn, *unresolved, *faulty)
     result = CurveResult(
         curve=curve,
         moments=columns,
@@ -383,6 +384,17 @@ def _solve(draft: Draft, wanted: Wanted, numerics: Numerics, progress: Callable[
     told = (*(failure.reason for failure in result.failures), *result.warnings, *result.notes)
     is_passing = any(each.tells_of(code) for each in told for code in (Code.NO_MEMORY, Code.FAULT))
     return Solved(result, pairs, stationary, is_passing, directions)
+
+
+def _refused(problem: Problem, p: FloatArray) -> dict[float, Message]:
+    """The p of a set of a sweep of which there is no Λ(p), as for other sets, and why."""
+    found = dict[float, Message]()
+    for each in p.tolist():
+        try:
+            refuse_infinite(problem, each)
+        except NoSuchExponent as failure:
+            found[each] = failure.message
+    return found
 
 
 def without_failed(wanted: Wanted, failures: Sequence[Failure]) -> Wanted:
@@ -475,8 +487,6 @@ def _solve_indices(
                 continue
             code, reason = Code.INDEX_ABSENT, found.reason
             if name == STABILITY_INDEX.name:
-                if reason.code is Code.NO_INDEX:  # of which a note tells
-                    continue
                 code, symbol = Code.INDEX_MISSING, "stability index"
         missing.setdefault((code, reason), []).append(symbol)
     return estimates, [Message(code, symbols=symbols, reason=reason) for (code, reason), symbols in missing.items()]
@@ -641,7 +651,7 @@ def _fault(failure: Exception) -> Message:
 def failed(curve: Curve, reason: str) -> CurveResult:
     nothing = np.zeros(0)
     failures = (Failure(None, message_of(reason)),)
-    return CurveResult(curve, MomentColumns(*[nothing] * 8), dict.fromkeys(INDICES), failures=failures)
+    return CurveResult(curve, MomentColumns(*[nothing] * 7), dict.fromkeys(INDICES), failures=failures)
 
 
 def lost(curve: Curve) -> CurveResult:

@@ -1,5 +1,3 @@
-from .far import Place as Place
-from .far import far_places as far_places
 from .frozen import FrozenNoise as FrozenNoise
 from .frozen import frozen_noise as frozen_noise
 from .moments import EvenMoment as EvenMoment

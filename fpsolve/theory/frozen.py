@@ -12,12 +12,10 @@ from fpsolve.arrays import FloatArray
 from fpsolve.model.plane import matrix_at, noise_strength, squared_frequency
 from fpsolve.model.problem import Problem, kept
 
-SAMPLES, FEWER_SAMPLES = 1001, 601
-"""Points on each side; fewer without algebraic tails, where all lie within a few decades."""
+SAMPLES, SIDE_SAMPLES = 1001, 601
+"""Points of steady values of a filter, and of values of a diffusion on each side."""
 LARGEST_P = 25.0
 """The places for larger p may lie beyond those that are looked at."""
-FURTHEST = 1e12
-"""Where algebraic tails are looked at last, in standard deviations."""
 CLOSE = 0.1
 """Standard deviations within which the centre of a tilted density is found."""
 ZOOM = 41
@@ -77,11 +75,11 @@ class FrozenNoise:
     an eigenvalue of A(ξ): for the paper's oscillator εξ/2 while it oscillates, |εξ| < 2ω, and what the impacts take,
     the rate of the faster real mode beyond. For p < −1 the paths that stay on the other real mode carry more:
     (p + 1)·slow − fast. Slow noise has its tilted density where F is largest, and more than one such place. Far out
-    there is none for r₀ ≤ 1: Gaussian noise is held at a cost ~ξ², bounded noise of Eq. (9) at one ~1/(distance to its
-    end)², and the gain is at most linear in ξ. Algebraic tails cost ~1/ξ² only, see `far`.
+    there is none: Gaussian noise is held at a cost ~ξ², bounded noise of Eq. (9) at one ~1/(distance to its end)², and
+    the gain is at most linear in ξ.
 
     Args:
-        problem: its noise must be a diffusion.
+        problem: its noise must be a diffusion without algebraic tails.
 
     Attributes:
         z: points on both sides, increasing, denser near 0, shape (n,).
@@ -93,11 +91,9 @@ class FrozenNoise:
             raise TypeError("there is no z to look for where ξ is no diffusion by itself")
         unit = noise.standard_deviation
         furthest = 5 * LARGEST_P * unit * noise_strength(problem.motion) * noise.correlation_time
-        self._is_heavy = noise.has_algebraic_tails
-        end = FURTHEST if self._is_heavy else min(max(furthest, 1.0), 0.999 * noise.half_width / unit)
+        end = min(max(furthest, 1.0), 0.999 * noise.half_width / unit)
         spread = max(np.log(end / 1e-2), 1.0)
-        count = SAMPLES if self._is_heavy else FEWER_SAMPLES
-        side = end * np.sinh(spread * np.linspace(0, 1, count)) / np.sinh(spread)
+        side = end * np.sinh(spread * np.linspace(0, 1, SIDE_SAMPLES)) / np.sinh(spread)
         self.z = np.concatenate([-side[:0:-1], side])
         self._problem, self._held = problem, _Held(problem, self.z)
         self._slope = np.gradient(noise.log_density(unit * self.z), self.z)
@@ -111,16 +107,11 @@ class FrozenNoise:
         """z and F of the local maxima."""
         rate = self.rate(p)
         at = np.flatnonzero((rate[1:-1] > rate[:-2]) & (rate[1:-1] >= rate[2:])) + 1
-        if self._is_heavy:
-            return self.z[at], rate[at]
         found = np.array([self._peak(p, int(k)) for k in at]).reshape(-1, 2)
         return found[:, 0], found[:, 1]
 
     def center(self, p: float) -> float:
-        """About the mean z of the tilted density; for algebraic tails that of the place nearest to 0."""
-        if self._is_heavy:
-            peaks, _ = self.peaks(p)
-            return float(peaks[np.argmin(np.abs(peaks))]) if peaks.size else 0.0
+        """About the mean z of the tilted density."""
         return self._peak(p, int(np.argmax(self.rate(p))))[0]
 
     def _peak(self, p: float, number: int) -> tuple[float, float]:
@@ -144,11 +135,6 @@ class FrozenNoise:
         rate = np.where((self.z >= lower) & (self.z <= upper), self.rate(p), -math.inf)
         return not self._held.turns[np.argmax(rate)]
 
-    def at_the_ends(self, p: float) -> float:
-        """The larger F of the outermost z."""
-        rate = self.rate(p)
-        return float(max(rate[0], rate[-1]))
-
     def tilt(self, z: float) -> float:
         """s for which P_s exp(2s z) is the largest at z: −½(ln P_s)′."""
         return -0.5 * float(np.interp(z, self.z, self._slope))
@@ -156,5 +142,7 @@ class FrozenNoise:
 
 @kept(8)
 def frozen_noise(problem: Problem) -> FrozenNoise | None:
-    """The `FrozenNoise` of a problem; None beyond the plane, where ξ is no diffusion by itself, for several noises."""
-    return FrozenNoise(problem) if problem.coloured.is_diffusion and problem.dimension == 2 else None
+    """The `FrozenNoise` of a problem; None beyond the plane, where ξ is no diffusion, or has algebraic tails."""
+    noise = problem.coloured
+    is_held = noise.is_diffusion and not noise.has_algebraic_tails
+    return FrozenNoise(problem) if is_held and problem.dimension == 2 else None

@@ -182,7 +182,7 @@ def test_what_is_out_of_reach_is_refused_and_the_rest_is_kept():
 @pytest.mark.parametrize(
     ("problem", "message"),
     [
-        (Problem(FIG1, NonGaussianNoise(D0=1.0, tau0=0.5, r0=1.1)), "has a kink"),
+        (Problem(FIG1, NonGaussianNoise(D0=1.0, tau0=0.5, r0=1.1)), "the law of growth is not computed: for r0 > 1"),
         (
             Problem(
                 PlaneSystem([CoefficientMatrix(0, ((-1, 1), (0, -2))), CoefficientMatrix(1, np.eye(2), identity)]), UNIT

@@ -24,7 +24,7 @@ from fpsolve.model.plane import CoefficientMatrix
 from fpsolve.model.systems.vibro_impact import DAMPING
 from tests.conftest import FIG1, FIG1_NOISE, sampled
 from tests.oracles import moment_hierarchy, phase_fraction
-from tests.random_sensitivities import RTOL, central, drawn, heavy_tailed, problem_of
+from tests.random_sensitivities import RTOL, central, drawn, problem_of
 
 
 @pytest.mark.parametrize("seed", sampled(*range(1, 12), keep=4))
@@ -74,9 +74,9 @@ HEAVY = Problem(
 def test_a_finer_mesh_beyond_the_budget_costs_what_needs_it_alone(monkeypatch):
     """At p = 0 that is four times as wide as what λ itself takes."""
     rtol, made = 1e-3, list[int]()
-    size = max(ExponentSolver(HEAVY, rtol=rtol).near.solution(p).pair.generator.size for p in (0.0, -0.5))
+    size = ExponentSolver(HEAVY, rtol=rtol).near.solution(0.0).pair.generator.size
     monkeypatch.setattr(Generator, "at", lambda self, p, own=Generator.at: made.append(self.size) or own(self, p))
-    found = sensitivities(HEAVY, -0.5, rtol=rtol, budget=Budget(unknowns=size))
+    found = sensitivities(HEAVY, [], rtol=rtol, budget=Budget(unknowns=size))
     assert max(made) <= 4 / 3 * size
     assert "lyapunov_exponent" not in found.indices
     assert any("p = 0 did not converge on a finer mesh: the next mesh has" in note for note in found.notes)
@@ -89,7 +89,7 @@ def test_what_memory_does_not_suffice_for_costs_itself_alone(monkeypatch):
         raise MemoryError
 
     monkeypatch.setattr(Gradient, "lyapunov_exponent", fail)
-    found = sensitivities(HEAVY, -0.5, rtol=1e-3)
+    found = sensitivities(Problem(HEAVY.system, NonGaussianNoise(D0=0.5, tau0=1.0, r0=0.8)), 2.0, rtol=1e-3)
     assert found.moments[0]
     assert "variance_rate" in found.indices
     assert any("no sensitivities of λ: not enough memory" in note for note in found.notes)
@@ -160,21 +160,18 @@ def test_against_the_moment_hierarchy():
 
 
 @pytest.mark.slow
-def test_errors_hold_what_is_beyond_the_ends_of_algebraic_tails():
-    theta, law, is_exact, p = heavy_tailed(14)
-    problem, _ = problem_of(theta, law, is_exact)
-    [found], [finer] = (sensitivities(problem, p, rtol=rtol).moments for rtol in (1e-8, 1e-9))
+def test_slopes_of_the_exponent_under_algebraic_tails():
+    """Within the errors of a solve with a smaller tolerance, and as a difference in r₀."""
+    theta = dict(zip(drawn(0)[0], (1.2, 0.8, 0.1, 0.7, 0.6, 0.8, 1.1), strict=True))
+    found, finer = (
+        sensitivities(problem_of(theta, "delta", True)[0], [], rtol=rtol).indices["lyapunov_exponent"]
+        for rtol in (1e-7, 1e-8)
+    )
     for key, estimate in found.items():
         off = abs(estimate.value - finer[key].value)
         assert off <= estimate.error_estimate + finer[key].error_estimate, key
-
-
-@pytest.mark.slow
-def test_heavy_tails_too():
-    theta = dict(zip(drawn(0)[0], (1.2, 0.8, 0.1, 0.7, 0.6, 0.8, 1.1), strict=True))
-    [found] = sensitivities(problem_of(theta, "delta", True)[0], -0.5).moments
-    expected = central(theta, "noise.r0", lambda at: ExponentSolver(problem_of(at, "delta", True)[0]).pair(-0.5).value)
-    assert found["noise.r0"].value == pytest.approx(expected, rel=1e-5)
+    expected = central(theta, "noise.r0", lambda at: lyapunov_exponent(problem_of(at, "delta", True)[0]).value)
+    assert found["noise.r0"].value == pytest.approx(expected, rel=1e-4)
 
 
 def test_gaussian_noise_is_met_from_below():

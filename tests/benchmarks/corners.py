@@ -29,7 +29,6 @@ SLOWNESS, SIZES, MOMENTS = (1.0, 10.0, 100.0), (0.3, 1.0, 2.0), (-3.0, 1.0, 4.0)
 """τ₀, standard deviations and p of the 54 problems."""
 LAYERED = (100.0, 2.0)
 """Their slowest and strongest noise."""
-TAILS = (1.05, 1.2, 1.4)
 """r₀ of algebraic tails."""
 
 
@@ -105,15 +104,6 @@ def all_slow() -> dict[str, float]:
     return {name: found[name] for name in longest} | {"median": float(np.median(np.abs([*found.values()])))}
 
 
-def heavy_tails() -> dict[str, float]:
-    """Algebraic tails in weak noise."""
-    oscillator = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=0.1)
-    found = {}
-    for r0, p in itertools.product(TAILS, (-0.9, -0.5, -0.1)):
-        found[f"r₀ = {r0:g}, p = {p:g}"] = one_moment(NonGaussianNoise(D0=1.0, tau0=0.5, r0=r0), p, oscillator)
-    return found
-
-
 def strong() -> dict[str, float]:
     """33 moments by fpsolve and by peers that are as accurate."""
     found = race(CASES["strong"])
@@ -126,7 +116,6 @@ ROWS: Sequence[Row] = (
     Row("layers: reduced noise, τ₀ = 100, standard deviation 2", "2", layers),
     Row("reduced noise, τ₀ = 100, D₀ = 1, r₀ = 0.95", "2", nearly_gaussian),
     Row("54 problems of slow noise, the longest", "1", all_slow),
-    Row("heavy tails", "a tenth", heavy_tails),
     Row("strong noise, 33 p, rtol 1e-6", "1.0 of the tuned code", strong),
 )
 

@@ -13,6 +13,8 @@ from fpsolve.case.remedies import CASE_WORDS
 from fpsolve.errors import NoSuchExponent, NotConverged
 from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.noises.non_gaussian import NonGaussianNoise
+from fpsolve.model.problem import Problem, refuse_infinite
+from tests.conftest import FIG1
 
 WORDS = {
     "MESH": "use more cells ([mesh] phi_cells, xi_cells), a wider noise interval (xi_min, xi_max) or no [mesh]",
@@ -47,7 +49,7 @@ def test_every_remedy_has_words_for_a_case(remedy: Remedy) -> None:
 
 def test_the_solver_speaks_of_the_noise_and_a_case_of_its_treatment() -> None:
     with pytest.raises(NoSuchExponent, match=r"r0 <= 1, or the Ornstein-Uhlenbeck reduction of the noise$") as raised:
-        NonGaussianNoise(D0=1.0, tau0=1.0, r0=1.2).check_existence(2.0)
+        refuse_infinite(Problem(FIG1, NonGaussianNoise(D0=1.0, tau0=1.0, r0=1.2)), 2.0)
     assert raised.value.message.words(CASE_WORDS).endswith('r0 <= 1, or treatment = "ou-reduction"')
     [note] = NonGaussianNoise(D0=1.0, tau0=1.0, r0=0.5).ou_reduction().remarks
     assert note.endswith("; the unreduced noise keeps Eq. (7)")

@@ -36,7 +36,7 @@ def _result(case, curve, *, has_failed):
     estimates = {**dict.fromkeys(INDICES), **known}
     failures = (Failure(None, "it was too hard"),) if has_failed else ()
     return CurveResult(
-        curve, MomentColumns(p, value, nothing, nothing, nothing, nothing, value, p[:0]), estimates, failures=failures
+        curve, MomentColumns(p, value, nothing, nothing, nothing, nothing, value), estimates, failures=failures
     )
 
 

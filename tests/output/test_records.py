@@ -124,7 +124,7 @@ def test_results_are_the_same_from_their_records(tmp_path, text):
         record = record_of(result)
         again = result_of(json.loads(json.dumps(record)), result.curve)
         assert same(record_of(again), record)
-        for name in ("p", "value", "derivative", "error_estimate", "residual", "perturbation", "rare"):
+        for name in ("p", "value", "derivative", "error_estimate", "residual", "perturbation"):
             np.testing.assert_array_equal(getattr(again.moments, name), getattr(result.moments, name))
         assert again.estimates == result.estimates
         assert (again.warnings, again.notes, again.failures) == (result.warnings, result.notes, result.failures)
@@ -229,7 +229,6 @@ WRONG = {
     "values in a table": column(1, [[1.0, 2.0, 3.0]]),
     "no value": column(1, [math.nan, 0.0, 0.0]),
     "infinite error": column(3, [math.inf, 0.0, 0.0]),
-    "rare of others": column(6, [7.0]),
     "a value in words": lambda record: record["moments"][1].__setitem__(0, "1.0") or record,
     "a value that is true": lambda record: record["moments"][1].__setitem__(0, True) or record,
     "no shape": compressed(shape=[-1]),

@@ -133,7 +133,7 @@ def result(curve, D0, **more):
     """A made-up result of a curve."""
     numbers = np.array([D0, 2 * D0])
     theory = 0 * numbers
-    moments = MomentColumns(np.array([-1.0, 2.0]), numbers, theory, 1e-9 * numbers, *[theory] * 3, np.zeros(0))
+    moments = MomentColumns(np.array([-1.0, 2.0]), numbers, theory, 1e-9 * numbers, *[theory] * 3)
     estimates = {name: Estimate(D0 * (-1) ** i, 1e-12, 1.0) for i, name in enumerate(INDICES)}
     return CurveResult(curve, moments, estimates, **more)
 

@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fpsolve.errors import NoSuchExponent
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.model.noises.non_gaussian import NonGaussianNoise
 from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
@@ -16,27 +15,8 @@ from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
 from fpsolve.simulation import batches, estimators
 from fpsolve.simulation.estimators import simulate
 from fpsolve.simulation.setup import largest_step, transient
-from tests.agreement import cheap_step
 from tests.conftest import FIG1, UNIT_NOISE, sampled
 from tests.simulation.problems import MODERATE, NOISE, REDUCED, STRONG, exact
-
-
-@pytest.mark.parametrize(
-    ("estimator", "paths", "most"),
-    sampled(("direct", 1024, 4.5e-4), ("population", 2048, 3e-4)),
-)
-def test_algebraic_tails(estimator, paths, most):
-    noise = NonGaussianNoise(D0=0.5, tau0=1.0, r0=1.1)
-    oscillator = VibroImpactOscillator(omega=1.0, restitution=1.0, c1=0.0, epsilon=0.5)
-    reference = exact(oscillator, noise, [-0.4])[0]
-    step = cheap_step(oscillator, noise)
-    found = simulate(Problem(oscillator, noise), [-0.9, -0.4], estimator=estimator, paths=paths, step=step, seed=6)
-    assert found.estimates[0].value is None
-    assert any("no estimate of Λ(p) at p = -0.9: ‖x‖^p has infinite variance" in text for text in found.warnings)
-    assert found.estimates[1].value == pytest.approx(reference, abs=4 * found.estimates[1].standard_error)
-    assert found.estimates[1].standard_error < most
-    with pytest.raises(NoSuchExponent, match="infinite"):
-        simulate(Problem(oscillator, noise), [1.0])
 
 
 @pytest.mark.slow

@@ -15,7 +15,7 @@ from tests.conftest import sampled
 from tests.oracles import perturbation
 
 CASES = Path(__file__).parents[2] / "cases"
-LONG = ("fig5", "fig6", "heavy_tails", "response", "response_impacts")
+LONG = ("fig5", "fig6", "response", "response_impacts")
 NAMES = sorted((path.stem for path in CASES.glob("*.toml")), key=lambda name: name in LONG)
 SAMPLE = sampled(*NAMES, keep=len(NAMES) - len(LONG))
 

@@ -143,7 +143,7 @@ def solved(case):
     ],
 )
 def test_why_there_is_none_is_told(tmp_path, change, code):
-    text = case_text(SECTIONS.replace("[1.0]", "[-0.5]"), **{"noise": NOISE, **NONLINEAR, **change})
+    text = case_text(SECTIONS.replace("[1.0]", "[0.0]"), **{"noise": NOISE, **NONLINEAR, **change})
     found = solved(case_in(tmp_path, text))
     assert found.response is None
     assert [each for each in found.notes if each.code is code]

@@ -224,9 +224,8 @@ class NonGaussianNoise(TreatedNoise):
         return 2 * (2 - self.r0) / self._bracket * self.tau0 if self._bracket > 0 else math.inf
 
     @property
-    def moments(self) -> tuple[float, float]:
-        """[−1, 0] for the algebraic tails of r₀ > 1, else all."""
-        return (-1.0, 0.0) if self.r0 > 1 else (-math.inf, math.inf)
+    def has_algebraic_tails(self) -> bool:
+        return self.r0 > 1
 
     def spectral_density(self, omega: float) -> float:
         """S(ω) of the reduced noise, Eq. (16); that of Eq. (7) itself has no closed form."""

@@ -160,10 +160,6 @@ class Noises(Noise):
     def largest_step(self) -> float:
         return min(noise.largest_step for _, noise in self.named)
 
-    def check_existence(self, p: float) -> None:
-        for _, noise in self.named:
-            noise.check_existence(p)
-
     def motion(self, system: System) -> tuple[System, Sequence[CoefficientMatrix]]:
         """The motion besides the white noises, and the diffusions by all white noises, each in its own `sense`."""
         drift, diffusions = list(_besides(system.terms, self.named)), list[CoefficientMatrix]()
