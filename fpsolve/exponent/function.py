@@ -362,12 +362,14 @@ def nonzero_root(
             return min(known, key=lambda each: each.value)
         return Absent(Message(Code.NO_ROOT, low=ends[0], high=ends[1], is_bounded=noise.is_bounded))
     steps, tolerance, tried, signed, beyond = [high - low] * 2, None, set[float](), set[float](), list[Message]()
+    outward = {*ends}  # where the sign is wanted
     if guess is None:
         if "λ" in solver.spent:  # where this begins
             raise NotConverged(solver.spent["λ"])
         ratio, slope, error = solver.ratio(0.0)
         guess = -ratio / slope if slope > 0 else math.copysign(1.0, -ratio)
         guess = min(max(guess, -OUTWARD), OUTWARD)
+        outward |= {-OUTWARD, OUTWARD}
         if abs(ratio) > 2 * error and low < 0 < high:
             low, high = (0.0, high) if ratio < 0 else (low, 0.0)
             tried, signed = {0.0}, {0.0}
@@ -375,7 +377,7 @@ def nonzero_root(
     for _ in range(MOST_STEPS):
         tried.add(p)
         try:
-            is_rough = p in ends and solver.mesh is None and not solver.classes and tolerance is None
+            is_rough = p in outward and solver.mesh is None and not solver.classes and tolerance is None
             ratio, slope, error = _rough_ratio(solver, p) if is_rough else _precise_ratio(solver, p, tolerance)
         except (NotConverged, OverBudget) as failure:
             if len(sides := signed & {low, high}) != 1 or not low < high:
@@ -409,6 +411,7 @@ def nonzero_root(
             return Absent(Message(Code.NO_ROOT, low=ends[0], high=ends[1], is_bounded=noise.is_bounded))
         farthest = max(OUTWARD, 2 * abs(p))
         new = min(max(new, -farthest), farthest)
+        outward |= {-farthest, farthest}
         if not low < new < high:
             if beyond and len(sides := signed & {low, high}) == 1:
                 return _none_within_reach(ends, low in signed, sides.pop(), beyond[0])
