@@ -257,15 +257,24 @@ class ExponentSolver:
             point = 0.0
         point = solved_p(point)
         if not self.classes:
-            found = self.near.solution(point, tolerance)
-            if (known := self.even(point)) and abs(found.pair.value - known.value) > self.doubt(found.error, known):
-                told = {"p": point, "value": found.pair.value, "other": point, "expected": known.value}
-                raise NotConverged(Message(Code.NOT_PRINCIPAL, **told), remedy=self.near.refinement)
+            try:
+                found = self.near.solution(point, tolerance)
+            except NotConverged as failure:
+                if failure.reason.code is Code.BUDGET_SPENT:  # which tells a value
+                    self._witness(point, failure.reason.data["value"], failure.reason.data["error"])
+                raise
+            self._witness(point, found.pair.value, found.error)
             return found
         if point < 0 and len(self.classes) > 1:
             return self._joint(point, tolerance)[0]
         of_each = [each.solution(point, tolerance) for each in self.classes]
         return max(of_each, key=lambda each: each.pair.value if point else each.pair.derivative)
+
+    def _witness(self, p: float, value: float, error: float) -> None:
+        """Refuse a value with this error that contradicts the even moment of the same p."""
+        if (known := self.even(p)) and abs(value - known.value) > self.doubt(error, known):
+            told = {"p": p, "value": value, "other": p, "expected": known.value}
+            raise NotConverged(Message(Code.NOT_PRINCIPAL, **told), remedy=self.near.refinement)
 
     def even(self, p: float) -> EvenMoment | None:
         """Λ(p) of an even p > 0 by the equations of the moments; None where these do not close, or are too many.

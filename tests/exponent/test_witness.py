@@ -9,7 +9,7 @@ from fpsolve import ExponentSolver, OrnsteinUhlenbeck, PlaneSystem, Problem
 from fpsolve.arrays import identity
 from fpsolve.errors import NotConverged
 from fpsolve.exponent.function import contradiction
-from fpsolve.messages import Code
+from fpsolve.messages import Code, Message
 from fpsolve.model import CoefficientMatrix, Filter, LinearSystem, Telegraph, White
 from tests.theory.test_moments import NODE, NODE_FILTER, NODE_NOISE, driven, second_moment
 
@@ -31,6 +31,18 @@ def test_a_lower_eigenvalue_is_seen(node, monkeypatch):
     monkeypatch.setattr("fpsolve.exponent.solver.even_moment", lambda *_: SimpleNamespace(value=0.79, error=1e-9))
     with pytest.raises(NotConverged, match="p = 2 is not the principal one: by the equations of the moments"):
         ExponentSolver(node.problem).solution(2.0)
+
+
+def test_a_lower_best_value_is_seen(node):
+    """What a budget leaves is a value, too: one that contradicts the even moment is not told as the best."""
+    known = node.even(4.0).value
+    for value, code in ((known - 0.3, Code.NOT_PRINCIPAL), (known + 1e-5, Code.BUDGET_SPENT)):
+        told = Message(Code.BUDGET_SPENT, p=4.0, reason="", value=value, error=1e-4, size=2.0)
+        solver = ExponentSolver(node.problem)
+        object.__setattr__(solver, "near", SimpleNamespace(solution=lambda *_, told=told: _fail(told), refinement=None))
+        with pytest.raises(NotConverged) as raised:
+            solver.solution(4.0)
+        assert raised.value.reason.code is code
 
 
 def test_where_the_witness_is_called():
@@ -56,12 +68,12 @@ def test_values_beyond_the_plane(rng):
     assert np.isfinite(found.derivative[0])
     system = LinearSystem([CoefficientMatrix(0, free), CoefficientMatrix(0, matrix, identity)])
     solver = ExponentSolver(Problem(system, White(s=0.5, interpretation="stratonovich")), rtol=1e-3)
-    object.__setattr__(solver, "place", SimpleNamespace(solution=_fail))
+    object.__setattr__(solver, "near", SimpleNamespace(solution=lambda *_: _fail(), refinement=None))
     found = solver.moments([1.0, 2.0])
     assert found.value.tolist() == [pytest.approx(expected, abs=1e-11)]
     assert np.isnan(found.derivative[0])
     assert [each.p for each in found.failures] == [1.0]
 
 
-def _fail(*_):
-    raise NotConverged("it fails")
+def _fail(reason="it fails"):
+    raise NotConverged(reason)

@@ -123,7 +123,7 @@ def test_algebraic_tails_are_refused_also_where_the_moments_are_finite(case, tmp
     tails = [f"--set=noise.r0={r0}", "--set=noise.treatment=exact", "--set=moments.p=[-0.5]"]
     assert main(["prove", case, *tails]) == BAD_INPUT
     err = capsys.readouterr().err
-    assert f"got noise.r0 = {r0}; for r0 > 1 the noise of Eq. (7) has algebraic tails" in err
+    assert "has algebraic tails" in err
     assert "choose r0 <= 1" in err
     assert not (tmp_path / "results").exists()
 
