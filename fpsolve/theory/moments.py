@@ -17,7 +17,7 @@ import math
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache, partial
 from itertools import combinations_with_replacement
 from typing import Any, NamedTuple, cast
@@ -47,6 +47,8 @@ MEANINGLESS = 1e-3
 """Of the same, from which on an error leaves nothing of a value."""
 NEARER, NEAREST, SETTLED, MOST_STEPS, MOST_POLISHES = 0.15, 1e-3, 1e-7, 60, 5
 """The share of σ − Λ that the next σ keeps, and the last one; what Λ may still change, over it; steps at most."""
+PASSED = 10.0
+"""By how many times the last σ − Λ the next Λ is lower where rounding has put σ on the left of it: it is another."""
 KRYLOV, ROUGH, MOST_RESTARTS = 16, 1e-2, 200
 """Vectors of one search by Arnoldi's method, its tolerance, and how often it begins again at most."""
 STEP = 1e-5
@@ -202,11 +204,11 @@ def even_moment(problem: Problem, p: float, tolerance: float | None = None, most
         if level is None:
             break
         allowed = TOLERANCE * level.scale if tolerance is None else tolerance
-        truncation = sum(map(abs, level.effects))
-        is_settled = not any(level.effects) or (
-            before and abs(before.value - level.value) <= before.error + level.error
-        )
-        if is_settled and level.is_positive and truncation + level.rounding <= max(allowed, 2 * level.rounding):
+        if any(level.effects):
+            change = abs(before.value - level.value) if before else math.inf
+            told = level.error + before.error - before.change if before else 0.0
+            level = replace(level, change=change if change > told else 0.0)
+        if level.is_positive and level.error <= max(allowed, 2 * level.rounding):
             return level
         before = level
         worst = max(map(abs, level.effects), default=0.0)
@@ -260,6 +262,7 @@ class EvenMoment:
         x, y: the right and the left vector, yᵀx = 1.
         moments: of √(p!/α!) x^α, |α| = p, the right vector in the mean over the noise.
         polynomial: the coefficients of T at the same, in the mean over the noise.
+        change: from fewer functions, where that is beyond the errors of both: then `effects` are no errors.
     """
 
     equations: _Equations
@@ -271,6 +274,7 @@ class EvenMoment:
     y: FloatArray
     moments: FloatArray
     polynomial: FloatArray
+    change: float = 0.0
 
     @property
     def value(self) -> float:
@@ -285,7 +289,7 @@ class EvenMoment:
     @property
     def error(self) -> float:
         """Estimate of |error of `value`|."""
-        return sum(map(abs, self.effects)) + self.rounding
+        return sum(map(abs, self.effects)) + self.rounding + self.change
 
     def slope(self, key: str) -> float:
         """∂Λ(p)/∂θ of a parameter such as "noise.alpha": ⟨y, ∂H/∂θ x⟩ by differences of H.
@@ -488,14 +492,17 @@ def _rightmost(h: Any, *starts: FloatArray) -> tuple[float, FloatArray, FloatArr
     diagonal, sizes = h.diagonal(), abs(h)
     bound = min(float(np.max(diagonal - np.abs(diagonal) + sizes.sum(axis=axis))) for axis in (0, 1))
     sigma = bound + 0.1 * max(1e-3 * float(sizes.max()), abs(bound), sys.float_info.min)
-    value = -math.inf
-    x = starts[0]
+    value, away, x = -math.inf, math.inf, starts[0]
     for _ in range(MOST_STEPS):
         last, (share, x) = value, _largest(_solver(h, sigma), x)
         value = sigma - 1 / share
+        if last - value > PASSED * away:
+            value, sigma = last, last + away
+            break
         if abs(value - last) <= SETTLED * (sigma - value):
             break
-        sigma = value + NEARER * (sigma - value)
+        away = sigma - value
+        sigma = value + NEARER * away
     x, y, sigma = *starts, value + NEAREST * (sigma - value)
     for _ in range(MOST_POLISHES):
         try:

@@ -24,7 +24,7 @@ from fpsolve.model import (
     White,
 )
 from fpsolve.theory.moments import even_moment, hierarchy_exponent
-from tests.oracles import filtered, moment_hierarchy, two_noises
+from tests.oracles import filtered, moment_hierarchy, planar, two_noises
 
 FREE, STIFFNESS = [[0.0, 1.0], [-1.0, -0.1]], [[0.0, 0.0], [-1.0, 0.0]]
 SADDLE = ((-1.0115024817178828, 0.027976596819670015), (3.2543543385618436, -2.1504180261123937))
@@ -85,6 +85,18 @@ def test_every_noise(noise, p, expected):
     value, error = hierarchy_exponent(driven(FREE, STIFFNESS, noise), p)
     assert value == pytest.approx(expected, abs=5e-13)
     assert error < 1e-11
+
+
+def test_many_functions_of_a_strong_slow_filter():
+    """Rounding, 1e-7 of Λ(4) by 44 or 54 of them, does not put the search on the wrong side of it: as by 32."""
+    noise = (0.62, 0.71, 0.28, 1.0, 2.3)
+    drift, loaded = np.array([[0.0, 1.0], [-1.0, -1.4]]), np.array([[0.04, 0.9], [0.95, 0.1]])
+    system = planar.Planar(drift, ((loaded, planar.filtered(*noise)),)).balanced()
+    expected = planar.rightmost(system.generator(4.0, 2, 32)[0], near=1.87)[0].real
+    problem = driven(drift, loaded, Filter(*noise))
+    assert even_moment(problem, 4, most=8000).value == pytest.approx(expected, abs=1e-6)
+    few = even_moment(problem, 4, most=2000)  # the last of these levels is off by more than the next functions tell
+    assert abs(few.value - expected) < few.error
 
 
 def test_noise_of_eq_7():
