@@ -137,6 +137,7 @@ def drawn(seed: int) -> tuple[str, Callable[[Units], Problem], Units]:
         steady, driven = np.array([[0.0, 1.0], [-1.0, -2 * damping]]), np.array([[0.0, 0.0], [-0.5 * size, 0.0]])
         if kind == "wall":
             jumps, basis = [Jump(math.pi / 2, math.log(rng.uniform(0.7, 0.95)))], np.tril(basis)
+            basis += np.diag(np.diag(basis) == 0)  # else it has no inverse
     elif kind == "node":
         steady = np.array([[0.0, 1.0], [-0.2, -1.5]])
     elif kind == "saddle":
