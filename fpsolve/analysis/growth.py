@@ -225,7 +225,7 @@ def growth_law(
     mesh: CylinderMesh | None = None,
     budget: Budget | None = None,
 ) -> GrowthLaw:
-    """The density of s_t = (1/t) ln ‖x(t)‖ and P(s_t ≥ s), from T and T* at the saddle points p(s), with their errors.
+    """The density of s_t = (1/t) ln ‖x(t)‖ and P(s_t ≥ s), from ln E‖x(t)‖^p at its saddle points, with their errors.
 
     Args:
         problem: a motion and its noise.
@@ -577,7 +577,7 @@ def log_moment(
 def finer_or_none(solver: ExponentSolver, pair: PrincipalPair) -> PrincipalPair | None:
     """The pair on a finer discretisation, where it is to be had."""
     with suppress(NotConverged):
-        return solver.near.finer_pair(pair, widened(pair.generator).enriched())
+        return solver.near.finer_pair(pair)
     return None
 
 

@@ -29,7 +29,7 @@ from fpsolve.budget import one_number
 from fpsolve.data import Result, dataset
 from fpsolve.drawing import add_legend, draw_bars
 from fpsolve.errors import NoSuchExponent, NotConverged
-from fpsolve.exponent.adapt import Budget, widened
+from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.eigen import Bordered
 from fpsolve.exponent.error import Estimate, MissingModes, Solution
 from fpsolve.exponent.function import nonzero_root
@@ -350,7 +350,7 @@ class Gradient:
             errors = changes_of_errors(solution, around, changed)
             sizes = {key: float(np.sum(np.abs(each))) for key, each in errors.items()}
             return _with_errors(values, sizes, solution.error / solver.scale(p))
-        finer = solver.near.finer_pair(solution.pair, widened(solution.pair.generator).enriched())
+        finer = solver.near.finer_pair(solution.pair)
         share = abs(finer.value - solution.pair.value) / solver.scale(p)
         return _compared(values, {key: each.value for key, each in _changed(Bordered(finer), along).items()}, share)
 

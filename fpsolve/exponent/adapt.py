@@ -191,12 +191,15 @@ class NearPlace:
         except NotConverged as failure:
             raise NotConverged(failure.reason, failure.partial, self.remedy) from failure
 
-    def finer_pair(self, pair: PrincipalPair, chosen: Discretisation) -> PrincipalPair:
+    def finer_pair(self, pair: PrincipalPair) -> PrincipalPair:
         """That at the same p on a finer discretisation, which tells the errors of what the other says.
+
+        It has two degrees more each way; for algebraic tails its interval is wider, too.
 
         Raises:
             NotConverged: it cannot be made, has a third more unknowns than the budget allows, or does not resolve it.
         """
+        chosen = widened(pair.generator).enriched()
         limit = A_THIRD_MORE * self.budget.unknowns if self.mesh is None else math.inf
         reason: Message | str
         if chosen.size > limit:

@@ -24,7 +24,6 @@ from fpsolve.exponent.adapt import (
     Tolerance,
     misplaced,
     solved_p,
-    widened,
 )
 from fpsolve.exponent.eigen import Bordered, PrincipalPair, second_derivative, slope_rounding
 from fpsolve.exponent.error import Estimate, Failure, Moment, Solution, checked, slope_error
@@ -457,7 +456,7 @@ class ExponentSolver:
         with one_thread():
             if solution.modes_tell:
                 return slope_error(solution.pair)
-            finer = self.near.finer_pair(solution.pair, widened(solution.pair.generator).enriched())
+            finer = self.near.finer_pair(solution.pair)
             return 2 * abs(finer.derivative - solution.pair.derivative) + slope_rounding(solution.pair)
 
     def lyapunov_exponent(self) -> Estimate:
@@ -504,8 +503,7 @@ class ExponentSolver:
     @cached_property
     def finer_around_zero(self) -> Bordered:
         """That of a finer discretisation, for algebraic tails of a wider one. Raises `NotConverged`."""
-        pair = self.around_zero.pair
-        return Bordered(self.near.finer_pair(pair, widened(pair.generator).enriched()))
+        return Bordered(self.near.finer_pair(self.around_zero.pair))
 
     @one_number("Λ({0:g})/{0:g}")
     def ratio(self, p: float, tolerance: Tolerance | None = None) -> tuple[float, float, float]:
