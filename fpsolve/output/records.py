@@ -24,7 +24,7 @@ from pathlib import Path
 from secrets import token_hex
 from time import monotonic, sleep
 from types import NoneType, UnionType
-from typing import Any, Literal, NamedTuple, get_args, get_origin, get_type_hints
+from typing import Any, Literal, NamedTuple, TypeVar, get_args, get_origin, get_type_hints
 
 import numpy as np
 
@@ -62,6 +62,7 @@ MOST_LISTED = 8
 _NAMES: dict[int, str] = {}
 """The file of this process."""
 Record = dict[str, Any]
+Made = TypeVar("Made")
 
 
 @dataclass(frozen=True)
@@ -132,6 +133,13 @@ class Records:
         if found is None:
             raise ValueError(f"{self.folder / address.file} has changed")
         return found[1]
+
+    def made(self, key: str, make: Callable[[Record], Made]) -> Made | None:
+        """What is made of the record of a key; None where there is none, or none of the form that `make` takes."""
+        try:
+            return None if (address := self.address(key)) is None else make(self.read(address))
+        except (OSError, ValueError):
+            return None
 
     def remove(self) -> None:
         """Start over."""

@@ -139,13 +139,8 @@ class Sweep(_Kept):
 
     def _known_of(self, curve: Curve) -> CurveResult | None:
         """What an interrupted run knew of a set; None where there is nothing that can be read."""
-        if (address := self.growing.address(growing_key(curve, self.numerics))) is None:
-            return None
-        try:
-            found = result_of(self.growing.read(address), curve)
-        except (OSError, ValueError):
-            return None
-        return found if fits(found, found.moments.p.tolist()) else None
+        found = self.growing.made(growing_key(curve, self.numerics), lambda record: result_of(record, curve))
+        return found if found and fits(found, found.moments.p.tolist()) else None
 
     def _grow(self, result: CurveResult) -> None:
         """Keep what is known of the only set, and show it in the tables."""
@@ -240,11 +235,7 @@ class Lines:
 
     def find(self, line: Boundary) -> Boundary | None:
         """A line as it was finished, if it was; otherwise None."""
-        try:
-            address = self.records.address(line_key(self.case, line))
-            found = None if address is None else line_of(self.records.read(address), line)
-        except (OSError, ValueError):
-            return None
+        found = self.records.made(line_key(self.case, line), lambda record: line_of(record, line))
         self._kept |= {line.zero} if found else set()
         return found
 
@@ -295,11 +286,7 @@ class Simulations(_Kept):
 
     def _found(self, curve: Curve) -> SimulatedCurve | None:
         """Its simulation, if that is known; a record of another form does not count."""
-        address = self.records.address(self._key(curve))
-        try:
-            found = None if address is None else simulated_of(self.records.read(address), curve)
-        except (OSError, ValueError):
-            return None
+        found = self.records.made(self._key(curve), lambda record: simulated_of(record, curve))
         return found if found and simulation_fits(found, self.asked["orders"]) else None
 
     def _key(self, curve: Curve) -> str:
