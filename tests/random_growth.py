@@ -97,7 +97,8 @@ def main(first: int = 0, last: int = 35, paths: int = 400_000) -> None:
     for seed in range(first, last + 1):
         _, found, error, share, deviation = compared(seed, paths)
         off = np.abs(found - share)
-        of_both, k = off / (1.5 * error + 3 * deviation), int(np.argmax(off / (1.5 * error + 3 * deviation)))
+        of_both = off / (1.5 * error + 3 * deviation)
+        k = int(np.argmax(of_both))
         beyond += bool(of_both[k] > 1)
         print(
             f"{seed:3d} {KINDS[seed % 3]:20s} {of_both[k]:5.2f}: P = {found[k]:.5f}, off {off[k]:.1e}, error "

@@ -24,8 +24,6 @@ from fpsolve.model.problem import ParameterDerivative, Problem
 
 KEPT_SPACES = 16
 LANCZOS_STEPS = 16
-SAMPLES = 721
-"""ξ at which it is looked whether an arc is closed."""
 LEFT_BY_STATES = 1.0
 """Share of the effect of two modes that is left at least where T is not analytic, as where the phase rests in a state,
 or at φ that white noise does not move: there it falls unevenly, and ever more slowly."""
