@@ -38,8 +38,7 @@ from fpsolve.fem.axis import KroneckerSum
 from fpsolve.fem.factors import one_thread
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import Code, Message, Remedy
-from fpsolve.model.noise import Noise
-from fpsolve.model.problem import ParameterDerivative, Problem, checked_moments, with_original
+from fpsolve.model.problem import ParameterDerivative, Problem, checked_moments
 from fpsolve.model.quantity import (
     LYAPUNOV_EXPONENT,
     MOMENT,
@@ -207,7 +206,6 @@ def sensitivities(
     problem: Problem,
     p: ArrayLike = (),
     *,
-    original: Noise | None = None,
     rtol: float | None = None,
     mesh: CylinderMesh | None = None,
     budget: Budget | None = None,
@@ -220,15 +218,13 @@ def sensitivities(
     Args:
         problem: a motion and its noise.
         p: one moment, or an array of shape (n,); none by default.
-        original: deprecated, as `ReducedNoise` has the parameters of the noise of Eq. (7).
         rtol, mesh, budget: as for `moment_lyapunov`.
         progress: called once for each p, and for each of λ, δ_p and Λ″(0).
 
     Raises:
-        ValueError: a p is not finite, or the noise is not the reduction of `original`.
+        ValueError: a p is not finite.
         NoSuchExponent: Λ(p) is infinite for one of the p.
     """
-    problem = with_original(problem, original)
     solver = solver_of(problem, mesh, rtol, budget)
     points = checked_moments(p, problem, may_be_empty=True)
     return solve_sensitivities(solver, points, problem.derivatives(), progress=progress)

@@ -7,7 +7,6 @@ starts from that at the point before; the rows of a scan begin anew, so that oth
 from __future__ import annotations
 
 import math
-import warnings
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -26,8 +25,7 @@ from fpsolve.data import Result, brief, dataset
 from fpsolve.drawing import add_legend, coloured, label_axes, scale_axis
 from fpsolve.exponent.adapt import Budget
 from fpsolve.messages import Code, Message
-from fpsolve.model.noise import Noise
-from fpsolve.model.problem import Problem, with_original
+from fpsolve.model.problem import Problem
 from fpsolve.model.quantity import POINTS
 from fpsolve.pool import Steps
 
@@ -48,7 +46,6 @@ ON_IT = 1e-4
 
 _ANEW: dict[str, Any] = {"traces": (), "seconds": 0.0, "obstacles": (), "complete": False}
 """A line of which nothing is traced."""
-Map = Callable[[Callable[[Row], ScannedRow], Iterable[Row]], Iterable[ScannedRow]]
 """The builtin `map`, or that of an executor: results in the order of the tasks."""
 
 
@@ -137,12 +134,6 @@ class Boundary(Result):
         limit = () if most is None else (None, most - self.seconds, Message(Code.LINE_SPENT, most=most))
         return ZeroField(self.zero, self.problem, (self.x, self.y), self.budget, *limit)
 
-    @property
-    def quantity(self) -> ZeroField:
-        """Deprecated: `zero_field`."""
-        warnings.warn("quantity is called zero_field now", DeprecationWarning, stacklevel=2)
-        return self.zero_field
-
     def remark(self) -> str:
         """That there is no line, or not all of it, as a `Message`, or an empty text."""
         if self.obstacles:
@@ -230,13 +221,6 @@ class Boundary(Result):
             yield now
         yield now._ended(zero_field)
 
-    def grown(
-        self, progress: Callable[[], None] = lambda: None, stepped: Callable[[], None] = lambda: None, map: Map = map
-    ) -> Iterator[Boundary]:
-        """Deprecated: `solve`."""
-        warnings.warn("grown is called solve now", DeprecationWarning, stacklevel=2)
-        return self.solve(iter(map(scan_row, self.rows())), progress, stepped)
-
     def _from(self, seeds: Iterable[FloatArray]) -> Boundary:
         """With the branches through some points of the lines."""
         zero_field, traces = self.zero_field, list[Trace]()
@@ -309,7 +293,6 @@ def boundary(
     x: Axis,
     y: Axis,
     *,
-    original: Noise | None = None,
     step: float = LONGEST,
     nodes: int = NODES,
     budget: Budget | None = None,
@@ -321,7 +304,6 @@ def boundary(
         problem: a motion and its noise, whose other parameters are held.
         zero: "lyapunov_exponent", {"moment": p} or {"stability_index": v}.
         x, y: the frame.
-        original: deprecated, as `ReducedNoise` has the parameters of the noise of Eq. (7).
         step: the longest step between two points, in sides of the frame.
         nodes: of the grid in which branches are looked for, each way.
         budget: for a solve, and for the line: beyond its `line_seconds` what is traced is returned, with `obstacles`.
@@ -331,7 +313,6 @@ def boundary(
         ValueError: an axis is no parameter of the problem or out of its range, both are the same, or `zero`, `step` or
             `nodes` is none of these.
     """
-    problem = with_original(problem, original)
     check_axes(problem, x, y)
     if not is_whole(nodes, 2):
         raise ValueError(f"got nodes = {shown(nodes)}; must be a whole number from 2")

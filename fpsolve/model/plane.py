@@ -10,7 +10,6 @@ dφ = h dt and d ln a = q dt with h = e′ᵀA e, q = eᵀA e, e′ = de/dφ: a 
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -373,18 +372,6 @@ class System(Parametrised):
     def driven_by(self) -> frozenset[str]:
         """The names that its terms give the noises that drive it."""
         return frozenset(term.noise for term in self.terms if is_driven(term.g))
-
-    @property
-    def drives(self) -> Sequence[CoefficientMatrix]:
-        """Deprecated: `terms`."""
-        warnings.warn("drives are called terms now", DeprecationWarning, stacklevel=2)
-        return self.terms
-
-    @property
-    def kicks(self) -> Sequence[Jump]:
-        """Deprecated: `jumps`."""
-        warnings.warn("kicks are called jumps now", DeprecationWarning, stacklevel=2)
-        return self.jumps
 
     def derivative(self, name: str) -> tuple[tuple[CoefficientMatrix, ...], tuple[float, ...]]:
         """∂/∂θ of the sum of the terms, as terms, and ∂ ln R/∂θ of every jump, nothing where none changes."""

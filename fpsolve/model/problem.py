@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections import Counter
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -611,29 +610,6 @@ def _valued(parameter: Parameter) -> str:
     """The value of a parameter with its unit."""
     text = written(parameter.value)
     return text if parameter.quantity.unit in ("1", "unknown") else f"{text} ({plain_unit(parameter.quantity.unit)})"
-
-
-def with_original(problem: Problem, original: Any) -> Problem:
-    """The problem with the parameters of the noise of Eq. (7) that its noise is the reduction of; deprecated.
-
-    Raises:
-        ValueError: it is not the reduction of that noise, nor that noise.
-    """
-    if original is None:
-        return problem
-    warnings.warn(
-        "`original` is not needed any more: NonGaussianNoise.ou_reduction() knows D0, tau0 and r0; leave it out",
-        DeprecationWarning,
-        stacklevel=4,
-    )
-    noise = problem.noise
-    if noise == original:
-        return problem
-    reduced = original.ou_reduction()
-    same = [getattr(noise, name, math.nan) for name in ("alpha", "sigma")] == [reduced.alpha, reduced.sigma]
-    if not same:
-        raise ValueError(f"got original = {original}, but {noise} is not its reduction")
-    return Problem(problem.system, reduced)
 
 
 def checked_problem(problem: object) -> Problem:

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 
 from fpsolve.analysis.regions import Regions, regions
-from fpsolve.analysis.scan import scan_row
-from fpsolve.analysis.stability import NODES, Boundary, Map, crossed, empty_scan
+from fpsolve.analysis.scan import Row, ScannedRow, scan_row
+from fpsolve.analysis.stability import NODES, Boundary, crossed, empty_scan
 from fpsolve.analysis.zero import Axis, Zero
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case
@@ -21,6 +21,7 @@ from fpsolve.model.problem import Problem
 from fpsolve.pool import Steps
 from fpsolve.theory.perturbation import second_order
 
+Map = Callable[[Callable[[Row], ScannedRow], Iterable[Row]], Iterable[ScannedRow]]
 CLOSED_FORM_NODES = 41
 """Of the grid, each way, on which the closed forms are evaluated."""
 

@@ -228,20 +228,6 @@ def test_a_motion_of_ones_own():
     assert found["system.epsilon"].value == pytest.approx(expected, rel=1e-6)
 
 
-def test_the_original_of_a_noise_may_still_be_named():
-    theta, law, _, p = drawn(0)
-    problem, noise = problem_of(theta, law, False)
-    with (
-        pytest.warns(DeprecationWarning, match="knows D0, tau0 and r0"),
-        pytest.raises(ValueError, match="not its red"),
-    ):
-        sensitivities(problem, original=NonGaussianNoise(D0=2 * noise.D0, tau0=noise.tau0, r0=noise.r0))
-    own = OrnsteinUhlenbeck(alpha=problem.noise.alpha, sigma=problem.noise.sigma)
-    with pytest.warns(DeprecationWarning, match="knows D0, tau0 and r0"):
-        [found] = sensitivities(Problem(problem.system, own), p, original=noise).moments
-    assert found == sensitivities(problem, p).moments[0]
-
-
 def test_progress_is_told_of_each_p_and_index():
     told, (theta, law, is_exact, _) = [], drawn(1)
     problem, _ = problem_of(theta, law, is_exact)

@@ -12,7 +12,7 @@ from threadpoolctl import ThreadpoolController, threadpool_limits
 
 from fpsolve import NonGaussianNoise, OrnsteinUhlenbeck, Problem, VibroImpactOscillator, budget
 from fpsolve.analysis.continuation import FRAME
-from fpsolve.analysis.scan import Sample, Scan, ScannedRow, scan_row
+from fpsolve.analysis.scan import Sample, Scan, scan_row
 from fpsolve.analysis.sensitivity import sensitivities
 from fpsolve.analysis.stability import Boundary, boundary, crossed
 from fpsolve.analysis.zero import Axis, ZeroField, zero_of
@@ -445,11 +445,6 @@ def test_a_problem_without_such_parameters_is_refused():
     chain = MarkovChain(states=(-1.0, 1.0), rates=((-1.0, 1.0), (1.0, -1.0)))
     with pytest.raises(ValueError, match=r"got noise\.D0 as an axis; the parameters are oscillator\.omega, .*epsilon$"):
         boundary(Problem(oscillator(), chain), LAMBDA, OMEGA, Axis("noise.D0", 0.1, 1.0))
-    with (
-        pytest.warns(DeprecationWarning, match="knows"),
-        pytest.raises(ValueError, match=r"got original = .* is not its reduction"),
-    ):
-        boundary(Problem(oscillator(), OrnsteinUhlenbeck(1.0, 1.0)), LAMBDA, OMEGA, C1, original=NOISE)
 
 
 @pytest.mark.slow
@@ -537,16 +532,6 @@ def test_rows_are_the_same_in_other_processes():
     assert np.array_equal(there.gradients, here.gradients)
     assert all(len(pickle.dumps(row)) < 4000 for row in of.rows())
     assert all(len(pickle.dumps(scan_row(row))) < 1000 for row in of.rows())
-
-
-def test_former_names_work_and_are_deprecated():
-    of = Boundary(zero_of(LAMBDA), OMEGA, C1, Problem(oscillator(), NOISE.ou_reduction()))
-    at = np.array([0.3, 0.4])
-    with pytest.warns(DeprecationWarning, match="quantity is called zero_field now"):
-        assert of.quantity(at).value == of.zero_field(at).value
-    with pytest.warns(DeprecationWarning, match="grown is called solve now"):
-        former = of.grown(map=lambda scan, rows: [ScannedRow(np.ones(13), np.ones((13, 2)))] * len(rows))
-    assert np.all(next(former).scan.values == 1)
 
 
 def test_a_row_does_not_depend_on_others():

@@ -108,19 +108,6 @@ def test_what_is_affine(g, line):
     assert is_driven(coefficient(g)) == (line is None or line[1] != 0)
 
 
-def test_former_names_warn():
-    from fpsolve import model
-
-    with pytest.warns(DeprecationWarning, match="Drive is called CoefficientMatrix now"):
-        assert model.Drive is CoefficientMatrix
-    with pytest.warns(DeprecationWarning, match="drives are called terms now"):
-        system = PlaneSystem(drives=[CoefficientMatrix(0, ROTATION)])
-    with pytest.warns(DeprecationWarning, match="kicks are called jumps now"):
-        assert system.kicks == ()
-    with pytest.warns(DeprecationWarning, match="drives are called terms now"):
-        assert system.drives == system.terms
-
-
 def test_no_function_is_refused():
     with pytest.raises(TypeError, match=r"got g = 3\.0; must be a function of xi"):
         CoefficientMatrix(0, ROTATION, 3.0)

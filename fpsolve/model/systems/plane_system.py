@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import wraps
 from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
@@ -74,24 +72,6 @@ class StatedJump(BaseModel):
     log_factor: Annotated[float, parameter("the logarithm of the factor of the state", "log_factor = -0.1")]
 
 
-def _renamed(kind: type[System]) -> type[System]:
-    """A class that also takes `drives` and `kicks`, which its `terms` and `jumps` were called; deprecated."""
-    changed: Any = kind
-    made = changed.__init__
-
-    @wraps(made)
-    def __init__(self: Any, *given: Any, **named: Any) -> None:
-        for old, new in (("drives", "terms"), ("kicks", "jumps")):
-            if old in named:
-                warnings.warn(f"{old} are called {new} now", DeprecationWarning, stacklevel=2)
-                named[new] = named.pop(old)
-        made(self, *given, **named)
-
-    changed.__init__ = __init__
-    return kind
-
-
-@_renamed
 @dataclass(frozen=True)
 class PlaneSystem(System):
     """A linear system in the plane from its parts, see `System`.
