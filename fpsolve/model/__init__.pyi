@@ -1,4 +1,3 @@
-from .checks import check_noise as check_noise
 from .kinds import noise_kind as noise_kind
 from .kinds import system_kind as system_kind
 from .noise import Noise as Noise

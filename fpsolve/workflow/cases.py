@@ -15,7 +15,6 @@ from fpsolve.case.sections import Varied
 from fpsolve.errors import NotConverged
 from fpsolve.files import writable
 from fpsolve.messages import Code, Message
-from fpsolve.model.checks import check_noise
 from fpsolve.model.kinds import is_ours
 from fpsolve.output.charts import draw_chart, write_chart
 from fpsolve.output.designs import write_design
@@ -32,6 +31,7 @@ from fpsolve.study.results import Comparison, CurveResult, SimulatedCurve
 from fpsolve.study.simulate import refuse_obstacles, simulation_work
 from fpsolve.study.solve import Numerics, Order, Wanted, batches, compare, expected, lost, result_alone, solve_batch
 from fpsolve.study.uncertain import Samples, sampled_case, samples_of
+from fpsolve.testing import check_noise
 from fpsolve.workflow.folders import (
     AGAIN,
     ANEW,

@@ -1,4 +1,4 @@
-"""Whether what a noise states agrees with itself: every member against what other members make of it.
+"""For authors of a noise: whether what it states agrees with itself, each member with what others make of it.
 
 Solvers believe a noise. A kind of one's own whose `derivative` or `spectral_density` is wrong gives wrong numbers with
 small errors, as these errors are those of solving. Here the law P_s is integrated, the generator made of P_s and σ² is
@@ -9,15 +9,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from functools import lru_cache
 from typing import Any, NamedTuple, cast
 
 import numpy as np
 
 from fpsolve.arrays import FloatArray
-from fpsolve.errors import NoDerivative
 from fpsolve.messages import Code, Message
 from fpsolve.model.noise import Noise
+
+__all__ = ["check_noise"]
 
 CLOSE, CLOSE_SPECTRUM, CLOSE_SLOPE = 1e-6, 1e-3, 1e-5
 """Shares by which integrals, spectral densities and derivatives may differ, beside the errors of what they are compared
@@ -59,31 +59,14 @@ class Spectrum(NamedTuple):
         return float(np.sum(self.weights * np.exp(-self.rates * t)).real)
 
 
-class MatrixSpectrum(NamedTuple):
-    """C(t) = variance · (e^{−Mt})₁₁; M may have one eigenvector only."""
-
-    variance: float
-    matrix: FloatArray
-
-    def density(self, omega: float) -> float:
-        """S(ω), as of a `Spectrum`."""
-        inverse = np.linalg.inv(self.matrix + 1j * omega * np.eye(len(self.matrix)))
-        return float(2 * self.variance * inverse[0, 0].real)
-
-    def correlation(self, t: float) -> float:
-        """C(t)."""
-        from scipy.linalg import expm  # takes a while to import
-
-        return float(self.variance * expm(-t * self.matrix)[0, 0])
-
-
 def check_noise(noise: Noise) -> tuple[Message, ...]:
     """What is wrong with the members of a noise, one sentence for each fault; nothing where they agree.
 
     P_s must integrate to 1 and have the stated mean, standard deviation, support and exponent at its ends; `diffusion`,
     `drift` and `spectral_density` must be those of P_s and σ²; `derivative` that of the noise with other parameters;
-    `sample`, `start` and `step` must draw what P_s says. What a kind does not state is not checked. Paths are tried
-    with 4000 of them, so that a `step` that is wrong by less than some percent passes.
+    `sample`, `start` and `step` must draw what P_s says. What a kind does not state is not checked, and generator and
+    derivatives are those of diffusions and chains alone. Paths are tried with 4000 of them, so that a `step` that is
+    wrong by less than some percent passes.
 
     >>> from fpsolve import OrnsteinUhlenbeck
     >>> check_noise(OrnsteinUhlenbeck(alpha=1.0, sigma=0.5))
@@ -99,32 +82,6 @@ def check_noise(noise: Noise) -> tuple[Message, ...]:
         return tuple(fault for part in noise.parts.values() for fault in check_noise(part))
     with np.errstate(all="ignore"):
         return tuple(_tried("the noise", lambda: _faults(noise)))
-
-
-def refuse_wrong_derivative(noise: Noise, name: str) -> None:
-    """Refuse a `derivative` by a parameter that differs from differences; a kind of fpsolve itself is not tried.
-
-    Raises:
-        NoDerivative: it is not that of the noise.
-    """
-    if type(noise).__module__.partition(".")[0] == "fpsolve":
-        return
-    try:
-        faults = _known_slopes(noise, name)
-    except TypeError:  # parameters that cannot be hashed
-        faults = _slopes(noise, name)
-    if faults:
-        raise NoDerivative(Message(Code.NOISE_REFUSED, kind=noise.kind, reason=faults[0]))
-
-
-@lru_cache(maxsize=1024)
-def _known_slopes(noise: Noise, name: str) -> tuple[Message, ...]:
-    return _slopes(noise, name)
-
-
-def _slopes(noise: Noise, name: str) -> tuple[Message, ...]:
-    with np.errstate(all="ignore"):
-        return tuple(_tried(f'derivative("{name}")', lambda: _derivative(noise, name)))
 
 
 def _tried(member: str, faults: Callable[[], Iterator[Message]]) -> Iterator[Message]:
@@ -231,25 +188,17 @@ def _inner(noise: Noise, count: int = 41) -> FloatArray:
     )
 
 
-def _spectrum(noise: Noise, law: Law | None) -> Spectrum | MatrixSpectrum | None:
-    """That of the generator, as P_s and σ², the rates or the matrix of a filter state it."""
+def _spectrum(noise: Noise, law: Law | None) -> Spectrum | None:
+    """That of the generator, as P_s and σ² or the rates of a chain state it; None of another process."""
+    if not noise.has_states:
+        return _diffusion_spectrum(noise, law) if noise.is_diffusion and law is not None else None
     some = cast("Any", noise)
-    match noise.basis:
-        case "states":
-            rates, states = np.array(some.rates), np.array(some.states)
-            weights, deviations = some.probabilities, states - some.probabilities @ states
-            values, vectors = np.linalg.eig(-rates)
-            parts = ((weights * deviations) @ vectors) * np.linalg.solve(vectors, deviations)
-            keep = np.abs(values) > 1e-12 * np.abs(values).max()
-            return Spectrum(parts[keep], values[keep])
-        case "waves":
-            angles = 2 * math.pi * np.arange(256) / 256
-            waves = np.fft.fft(some.of_angle(angles)) / 256
-            k = np.fft.fftfreq(256, 1 / 256)
-            return Spectrum(np.abs(waves[1:]) ** 2, 0.5 * some.sigma**2 * k[1:] ** 2 + 1j * some.nu * k[1:])
-        case "pairs":
-            return MatrixSpectrum(noise.standard_deviation**2, np.array(some.drift_matrix))
-    return _diffusion_spectrum(noise, law) if law is not None else None
+    rates, states = np.array(some.rates), np.array(some.states)
+    weights, deviations = some.probabilities, states - some.probabilities @ states
+    values, vectors = np.linalg.eig(-rates)
+    parts = ((weights * deviations) @ vectors) * np.linalg.solve(vectors, deviations)
+    keep = np.abs(values) > 1e-12 * np.abs(values).max()
+    return Spectrum(parts[keep], values[keep])
 
 
 def _diffusion_spectrum(noise: Noise, law: Law) -> Spectrum:
@@ -276,7 +225,7 @@ def _diffusion_spectrum(noise: Noise, law: Law) -> Spectrum:
     return Spectrum(parts, np.maximum(rates, 1e-300))
 
 
-def _of_spectrum(noise: Noise, law: Law | None, spectrum: Spectrum | MatrixSpectrum) -> Iterator[Message]:
+def _of_spectrum(noise: Noise, law: Law | None, spectrum: Spectrum) -> Iterator[Message]:
     some, std = cast("Any", noise), noise.standard_deviation
     error, unit = CLOSE_SPECTRUM, 1 / noise.correlation_time
     if noise.is_diffusion and law is not None:
@@ -333,8 +282,6 @@ def _derivative(noise: Noise, name: str) -> Iterator[Message]:
     except NotImplementedError:
         return  # it is optional
     theta = float(noise.values[name])
-    if noise.is_white:
-        return
     unit = 1 / abs(theta) if theta else 1.0
     part = f'derivative("{name}")'
 
@@ -349,16 +296,8 @@ def _derivative(noise: Noise, name: str) -> Iterator[Message]:
         yield from compared("states", stated.states or np.zeros(n), lambda n, _: n.states, "states")
         yield from compared("rates", stated.rates or np.zeros((n, n)), lambda n, _: n.rates, "rates")
         return
-    if noise.basis in ("pairs", "waves"):
-        told = "ln standard_deviation"
-        yield from compared("log_scale", stated.log_scale, lambda n, _: math.log(n.standard_deviation), told)
-        if noise.basis == "pairs":
-            yield from compared("drift", stated.drift or np.zeros((2, 2)), lambda n, _: n.drift_matrix, "drift_matrix")
-            return
-        yield from compared("turning", stated.turning, lambda n, _: n.nu, "nu")
-        rate = stated.log_diffusion - stated.log_scale
-        yield from compared("log_diffusion - log_scale", rate, lambda n, _: math.log(n.sigma), "ln sigma")
-        return
+    if not noise.is_diffusion:
+        return  # its derivative has other parts
     if math.isfinite(noise.half_width) and (stated.log_scale or noise.end_exponent <= 0):
         told = "ln half_width"
         found = list(compared("log_scale", stated.log_scale, lambda n, _: math.log(n.half_width), told))
@@ -436,7 +375,7 @@ def _of_sample(noise: Noise, law: Law | None) -> Iterator[Message]:
         yield from _differs("mean", noise.mean, source, float(values.mean()), error)
 
 
-def _of_step(noise: Noise, law: Law | None, spectrum: Spectrum | MatrixSpectrum | None) -> Iterator[Message]:
+def _of_step(noise: Noise, law: Law | None, spectrum: Spectrum | None) -> Iterator[Message]:
     """Paths that begin by the stationary law keep it, and forget their start as the generator says."""
     h, rng = noise.largest_step, np.random.default_rng(2)
     if not 0 < h < math.inf:
