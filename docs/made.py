@@ -41,7 +41,7 @@ ROOMS = {
     "fem": "meshes and the matrices of the generator",
     "case": "case files",
     "study": "cases become results",
-    "output": "results become files",
+    "output": "results become files and pictures",
     "workflow": "run, simulate, chart and check a case",
 }
 

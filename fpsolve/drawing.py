@@ -28,6 +28,8 @@ SIZE = (7.2, 5.0)
 """Inches of a figure of `plot`."""
 MARKED = 40
 """Points up to which each point of a line has a marker."""
+MOST_LINES = 10
+"""Lines that a legend names."""
 QUARTERS = np.pi * np.arange(5) / 2, ["0", r"$\pi/2$", r"$\pi$", r"$3\pi/2$", r"$2\pi$"]
 """Ticks of a phase, and what they say."""
 

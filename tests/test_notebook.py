@@ -12,6 +12,7 @@ START = """
 from fpsolve import NonGaussianNoise, Problem, VibroImpactOscillator, moment_lyapunov, sensitivities, stability_index
 from fpsolve import tilted_density
 from fpsolve.exponent import ExponentSolver
+from fpsolve.output import draw_eigenfunction
 oscillator = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=0.1)
 noise = NonGaussianNoise(D0=1.0, tau0=0.5, r0=0.95).ou_reduction()
 problem = Problem(oscillator, noise)
@@ -24,7 +25,7 @@ SHOWN = {
     "sensitivities(problem, 2.0)": "moment_by_theta",
 }
 """Cells, and what is in their HTML."""
-DRAWN = ("result.plot()", "result.pairs[2].plot()", "tilted_density(result.pairs[2]).plot()")
+DRAWN = ("result.plot()", "draw_eigenfunction(result.pairs[2])", "tilted_density(result.pairs[2]).plot()")
 
 
 @pytest.fixture(scope="module")

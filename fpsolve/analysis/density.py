@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from fpsolve.analysis.directions import DirectionDensity, settled_directions
 from fpsolve.arrays import FloatArray, one
 from fpsolve.data import Quantity, Result, dataset
-from fpsolve.drawing import QUARTERS, add_legend, coloured, draw_plane, label_axes
+from fpsolve.drawing import MOST_LINES, QUARTERS, add_legend, coloured, draw_plane, label_axes
 from fpsolve.errors import NotConverged
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.fields import MOST_NEGATIVE, fields
@@ -20,7 +20,6 @@ from fpsolve.fem.mesh import vertices_at
 from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.plane import growth_rate, phase_speed
 from fpsolve.model.quantity import NOISE, PHASE, density_unit
-from fpsolve.surfaces import MOST_LINES
 
 if TYPE_CHECKING:
     import xarray

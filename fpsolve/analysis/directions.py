@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 
 from fpsolve.arrays import FloatArray
 from fpsolve.data import Quantity, Result, dataset
+from fpsolve.drawing import QUARTERS, draw_colours, label_axes
 from fpsolve.errors import MeshError, NotConverged, SingularMatrix
 from fpsolve.exponent.directions import DirectionFields, DirectionGrid, Directions
 from fpsolve.exponent.eigen import PrincipalPair, principal_pair
@@ -28,6 +29,9 @@ SETTLED = 0.02
 """Total variation between two densities in turn from which on the finer one is taken."""
 MOST_DIRECTIONS, MOST_UNKNOWNS = 1700, 15000
 """Functions of directions, and all functions, that are made for a density alone: seconds of work."""
+SHARES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
+"""Of the second pair in ‖z‖², at which the axis of η has ticks."""
+LATITUDES = np.pi * np.arange(-2, 3) / 4, [r"$-\pi/2$", r"$-\pi/4$", "0", r"$\pi/4$", r"$\pi/2$"]
 DENSITY = Quantity("density", "ρ", "density")
 
 
@@ -116,7 +120,8 @@ class DirectionDensity(Result):
         return replace(DENSITY, words=self.name, unit=self.grid.unit, dims=dims)
 
     def _draw(self, found: xarray.Dataset, axes: Axes, **kwargs: Any) -> None:
-        self.grid.draw(axes, self.values, replace(self._density, words="density").attributes, **{"vmin": 0.0, **kwargs})
+        about = replace(self._density, words="density").attributes
+        draw_over(self.grid, axes, self.values, about, **{"vmin": 0.0, **kwargs})
 
     def _said(self) -> str:
         share = f", mean share of {self.grid.names[1]} {self.grid.share(self.values):.2%}"
@@ -159,3 +164,18 @@ def coordinates_of(grid: DirectionGrid) -> dict[Quantity, FloatArray]:
         words = "weight of the rule for integrals"
         found |= {axis: nodes, Quantity(f"{axis.name}_weights", "w", words, unit=unit, dims=axis.dims): own}
     return found
+
+
+def draw_over(grid: DirectionGrid, axes: Any, values: FloatArray, about: Any, **kwargs: Any) -> None:
+    """Values at the nodes in colours, with ticks at shares of the second pair, or of a turn."""
+    first, second = grid.quantities
+    draw_colours(axes, grid.first, grid.second, values.T, about, **{"shading": "gouraud", **kwargs})
+    if grid.dimension == 4:
+        axes.set_xticks(np.arcsin(np.sqrt(SHARES)), [f"{100 * share:g}" for share in SHARES])
+        axes.set_yticks(*QUARTERS)
+        words = f"share of {grid.names[1]} in the {grid.what}, $\\sin^2\\eta$ (%)"
+        label_axes(axes, {"long_name": words, "units": "1"}, second.attributes)
+    else:
+        axes.set_xticks(*QUARTERS)
+        axes.set_yticks(*LATITUDES)
+        label_axes(axes, first.attributes, second.attributes)

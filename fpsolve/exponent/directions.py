@@ -18,19 +18,15 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property, reduce
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from fpsolve.arrays import FloatArray, one
-from fpsolve.drawing import QUARTERS, draw_colours, label_axes
+from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.fem.axis import along
 from fpsolve.model.plane import is_driven
 from fpsolve.model.problem import Problem
 from fpsolve.model.quantity import Quantity
-
-if TYPE_CHECKING:
-    from fpsolve.exponent.eigen import PrincipalPair
 
 FEWEST_NODES, MOST_NODES = 48, 192
 """Of the first coordinate, twice as many of the second, unless that resolves the tilted density no better."""
@@ -40,9 +36,6 @@ RESOLVED = 1e-3
 """By how much the integral of the tilted density over the nodes may miss 1."""
 CHUNK = 2**23
 """Numbers of a table of functions at points, at most."""
-SHARES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
-"""Of the second pair in ‖z‖², at which the axis of η has ticks."""
-LATITUDES = np.pi * np.arange(-2, 3) / 4, [r"$-\pi/2$", r"$-\pi/4$", "0", r"$\pi/4$", r"$\pi/2$"]
 
 
 def oscillators(problem: Problem) -> dict[int, float]:
@@ -152,20 +145,6 @@ class DirectionGrid:
         if self.dimension == 3:
             return values[..., 0]
         return (np.cos(self.first) * np.sin(self.first))[:, None] * 2 * math.pi * np.mean(values, axis=-1)
-
-    def draw(self, axes: Any, values: FloatArray, about: Any, **kwargs: Any) -> None:
-        """Values at the nodes in colours, with ticks at shares of the second pair, or of a turn."""
-        first, second = self.quantities
-        draw_colours(axes, self.first, self.second, values.T, about, **{"shading": "gouraud", **kwargs})
-        if self.dimension == 4:
-            axes.set_xticks(np.arcsin(np.sqrt(SHARES)), [f"{100 * share:g}" for share in SHARES])
-            axes.set_yticks(*QUARTERS)
-            words = f"share of {self.names[1]} in the {self.what}, $\\sin^2\\eta$ (%)"
-            label_axes(axes, {"long_name": words, "units": "1"}, second.attributes)
-        else:
-            axes.set_xticks(*QUARTERS)
-            axes.set_yticks(*LATITUDES)
-            label_axes(axes, first.attributes, second.attributes)
 
     @property
     def what(self) -> str:

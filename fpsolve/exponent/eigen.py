@@ -25,7 +25,6 @@ from fpsolve.arrays import FloatArray, finite, one
 from fpsolve.budget import charge
 from fpsolve.data import brief
 from fpsolve.errors import NotConverged, NumericalFailure, SingularMatrix
-from fpsolve.exponent.fields import EigenfunctionPlot
 from fpsolve.fem.axis import KroneckerSum, TensorSpace
 from fpsolve.fem.dense import Factors
 from fpsolve.fem.factors import one_thread
@@ -65,7 +64,7 @@ SURVEYED_UNKNOWNS = 600
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class PrincipalPair(EigenfunctionPlot):
+class PrincipalPair:
     """Λ(p) with its eigenfunctions on a mesh.
 
     Attributes:

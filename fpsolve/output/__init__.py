@@ -1,4 +1,4 @@
-"""Results become files and text."""
+"""Results become files, text and pictures."""
 
 import lazy_loader
 

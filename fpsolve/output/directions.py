@@ -10,16 +10,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fpsolve.analysis.directions import SettledDirections, coordinates_of, mean_share
+from fpsolve.analysis.directions import SettledDirections, coordinates_of, draw_over, mean_share
 from fpsolve.case.case import Case, Curve
 from fpsolve.data import Quantity, dataset
 from fpsolve.drawing import Format, figure_for
 from fpsolve.exponent.directions import DirectionGrid
-from fpsolve.exponent.fields import FIELDS
 from fpsolve.files import atomic
 from fpsolve.model.quantity import MOMENT, P
 from fpsolve.output.charts import held_in_words
 from fpsolve.output.figures import headed
+from fpsolve.output.nodes import FIELDS
 from fpsolve.study.results import CurveResult
 
 if TYPE_CHECKING:
@@ -116,7 +116,7 @@ def _draw(case: Case, curve: Curve, found: xarray.Dataset, paths: list[Path], ti
         for place, (axis, (words, values)) in enumerate(zip(axes, panels, strict=False)):
             is_right = place % columns == columns - 1 or place == len(panels) - 1
             about = {"long_name": "density", "units": grid.unit} if is_right else {"long_name": "", "units": "1"}
-            grid.draw(axis, values.values, about, vmin=0.0)
+            draw_over(grid, axis, values.values, about, vmin=0.0)
             if place % columns:
                 axis.set_ylabel("")
             if place + columns < len(panels):

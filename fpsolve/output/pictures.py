@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from fpsolve.model.quantity import NOISE, PHASE, UNNAMED
-from fpsolve.surfaces import Surface, flat_picture, picture_in_space
+from fpsolve.output.surfaces import Surface, flat_picture, picture_in_space
 
 FURTHEST = 4.0
 """Standard deviations of the noise up to which T is shown; beyond, where next to no path is, it only grows."""

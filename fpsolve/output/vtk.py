@@ -23,11 +23,12 @@ from fpsolve.case.case import Case, Curve
 from fpsolve.data import plain_unit
 from fpsolve.exponent.directions import DirectionGrid
 from fpsolve.exponent.eigen import PrincipalPair
-from fpsolve.exponent.fields import FIELDS, Nodes, xi_marginal
+from fpsolve.exponent.fields import xi_marginal
 from fpsolve.files import write_text
 from fpsolve.model.problem import Problem, parameter_lines, parameter_words
 from fpsolve.model.quantity import Quantity
 from fpsolve.output.directions import on_one_grid, write_densities
+from fpsolve.output.nodes import FIELDS, Nodes
 from fpsolve.signals import signals_held
 from fpsolve.study.results import CurveResult, SimulatedCurve, Solved
 

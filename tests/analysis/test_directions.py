@@ -14,6 +14,7 @@ from fpsolve.arrays import identity
 from fpsolve.exponent import principal_pair
 from fpsolve.exponent.directions import DirectionGrid, Directions, oscillators, pair_names
 from fpsolve.model import CoefficientMatrix, LinearSystem, ModalSystem, White
+from fpsolve.output.eigenfunctions import draw_eigenfunction
 from tests.exponent.test_modes import COUPLED, FREE, problem
 
 OMEGA = 1.6
@@ -221,11 +222,11 @@ def test_what_densities_say():
     axes = density.plot()
     assert axes.get_xlabel().startswith("share of (x₃, x₄) in the sum of squares")
     assert axes.get_ylabel().startswith("phase of (x₁, x₂) less that")
-    assert pair.plot("T_adjoint").png.startswith(b"\x89PNG")
+    assert draw_eigenfunction(pair, "T_adjoint").png.startswith(b"\x89PNG")
     with pytest.raises(ValueError, match="cylinder"):
-        pair.plot(cylinder=True)
+        draw_eigenfunction(pair, cylinder=True)
     with pytest.raises(ValueError, match="field"):
-        pair.plot("U")
+        draw_eigenfunction(pair, "U")
     with pytest.raises(ValueError, match="p = 0, but the pair has p = 1"):
         stationary_density(pair)
     with pytest.raises(ValueError, match="two variables"):

@@ -15,7 +15,6 @@ from fpsolve.data import plain_unit
 from fpsolve.drawing import is_math, plain_numbers, typeset
 from fpsolve.errors import OutputError
 from fpsolve.exponent import ExponentSolver, critical_impact_factor, critical_restitution, impact_rate
-from fpsolve.exponent.fields import surface_of
 from fpsolve.messages import Code
 from fpsolve.model import (
     Bounded,
@@ -27,13 +26,14 @@ from fpsolve.model import (
     noise_kind,
 )
 from fpsolve.model.kinds import NOISES
+from fpsolve.output.eigenfunctions import draw_eigenfunction, surface_of
 from fpsolve.output.figures import draw
+from fpsolve.output.surfaces import flat_figure
 from fpsolve.output.tables import write_results
 from fpsolve.output.terminal import note_missing, print_results, shows_perturbed_moments, varied_columns
 from fpsolve.output.vtk import write_eigenfunctions, write_functions
 from fpsolve.simulation import MonteCarlo
 from fpsolve.simulation.estimators import MomentEstimate
-from fpsolve.surfaces import flat_figure
 from fpsolve.workflow import run
 from tests.output.eigenfunctions import integral
 from tests.solving import ALL, case_in, solve_case, solve_sets
@@ -306,9 +306,9 @@ def test_eigenfunctions_of_several_noises_with_values_are_refused_in_words(tmp_p
         capsys.readouterr().err.split()
     )
     pair = ExponentSolver(case.problem).pair(2.0)
-    for draw_it in (pair.plot, lambda: tilted_density(pair)):
+    for draw_it in (draw_eigenfunction, tilted_density):
         with pytest.raises(OutputError, match="make all of these noises white but one"):
-            draw_it()
+            draw_it(pair)
     assert max(Counter(signs(case.problem)).values()) == 1
     assert case.about("noise.b.k").shown == r"${k}_{\mathrm{b}}$"
 
@@ -331,7 +331,7 @@ def test_files_say_where_the_impacts_are(tmp_path):
 @pytest.mark.parametrize("noise", [Telegraph(a=0.5, k=1.0), White(s=0.5)], ids=lambda noise: noise.kind)
 def test_python_draws_lines_for_states(noise):
     solver = ExponentSolver(Problem(ParametricOscillator(stiffness=1.0, damping=0.1, restitution=0.8), noise))
-    assert solver.pair(2.0).plot().png.startswith(b"\x89PNG")
+    assert draw_eigenfunction(solver.pair(2.0)).png.startswith(b"\x89PNG")
     figure = flat_figure(surface_of(solver.pair(2.0), "T"), "viridis")
     lines = [line for line in figure.axes[0].lines if line.get_label().startswith(r"$\xi$")]
     assert len(lines) == len(noise.states)

@@ -153,7 +153,7 @@ def test_where_the_noise_has_states_each_is_a_line(tmp_path):
 @pytest.mark.slow
 @pytest.mark.usefixtures("pictures")
 def test_eigenfunctions_are_pictures_where_this_machine_renders(tmp_path):
-    from fpsolve.surfaces import can_render
+    from fpsolve.output.surfaces import can_render
 
     assert run(tmp_path, ONE, "--report") == 0
     page = (tmp_path / "test/report.html").read_text(encoding="utf-8")

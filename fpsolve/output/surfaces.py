@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fpsolve.arrays import FloatArray
-from fpsolve.drawing import COLOURS, QUARTERS, SIZE, STYLE, add_legend, draw_colours, label_axes
+from fpsolve.drawing import COLOURS, MOST_LINES, QUARTERS, SIZE, STYLE, add_legend, draw_colours, label_axes
 from fpsolve.signals import signals_held
 
 if TYPE_CHECKING:
@@ -42,8 +42,6 @@ LINES = (
 RIM = ("0", "pi/2", "pi", "3 pi/2", "2 pi")
 """Words at the quarters of the rim, in ASCII."""
 RED = "#C8102E"
-MOST_LINES = 10
-"""Lines that a legend names."""
 NEXT_TO_ZERO = 0.05
 """A least value below this share of the maximum is drawn as 0, which rounding and small errors miss."""
 Label = tuple[str, FloatArray, str]

@@ -8,13 +8,15 @@ import matplotlib.image
 import numpy as np
 import pytest
 
-from fpsolve import surfaces
-from fpsolve.exponent.fields import FIELDS, fields, surface_of
+from fpsolve.exponent.fields import fields
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.model.noises.non_gaussian import NonGaussianNoise
 from fpsolve.model.problem import Problem
 from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
-from fpsolve.surfaces import can_render, flat_figure
+from fpsolve.output import surfaces
+from fpsolve.output.eigenfunctions import draw_eigenfunction, surface_of
+from fpsolve.output.nodes import FIELDS
+from fpsolve.output.surfaces import can_render, flat_figure
 from tests.conftest import FIG1, UNIT_NOISE
 
 pytestmark = pytest.mark.usefixtures("pictures")
@@ -66,17 +68,17 @@ def test_it_finds_out_once(probe, tmp_path):
 def test_who_draws(pair, monkeypatch, answer):
     """Where nothing can be rendered the plane is drawn, and of a cylinder a warning tells how to get it."""
     drawn = []
-    monkeypatch.setattr("fpsolve.exponent.fields.can_render", lambda: answer)
+    monkeypatch.setattr("fpsolve.output.eigenfunctions.can_render", lambda: answer)
     monkeypatch.setattr(
-        "fpsolve.exponent.fields.picture_in_space", lambda *_, cylinder: drawn.append(f"space {cylinder}")
+        "fpsolve.output.eigenfunctions.picture_in_space", lambda *_, cylinder: drawn.append(f"space {cylinder}")
     )
-    monkeypatch.setattr("fpsolve.exponent.fields.flat_picture", lambda *_: drawn.append("plane"))
-    pair.plot()
+    monkeypatch.setattr("fpsolve.output.eigenfunctions.flat_picture", lambda *_: drawn.append("plane"))
+    draw_eigenfunction(pair)
     if answer:
-        pair.plot(cylinder=True)
+        draw_eigenfunction(pair, cylinder=True)
     else:
         with pytest.warns(UserWarning, match="apt-get install libegl1"):
-            pair.plot(cylinder=True)
+            draw_eigenfunction(pair, cylinder=True)
     assert drawn == (["space False", "space True"] if answer else ["plane", "plane"])
 
 
@@ -129,8 +131,8 @@ def assert_not_blank(picture, shape):
 
 
 def test_picture_of_the_plane(pair, monkeypatch, tmp_path):
-    monkeypatch.setattr("fpsolve.exponent.fields.can_render", lambda: False)
-    picture = pair.plot("tilted_density", cmap="magma")
+    monkeypatch.setattr("fpsolve.output.eigenfunctions.can_render", lambda: False)
+    picture = draw_eigenfunction(pair, "tilted_density", cmap="magma")
     assert_not_blank(picture, (750, 1080, 3))
     assert picture.save(tmp_path / "picture.png").read_bytes() == picture.png == picture._repr_png_()
 
@@ -140,7 +142,7 @@ def test_picture_of_the_plane(pair, monkeypatch, tmp_path):
 def test_picture_in_space(pair, cylinder):
     if not can_render():
         pytest.skip("nothing can be rendered here: apt-get install libegl1 libgl1-mesa-dri")
-    assert_not_blank(pair.plot("tilted_density", cylinder=cylinder), (800, 1200, 3))
+    assert_not_blank(draw_eigenfunction(pair, "tilted_density", cylinder=cylinder), (800, 1200, 3))
 
 
 def test_a_constant_has_a_picture():
@@ -152,7 +154,7 @@ def test_a_constant_has_a_picture():
 
 def test_what_cannot_be_drawn_is_refused(pair):
     with pytest.raises(ValueError, match="got field = 'density'; must be one of 'T', 'T_adjoint', 'tilted_density'"):
-        pair.plot("density")
+        draw_eigenfunction(pair, "density")
 
 
 def test_solving_loads_nothing_that_draws():

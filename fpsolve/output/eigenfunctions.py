@@ -1,0 +1,112 @@
+"""Pictures of an eigenpair: T, T* or their product over phase and noise, or over directions."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from io import BytesIO
+from typing import Literal
+
+from fpsolve.analysis.directions import draw_over
+from fpsolve.arrays import shown
+from fpsolve.drawing import SIZE, STYLE
+from fpsolve.exponent.directions import Directions
+from fpsolve.exponent.eigen import PrincipalPair
+from fpsolve.model.problem import parameter_lines
+from fpsolve.model.quantity import PHASE, density_unit
+from fpsolve.output.nodes import FIELDS, Nodes
+from fpsolve.output.surfaces import Picture, Surface, can_render, flat_picture, picture_in_space
+
+FINER = 2
+"""So many times as many nodes either way as a file for ParaView has; there they carry polynomials."""
+Field = Literal["T", "T_adjoint", "tilted_density"]
+
+
+def draw_eigenfunction(
+    pair: PrincipalPair, field: Field = "T", *, cylinder: bool = False, cmap: str = "viridis"
+) -> Picture:
+    """Draw an eigenfunction, or the tilted density, over phase and noise; for noise with states a line for each.
+
+    Of more than two variables over directions, see `analysis.DirectionDensity`, as the functions of the pair have it: T
+    as its mean, T* and T T* as densities.
+
+    In space by pyvista where this machine can render, which takes some seconds to find out the first time; else in
+    the plane by matplotlib.
+
+    Args:
+        pair: the eigenpair.
+        field: "T", "T_adjoint", or their product "tilted_density".
+        cylinder: whether φ goes around a cylinder; only where this machine can render.
+        cmap: the colours, by matplotlib's names.
+
+    Raises:
+        ValueError: there is no such field, or a cylinder is wanted of more than two variables.
+        OutputError: T depends on more than φ and ξ.
+    """
+    if pair.generator.problem.dimension > 2:
+        if cylinder:
+            raise ValueError("got cylinder = True, which is for functions of phase and noise; leave it out")
+        return _picture_of_directions(pair, _known(field), cmap)
+    surface = surface_of(pair, field)
+    if surface.is_lines:
+        return flat_picture(surface, cmap)
+    if can_render():
+        return picture_in_space(surface, cmap, cylinder=cylinder)
+    if cylinder:
+        warnings.warn(
+            "this machine cannot render, so that the plane is drawn; to draw a cylinder install OpenGL, as "
+            "by apt-get install libegl1 libgl1-mesa-dri",
+            stacklevel=2,
+        )
+    return flat_picture(surface, cmap)
+
+
+def _known(field: str) -> str:
+    """The name of a field. Raises `ValueError`."""
+    if field not in FIELDS:
+        raise ValueError(f"got field = {shown(field)}; must be one of {', '.join(map(repr, FIELDS))}")
+    return field
+
+
+def _title_of(pair: PrincipalPair) -> str:
+    """p and Λ(p) in words."""
+    return f"p = {pair.p:g}, Λ(p) = {round(pair.value, 14) + 0.0:.6g} (1/time)"
+
+
+def _picture_of_directions(pair: PrincipalPair, field: str, cmap: str) -> Picture:
+    """A function of directions in colours."""
+    from matplotlib import rc_context
+    from matplotlib.figure import Figure
+
+    found, (name, quantity), content = Directions(pair).fields, FIELDS[field], BytesIO()
+    unit = quantity.unit if name == "right" else found.grid.unit
+    with rc_context(STYLE):
+        figure = Figure(figsize=SIZE, layout="constrained")
+        axes = figure.add_subplot()
+        draw_over(found.grid, axes, getattr(found, name), {**quantity.attributes, "units": unit}, cmap=cmap)
+        figure.suptitle(_title_of(pair), parse_math=False)
+        axes.set_title("\n".join(parameter_lines(pair.generator.problem.parameters)), fontsize=9, parse_math=False)
+    figure.savefig(content, format="png", dpi=150)
+    return Picture(content.getvalue())
+
+
+def surface_of(pair: PrincipalPair, field: str) -> Surface:
+    """A function of a pair where it is not negligible, with its words. Raises `ValueError`."""
+    (name, quantity), problem = FIELDS[_known(field)], pair.generator.problem
+    nodes, noise, is_lines = Nodes.of(pair, FINER).seen(pair), problem.noise_quantity, problem.noise.has_states
+    unit = quantity.unit if name == "right" else "1/rad" if is_lines else density_unit(noise)
+    xi = pair.space.xi.support if is_lines else nodes.unit * nodes.z
+    values = getattr(nodes.fields(pair), name)
+    about = {"phi": PHASE.attributes, "xi": noise.attributes, "values": {**quantity.attributes, "units": unit}}
+    rays = {(jump.phase + turn) % (2 * math.pi) for jump in problem.system.jumps for turn in (0, math.pi)}
+    return Surface(
+        phi=nodes.phi,
+        xi=xi,
+        values=values[:, :: nodes.order + 1] if is_lines else values,
+        about=about,
+        name=quantity.symbol,
+        title=_title_of(pair),
+        lines=parameter_lines(problem.parameters),
+        impacts=sorted(rays),
+        is_lines=is_lines,
+    )

@@ -1,0 +1,180 @@
+"""Nodes that show T, T* and their product over phase and noise, for files and pictures.
+
+They are those of Lagrange quadrilaterals on the full circle, x = φ, y = ξ. They show the elements' polynomials,
+not an interpolation through shared nodes: nodes are doubled at every φ-line of the mesh and carry the one-sided limits
+there, so that the jump T(φ⁻) = R^p T(φ⁺) of an impact is seen. A half circle is repeated, as everything in Eq. (19) is
+π-periodic, and its cells are cut at φ = 0 and 2π. Where the noise has states there is a strip for each,
+around y = 1 for the first, y = 2 for the second; white noise has one.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any, cast
+
+import numpy as np
+
+from fpsolve.arrays import FloatArray
+from fpsolve.exponent.eigen import PrincipalPair
+from fpsolve.exponent.fields import Fields, fields, refuse_more, xi_marginal
+from fpsolve.fem.noise_axes import LineAxis, Samples
+from fpsolve.model.quantity import Quantity
+
+MAX_ORDER = 4
+"""Largest degree of the quadrilaterals; elements of a higher degree are cut into several of them."""
+FAINT = 1e-6
+"""Share of the largest values of P_s and of the tilted density below which the noise is not shown."""
+NEGLIGIBLE = 1e-3
+"""A picture shows the ξ at which a density exceeds this share of its maximum."""
+FIELDS = {
+    "T": ("right", Quantity("T", "T", "eigenfunction", "$T$")),
+    "T_adjoint": ("adjoint", Quantity("T_adjoint", "T*", "adjoint eigenfunction", "$T^*$")),
+    "tilted_density": ("product", Quantity("tilted_density", "T T*", "tilted density", r"$T\,T^*$")),
+}
+"""By the names that they have in files for ParaView: those among `Fields`, and what they are."""
+
+
+@dataclass(frozen=True, eq=False)
+class Nodes:
+    """Nodes of the quadrilaterals: a block of them for each φ-cell or part of one, continuous in ξ.
+
+    Attributes:
+        phi: φ of the nodes, shape (blocks, nodes of a block); the ends are the φ-lines, 0 and 2π.
+        z_cells: z of the nodes, shape (ξ-cells, nodes of a cell), with the ends of neighbours equal.
+        unit: ξ/z.
+        order: degree of the quadrilaterals.
+    """
+
+    phi: FloatArray
+    z_cells: FloatArray
+    unit: float
+    order: int
+
+    @classmethod
+    def of(cls, pair: PrincipalPair, finer: int = 1) -> Nodes:
+        """Nodes that show a pair, or so many times more either way; P_s in the adjoint asks for low quadrilaterals.
+
+        Raises:
+            OutputError: T depends on more than φ and ξ.
+        """
+        refuse_more(pair)
+        space = pair.space
+        degrees = int(np.max(space.phi.degrees)), int(np.max(space.xi.modes))
+        order = min(MAX_ORDER, max(degrees))
+        frame = pair.generator.problem.frame
+        lines_of_phi = space.phi.lines if frame is None else frame.own_phase(space.phi.lines)
+        starts = np.sort(np.mod(lines_of_phi[:-1], space.phi.span))
+        starts = np.concatenate([starts + k * space.phi.span for k in range(space.phi.turns)])
+        breaks = np.concatenate([[0.0], starts[(starts > 1e-9) & (starts < 2 * math.pi - 1e-9)], [2 * math.pi]])
+        phi = _nodes(breaks, order, finer * _parts(degrees[0], order))
+        if pair.generator.problem.noise.has_states:
+            return Strips(phi, _nodes(np.arange(0.5, space.xi.size + 1), order, 1), 1.0, order)
+        lines = _z_lines(pair)
+        # P_s is shown by quadrilaterals as high as a noise unit, or higher in algebraic tails
+        noise, inner = pair.generator.problem.coloured, np.minimum(abs(lines[:-1]), abs(lines[1:]))
+        widest = np.maximum(1.0, inner / 6 if noise.has_algebraic_tails else 1.0)
+        tall = math.ceil(np.max(np.diff(lines) / widest) - 1e-9)
+        z = _nodes(lines, order, finer * max(tall, _parts(pair.generator.chosen.noise.degree, order)))
+        return cls(phi, z, noise.standard_deviation, order)
+
+    @property
+    def z(self) -> FloatArray:
+        """z of the nodes, each once."""
+        return np.append(self.z_cells[:, :-1], self.z_cells[-1, -1])
+
+    def seen(self, pair: PrincipalPair) -> Nodes:
+        """The same where the tilted density, or that of the noise, is not negligible."""
+        noise = pair.generator.problem.coloured
+        densities = self.fields(pair).product.max(axis=0), noise.density(self.unit * self.z)
+        living = np.flatnonzero(np.any([each > NEGLIGIBLE * each.max() for each in densities], axis=0))
+        return replace(self, z_cells=self.z[None, living[0] : living[-1] + 1])
+
+    def fields(self, pair: PrincipalPair) -> Fields:
+        """The functions of a pair at the nodes, shape (φ-nodes, ξ-nodes)."""
+        return fields(pair, self.phi.ravel(), self.phase_table(pair), self.samples(pair))
+
+    def phase_table(self, pair: PrincipalPair) -> FloatArray:
+        """Values of the φ-elements at the nodes, shape (φ-nodes, φ-unknowns)."""
+        axis, frame, phi = pair.space.phi, pair.generator.problem.frame, self.phi
+        # contracted a little, as they then tell from which side a line of the mesh is seen
+        inside = phi + 1e-6 * (phi.mean(axis=1, keepdims=True) - phi)
+        if frame is not None:
+            phi, inside = frame.phase(phi), frame.phase(inside)
+        turned = axis.span * np.floor((inside - axis.lines[0]) / axis.span)
+        return axis.at((phi - turned).ravel(), (inside - turned).ravel())
+
+    def samples(self, pair: PrincipalPair) -> Samples:
+        """The functions of ξ at the nodes."""
+        axis: Any = pair.space.xi
+        found: Samples = axis.at(self.z)
+        return found
+
+    def points(self) -> FloatArray:
+        """(φ, ξ, 0), φ slowest, shape (points, 3)."""
+        phi, xi = np.meshgrid(self.phi.ravel(), self.unit * self.z, indexing="ij")
+        return np.stack([phi.ravel(), xi.ravel(), np.zeros(phi.size)], axis=1)
+
+    @property
+    def _rows(self) -> Any:
+        """Where cells begin among the nodes of ξ."""
+        return np.arange(0, self.z.size - 1, self.order)
+
+    def cells(self) -> Any:
+        """Points of each quadrilateral in VTK's order, shape (cells, (order + 1)²)."""
+        k, (blocks, nodes) = self.order, self.phi.shape
+        columns = (np.arange(blocks)[:, None] * nodes + np.arange(0, nodes - 1, k)).ravel()
+        corners = columns[:, None] * self.z.size + self._rows
+        inner = range(1, k)
+        edges = [*((i, 0) for i in inner), *((k, j) for j in inner), *((i, k) for i in inner), *((0, j) for j in inner)]
+        i, j = np.transpose([(0, 0), (k, 0), (k, k), (0, k), *edges, *((i, j) for j in inner for i in inner)])
+        return corners.reshape(-1, 1) + i * self.z.size + j
+
+
+class Strips(Nodes):
+    """The same for the states of a noise: a strip for each, z their numbers from 1 on, half a unit to either side."""
+
+    @property
+    def z(self) -> FloatArray:
+        return 0.8 * self.z_cells.ravel() + 0.2 * self.z_cells.mean(axis=1).repeat(self.z_cells.shape[1])
+
+    def seen(self, pair: PrincipalPair) -> Strips:
+        """All of them."""
+        return self
+
+    def samples(self, pair: PrincipalPair) -> Samples:
+        at, states = pair.space.xi.samples(), np.arange(self.z_cells.shape[0]).repeat(self.z_cells.shape[1])
+        return Samples(*(each[states] for each in at))
+
+    @property
+    def _rows(self) -> Any:
+        return np.arange(0, self.z.size, self.order + 1)
+
+
+def _z_lines(pair: PrincipalPair) -> FloatArray:
+    """The lines of the ξ-cells; of polynomials the interval in which the noise lives along some paths, in noise units.
+
+    Outside it P_s and the tilted density are below `FAINT` of their largest values.
+    """
+    xi, noise = cast("LineAxis", pair.space.xi), pair.generator.problem.coloured
+    if pair.generator.chosen.noise.lines.size:
+        return pair.generator.chosen.noise.lines
+    end = noise.half_width / noise.standard_deviation
+    reach = min(end, 12.0 + abs(xi.center))
+    z = np.linspace(-reach, reach, 2001)[1:-1]
+    tilted, stationary = np.abs(xi_marginal(pair, xi.at(z))), noise.density(noise.standard_deviation * z)
+    seen = z[(tilted > FAINT * tilted.max()) | (stationary > FAINT * stationary.max())]
+    lower, upper = max(math.floor(seen[0]), -end), min(math.ceil(seen[-1]), end)
+    inside = np.arange(math.floor(lower) + 1, math.ceil(upper))
+    return np.concatenate([[lower], inside[(inside > lower + 0.1) & (inside < upper - 0.1)], [upper]])
+
+
+def _parts(degree: int, order: int) -> int:
+    """Into how many polynomials of degree `order` one of `degree` is cut: one where that is exact."""
+    return 1 if degree <= order else math.ceil(degree / order) + 1
+
+
+def _nodes(breaks: FloatArray, order: int, parts: int) -> FloatArray:
+    """Equidistant nodes in each interval, shape (intervals, parts·order + 1)."""
+    t = np.linspace(0, 1, parts * order + 1)
+    return breaks[:-1, None] * (1 - t) + breaks[1:, None] * t
