@@ -13,4 +13,4 @@
 import lazy_loader
 
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)  # the command line starts at once
-__version__ = "0.1.0"
+__version__ = "0.2.0"
