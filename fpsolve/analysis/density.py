@@ -18,7 +18,7 @@ from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.fields import MOST_NEGATIVE, fields
 from fpsolve.fem.mesh import vertices_at
 from fpsolve.messages import Code, Message, Remedy
-from fpsolve.model.plane import growth_rate, phase_speed
+from fpsolve.model.plane import growth_rate
 from fpsolve.model.quantity import NOISE, PHASE, density_unit
 
 if TYPE_CHECKING:
@@ -153,9 +153,8 @@ def furstenberg_khasminskii(pair: PrincipalPair) -> float:
     density = space.evaluate(pair.left, space.phi.values, at.values) * at.weight / at.factor
     growth = space.turns * float(space.phi.weights @ (rate * density) @ at.measure)
     table = space.table(pair.left)
-    for jump in system.jumps:
+    for jump, speed in zip(system.jumps, problem.wall_speeds(system), strict=True):
         vertices = vertices_at(space.phi.lines, jump.phase)
-        speed = float(phase_speed(system, np.ravel(at.xi)[0])(jump.phase))
         density = np.sum((space.phi.left_trace if speed > 0 else space.phi.right_trace)[vertices] @ table, axis=0)
         passages = abs(speed) * float(density @ (space.xi.matrix(one) @ space.xi.constant))
         growth += space.turns * jump.log_factor * passages

@@ -37,7 +37,6 @@ class CircleAxis(NoiseAxis):
         self.points = np.asarray(np.arange(points) * (2 * np.pi / points), dtype=float)
         self.values, self.measure = self.values_at(self.points), np.full(points, 1 / points)
         self._xi = noise.of_angle(self.points)
-        self.support = np.array([self._xi.min(), self._xi.max()])
 
     def values_at(self, theta: FloatArray) -> FloatArray:
         """The waves at any θ, shape (len(θ), size)."""

@@ -23,8 +23,6 @@ from fpsolve.fem.phase import MAX_DENSE_UNKNOWNS
 from fpsolve.model.noise import Noise, NoiseDerivative
 from fpsolve.polynomials import Polynomials, gegenbauer, hermite, logarithm, stieltjes
 
-FAR = 50.0
-"""Noise units beyond which OU noise does not come."""
 REACH = 9.0
 """Noise units on either side of its centre, beyond which nothing is left of a weight that falls like a Gaussian."""
 SHARP_ENDS = 50.0
@@ -61,14 +59,12 @@ class NoiseAxis(Axis):
     Attributes:
         tilt: s of the factor exp(s (z − c)) that every function carries.
         center: c, about the mean z of the weight.
-        support: ξ between whose extremes the noise lives, as far as it matters, or its states.
         values: the functions at the points of a quadrature rule, or at the states, without factor, shape (n, size).
         measure: ∫ of the weight at those points, shape (n,).
         is_local: whether the functions can follow a kink in ξ.
     """
 
     tilt, center, is_local = 0.0, 0.0, True
-    support: FloatArray
     values: Any
     measure: FloatArray
 
@@ -223,7 +219,6 @@ class PolynomialAxis(LineAxis):
         self._slopes = slopes / self._scale + tilt * self.values
         self._flux = self.measure * self.rate(self.points)
         self.center = float(self.measure @ self.points)
-        self.support = self.unit * min(end, FAR) * np.array([-1.0, 1.0])
         self.size, self.cells, self.modes = count, np.zeros(count, dtype=int), np.arange(count)
         self.constant = np.eye(1, count)[0]
 
@@ -279,7 +274,6 @@ class CellAxis(LineAxis):
         self.points, self.measure, self.values = self.line.points, self.line.measure, self.line.values[:, self._inner]
         self.size, self.cells, self.modes = self._inner.size, self.line.cells[self._inner], self.line.modes[self._inner]
         self.constant = self.line.constant()[self._inner]
-        self.support = self.unit * lines[[0, -1]]
 
     def mass(self, g: Coefficient = one) -> Any:
         return self._form(self.line.mass() if g == one else self.line.mass(lambda z: g(self.unit * z)))
@@ -313,7 +307,11 @@ class CellAxis(LineAxis):
 
 
 class StateAxis(NoiseAxis):
-    """One value for each state of a Markov chain: ∫ P_s becomes a sum over the states with their probabilities."""
+    """One value for each state of a Markov chain: ∫ P_s becomes a sum over the states with their probabilities.
+
+    Attributes:
+        support: the states.
+    """
 
     def __init__(self, noise: Any) -> None:
         super().__init__()

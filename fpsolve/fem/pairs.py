@@ -16,7 +16,7 @@ import numpy as np
 import scipy.sparse
 
 from fpsolve.arrays import Coefficient, FloatArray, one
-from fpsolve.fem.noise_axes import FAR, MORE_POINTS, STEP, NoiseAxis, Samples, form
+from fpsolve.fem.noise_axes import MORE_POINTS, STEP, NoiseAxis, Samples, form
 from fpsolve.model.noise import NoiseDerivative
 from fpsolve.polynomials import hermite
 
@@ -50,7 +50,6 @@ class PairAxis(NoiseAxis):
         self.values = (table[:, None, self._first] * table[None, :, self._second]).reshape(-1, self.size)
         fine, self._weights = hermite(count + MORE_POINTS).rule()
         self._points, self._table = self.unit * (fine + means[0]), hermite(count).at(fine)[0]
-        self.support = self.unit * (means[0] + FAR * np.array([-1.0, 1.0]))
 
     def mass(self, g: Coefficient = one) -> FloatArray:
         return self._weighed(g(self._points)) if g != one else np.eye(self.size)

@@ -6,9 +6,9 @@ For trial T and test w, every integral weighted by P_s(ξ), a term ε^n g(ξ) A 
 
 and at each φ-vertex the point load ∫ P_s (v {w} − ½θ [w]) [T], with the phase speed v = Σ ε^n g h, the mean {w} and the
 jump [w] = w(φ⁺) − w(φ⁻) of its two traces. θ = |v| is upwinding; for polynomials of ξ, which cannot follow its kink, θ
-is its size for the typical ξ, |Σ ε^n h| over what no noise drives + Σ ε^n |h| (mean of g²)^½ over the rest. A jump
-makes the load that of R^p T(φ⁺) − T(φ⁻), on w(φ⁻), as the phase runs forward, or of T(φ⁺) − R^p T(φ⁻), on w(φ⁺): an
-impact is exactly a point load, for which θ must be |v|.
+is its size for the typical ξ, |Σ ε^n h| over what no noise drives + Σ ε^n |h| (mean of g²)^½ over the rest. At a wall
+v is one number for all ξ, and θ = |v|. The wall is the point load (R^p − 1)|v| δ(φ − φ_j) T of the trace of T that v
+brings, T(φ⁺) on w(φ⁻) for v > 0 and T(φ⁻) on w(φ⁺) for v < 0, so that T jumps by R^p.
 
 White noise by which dx has Bx ∘ dW adds ½ (h ∂φ + p q)² with h and q of B, see `PhaseAxis.diffusion`. Impulses
 exp(B) add their rate times |exp(B)e|^p T(ψ) − T, ψ being where they take φ, see `PhaseAxis.impulses`.
@@ -20,7 +20,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import product
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -37,7 +37,9 @@ from fpsolve.model.plane import (
     LinearMotion,
     Xi,
     is_driven,
+    matrix_at,
     phase_speed,
+    turning,
     written_coefficient,
 )
 from fpsolve.model.problem import ParameterDerivative, Problem
@@ -156,6 +158,14 @@ class TermSum:
         )
 
 
+class Wall(NamedTuple):
+    """A jump, the speed v of the phase at its ray φ_j, and δ(φ − φ_j): w(φ⁻) T(φ⁺) for v > 0, else w(φ⁺) T(φ⁻)."""
+
+    jump: Jump
+    speed: float
+    delta: Any
+
+
 class NoiseTerms:
     """What lists of terms share: which noise each of them has a function of.
 
@@ -189,32 +199,26 @@ class Terms(NoiseTerms):
 
     def __init__(self, problem: Problem, space: TensorSpace) -> None:
         super().__init__(problem)
+        self._problem = problem
         system = self.system = problem.motion
         self._diffusions, self.phi, self.noises = problem.diffusions, space.phi, space.axes[1:]
         self._impulses = problem.impulses
         self._vertices, self._jump = self.phi.lines[:-1], self.phi.jump
-        self._ends = problem.at_values([axis.support for axis in self.noises])
-        speed = self._speed_at_ends(self._vertices)
-        # where θ = |v|
-        is_exact = np.full(self._vertices.size, all(axis.is_local for axis in self.noises))
-        for ray in system.jumps:
-            is_exact[vertices_at(self.phi.lines, ray.phase)] = True
-        # the sign of v at those of these vertices where it is the same for all ξ, otherwise 0
-        direction = np.where(is_exact, 1.0 * np.all(speed > 0, axis=0) - np.all(speed < 0, axis=0), 0.0)
+        # where θ = |v|, and the sign of v where that is the same for all ξ, otherwise 0
+        is_exact, direction = np.full(self._vertices.size, False), np.zeros(self._vertices.size)
+        if all(axis.is_local for axis in self.noises):
+            rates = matrix_at(system, problem.at_values([axis.samples().xi for axis in self.noises]))
+            speed = turning(rates.reshape(-1, 1, 2, 2))(self._vertices)
+            is_exact, direction = ~is_exact, 1.0 * np.all(speed > 0, axis=0) - np.all(speed < 0, axis=0)
+        self._walls = list[Wall]()
+        for jump, v in zip(system.jumps, problem.wall_speeds(system), strict=True):
+            at = vertices_at(self.phi.lines, jump.phase)
+            is_exact[at], direction[at] = True, math.copysign(1.0, v)
+            left, right = self.phi.left_trace[at], self.phi.right_trace[at]
+            self._walls.append(Wall(jump, v, left.T @ right if v > 0 else right.T @ left))
         self._is_exact, self._two_way = is_exact, np.flatnonzero(is_exact & (direction == 0))
         # nothing is left of the other side: where ξ is large that would count
         self._trace = 0.5 * (self.phi.right_trace + self.phi.left_trace) - by_rows(0.5 * direction, self._jump)
-
-    def _terms(self, phase: Any, f: Callable[[Xi], Any], text: str) -> Iterator[Term]:
-        """Those with a function of all noises at once: one for each combination of the states of all but the first."""
-        first, *others = self._names
-        for values in product(*(np.unique(axis.support) for axis in self.noises[1:])):
-            held = dict(zip(others, values, strict=True))
-
-            def of_first(xi: Any, held: dict[str, float] = held) -> Any:
-                return f({**held, first: xi} if held else xi)
-
-            yield Term(0, OfMoment(0), phase, (of_first, *map(At, values)), text)
 
     def whole(self) -> Iterator[Term]:
         """L(p) of Eq. (19)."""
@@ -230,35 +234,32 @@ class Terms(NoiseTerms):
         if not np.all(self._is_exact):
             typical = np.where(self._is_exact, 0.0, self.typical_speed())
             yield self._term(-0.5 * jump.T @ by_rows(typical, jump), one, text)
-        for j in self._two_way:
-            yield from self._terms(-0.5 * jump[[j]].T @ jump[[j]], self._size_of_speed(float(self._vertices[j])), text)
-        for ray in self.system.jumps:
+        yield from self._upwind(lambda phi, xi: np.abs(phase_speed(self.system, xi)(phi)), text)
+        for ray, v, delta in self._walls:
             text = f"(R^p − 1) |dφ/dt| δ(φ − {ray.phase:.6g} mod π), R = {math.exp(ray.log_factor):.6g}"
-            speed, load = self._load(ray)
-            yield self._term(abs(speed) * load, one, text, OfMoment(0, ray.log_factor, is_change=True), order=2)
+            yield self._term(abs(v) * delta, one, text, OfMoment(0, ray.log_factor, is_change=True), order=2)
 
     def changed(self, by: ParameterDerivative) -> Iterator[Term]:
         """∂L(p)/∂θ of the same terms where the motion and its jumps change with θ.
 
         Where θ is the size of the speed for the typical ξ it is held: [T] = 0 there but for the error of the elements.
         """
-        text, jump, moved = "∂/∂θ", self._jump, LinearMotion(self.system.epsilon, by.terms)
+        text, moved = "∂/∂θ", LinearMotion(self.system.epsilon, by.terms)
         for term in by.terms:
             yield from self._driven(term)
         for own, other in zip(self._diffusions, by.diffusions, strict=bool(by.diffusions)):
             yield from self._diffused(own, [(0.5, own, other), (0.5, other, own)])
         for struck, moved_by in zip(self._impulses, by.impulses, strict=bool(by.impulses)):
             yield self._struck(struck, moved_by)
-        for j in self._two_way:
-            yield from self._terms(-0.5 * jump[[j]].T @ jump[[j]], self._faster(moved, float(self._vertices[j])), text)
-        for ray, slope in zip(self.system.jumps, by.jumps or np.zeros(len(self.system.jumps)), strict=True):
-            speed, load = self._load(ray)
-            if slope:
-                yield self._term(slope * abs(speed) * load, one, text, OfMoment(1, ray.log_factor), order=2)
-            for term in by.terms:
-                faster = math.copysign(self.system.epsilon**term.order, speed) * float(term.h(ray.phase))
-                change = OfMoment(0, ray.log_factor, is_change=True)
-                yield self._term(faster * load, term.g, text, change, 2, term.noise)
+        yield from self._upwind(
+            lambda phi, xi: np.sign(phase_speed(self.system, xi)(phi)) * phase_speed(moved, xi)(phi), text
+        )
+        faster = self._problem.wall_speeds(moved)
+        for k, (ray, v, delta) in enumerate(self._walls):
+            if by.jumps:
+                yield self._term(by.jumps[k] * abs(v) * delta, one, text, OfMoment(1, ray.log_factor), order=2)
+            of_p = OfMoment(0, ray.log_factor, is_change=True)
+            yield self._term(math.copysign(1.0, v) * faster[k] * delta, one, text, of_p, order=2)
 
     def _driven(self, term: CoefficientMatrix) -> Iterator[Term]:
         """h ∂φ with the loads at the φ-vertices, and p q."""
@@ -313,28 +314,18 @@ class Terms(NoiseTerms):
                 driven = driven + abs(speed) * math.sqrt(constant @ (square @ constant) / total)
         return np.asarray(abs(steady) + driven)
 
-    def _load(self, ray: Jump) -> tuple[float, Any]:
-        """dφ/dt at the ray of a jump, and its load: w(φ⁻) T(φ⁺) where the phase runs forward, else w(φ⁺) T(φ⁻)."""
-        at, speed = (
-            vertices_at(self.phi.lines, ray.phase),
-            float(np.mean(phase_speed(self.system, self._ends)(ray.phase))),
-        )
-        left, right = self.phi.left_trace[at], self.phi.right_trace[at]
-        return speed, left.T @ right if speed > 0 else right.T @ left
+    def _upwind(self, theta: Callable[[float, Xi], Any], text: str) -> Iterator[Term]:
+        """−½ ∫ P_s θ(φ, ξ) [w] [T] where the phase runs both ways: of several noises, chains, for each other state."""
+        first, *others = self._names
+        for j in self._two_way:
+            phi, phase = float(self._vertices[j]), -0.5 * self._jump[[j]].T @ self._jump[[j]]
+            for values in product(*(np.unique(axis.support) for axis in self.noises[1:])):
+                held = dict(zip(others, values, strict=True))
 
-    def _speed_at_ends(self, phi: FloatArray) -> FloatArray:
-        """dφ/dt at the extremes of all noises, shape (extremes, len(phi))."""
-        speed = phase_speed(self.system, self._ends)
-        parts = (np.ravel(part)[:, None] for part in (speed.mean, speed.cosine, speed.sine))
-        return Harmonics(*parts)(phi)
+                def of_first(xi: Any, phi: float = phi, held: dict[str, float] = held) -> Any:
+                    return theta(phi, {**held, first: xi} if held else xi)
 
-    def _size_of_speed(self, phi: float) -> Callable[[Xi], Any]:
-        """|dφ/dt| at φ."""
-        return lambda xi: np.abs(phase_speed(self.system, xi)(phi))
-
-    def _faster(self, moved: LinearMotion, phi: float) -> Callable[[Xi], Any]:
-        """∂|dφ/dt|/∂θ at φ."""
-        return lambda xi: np.sign(phase_speed(self.system, xi)(phi)) * phase_speed(moved, xi)(phi)
+                yield Term(0, OfMoment(0), phase, (of_first, *map(At, values)), text)
 
 
 def power_of_epsilon(order: int) -> str:

@@ -306,7 +306,7 @@ def changed_exponential(exponent: Matrix, change: Matrix) -> FloatArray:
 
 @dataclass(frozen=True)
 class Jump:
-    """x⁺ = R x⁻ where the phase passes φ or φ + π, in either direction.
+    """x⁺ = R x⁻ where the phase passes φ or φ + π, with a speed v ≠ 0 that no noise changes, else a problem refuses it.
 
     Args:
         phase: φ of the ray, in radians.
@@ -499,24 +499,6 @@ def phase_speed(system: System, xi: Xi) -> Harmonics:
 def growth_rate(system: System, xi: Xi) -> Harmonics:
     """d ln a/dt at ξ as a function of φ: in Eq. (17) ε q₁ξ + ε² q₂ between the impacts."""
     return stretching(matrix_at(system, xi))
-
-
-def moves_phase(system: System, terms: Sequence[CoefficientMatrix], phase: float, xi: FloatArray) -> bool:
-    """Whether a noise changes the speed of the phase at a ray, but for rounding.
-
-    Args:
-        system: whose terms they are.
-        terms: those that the noise drives.
-        phase: φ of the ray.
-        xi: values of the noise, shape (n,).
-    """
-    speed, size = np.zeros(xi.size), 0.0
-    for term in terms:
-        strength, along = system.epsilon**term.order, term.h(phase)
-        values = strength * (term.g(xi) - term.g(xi[:1]))
-        speed += along * values
-        size += term.fastest[0] * float(np.max(np.abs(values)))
-    return not np.max(np.abs(speed)) <= 1e-12 * size
 
 
 def squared_frequency(a: FloatArray) -> FloatArray:

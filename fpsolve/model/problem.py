@@ -35,7 +35,6 @@ from fpsolve.model.plane import (
     combined,
     is_driven,
     matrix_at,
-    moves_phase,
     phase_speed,
     turning,
 )
@@ -52,6 +51,8 @@ RTOL, RTOL_OF_SEVERAL, RTOL_BEYOND_PLANE = 1e-8, 1e-6, 1e-5
 """The relative error wanted where a case names none: of two variables, the same under two noises, and of more."""
 SUPPORT = np.linspace(-12, 12, 2401)
 """In standard deviations, where a coefficient of noise is looked at."""
+ROUNDED_SPEED = 1e-12
+"""A share of the largest speeds of the phase by all terms, below which that over a ray is 0 but for rounding."""
 LINE = 90
 """Letters of a line of parameters at most."""
 
@@ -91,8 +92,8 @@ class Problem:
     Raises:
         TypeError: one of them is something else.
         ValueError: white noise would drive the system in a way that has no meaning, see `White.motion`; or the noises
-            are not those that the terms name; or one moves the phase over the ray of a jump; or nothing is random, as
-            under a harmonic load alone.
+            are not those that the terms name; or one moves the phase over the ray of a jump, or nothing does; or
+            nothing is random, as under a harmonic load alone.
     """
 
     system: System
@@ -115,7 +116,7 @@ class Problem:
         if any(noise.is_white for noise in given.values()):
             _ = self._moved, self._struck  # refuses what has no meaning
         for jump in self.system.jumps:
-            self._refuse_turned(jump)
+            self._refuse_ray(jump)
         if self.dimension > 2 and (self._struck or self.noise.has_algebraic_tails):
             raise ValueError(
                 f"got {self.noise.kind} noise for {self.dimension} variables; impulses and noise with algebraic tails "
@@ -128,26 +129,47 @@ class Problem:
                 "noise"
             )
 
-    def _refuse_turned(self, jump: Jump) -> None:
-        """Refuse the ray of a jump that a noise turns. Raises `ValueError`."""
-        for name, noise in self.noise.parts.items():
-            driven = [term for term in self.system.terms if is_driven(term.g) and name in ("", term.noise)]
-            if abs(math.cos(jump.phase)) < 1e-15 and not any(term.matrix[0][1] for term in driven):
-                continue  # the usual wall, x = 0, of thousands of sets
+    def _refuse_ray(self, jump: Jump) -> None:
+        """Refuse a jump at a ray over which a noise moves the phase, or nothing does. Raises `ValueError`."""
+        ray, terms, names = f"the ray of a jump, phi = {jump.phase:.6g}", self.system.terms, [*self.noise.parts]
+        by = [(term.noise if len(names) > 1 else names[0]) if is_driven(term.g) else None for term in terms]
+        rates = [(float(term.matrix[0][1]), abs(term.matrix[0][1])) for term in terms]
+        is_turned = any(rate and name is not None for name, (_, rate) in zip(by, rates, strict=True))
+        # over x = 0, the wall of thousands of sets, the first row tells all in any units of x, over others `frame`
+        if abs(math.cos(jump.phase)) > 1e-15 or is_turned:
+            turned, phase = terms, jump.phase
+            if self.frame is not None:
+                turned, phase = [self.frame.term(term) for term in terms], float(self.frame.phase(np.array(phase)))
+            rates = [(float(term.h(phase)), term.fastest[0]) for term in turned]
+        total = size = 0.0
+        for name, noise in ((None, self.noise), *self.noise.parts.items()):
+            own = [(term, *rate) for term, of, rate in zip(terms, by, rates, strict=True) if of == name and rate[1]]
             xi = np.array([0.0, 1.0])
-            if any(affine(term.g) is None for term in driven):
+            if any(affine(term.g) is None for term, *_ in own):
                 xi = np.array(noise.states) if noise.has_states else noise.standard_deviation * SUPPORT  # type: ignore[attr-defined]
                 xi = np.unique(np.clip(xi, -noise.half_width, noise.half_width))
-            phase = jump.phase
-            if driven and self.frame is not None:  # in which all rates are of one size, whatever the units of x
-                driven, phase = [self.frame.term(term) for term in driven], float(self.frame.phase(np.array(phase)))
-            if driven and moves_phase(self.system, driven, phase, xi):
+            speeds, most = np.zeros(xi.size), 0.0
+            for term, along, rate in own:
+                strengths = self.system.epsilon**term.order * term.g(xi)
+                speeds, most = speeds + along * strengths, most + rate * float(np.max(np.abs(strengths)))
+            if not np.ptp(speeds) <= ROUNDED_SPEED * most:
                 which = f'the noise "{name}"' if name else f"{noise.kind} noise"
                 raise ValueError(
-                    f"{which} moves the phase across the ray of a jump, phi = {jump.phase:.6g}, which it does over no "
-                    "wall: x = 0, phi = pi/2 = 1.5707963267948966, is passed with the speed v whatever the noise; let "
-                    "it drive terms that do not move the phase there, or remove the jump"
+                    f"{which} moves the phase across {ray}, which it does over no wall: x = 0, phi = pi/2 = "
+                    "1.5707963267948966, is passed with the speed v whatever the noise; let it drive terms that do "
+                    "not move the phase there, or remove the jump"
                 )
+            total, size = total + float(speeds[0]), size + most
+        if abs(total) <= ROUNDED_SPEED * size:
+            raise ValueError(
+                f"the phase does not pass {ray}: nothing moves it there, so that no path comes to this wall; remove "
+                "the jump"
+            )
+
+    def wall_speeds(self, motion: System) -> list[float]:
+        """dφ/dt of a motion in the coordinates of `frame` at the ray of each jump, which no noise changes."""
+        speed = phase_speed(motion, self.typical)
+        return [float(np.ravel(speed(jump.phase))[0]) for jump in self.motion.jumps]
 
     @cached_property
     def coloured(self) -> Noise:

@@ -90,8 +90,7 @@ class Flow:
     @cached_property
     def sense(self) -> float:
         """1 where the phase grows at the wall, −1 where it falls; 1 without a wall."""
-        speed = sum(float(rate.g(0.0)) * float(rate.h(self.half_turn[1])) for rate in self.linear)
-        return -1.0 if self.has_wall and speed < 0 else 1.0
+        return math.copysign(1.0, math.fsum(self.problem.wall_speeds(self.problem.motion)))
 
     @cached_property
     def log_factor(self) -> float:

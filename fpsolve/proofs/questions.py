@@ -132,7 +132,7 @@ def prove(
     Raises:
         NoSuchExponent: r₀ > 1 for Eq. (7) as it stands.
         TypeError: another noise, a chain of too many states, or a coefficient that is not a + bξ.
-        ValueError: p is not finite, the width not positive, or the phase may pass the ray of a jump both ways.
+        ValueError: p is not finite, the width not positive, or the speed at a jump has no one sign.
         MissingFlint: python-flint is not installed.
     """
     return prove_bounds(problem, statement_of(problem), repr(float(p)), width, budget or Budget(), progress)

@@ -137,7 +137,7 @@ def statement_of(problem: Problem, stated: Parameters | None = None) -> Statemen
     Raises:
         NoSuchExponent: no bound can be proven for these parameters.
         TypeError: no proof is known for such a system with such a noise.
-        ValueError: the phase may pass the ray of a jump both ways.
+        ValueError: the speed of the phase at the ray of a jump has no one sign.
     """
     checked_problem(problem)
     if stated is None:
@@ -161,7 +161,7 @@ def exact_halves(stated: Statement) -> tuple[ExactMotion, ExactLaw, list[int]]:
     Raises:
         NoSuchExponent: no bound can be proven for these parameters.
         ValueError: these are no parameters of a system and a noise for which a proof is known, or out of range; or the
-            phase may pass the ray of a jump both ways.
+            speed of the phase at the ray of a jump has no one sign.
     """
     parameters = _plain(stated.parameters)
     system, noise = _kinds(parameters)
@@ -183,8 +183,8 @@ def exact_halves(stated: Statement) -> tuple[ExactMotion, ExactLaw, list[int]]:
         if not direction:
             ray = ", ".join(f"{float(each):g}" for each in jump.ray)
             raise ValueError(
-                f"got a jump at the ray of ({ray}), which the phase does not pass one way only; proofs are for jumps "
-                "at rays where its speed has one sign for every value of the noise"
+                f"got a jump at the ray of ({ray}), where the speed of the phase has no one sign; proofs are for jumps "
+                "at rays over which no noise moves the phase"
             )
     return motion, law, directions
 

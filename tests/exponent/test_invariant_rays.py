@@ -184,8 +184,10 @@ def test_refused():
     own, _ = SYSTEMS["triangular"]
     with pytest.raises(NoSuchExponent, match=r"never leaves the ray at phi = 1\.5708, .* choose p >= -1"):
         moment_lyapunov(Problem(own, NOISES["OU"]), -1.5)
+    with pytest.raises(ValueError, match=r"does not pass the ray of a jump, phi = 1\.5708: .* remove the jump"):
+        Problem(PlaneSystem(own.terms, [Jump(math.pi / 2, -0.1)]), NOISES["OU"])
     with pytest.raises(NoSuchExponent, match="remove the jumps"):
-        moment_lyapunov(Problem(PlaneSystem(own.terms, [Jump(math.pi / 2, -0.1)]), NOISES["OU"]), 1.0)
+        moment_lyapunov(Problem(PlaneSystem(own.terms, [Jump(math.atan2(-1, 7), -0.1)]), NOISES["OU"]), 1.0)
     with pytest.raises(NotConverged, match="no positive eigenfunction"):
         ExponentSolver(Problem(own, NOISES["OU"])).pair(1.0)
 

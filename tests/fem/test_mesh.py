@@ -1,15 +1,21 @@
 """Meshes: what they must be, how they are made, written and read."""
 
+import math
+
 import meshio
 import numpy as np
 import pytest
 
 from fpsolve.errors import MeshError
 from fpsolve.exponent.function import moment_lyapunov
+from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem.discretisation import Discretisation
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.mesh import MARKERS, CylinderMesh, make_mesh, read_mesh, write_mesh
+from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
+from fpsolve.model.plane import CoefficientMatrix, Jump
 from fpsolve.model.problem import Problem
+from fpsolve.model.systems.plane_system import PlaneSystem
 from tests.conftest import FIG1, FIG1_NOISE, UNIT_NOISE, oracle_arguments
 from tests.oracles import fourier_hermite
 
@@ -214,3 +220,15 @@ def test_degrees_that_are_none_are_refused(tmp_path, values):
     write_raw(path, HALF, [[0, 1, 2, 3]], point_data={"xi_degree": values})
     with pytest.raises(MeshError, match="xi_degree must be one whole number from 1 to 20 throughout"):
         read_mesh(path)
+
+
+def test_a_phase_that_turns_back_for_ordinary_noise_alone():
+    """v̇ = −(1 − 3e^(−ξ²))x − 0.2v: the phase runs one way at both ends of the mesh and back between."""
+    terms = (
+        CoefficientMatrix(0, ((0.0, 1.0), (-1.0, -0.2))),
+        CoefficientMatrix(1, ((0.0, 0.0), (3.0, 0.0)), lambda xi: np.exp(-(xi**2))),
+    )
+    problem = Problem(PlaneSystem(terms, [Jump(math.pi / 2, math.log(0.8))]), OrnsteinUhlenbeck(alpha=1.0, sigma=0.7))
+    own, meshed = (ExponentSolver(problem, mesh=mesh, rtol=1e-6).solution(2.0) for mesh in (None, make_mesh()))
+    assert own.error < 1e-5
+    assert abs(own.pair.value - meshed.pair.value) <= own.error + meshed.error

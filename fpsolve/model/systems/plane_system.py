@@ -84,7 +84,7 @@ class PlaneSystem(System):
 
     Args:
         terms: one at least.
-        jumps: stretches at rays.
+        jumps: stretches at rays that are passed with a speed which no noise changes, as x = 0 is where ẋ = v.
         epsilon: ε > 0.
         build: makes both from parameters, see `of`, which is the usual way.
         named: the values of these parameters by their names.
@@ -112,7 +112,7 @@ class PlaneSystem(System):
         "jumps": stated_field(
             Annotated[
                 Annotated[tuple[StatedJump, ...], Field(strict=False)],
-                parameter("jumps of the state at rays", "jumps = [{ phase = 0.0, log_factor = -0.1 }]"),
+                parameter("jumps of the state at rays", "jumps = [{ phase = 1.5707963267948966, log_factor = -0.1 }]"),
             ],
             (),
         ),
