@@ -347,6 +347,9 @@ class Code(Enum):
     )
     NOISE_SIZE = "failure: {member}{xi:? at xi = {xi:.4g}} is {value:.6g}; it must be a finite number > 0"
     NOISE_FAILS = "failure: {member}: {reason}"
+    NOISE_REFUSED = (
+        "warning: no sensitivities under {kind} noise: {reason}; correct its class until `check_noise` finds no fault"
+    )
 
     FEW_PATHS = (
         "warning: no estimate of Λ(p) at p = {p:g}: too few effective {is_direct:?windows¦paths} carry the mean, "

@@ -17,6 +17,7 @@ from fpsolve.arrays import FloatArray, real_numbers, shown
 from fpsolve.data import plain_unit, written
 from fpsolve.errors import NoSuchExponent
 from fpsolve.messages import Code, Message, Remedy
+from fpsolve.model.checks import refuse_wrong_derivative
 from fpsolve.model.frame import Frame, own_frame
 from fpsolve.model.noise import Noise, NoiseDerivative
 from fpsolve.model.noises.several import noises_of
@@ -573,6 +574,7 @@ class Problem:
             if section == self.system.section:
                 terms, jumps = self.system.derivative(name)
             elif not (own := self.named_noise(part)).is_white:
+                refuse_wrong_derivative(own, name)
                 noise = own.derivative(name)
             changed = "" if section == self.system.section else name if len(self.noise.parts) == 1 else f"{part}.{name}"
             impulses = self.noise.changed_impulses(self.system, terms, changed)

@@ -308,7 +308,7 @@ def _solve(draft: Draft, wanted: Wanted, numerics: Numerics, progress: Callable[
     missing = [each for each in missing if wanted.is_stated or not each.tells_of(Code.NOT_ONE_RAY)] + more
     index = estimates[STABILITY_INDEX.name]
     root = None if index is None else index.value
-    rare, response, slopes = None, None, None
+    rare, response, slopes, faulty = None, None, None, list[Message]()
     if wanted.start is not None:
         phi, xi = wanted.start
         rare, reason = draft.part("excursion", lambda: solve_excursion(solver, phi=phi, xi=xi, root=root))
@@ -325,7 +325,9 @@ def _solve(draft: Draft, wanted: Wanted, numerics: Numerics, progress: Callable[
             return solve_sensitivities(solver, p, curve.problem.derivatives(), indices=names, root=root)
 
         slopes, reason = draft.part("sensitivities", differentiate)
-        missing += _missing(SENSITIVITIES, reason, found)
+        is_faulty = reason is not None and reason.code is Code.NOISE_REFUSED
+        faulty = [reason] if reason and is_faulty else []
+        missing += [] if is_faulty else _missing(SENSITIVITIES, reason, found)
     of = {each: [message for message in missing if message.severity is each] for each in Severity}
     pairs, stationary, undrawn = _functions(solver, without_failed(wanted, found.failures))
     directions, unsettled = _directions(solver, without_failed(wanted, found.failures))
@@ -363,7 +365,7 @@ def _solve(draft: Draft, wanted: Wanted, numerics: Numerics, progress: Callable[
         for name, estimate in estimates.items()
         if estimate and estimate.relative_error > numerics.rtol
     ]
-    limits = (*of[Severity.WARNING], *imprecise, *undrawn, *unresolved)
+    limits = (*of[Severity.WARNING], *imprecise, *undrawn, *unresolved, *faulty)
     result = CurveResult(
         curve=curve,
         moments=columns,

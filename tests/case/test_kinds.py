@@ -232,6 +232,7 @@ def test_figures_speak_of_the_parameters_of_the_case(tmp_path: Path) -> None:
 def test_check_tells_the_faults_of_a_kind_of_others(
     windy: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    """A run keeps Λ, and has no sensitivities where the derivative is wrong."""
     path = write(tmp_path, OSCILLATOR, WIND, MOMENTS, '[output]\nquantities = ["moment", "sensitivities"]\n')
     assert main(["check", str(path)]) == 0
     kind = noise_kind("wind")
@@ -241,6 +242,9 @@ def test_check_tells_the_faults_of_a_kind_of_others(
     assert main(["check", str(path)]) == 1
     said = capsys.readouterr().err
     assert 'kinds: derivative("memory").log_diffusion at xi = -' in said
+    assert solved(path, tmp_path / "out")
+    [curve] = json.loads((tmp_path / "out/kinds/summary.json").read_text(encoding="utf-8"))["curves"]
+    assert any(each.startswith("no sensitivities under wind noise: derivative") for each in curve["warnings"])
 
 
 def test_ours_cannot_be_replaced(windy: None) -> None:

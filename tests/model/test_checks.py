@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 from pydantic.dataclasses import dataclass
 
+from fpsolve import PlaneSystem, Problem, sensitivities
+from fpsolve.errors import NoDerivative
 from fpsolve.model import (
     Bounded,
     Filter,
@@ -156,8 +158,10 @@ FAULTS = {
     ),
     "chain": (Telegraph, {"derivative": lambda self, name: NoiseDerivative()}, 'derivative("a").states'),
     "chain's spectrum": (Telegraph, {"spectral_density": lambda self, w: 3.0}, "spectral_density(0) is 3, but the gen"),
+    "filter": (Filter, {"derivative": lambda self, name: NoiseDerivative()}, 'derivative("omega").log_scale'),
+    "waves": (Bounded, {"derivative": lambda self, name: NoiseDerivative()}, 'derivative("mu").log_scale'),
 }
-ARGUMENTS = {Telegraph: (0.5, 1.0)}
+ARGUMENTS = {Telegraph: (0.5, 1.0), Filter: (2.0, 0.1, 0.5), Bounded: (0.4, 2.0, 0.5)}
 
 
 @pytest.mark.parametrize("fault", FAULTS)
@@ -170,3 +174,12 @@ def test_a_planted_fault_is_named(fault):
 def test_of_several_noises_each_is_checked():
     wrong = type("Changed", (Gaussian,), {"mean": 0.1})()
     assert check_noise(Noises({"one": Gaussian(), "two": wrong})) == check_noise(wrong) != ()
+
+
+def test_a_wrong_derivative_gives_no_sensitivity():
+    """With end_exponent alone it would be a number with a small error, and wrong."""
+    system = PlaneSystem.of_equations(("x", "v"), ("v", "-x - 0.2*v - xi*x"))
+    assert sensitivities(Problem(system, Beta()), 2.0).moments[0]["noise.a"].value < 0  # less noise
+    wrong = type("Changed", (Beta,), {"derivative": lambda self, name: NoiseDerivative(end_exponent=1.0)})()
+    with pytest.raises(NoDerivative, match=r'no sensitivities under beta noise: derivative\("a"\)\.log_density at xi'):
+        sensitivities(Problem(system, wrong), 2.0)
