@@ -68,9 +68,12 @@ class Code(Enum):
         "choose r0 <= 1, {remedy}"
     )
     INVARIANT_RAY = (
-        "failure: Λ({p:g}) is not known: the phase never leaves the ray at phi = {phase:.6g}, whatever the noise does"
-        "{has_jumps:?, and how often it passes a jump depends on the start; remove the jumps¦, so that for p < -1 rare "
-        "cancellations count, which are not computed; choose p >= -1}"
+        "failure: Λ({p:g}) is not known: the phase never leaves the ray at phi = {phase:.6g}, whatever the noise does, "
+        "and how often it passes a jump depends on the start; remove the jumps"
+    )
+    NEGATIVE_OF_SEVERAL = (
+        "failure: Λ(p) for p < 0 is not computed: the parts of the motion {parts} do not all drive each other, so that "
+        "it depends on how they grow together, not on each alone; choose p >= 0, or solve each part by itself"
     )
     NO_EIGENFUNCTION = (
         "failure: there is no positive eigenfunction at p = {p:g}: the phase never leaves the ray at "
@@ -88,18 +91,6 @@ class Code(Enum):
     KINK = (
         "failure: {p:?Λ({p:g})¦λ} has no derivatives: within the errors it is that of two parts of the motion that do "
         "not mix, and either may be the larger one for other parameters"
-    )
-    BETWEEN_CLASSES = (
-        "failure: the derivatives of Λ({p:g}) are not computed: it is that of paths on which two parts of the motion "
-        "grow alike; choose p > 0"
-    )
-    GROWING_TOGETHER = (
-        "failure: Λ({p:g}) is not known: for p < 0 it depends on how the blocks of variables {blocks} grow together "
-        "under the noise that they share, not on each alone; choose p >= 0"
-    )
-    CANCELLATIONS = (
-        "failure: Λ({p:g}) is not known: one of the blocks of variables {blocks} drives another one, so that for "
-        "p < -1 rare cancellations count, which are not computed; choose p >= -1"
     )
     CLOSES_BLOCKS = (
         "note: no sensitivities to {key} at {value:g}: for any other value blocks of variables that are solved one by "

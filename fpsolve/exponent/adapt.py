@@ -179,11 +179,6 @@ class NearPlace:
         """What to do where it is not resolved."""
         return Remedy.BUDGET if self.mesh is None else Remedy.MESH
 
-    @property
-    def refinement(self) -> Remedy:
-        """What to do where it should be resolved better."""
-        return Remedy.SMALLER_RTOL if self.mesh is None else Remedy.MESH
-
     def pair_on(self, generator: Generator, p: float, start: PrincipalPair | Sequence[PrincipalPair]) -> PrincipalPair:
         """The principal pair; where it is not found, the failure has the remedy of this place."""
         try:

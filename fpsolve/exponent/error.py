@@ -153,7 +153,7 @@ class Solution:
     Attributes:
         pair: the principal pair.
         finer: that on a finer mesh, which measures the error of a given mesh: it may have few modes.
-        search: the error of the place among several problems where the value is the least, or of a correction.
+        search: the error of a correction.
         measured: what finer functions change, in the place of the effects of the highest modes; None where these tell.
     """
 
@@ -194,24 +194,6 @@ class Solution:
     @cached_property
     def _other(self) -> float:
         return sum(self.truncation) + self.pair.rounding + self.search
-
-
-@dataclass(frozen=True, eq=False)
-class SumOfSolutions(Solution):
-    """The sum of the values of two problems, whose eigenfunctions are apart; `pair` has the sum.
-
-    Attributes:
-        parts: of which it is the sum.
-    """
-
-    parts: tuple[Solution, ...] = ()
-
-    modes_tell = False
-
-    @cached_property
-    def error(self) -> float:
-        """That of the parts, and of the place."""
-        return sum(each.error for each in self.parts) + self.search
 
 
 @dataclass(frozen=True, eq=False)

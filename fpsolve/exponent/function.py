@@ -24,14 +24,13 @@ from fpsolve.exponent.error import MEANINGLESS, Absent, Estimate, Failure, Momen
 from fpsolve.exponent.solver import TINY_P, ExponentSolver, MomentLyapunov, best_order, missed, of_the_start, solver_of
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import Code, Message, Remedy, message_of
-from fpsolve.model.problem import Problem, checked_moments, tails_refused
+from fpsolve.model.problem import Problem, checked_moments, negative_refused, tails_refused
 from fpsolve.model.quantity import DERIVATIVE, MOMENT, SECOND_DERIVATIVE, STABILITY_INDEX, P, moment_at
 
 if TYPE_CHECKING:
     import xarray
 
 SEARCH_INTERVAL: tuple[float, float] = (-20.0, 20.0)
-LEAST_SLOPE = 1e-100
 MOST_STEPS = 100
 OUTWARD = 4.0
 """The first p at most; others are at most twice as far out as the one before, as Λ(p) costs more there."""
@@ -114,7 +113,7 @@ class MomentLyapunovFunction(Result):
         slope = np.array([self._known[p].derivative for p in self.nodes.tolist()])
         columns = self.nodes, self.nodes * self._values, slope, np.abs(self.nodes) * self._errors
         if obstacle := broken_convexity(*columns, lambda: self._slope_errors) or contradiction(self.solver, *columns):
-            raise NotConverged(obstacle, remedy=self.solver.near.refinement)
+            raise NotConverged(obstacle, remedy=self.solver.refinement)
 
     def __call__(self, p: ArrayLike) -> FloatArray:
         """Λ(p), per unit time, of the shape of p. Raises `ValueError` outside the interval."""
@@ -166,7 +165,7 @@ class MomentLyapunovFunction(Result):
         is_meaningless = ~(error <= MEANINGLESS * np.maximum(np.abs(value), scale)) & (points != 0)
         for i in np.flatnonzero(is_meaningless):
             estimate = Estimate(float(value[i]), float(error[i]), float(scale[i]), quantity=moment_at(points[i]))
-            checked(estimate, self.solver.near.refinement, float(points[i]))
+            checked(estimate, self.solver.refinement, float(points[i]))
         return MomentLyapunov(
             p=points,
             value=value,
@@ -356,7 +355,9 @@ def nonzero_root(
         return Absent(told)
     noise = solver.problem.noise
     ends = low, high = tuple(float(end) for end in np.clip(interval, *solver.problem.moments))
-    if solver.classes and solver.lyapunov_exponent().value < 0:  # p > 0, where Λ(p) is the largest of theirs
+    if solver.classes:  # for p > 0 Λ(p) is the largest of theirs
+        if len(solver.classes) > 1 and solver.lyapunov_exponent().value > 0:
+            return Absent(negative_refused(solver.problem))
         roots = [nonzero_root(each, interval) for each in solver.classes if each.problem.system.driven_by]
         if known := [each for each in roots if each]:
             return min(known, key=lambda each: each.value)
@@ -377,7 +378,7 @@ def nonzero_root(
     for _ in range(MOST_STEPS):
         tried.add(p)
         try:
-            is_rough = p in outward and solver.mesh is None and not solver.classes and tolerance is None
+            is_rough = p in outward and solver.mesh is None and tolerance is None
             ratio, slope, error = _rough_ratio(solver, p) if is_rough else _precise_ratio(solver, p, tolerance)
         except (NotConverged, OverBudget) as failure:
             if len(sides := signed & {low, high}) != 1 or not low < high:
@@ -390,19 +391,17 @@ def nonzero_root(
             p = 0.5 * (inner + p)
             continue
         signed.add(p)
-        if solver.classes:  # Λ(p)/p may be constant
-            slope = max(slope, LEAST_SLOPE)
         if not slope > 0:
-            raise NotConverged(Message(Code.NOT_INCREASING, p=p), remedy=solver.near.refinement)
+            raise NotConverged(Message(Code.NOT_INCREASING, p=p), remedy=solver.refinement)
         new = p - ratio / slope
         least = 1e-13 * max(1.0, abs(p))
         if abs(new - p) <= max(least, 0.1 * error / slope) or 0 < high - low <= 10 * least:
             found = Estimate(p, error / slope + abs(new - p), scale=1.0, quantity=STABILITY_INDEX)
-            if found.relative_error <= solver.rtol or tolerance or solver.mesh is not None or solver.classes:
+            if found.relative_error <= solver.rtol or tolerance or solver.mesh is not None:
                 curve = (np.array([number]) for number in (p, p * ratio, ratio + p * slope, abs(p) * error))
                 if obstacle := contradiction(solver, *curve):
-                    raise NotConverged(obstacle, remedy=solver.near.refinement)
-                return checked(found, solver.near.refinement)
+                    raise NotConverged(obstacle, remedy=solver.refinement)
+                return checked(found, solver.refinement)
             tolerance = partial(_share_of, PRECISE * solver.rtol * slope * max(1.0, abs(p)))
             low, high = max(ends[0], low - 2 * found.error_estimate), min(ends[1], high + 2 * found.error_estimate)
             continue
@@ -420,7 +419,7 @@ def nonzero_root(
             new = 0.5 * (low + high)
         steps.append(abs(new - p))
         p = new
-    raise NotConverged(Message(Code.INDEX_UNSETTLED, p=p), remedy=solver.near.refinement)
+    raise NotConverged(Message(Code.INDEX_UNSETTLED, p=p), remedy=solver.refinement)
 
 
 def _rough_ratio(solver: ExponentSolver, p: float) -> tuple[float, float, float]:
@@ -485,7 +484,8 @@ def moment_lyapunov(
     solver = solver_of(problem, mesh, rtol, budget)
     result = solve_moments(solver, real_numbers(p, "p"))
     if result.failures:
-        raise NotConverged(Message(Code.SEVERAL, reasons=[failure.reason for failure in result.failures]), result)
+        reasons = [*dict.fromkeys(failure.reason for failure in result.failures)]
+        raise NotConverged(Message(Code.SEVERAL, reasons=reasons), result)
     return result
 
 
@@ -545,7 +545,7 @@ def _one_by_one(
     if not result.failures:
         obstacle = broken_convexity(*columns, lambda: result.derivative_error) or contradiction(solver, *columns)
     if obstacle:
-        return replace(result, failures=(Failure(None, message_of(obstacle).advising(solver.near.refinement)),))
+        return replace(result, failures=(Failure(None, message_of(obstacle).advising(solver.refinement)),))
     failures = tuple(failure for failure in result.failures if failure.p != 0)
     if len(failures) == len(result.failures):
         return result

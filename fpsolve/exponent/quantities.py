@@ -74,7 +74,7 @@ def impact_rate(solver: ExponentSolver, jump: int | None = None) -> Estimate | A
     usual = generator.unit_rate / math.pi
     rounding, lost = 10 * _EPS * max(usual, better), _EPS * generator.loss * usual
     error = abs(better - value) + (rounding if better > lost else lost)
-    return checked(Estimate(better, error, usual, quantity=quantity.IMPACT_RATE), solver.near.refinement)
+    return checked(Estimate(better, error, usual, quantity=quantity.IMPACT_RATE), solver.refinement)
 
 
 @one_number("R_c")
@@ -96,7 +96,7 @@ def critical_impact_factor(solver: ExponentSolver, jump: int | None = None) -> E
     value = math.exp(log.value)
     error = value * math.expm1(min(log.error_estimate, LARGEST_LOG))
     found = Estimate(value, error, value * max(1.0, log.scale), quantity=quantity.CRITICAL_IMPACT_FACTOR)
-    return checked(found, solver.near.refinement)
+    return checked(found, solver.refinement)
 
 
 @one_number("r_c")
@@ -127,7 +127,7 @@ def critical_restitution(solver: ExponentSolver, jump: int | None = None) -> Est
         return Absent(Message(Code.ALWAYS_UNSTABLE, symbol=system.impact_symbol, value=value))
     slope = system.impact_slope(log.value)
     error, scale = slope * log.error_estimate + _EPS, max(1.0, slope * log.scale)
-    return checked(Estimate(value, error, scale, quantity=quantity.CRITICAL_RESTITUTION), solver.near.refinement)
+    return checked(Estimate(value, error, scale, quantity=quantity.CRITICAL_RESTITUTION), solver.refinement)
 
 
 def _ray(solver: ExponentSolver, jump: int | None) -> int | None:

@@ -27,12 +27,18 @@ from fpsolve.exponent.adapt import (
 )
 from fpsolve.exponent.eigen import Bordered, PrincipalPair, second_derivative, slope_rounding
 from fpsolve.exponent.error import Estimate, Failure, Moment, Solution, checked, slope_error
-from fpsolve.exponent.joint import joint_solution
 from fpsolve.fem.factors import one_thread
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import ALMOST_EVERY, Code, Message, Remedy
 from fpsolve.model import quantity
-from fpsolve.model.problem import Problem, checked_moments, checked_problem, refuse_infinite, refuse_tails
+from fpsolve.model.problem import (
+    Problem,
+    checked_moments,
+    checked_problem,
+    negative_refused,
+    refuse_infinite,
+    refuse_tails,
+)
 from fpsolve.theory.moments import EvenMoment, even_moment
 from fpsolve.theory.perturbation import Scale, scale_of
 
@@ -46,7 +52,7 @@ SURELY, ROUNDED = 10.0, 1e-6
 TINY_P = 1e-3
 """Below it Λ(p)/p is a mean of Λ′, as rounding is not proportional to p."""
 TINIEST_P = 1e-9
-"""For p < 0 of smaller size Λ(p)/p is that of p = 0 also where several classes compete."""
+"""For smaller |p| the error of Λ(p), which falls as p, has no scale, which may fall as p²."""
 
 _KINDS: Sequence[tuple[str, Any, str]] = (
     ("mesh", CylinderMesh | None, "a CylinderMesh, or None"),
@@ -214,6 +220,11 @@ class ExponentSolver:
         return NearPlace(self.problem, mesh=self.mesh, starts=self.starts, **self._own)
 
     @property
+    def refinement(self) -> Remedy:
+        """What to do where it should be resolved better."""
+        return Remedy.SMALLER_RTOL if self.mesh is None else Remedy.MESH
+
+    @property
     def _own(self) -> dict[str, Any]:
         tolerance = partial(tolerated, self.rtol, self.scales)  # not a method: a cycle would keep matrices for long
         return {"rtol": self.rtol, "budget": self.budget, "tolerance": tolerance}
@@ -243,18 +254,17 @@ class ExponentSolver:
         carried on since, E‖Φ_i R_ij x_j‖^p ~ exp(Λ_i(p)(t − s) + Λ_j(p) s) at most, and by Minkowski's inequality for
         p ≥ 1, or |a + b|^p ≤ |a|^p + |b|^p for p < 1, E‖x_i‖^p grows as the largest of these, but for powers of t. It
         grows no slower: two starts that differ in x_i alone differ by Φ_i of that for ever, so that E‖x‖^p of one of
-        them grows as Λ_i(p). For p < 0 see `joint`.
+        them grows as Λ_i(p). For p < 0 it depends on how the x_i grow together, and is refused.
 
         Raises:
             NoSuchExponent: Λ(p) is infinite.
-            NotConverged: the mesh does not resolve the problem, or the budget does not suffice to find one; or for
-                p < 0 more of several classes counts than their Λ(p).
+            NotConverged: the mesh does not resolve the problem, or the budget does not suffice to find one; or p < 0,
+                of several classes.
         """
         point = real_number(p, "p")
         refuse_infinite(self.problem, point)
-        if -TINIEST_P < point < 0 and len(self.classes) > 1:
-            point = 0.0
         point = solved_p(point)
+        self._refuse_negative(point)
         if not self.classes:
             try:
                 found = self.near.solution(point, tolerance)
@@ -264,16 +274,14 @@ class ExponentSolver:
                 raise
             self._witness(point, found.pair.value, found.error)
             return found
-        if point < 0 and len(self.classes) > 1:
-            return self._joint(point, tolerance)[0]
-        of_each = [each.solution(point, tolerance) for each in self.classes]
-        return max(of_each, key=lambda each: each.pair.value if point else each.pair.derivative)
+        of_each, is_zero = [each.solution(point, tolerance) for each in self.classes], abs(point) < TINIEST_P
+        return max(of_each, key=lambda each: each.pair.derivative if is_zero else each.pair.value / point)
 
     def _witness(self, p: float, value: float, error: float) -> None:
         """Refuse a value with this error that contradicts the even moment of the same p."""
         if (known := self.even(p)) and abs(value - known.value) > self.doubt(error, known):
             told = {"p": p, "value": value, "other": p, "expected": known.value}
-            raise NotConverged(Message(Code.NOT_PRINCIPAL, **told), remedy=self.near.refinement)
+            raise NotConverged(Message(Code.NOT_PRINCIPAL, **told), remedy=self.refinement)
 
     def even(self, p: float) -> EvenMoment | None:
         """Λ(p) of an even p > 0 by the equations of the moments; None where these do not close, or are too many.
@@ -302,31 +310,24 @@ class ExponentSolver:
 
         Raises:
             NoSuchExponent: it is that of two classes, so that Λ(p) has no derivatives by parameters.
-            NotConverged: it is that of none of them; or as `solution`.
+            NotConverged: as `solution`.
         """
         if len(self.classes) < 2:
             return self.classes[0] if self.classes else self
-        if p < 0:
-            _, number = self._joint(p, None)
-            if number is None:
-                raise NotConverged(Message(Code.BETWEEN_CLASSES, p=p))
-            return self.classes[number]
+        self._refuse_negative(p)
         rates = [each.ratio_alone(p) for each in self.classes]
         best, second = sorted(range(len(rates)), key=lambda k: -rates[k][0])[:2]
         if rates[best][0] - rates[second][0] <= rates[best][1] + rates[second][1]:
             raise NoSuchExponent(Message(Code.KINK, p=p or None))
         return self.classes[best]
 
-    def _joint(self, p: float, tolerance: Tolerance | None) -> tuple[Solution, int | None]:
-        """Λ(p) of several classes for p < 0, and the number of the class that has it, if one has."""
-
-        def solve(problem: Problem) -> Solution:
-            return ExponentSolver(problem, self.mesh, **self._usual).solution(p, tolerance)
-
-        return joint_solution(self.problem, self.classes, solve, p, tolerance)
+    def _refuse_negative(self, p: float) -> None:
+        """Refuse p < 0 of several classes, one of which a noise drives. Raises `NotConverged`."""
+        if p < self.problem.moments[0] - TINIEST_P:  # 0 but for rounding
+            raise NotConverged(negative_refused(self.problem))
 
     def by_class(self, p: ArrayLike) -> tuple[InvariantClass, ...]:
-        """λ and Λ(p) of the `classes`; nothing where there are none. Raises `NotConverged`."""
+        """λ and Λ(p) of the `classes`, for p < 0 too; nothing where there are none. Raises `NotConverged`."""
         points, found = real_numbers(p, "p", may_be_empty=True), []
         phases = self.problem.invariant_rays
         for number, (block, each) in enumerate(zip(self.problem.blocks, self.classes, strict=True)):
@@ -395,7 +396,7 @@ class ExponentSolver:
                 solution = self.solution(point)
                 estimate, pair = self.estimate(point, solution), solution.pair
                 if abs(point) >= TINIEST_P and not even:  # else Λ has no scale
-                    checked(estimate, self.near.refinement, point)
+                    checked(estimate, self.refinement, point)
                 number, error = (even.value, even.error) if even else (estimate.value, estimate.error_estimate)
                 solved[i] = pair
                 rows[i] = known[point] = Moment(number, pair.derivative, math.nan, error, pair.residual)
@@ -470,7 +471,7 @@ class ExponentSolver:
             raise
         meaning = ALMOST_EVERY if self.problem.has_algebraic_tails else ""
         found = Estimate(value, error, self.scales.linear, meaning, quantity.LYAPUNOV_EXPONENT)
-        return checked(found, self.near.refinement)
+        return checked(found, self.refinement)
 
     @one_number("Λ″(0)")
     def variance_rate(self) -> Estimate:
@@ -493,7 +494,7 @@ class ExponentSolver:
         value, better = self.around_zero.second_derivative, self.finer_around_zero.second_derivative
         rounding = 10 * sys.float_info.epsilon * max(scale, abs(better))
         error = abs(better - value) + rounding
-        return checked(Estimate(better, error, scale, quantity=quantity.VARIANCE_RATE), self.near.refinement)
+        return checked(Estimate(better, error, scale, quantity=quantity.VARIANCE_RATE), self.refinement)
 
     @cached_property
     def around_zero(self) -> Bordered:
@@ -525,12 +526,12 @@ class ExponentSolver:
         """
         if self.problem.dimension > 2 and (known := self.even(p)):
             return known.value / p, known.error / p
-        if abs(p) >= TINY_P or (p <= -TINIEST_P and len(self.classes) > 1):
+        self._refuse_negative(p)
+        if abs(p) >= TINY_P:
             solution = self._nearest(p, tolerance)
             return solution.pair.value / p, solution.error / abs(p)
         if self.classes:
-            value, error = max(each.ratio_alone(p, tolerance) for each in self.classes)
-            return value, error + (max(each.ratio_alone(0.0)[0] for each in self.classes) - value if p < 0 else 0.0)
+            return max(each.ratio_alone(p, tolerance) for each in self.classes)
         points = {p * (0.5 + shift) for shift in (-0.5 / math.sqrt(3), 0.5 / math.sqrt(3))}
         pairs = [self.near.solution(point, tolerance).pair for point in points]
         near = self.near.near_zero(p, tolerance)

@@ -28,7 +28,6 @@ from fpsolve.model.plane import (
     Impulse,
     ImpulseDerivative,
     Jump,
-    LinearMotion,
     System,
     Xi,
     affine,
@@ -399,8 +398,11 @@ class Problem:
 
     @property
     def block_names(self) -> tuple[str, ...]:
-        """The blocks of variables as sentences have them: "(x, v)"."""
-        return tuple(f"({', '.join(block.names)})" for block in self.blocks)
+        """The blocks as sentences have them: "(x, v)", "along the ray at phi = 1.5708"."""
+        if not (rays := self.invariant_rays):
+            return tuple(f"({', '.join(block.names)})" for block in self.blocks)
+        sides = [("along", phase) for phase in rays] + [("across", rays[0])]
+        return tuple(f"{side} the ray at phi = {phase:.6g}" for side, phase in sides[: len(self.blocks)])
 
     def _noise_of(self, system: System) -> Noise:
         """The noises that drive a part of the system; the first one where none does."""
@@ -442,26 +444,6 @@ class Problem:
                 parts[name] = parts.get(name, 0.0) + c * self.system.epsilon**term.order * np.array(term.matrix)
         return [*parts.values()]
 
-    def mixed(self, first: Problem, second: Problem, share: float) -> Problem:
-        """d ln a/dt = θ a₁ + (1 − θ) a₂ of two `classes` of one coordinate each, θ the share of the first.
-
-        As for these the system is ẋ = (θ a₁ + (1 − θ) a₂ + J) x, J a uniform rotation.
-        """
-        terms, pairs = [first.system.terms[0]], ((share, first), (1 - share, second))
-        for size, each in pairs:
-            terms += [replace(term, matrix=(size * np.array(term.matrix)).tolist()) for term in each.system.terms[1:]]
-        system = LinearMotion(self.system.epsilon, tuple(terms))
-        made = Problem(system, self._noise_of(system))
-        if first.diffusions or second.diffusions:  # what Itô's sense takes from the drift is not linear in the rates
-            rest = sum(size * each.drift_rate for size, each in pairs) - made.drift_rate
-            terms.append(CoefficientMatrix(0, ((rest, 0.0), (0.0, rest))))
-        return Problem(LinearMotion(self.system.epsilon, tuple(terms)), made.noise)
-
-    @property
-    def drift_rate(self) -> float:
-        """The sum of the first entries of the terms of the drift."""
-        return sum(self.drift.epsilon**each.order * each.matrix[0][0] for each in self.drift.terms)
-
     @property
     def is_driven(self) -> bool:
         """Whether a noise moves the state; one of strength 0 does not, and Λ(p) is p times the growth rate."""
@@ -477,7 +459,7 @@ class Problem:
         """The p for which Λ(p) is computed, as a closed interval."""
         if self.has_algebraic_tails:
             return 0.0, 0.0
-        return (-1.0 if len(self.blocks) > len(self.invariant_rays) > 0 else -math.inf), math.inf
+        return (0.0 if len(self.blocks) > 1 and self.is_driven else -math.inf), math.inf
 
     @property
     def halves(self) -> tuple[Parametrised, ...]:
@@ -659,18 +641,20 @@ def refuse_tails(problem: Problem, what: str) -> None:
 
 
 def refuse_infinite(problem: Problem, p: float) -> None:
-    """Refuse a p for which E‖x‖^p is infinite, or Λ(p) not computed.
+    """Refuse a p for which E‖x‖^p is infinite, or of any sign not computed.
 
     Raises:
-        NoSuchExponent: p is not among the `moments` of the problem, or the phase never leaves the ray of a jump.
+        NoSuchExponent: p ≠ 0, and the noise has algebraic tails; or jumps, and the phase never leaves some ray.
     """
     if p:
         refuse_tails(problem, moment_at(p).symbol)
-    system = problem.motion
-    if problem.invariant_rays:
-        has_jumps = any(jump.log_factor for jump in system.jumps)
-        if has_jumps or p < problem.moments[0]:
-            raise NoSuchExponent(Message(Code.INVARIANT_RAY, p=p, phase=problem.invariant_ray, has_jumps=has_jumps))
+    if problem.invariant_rays and any(jump.log_factor for jump in problem.motion.jumps):
+        raise NoSuchExponent(Message(Code.INVARIANT_RAY, p=p, phase=problem.invariant_ray))
+
+
+def negative_refused(problem: Problem) -> Message:
+    """Why Λ(p) for p < 0 is not computed where a problem has several `blocks`."""
+    return Message(Code.NEGATIVE_OF_SEVERAL, parts=problem.block_names)
 
 
 def checked_moments(p: ArrayLike, problem: Problem, *, may_be_empty: bool = False) -> FloatArray:

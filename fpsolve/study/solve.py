@@ -421,7 +421,7 @@ def _functions(
         if stationary is not None:
             stationary_density(stationary)
     except NotConverged as failure:
-        remedy = solver.near.refinement
+        remedy = solver.refinement
         return pairs, None, [Message(Code.NOTHING_DRAWN, reason=failure.reason, remedy=remedy)]
     return pairs, stationary, []
 

@@ -5,7 +5,6 @@ from functools import partial
 
 import numpy as np
 import pytest
-from scipy.optimize import brentq, minimize_scalar
 
 from fpsolve import (
     OrnsteinUhlenbeck,
@@ -20,8 +19,10 @@ from fpsolve.analysis import Axis
 from fpsolve.arrays import identity
 from fpsolve.errors import NoSuchExponent, NotConverged
 from fpsolve.exponent.adapt import Budget
+from fpsolve.exponent.function import nonzero_root
 from fpsolve.exponent.modes import SpherePlace
 from fpsolve.exponent.solver import ExponentSolver, tolerated
+from fpsolve.messages import Code
 from fpsolve.model import CoefficientMatrix, LinearSystem, ModalSystem, Telegraph, White
 from fpsolve.theory.perturbation import scale_of
 from tests.oracles import kronecker
@@ -146,15 +147,15 @@ def test_a_driven_block_as_one_system_states_a_true_error(rtol):
 
 @pytest.mark.slow
 def test_blocks_against_a_simulation():
-    """λ, Λ(1) and Λ(−0.5) where one block decays much sooner than the other, so that paths forget it."""
+    """λ and Λ(1) where one block decays much sooner than the other, so that paths forget it."""
     steady, driven = (matrix.copy() for matrix in CASCADE)
     steady[3, 3] = -1.2
     whole = problem(White(s=1.0), steady, driven)
     solver, made = ExponentSolver(whole), by_simulation(whole, path_steps=1e7)
     rate = solver.lyapunov_exponent().value
     assert abs(made.lyapunov_exponent - rate) < 4 * made.lyapunov_exponent_error
-    for each in made.estimates:
-        assert abs(each.value - solver.solution(each.p).pair.value) < 4 * each.standard_error
+    found = next(each for each in made.estimates if each.p == 1.0)
+    assert abs(found.value - solver.solution(1.0).pair.value) < 4 * found.standard_error
 
 
 def test_the_largest_class_changes_with_p():
@@ -173,67 +174,35 @@ def test_the_largest_class_changes_with_p():
     assert index.value == pytest.approx(stability_index(plane.problem).value, rel=1e-7)
 
 
-def test_negative_moments_with_a_part_that_no_noise_drives():
-    """Λ(p) of the oscillator as far as its slope is above the rate c of z, then c p and a constant."""
-    plane, c = ExponentSolver(problem(White(s=1.0), *OSCILLATOR)), -0.1
-    steady, driven = np.diag([0.0, 0.0, c]), np.zeros((3, 3))
-    steady[:2, :2], driven[:2, :2], steady[2, 0] = *OSCILLATOR, 1.0
-    solver = ExponentSolver(problem(White(s=1.0), steady, driven))
-    turn = brentq(lambda p: plane.solution(p).pair.derivative - c, -0.9, -0.1)
-    assert solver.solution(0.5 * turn).pair.value == pytest.approx(plane.solution(0.5 * turn).pair.value, abs=1e-12)
-    for p in (-0.7, -1.0):
-        found = solver.solution(p)
-        assert found.pair.value == pytest.approx(plane.solution(turn).pair.value + c * (p - turn), abs=1e-9)
-        assert found.pair.derivative == pytest.approx(c, abs=1e-6)
-    with pytest.raises(NotConverged, match="rare cancellations"):
-        solver.solution(-1.5)
-    with pytest.raises(NotConverged, match="two parts of the motion grow alike"):
-        solver.leading(-0.7)
-    assert solver.leading(0.5 * turn) is solver.classes[0]
+@pytest.mark.parametrize("name", SYSTEMS)
+def test_negative_moments_are_refused_alone(name):
+    """One sentence for all p < 0; the other p, and each block by itself stay."""
+    solver = ExponentSolver(problem(White(s=1.0), *SYSTEMS[name]))
+    with pytest.raises(NotConverged, match=r"for p < 0 is not computed: .* choose p >= 0, or solve each") as failure:
+        moment_lyapunov(solver.problem, [-1.0, -1e-6, 0.5, 2.0])
+    assert str(failure.value).count("\n") == 0
+    assert failure.value.partial.p.tolist() == [0.5, 2.0]
+    assert {each.reason.code for each in solver.moments([-1.0, 0.5]).failures} == {Code.NEGATIVE_OF_SEVERAL}
+    for refused in (solver.ratio, solver.leading):
+        with pytest.raises(NotConverged, match="for p < 0 is not computed"):
+            refused(-0.5)
+    assert [each.value.size for each in solver.by_class([-1.0, 2.0])] == [2, 2]
 
 
-def test_negative_moments_of_parts_with_noises_of_their_own():
-    """min Λ₁(pθ) + Λ₂(p(1 − θ)) over θ, of an oscillator and of ẏ = −0.09y + 0.3ηy, Λ₂ = −0.09p + 0.045p²."""
-    plane = ExponentSolver(problem(White(s=1.0), *OSCILLATOR))
-    rates = "v", "-x - 0.3*v - 0.8*xi*x", "-0.09*y + 0.3*eta*y"
-    system = PlaneSystem.of_equations(("x", "v", "y"), rates, noises={"xi": "noise.one", "eta": "noise.two"})
-    solver = ExponentSolver(Problem(system, {"one": White(s=1.0), "two": White(s=1.0)}))
-    for p in (-0.8, -2.0):
-
-        def total(share, p=p):
-            rest = p * (1 - share)
-            return plane.solution(p * share).pair.value - 0.09 * rest + 0.045 * rest**2
-
-        least = minimize_scalar(total, bounds=(0, 1), method="bounded", options={"xatol": 1e-6})
-        assert 0.01 < least.x < 0.99
-        found = solver.solution(p)
-        assert found.pair.value == pytest.approx(least.fun, abs=1e-8)
-        step = (solver.solution(p + 1e-3).pair.value - solver.solution(p - 1e-3).pair.value) / 2e-3
-        assert found.pair.derivative == pytest.approx(step, abs=1e-5)
-
-
-def test_negative_moments_under_one_noise():
-    """That of the slower block is Λ(p) as long as entropy leaves the other one behind; at p = −2 it does not."""
+def test_a_moment_takes_no_other_solve():
+    """What a message would advise needs no λ."""
     solver = ExponentSolver(problem(White(s=1.0), *PAIRS))
-    for p in (-0.2, -0.5):
-        assert solver.solution(p).pair.value == solver.classes[0].solution(p).pair.value
-    with pytest.raises(NotConverged, match="under the noise that they share") as failure:
-        moment_lyapunov(solver.problem, [-2.0, 1.0])
-    assert failure.value.partial.p.tolist() == [1.0]
+    assert solver.moments([2.0]).value.size == 1
+    assert [[*each.near.known] for each in solver.classes] == [[2.0], [2.0]]
 
 
-@pytest.mark.parametrize("p", [-0.3, -0.6])
-def test_negative_moments_that_are_known_in_closed_form(p):
-    """Of ẋ_i = (a_i + b_i ξ) x_i: the one with the least Λ_i where the others are left behind on its paths.
-
-    On the paths that carry E|x₁|^p ∫ξ dt grows as p b₁S(0)t, so that ln |x_i| grows as a_i + p b₁b_i S(0).
-    """
-    a, b, density = np.array([-0.1, -1.0, -1.5]), np.array([0.4, -0.3, 0.2]), OU.spectral_density(0.0)
-    rates = a + p * b[0] * b * density
-    assert rates[0] > max(rates[1:])
-    found = moment_lyapunov(problem(OU, np.diag(a), np.diag(b)), p)
-    expected = p * a[0] + 0.5 * (p * b[0]) ** 2 * density
-    assert abs(found.value[0] - expected) <= found.error_estimate[0] + 1e-12
+def test_a_negative_index_is_absent():
+    """λ > 0: δ_p is below 0, and is not looked for; λ is that of the faster block."""
+    solver = ExponentSolver(problem(White(s=2.0), *PAIRS))
+    assert solver.lyapunov_exponent().value > 0
+    index = nonzero_root(solver)
+    assert not index
+    assert index.reason.code is Code.NEGATIVE_OF_SEVERAL
 
 
 def of_equations(**changed):
@@ -245,7 +214,7 @@ def of_equations(**changed):
 
 def test_sensitivities_are_those_of_the_largest_block():
     whole = Problem(of_equations(), White(s=0.6))
-    found, step = sensitivities(whole, [1.0, -0.5], rtol=1e-9), 1e-4
+    found, step = sensitivities(whole, [1.0, 2.5], rtol=1e-9), 1e-4
     assert [str(note) for note in found.notes if "system.kappa" in note and "any other value" in note]
     assert set(found.theta) == {"system.a", "system.zeta", "system.b", "system.c", "noise.s"}
     for key, value in found.theta.items():

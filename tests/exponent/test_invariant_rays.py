@@ -75,74 +75,13 @@ def test_one_number_for_all_rays():
     np.testing.assert_allclose(found.value, [scalar(NOISES["OU"], p, -0.1, 1.0) for p in (-2.0, 2.0)], atol=1e-9)
 
 
-def smaller_moment(noise, p, blocks):
-    """lim ln E min(e^(pa), e^(pb))/t, for a and b of one Gaussian W(t), by its integral at t = 2,000 and 4,000.
-
-    The integral is carried by one end, or by the W at which a = b; then it has a factor t^(−½).
-    """
-    (first, strong), (second, weak) = blocks
-    density = noise.spectral_density(0.0)
-
-    def log_mean(time):
-        w = np.linspace(-6, 6, 400_001) * density * time
-        exponent = np.minimum(p * (first * time + strong * w), p * (second * time + weak * w)) - 0.5 * w**2 / (
-            density * time
-        )
-        return exponent.max() + math.log(np.trapezoid(np.exp(exponent - exponent.max()), w)) - 0.5 * math.log(time)
-
-    return (log_mean(4000.0) - log_mean(2000.0)) / 2000.0
-
-
-@pytest.mark.parametrize("name", ["triangular", "diagonal", "the other way"])
-@pytest.mark.parametrize("p", [-1.0, -0.6])
-def test_negative_moments_are_the_smaller_of_two(name, p):
-    """Between the ends too: of a = −0.3t + 0.4W and b = −0.1t + W that where a = b decides at p = −1."""
-    own, blocks = SYSTEMS[name]
-    expected = smaller_moment(NOISES["OU"], p, blocks)
-    for noise in (NOISES["OU"], NOISES["white"]):
-        solver = ExponentSolver(Problem(turned(own, 0.7), noise))
-        found = solver.solution(p)
-        assert found.error < 1e-8
-        assert found.pair.value == pytest.approx(expected, abs=2e-4)  # ln 2/(2 · 2,000) where a = b
-        slope = (solver.solution(p + 1e-3).pair.value - solver.solution(p - 1e-3 * (p > -1)).pair.value) / (
-            1e-3 * (1 + (p > -1))
-        )
-        assert found.pair.derivative == pytest.approx(slope, abs=2e-3)
-
-
-def test_negative_moments_in_the_sense_of_ito():
-    """That of Itô is that of Stratonovich with −½s²k² in the rates, also between two rates."""
-    own, _ = SYSTEMS["diagonal"]
-    noise = White(0.7, "ito")
-    moved = PlaneSystem([*own.terms, CoefficientMatrix(0, ((0.5 * 0.49 * 0.16, 0.0), (0.0, 0.5 * 0.49)))])
-    for p in (-0.9, -3.0):
-        found, expected = (
-            ExponentSolver(Problem(*each)).solution(p) for each in ((moved, noise), (own, NOISES["white"]))
-        )
-        assert found.pair.value == pytest.approx(expected.pair.value, abs=1e-10)
-
-
-@pytest.mark.slow
-def test_negative_moments_are_the_limit_of_systems_without_such_a_ray():
-    """Λ(p) for −1 < p < 0 is continuous where the ray ceases to be invariant: a second method on each side."""
-    free, driven = ((-0.3, 0.0), (0.5, -0.1)), ((0.4, 0.0), (0.2, 1.0))
-    whole = ExponentSolver(Problem(system(free, driven), NOISES["white"])).solution(-0.5).pair.value
-    off = [
-        whole
-        - ExponentSolver(Problem(system(((-0.3, size), free[1]), driven), NOISES["white"])).solution(-0.5).pair.value
-        for size in (1e-2, 1e-3, 1e-4)
-    ]
-    assert 0 < off[2] < off[1] / 3 < off[0] / 9
-    assert off[2] < 3e-3
-
-
 def test_classes_have_names():
     own, blocks = SYSTEMS["triangular"]
     p = np.array([-0.5, 2.0])
     across, along = blocks  # (0, 1) spans what is invariant
-    found = moment_lyapunov(Problem(own, NOISES["OU"]), p)
-    assert [each.is_along for each in found.classes] == [True, False]
-    for each, block in zip(found.classes, (along, across), strict=True):
+    found = ExponentSolver(Problem(own, NOISES["OU"])).by_class(p)
+    assert [each.is_along for each in found] == [True, False]
+    for each, block in zip(found, (along, across), strict=True):
         assert each.phase == pytest.approx(math.pi / 2)
         assert each.lyapunov_exponent.value == pytest.approx(block[0], abs=1e-9)
         np.testing.assert_allclose(each.value, [scalar(NOISES["OU"], one, *block) for one in p], atol=1e-9)
@@ -157,11 +96,10 @@ def test_classes_have_names():
 
 
 def test_one_rate_has_no_variance():
-    """ln ‖x‖ ≈ |W| for diag(ξ, −ξ): Λ″(0) is s² from the right, 0 from the left, and Λ(p) = 0 for p < 0."""
+    """ln ‖x‖ ≈ |W| for diag(ξ, −ξ): Λ″(0) is s² from the right, 0 from the left."""
     solver = ExponentSolver(Problem(system(((0.1, 0.0), (0.0, 0.1)), ((1.0, 0.0), (0.0, -1.0))), NOISES["white"]))
     with pytest.raises(NoSuchExponent, match=r"Λ″\(p\) jumps"):
         solver.variance_rate()
-    assert solver.solution(-2.0).pair.value == pytest.approx(-0.2, abs=1e-9)
     assert not nonzero_root(solver)
 
 
@@ -182,8 +120,9 @@ def test_derivatives_are_those_of_the_larger_rate():
 
 def test_refused():
     own, _ = SYSTEMS["triangular"]
-    with pytest.raises(NoSuchExponent, match=r"never leaves the ray at phi = 1\.5708, .* choose p >= -1"):
-        moment_lyapunov(Problem(own, NOISES["OU"]), -1.5)
+    with pytest.raises(NotConverged, match=r"along the ray at phi = 1\.5708, across .* choose p >= 0") as failure:
+        moment_lyapunov(Problem(own, NOISES["OU"]), [-0.5, 1.0, -1.5])
+    assert failure.value.partial.p.tolist() == [1.0]
     with pytest.raises(ValueError, match=r"does not pass the ray of a jump, phi = 1\.5708: .* remove the jump"):
         Problem(PlaneSystem(own.terms, [Jump(math.pi / 2, -0.1)]), NOISES["OU"])
     with pytest.raises(NoSuchExponent, match="remove the jumps"):

@@ -9,6 +9,7 @@ from fpsolve.case.case import load_case
 from fpsolve.messages import Code
 from fpsolve.output.records import record_of, result_of
 from fpsolve.output.tables import write_results
+from fpsolve.output.terminal import print_remarks
 from fpsolve.study.solve import Numerics, everything, solve_curve
 
 CASE = """
@@ -22,7 +23,7 @@ kind = "ornstein-uhlenbeck"
 alpha = 1.0
 standard_deviation = 0.5
 [moments]
-p = { start = -1.0, stop = 3.0, num = 5 }
+p = [0.0, 1.0, 2.0, 3.0]
 [output]
 quantities = ["moment", "lyapunov_exponent"]
 """
@@ -53,8 +54,7 @@ def test_both_classes_are_told_by_name_from_records_too(tmp_path):
         expected = p * growth + 0.25 * p**2 * strength**2
         np.testing.assert_allclose([row["value"] for row in found["moments"]], expected, atol=1e-9)
         assert [row["p"] for row in found["moments"]] == p.tolist()
-        assert np.all((total >= expected - 1e-9) | (p < 0))
-        assert np.all((total <= expected + 1e-9) | (p > 0))
+        assert np.all(total >= expected - 1e-9)
 
 
 BLOCKS = """
@@ -67,21 +67,27 @@ noises = { load = "noise.axial" }
 kind = "white"
 s = 0.8
 [moments]
-p = [-2.0, 1.0, 2.0]
+p = [-2.0, -0.5, 1.0, 2.0]
 [output]
 quantities = ["moment", "lyapunov_exponent", "stability_index", "sensitivities"]
 """
 
 
-def test_blocks_are_told_by_their_variables(tmp_path):
-    """Λ(1) and Λ(2) are those of x and v alone; Λ(−2) is not known, as y drives them."""
+def test_blocks_are_told_by_their_variables(tmp_path, capsys):
+    """Λ(1) and Λ(2) are those of x and v alone; p < 0 is told in one sentence."""
     path = tmp_path / "blocks.toml"
     path.write_text(BLOCKS, encoding="utf-8")
     case = load_case(path)
     [curve] = case.curves()
     result = solve_curve(curve, everything(case), Numerics.of(case)).result
     assert [note for note in result.notes if "the blocks of variables (y), (x, v) are solved one by one" in note]
-    assert [(each.p, each.reason.code) for each in result.failures] == [(-2.0, Code.CANCELLATIONS)]
+    assert [(each.p, each.reason.code) for each in result.failures] == [
+        (p, Code.NEGATIVE_OF_SEVERAL) for p in (-2.0, -0.5)
+    ]
+    print_remarks(case, [result])
+    said = capsys.readouterr().err
+    assert said.count("Λ(p) for p < 0 is not computed") == 1
+    assert "(y), (x, v) do not all drive each other" in " ".join(said.split())
     assert result_of(json.loads(json.dumps(record_of(result))), curve).classes[1].variables == ("x", "v")
     write_results(case, [result], tmp_path, {})
     [summary] = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))["curves"]
