@@ -9,8 +9,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, field, replace
-from functools import cached_property
-from typing import Annotated, NoReturn
+from functools import cached_property, partial
+from typing import Annotated, NoReturn, TypeVar
 
 import numpy as np
 from pydantic.dataclasses import dataclass as pydantic_dataclass
@@ -76,6 +76,9 @@ Tolerance = Callable[[float, float], float]
 """The largest error allowed, from p and a value of Λ(p)."""
 GROWTH = 1.5
 """A stage costs about this power of the number of unknowns, by the last one."""
+UNSOLVED = MeshError, NotConverged, SingularMatrix, np.linalg.LinAlgError
+"""What is raised where a discretisation does not have the principal pair, so that another one is tried."""
+Found = TypeVar("Found")
 
 
 @told_in_words
@@ -136,7 +139,7 @@ class NearPlace:
     tolerance: Tolerance
     starts: Mapping[float, Solution] = field(default_factory=dict)
     known: dict[float, Solution] = field(init=False, default_factory=dict)
-    _failed: dict[float, NotConverged] = field(init=False, default_factory=dict)
+    _failed: dict[float, Message] = field(init=False, default_factory=dict)
 
     def solution(self, p: float, tolerance: Tolerance | None = None) -> Solution:
         """The principal eigenpair at p and its error, within a tolerance, the usual one if none is given.
@@ -150,7 +153,7 @@ class NearPlace:
         """
         p = solved_p(p)
         if tolerance is None and p in self._failed:
-            raise self._failed[p]
+            raise NotConverged(self._failed[p])
         allowed = tolerance or self.tolerance
         if p not in self.known or (self.mesh is None and not self.meets(self.known[p], allowed)):
             try:
@@ -158,14 +161,14 @@ class NearPlace:
                     self.known[p] = _Search(self, p, allowed, under_way() or self.budget.countdown(f"Λ({p:g})")).found()
             except NotConverged as failure:
                 if tolerance is None:  # a tighter one may be out of reach where this is not
-                    self._failed[p] = failure
+                    self._failed[p] = failure.message
                 raise failure from None
             except MeshError as failure:
                 if self.mesh is not None:
                     raise
                 told = Message(Code.NOT_CONVERGED, p=p, reason=failure.message, remedy=self.remedy)
                 raise NotConverged(told) from failure
-            except np.linalg.LinAlgError as failure:
+            except (SingularMatrix, np.linalg.LinAlgError) as failure:
                 told = Message(Code.NOT_SOLVED, p=p, reason=str(failure), remedy=self.remedy)
                 raise NotConverged(told) from failure
             except MemoryError as failure:
@@ -203,8 +206,8 @@ class NearPlace:
             try:
                 with one_thread(), counted(self.budget.countdown(f"a finer Λ({pair.p:g})")):
                     return self.pair_on(type(pair.generator)(self.problem, chosen), pair.p, pair)
-            except MeshError as failure:
-                reason = failure.message
+            except (MeshError, SingularMatrix, np.linalg.LinAlgError) as failure:
+                reason = getattr(failure, "message", str(failure))
             except MemoryError:
                 raise NotConverged(Message(Code.NO_MEMORY), remedy=Remedy.MEMORY) from None
         raise NotConverged(Message(Code.NOT_FINER, p=pair.p, reason=reason, remedy=self.remedy))
@@ -250,10 +253,10 @@ class NearPlace:
         smaller = refined(solution, tolerance(pair.p, pair.value), 0)
         return smaller if smaller.size <= TRIM * generator.size else generator.chosen
 
-    def fits(self, generator: Generator, q: float, p: float) -> bool:
+    def fits(self, chosen: Discretisation, q: float, p: float) -> bool:
         """Whether what serves q is likely to serve p, or so small that it is worth a try."""
-        part, frozen = generator.chosen.noise, frozen_noise(self.problem)
-        if generator.size > WORTH_A_TRY and abs(p - q) > max(0.5, 0.4 * min(abs(p), abs(q))):
+        part, frozen = chosen.noise, frozen_noise(self.problem)
+        if chosen.size > WORTH_A_TRY and abs(p - q) > max(0.5, 0.4 * min(abs(p), abs(q))):
             return False
         if frozen is None or part.kind != "polynomials":
             return True
@@ -317,7 +320,7 @@ class _Search:
         halved = replace(chosen, phase=chosen.phase.doubled())
         if halved.size > min(MOST_HALVED, self.place.budget.unknowns):
             return found
-        finer = Solution(self.place.pair_on(Generator(self.place.problem, halved), self.p, found.pair))
+        finer = self.attempt(lambda: Solution(self.pair_on(halved, found.pair))) or self.run(halved)
         change = abs(finer.pair.value - found.pair.value)
         if change <= found.error:
             return found
@@ -332,11 +335,7 @@ class _Search:
             return None
         if _bases(start.pair.generator.problem) != _bases(problem):
             return None
-        try:
-            generator = Generator(problem, self.place.trimmed(start, self.tolerance))
-            return Solution(principal_pair(generator, self.p, start=start.pair))
-        except (NotConverged, MeshError):
-            return None
+        return self.attempt(lambda: Solution(self.pair_on(self.place.trimmed(start, self.tolerance), start.pair)))
 
     def from_nearest(self) -> Solution | None:
         """The solution with what was chosen for the nearest p, where that is likely to do."""
@@ -344,21 +343,31 @@ class _Search:
         if nearest is None:
             return None
         known = self.place.known[nearest]
-        generator = known.pair.generator
-        if (chosen := self.place.trimmed(known, self.tolerance)) is not generator.chosen:
-            generator = Generator(self.place.problem, chosen)
-        elif nearest == self.p:
+        generator, chosen = known.pair.generator, self.place.trimmed(known, self.tolerance)
+        if nearest == self.p and chosen is generator.chosen:
             return known
-        try:
-            return self.tried(generator) if self.place.fits(generator, nearest, self.p) else None
-        except NotConverged:
+        if not self.place.fits(chosen, nearest, self.p):
             return None
+        is_same, problem = chosen is generator.chosen, self.place.problem
+        return self.attempt(lambda: self.tried(generator if is_same else Generator(problem, chosen)))
 
     def tried(self, generator: Generator) -> Solution:
         """The solution with a generator, from those around p, or from the nearest one."""
         known = (solution.pair for solution in self.place.known.values())
         near = sorted(known, key=lambda pair: abs(pair.p - self.p))[:NEIGHBOURS]
         return Solution(self.place.pair_on(generator, self.p, near))
+
+    def pair_on(self, chosen: Discretisation, start: PrincipalPair | None) -> PrincipalPair:
+        """The principal pair on a discretisation."""
+        return principal_pair(Generator(self.place.problem, chosen), self.p, start=start)
+
+    def attempt(self, solve: Callable[[], Found]) -> Found | None:
+        """What is solved, or None where a discretisation does not have it, and the `failure` tells why."""
+        try:
+            return solve()
+        except UNSOLVED as failure:
+            self.failure = failure.with_traceback(None)  # which would keep this search, and all that it has found
+            return None
 
     def run(self, start: Solution | Discretisation) -> Solution:
         """A solution within the tolerance, the tilted density sought where a first discretisation, or a solution, is.
@@ -373,11 +382,9 @@ class _Search:
             chosen, pair = start, None
         while True:
             self.check(chosen)
-            try:
-                pair = principal_pair(Generator(self.place.problem, chosen), self.p, start=pair)
-            except (MeshError, NotConverged, SingularMatrix, np.linalg.LinAlgError) as failure:
-                self.failure, pair = failure, None
-                chosen = chosen.doubled(effects_of(failure))
+            pair = self.attempt(partial(self.pair_on, chosen, pair))
+            if pair is None:
+                chosen = chosen.doubled(effects_of(self.failure))
                 continue
             solution, allowed = Solution(pair), self.tolerance(self.p, pair.value)
             seems_enough = solution.error_by_modes <= allowed
@@ -470,7 +477,7 @@ def _phase(system: System, xi: Xi, digits: float, is_smooth: bool = False) -> Ph
     return PhaseCells(lines, np.full(lines.size - 1, degree))
 
 
-def effects_of(failure: Exception) -> Sequence[ModeEffects | None]:
+def effects_of(failure: Exception | None) -> Sequence[ModeEffects | None]:
     """Those of the pair that a failed search has reached; nothing where there is none."""
     pair = getattr(failure, "partial", None)
     return mode_effects(pair) if pair is not None and pair.residual <= BACKWARD_ERROR_LIMIT else ()

@@ -16,13 +16,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 import scipy.linalg
 
 from fpsolve.arrays import FloatArray
-from fpsolve.errors import MeshError, NoHierarchy, NotConverged, SingularMatrix
+from fpsolve.errors import NoHierarchy, NotConverged
 from fpsolve.exponent.adapt import SHARE, NearPlace, _Search
 from fpsolve.exponent.eigen import PrincipalPair, principal_pair
 from fpsolve.exponent.error import Solution, mode_effects
@@ -162,7 +163,7 @@ class SpherePlace(NearPlace):
     _levels: list[SphereGenerator] = field(init=False, default_factory=list)
     _pairs: list[PrincipalPair] = field(init=False, default_factory=list)
 
-    def fits(self, generator: Any, q: float, p: float) -> bool:
+    def fits(self, chosen: Discretisation, q: float, p: float) -> bool:
         """False: every p has waves of its own."""
         return False
 
@@ -186,11 +187,9 @@ class SpherePlace(NearPlace):
                 if enough is None:
                     raise
                 return enough
-            try:
-                pair = self._pair(level, search, pair)
-            except (NotConverged, SingularMatrix, MeshError) as failure:
-                search.failure, pair, steps = failure, None, []
-                level += 1
+            pair = search.attempt(partial(self._pair, level, search, pair))
+            if pair is None:
+                level, steps = level + 1, []
                 continue
             allowed = search.tolerance(search.p, pair.value)
             effects = mode_effects(pair)

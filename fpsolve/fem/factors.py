@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from functools import cache, partial
 from itertools import pairwise
+from threading import RLock
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -50,9 +51,23 @@ LARGEST_GROWTH = 1e3
 """Of the entries, by the norm of all, in an elimination that does not exchange rows of different levels."""
 
 
-def one_thread() -> Any:
-    """Keeps BLAS in the body from threads, which for the small blocks of an LU cost three times what they save."""
-    return _pools().limit(limits=1)
+_limited = RLock()
+
+
+@contextmanager
+def one_thread() -> Iterator[None]:
+    """Keeps BLAS in the body from threads, which for the small blocks of an LU cost three times what they save.
+
+    The limit is of the whole process: where bodies of several threads overlap, the first one sets it and lifts it.
+    """
+    if not _limited.acquire(blocking=False):
+        yield
+        return
+    try:
+        with _pools().limit(limits=1):
+            yield
+    finally:
+        _limited.release()
 
 
 @cache

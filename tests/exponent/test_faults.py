@@ -1,5 +1,9 @@
 """What goes wrong is said once, in the right words, and what is right is not lost."""
 
+import gc
+import traceback
+import weakref
+
 import numpy as np
 import pytest
 from scipy.sparse import csc_matrix
@@ -16,7 +20,7 @@ from fpsolve import (
 from fpsolve.analysis import adjoint_density, stationary_density
 from fpsolve.arrays import finite
 from fpsolve.errors import MeshError, NotConverged, NumericalFailure, SingularMatrix
-from fpsolve.exponent import eigen
+from fpsolve.exponent import adapt, eigen
 from fpsolve.exponent.adapt import Budget, NearPlace
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem.factors import sparse_lu
@@ -48,7 +52,7 @@ def test_a_density_that_is_none_is_refused():
     [
         (OverflowError("too large"), "beyond floating-point numbers"),
         (NumericalFailure("array must not contain infs or NaNs"), "beyond floating-point numbers"),
-        (SingularMatrix("Factor is exactly singular"), "beyond floating-point numbers"),
+        (SingularMatrix("Factor is exactly singular"), "cannot be solved"),
         (np.linalg.LinAlgError("singular"), "cannot be solved"),
         (MeshError("P_s underflows"), "did not converge: P_s underflows"),
     ],
@@ -57,6 +61,47 @@ def test_what_numbers_do_is_not_converged(monkeypatch, failure, words):
     monkeypatch.setattr(NearPlace, "searched", lambda *_: (_ for _ in ()).throw(failure))
     with pytest.raises(NotConverged, match=words):
         moment_lyapunov(FIG1, 2.0)
+
+
+@pytest.mark.parametrize("kind", [SingularMatrix, np.linalg.LinAlgError, MeshError, NotConverged])
+@pytest.mark.parametrize("place", ["alone", "after another p", "next to another problem", "on halved cells"])
+def test_one_space_that_fails_is_passed_by(monkeypatch, kind, place):
+    """Λ(2) does not depend on a space without a pair, whatever it is tried for."""
+    alone, known, count = ExponentSolver(FIG1).solution(2.0), adapt.principal_pair, [0]
+    starts = {2.0: alone} if place == "next to another problem" else {}
+    solver = ExponentSolver(FIG1, rtol=1e-5 if place == "on halved cells" else 1e-8, starts=starts)
+    if place == "after another p":
+        solver.solution(2.2)
+
+    def failing_once(*given, **named):
+        count[0] += 1
+        if count[0] == (2 if place == "on halved cells" else 1):
+            raise kind("pivot")
+        return known(*given, **named)
+
+    monkeypatch.setattr(adapt, "principal_pair", failing_once)
+    found = solver.solution(2.0)
+    assert count[0] > 1
+    assert abs(found.pair.value - alone.pair.value) <= found.error + alone.error < 1e-6
+
+
+def test_what_failed_is_kept_in_words_alone():
+    """No solution stays alive with it, and its traceback does not grow from one time to the next."""
+    solver = ExponentSolver(SLOW, budget=Budget(unknowns=510))
+
+    def failed():
+        with pytest.raises(NotConverged) as caught:
+            solver.solution(2.0)
+        return caught.value
+
+    first = failed()
+    best, text = weakref.ref(first.partial), str(first)
+    del first
+    gc.collect()
+    assert best() is None
+    again = [failed() for _ in range(3)]
+    assert {str(each) for each in again} == {text}
+    assert len({len(traceback.extract_tb(each.__traceback__)) for each in again}) == 1
 
 
 @pytest.mark.parametrize("failure", [ValueError("zip() argument 3 is longer"), TypeError("no"), RuntimeError("dict")])

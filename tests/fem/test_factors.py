@@ -1,6 +1,9 @@
 """LU factors of Kronecker sums, dense, by blocks and sparse, against one dense solve."""
 
+import os
+import sys
 from itertools import product
+from subprocess import run
 
 import numpy as np
 import pytest
@@ -25,6 +28,46 @@ from fpsolve.fem.generator import Generator
 from fpsolve.fem.refined import RefinedFactors
 from fpsolve.fem.rings import RingFactors
 from fpsolve.model import Telegraph, White
+
+OVERLAP = """
+from threading import Event, Thread
+from threadpoolctl import threadpool_info
+import fpsolve, scipy.linalg
+from fpsolve.fem.factors import one_thread
+
+def count():
+    return {pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas"}
+
+def first():
+    with one_thread(), one_thread():
+        assert count() == {1}
+        entered[0].set()
+        entered[1].wait()
+    left.set()
+
+def second():
+    entered[0].wait()
+    with one_thread():
+        entered[1].set()
+        left.wait()
+
+entered, left, before = (Event(), Event()), Event(), count()
+threads = [Thread(target=each) for each in (first, second)]
+for each in threads:
+    each.start()
+for each in threads:
+    each.join()
+assert count() == before
+print(before)
+"""
+
+
+def test_bodies_that_overlap_in_two_threads_leave_blas_as_it_was():
+    """The first one begins and ends before the second one."""
+    threads = dict.fromkeys(("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS"), "2")
+    done = run([sys.executable, "-c", OVERLAP], env=os.environ | threads, capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout in ("{2}\n", "{1}\n")  # 1 on a machine of one processor
 
 
 def banded(rng, n, band):

@@ -7,7 +7,12 @@ import pytest
 import scipy.integrate
 import scipy.linalg
 
+from fpsolve.arrays import identity
 from fpsolve.model.noises.markov_chain import MarkovChain
+from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
+from fpsolve.model.plane import CoefficientMatrix, Jump
+from fpsolve.model.problem import Problem
+from fpsolve.model.systems.plane_system import PlaneSystem
 
 RING = MarkovChain((0.0, 1.0, 3.0), ((0, 2.0, 0), (0, 0, 1.0), (0.5, 0, 0)))
 """0 → 1 → 3 → 0, which no detailed balance holds for."""
@@ -74,3 +79,17 @@ def test_many_states_that_are_hardly_connected():
     rates[119, 120] = 0.0
     with pytest.raises(ValueError, match="every state must be reachable"):
         MarkovChain(states=np.linspace(-1, 1, 240), rates=rates)
+
+
+@pytest.mark.parametrize("size", [20, 42, 100])
+def test_every_state_beside_another_noise_is_looked_at(size):
+    """A noise that moves the phase across a wall in its last state alone is refused."""
+    states = np.linspace(-1.0, 1.0, size)
+    chain = MarkovChain(states, np.eye(size, k=1) + np.eye(size, k=-1))
+    terms = [
+        CoefficientMatrix(0, ((0.0, 1.0), (-1.0, -0.2))),
+        CoefficientMatrix(1, ((0.0, 0.3), (0.0, 0.0)), lambda xi: np.maximum(xi - states[-2], 0.0), "a"),
+        CoefficientMatrix(1, ((0.0, 0.0), (-1.0, 0.0)), identity, "b"),
+    ]
+    with pytest.raises(ValueError, match='the noise "a" moves the phase across the ray of a jump'):
+        Problem(PlaneSystem(terms, [Jump(math.pi / 2, -0.2)]), {"a": chain, "b": OrnsteinUhlenbeck(1.0, 0.5)})
