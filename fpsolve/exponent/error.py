@@ -153,7 +153,7 @@ class Solution:
     Attributes:
         pair: the principal pair.
         finer: that on a finer mesh, which measures the error of a given mesh: it may have few modes.
-        search: the error of a correction.
+        search: what the value may still lack: of a correction by finer waves, or by halved cells.
         measured: what finer functions change, in the place of the effects of the highest modes; None where these tell.
     """
 
