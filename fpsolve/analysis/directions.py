@@ -20,6 +20,7 @@ from fpsolve.drawing import QUARTERS, draw_colours, label_axes
 from fpsolve.errors import MeshError, NotConverged, SingularMatrix
 from fpsolve.exponent.directions import DirectionFields, DirectionGrid, Directions
 from fpsolve.exponent.eigen import PrincipalPair, principal_pair
+from fpsolve.fem.generator import Generator
 
 if TYPE_CHECKING:
     import xarray
@@ -63,11 +64,11 @@ def settled_directions(pair: PrincipalPair) -> SettledDirections:
     found = SettledDirections(pair.value, pair, Directions(pair).fields, math.nan)
     while not found.error <= SETTLED:
         generator = found.pair.generator
-        finer = replace(generator.chosen, phase=generator.chosen.phase.enriched())
-        if finer.phase.size > MOST_DIRECTIONS or finer.size > MOST_UNKNOWNS:
+        finer = generator.chosen.with_phi(generator.chosen.phi.enriched())
+        if finer.phi.size > MOST_DIRECTIONS or finer.size > MOST_UNKNOWNS:
             return found
         try:
-            new = principal_pair(type(generator)(generator.problem, finer), pair.p, start=found.pair)
+            new = principal_pair(Generator(generator.problem, finer), pair.p, start=found.pair)
         except (NotConverged, SingularMatrix, MeshError):  # what there is stands, with its error
             return found
         fields = Directions(new).fields

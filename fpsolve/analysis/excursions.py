@@ -331,7 +331,7 @@ class Grid(NamedTuple):
         """T in the coordinates of the system, and q, both of shape (cells, n, ...)."""
         space, problem = pair.space, pair.generator.problem
         at_phi = space.phi.at(self.psi.ravel(), self.inside.ravel())
-        reached = [axis.everywhere(count) for axis, count in zip(space.axes[1:], self.counts, strict=True)]
+        reached = [axis.everywhere(count) for axis, count in zip(space.noises, self.counts, strict=True)]
         table = space.evaluate(pair.right, at_phi, *(values for _, values in reached))
         phi, stretch = _own(pair, self.psi.ravel())
         columns = (-1, *[1] * len(reached))
@@ -341,7 +341,7 @@ class Grid(NamedTuple):
 
     def continuous(self, pair: PrincipalPair) -> tuple[int, ...]:
         """The axes of these tables along which T is continuous: φ within a cell, and noise without states."""
-        return (1, *[2 + k for k, axis in enumerate(pair.space.axes[1:]) if axis.cells.max() >= 0])
+        return (1, *[2 + k for k, axis in enumerate(pair.space.noises) if axis.cells.max() >= 0])
 
 
 def _own(pair: PrincipalPair, psi: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -367,7 +367,7 @@ def _at_start(pair: PrincipalPair, *, phi: Start, xi: StartOfNoise) -> float:
         first, span = space.phi.lines[0], space.phi.span
         psi, after = (first + np.mod(each - first, span) for each in (psi, psi + 1e-9))
         at_phi = space.phi.at(psi, after) * (1.0 if frame is None else float(frame.length(place)[0]) ** pair.p)
-    means = [_mean_functions(axis, xi) for axis in space.axes[1:]]
+    means = [_mean_functions(axis, xi) for axis in space.noises]
     return float(space.evaluate(pair.right, at_phi, *(each[None] for each in means)).ravel()[0])
 
 
@@ -493,8 +493,8 @@ def _flux(pair: PrincipalPair, parts: int) -> float:
     space, problem = pair.space, pair.generator.problem
     psi, weights = space.phi.finer_rule(parts)
     phi, stretch = _own(pair, psi)
-    most = (MOST_POINTS / psi.size) ** (1 / len(space.axes[1:]))
-    each = [axis.finer_samples(round(min(most, POINTS * parts / PARTS))) for axis in space.axes[1:]]
+    most = (MOST_POINTS / psi.size) ** (1 / len(space.noises))
+    each = [axis.finer_samples(round(min(most, POINTS * parts / PARTS))) for axis in space.noises]
     left = space.evaluate(pair.left, space.phi.at(psi), *(at.values for at in each))
     measures = [at.weight * at.measure / at.factor for at in each]
     shape = (-1, *[1] * len(each))

@@ -43,9 +43,9 @@ from fpsolve.exponent.adapt import Budget, widened
 from fpsolve.exponent.eigen import PrincipalPair, length, second_derivative
 from fpsolve.exponent.function import SEARCH_INTERVAL
 from fpsolve.exponent.solver import TINY_P, ExponentSolver, solver_of
-from fpsolve.fem.axis import TensorSpace
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.mesh import CylinderMesh
+from fpsolve.fem.space import Space
 from fpsolve.messages import Code, Message
 from fpsolve.model.problem import Problem, refuse_tails
 from fpsolve.model.quantity import (
@@ -442,7 +442,7 @@ class _Cumulants:
                 chosen = widened(generator).enriched()
                 if change <= FINE or chosen.size > self._solver.budget.unknowns:
                     break
-                generator = type(generator)(generator.problem, chosen)
+                generator = Generator(generator.problem, chosen)
         error = (change if math.isfinite(change) else math.nan) + abs(found - fewer) + self.time * solution.error
         self._known[p] = found, error
         return self._known[p]
@@ -607,10 +607,10 @@ def _ends(generator: Generator, p: float, start: float) -> tuple[FloatArray, Flo
     return space.product([first / total, *noise]), space.product([np.ravel(last), *noise])
 
 
-def _of_noises(space: TensorSpace) -> tuple[list[FloatArray], float]:
+def _of_noises(space: Space) -> tuple[list[FloatArray], float]:
     """∫ P_s u for every function u of each noise, P_s scaled as the weight of the space is, and ∫ P_s."""
     found, total = list[FloatArray](), 1.0
-    for axis in space.axes[1:]:
+    for axis in space.noises:
         at = axis.samples()
         weight = at.measure * at.weight / at.factor
         found.append(np.ravel(at.values.T @ weight))

@@ -43,8 +43,8 @@ from fpsolve.case.sections import (
 )
 from fpsolve.case.vary import Vary, assignments, map_key, values_of
 from fpsolve.errors import FpsolveError, MeshError, NoSuchExponent
-from fpsolve.fem.discretisation import Discretisation
 from fpsolve.fem.mesh import CylinderMesh
+from fpsolve.fem.space import Space
 from fpsolve.model.problem import Problem, refuse_infinite
 from fpsolve.simulation.setup import obstacles, simulated_parts
 from fpsolve.theory.perturbation import second_order_or_none
@@ -140,7 +140,7 @@ def _misfit(mesh: CylinderMesh, valid: Known) -> str:
             continue
         judged.add(shape)
         told = _with({key: value for key, value in varied.items() if key in shaping})
-        chosen = Discretisation.on(mesh, noise)
+        chosen = Space.on(mesh, noise)
         size, most = chosen.size, valid["budget"].unknowns
         if size > most:
             return (
@@ -149,9 +149,9 @@ def _misfit(mesh: CylinderMesh, valid: Known) -> str:
             )
         try:
             for each in (chosen, chosen.enriched().enriched()):  # the finer one tells the error
-                each.noise.axis(noise, 0.0)
+                _ = each.xi.constant
         except MeshError as failure:
-            lines = chosen.noise.lines
+            lines = chosen.xi.lines
             return f"{told}from xi = {lines[0]:g} to {lines[-1]:g} {failure}"
     return ""
 

@@ -20,18 +20,14 @@ from fpsolve.errors import FpsolveError, MeshError, NotConverged, SingularMatrix
 from fpsolve.exponent.eigen import BACKWARD_ERROR_LIMIT, PrincipalPair, principal_pair
 from fpsolve.exponent.error import Solution, mode_effects
 from fpsolve.exponent.fields import noise_marginal
-from fpsolve.fem.discretisation import (
-    MOST_DEGREE,
-    Cells,
-    Discretisation,
-    ModeEffects,
-    PhaseCells,
-    Polynomials,
-    first_part,
-)
+from fpsolve.fem.effects import MOST_DEGREE, ModeEffects
 from fpsolve.fem.factors import MAX_DENSE_UNKNOWNS, one_thread
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.mesh import CylinderMesh
+from fpsolve.fem.noise_axes import CellAxis, PolynomialAxis
+from fpsolve.fem.pairs import PairAxis
+from fpsolve.fem.phase import PhaseAxis
+from fpsolve.fem.space import Space, first_axis
 from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.faults import told_in_words
 from fpsolve.model.parameters import STRICT, parameter
@@ -205,7 +201,7 @@ class NearPlace:
         else:
             try:
                 with one_thread(), counted(self.budget.countdown(f"a finer Λ({pair.p:g})")):
-                    return self.pair_on(type(pair.generator)(self.problem, chosen), pair.p, pair)
+                    return self.pair_on(Generator(self.problem, chosen), pair.p, pair)
             except (MeshError, SingularMatrix, np.linalg.LinAlgError) as failure:
                 reason = getattr(failure, "message", str(failure))
             except MemoryError:
@@ -245,7 +241,7 @@ class NearPlace:
         pair = solution.pair
         return abs(pair.p) < SMALL_P or solution.error <= tolerance(pair.p, pair.value)
 
-    def trimmed(self, solution: Solution, tolerance: Tolerance) -> Discretisation:
+    def trimmed(self, solution: Solution, tolerance: Tolerance) -> Space:
         """The discretisation of a solution, or a much smaller one that would do."""
         pair, generator = solution.pair, solution.pair.generator
         if abs(pair.p) < SMALL_P or generator.size <= WORTH_A_TRY:
@@ -253,14 +249,14 @@ class NearPlace:
         smaller = refined(solution, tolerance(pair.p, pair.value), 0)
         return smaller if smaller.size <= TRIM * generator.size else generator.chosen
 
-    def fits(self, chosen: Discretisation, q: float, p: float) -> bool:
+    def fits(self, chosen: Space, q: float, p: float) -> bool:
         """Whether what serves q is likely to serve p, or so small that it is worth a try."""
-        part, frozen = chosen.noise, frozen_noise(self.problem)
+        axis, frozen = chosen.xi, frozen_noise(self.problem)
         if chosen.size > WORTH_A_TRY and abs(p - q) > max(0.5, 0.4 * min(abs(p), abs(q))):
             return False
-        if frozen is None or part.kind != "polynomials":
+        if frozen is None or not isinstance(axis, PolynomialAxis):
             return True
-        away = abs(frozen.tilt(frozen.center(p)) - part.slope * p) if self.problem.coloured.may_tilt else 0.0
+        away = abs(frozen.tilt(frozen.center(p)) - axis.slope * p) if self.problem.coloured.may_tilt else 0.0
         return away <= MOST_TILT_AWAY
 
 
@@ -315,9 +311,9 @@ class _Search:
         none of its modes shows it.
         """
         chosen = found.pair.generator.chosen
-        if self.place.rtol <= SURELY_SEEN or not isinstance(chosen.phase, PhaseCells):
+        if self.place.rtol <= SURELY_SEEN or not isinstance(chosen.phi, PhaseAxis):
             return found
-        halved = replace(chosen, phase=chosen.phase.doubled())
+        halved = chosen.with_phi(chosen.phi.doubled())
         if halved.size > min(MOST_HALVED, self.place.budget.unknowns):
             return found
         finer = self.attempt(lambda: Solution(self.pair_on(halved, found.pair))) or self.run(halved)
@@ -357,7 +353,7 @@ class _Search:
         near = sorted(known, key=lambda pair: abs(pair.p - self.p))[:NEIGHBOURS]
         return Solution(self.place.pair_on(generator, self.p, near))
 
-    def pair_on(self, chosen: Discretisation, start: PrincipalPair | None) -> PrincipalPair:
+    def pair_on(self, chosen: Space, start: PrincipalPair | None) -> PrincipalPair:
         """The principal pair on a discretisation."""
         return principal_pair(Generator(self.place.problem, chosen), self.p, start=start)
 
@@ -369,7 +365,7 @@ class _Search:
             self.failure = failure.with_traceback(None)  # which would keep this search, and all that it has found
             return None
 
-    def run(self, start: Solution | Discretisation) -> Solution:
+    def run(self, start: Solution | Space) -> Solution:
         """A solution within the tolerance, the tilted density sought where a first discretisation, or a solution, is.
 
         Raises:
@@ -392,17 +388,17 @@ class _Search:
             if error <= allowed:
                 return solution
             self.note(solution, error, allowed)
-            goal = max(allowed, MOST_GAIN * error) if chosen.noise.lines.size else allowed
+            goal = max(allowed, MOST_GAIN * error) if chosen.xi.lines.size else allowed
             chosen = chosen.enriched() if seems_enough else self.affordable(solution, goal)
 
-    def affordable(self, solution: Solution, goal: float) -> Discretisation:
+    def affordable(self, solution: Solution, goal: float) -> Space:
         """A refined discretisation; where it takes more unknowns than there are, one that does for this p alone."""
         found = refined(solution, goal, self.stages)
         if found.size <= self.place.budget.unknowns:
             return found
         return refined(solution, ALONE / SHARE * goal, self.stages)
 
-    def check(self, chosen: Discretisation) -> None:
+    def check(self, chosen: Space) -> None:
         """Refuse a stage beyond the budget, and count it."""
         size, spent = chosen.size, self.countdown.spent
         if size > self.place.budget.unknowns:
@@ -433,33 +429,33 @@ class _Search:
         raise NotConverged(told, best, None if reason.code is Code.ROUNDED else Remedy.BUDGET)  # a budget rounds, too
 
 
-def first(problem: Problem, p: float, rtol: float, center: float | None = None) -> Discretisation:
+def first(problem: Problem, p: float, rtol: float, center: float | None = None) -> Space:
     """A first discretisation, small, for a tilted density around some z; None for where slow noise carries it."""
     noise, system, digits = problem.coloured, problem.motion, -math.log10(rtol)
     if noise.basis == "cells":  # around ξ = 0, their lines on both sides, further apart further out
         steps = np.concatenate([[0.0], 3.0 * 1.5 ** np.arange(60)])
         side = np.append(steps[steps < 0.8 * REACH], REACH)
         phase = _phase(system, noise.standard_deviation * np.array([-2.0, 2.0]), digits)
-        return Discretisation(phase, (Cells.of_degree(np.concatenate([-side[:0:-1], side]), round(2 + digits / 2)),))
+        lines = np.concatenate([-side[:0:-1], side])
+        return Space((phase, CellAxis(noise, lines, np.full(lines.size - 1, round(2 + digits / 2)))))
     frozen = frozen_noise(problem)
     if frozen is None:  # the noise has states, or a state of its own, or there are several
-        parts = tuple(first_part(each, digits) for each in noise.parts.values())
-        phase = _phase(system, problem.typical, digits, is_smooth=sum(each.dimension for each in parts) > 1)
-        chosen = Discretisation(phase, parts)
-        if noise.basis != "pairs":
-            return chosen
-        if center is None:
-            center = float(steady_places(problem, p)[0][0])
-        pull = noise.standard_deviation**2 * center / noise.spectral_density(0.0) if center else 0.0
-        return chosen.with_noise(replace(chosen.noise, slope=pull / p))
+        axes = [first_axis(each, digits) for each in noise.parts.values()]
+        phase = _phase(system, problem.typical, digits, is_smooth=sum(axis.dimension for axis in axes) > 1)
+        if len(axes) == 1 and isinstance(axis := axes[0], PairAxis):
+            if center is None:
+                center = float(steady_places(problem, p)[0][0])
+            pull = noise.standard_deviation**2 * center / noise.spectral_density(0.0) if center else 0.0
+            axes = [replace(axis, slope=pull / p)]
+        return Space((phase, *axes))
     unit, center = noise.standard_deviation, frozen.center(p) if center is None else center
     end = noise.half_width / unit
     phase = _phase(system, unit * np.clip(center + np.array([-2.0, 2.0]), -end, end), digits)
     slope = frozen.tilt(center) / p if noise.may_tilt else 0.0
-    return Discretisation(phase, (Polynomials(round(digits / 2) + (3 if math.isinf(end) else 5), slope),))
+    return Space((phase, PolynomialAxis(noise, round(digits / 2) + (3 if math.isinf(end) else 5), slope)))
 
 
-def _phase(system: System, xi: Xi, digits: float, is_smooth: bool = False) -> PhaseCells:
+def _phase(system: System, xi: Xi, digits: float, is_smooth: bool = False) -> PhaseAxis:
     """Equal cells on a half circle from one jump to where it comes again, and a line at every other jump.
 
     There are more where the speed of the phase changes much for some of the ξ; but one, of a higher degree, where
@@ -474,7 +470,7 @@ def _phase(system: System, xi: Xi, digits: float, is_smooth: bool = False) -> Ph
     near = np.min(np.abs(lines[1:-1, None] - others[None]), axis=1, initial=math.inf) < 0.3 * math.pi / cells
     lines = np.sort(np.concatenate([lines[:1], lines[1:-1][~near], lines[-1:], others]))
     degree = round(np.clip(digits + (4 if is_smooth else -2 if widest > 0.5 else 2), 4, MOST_DEGREE))
-    return PhaseCells(lines, np.full(lines.size - 1, degree))
+    return PhaseAxis.of(lines, np.full(lines.size - 1, degree))
 
 
 def effects_of(failure: Exception | None) -> Sequence[ModeEffects | None]:
@@ -483,24 +479,24 @@ def effects_of(failure: Exception | None) -> Sequence[ModeEffects | None]:
     return mode_effects(pair) if pair is not None and pair.residual <= BACKWARD_ERROR_LIMIT else ()
 
 
-def widened(generator: Generator) -> Discretisation:
+def widened(generator: Generator) -> Space:
     """That of a generator, on an interval `WIDER` times as wide for algebraic tails."""
-    chosen, lines = generator.chosen, generator.chosen.noise.lines
+    chosen, lines = generator.chosen, generator.chosen.xi.lines
     if not (lines.size and generator.problem.coloured.has_algebraic_tails):
         return chosen
     steps = WIDER ** np.linspace(0, 1, 4)[1:]
     wide = np.concatenate([(lines[0] * steps)[::-1], lines, lines[-1] * steps])
-    return chosen.with_noise(chosen.noise.on(wide))
+    return chosen.with_xi(chosen.xi.on(wide))
 
 
-def refined(solution: Solution, tolerance: float, stages: int) -> Discretisation:
+def refined(solution: Solution, tolerance: float, stages: int) -> Space:
     """A discretisation on which every cell should lack no more than its share of the tolerance."""
     pair, share = solution.pair, SHARE * tolerance
     chosen = pair.generator.chosen
     new = chosen.refined(solution.effects, share, stages < FREE_STAGES)
-    if chosen.noise.lines.size:
+    if chosen.xi.lines.size:
         lower, upper = solution.truncation
-        new = new.with_noise(new.noise.reaching(lower > share, upper > share))
+        new = new.with_xi(new.xi.reaching(lower > share, upper > share))
     return new if new.size > chosen.size or solution.error_by_modes <= tolerance else new.raised()
 
 

@@ -185,7 +185,7 @@ class Directions:
     @cached_property
     def _map(self) -> FloatArray:
         """R = S⁻¹D."""
-        coordinates, frame = np.array(self.pair.generator.chosen.phase.coordinates), self.pair.generator.problem.frame
+        coordinates, frame = np.array(self.pair.space.phi.coordinates), self.pair.generator.problem.frame
         coordinates = coordinates if frame is None else np.array(frame.matrix) @ coordinates
         scales = np.ones(len(coordinates))
         for q, size in oscillators(self.pair.generator.problem).items():
@@ -197,9 +197,9 @@ class Directions:
         """Coefficients over directions alone: the means of T and T* over the noise, and T beside T* times its mass."""
         space = self.pair.space
         right, left = (space.table(v).reshape(space.phi.size, -1) for v in (self.pair.right, self.pair.left))
-        samples = [axis.samples() for axis in space.axes[1:]]
+        samples = [axis.samples() for axis in space.noises]
         mean = reduce(np.kron, [(at.measure * at.weight / at.factor) @ at.values for at in samples])
-        masses = [None, *(axis.matrix(one) for axis in space.axes[1:])]
+        masses = [None, *(axis.matrix(one) for axis in space.noises)]
         weighed = along(masses, space.table(self.pair.left)).reshape(left.shape)
         return np.column_stack([right @ mean, left @ mean]), np.concatenate([right, weighed], axis=1)
 

@@ -25,10 +25,11 @@ from fpsolve.arrays import FloatArray, finite, one
 from fpsolve.budget import charge
 from fpsolve.data import brief
 from fpsolve.errors import NotConverged, NumericalFailure, SingularMatrix
-from fpsolve.fem.axis import KroneckerSum, TensorSpace
+from fpsolve.fem.axis import KroneckerSum
 from fpsolve.fem.dense import Factors
 from fpsolve.fem.factors import one_thread
 from fpsolve.fem.generator import Generator, Pencil
+from fpsolve.fem.space import Space
 from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.problem import Problem
 from fpsolve.theory.frozen import frozen_noise
@@ -101,7 +102,7 @@ class PrincipalPair:
         return brief(self, f"Λ{of_p}{self.value:.10g}, Λ′{of_p}{self.derivative:.10g}, {self.right.size} unknowns")
 
     @property
-    def space(self) -> TensorSpace:
+    def space(self) -> Space:
         """The functions that the coefficients are of."""
         return self.generator.space(self.p)
 
@@ -184,11 +185,11 @@ def _has_other_positive(generator: Generator, p: float) -> bool:
         return False
     if problem.noise.mixes_slowly or (frozen := frozen_noise(problem)) is None:
         return problem.noise.mixes_slowly or problem.may_rest
-    lines = generator.chosen.noise.lines
+    lines = generator.chosen.xi.lines
     return frozen.rests(p, lines[0], lines[-1]) if lines.size else frozen.rests(p)
 
 
-def _share(space: TensorSpace, pair: PrincipalPair, x: FloatArray, y: FloatArray) -> float:
+def _share(space: Space, pair: PrincipalPair, x: FloatArray, y: FloatArray) -> float:
     """That of a pair in the Rayleigh quotient of x = Σ aᵢTᵢ and y = Σ bᵢTᵢ*: of the aᵢbᵢ⟨Tᵢ*, Tᵢ⟩ in ⟨y, x⟩."""
     of_right, of_x = space.weighed(pair.right), space.weighed(x)
     return float((y @ of_right) * (pair.left @ of_x) / ((y @ of_x) * (pair.left @ of_right)))
@@ -330,7 +331,7 @@ def rayleigh_iteration(pencil: Pencil, x: FloatArray, y: FloatArray, rate: float
     return _improved(factor, space, shift, size, best)
 
 
-def _improved(factor: Factors, space: TensorSpace, shift: float, size: float, old: Iterate) -> Iterate:
+def _improved(factor: Factors, space: Space, shift: float, size: float, old: Iterate) -> Iterate:
     """One step of inverse iteration; of (L − σM) x₁ = M x₀ the images L x₁ need no product with L."""
     x, y = factor.solve(old.mx), factor.solve(old.my, transposed=True)
     lengths = length(x), length(y)
@@ -374,9 +375,9 @@ def _pair(generator: Generator, pencil: Pencil, found: Iterate) -> PrincipalPair
     )
 
 
-def _of_noises(space: TensorSpace) -> FloatArray:
+def _of_noises(space: Space) -> FloatArray:
     """⟨L_ξ T, 1⟩ for every function T, L_ξ the generator of all noises, shape (size,)."""
-    noises, total = space.axes[1:], np.zeros(space.size)
+    noises, total = space.noises, np.zeros(space.size)
     for k, own in enumerate(noises):
         others = [axis.generator_of_one() if axis is own else axis.matrix(one) @ axis.constant for axis in noises]
         if np.any(others[k]) or len(noises) == 1:
@@ -389,12 +390,12 @@ def length(vector: FloatArray) -> float:
     return math.sqrt(vector @ vector)
 
 
-def _sign_defects(space: TensorSpace, x: FloatArray, y: FloatArray) -> tuple[float, float]:
+def _sign_defects(space: Space, x: FloatArray, y: FloatArray) -> tuple[float, float]:
     """Shares of T and of T* that are not positive, by their own size or by |T T*|, whichever is larger.
 
     T T* looks where the tilted density lives: a strong tilt hides the sign change of another pair from P_s.
     """
-    noises = space.axes[1:]
+    noises = space.noises
     right, left = (space.evaluate(v, space.phi.inner_values, *(axis.values for axis in noises)) for v in (x, y))
     measure = reduce(np.multiply.outer, (axis.measure for axis in noises))
     tilted = np.abs(right * left) * measure

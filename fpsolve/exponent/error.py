@@ -22,8 +22,9 @@ from fpsolve.arrays import FloatArray
 from fpsolve.data import Quantity, Result, brief, dataset
 from fpsolve.errors import NotConverged
 from fpsolve.exponent.eigen import Bordered, PrincipalPair, slope_rounding
-from fpsolve.fem.axis import KroneckerSum, TensorSpace, along
-from fpsolve.fem.discretisation import ModeEffects
+from fpsolve.fem.axis import KroneckerSum, along
+from fpsolve.fem.effects import ModeEffects
+from fpsolve.fem.space import Space
 from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.quantity import UNNAMED
 
@@ -183,7 +184,7 @@ class Solution:
     def modes_tell(self) -> bool:
         """Whether the error is that by the highest modes."""
         is_whole = self.measured is None and self.finer is None
-        return is_whole and not self.pair.generator.chosen.noise.lines.size
+        return is_whole and not self.pair.space.xi.lines.size
 
     @cached_property
     def error_by_modes(self) -> float:
@@ -204,7 +205,6 @@ class Ladder:
         at: the axis.
         cells, modes: of its functions, shape (size,), see `Axis`.
         degrees: of its cells, shape (cells,).
-        slowest: see `ModeEffects`.
         nested: for each axis the matrix to coefficients of modes; None where they are that already.
     """
 
@@ -212,7 +212,6 @@ class Ladder:
     cells: Any
     modes: Any
     degrees: Any
-    slowest: float
     nested: tuple[Any, ...]
 
     def highest(self, depth: int) -> Any:
@@ -224,7 +223,7 @@ class Ladder:
         return of_functions.reshape([-1 if k == self.at else 1 for k in range(len(self.nested))])
 
 
-def ladders(space: TensorSpace) -> Iterator[Ladder | None]:
+def ladders(space: Space) -> Iterator[Ladder | None]:
     """Those of all directions; None for one that has states."""
     for at, axis in enumerate(space.axes):
         for cells, modes, own in axis.ladders:
@@ -234,7 +233,7 @@ def ladders(space: TensorSpace) -> Iterator[Ladder | None]:
             degrees = np.zeros(count, dtype=int)
             np.maximum.at(degrees, cells[cells >= 0], modes[cells >= 0])
             nested = tuple(own if k == at else None for k in range(len(space.axes)))
-            yield Ladder(at, cells, modes, degrees, axis.slowest, nested)
+            yield Ladder(at, cells, modes, degrees, nested)
 
 
 def sides(pair: PrincipalPair) -> tuple[FloatArray, FloatArray, KroneckerSum]:
@@ -290,7 +289,7 @@ def _effects(
             shares = shares + np.abs(last * images).sum(axis=others) * np.cumsum(masks, axis=0)
         inside = np.flatnonzero(ladder.cells >= 0)
         effects = [np.bincount(ladder.cells[inside], each[inside], ladder.degrees.size) / norm for each in shares]
-        found.append(ModeEffects(ladder.degrees, np.array(effects), ladder.slowest))
+        found.append(ModeEffects(ladder.degrees, np.array(effects), pair.generator.slowest[ladder.at]))
     return tuple(found)
 
 
@@ -336,9 +335,8 @@ class MissingModes:
 
 def truncation(pair: PrincipalPair) -> tuple[float, float]:
     """Bounds on what the two ends of an interval of cells change in Λ: ½σ² ∫ P_s |T_z| T* dφ / ∫ T T* there."""
-    if not pair.generator.chosen.noise.lines.size:
+    if not (lines := pair.space.xi.lines).size:
         return 0.0, 0.0
-    lines = pair.space.xi.line.lines
     return _end_effect(pair, lines[[0, 1]]), _end_effect(pair, lines[[-1, -2]])
 
 

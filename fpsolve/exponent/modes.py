@@ -27,9 +27,12 @@ from fpsolve.errors import NoHierarchy, NotConverged
 from fpsolve.exponent.adapt import SHARE, NearPlace, _Search
 from fpsolve.exponent.eigen import PrincipalPair, principal_pair
 from fpsolve.exponent.error import Solution, mode_effects
-from fpsolve.fem.discretisation import Discretisation, ModeEffects, Polynomials, first_part
-from fpsolve.fem.harmonics import HarmonicCells
-from fpsolve.fem.sphere import Coordinates, SphereCells, SphereGenerator, group_dimensions
+from fpsolve.fem.effects import ModeEffects
+from fpsolve.fem.generator import Generator
+from fpsolve.fem.harmonics import HarmonicAxis
+from fpsolve.fem.noise_axes import CountedAxis
+from fpsolve.fem.space import Space, first_axis
+from fpsolve.fem.sphere import Coordinates, DirectionAxis, SphereAxis, group_dimensions
 from fpsolve.model.problem import Problem
 from fpsolve.theory.moments import even_moment, moment_form
 
@@ -110,17 +113,17 @@ def modal_coordinates(problem: Problem) -> tuple[Coordinates, float, tuple[float
     return tuple(map(tuple, found.tolist())), max(width, THINNEST), (places[0], places[1])
 
 
-def first_cells(problem: Problem) -> SphereCells | HarmonicCells:
+def first_directions(problem: Problem) -> DirectionAxis:
     """The coarsest functions of directions."""
     coordinates, width, places = modal_coordinates(problem)
     if width >= ROUND:
-        return HarmonicCells(coordinates, FIRST_WAVES)
+        return HarmonicAxis(coordinates, FIRST_WAVES)
     lines = np.linspace(0, math.pi / 2, 3)
     if max(map(abs, places)) > math.log(1 / WEAK):
         low, high = min(places) - 1, max(places) + 1
         inner = np.linspace(low, high, max(2, round((high - low) / STEP)) + 1)
         lines = np.concatenate([[0.0], np.arctan(np.exp(inner)), [math.pi / 2]])
-    return SphereCells(coordinates, lines, FIRST_DEGREE, FIRST_WAVES)
+    return SphereAxis(coordinates, lines, FIRST_DEGREE, FIRST_WAVES)
 
 
 def left_of(degrees: Sequence[int], values: Sequence[float]) -> float:
@@ -144,7 +147,7 @@ def left_of(degrees: Sequence[int], values: Sequence[float]) -> float:
     return left
 
 
-def _told(pair: PrincipalPair, finer: SphereGenerator, axis: int, new: Any) -> float:
+def _told(pair: PrincipalPair, finer: Generator, axis: int, new: Any) -> float:
     """What the new functions of an axis of a finer space change in Λ(p), to first order."""
     pencil, space, old = finer.at(pair.p), finer.space(pair.p), pair.space
     operator = pencil.matrix.shifted(pair.eigenvalue)
@@ -160,21 +163,21 @@ def _told(pair: PrincipalPair, finer: SphereGenerator, axis: int, new: Any) -> f
 class SpherePlace(NearPlace):
     """Λ(p) of a system of dimension 3 or 4; arguments as in `NearPlace`."""
 
-    _levels: list[SphereGenerator] = field(init=False, default_factory=list)
+    _levels: list[Generator] = field(init=False, default_factory=list)
     _pairs: list[PrincipalPair] = field(init=False, default_factory=list)
 
-    def fits(self, chosen: Discretisation, q: float, p: float) -> bool:
+    def fits(self, chosen: Space, q: float, p: float) -> bool:
         """False: every p has waves of its own."""
         return False
 
-    def trimmed(self, solution: Solution, tolerance: Any) -> Discretisation:
+    def trimmed(self, solution: Solution, tolerance: Any) -> Space:
         return solution.pair.generator.chosen
 
     def searched(self, search: _Search, start: Solution | None) -> Solution:
         """From the coarsest space on."""
         if not self._levels:
-            parts = tuple(first_part(noise, -math.log10(self.rtol)) for noise in self.problem.coloured.parts.values())
-            self._begin(Discretisation(first_cells(self.problem), parts))
+            noises = (first_axis(noise, -math.log10(self.rtol)) for noise in self.problem.coloured.parts.values())
+            self._begin(Space((first_directions(self.problem), *noises)))
         steps = list[PrincipalPair]()
         pair: PrincipalPair | None = None
         enough: Solution | None = None
@@ -204,7 +207,7 @@ class SpherePlace(NearPlace):
             steps.append(pair)
             left = BEYOND[min(len(steps), len(BEYOND)) - 1] * abs(change)
             if len(steps) > 1:
-                waves = [each.generator.chosen.phase.waves for each in steps]
+                waves = [each.space.phi.waves for each in steps]
                 uncorrected = left_of(waves, [each.eigenvalue for each in steps])
                 step, beyond = abs(pair.value - steps[-2].value), left_of(waves, [each.value for each in steps])
                 left = max(left, beyond, LEFT * step, LEFT * uncorrected)
@@ -221,7 +224,7 @@ class SpherePlace(NearPlace):
     def _change(self, pair: PrincipalPair, level: int) -> float:
         """What the waves of the next level change in Λ(p), to first order."""
         generator = self._generator(level)
-        return _told(pair, generator, 0, generator.phi.degrees > pair.generator.chosen.phase.waves)
+        return _told(pair, generator, 0, generator.phi.degrees > pair.space.phi.waves)
 
     def _errors(self, pair: PrincipalPair, effects: Sequence[ModeEffects | None], allowed: float) -> list[float]:
         """Of the elements and of each noise: the effects of the highest modes, or the geometric mean of these and of
@@ -237,48 +240,45 @@ class SpherePlace(NearPlace):
             if error <= SHARE * allowed:
                 continue
             if k < count:
-                finer = replace(chosen, phase=replace(chosen.phase, degree=chosen.phase.degree + 2))
-                generator = SphereGenerator(self.problem, finer)
+                finer = chosen.with_phi(replace(chosen.phi, degree=chosen.phi.degree + 2))
+                generator = Generator(self.problem, finer)
                 cells, modes, _ = generator.phi.ladders[0]
-                change = _told(pair, generator, 0, (cells >= 0) & (modes > chosen.phase.degree))
-            elif isinstance(part := chosen.noises[k - count], Polynomials):
-                noises = list(chosen.noises)
-                noises[k - count] = part.enriched()
-                generator = SphereGenerator(self.problem, replace(chosen, noises=tuple(noises)))
-                axis = 1 + k - count
-                change = _told(pair, generator, axis, np.arange(generator.space(pair.p).shape[axis]) >= part.size)
+                change = _told(pair, generator, 0, (cells >= 0) & (modes > chosen.phi.degree))
+            elif isinstance(axis := chosen.noises[k - count], CountedAxis):
+                axes, at = [*chosen.axes], 1 + k - count
+                axes[at] = axis.enriched()
+                generator = Generator(self.problem, Space(tuple(axes)))
+                change = _told(pair, generator, at, np.arange(axes[at].size) >= axis.size)
             else:
                 continue
             errors[k] = min(error, max(MEASURED * abs(change), math.sqrt(error * abs(change))))
         return errors
 
-    def _begin(self, chosen: Discretisation) -> None:
+    def _begin(self, chosen: Space) -> None:
         """Other elements and functions of the noise, the waves from the coarsest on."""
-        cells = replace(chosen.phase, waves=FIRST_WAVES)
-        self._levels[:] = [SphereGenerator(self.problem, replace(chosen, phase=cells))]
+        coarsest = chosen.with_phi(replace(chosen.phi, waves=FIRST_WAVES))
+        self._levels[:] = [Generator(self.problem, coarsest)]
 
-    def _chosen(self, level: int) -> Discretisation:
+    def _chosen(self, level: int) -> Space:
         first = self._levels[0].chosen
-        return replace(first, phase=replace(first.phase, waves=first.phase.waves + 2 * level))
+        return first.with_phi(replace(first.phi, waves=first.phi.waves + 2 * level))
 
-    def _finer(
-        self, chosen: Discretisation, effects: Sequence[Any], errors: Sequence[float], allowed: float
-    ) -> Discretisation:
+    def _finer(self, chosen: Space, effects: Sequence[Any], errors: Sequence[float], allowed: float) -> Space:
         count, share = len(effects) - len(chosen.noises), SHARE * allowed
-        noises = tuple(
-            part if error <= share else part.enriched() if error < each.error else part.refined(each, share, False)
-            for part, each, error in zip(chosen.noises, effects[count:], errors[count:], strict=True)
+        noises = (
+            axis if error <= share else axis.enriched() if error < each.error else axis.refined(each, share, False)
+            for axis, each, error in zip(chosen.noises, effects[count:], errors[count:], strict=True)
         )
-        phase = chosen.phase
+        phi = chosen.phi
         for error in errors[:count]:
             if error > 0.1 * allowed:
-                phase = phase.finer_elements()
-        found = Discretisation(phase, noises)
+                phi = phi.finer_elements()
+        found = Space((phi, *noises))
         return found if found.size > chosen.size else chosen.enriched()
 
-    def _generator(self, level: int) -> SphereGenerator:
+    def _generator(self, level: int) -> Generator:
         while len(self._levels) <= level:
-            self._levels.append(SphereGenerator(self.problem, self._chosen(len(self._levels))))
+            self._levels.append(Generator(self.problem, self._chosen(len(self._levels))))
         return self._levels[level]
 
     def _pair(self, level: int, search: _Search, coarse: PrincipalPair | None) -> PrincipalPair:

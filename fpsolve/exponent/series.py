@@ -35,7 +35,7 @@ from numpy.typing import ArrayLike
 from fpsolve.arrays import FloatArray, dense, is_whole, one, real_number, real_numbers, shown
 from fpsolve.data import Quantity, Result, dataset
 from fpsolve.errors import NoPerturbationTheory
-from fpsolve.fem.discretisation import first_part
+from fpsolve.fem.space import first_axis
 from fpsolve.model.frame import is_free
 from fpsolve.model.plane import CoefficientMatrix, Harmonics, matrix_at, rotating_coordinates, stretching, turning
 from fpsolve.model.problem import Problem, checked_problem
@@ -237,9 +237,8 @@ class _Recursion:
         steady = matrix_at(system, 0.0, slice(0, 1))
         frame = rotating_coordinates(steady)
         assert frame is not None
-        parts = [first_part(noise, 2 * count) for noise in problem.coloured.parts.values()]
-        noises = zip(parts, problem.coloured.parts.values(), strict=True)
-        self._axes, self._names = [part.axis(noise, 0.0) for part, noise in noises], [*problem.coloured.parts]
+        self._axes = [first_axis(noise, 2 * count) for noise in problem.coloured.parts.values()]
+        self._names = [*problem.coloured.parts]
         self.size = math.prod(axis.size for axis in self._axes)
         self.is_complete = all(noise.has_states for noise in problem.coloured.parts.values())
         waves = order + 1

@@ -1,4 +1,4 @@
-"""Axes, the functions along one direction each, their tensor product, and the operators on it.
+"""Axes, the functions along one direction each, and the operators on their products.
 
 A function of (φ, ξ, …) has one coefficient for each choice of a function on every axis, the first axis slowest; an
 operator f(φ)·g(ξ)·… is a Kronecker product of one matrix for each axis, others are sums Σ Φ_k ⊗ Ξ_k ⊗ … of them.
@@ -8,53 +8,77 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property, reduce
-from typing import Any
+from typing import Any, ClassVar, Self
 
 import numpy as np
 import scipy.sparse
 from scipy.sparse import csc_matrix, identity, issparse
 
 from fpsolve.arrays import Coefficient, FloatArray, dense, one
+from fpsolve.fem.effects import ModeEffects
+
+NO_LINES = np.zeros(0)
 
 
 class Axis:
     """What terms of a generator, error estimates and pictures ask of the functions along one direction.
 
+    An axis is a frozen choice of functions. Its tables are made when they are first asked for, and are not pickled.
+
     Attributes:
-        size: number of unknowns.
         cells: for each unknown the cell that it belongs to, -1 for none or two, shape (size,).
         modes: for each unknown the degree of its polynomial, shape (size,).
-        constant: coefficients of the function 1, times the factor of the axis, shape (size,).
+        lines: the vertices of cells; none where the functions are of the whole axis.
         nested: the matrix to coefficients of modes whose sums by degree are all functions of a lower degree; None where
             they are that already.
         unit: ∫ u v; None where it is the identity, or for noise.
         is_full: whether every function is coupled to most others.
-        ladders: cells, modes and `nested` of every direction, for which errors are estimated.
-        turns: how often the axis fits on the full circle; 1 for noise.
         levels: functions to be eliminated together, of which each level is coupled to its neighbours only; empty where
             the matrices tell them, None where every function can be by itself.
         slowest: the least share of the effect of the highest modes that two more may leave, see `ModeEffects`.
         ring: its cells, a `Ring`, where only their end values couple them; None for others.
+        slope: s/p of the factor exp(s z) that moves with p.
     """
 
-    size: int
+    __dataclass_fields__: ClassVar[dict[str, Any]]
     cells: Any
     modes: Any
-    constant: FloatArray
+    lines = NO_LINES
     nested: Any = None
     levels: Any = None
     unit: Any = None
     ring: Any = None
     is_full = False
-    turns, slowest = 1, 0.0
+    slowest, slope = 0.0, 0.0
 
-    def __init__(self) -> None:
-        self._matrices: dict[Coefficient | None, Any] = {}
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), tuple(getattr(self, each.name) for each in fields(self))
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns."""
+        raise NotImplementedError
+
+    @property
+    def constant(self) -> FloatArray:
+        """Coefficients of the function 1, times the factor of the axis, shape (size,)."""
+        raise NotImplementedError
+
+    @property
+    def turns(self) -> int:
+        """How often the axis fits on the full circle; 1 for noise."""
+        return 1
+
+    @property
+    def facts(self) -> dict[str, Any]:
+        """What a table says of it."""
+        raise NotImplementedError
 
     @property
     def ladders(self) -> Sequence[tuple[Any, Any, Any]]:
+        """Cells, modes and `nested` of every direction, for which errors are estimated."""
         return ((self.cells, self.modes, self.nested),)
 
     def mass(self, g: Any = one) -> Any:
@@ -71,9 +95,29 @@ class Axis:
             self._matrices[g] = self.generator() if g is None else self.mass(g)
         return self._matrices[g]
 
+    @cached_property
+    def _matrices(self) -> dict[Coefficient | None, Any]:
+        return {}
+
     def projection(self, other: Any) -> Any:
         """The matrix that takes a function on another axis to its projection on this one, shape (size, other.size)."""
         raise NotImplementedError
+
+    def enriched(self) -> Self:
+        """The next finer one."""
+        return self
+
+    def doubled(self) -> Self:
+        """About twice as many functions, where nothing is known yet."""
+        return self
+
+    def raised(self) -> Self:
+        """One function more in each cell, where what a cell lacks harms others."""
+        return self
+
+    def refined(self, effects: ModeEffects, share: float, may_coarsen: bool) -> Self:
+        """One that all together should lack no more than a share."""
+        return self
 
 
 def along(factors: Sequence[Any], table: FloatArray) -> FloatArray:
@@ -230,68 +274,3 @@ def _on_one_pattern(matrices: Sequence[Any]) -> tuple[csc_matrix, FloatArray]:
     if not columns.size:  # of no indices scipy returns no array
         return csc_matrix(pattern, dtype=float), np.zeros((len(columnwise), 0))
     return pattern, np.stack([np.ravel(matrix[pattern.indices, columns]) for matrix in columnwise])
-
-
-class TensorSpace:
-    """The products of the functions of several axes: φ, and every noise.
-
-    Attributes:
-        axes: φ first.
-        shape: their sizes.
-    """
-
-    def __init__(self, axes: Sequence[Any]) -> None:
-        self.axes, self.shape = tuple(axes), tuple(axis.size for axis in axes)
-        self.size = math.prod(self.shape)
-
-    @property
-    def phi(self) -> Any:
-        """The phase."""
-        return self.axes[0]
-
-    @property
-    def xi(self) -> Any:
-        """The noise of a problem with one."""
-        return self.axes[1]
-
-    @property
-    def turns(self) -> int:
-        """How often the domain fits on the full circle."""
-        return math.prod(axis.turns for axis in self.axes)
-
-    @cached_property
-    def constant(self) -> FloatArray:
-        """Coefficients of the function 1, times the factor where there is a tilt, shape (size,)."""
-        return self.product([axis.constant for axis in self.axes])
-
-    def product(self, vectors: Sequence[FloatArray]) -> FloatArray:
-        """Coefficients of the product of one function for each axis, shape (size,)."""
-        return reduce(np.multiply.outer, vectors).ravel()
-
-    @cached_property
-    def mass(self) -> KroneckerSum:
-        """∫ P_s w T."""
-        return KroneckerSum([tuple(axis.matrix(one) for axis in self.axes)])
-
-    def weighed(self, coefficients: FloatArray) -> FloatArray:
-        """∫ P_s w T for every test function w, T a function of the space."""
-        return along(self._of_noises, self.table(coefficients)).ravel()
-
-    @cached_property
-    def _of_noises(self) -> tuple[Any, ...]:
-        """The factors of `mass`; None for that of φ where it is the identity."""
-        return self.phi.unit, *self.mass.terms[0][1:]
-
-    def table(self, coefficients: FloatArray) -> FloatArray:
-        """Coefficients of a function by axes, shape `shape`."""
-        return coefficients.reshape(self.shape)
-
-    def carry(self, coefficients: FloatArray, old: TensorSpace) -> FloatArray:
-        """A function of another space, factor and all, projected on this one."""
-        pairs = zip(self.axes, old.axes, strict=True)
-        matrices = [None if new is was else new.projection(was) for new, was in pairs]
-        return np.ravel(along(matrices, old.table(coefficients)))
-
-    def evaluate(self, coefficients: FloatArray, *values: Any) -> FloatArray:
-        """A function without its factor, from the values of the functions of each axis at points of it."""
-        return along(values, self.table(coefficients))

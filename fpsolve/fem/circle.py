@@ -2,41 +2,55 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from fpsolve.arrays import Coefficient, FloatArray, one
-from fpsolve.fem.noise_axes import STEP, NoiseAxis, Samples, form
+from fpsolve.fem.noise_axes import STEP, CountedAxis, Rule, Samples, form
 from fpsolve.model.noise import NoiseDerivative
 
 MORE_POINTS = 64
 """Of a rule of equidistant points, beyond four for each wave: it is exact for g(ξ(θ)) of that many harmonics."""
 
 
-class CircleAxis(NoiseAxis):
+@dataclass(frozen=True, eq=False)
+class CircleAxis(CountedAxis):
     """The waves 1, √2 cos kθ, √2 sin kθ, k ≤ n, in this order: ½σ²∂² is diagonal, ν∂ couples the two of each k.
 
     Where ξ = μ cos θ, that of ξ has two diagonals on each side. The two of each k are eliminated together: for
     σ = 0 the pivot of one alone would be as singular as the problem with ξ = 0.
 
-    Args:
+    Attributes:
         noise: it states ν as `nu`, σ as `sigma`, and ξ(θ) as `of_angle`.
         count: n.
     """
 
-    is_local = False
+    word = "waves"
 
-    def __init__(self, noise: Any, count: int) -> None:
-        super().__init__()
-        self.size, self.noise = 2 * count + 1, noise
-        self.modes = (np.arange(self.size) + 1) // 2
-        self.levels = [np.flatnonzero(self.modes == k) for k in range(count + 1)]
-        self.cells, self.constant = np.zeros(self.size, dtype=int), np.eye(1, self.size)[0]
-        points = 4 * count + MORE_POINTS
-        self.points = np.asarray(np.arange(points) * (2 * np.pi / points), dtype=float)
-        self.values, self.measure = self.values_at(self.points), np.full(points, 1 / points)
-        self._xi = noise.of_angle(self.points)
+    @property
+    def size(self) -> int:
+        return 2 * self.count + 1
+
+    @cached_property
+    def modes(self) -> Any:
+        return (np.arange(self.size) + 1) // 2
+
+    @cached_property
+    def levels(self) -> Any:
+        return [np.flatnonzero(self.modes == k) for k in range(self.count + 1)]
+
+    @cached_property
+    def rule(self) -> Rule:
+        count = 4 * self.count + MORE_POINTS
+        theta = np.asarray(np.arange(count) * (2 * np.pi / count), dtype=float)
+        return Rule(theta, np.full(count, 1 / count), self.values_at(theta))
+
+    @cached_property
+    def _xi(self) -> FloatArray:
+        return np.asarray(self.noise.of_angle(self.rule.points))
 
     def values_at(self, theta: FloatArray) -> FloatArray:
         """The waves at any θ, shape (len(θ), size)."""
@@ -60,8 +74,8 @@ class CircleAxis(NoiseAxis):
 
     def samples(self) -> Samples:
         """At equidistant θ; weight and measure are those of θ."""
-        weight, turn = np.full(self.points.size, 0.5 / np.pi), 2 * np.pi
-        return Samples(self._xi, weight, turn * self.measure, self.values, np.ones(self.points.size))
+        weight, turn = np.full(self.measure.size, 0.5 / np.pi), 2 * np.pi
+        return Samples(self._xi, weight, turn * self.measure, self.values, np.ones(self.measure.size))
 
     def everywhere(self, count: int) -> tuple[FloatArray, Any]:
         """At equidistant θ of the whole circle, the first one twice."""

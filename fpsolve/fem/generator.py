@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -13,12 +12,12 @@ import numpy as np
 import scipy.linalg
 
 from fpsolve.arrays import dense, one
-from fpsolve.fem.axis import KroneckerSum, TensorSpace, along
+from fpsolve.fem.axis import KroneckerSum, along
 from fpsolve.fem.dense import Factors
-from fpsolve.fem.discretisation import Discretisation
 from fpsolve.fem.factors import factorised
 from fpsolve.fem.mesh import CylinderMesh, vertices_at
 from fpsolve.fem.rings import Ring
+from fpsolve.fem.space import Space
 from fpsolve.fem.terms import ALL_ORDERS, Term, Terms, TermSum, power_of_epsilon
 from fpsolve.model.problem import ParameterDerivative, Problem
 
@@ -42,13 +41,13 @@ class Pencil:
     """
 
     p: float
-    space: TensorSpace
+    space: Space
     matrix: KroneckerSum
     levels: Sequence[Any]
     ring: Ring | None = None
 
     @staticmethod
-    def of(p: float, space: TensorSpace, matrix: KroneckerSum, ring: Ring | None = None) -> Pencil:
+    def of(p: float, space: Space, matrix: KroneckerSum, ring: Ring | None = None) -> Pencil:
         """That of all functions."""
         return Pencil(p, space, matrix, [axis.levels for axis in space.axes], ring)
 
@@ -63,7 +62,7 @@ class Pencil:
     def numerical_abscissa(self) -> float:
         """About the largest ω of ½(L + Lᵀ)v = ωMv, rather above it, by some steps of Lanczos from a start of all v."""
         space, rows, betas = self.space, [0.0], [0.0]
-        masses = [axis.matrix(one) for axis in space.axes[1:]]
+        masses = [axis.matrix(one) for axis in space.noises]
         inverses = [None if each is None else np.linalg.inv(dense(each)) for each in (space.phi.unit, *masses)]
         rest, old = np.random.default_rng(0).standard_normal(space.size), np.zeros(space.size)
         for _ in range(LANCZOS_STEPS):
@@ -93,20 +92,17 @@ class Generator:
         MeshError: there is no φ-line at a jump, or a cell's polynomials in the noise cannot be told apart.
     """
 
-    def __init__(self, problem: Problem, chosen: Discretisation | CylinderMesh) -> None:
+    def __init__(self, problem: Problem, chosen: Space | CylinderMesh) -> None:
         if isinstance(chosen, CylinderMesh):
-            chosen = Discretisation.on(chosen, problem.coloured, problem.frame)
+            chosen = Space.on(chosen, problem.coloured, problem.frame)
         self.problem, self.chosen, self.size = problem, chosen, chosen.size
-        self.phi = chosen.phase.axis()
-        if any(noise.has_states for noise in problem.noise.parts.values()):
-            self.phi = copy(self.phi)
-            self.phi.slowest = LEFT_BY_STATES
-        self._spaces: dict[float, TensorSpace] = {}
+        self.phi = chosen.phi
+        self._spaces: dict[float, Space] = {}
         self._changes: dict[ParameterDerivative, tuple[Term, ...]] = {}
         self._last: Pencil | None = None
         for jump in problem.motion.jumps:
             vertices_at(self.phi.lines, jump.phase)
-        self.space(0.0)  # refuses a mesh that cannot be used
+        _ = self.space(0.0).constant  # refuses a mesh that cannot be used
 
     def __reduce__(self) -> tuple[Any, ...]:
         """What it is made of; the matrices are assembled again when they are needed."""
@@ -117,14 +113,13 @@ class Generator:
         words = "" if self.problem.frame is None else " in coordinates of its own,"
         return "\n".join([f"L(p), Eq. (19){words} the sum of", *lines])
 
-    def space(self, p: float) -> TensorSpace:
+    def space(self, p: float) -> Space:
         """Trial and test functions; the tilt of those of ξ moves with p."""
         key = p if self.chosen.is_tilted else 0.0
         if key not in self._spaces:
             if len(self._spaces) >= KEPT_SPACES:
                 del self._spaces[next(iter(self._spaces))]
-            pairs = zip(self.chosen.noises, self.problem.coloured.parts.values(), strict=True)
-            self._spaces[key] = TensorSpace([self.phi, *(part.axis(noise, p) for part, noise in pairs)])
+            self._spaces[key] = self.chosen.at(p, self.problem.coloured.parts.values())
         return self._spaces[key]
 
     def at(self, p: float) -> Pencil:
@@ -133,14 +128,20 @@ class Generator:
             self._last = Pencil.of(p, self.space(p), self.matrix(p), self._ring)
         return self._last
 
+    @cached_property
+    def slowest(self) -> list[float]:
+        """For each axis the least share of the effect of its highest modes that two more may leave."""
+        has_states = any(noise.has_states for noise in self.problem.noise.parts.values())
+        return [LEFT_BY_STATES * has_states, *(axis.slowest for axis in self.space(0.0).noises)]
+
     @property
     def _ring(self) -> Ring | None:
         """The cells of φ, if noise without a value does not couple what lies within them."""
         return None if self.problem.diffusions or self.problem.impulses else self.phi.ring
 
     def enriched(self) -> Generator:
-        """That of the next finer discretisation."""
-        return type(self)(self.problem, self.chosen.enriched())
+        """That of the next finer space."""
+        return Generator(self.problem, self.chosen.enriched())
 
     def terms(self) -> tuple[Term, ...]:
         """L(p) term by term."""
@@ -148,7 +149,11 @@ class Generator:
 
     @cached_property
     def _own_terms(self) -> Any:
-        return Terms(self.problem, self.space(0.0))
+        if self.problem.dimension == 2:
+            return Terms(self.problem, self.space(0.0))
+        from fpsolve.fem.sphere import SphereTerms  # scikit-fem takes a while to import
+
+        return SphereTerms(self.problem, self.space(0.0))
 
     def matrix(self, p: float, *, derivative: int = 0, orders: slice = ALL_ORDERS) -> KroneckerSum:
         """The matrix of dᵏL/dpᵏ in the space for p, from the terms of some orders in ε, the ξ-matrix of 1 first.
@@ -162,7 +167,7 @@ class Generator:
 
     def changed(self, by: ParameterDerivative, p: float, rate: float, *, derivative: int = 0) -> KroneckerSum:
         """The matrix of ∂/∂θ (dᵏL/dpᵏ − rate M), the functions of φ and ξ held, M = `mass`; that of P_s is in it."""
-        axes = self.space(p).axes[1:]
+        axes = self.space(p).noises
         if by not in self._changes:
             self._changes[by] = tuple(self._own_terms.changed(by))
         parts: list[tuple[Any, ...]] = [
@@ -195,12 +200,14 @@ class Generator:
         """About how many times its rounding elimination may harm T − 1: the size of L, free of forcing, over a rate."""
         orders = ALL_ORDERS if self.problem.diffusions or self.problem.impulses else slice(0, 1)
         space = self.space(0.0)
-        free = [self.matrix(0.0, orders=orders).terms[0][0], *(axis.matrix(None) for axis in space.axes[1:])]
+        free = [self.matrix(0.0, orders=orders).terms[0][0], *(axis.matrix(None) for axis in space.noises)]
         return 30 * sum(float(abs(each).sum(axis=0).max()) for each in free) / self.unit_rate
 
     @cached_property
     def keeps_constants(self) -> bool:
-        """Whether ⟨P_s, L₀T⟩ = 0 for every T: the order 0 only rotates uniformly."""
+        """Whether ⟨P_s, L₀T⟩ = 0 for every T: the order 0 only rotates uniformly, as it does in the plane alone."""
+        if self.problem.dimension > 2:
+            return False
         free = [term for term in self.problem.motion.terms if term.order == 0]
         is_weak = all(each.order for each in self.problem.diffusions) and not self.problem.impulses
         return is_weak and all(term.h.amplitude == 0 and term.q.vanishes for term in free)

@@ -26,41 +26,8 @@ import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix, diags, identity
 from scipy.special import betaln, eval_jacobi, gammaln, roots_jacobi
 
-from fpsolve.arrays import FloatArray, one
-from fpsolve.fem.sphere import Coordinates, DirectionAxis, group, group_dimensions, waves_at
-
-
-@dataclass(frozen=True, eq=False)
-class HarmonicCells:
-    """Which functions there are of directions, in the place of those of the phase.
-
-    Attributes:
-        coordinates: S of y = S⁻¹x, whose directions they are of, n rows.
-        waves: the largest degree, even.
-        elements: 1, as every function is of the whole sphere.
-    """
-
-    coordinates: Coordinates
-    waves: int
-    elements = 1
-
-    @property
-    def size(self) -> int:
-        """Number of unknowns: of the even degrees."""
-        return int(np.count_nonzero(Harmonics.of(len(self.coordinates), self.waves).own))
-
-    def axis(self) -> HarmonicAxis:
-        """The functions."""
-        return HarmonicAxis(self)
-
-    def enriched(self) -> HarmonicCells:
-        """Two degrees more."""
-        return replace(self, waves=self.waves + 2)
-
-    @property
-    def facts(self) -> dict[str, Any]:
-        """What a table says of it."""
-        return {"harmonics": self.waves}
+from fpsolve.arrays import FloatArray
+from fpsolve.fem.sphere import DirectionAxis, group, group_dimensions, waves_at
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,38 +123,48 @@ def _components(n: int, most: int) -> tuple[Any, list[Any], list[tuple[FloatArra
     return degrees[by_degree], factors, values
 
 
+@dataclass(frozen=True, eq=False)
 class HarmonicAxis(DirectionAxis):
-    """Harmonics up to a degree, see the module.
-
-    Args:
-        chosen: which.
+    """Harmonics up to a degree, see the module; what two degrees more change tells their error.
 
     Attributes:
-        identity: ∫ u v.
-        inner_values: values at points of the sphere, shape (points, size).
-        ladders: none; the error is told by what two degrees more change.
+        waves: the largest degree, even.
     """
 
-    ladders: tuple[tuple[Any, Any, Any], ...] = ()
+    waves: int
 
-    def __init__(self, chosen: HarmonicCells) -> None:
-        super().__init__()
-        self.n, self.chosen = len(chosen.coordinates), chosen
-        self._harmonics = Harmonics.of(self.n, chosen.waves)
-        own = self._harmonics.own
-        self.size = int(np.count_nonzero(own))
-        self.degrees = self._harmonics.degrees[own]
-        self.cells, self.modes = np.full(self.size, -1), np.zeros(self.size, dtype=int)
-        self.constant = np.eye(1, self.size).ravel()
-        self.identity = np.eye(self.size)
+    elements = 1
+
+    @property
+    def size(self) -> int:
+        return self.degrees.size
+
+    @property
+    def facts(self) -> dict[str, Any]:
+        return {"harmonics": self.waves}
+
+    def enriched(self) -> HarmonicAxis:
+        return replace(self, waves=self.waves + 2)
+
+    @cached_property
+    def _harmonics(self) -> Harmonics:
+        return Harmonics.of(self.n, self.waves)
+
+    @property
+    def degrees(self) -> Any:
+        return self._harmonics.degrees[self._harmonics.own]
+
+    @cached_property
+    def constant(self) -> FloatArray:
+        return np.eye(1, self.size).ravel()
+
+    @cached_property
+    def identity(self) -> FloatArray:
+        return np.eye(self.size)
 
     @property
     def inner_values(self) -> FloatArray:
         return self._harmonics.samples
-
-    def mass(self, g: Any = one) -> Any:
-        """∫ u v."""
-        return self.identity
 
     def projection(self, other: HarmonicAxis) -> Any:
         """Those that both have."""
@@ -217,7 +194,7 @@ class HarmonicAxis(DirectionAxis):
         return 2 * math.pi ** (self.n / 2) / math.gamma(self.n / 2)
 
     def at(self, points: FloatArray) -> FloatArray:
-        dimensions, most = group_dimensions(self.n), self.chosen.waves + 2
+        dimensions, most = self.dimensions, self.waves + 2
         sides = np.linalg.norm(points[: dimensions[0]], axis=0), np.linalg.norm(points[dimensions[0] :], axis=0)
         x = (sides[0] - sides[1]) * (sides[0] + sides[1])
         degrees = [group(k, most).degrees for k in dimensions]

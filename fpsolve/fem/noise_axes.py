@@ -12,16 +12,22 @@ moved by 2s, however far that is.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 import numpy as np
 
 from fpsolve.arrays import Coefficient, FloatArray, dense, one
 from fpsolve.fem.axis import Axis
+from fpsolve.fem.effects import ModeEffects, split
+from fpsolve.fem.mesh import MAX_DEGREE, halved
 from fpsolve.fem.phase import MAX_DENSE_UNKNOWNS
 from fpsolve.model.noise import Noise, NoiseDerivative
 from fpsolve.polynomials import Polynomials, gegenbauer, hermite, logarithm, stieltjes
+
+if TYPE_CHECKING:
+    from fpsolve.fem.line import LineSpace
 
 REACH = 9.0
 """Noise units on either side of its centre, beyond which nothing is left of a weight that falls like a Gaussian."""
@@ -33,6 +39,8 @@ STEP = 1e-5
 """Of ln ξ, by which a coefficient is differentiated."""
 MORE_POINTS = 16
 """Quadrature points beyond the number of polynomials."""
+MAX_COUNT = 200
+"""Number of polynomials, or highest degree of others, beyond which none are added."""
 
 
 class Samples(NamedTuple):
@@ -53,24 +61,64 @@ class Samples(NamedTuple):
     factor: FloatArray
 
 
+class Rule(NamedTuple):
+    """The functions of a noise at the points of a quadrature rule, or at the states.
+
+    Attributes:
+        points: of what the functions are of, shape (n,) or (2, n).
+        measure: ∫ of the weight of the axis there, shape (n,).
+        values: without the factor of the axis, shape (n, size).
+    """
+
+    points: FloatArray
+    measure: FloatArray
+    values: Any
+
+
+@dataclass(frozen=True, eq=False)
 class NoiseAxis(Axis):
     """What the generator and its users ask of the functions of ξ; matrices are arrays, or sparse where they are large.
 
     Attributes:
+        noise: ξ.
+        word: what the functions are, as a table says it.
+        dimension: of the state of the noise.
         tilt: s of the factor exp(s (z − c)) that every function carries.
         center: c, about the mean z of the weight.
-        values: the functions at the points of a quadrature rule, or at the states, without factor, shape (n, size).
-        measure: ∫ of the weight at those points, shape (n,).
         is_local: whether the functions can follow a kink in ξ.
     """
 
-    tilt, center, is_local = 0.0, 0.0, True
-    values: Any
-    measure: FloatArray
+    noise: Any
 
-    def __init__(self) -> None:
-        super().__init__()
-        self._changes: dict[tuple[NoiseDerivative, Coefficient | None], Any] = {}
+    word, dimension = "", 1
+    tilt, center, is_local = 0.0, 0.0, True
+
+    @property
+    def rule(self) -> Rule:
+        """The functions at points of their own."""
+        raise NotImplementedError
+
+    def of(self, noise: Noise, p: float) -> Self:
+        """The functions for a noise, which may be of a problem close by, with the tilt for p; no tables are kept."""
+        return replace(self, noise=noise, **({"p": p} if self.slope else {}))
+
+    @property
+    def facts(self) -> dict[str, Any]:
+        return {"xi": self.word, "xi_size": self.size, "tilt": self.tilt}
+
+    @property
+    def measure(self) -> FloatArray:
+        """∫ of the weight at the points of the rule, shape (n,)."""
+        return self.rule.measure
+
+    @property
+    def values(self) -> Any:
+        """The functions at the points of the rule, without factor, shape (n, size)."""
+        return self.rule.values
+
+    @cached_property
+    def _changes(self) -> dict[tuple[NoiseDerivative, Coefficient | None], Any]:
+        return {}
 
     def changed(self, change: NoiseDerivative, g: Coefficient | None) -> Any:
         """∂/∂θ of `mass(g)`, for None of `generator()`, where the noise changes and the functions of ξ do not."""
@@ -109,20 +157,57 @@ class NoiseAxis(Axis):
         return at.xi, at.values
 
 
-class LineAxis(NoiseAxis):
-    """What functions on the line of a diffusion share.
+@dataclass(frozen=True, eq=False)
+class CountedAxis(NoiseAxis):
+    """Functions on the whole of a noise by their degree: one cell, of which the function 1 is the first.
 
     Attributes:
-        unit: ξ/z.
-        points: z of a quadrature rule, shape (n,).
+        count: how many, or up to which degree.
     """
 
-    points: FloatArray
+    count: int
+    is_local = False
 
-    def __init__(self, noise: Noise, tilt: float = 0.0) -> None:
-        super().__init__()
-        self.noise, self.unit, self.tilt, self._log_weight = noise, noise.standard_deviation, tilt, 0.0
-        self._log_weight -= math.log(self.unit)
+    @cached_property
+    def cells(self) -> Any:
+        return np.zeros(self.size, dtype=int)
+
+    @cached_property
+    def constant(self) -> FloatArray:
+        return np.eye(1, self.size)[0]
+
+    def enriched(self) -> Self:
+        return replace(self, count=self.count + max(3, self.count // 8))
+
+    def doubled(self) -> Self:
+        return replace(self, count=min(2 * self.count, MAX_COUNT))
+
+    def raised(self) -> Self:
+        return replace(self, count=min(self.count + 2, MAX_COUNT))
+
+    def refined(self, effects: ModeEffects, share: float, may_coarsen: bool) -> Self:
+        needed = math.ceil(float(effects.needed(share)[0]) + 1.3)
+        least = max(self.count // 2, 3) if may_coarsen else self.count
+        return replace(self, count=max(least, min(needed, 3 * self.count // 2 + 3, MAX_COUNT)))
+
+
+class LineAxis(NoiseAxis):
+    """What functions on the line of a diffusion share; the points of their rule are z."""
+
+    @cached_property
+    def unit(self) -> float:
+        """ξ/z."""
+        return float(self.noise.standard_deviation)
+
+    @property
+    def points(self) -> FloatArray:
+        """z of the rule, shape (n,)."""
+        return self.rule.points
+
+    @property
+    def _log_mass(self) -> float:
+        """ln ∫ P_s exp(2s z)."""
+        return 0.0
 
     def rate(self, z: FloatArray) -> FloatArray:
         """½σ²/std², the diffusion of z."""
@@ -158,7 +243,8 @@ class LineAxis(NoiseAxis):
 
     def weight(self, z: FloatArray) -> FloatArray:
         """P_s exp(2s z) as a density of z: its integral is 1."""
-        return np.exp(self.noise.log_density(self.unit * z) + 2 * self.tilt * z - self._log_weight)
+        logs = self.noise.log_density(self.unit * z) + 2 * self.tilt * z - self._log_mass
+        return np.asarray(self.unit * np.exp(logs))
 
     def at(self, z: FloatArray) -> Samples:
         """At any z; the measure is 0."""
@@ -176,7 +262,19 @@ class LineAxis(NoiseAxis):
         return np.asarray(np.linalg.solve(dense(self.matrix(one)), self.values.T @ scaled))
 
 
-class PolynomialAxis(LineAxis):
+class _Table(NamedTuple):
+    """Polynomials of (z − shift)/scale, their rule, ∂/∂z with the tilt at its points, and ln ∫ P_s exp(2s z)."""
+
+    polynomials: Polynomials
+    shift: float
+    scale: float
+    rule: Rule
+    slopes: FloatArray
+    log_mass: float
+
+
+@dataclass(frozen=True, eq=False)
+class PolynomialAxis(CountedAxis, LineAxis):
     """Orthogonal polynomials: with P_s ~ (1 − x²)^a, x = ξ/ξ_s, and σ² ~ (1 − x²)^b at the ends of the noise those of
 
         P_s σ² exp(2s z)/(1 − x²),
@@ -185,95 +283,179 @@ class PolynomialAxis(LineAxis):
     Ornstein-Uhlenbeck noise, on the whole line, that of 1 is the identity, that of L_ξ without a tilt is diagonal, and
     that of ξ has one diagonal on each side. Near ±ξ_s expansions converge only like powers.
 
-    Args:
-        noise: the noise; P_s must end, or fall like a Gaussian.
+    Attributes:
+        noise: P_s must end, or fall like a Gaussian.
         count: the number of polynomials.
-        tilt: s.
+        slope: s/p.
+        p: the moment that the tilt is for.
     """
 
-    is_local = False
+    slope: float = 0.0
+    p: float = 1.0
 
-    def __init__(self, noise: Noise, count: int, tilt: float = 0.0) -> None:
-        super().__init__(noise, tilt)
-        end = noise.half_width / self.unit
+    word = "polynomials"
+
+    @property
+    def size(self) -> int:
+        return self.count
+
+    @property
+    def tilt(self) -> float:  # type: ignore[override]
+        return self.slope * self.p
+
+    @cached_property
+    def center(self) -> float:  # type: ignore[override]
+        return float(self.measure @ self.points)
+
+    @cached_property
+    def modes(self) -> Any:
+        return np.arange(self.count)
+
+    @property
+    def slowest(self) -> float:  # type: ignore[override]
+        return 0.0 if math.isinf(self.noise.half_width) else 1.0
+
+    @property
+    def rule(self) -> Rule:
+        return self._table.rule
+
+    @cached_property
+    def _table(self) -> _Table:
+        tilt, end = self.tilt, self.noise.half_width / self.unit
         if math.isinf(end):
-            self._polynomials, x, self.values, slopes, self.measure = _hermite_table(count)
-            self._shift, self._scale, self._log_weight = 2 * tilt, 1.0, self._log_weight + 2 * tilt**2
-            self.points = x + self._shift
-        else:
-            self._shift, self._scale, self.slowest = 0.0, end, 1.0
-            middle, near = noise.squared_diffusion(noise.half_width * np.array([0.0, 1 - NEAR_END]))
-            missing = 0.0 if near < VANISHES * middle else 1.0  # 1 − b: by so much more does P_s fall at the ends
-            more = min(abs(tilt) * end, 4 * tilt**2)
-            points = 16 * math.ceil((2 * count + MORE_POINTS + more) / 16)  # few rules serve many spaces
-            self._end = noise.end_exponent - missing
-            x, weights = _gegenbauer_rule(points, self._end)
-            self.points, damping = end * x, (1 - x**2) ** missing
-            logs = np.log(weights) + 2 * tilt * self.points
-            tilted = np.exp(logs - logs.max())
-            own = gegenbauer(count, self._end)
-            self._polynomials = stieltjes(x, tilted, count) if tilt else own
-            self.values, slopes = self._polynomials.at(x)
-            self.measure = tilted * damping / (tilted @ damping)
-            self._log_weight += math.log((tilted @ damping) / (weights @ damping)) + float(logs.max())
-        self._slopes = slopes / self._scale + tilt * self.values
-        self._flux = self.measure * self.rate(self.points)
-        self.center = float(self.measure @ self.points)
-        self.size, self.cells, self.modes = count, np.zeros(count, dtype=int), np.arange(count)
-        self.constant = np.eye(1, count)[0]
+            polynomials, x, values, slopes, weights = _hermite_table(self.count)
+            rule = Rule(x + 2 * tilt, weights, values)
+            return _Table(polynomials, 2 * tilt, 1.0, rule, slopes + tilt * values, 2 * tilt**2)
+        exponent, missing = self._ends
+        more = min(abs(tilt) * end, 4 * tilt**2)
+        points = 16 * math.ceil((2 * self.count + MORE_POINTS + more) / 16)  # few rules serve many spaces
+        x, weights = _gegenbauer_rule(points, exponent)
+        damping, logs = (1 - x**2) ** missing, np.log(weights) + 2 * tilt * end * x
+        tilted = np.exp(logs - logs.max())
+        polynomials = stieltjes(x, tilted, self.count) if tilt else gegenbauer(self.count, exponent)
+        values, slopes = polynomials.at(x)
+        rule = Rule(end * x, tilted * damping / (tilted @ damping), values)
+        log_mass = math.log((tilted @ damping) / (weights @ damping)) + float(logs.max())
+        return _Table(polynomials, 0.0, end, rule, slopes / end + tilt * values, log_mass)
+
+    @cached_property
+    def _ends(self) -> tuple[float, float]:
+        """a + b − 1, and 1 − b: by so much more does P_s fall at the ends."""
+        middle, near = self.noise.squared_diffusion(self.noise.half_width * np.array([0.0, 1 - NEAR_END]))
+        missing = 0.0 if near < VANISHES * middle else 1.0
+        return self.noise.end_exponent - missing, missing
+
+    @cached_property
+    def _flux(self) -> FloatArray:
+        return self.measure * self.rate(self.points)
+
+    @property
+    def _log_mass(self) -> float:
+        return self._table.log_mass
 
     def mass(self, g: Coefficient = one) -> FloatArray:
         return form(self.values, self.measure if g == one else self.measure * g(self.unit * self.points))
 
     def generator(self) -> FloatArray:
         """−½ ∫ P_s σ² (u′ + s u)(v′ + s v)."""
-        return -form(self._slopes, self._flux)
+        return -form(self._table.slopes, self._flux)
 
     def changed(self, change: NoiseDerivative, g: Coefficient | None) -> FloatArray:
         logs, a = change.log_density(self.unit * self.points), self.noise.end_exponent
         if change.end_exponent and a < SHARP_ENDS:  # no rule of Gauss takes its ln(1 − x²) near ±1 as it stands
-            x = self.points / self._scale
-            logs = logs + change.end_exponent * (_end_logarithm(x.size, self._end, a) - np.log1p(-(x**2)))
+            x = self.points / self._table.scale
+            logs = logs + change.end_exponent * (_end_logarithm(x.size, self._ends[0], a) - np.log1p(-(x**2)))
         logs = np.asarray(logs - self.measure @ logs)
         if g is not None:
             return form(self.values, self.measure * self.changed_weight(change, g, logs, self.points))
         own = 2 * (change.log_diffusion - change.log_scale) * self.matrix(None)
-        return own - form(self._slopes, self._flux * logs)
+        return own - form(self._table.slopes, self._flux * logs)
 
     def generator_of_one(self) -> FloatArray:
-        return np.asarray(-self.tilt * (self._flux @ self._slopes))
+        return np.asarray(-self.tilt * (self._flux @ self._table.slopes))
 
     def values_at(self, z: FloatArray) -> FloatArray:
-        return self._polynomials.at((z - self._shift) / self._scale)[0]
+        return self._table.polynomials.at((z - self._table.shift) / self._table.scale)[0]
 
 
+@dataclass(frozen=True, eq=False)
 class CellAxis(LineAxis):
     """Continuous elements on an interval, for given meshes and algebraic tails.
 
-    Args:
-        noise: the noise.
-        lines: vertices in z, within the support of the noise.
-        degrees: of the elements in each cell.
-
     Attributes:
-        line: the elements, in the weight P_s.
-
-    Raises:
-        MeshError: a cell's polynomials cannot be told apart under the weight.
+        lines: vertices in z, within the support of the noise, shape (n + 1,).
+        degrees: of the elements in each cell, shape (n,).
     """
 
-    def __init__(self, noise: Noise, lines: FloatArray, degrees: Any) -> None:
+    lines: FloatArray = field()
+    degrees: Any
+
+    word = "cells"
+
+    @property
+    def size(self) -> int:
+        return int(np.sum(self.degrees)) + 1
+
+    @property
+    def facts(self) -> dict[str, Any]:
+        interval = {"xi_min": float(self.lines[0]), "xi_max": float(self.lines[-1])}
+        return {"xi": self.word, "xi_size": self.size, **interval, "tilt": 0.0}
+
+    @cached_property
+    def line(self) -> LineSpace:
+        """The elements, in the weight P_s. Raises `MeshError` where those of a cell cannot be told apart."""
         from fpsolve.fem.line import LineSpace  # scikit-fem takes a while to import
 
-        super().__init__(noise)
-        end, exponent = noise.half_width / self.unit, noise.end_exponent
-        reaches = (lines[0] <= -end * (1 - 1e-12), lines[-1] >= end * (1 - 1e-12))
+        end, exponent = self.noise.half_width / self.unit, self.noise.end_exponent
+        reaches = (self.lines[0] <= -end * (1 - 1e-12), self.lines[-1] >= end * (1 - 1e-12))
         ends = (exponent * reaches[0], exponent * reaches[1])
-        self.line = LineSpace(lines, degrees, self.weight, end_exponents=ends)
-        self._inner = np.flatnonzero(self.line.kept)
-        self.points, self.measure, self.values = self.line.points, self.line.measure, self.line.values[:, self._inner]
-        self.size, self.cells, self.modes = self._inner.size, self.line.cells[self._inner], self.line.modes[self._inner]
-        self.constant = self.line.constant()[self._inner]
+        return LineSpace(self.lines, self.degrees, self.weight, end_exponents=ends)
+
+    @cached_property
+    def _inner(self) -> Any:
+        """Which functions of the highest degree there are."""
+        return np.flatnonzero(self.line.kept)
+
+    @cached_property
+    def rule(self) -> Rule:
+        return Rule(self.line.points, self.line.measure, self.line.values[:, self._inner])
+
+    @cached_property
+    def cells(self) -> Any:
+        return self.line.cells[self._inner]
+
+    @cached_property
+    def modes(self) -> Any:
+        return self.line.modes[self._inner]
+
+    @cached_property
+    def constant(self) -> FloatArray:
+        return self.line.constant()[self._inner]
+
+    def enriched(self) -> CellAxis:
+        if np.max(self.degrees) + 2 > MAX_DEGREE:
+            return self.doubled()
+        return replace(self, degrees=self.degrees + 2)
+
+    def doubled(self) -> CellAxis:
+        return replace(self, lines=halved(self.lines), degrees=np.repeat(self.degrees, 2))
+
+    def raised(self) -> CellAxis:
+        return replace(self, degrees=np.minimum(self.degrees + 1, MAX_DEGREE))
+
+    def refined(self, effects: ModeEffects, share: float, may_coarsen: bool) -> CellAxis:
+        return CellAxis(self.noise, *split(self.lines, effects, share, may_coarsen))
+
+    def on(self, lines: FloatArray) -> CellAxis:
+        """Those between other lines, each with the degree of the cell that its middle is in, or is next to."""
+        middles = 0.5 * (lines[:-1] + lines[1:])
+        own = np.clip(np.searchsorted(self.lines, middles) - 1, 0, self.degrees.size - 1)
+        return CellAxis(self.noise, lines, self.degrees[own])
+
+    def reaching(self, below: bool, above: bool) -> CellAxis:
+        """With one more cell at the ends whose effect exceeds its share."""
+        lower, upper = [1.6 * self.lines[0]] if below else [], [1.6 * self.lines[-1]] if above else []
+        return self.on(np.concatenate([lower, self.lines, upper]))
 
     def mass(self, g: Coefficient = one) -> Any:
         return self._form(self.line.mass() if g == one else self.line.mass(lambda z: g(self.unit * z)))
@@ -306,18 +488,40 @@ class CellAxis(LineAxis):
         return inner.toarray() if inner.shape[0] <= MAX_DENSE_UNKNOWNS else inner
 
 
+@dataclass(frozen=True, eq=False)
 class StateAxis(NoiseAxis):
-    """One value for each state of a Markov chain: ∫ P_s becomes a sum over the states with their probabilities.
+    """One value for each state of a Markov chain: ∫ P_s becomes a sum over the states with their probabilities."""
 
-    Attributes:
-        support: the states.
-    """
+    word, dimension = "states", 0
 
-    def __init__(self, noise: Any) -> None:
-        super().__init__()
-        self.support, self.measure, self._rates = np.array(noise.states), noise.probabilities, np.array(noise.rates)
-        self.size, self.constant, self.values = self.support.size, np.ones(self.support.size), np.eye(self.support.size)
-        self.cells, self.modes = np.full(self.size, -1), np.zeros(self.size, dtype=int)
+    @property
+    def size(self) -> int:
+        return self.support.size
+
+    @cached_property
+    def support(self) -> FloatArray:
+        """The states."""
+        return np.array(self.noise.states)
+
+    @cached_property
+    def rule(self) -> Rule:
+        return Rule(self.support, self.noise.probabilities, np.eye(self.size))
+
+    @cached_property
+    def cells(self) -> Any:
+        return np.full(self.size, -1)
+
+    @cached_property
+    def modes(self) -> Any:
+        return np.zeros(self.size, dtype=int)
+
+    @cached_property
+    def constant(self) -> FloatArray:
+        return np.ones(self.size)
+
+    @cached_property
+    def _rates(self) -> FloatArray:
+        return np.array(self.noise.rates)
 
     def mass(self, g: Coefficient = one) -> FloatArray:
         return np.diag(self.measure * g(self.support))

@@ -10,49 +10,80 @@ r = g M⁻ᵀ(1, 0) and l = g M⁻¹(1, 0).
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 import scipy.sparse
 
 from fpsolve.arrays import Coefficient, FloatArray, one
-from fpsolve.fem.noise_axes import MORE_POINTS, STEP, NoiseAxis, Samples, form
+from fpsolve.fem.noise_axes import MORE_POINTS, STEP, CountedAxis, Rule, Samples, form
 from fpsolve.model.noise import NoiseDerivative
 from fpsolve.polynomials import hermite
 
 
-class PairAxis(NoiseAxis):
+@dataclass(frozen=True, eq=False)
+class PairAxis(CountedAxis):
     """The products He_j He_k of normalised Hermite polynomials of u₁ and u₂ less their means, j + k < n, by j + k.
 
-    Args:
+    Attributes:
         noise: it states M as `drift_matrix`.
         count: n.
-        pull: g.
+        slope: g/p.
+        p: the moment that g is for.
     """
 
-    is_local, levels = False, ()
+    slope: float = 0.0
+    p: float = 1.0
 
-    def __init__(self, noise: Any, count: int, pull: float = 0.0) -> None:
-        super().__init__()
-        self.noise, self.unit = noise, noise.standard_deviation
-        drift, first = noise.drift_matrix, np.array([pull, 0.0])
-        self._right, self._left = np.linalg.solve(drift.T, first), np.linalg.solve(drift, first)
-        means = self._right + self._left
-        self.center = float(means[0])
-        degree, second = np.tril_indices(count)
-        self._first, self._second, self.modes = degree - second, second, degree
-        self.size, self.cells = degree.size, np.zeros(degree.size, dtype=int)
-        self.constant = np.eye(1, self.size)[0]
-        x, weights = hermite(count).rule()
-        table = hermite(count).at(x)[0]
-        self._u, self.measure = np.array([np.repeat(x, x.size), np.tile(x, x.size)]), np.outer(weights, weights).ravel()
-        self._xi = self.unit * (self._u[0] + means[0])
-        self.values = (table[:, None, self._first] * table[None, :, self._second]).reshape(-1, self.size)
-        fine, self._weights = hermite(count + MORE_POINTS).rule()
-        self._points, self._table = self.unit * (fine + means[0]), hermite(count).at(fine)[0]
+    word, dimension, levels = "pairs", 2, ()
+
+    @property
+    def size(self) -> int:
+        return self.count * (self.count + 1) // 2
+
+    @property
+    def facts(self) -> dict[str, Any]:
+        return super().facts | {"tilt": self.slope * self.p}
+
+    @cached_property
+    def _degrees(self) -> Any:
+        """The total degree, and those in u₁ and u₂, of each product, shape (3, size)."""
+        total, second = np.tril_indices(self.count)
+        return np.stack([total, total - second, second])
+
+    @property
+    def modes(self) -> Any:
+        return self._degrees[0]
+
+    @cached_property
+    def _factors(self) -> FloatArray:
+        """r and l."""
+        drift, first = self.noise.drift_matrix, np.array([self.slope * self.p, 0.0])
+        return np.stack([np.linalg.solve(drift.T, first), np.linalg.solve(drift, first)])
+
+    @property
+    def center(self) -> float:  # type: ignore[override]
+        return float(self._factors[0, 0] + self._factors[1, 0])
+
+    @cached_property
+    def rule(self) -> Rule:
+        x, weights = hermite(self.count).rule()
+        table, (_, first, second) = hermite(self.count).at(x)[0], self._degrees
+        points = np.array([np.repeat(x, x.size), np.tile(x, x.size)])
+        values = (table[:, None, first] * table[None, :, second]).reshape(-1, self.size)
+        return Rule(points, np.outer(weights, weights).ravel(), values)
+
+    @cached_property
+    def _fine(self) -> Rule:
+        """The polynomials at the points ξ of a rule for u₁."""
+        x, weights = hermite(self.count + MORE_POINTS).rule()
+        unit = self.noise.standard_deviation
+        return Rule(unit * (x + self.center), weights, hermite(self.count).at(x)[0])
 
     def mass(self, g: Coefficient = one) -> FloatArray:
-        return self._weighed(g(self._points)) if g != one else np.eye(self.size)
+        return self._weighed(g(self._fine.points)) if g != one else np.eye(self.size)
 
     def generator(self) -> FloatArray:
         return self._moved(self.noise.drift_matrix)
@@ -63,16 +94,18 @@ class PairAxis(NoiseAxis):
     def changed(self, change: NoiseDerivative, g: Coefficient | None) -> FloatArray:
         if g is None:
             return self._moved(np.array(change.drift)) if change.drift else np.zeros((self.size, self.size))
-        slope = (g(self._points * (1 + STEP)) - g(self._points * (1 - STEP))) / (2 * STEP)
+        xi = self._fine.points
+        slope = (g(xi * (1 + STEP)) - g(xi * (1 - STEP))) / (2 * STEP)
         return self._weighed(change.log_scale * slope)
 
     def samples(self) -> Samples:
         """At the points of a rule for (u₁, u₂); the weight is in the measure."""
-        factor = np.exp(np.clip(self._right @ self._u, -600, 600))
-        return Samples(self._xi, np.ones(factor.size), self.measure, self.values, factor)
+        factor = np.exp(np.clip(self._factors[0] @ self.rule.points, -600, 600))
+        xi = self.noise.standard_deviation * (self.rule.points[0] + self.center)
+        return Samples(xi, np.ones(factor.size), self.measure, self.values, factor)
 
     def law(self) -> FloatArray:
-        weights = self.measure * np.exp(-(self._right + self._left) @ self._u)
+        weights = self.measure * np.exp(-self._factors.sum(axis=0) @ self.rule.points)
         return np.asarray(weights / weights.sum())
 
     def projection(self, other: PairAxis) -> FloatArray:
@@ -80,18 +113,19 @@ class PairAxis(NoiseAxis):
 
     def _weighed(self, values: FloatArray) -> FloatArray:
         """∫ g u v from g at the points of the rule for u₁."""
-        matrix = form(self._table, self._weights * values)
-        return np.where(np.equal.outer(self._second, self._second), matrix[np.ix_(self._first, self._first)], 0.0)
+        matrix, (_, first, second) = form(self._fine.values, self._fine.measure * values), self._degrees
+        return np.where(np.equal.outer(second, second), matrix[np.ix_(first, first)], 0.0)
 
     def _moved(self, drift: FloatArray) -> FloatArray:
         """−Σ M_ij ∫ v (a_j† + l_j)(a_i + r_i) u."""
         identity, found = scipy.sparse.eye_array(self.size), np.zeros((self.size, self.size))
         lower = []  # a₁ and a₂
-        for power, less in ((self._first, self.modes), (self._second, self.modes + 1)):
+        right, left = self._factors
+        for power, less in ((self._degrees[1], self.modes), (self._degrees[2], self.modes + 1)):
             at = np.flatnonzero(power)
             entries = np.sqrt(power[at]), (at - less[at], at)
             lower.append(scipy.sparse.csr_array(entries, shape=found.shape))
         for i, j in np.ndindex(2, 2):
-            first, last = lower[i] + self._right[i] * identity, lower[j].T + self._left[j] * identity
+            first, last = lower[i] + right[i] * identity, lower[j].T + left[j] * identity
             found -= drift[i, j] * (last @ first)
         return found

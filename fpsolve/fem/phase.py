@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
-from functools import cached_property
+from dataclasses import dataclass, field, replace
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -12,9 +12,11 @@ from scipy.sparse import csr_matrix, diags, issparse
 
 from fpsolve.arrays import FloatArray, one
 from fpsolve.fem.axis import Axis
+from fpsolve.fem.effects import ModeEffects, split
+from fpsolve.fem.mesh import MAX_DEGREE, halved
 from fpsolve.fem.rings import Ring
 from fpsolve.model.plane import CoefficientMatrix, Harmonics, Impulse, ImpulseDerivative, changed_exponential
-from fpsolve.polynomials import gauss_legendre, legendre, orthonormal
+from fpsolve.polynomials import Orthonormal, gauss_legendre, legendre, orthonormal
 
 PENALTY = 2.0
 """η of the interior penalty method times size/(degree + 1)²."""
@@ -22,47 +24,130 @@ STRIPS, MORE_POINTS = 32, 8
 """Of an impulse: parts of the domain before and after it, in which a rule of Gauss has points beyond the degree."""
 KEPT_IMPULSES = 8
 """Whose matrices are kept, as many problems may share the functions."""
+MOST_SHARED = 100
+"""Functions of φ that are kept for the next problem."""
 MAX_DENSE_UNKNOWNS = 600
 """Matrices of φ, and of ξ, are NumPy arrays for so many unknowns, and sparse beyond."""
 
 
+@dataclass(frozen=True, eq=False)
 class PhaseAxis(Axis):
     """Discontinuous elements on the circle or half circle; in each cell the basis is orthonormal, by degree.
 
-    Args:
+    Attributes:
         lines: the ends of the cells, shape (m + 1,); the first and the last are one.
         degrees: the degree in each cell, from 1 on, shape (m,).
-
-    Attributes:
-        points, weights: a quadrature rule, shape (n,).
-        span: π or 2π.
-        left_trace, right_trace: T(φⱼ⁻) and T(φⱼ⁺) at lines[:-1], shape (m, size); the left trace at the seam
-            comes from the last cell.
-        jump: T(φⱼ⁺) − T(φⱼ⁻).
     """
 
-    def __init__(self, lines: FloatArray, degrees: Any) -> None:
-        super().__init__()
-        self.lines, self.degrees = np.asarray(lines, dtype=float), np.asarray(degrees, dtype=int)
-        self._sizes, self._table = np.diff(self.lines), orthonormal(int(self.degrees.max()))
-        kept = np.arange(self.degrees.max() + 1) <= self.degrees[:, None]
-        self.cells, self.modes = np.nonzero(kept)
-        self.size = self.cells.size
-        self._number = np.cumsum(kept).reshape(kept.shape) - 1
-        self._pairs = kept[:, :, None] & kept[:, None, :]
-        local, weights = self._table.rule
-        self._grid = self.lines[:-1, None] + self._sizes[:, None] * local
-        self._local_weights = weights
-        self.points, self.weights = self._grid.ravel(), (self._sizes[:, None] * weights).ravel()
-        self.constant = np.where(self.modes == 0, np.sqrt(self._sizes)[self.cells], 0.0)
-        self.span = float(self.lines[-1] - self.lines[0])
-        self.turns = round(2 * math.pi / self.span)
-        self.right_trace, self.left_trace = (
-            self._scattered(np.arange(kept.shape[0]) + shift, self._table.ends[side] / np.sqrt(self._sizes)[:, None])
-            for side, shift in ((0, 0), (1, 1))
-        )
-        self.jump = self.right_trace - self.left_trace
-        self._strikes: dict[Impulse, tuple[Any, ...]] = {}
+    lines: FloatArray = field()
+    degrees: Any
+
+    @staticmethod
+    def of(lines: FloatArray, degrees: Any) -> PhaseAxis:
+        """The axis of lines and degrees; many problems share the tables of a small one."""
+        axis = PhaseAxis(lines, np.asarray(degrees, dtype=int))
+        return axis if axis.size > MOST_SHARED else _shared(lines.tobytes(), axis.degrees.tobytes())
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return self.of, (self.lines, self.degrees)
+
+    @cached_property
+    def size(self) -> int:
+        return int(np.sum(self.degrees + 1))
+
+    @property
+    def facts(self) -> dict[str, Any]:
+        return {"phi_cells": self.lines.size - 1, "phi_degrees": [int(degree) for degree in self.degrees]}
+
+    def enriched(self) -> PhaseAxis:
+        if np.max(self.degrees) + 2 > MAX_DEGREE:
+            return self.doubled()
+        return self.of(self.lines, self.degrees + 2)
+
+    def doubled(self) -> PhaseAxis:
+        return self.of(halved(self.lines), np.repeat(self.degrees, 2))
+
+    def raised(self) -> PhaseAxis:
+        return self.of(self.lines, np.minimum(self.degrees + 1, MAX_DEGREE))
+
+    def refined(self, effects: ModeEffects, share: float, may_coarsen: bool) -> PhaseAxis:
+        return self.of(*split(self.lines, effects, share, may_coarsen))
+
+    @cached_property
+    def _sizes(self) -> FloatArray:
+        return np.diff(self.lines)
+
+    @cached_property
+    def _table(self) -> Orthonormal:
+        return orthonormal(int(self.degrees.max()))
+
+    @cached_property
+    def _kept(self) -> Any:
+        """Which modes each cell has, shape (m, largest degree + 1)."""
+        return np.arange(self.degrees.max() + 1) <= self.degrees[:, None]
+
+    @cached_property
+    def cells(self) -> Any:
+        return np.nonzero(self._kept)[0]
+
+    @cached_property
+    def modes(self) -> Any:
+        return np.nonzero(self._kept)[1]
+
+    @cached_property
+    def _number(self) -> Any:
+        return np.cumsum(self._kept).reshape(self._kept.shape) - 1
+
+    @cached_property
+    def _pairs(self) -> Any:
+        return self._kept[:, :, None] & self._kept[:, None, :]
+
+    @cached_property
+    def _grid(self) -> FloatArray:
+        """The points of a rule in each cell, shape (m, n)."""
+        return self.lines[:-1, None] + self._sizes[:, None] * self._table.rule.points
+
+    @cached_property
+    def points(self) -> FloatArray:
+        """The points of all cells, shape (m n,)."""
+        return self._grid.ravel()
+
+    @cached_property
+    def weights(self) -> FloatArray:
+        """Those of the points, shape (m n,)."""
+        return (self._sizes[:, None] * self._table.rule.weights).ravel()
+
+    @cached_property
+    def constant(self) -> FloatArray:
+        return np.where(self.modes == 0, np.sqrt(self._sizes)[self.cells], 0.0)
+
+    @property
+    def span(self) -> float:
+        """π or 2π."""
+        return float(self.lines[-1] - self.lines[0])
+
+    @cached_property
+    def turns(self) -> int:
+        return round(2 * math.pi / self.span)
+
+    @cached_property
+    def right_trace(self) -> Any:
+        """T(φⱼ⁺) at lines[:-1], shape (m, size)."""
+        return self._trace(0)
+
+    @cached_property
+    def left_trace(self) -> Any:
+        """T(φⱼ⁻) at lines[:-1], shape (m, size); that at the seam comes from the last cell."""
+        return self._trace(1)
+
+    @cached_property
+    def jump(self) -> Any:
+        """T(φⱼ⁺) − T(φⱼ⁻)."""
+        return self.right_trace - self.left_trace
+
+    def _trace(self, side: int) -> Any:
+        values = self._table.ends[side] / np.sqrt(self._sizes)[:, None]
+        return self._scattered(np.arange(self._sizes.size) + side, values)
 
     def mass(self, f: Any = one) -> Any:
         """∫ f u v of `Harmonics` f, or of 1."""
@@ -83,7 +168,7 @@ class PhaseAxis(Axis):
         at a vertex, as h = 0 at the ray of a jump, is not there.
         """
         grid, at = self._grid, self.lines[:-1]
-        size, weights = self._sizes[:, None], self._sizes[:, None] * self._local_weights
+        size, weights = self._sizes[:, None], self._sizes[:, None] * self._table.rule.weights
 
         def cellwise(f: FloatArray, table: FloatArray, power: int) -> FloatArray:
             return (f * weights / size ** (1 + power)) @ table
@@ -113,7 +198,7 @@ class PhaseAxis(Axis):
         """∂ᵏ/∂pᵏ of ∫ w |exp(B)e|^p T(ψ(φ)), ψ being where an impulse takes φ."""
         at, end, weights, stretch, _ = self._struck(of)
         logs = np.log(stretch)
-        return self._kept(at.T @ diags(weights * np.exp(p * logs) * logs**derivative) @ end)
+        return self._stored(at.T @ diags(weights * np.exp(p * logs) * logs**derivative) @ end)
 
     def changed_impulses(self, of: Impulse, by: ImpulseDerivative, p: float, derivative: int = 0) -> Any:
         """The same, differentiated by θ of which B depends."""
@@ -125,11 +210,15 @@ class PhaseAxis(Axis):
         longer = (x * dx + u * du) / stretch**2 * (p * logs**derivative + derivative * logs ** max(derivative - 1, 0))
         turned = (u * dx - x * du) / stretch**2 * logs**derivative
         slope = end @ csr_matrix(self.convection(Harmonics(1.0, 0.0, 0.0)))
-        return self._kept(at.T @ (diags(size * longer) @ end + diags(size * turned) @ slope))
+        return self._stored(at.T @ (diags(size * longer) @ end + diags(size * turned) @ slope))
 
-    def _kept(self, matrix: Any) -> Any:
+    def _stored(self, matrix: Any) -> Any:
         """An array where matrices of φ are."""
         return matrix if self.size > MAX_DENSE_UNKNOWNS else matrix.toarray()
+
+    @cached_property
+    def _strikes(self) -> dict[Impulse, tuple[Any, ...]]:
+        return {}
 
     def _struck(self, of: Impulse) -> tuple[Any, ...]:
         """The functions at the points of a rule and where an impulse takes them, weights, |exp(B)e|, and the points."""
@@ -159,7 +248,7 @@ class PhaseAxis(Axis):
     @cached_property
     def ring(self) -> Ring:
         """The cells, as long as nothing but their end values couples them."""
-        kept = self._pairs[:, :, 0]
+        kept = self._kept
         ends = (self._table.ends[:, None] / np.sqrt(self._sizes)[:, None]).transpose(1, 2, 0)
         return Ring(np.where(kept, self._number, -1), np.where(kept[:, :, None], ends, 0.0))
 
@@ -193,7 +282,7 @@ class PhaseAxis(Axis):
         sizes = np.repeat(self._sizes / parts, parts)
         starts = (self.lines[:-1, None] + self._sizes[:, None] * np.arange(parts) / parts).ravel()
         points = starts[:, None] + sizes[:, None] * self._table.rule.points
-        return points.ravel(), (sizes[:, None] * self._local_weights).ravel()
+        return points.ravel(), (sizes[:, None] * self._table.rule.weights).ravel()
 
     @cached_property
     def values(self) -> Any:
@@ -212,7 +301,7 @@ class PhaseAxis(Axis):
     @cached_property
     def _waves(self) -> FloatArray:
         """cos 2φ and sin 2φ times the weights of the rule, shape (2, m, n)."""
-        return np.stack([np.cos(2 * self._grid), np.sin(2 * self._grid)]) * self._local_weights
+        return np.stack([np.cos(2 * self._grid), np.sin(2 * self._grid)]) * self._table.rule.weights
 
     @cached_property
     def _masses(self) -> tuple[Any, Any, Any]:
@@ -221,7 +310,7 @@ class PhaseAxis(Axis):
 
     @cached_property
     def _convections(self) -> tuple[Any, Any, Any]:
-        weights = np.broadcast_to(self._local_weights, self._grid.shape)[None]
+        weights = np.broadcast_to(self._table.rule.weights, self._grid.shape)[None]
         blocks = np.concatenate([weights, self._waves]) @ self._table.convections
         mean, cosine, sine = blocks / self._sizes[:, None]
         return self._assembled(mean), self._assembled(cosine), self._assembled(sine)
@@ -245,7 +334,7 @@ class PhaseAxis(Axis):
 
     def _scattered(self, vertex: Any, values: FloatArray) -> Any:
         """A row for each vertex, with values for the functions of a cell."""
-        kept = self._pairs[:, :, 0]
+        kept = self._kept
         rows = np.broadcast_to((vertex % len(kept))[:, None], kept.shape)
         return self._matrix(values[kept], rows[kept], self._number[kept], (len(kept), self.size))
 
@@ -260,3 +349,9 @@ class PhaseAxis(Axis):
 def by_rows(factors: FloatArray, matrix: Any) -> Any:
     """A matrix with its rows multiplied."""
     return diags(factors) @ matrix if issparse(matrix) else factors[:, None] * matrix
+
+
+@lru_cache(maxsize=32)
+def _shared(lines: bytes, degrees: bytes) -> PhaseAxis:
+    """The functions of some cells; a problem changes nothing in them."""
+    return PhaseAxis(np.frombuffer(lines), np.frombuffer(degrees, dtype=int))

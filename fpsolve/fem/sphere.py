@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from typing import Any
 
@@ -28,9 +28,10 @@ from scipy.sparse import csr_matrix, diags
 from scipy.sparse.linalg import LinearOperator
 
 from fpsolve.arrays import FloatArray, one
-from fpsolve.fem.axis import Axis, KroneckerSum, TensorSpace, along
-from fpsolve.fem.generator import Generator
+from fpsolve.fem.axis import Axis, KroneckerSum, along
 from fpsolve.fem.line import LineSpace
+from fpsolve.fem.mesh import halved
+from fpsolve.fem.space import Space
 from fpsolve.fem.terms import NoiseTerms, OfMoment, Term
 from fpsolve.model.plane import CoefficientMatrix, written_coefficient
 from fpsolve.model.problem import ParameterDerivative, Problem
@@ -49,68 +50,6 @@ Parts = list[tuple[FloatArray, Any]]
 def group_dimensions(n: int) -> tuple[int, int]:
     """Of the two groups of coordinates."""
     return n // 2, (n + 1) // 2
-
-
-@dataclass(frozen=True, eq=False)
-class SphereCells:
-    """Which functions there are of directions, in the place of those of the phase.
-
-    Attributes:
-        coordinates: S of y = S⁻¹x, whose directions they are of, n rows; the first group of coordinates first.
-        lines: the vertices in η, shape (m + 1,).
-        degree: of the elements.
-        waves: the largest total degree of a wave, even.
-    """
-
-    coordinates: Coordinates
-    lines: FloatArray
-    degree: int
-    waves: int
-
-    @property
-    def dimensions(self) -> tuple[int, int]:
-        """Of the two groups of coordinates."""
-        return group_dimensions(len(self.coordinates))
-
-    @property
-    def size(self) -> int:
-        """Number of unknowns."""
-        nodes, (first, second) = (self.lines.size - 1) * self.degree + 1, self._degrees
-        return int(first.size * nodes - np.count_nonzero(first) - np.count_nonzero(second))
-
-    @property
-    def elements(self) -> int:
-        """How many there are in η."""
-        return self.lines.size - 1
-
-    @property
-    def _degrees(self) -> tuple[Any, Any]:
-        waves = Waves.of(self.dimensions, self.waves)
-        return waves.first[waves.own], waves.second[waves.own]
-
-    def axis(self) -> SphereAxis:
-        """The functions."""
-        return SphereAxis(self)
-
-    def enriched(self) -> SphereCells:
-        """Two degrees more in every direction."""
-        return self.finer_waves().finer_elements()
-
-    def finer_waves(self) -> SphereCells:
-        """Two degrees more of the waves."""
-        return replace(self, waves=self.waves + 2)
-
-    def finer_elements(self) -> SphereCells:
-        """Two degrees more in η, where there are none left elements of half the size."""
-        if self.degree + 2 <= MOST_DEGREE:
-            return replace(self, degree=self.degree + 2)
-        lines = np.sort(np.append(self.lines, 0.5 * (self.lines[1:] + self.lines[:-1])))
-        return replace(self, lines=lines, degree=MOST_DEGREE // 2 + 2)
-
-    @property
-    def facts(self) -> dict[str, Any]:
-        """What a table says of it."""
-        return {"eta_cells": self.elements, "eta_degree": self.degree, "waves": self.waves}
 
 
 @dataclass(frozen=True, eq=False)
@@ -211,21 +150,48 @@ def group(dimension: int, most: int) -> Group:
     return Group(degrees, unit, [-unit[1], unit[0]], slope, values(max(SIDE, most))[1])
 
 
+@dataclass(frozen=True, eq=False)
 class DirectionAxis(Axis):
     """Functions of directions, and what a matrix X does to them: h·∇u and q u of ẋ = Xx.
 
     Attributes:
-        n: the dimension.
-        chosen: which functions.
-        degrees: the total degree of the wave, or of the harmonic, of each unknown, shape (size,).
-        identity: ∫ u v, shape (size, size).
+        coordinates: S of y = S⁻¹x, whose directions they are of, n rows; the first group of coordinates first.
     """
 
-    is_full = True
-    n: int
-    chosen: Any
-    degrees: Any
-    identity: Any
+    coordinates: Coordinates
+
+    is_full, ladders = True, ()
+
+    @property
+    def n(self) -> int:
+        """The dimension."""
+        return len(self.coordinates)
+
+    @property
+    def dimensions(self) -> tuple[int, int]:
+        """Of the two groups of coordinates."""
+        return group_dimensions(self.n)
+
+    @cached_property
+    def cells(self) -> Any:
+        return np.full(self.size, -1)
+
+    @cached_property
+    def modes(self) -> Any:
+        return np.zeros(self.size, dtype=int)
+
+    @property
+    def degrees(self) -> Any:
+        """The total degree of the wave, or of the harmonic, of each unknown, shape (size,)."""
+        raise NotImplementedError
+
+    @property
+    def identity(self) -> Any:
+        """∫ u v, shape (size, size)."""
+        raise NotImplementedError
+
+    def mass(self, g: Any = one) -> Any:
+        return self.identity
 
     def _moved(self, matrix: FloatArray) -> tuple[Any, Any]:
         """h·∇u and q u of a matrix."""
@@ -273,47 +239,104 @@ class DirectionAxis(Axis):
         raise NotImplementedError
 
 
+@dataclass(frozen=True, eq=False)
 class SphereAxis(DirectionAxis):
     """Continuous elements in η times waves of the other angles, see the module.
 
-    Args:
-        chosen: which.
-
     Attributes:
-        identity: ∫ u v, which is no identity, shape (size, size).
-        inner_values: what takes coefficients to values at points of the sphere, shape (points, size).
-        ladders: of the elements alone; that of the waves is told by what two degrees more change.
+        lines: the vertices in η, shape (m + 1,).
+        degree: of the elements.
+        waves: the largest total degree of a wave, even.
     """
 
-    ladders: tuple[tuple[Any, Any, Any], ...] = ()
+    lines: FloatArray = field()
+    degree: int
+    waves: int
 
-    def __init__(self, chosen: SphereCells) -> None:
-        super().__init__()
-        self.n, (first, second) = len(chosen.coordinates), chosen.dimensions
-        self.chosen, self._slices = chosen, (slice(0, first), slice(first, None))
+    @cached_property
+    def size(self) -> int:
+        nodes = (self.lines.size - 1) * self.degree + 1
+        return nodes * self._waves.own.size - sum(int(np.count_nonzero(each)) for each in self._wave_degrees)
+
+    @property
+    def elements(self) -> int:
+        """How many there are in η."""
+        return self.lines.size - 1
+
+    @property
+    def facts(self) -> dict[str, Any]:
+        return {"eta_cells": self.elements, "eta_degree": self.degree, "waves": self.waves}
+
+    def enriched(self) -> SphereAxis:
+        """Two degrees more in every direction."""
+        return replace(self, waves=self.waves + 2).finer_elements()
+
+    def finer_elements(self) -> SphereAxis:
+        """Two degrees more in η, where there are none left elements of half the size."""
+        if self.degree + 2 <= MOST_DEGREE:
+            return replace(self, degree=self.degree + 2)
+        return replace(self, lines=halved(self.lines), degree=MOST_DEGREE // 2 + 2)
+
+    @cached_property
+    def line(self) -> LineSpace:
+        """The elements in η."""
+        first, second = self.dimensions
 
         def weight(eta: Any) -> Any:
             return np.cos(eta) ** (first - 1) * np.sin(eta) ** (second - 1)
 
-        ends = second - 1, first - 1
-        line = self.line = LineSpace(chosen.lines, chosen.degree, weight, end_exponents=ends, is_flat=True)
-        waves = self.waves = Waves.of(chosen.dimensions, chosen.waves)
-        degrees = waves.first[waves.own], waves.second[waves.own]
-        kept = np.ones((line.size, waves.own.size), dtype=bool)
-        kept[line.ends[0], degrees[1] > 0] = kept[line.ends[1], degrees[0] > 0] = False
-        self._kept = np.flatnonzero(kept)
-        self.size = self._kept.size
-        self.cells, self.modes = np.full(self.size, -1), np.zeros(self.size, dtype=int)
-        self.degrees = sum(degrees)[self._kept % waves.own.size]
-        node = self._kept // waves.own.size
+        return LineSpace(self.lines, self.degree, weight, end_exponents=(second - 1, first - 1), is_flat=True)
+
+    @cached_property
+    def _waves(self) -> Waves:
+        return Waves.of(self.dimensions, self.waves)
+
+    @property
+    def _wave_degrees(self) -> tuple[Any, Any]:
+        """Those in θ₁ and in θ₂ of the own waves."""
+        return self._waves.first[self._waves.own], self._waves.second[self._waves.own]
+
+    @cached_property
+    def _kept(self) -> Any:
+        """Which products of a function of η and a wave there are: waves vanish where their vector has no say."""
+        first, second = self._wave_degrees
+        kept = np.ones((self.line.size, first.size), dtype=bool)
+        kept[self.line.ends[0], second > 0] = kept[self.line.ends[1], first > 0] = False
+        return np.flatnonzero(kept)
+
+    @cached_property
+    def _node(self) -> Any:
+        """The function of η of each unknown."""
+        return self._kept // self._waves.own.size
+
+    @cached_property
+    def degrees(self) -> Any:
+        return sum(self._wave_degrees)[self._kept % self._waves.own.size]
+
+    @cached_property
+    def ladders(self) -> tuple[tuple[Any, Any, Any], ...]:  # type: ignore[override]
+        """That of the elements alone; of the waves what two degrees more change tells."""
+        line, node = self.line, self._node
         of_elements = np.where(line.modes[node] == 1, -1, line.cells[node])
-        self.ladders = ((of_elements, line.modes[node], self._on_kept(line.nested)),)
-        self.levels = [np.flatnonzero(line.first_cells[node] == k) for k in range(chosen.elements)]
-        constant = np.zeros((line.size, waves.own.size))
-        constant[:, 0] = line.constant()
-        self.constant = constant.ravel()[self._kept]
-        self._of_line, self._slopes = line.values.toarray(), line.slopes.toarray()
-        self.identity = self.unit = self._form(self._itself, self._itself)
+        return ((of_elements, line.modes[node], self._on_kept(line.nested)),)
+
+    @cached_property
+    def levels(self) -> Any:
+        return [np.flatnonzero(self.line.first_cells[self._node] == k) for k in range(self.elements)]
+
+    @cached_property
+    def constant(self) -> FloatArray:
+        constant = np.zeros((self.line.size, self._waves.own.size))
+        constant[:, 0] = self.line.constant()
+        return constant.ravel()[self._kept]
+
+    @cached_property
+    def identity(self) -> Any:
+        return self._form(self._itself, self._itself)
+
+    @property
+    def unit(self) -> Any:
+        return self.identity
 
     def _assembled(self, of_line: Sequence[FloatArray], of_waves: Sequence[Any]) -> Any:
         """Σ A_k ⊗ B_k of matrices in η and of the waves, sparse, shape (size, size)."""
@@ -322,26 +345,27 @@ class SphereAxis(DirectionAxis):
         found.eliminate_zeros()
         return found
 
+    @property
+    def _slices(self) -> tuple[slice, slice]:
+        """The two groups of coordinates."""
+        return slice(0, self.dimensions[0]), slice(self.dimensions[0], None)
+
     def _on_kept(self, of_line: Any) -> Any:
-        whole = scipy.sparse.kron(of_line, scipy.sparse.identity(self.waves.own.size), format="csr")
+        whole = scipy.sparse.kron(of_line, scipy.sparse.identity(self._waves.own.size), format="csr")
         return whole[self._kept][:, self._kept]
 
     @property
     def inner_values(self) -> LinearOperator:
-        samples, points = self.waves.samples[:, self.waves.own], self.line.values[:: max(1, self.chosen.degree // 4)]
+        samples, points = self._waves.samples[:, self._waves.own], self.line.values[:: max(1, self.degree // 4)]
 
         def of_columns(columns: FloatArray) -> FloatArray:
-            table = np.zeros((self.line.size * self.waves.own.size, columns.shape[1]))
+            table = np.zeros((self.line.size * self._waves.own.size, columns.shape[1]))
             table[self._kept] = columns
-            found = along((points, samples, None), table.reshape(self.line.size, self.waves.own.size, -1))
+            found = along((points, samples, None), table.reshape(self.line.size, self._waves.own.size, -1))
             return found.reshape(-1, columns.shape[1])
 
         shape = points.shape[0] * len(samples), self.size
         return LinearOperator(shape, matvec=lambda v: of_columns(v.reshape(-1, 1)), matmat=of_columns, dtype=float)
-
-    def mass(self, g: Any = one) -> Any:
-        """∫ u v."""
-        return self.identity
 
     def projection(self, other: SphereAxis) -> Any:
         """In η by the inner product, of waves those that both have."""
@@ -349,7 +373,7 @@ class SphereAxis(DirectionAxis):
         nodes = scipy.sparse.linalg.spsolve(self.line.mass().tocsc(), csr_matrix(of_line).tocsc())
         own = {each: k for k, each in enumerate(self._labels)}
         pairs = np.array([(own[each], k) for k, each in enumerate(other._labels) if each in own])
-        shape = self.waves.own.size, other.waves.own.size
+        shape = self._waves.own.size, other._waves.own.size
         shared = csr_matrix((np.ones(len(pairs)), pairs.T), shape=shape)
         return scipy.sparse.kron(nodes, shared, format="csr")[self._kept][:, other._kept]
 
@@ -359,7 +383,7 @@ class SphereAxis(DirectionAxis):
         counts: dict[tuple[int, int], int] = {}
         found = []
         for pair in zip(
-            *(each[self.waves.own].tolist() for each in (self.waves.first, self.waves.second)), strict=True
+            *(each[self._waves.own].tolist() for each in (self._waves.first, self._waves.second)), strict=True
         ):
             counts[pair] = counts.get(pair, -1) + 1
             found.append((*pair, counts[pair]))
@@ -367,19 +391,19 @@ class SphereAxis(DirectionAxis):
 
     def _moved(self, matrix: FloatArray) -> tuple[Parts, Parts]:
         """h·∇u and q u of a matrix."""
-        eta = self.line.points
+        eta, slices = self.line.points, self._slices
         c, s = np.cos(eta)[:, None], np.sin(eta)[:, None]
 
         def form(table: dict[tuple[int, int], Any], i: int, j: int) -> Any:
-            block = matrix[self._slices[i], self._slices[j]]
+            block = matrix[slices[i], slices[j]]
             return sum(size * table[i, j][k][m] for (k, m), size in np.ndenumerate(block))
 
-        a = {pair: form(self.waves.along, *pair) for pair in self.waves.along}
-        b = {pair: form(self.waves.across, *pair) for pair in self.waves.across}
-        values, slopes, own = self._of_line, self._slopes, self.waves.own
+        a = {pair: form(self._waves.along, *pair) for pair in self._waves.along}
+        b = {pair: form(self._waves.across, *pair) for pair in self._waves.across}
+        values, slopes, own = self.line.values.toarray(), self.line.slopes.toarray(), self._waves.own
         moved = [(c * c * slopes, a[1, 0]), (c * s * slopes, a[1, 1] - a[0, 0]), (-s * s * slopes, a[0, 1])]
         for i, ratio in ((0, s / c), (1, c / s)):
-            if (turn := self.waves.slopes[i]) is not None:
+            if (turn := self._waves.slopes[i]) is not None:
                 moved += [(values, b[i, i] @ turn), (ratio * values, b[i, 1 - i] @ turn)]
         growth = [(c * c * values, a[0, 0]), (c * s * values, a[0, 1] + a[1, 0]), (s * s * values, a[1, 1])]
         return [(of_eta, of[:, own]) for of_eta, of in moved], [(of_eta, of[:, own]) for of_eta, of in growth]
@@ -394,32 +418,32 @@ class SphereAxis(DirectionAxis):
     @property
     def _itself(self) -> Parts:
         """u."""
-        every = scipy.sparse.identity(self.waves.first.size, format="csc")
-        return [(self._of_line, every[:, self.waves.own])]
+        every = scipy.sparse.identity(self._waves.first.size, format="csc")
+        return [(self.line.values.toarray(), every[:, self._waves.own])]
 
     def penalty(self) -> Any:
         """−Σ γ h² N⁻³ (cs)² w [∂u/∂η] [∂v/∂η] over the inner vertices."""
-        inner, sizes, degree = self.line.lines[1:-1], np.diff(self.line.lines), self.chosen.degree
-        first, second = self.chosen.dimensions
+        inner, sizes, degree = self.line.lines[1:-1], np.diff(self.line.lines), self.degree
+        first, second = self.dimensions
         weights = PENALTY * (0.5 * (sizes[1:] + sizes[:-1])) ** 2 / degree**3
         weights = weights * np.cos(inner) ** (first + 1) * np.sin(inner) ** (second + 1)
         jump = self.line.jumps_of_slope().toarray()
-        return self._assembled([-(jump.T @ (weights[:, None] * jump))], [np.eye(self.waves.own.size)])
+        return self._assembled([-(jump.T @ (weights[:, None] * jump))], [np.eye(self._waves.own.size)])
 
     @property
     def area(self) -> float:
         """|S^(n₁ − 1)| |S^(n₂ − 1)|, as waves are orthonormal in the mean over both groups."""
-        return math.prod(2 * math.pi ** (k / 2) / math.gamma(k / 2) for k in self.chosen.dimensions)
+        return math.prod(2 * math.pi ** (k / 2) / math.gamma(k / 2) for k in self.dimensions)
 
     def at(self, points: FloatArray) -> csr_matrix:
         first, second = (points[each] for each in self._slices)
         on_line = self.line.at(np.arctan2(np.linalg.norm(second, axis=0), np.linalg.norm(first, axis=0)))
-        of_waves = waves_at(self.chosen.dimensions, self.chosen.waves + 2, points)[:, self._of_product]
-        shape = len(of_waves), self.chosen.degree + 1
+        of_waves = waves_at(self.dimensions, self.waves + 2, points)[:, self._of_product]
+        shape = len(of_waves), self.degree + 1
         nodes, values = (each.reshape(shape) for each in (on_line.indices, on_line.data))
-        place = np.full(self.line.size * self.waves.own.size, -1)
+        place = np.full(self.line.size * self._waves.own.size, -1)
         place[self._kept] = np.arange(self.size)
-        columns = place[nodes[:, :, None] * self.waves.own.size + np.arange(self.waves.own.size)]
+        columns = place[nodes[:, :, None] * self._waves.own.size + np.arange(self._waves.own.size)]
         entries = np.where(columns >= 0, values[:, :, None] * of_waves[:, None, :], 0.0)
         starts = np.arange(len(entries) + 1) * math.prod(entries.shape[1:])
         return csr_matrix((entries.ravel(), np.maximum(columns, 0).ravel(), starts), shape=(len(entries), self.size))
@@ -427,10 +451,10 @@ class SphereAxis(DirectionAxis):
     @cached_property
     def _of_product(self) -> Any:
         """Where the waves that functions have are among all products of `waves_at`."""
-        reach = self.chosen.waves + 2
-        first, second = (group(k, reach).degrees for k in self.chosen.dimensions)
+        reach = self.waves + 2
+        first, second = (group(k, reach).degrees for k in self.dimensions)
         sums = np.add.outer(first, second).ravel()
-        return np.flatnonzero((sums % 2 == 0) & (sums <= reach))[self.waves.own]
+        return np.flatnonzero((sums % 2 == 0) & (sums <= reach))[self._waves.own]
 
 
 def waves_at(dimensions: tuple[int, int], most: int, points: FloatArray) -> FloatArray:
@@ -456,10 +480,10 @@ class SphereTerms(NoiseTerms):
         space: the trial and test functions.
     """
 
-    def __init__(self, problem: Problem, space: TensorSpace) -> None:
+    def __init__(self, problem: Problem, space: Space) -> None:
         super().__init__(problem)
         self._problem, self.phi = problem, space.phi
-        coordinates = np.array(self.phi.chosen.coordinates)
+        coordinates = np.array(self.phi.coordinates)
         self._coordinates, self._inverse = coordinates, np.linalg.inv(coordinates)
 
     def matrix(self, term: CoefficientMatrix) -> FloatArray:
@@ -502,16 +526,3 @@ class SphereTerms(NoiseTerms):
             yield self._term(
                 total, one, f"{('', 'p ', 'p² ')[power]}½ (h·∇ + p q)² of white noise", OfMoment(power), order
             )
-
-
-class SphereGenerator(Generator):
-    """L(p) of a system of dimension 3 or 4 in weak form."""
-
-    @property
-    def _own_terms(self) -> SphereTerms:
-        return SphereTerms(self.problem, self.space(0.0))
-
-    @property
-    def keeps_constants(self) -> bool:
-        """False: damping moves directions."""
-        return False

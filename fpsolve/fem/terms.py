@@ -25,9 +25,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fpsolve.arrays import Coefficient, FloatArray, one
-from fpsolve.fem.axis import KroneckerSum, TensorSpace
+from fpsolve.fem.axis import KroneckerSum
 from fpsolve.fem.mesh import vertices_at
 from fpsolve.fem.phase import by_rows
+from fpsolve.fem.space import Space
 from fpsolve.model.plane import (
     CoefficientMatrix,
     Harmonics,
@@ -147,11 +148,11 @@ class TermSum:
                 phases[noises] = phases[noises] + phase_at(p, derivative)
         return phases
 
-    def matrix(self, space: TensorSpace, p: float, derivative: int = 0, orders: slice = ALL_ORDERS) -> KroneckerSum:
+    def matrix(self, space: Space, p: float, derivative: int = 0, orders: slice = ALL_ORDERS) -> KroneckerSum:
         """The sum in a space for p; its first term has ∫ P_s u v of every noise."""
         return KroneckerSum(
             [
-                (phase, *(axis.matrix(g) for axis, g in zip(space.axes[1:], noises, strict=True)))
+                (phase, *(axis.matrix(g) for axis, g in zip(space.noises, noises, strict=True)))
                 for noises, phase in self.phases(p, derivative, orders).items()
             ],
             space.phi.unit,
@@ -197,11 +198,11 @@ class Terms(NoiseTerms):
         space: the trial and test functions.
     """
 
-    def __init__(self, problem: Problem, space: TensorSpace) -> None:
+    def __init__(self, problem: Problem, space: Space) -> None:
         super().__init__(problem)
         self._problem = problem
         system = self.system = problem.motion
-        self._diffusions, self.phi, self.noises = problem.diffusions, space.phi, space.axes[1:]
+        self._diffusions, self.phi, self.noises = problem.diffusions, space.phi, space.noises
         self._impulses = problem.impulses
         self._vertices, self._jump = self.phi.lines[:-1], self.phi.jump
         # where θ = |v|, and the sign of v where that is the same for all ξ, otherwise 0

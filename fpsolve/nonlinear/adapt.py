@@ -19,8 +19,9 @@ from scipy.stats import gamma
 
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import NotConverged
-from fpsolve.fem.discretisation import NoisePart, first_part
 from fpsolve.fem.factors import one_thread
+from fpsolve.fem.noise_axes import NoiseAxis
+from fpsolve.fem.space import first_axis
 from fpsolve.messages import Code, Message
 from fpsolve.nonlinear.elimination import Solution, Tail, mean_damping, solved, solved_tail
 from fpsolve.nonlinear.operator import Circle, Flow, Height, Plane
@@ -67,14 +68,14 @@ class Choice:
 
     Attributes:
         cells, phi_degree: elements of φ.
-        part: functions of ξ.
+        xi: functions of ξ.
         bottom, top: the interval of u.
         step, degree: elements of u.
     """
 
     cells: int
     phi_degree: int
-    part: NoisePart
+    xi: NoiseAxis
     bottom: float
     top: float
     step: float
@@ -93,7 +94,7 @@ class Choice:
     @property
     def size(self) -> int:
         """Unknowns."""
-        return self.cells * self.phi_degree * self.part.size * (self.elements * self.degree + 1)
+        return self.cells * self.phi_degree * self.xi.size * (self.elements * self.degree + 1)
 
 
 def finer_phase(choice: Choice) -> Choice:
@@ -101,7 +102,7 @@ def finer_phase(choice: Choice) -> Choice:
 
 
 def finer_noise(choice: Choice) -> Choice:
-    return replace(choice, part=choice.part.enriched())
+    return replace(choice, xi=choice.xi.enriched())
 
 
 def finer_height(choice: Choice) -> Choice:
@@ -169,14 +170,14 @@ class Search:
         """One that serves weak noise, where a² has a law of the shape −δ_p/2 and the mean λ/κ."""
         shape, digits = self.index / 2, -math.log10(self.rtol)
         degree = round(4 + digits / 2)
-        plane = Plane(self.flow, self._circle(degree), first_part(self.flow.problem.coloured, digits))
+        plane = Plane(self.flow, self._circle(degree), first_axis(self.flow.problem.coloured, digits))
         most = float(np.max(np.abs(self.flow.rise(self.flow.cubic, plane.circle.points))))
         law = gamma(shape, scale=self.rate / max(mean_damping(plane), LEAST_DAMPING * most) / shape)
         bottom, top = (0.5 * math.log(max(law.ppf(q), 1e-300)) for q in (QUANTILE * self.rtol, 1 - self.rtol))
         tail = solved_tail(plane, self.index)
         bottom = min(max(bottom, tail.reach(QUANTILE * self.rtol)), top - 1.0)
         step = min(SPACING * 0.5 / math.sqrt(shape), WIDEST, (top - bottom) / FEWEST)
-        return Choice(CELLS, degree, plane.part, bottom, top, step, 4)
+        return Choice(CELLS, degree, plane.axis, bottom, top, step, 4)
 
     def _circle(self, degree: int) -> Circle:
         return Circle(CELLS, degree, self.flow.half_turn)
@@ -193,7 +194,7 @@ class Search:
         self.unknowns = max(self.unknowns, choice.size)
         with one_thread():
             if levels[:2] not in self._planes:
-                plane = Plane(self.flow, self._circle(choice.phi_degree), choice.part)
+                plane = Plane(self.flow, self._circle(choice.phi_degree), choice.xi)
                 self._planes[levels[:2]] = plane, solved_tail(plane, self.index)
             plane, tail = self._planes[levels[:2]]
             return left_at_signals(partial(solved, plane, Height(choice.lines, choice.degree), tail))

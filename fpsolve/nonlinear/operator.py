@@ -28,8 +28,8 @@ import numpy as np
 from scipy.sparse import csr_matrix, diags
 
 from fpsolve.arrays import Coefficient, FloatArray, dense, identity, one
-from fpsolve.fem.discretisation import NoisePart
 from fpsolve.fem.line import LineSpace
+from fpsolve.fem.noise_axes import NoiseAxis
 from fpsolve.model.frame import Frame, amplitude_frame
 from fpsolve.model.plane import CoefficientMatrix
 from fpsolve.model.problem import Problem
@@ -215,7 +215,7 @@ class Plane:
     Args:
         flow: the motion.
         circle: the functions of φ.
-        part: those of ξ.
+        axis: those of ξ.
 
     Attributes:
         size: number of unknowns, that of φ slowest.
@@ -226,9 +226,8 @@ class Plane:
         unit: ∫P_s w ρ.
     """
 
-    def __init__(self, flow: Flow, circle: Circle, part: NoisePart) -> None:
-        self.flow, self.circle, self.part = flow, circle, part
-        self.axis = axis = part.axis(flow.problem.coloured, 0.0)
+    def __init__(self, flow: Flow, circle: Circle, axis: NoiseAxis) -> None:
+        self.flow, self.circle, self.axis = flow, circle, axis
         phi = circle.points
         self.shape = circle.size, axis.size
         self.size = circle.size * axis.size

@@ -75,7 +75,7 @@ class Nodes:
         noise, inner = pair.generator.problem.coloured, np.minimum(abs(lines[:-1]), abs(lines[1:]))
         widest = np.maximum(1.0, inner / 6 if noise.has_algebraic_tails else 1.0)
         tall = math.ceil(np.max(np.diff(lines) / widest) - 1e-9)
-        z = _nodes(lines, order, finer * max(tall, _parts(pair.generator.chosen.noise.degree, order)))
+        z = _nodes(lines, order, finer * max(tall, _parts(degrees[1] if space.xi.lines.size else 0, order)))
         return cls(phi, z, noise.standard_deviation, order)
 
     @property
@@ -157,8 +157,8 @@ def _z_lines(pair: PrincipalPair) -> FloatArray:
     Outside it P_s and the tilted density are below `FAINT` of their largest values.
     """
     xi, noise = cast("LineAxis", pair.space.xi), pair.generator.problem.coloured
-    if pair.generator.chosen.noise.lines.size:
-        return pair.generator.chosen.noise.lines
+    if xi.lines.size:
+        return xi.lines
     end = noise.half_width / noise.standard_deviation
     reach = min(end, 12.0 + abs(xi.center))
     z = np.linspace(-reach, reach, 2001)[1:-1]

@@ -532,17 +532,8 @@ def _discretisation(solver: ExponentSolver) -> dict[str, Any] | None:
     p = max(known, key=abs, default=None)
     if p is None:
         return None
-    generator = known[p].pair.generator
-    phase, noise = generator.chosen.phase, generator.chosen.noise
-    interval = {"xi_min": float(noise.lines[0]), "xi_max": float(noise.lines[-1])} if noise.lines.size else {}
-    return {
-        **phase.facts,
-        "xi": noise.kind,
-        "xi_size": noise.size,
-        **interval,
-        "tilt": noise.slope * p,
-        "unknowns": generator.size,
-    }
+    space = known[p].pair.space
+    return {**space.phi.facts, **space.xi.facts, "unknowns": space.size}
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,7 +1,6 @@
 """Densities of directions of three and four variables: closed forms, moment equations, a simulation, coordinates."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -46,7 +45,7 @@ def turning(n, coordinates):
 def enriched(pair):
     """The pair on the next finer functions of directions."""
     generator = pair.generator
-    finer = replace(generator.chosen, phase=generator.chosen.phase.enriched())
+    finer = generator.chosen.with_phi(generator.chosen.phi.enriched())
     return principal_pair(type(generator)(generator.problem, finer), pair.p, start=pair)
 
 

@@ -247,7 +247,7 @@ def test_errors_are_how_what_lacks_changes(p):
 
     def solved(r):
         generator = Generator(problem.at({key: r}), chosen)
-        generator.phi.slowest = 1.0
+        generator.slowest = [1.0, 1.0]
         return Solution(principal_pair(generator, p))
 
     solution = solved(0.8)

@@ -13,9 +13,12 @@ from fpsolve.exponent.eigen import principal_pair
 from fpsolve.exponent.error import truncation
 from fpsolve.exponent.function import moment_lyapunov
 from fpsolve.exponent.solver import ExponentSolver
-from fpsolve.fem.discretisation import Discretisation, ModeEffects, PhaseCells, Polynomials
+from fpsolve.fem.effects import ModeEffects
 from fpsolve.fem.generator import Generator, Pencil
 from fpsolve.fem.mesh import make_mesh
+from fpsolve.fem.noise_axes import PolynomialAxis
+from fpsolve.fem.phase import PhaseAxis
+from fpsolve.fem.space import Space
 from fpsolve.model.noises.markov_chain import MarkovChain
 from fpsolve.model.noises.non_gaussian import NonGaussianNoise
 from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
@@ -108,8 +111,8 @@ def test_fast_noise_tends_to_white_noise(tau0):
 def test_the_tilt_changes_nothing_but_the_cost(tilt):
     oscillator = VibroImpactOscillator(omega=10.0, restitution=0.8, c1=0.1, epsilon=0.1)
     noise = NonGaussianNoise(D0=1.0, tau0=20.0, r0=0.95).ou_reduction()
-    phase = PhaseCells(make_mesh(phi_cells=2).phi_lines, np.array([12, 12]))
-    chosen = Discretisation(phase, (Polynomials(40, tilt / 15),))
+    phase = PhaseAxis(make_mesh(phi_cells=2).phi_lines, np.array([12, 12]))
+    chosen = Space((phase, PolynomialAxis(noise, 40, tilt / 15)))
     oracle = fourier_hermite.moment_lyapunov(**oracle_arguments(oscillator, noise), p=15.0, harmonics=8, hermite=200)
     assert principal_pair(Generator(Problem(oscillator, noise), chosen), 15.0).value == pytest.approx(oracle, rel=1e-9)
 
@@ -181,10 +184,11 @@ def test_cells_that_reach_the_ends_of_the_noise_cut_nothing_off():
 
 
 def test_while_nothing_is_resolved_the_axis_that_lacks_most_is_doubled():
-    chosen = Discretisation(PhaseCells(np.array([0.0, 1.0]), np.array([5])), (Polynomials(4), Polynomials(6)))
+    phase = PhaseAxis(np.array([0.0, 1.0]), np.array([5]))
+    chosen = Space((phase, PolynomialAxis(UNIT_NOISE, 4), PolynomialAxis(UNIT_NOISE, 6)))
     small, large = (ModeEffects(np.array([5]), size * np.array([[0.5], [1.0], [5.0], [10.0]])) for size in (1e-4, 1.0))
-    assert [part.count for part in chosen.doubled((small, large, small)).noises] == [8, 6]
-    assert chosen.doubled((small, large, small)).phase.size == 6
+    assert [axis.count for axis in chosen.doubled((small, large, small)).noises] == [8, 6]
+    assert chosen.doubled((small, large, small)).phi.size == 6
     assert chosen.doubled().size == 8 * chosen.size
 
 

@@ -59,7 +59,7 @@ def test_odd_sets_are_right_to_their_error(sets):
             continue
         solved += 1
         value, scale = found.pair.value, max(abs(found.pair.value), solver.scale(p))
-        known, doubt = reference(case, p, value * (1 + 1e-6), found.pair.generator.chosen.noise.slope * p, scale)
+        known, doubt = reference(case, p, value * (1 + 1e-6), found.pair.space.xi.tilt, scale)
         if np.isfinite(doubt):
             compared += 1
             assert abs(value - known) <= found.error + 3 * doubt, seed

@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 
 from fpsolve.exponent.eigen import principal_pair, spectrum
-from fpsolve.fem.discretisation import Discretisation, PhaseCells, Polynomials
 from fpsolve.fem.generator import Generator
+from fpsolve.fem.noise_axes import PolynomialAxis
+from fpsolve.fem.phase import PhaseAxis
+from fpsolve.fem.space import Space
 from fpsolve.fem.terms import Terms
 from fpsolve.model.noises.non_gaussian import NonGaussianNoise
 from fpsolve.model.problem import Problem
@@ -24,12 +26,12 @@ SPACES, MOMENTS = 4, 3
 """Of each kind; 20 and 10 take five minutes."""
 
 
-def random_space(rng, slope):
+def random_space(rng, noise, slope):
     """Two to four cells of degrees 4 to 7, six to ten polynomials, a tilt that may be wrong by half."""
     steps = rng.uniform(0.6, 1.4, rng.integers(2, 5))
     lines = np.pi / 2 + np.pi * np.append(0.0, np.cumsum(steps)) / np.sum(steps)
     degrees, slope = rng.integers(4, 8, lines.size - 1), slope * rng.uniform(0.5, 1.5)
-    return Discretisation(PhaseCells(lines, degrees), (Polynomials(int(rng.integers(6, 11)), slope),))
+    return Space((PhaseAxis(lines, degrees), PolynomialAxis(noise, int(rng.integers(6, 11)), slope)))
 
 
 @pytest.mark.parametrize("regime", REGIMES)
@@ -40,7 +42,7 @@ def test_nothing_lies_right_of_the_principal_eigenvalue(monkeypatch, rng, regime
     frozen = frozen_noise(problem)
     slope = frozen.tilt(frozen.center(1.0))
     for _ in range(SPACES):
-        generator = Generator(problem, random_space(rng, slope))
+        generator = Generator(problem, random_space(rng, problem.coloured, slope))
         for p in rng.uniform(-2, 4 if regime in ("weak", "slow") else 2, MOMENTS):
             rightmost, pair = spectrum(generator, p, 1)[0], principal_pair(generator, p)
             assert rightmost.real <= pair.value + 1e-8 * max(1.0, abs(pair.value))

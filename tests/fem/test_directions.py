@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from fpsolve.arrays import dense
-from fpsolve.fem.harmonics import HarmonicCells
-from fpsolve.fem.sphere import SphereCells
+from fpsolve.fem.harmonics import HarmonicAxis
+from fpsolve.fem.sphere import SphereAxis
 
 LINES = np.array([0.0, 0.5, math.pi / 2])
 TURNS = 2 * math.pi * np.arange(12) / 12
@@ -16,7 +16,7 @@ TURNS = 2 * math.pi * np.arange(12) / 12
 
 def axis_of(kind, n):
     unit = tuple(map(tuple, np.eye(n).tolist()))
-    return HarmonicCells(unit, 4).axis() if kind == "harmonics" else SphereCells(unit, LINES, 4, 4).axis()
+    return HarmonicAxis(unit, 4) if kind == "harmonics" else SphereAxis(unit, LINES, 4, 4)
 
 
 def rule(n, lines=LINES):
@@ -63,7 +63,7 @@ def test_opposite_directions_are_one(kind, n):
 def test_elements_and_harmonics_meet_the_same_polynomial():
     """A harmonic of the degree 4, smooth in η, by its projection on many elements, at points that no rule has."""
     unit, lines = tuple(map(tuple, np.eye(4).tolist())), np.linspace(0, math.pi / 2, 7)
-    elements, harmonics = SphereCells(unit, lines, 9, 4).axis(), axis_of("harmonics", 4)
+    elements, harmonics = SphereAxis(unit, lines, 9, 4), axis_of("harmonics", 4)
     points, weights = rule(4, lines)
     own = np.random.default_rng(4).standard_normal(harmonics.size)
     by_points = elements.at(points).T @ (weights * (harmonics.at(points) @ own)) / elements.area

@@ -13,7 +13,6 @@ from fpsolve import NonGaussianNoise, OrnsteinUhlenbeck, Problem, VibroImpactOsc
 from fpsolve.errors import SingularMatrix
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem.axis import KroneckerSum
-from fpsolve.fem.discretisation import Discretisation, PhaseCells, Polynomials, States
 from fpsolve.fem.factors import (
     MAX_BLOCK,
     MAX_DENSE_UNKNOWNS,
@@ -25,8 +24,11 @@ from fpsolve.fem.factors import (
     factorised,
 )
 from fpsolve.fem.generator import Generator
+from fpsolve.fem.noise_axes import PolynomialAxis, StateAxis
+from fpsolve.fem.phase import PhaseAxis
 from fpsolve.fem.refined import RefinedFactors
 from fpsolve.fem.rings import RingFactors
+from fpsolve.fem.space import Space
 from fpsolve.model import Telegraph, White
 
 OVERLAP = """
@@ -200,8 +202,8 @@ def test_cells_of_a_ring_one_after_the_other(noise, degrees, rng):
     """Any number of cells, of unequal degrees, whose phase turns both ways for some ξ."""
     problem = Problem(VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=0.9), noise)
     lines = 0.5 * np.pi + np.pi * np.linspace(0, 1, len(degrees) + 1) ** 1.2
-    part = States(2) if noise.has_states else Polynomials(9, 0.2)
-    pencil = Generator(problem, Discretisation(PhaseCells(lines, np.array(degrees)), (part,))).at(1.3)
+    axis = StateAxis(noise) if noise.has_states else PolynomialAxis(noise, 9, 0.2)
+    pencil = Generator(problem, Space((PhaseAxis(lines, np.array(degrees)), axis))).at(1.3)
     operator, b = pencil.matrix.shifted(0.7), rng.standard_normal(pencil.space.size)
     factors, matrix = RefinedFactors(operator, RingFactors(operator, pencil.ring)), operator.toarray()
     for transposed, expected in ((False, matrix), (True, matrix.T)):
@@ -226,4 +228,4 @@ def test_a_ring_next_to_an_eigenvalue():
 def test_white_noise_couples_more_than_the_ends_of_cells():
     problem = Problem(VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=0.9), White(0.4))
     lines = 0.5 * np.pi + np.pi * np.linspace(0, 1, 4)
-    assert Generator(problem, Discretisation(PhaseCells(lines, np.full(3, 5)), (States(1),))).at(1.0).ring is None
+    assert Generator(problem, Space((PhaseAxis(lines, np.full(3, 5)), StateAxis(White(0.4))))).at(1.0).ring is None

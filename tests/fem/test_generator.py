@@ -7,9 +7,11 @@ import pytest
 
 from fpsolve.arrays import identity
 from fpsolve.exponent.eigen import spectrum
-from fpsolve.fem.discretisation import Discretisation, PhaseCells, Polynomials
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.mesh import make_mesh
+from fpsolve.fem.noise_axes import PolynomialAxis
+from fpsolve.fem.phase import PhaseAxis
+from fpsolve.fem.space import Space
 from fpsolve.fem.terms import OfMoment
 from fpsolve.model.noises.markov_chain import MarkovChain
 from fpsolve.model.noises.non_gaussian import NonGaussianNoise
@@ -22,16 +24,16 @@ from tests.oracles.paper_generator import PaperGenerator
 
 WEAK = VibroImpactOscillator(omega=1.2, restitution=0.7, c1=-0.3, epsilon=0.4)
 STRONG = VibroImpactOscillator(omega=1.0, restitution=0.9, c1=0.2, epsilon=1.5, impact="restitution")
-PHASE = PhaseCells(np.array([np.pi / 2, 2.2, 3.5, 3 * np.pi / 2]), np.array([4, 7, 5]))
+PHASE = PhaseAxis(np.array([np.pi / 2, 2.2, 3.5, 3 * np.pi / 2]), np.array([4, 7, 5]))
 BOUNDED = NonGaussianNoise(D0=0.8, tau0=0.7, r0=0.4)
 PROBLEMS = {
     "weak": (WEAK, UNIT_NOISE, make_mesh(phi_degree=6, xi_degree=6)),
     "exact noise": (WEAK, BOUNDED, make_mesh(phi_degree=6, xi_degree=6)),
     "the phase turns back": (STRONG, UNIT_NOISE, make_mesh(phi_cells=4, phi_degree=6, xi_degree=6, xi_min=-6.0)),
     "full circle": (STRONG, UNIT_NOISE, make_mesh(phi_cells=4, phi_degree=6, xi_degree=6, full_circle=True)),
-    "polynomials": (STRONG, UNIT_NOISE, Discretisation(PHASE, (Polynomials(8),))),
-    "tilted": (STRONG, UNIT_NOISE, Discretisation(PHASE, (Polynomials(8, 0.9),))),
-    "bounded and tilted": (WEAK, BOUNDED, Discretisation(PHASE, (Polynomials(9, 0.4),))),
+    "polynomials": (STRONG, UNIT_NOISE, Space((PHASE, PolynomialAxis(UNIT_NOISE, 8)))),
+    "tilted": (STRONG, UNIT_NOISE, Space((PHASE, PolynomialAxis(UNIT_NOISE, 8, 0.9)))),
+    "bounded and tilted": (WEAK, BOUNDED, Space((PHASE, PolynomialAxis(BOUNDED, 9, 0.4)))),
 }
 KEEP_THEIR_DIRECTION = ("weak", "exact noise", "polynomials", "tilted", "bounded and tilted")
 

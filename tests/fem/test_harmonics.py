@@ -6,14 +6,16 @@ import pytest
 from fpsolve import Problem
 from fpsolve.arrays import identity
 from fpsolve.exponent.eigen import principal_pair
-from fpsolve.fem.discretisation import Discretisation, States, first_part
-from fpsolve.fem.harmonics import HarmonicCells, Harmonics
-from fpsolve.fem.sphere import SphereCells, SphereGenerator
-from fpsolve.model import CoefficientMatrix, LinearSystem, White
+from fpsolve.fem.generator import Generator
+from fpsolve.fem.harmonics import HarmonicAxis, Harmonics
+from fpsolve.fem.noise_axes import StateAxis
+from fpsolve.fem.space import Space, first_axis
+from fpsolve.fem.sphere import SphereAxis
+from fpsolve.model import CoefficientMatrix, LinearSystem, Telegraph, White
 
 
 def axis(n, most=6):
-    return HarmonicCells(tuple(map(tuple, np.eye(n).tolist())), most).axis()
+    return HarmonicAxis(tuple(map(tuple, np.eye(n).tolist())), most)
 
 
 @pytest.mark.parametrize("n", [3, 4])
@@ -59,13 +61,11 @@ def test_a_quadratic_form(n):
 
 
 @pytest.mark.parametrize("n", [3, 4])
-def test_a_discretisation_grows(n):
-    cells = axis(n).chosen
-    assert cells.enriched().size == axis(n, 8).size
-    assert Discretisation(cells, (States(2),)).size == 2 * cells.size
-    assert cells.enriched().axis().projection(cells.axis()) @ cells.axis().constant == pytest.approx(
-        cells.enriched().axis().constant
-    )
+def test_a_space_grows(n):
+    own, finer = axis(n), axis(n).enriched()
+    assert finer.size == axis(n, 8).size
+    assert Space((own, StateAxis(Telegraph(a=1.0, k=1.0)))).size == 2 * own.size
+    assert finer.projection(own) @ own.constant == pytest.approx(finer.constant)
 
 
 @pytest.mark.parametrize(
@@ -80,14 +80,14 @@ def test_another_code(n, harmonics, waves, tolerance):
         CoefficientMatrix(1, (0.5 * driven).tolist(), identity),
     )
     problem = Problem(LinearSystem(terms), White(s=1.0))
-    coordinates = axis(n).chosen.coordinates
-    noises = tuple(first_part(noise, 8.0) for noise in problem.coloured.parts.values())
+    coordinates = axis(n).coordinates
+    noises = tuple(first_axis(noise, 8.0) for noise in problem.coloured.parts.values())
     values = []
     for cells in (
-        HarmonicCells(coordinates, harmonics),
-        SphereCells(coordinates, np.linspace(0, np.pi / 2, 3), 8, waves),
+        HarmonicAxis(coordinates, harmonics),
+        SphereAxis(coordinates, np.linspace(0, np.pi / 2, 3), 8, waves),
     ):
-        generator = SphereGenerator(problem, Discretisation(cells, noises))
+        generator = Generator(problem, Space((cells, *noises)))
         pair = principal_pair(generator, 1.0, start=principal_pair(generator, 0.0))
         values.append(pair.value)
         assert np.min(generator.phi.inner_values @ pair.space.table(pair.right)[:, 0]) > 0

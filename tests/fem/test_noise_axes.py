@@ -97,7 +97,7 @@ def test_functions_are_carried_between_tilts_sizes_and_cells(noise):
     u = np.array([1.0, 0.3, -0.2, 0.1, 0.0, 0.05])
     np.testing.assert_allclose(rough.projection(fine) @ (fine.projection(rough) @ u), u, atol=1e-8)
     end = min(6.0, noise.half_width / noise.standard_deviation)
-    cells = CellAxis(noise, np.linspace(-end, end, 7), 9)
+    cells = CellAxis(noise, np.linspace(-end, end, 7), np.full(6, 9))
     z = np.linspace(-2, 2, 9) if end > 2 else np.linspace(-0.9, 0.9, 9) * end
     on_cells, first = cells.at(z), rough.at(z)
     carried = on_cells.values @ (cells.projection(rough) @ u)

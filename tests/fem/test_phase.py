@@ -12,7 +12,7 @@ WAVE = Harmonics(0.3, -0.4, 0.7)
 
 @pytest.fixture
 def space():
-    return PhaseAxis(LINES, [3, 7, 1, 2])
+    return PhaseAxis(LINES, np.array([3, 7, 1, 2]))
 
 
 def fine_rule(lines):
@@ -64,7 +64,7 @@ def test_traces_are_limits_from_either_side(space):
 
 
 def test_projection_keeps_what_both_hold(space):
-    coarse = PhaseAxis(LINES[[0, 2, 4]], [1, 1])
+    coarse = PhaseAxis(LINES[[0, 2, 4]], np.array([1, 1]))
     there, back = space.projection(coarse), coarse.projection(space)
     np.testing.assert_allclose(back @ there, np.eye(coarse.size), atol=1e-13)
 
@@ -82,10 +82,10 @@ def test_large_spaces_are_sparse_and_the_same():
 
 def test_sparse_and_dense_spaces_are_carried_into_each_other():
     large = PhaseAxis(np.linspace(np.pi / 2, 3 * np.pi / 2, 61), np.full(60, 10))
-    small = PhaseAxis(LINES, [3, 4, 1, 2])
+    small = PhaseAxis(LINES, np.array([3, 4, 1, 2]))
     u = np.linspace(-1, 1, small.size)
     phi, _ = fine_rule(LINES)
-    there = large.projection(PhaseAxis(LINES[[0, -1]], [6])) @ np.arange(7.0)
-    expected = PhaseAxis(LINES[[0, -1]], [6]).at(phi) @ np.arange(7.0)
+    there = large.projection(PhaseAxis(LINES[[0, -1]], np.array([6]))) @ np.arange(7.0)
+    expected = PhaseAxis(LINES[[0, -1]], np.array([6])).at(phi) @ np.arange(7.0)
     np.testing.assert_allclose(large.at(phi) @ there, expected, atol=1e-10)
     assert (small.projection(large) @ (large.projection(small) @ u)).shape == u.shape

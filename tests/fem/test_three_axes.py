@@ -7,11 +7,12 @@ from scipy.sparse import csr_matrix
 from fpsolve import OrnsteinUhlenbeck, PlaneSystem, Problem
 from fpsolve.arrays import identity
 from fpsolve.exponent.eigen import rayleigh_iteration
-from fpsolve.fem.axis import KroneckerSum, TensorSpace
+from fpsolve.fem.axis import KroneckerSum
 from fpsolve.fem.factors import BlockFactors, DenseFactors, SparseFactors
 from fpsolve.fem.generator import Pencil
 from fpsolve.fem.noise_axes import PolynomialAxis
 from fpsolve.fem.phase import PhaseAxis
+from fpsolve.fem.space import Space
 from fpsolve.fem.terms import Terms, TermSum
 from fpsolve.model.plane import CoefficientMatrix
 from tests.oracles import two_noises
@@ -24,7 +25,7 @@ def pencil(p, cells=4, degree=8, count=11):
     """L(p) of ẍ + (0.1 + ξ₂)ẋ + (1 + ξ₁)x = 0."""
     lines = np.linspace(np.pi / 2, 3 * np.pi / 2, cells + 1)
     phase = PhaseAxis(lines, np.full(cells, degree))
-    space = TensorSpace([phase, *(PolynomialAxis(noise, count) for noise in NOISES)])
+    space = Space((phase, *(PolynomialAxis(noise, count) for noise in NOISES)))
     terms = [
         CoefficientMatrix(0, ((0.0, 1.0), (-1.0, 0.0))),
         CoefficientMatrix(1, ((0.0, 0.0), (0.0, -0.1))),

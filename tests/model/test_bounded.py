@@ -56,7 +56,7 @@ def test_its_waves():
     cosine[0, 1] = cosine[1, 0] = math.sqrt(0.5)
     cosine[[1, 3, 2, 4], [3, 5, 4, 6]] = cosine[[3, 5, 4, 6], [1, 3, 2, 4]] = 0.5
     np.testing.assert_allclose(axis.mass(identity), 0.7 * cosine, atol=1e-15)
-    np.testing.assert_allclose(form_of(axis, np.ones(axis.points.size)), axis.mass(), atol=1e-14)
+    np.testing.assert_allclose(form_of(axis, np.ones(axis.measure.size)), axis.mass(), atol=1e-14)
     slopes = np.gradient(axis.values_at(np.linspace(0, 2 * math.pi, 20001)), 2 * math.pi / 20000, axis=0)[1:]
     values = axis.values_at(np.linspace(0, 2 * math.pi, 20001))[1:]
     expected = 1.4 * values.T @ slopes / 20000 - np.diag(0.5 * 0.9**2 * np.array([0, 1, 1, 4, 4, 9, 9]))

@@ -130,7 +130,7 @@ def test_the_factors_of_the_functions():
     for matrix in (driven, driven.T):
         np.testing.assert_allclose(matrix[:, 0], rate * np.eye(axis.size)[0], atol=1e-12)
     np.testing.assert_allclose(axis.generator_of_one(), axis.generator()[0], atol=0)
-    assert axis.mass(lambda xi: xi)[0, 0] == pytest.approx(axis.unit * axis.center, rel=1e-12)
+    assert axis.mass(lambda xi: xi)[0, 0] == pytest.approx(MIXED.standard_deviation * axis.center, rel=1e-12)
 
 
 @pytest.mark.parametrize("noise", [MIXED, Filter(0.8, 2.5, 0.3, 0.0, -1.0), Filter(2.0, 1.0, 0.3, 1.0, 0.2)])
