@@ -270,7 +270,7 @@ def rightmost(matrix, near=None):
 
 SIZES = {0: (1,), 1: (10, 20, 40, 80, 160), 2: (6, 9, 14, 21, 32, 44, 62, 88)}
 """Functions of a noise, by how many dimensions all noises have together."""
-MODES = (16, 32, 64, 128, 256, 512)
+MODES = (16, 32, 64, 128, 256, 512, 1024, 2048, 4096, 8192)
 FEWER = {0: (1,), 1: (8, 14, 22, 32, 42, 50), 2: (5, 8, 12, 16)}
 """Beside the modes of a Fourier series."""
 
@@ -347,7 +347,8 @@ class Limit:
 
     @property
     def _truncation(self):
-        """The last change, or all that are to come where changes fall like a geometric series; ∞ where they do not."""
+        """The last change where it is rounding; else the larger of the last two, or all that are to come after it if
+        changes fall like a geometric series, as where T is Hölder one may be small by chance; ∞ where they do not."""
         if self.is_closed and self.found:
             return 0.0
         if len(self.found) < 2:
@@ -358,4 +359,4 @@ class Limit:
         if not earlier:
             return math.inf
         share = change / max(earlier[-1], change)
-        return float(change * max(1.0, share / (1 - share))) if share < 0.7 else math.inf
+        return float(max(change, earlier[-1]) * max(1.0, share / (1 - share))) if share < 0.7 else math.inf
