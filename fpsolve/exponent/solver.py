@@ -98,8 +98,8 @@ class MomentLyapunov(Result):
         p: the moments, shape (n,), in the order asked for, without those that failed.
         value: Λ(p), per unit time, shape (n,).
         derivative: Λ′(p), shape (n,); NaN where only the value is known: at p = 0, as Λ(0) = 0 needs no solve, and
-            algebraic tails leave it no slope; and at even p of three and four variables, whose moments have equations
-            of their own, where elements failed.
+            algebraic tails leave it no slope; and at even p where elements failed, and moments have equations of their
+            own.
         error_estimate: estimate of |error of `value`|, from the highest modes, the ends of a noise interval and the
             bound of rounding, at least half a unit in the last place of the value, shape (n,).
         residual: backward error of the eigenpairs, shape (n,); NaN where there is none.
@@ -391,7 +391,7 @@ class ExponentSolver:
                 continue
             even = self.even(point) if self.problem.dimension > 2 else None
             if even:
-                rows[i] = known[point] = Moment(even.value, math.nan, math.nan, even.error, math.nan)
+                rows[i] = known[point] = _of_moments(even)
             try:
                 solution = self.solution(point)
                 estimate, pair = self.estimate(point, solution), solution.pair
@@ -403,7 +403,9 @@ class ExponentSolver:
                 if is_kept:
                     known[point] = rows[i]._replace(derivative_error=self.slope_error(point))
             except NotConverged as failure:
-                if not even:
+                if not even and (even := self.even(point)):
+                    rows[i] = known[point] = _of_moments(even)
+                elif not even:
                     failures.append(Failure(point, failure.message))
             progress()
         pairs, found = tuple(solved[i] for i in sorted(solved)), points[sorted(rows)]
@@ -545,6 +547,10 @@ def solver_of(
     """A solver of a problem, with what is usual for it in place of each None. Raises as `ExponentSolver`."""
     rtol = checked_problem(problem).usual_rtol if rtol is None else rtol
     return ExponentSolver(problem, mesh, rtol=rtol, budget=budget or Budget())
+
+
+def _of_moments(even: EvenMoment) -> Moment:
+    return Moment(even.value, math.nan, math.nan, even.error, math.nan)
 
 
 def tolerated(rtol: float, scales: Scale, p: float, value: float) -> float:
