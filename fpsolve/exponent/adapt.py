@@ -33,7 +33,7 @@ from fpsolve.model.faults import told_in_words
 from fpsolve.model.parameters import STRICT, parameter
 from fpsolve.model.plane import System, Xi, phase_speed
 from fpsolve.model.problem import Problem
-from fpsolve.theory.frozen import frozen_noise, steady_places
+from fpsolve.theory.frozen import frozen_noise, steady_places, swing
 
 MAX_STAGES = 30
 WORTH_A_TRY = MAX_DENSE_UNKNOWNS
@@ -220,14 +220,13 @@ class NearPlace:
     def searched(self, search: _Search, start: Solution | None) -> Solution:
         """A solution within a tolerance from a first discretisation, or from a solution that does not suffice.
 
-        Where slow noise may carry the moment in two places, the larger eigenvalue.
+        Where slow noise may carry the moment in several places, the largest eigenvalue.
         """
-        found = search.run(start or first(self.problem, search.p, self.rtol))
-        elsewhere = other_center(found.pair)
-        if elsewhere is None:
-            return found
-        other = search.run(first(self.problem, search.p, self.rtol, elsewhere))
-        return max(found, other, key=lambda each: each.pair.value)
+        places = [search.run(start or first(self.problem, search.p, self.rtol))]
+        for center in other_centers(places[0].pair):
+            search.best, search.error, search.share = None, math.inf, math.inf  # those of a lower eigenvalue, maybe
+            places.append(search.run(first(self.problem, search.p, self.rtol, center)))
+        return max(places, key=lambda each: each.pair.value)
 
     @cached_property
     def given(self) -> tuple[Generator, Generator]:
@@ -300,7 +299,7 @@ class _Search:
         start = None
         for attempt in (self.from_start, self.from_nearest):
             start = attempt() or start
-            if start is not None and self.place.meets(start, self.tolerance) and other_center(start.pair) is None:
+            if start is not None and self.place.meets(start, self.tolerance) and not other_centers(start.pair):
                 return self.confirmed(start)
         return self.confirmed(self.place.searched(self, start))
 
@@ -505,27 +504,31 @@ def _bases(problem: Problem) -> list[str]:
     return [noise.basis for noise in problem.coloured.parts.values()]
 
 
-def other_center(pair: PrincipalPair) -> float | None:
-    """Another z, far from the tilted density of a pair, where paths that hold the noise grow about as fast, or None.
+def other_centers(pair: PrincipalPair) -> list[float]:
+    """Other z, far from the tilted density of a pair, where paths that hold the noise grow about as fast.
+
+    It is 0 where they do on which the noise of a filter swings far to both sides.
 
     Between two such places slow noise hardly ever passes: each has its own pair with T > 0 as far as that can be
     told, and only the larger eigenvalue is Λ.
     """
     frozen, noise = frozen_noise(pair.generator.problem), pair.generator.problem.coloured
     if noise.basis == "pairs":
-        z, rate = steady_places(pair.generator.problem, pair.p)
-        far = (np.abs(z - pair.space.xi.center) > 5) & (rate > comparable(pair.value))
-        return float(z[far][0]) if np.any(far) else None
+        center, (z, rate) = pair.space.xi.center, steady_places(pair.generator.problem, pair.p)
+        far = (np.abs(z - center) > 5) & (rate > comparable(pair.value))
+        amplitude, swinging = swing(pair.generator.problem, pair.p)
+        is_elsewhere = center and amplitude > 5 and swinging > comparable(pair.value)
+        return [*z[far][:1].tolist(), *[0.0] * bool(is_elsewhere)]
     if frozen is None:
-        return None
+        return []
     z, rate = frozen.peaks(pair.p)
     if z.size < 2:
-        return None
+        return []
     at, density = noise_marginal(pair)
     mean = float(at @ density / density.sum())
     width = math.sqrt(float((at - mean) ** 2 @ density / density.sum()))
     far = (np.abs(z - mean) > 3 * width + 2) & (rate > comparable(pair.value))
-    return float(z[far][np.argmax(rate[far])]) if np.any(far) else None
+    return [float(z[far][np.argmax(rate[far])])] if np.any(far) else []
 
 
 def solved_p(p: float) -> float:
@@ -538,7 +541,7 @@ def misplaced(mesh: CylinderMesh | None, pairs: Sequence[PrincipalPair]) -> tupl
     if mesh is None:  # then both places have been looked at
         return ()
     for pair in pairs:
-        if (z := other_center(pair)) is not None:
+        for z in other_centers(pair):
             return (Message(Code.CARRIED_ELSEWHERE, p=pair.p, z=z, remedy=Remedy.REACH),)
     return ()
 

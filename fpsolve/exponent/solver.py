@@ -26,7 +26,7 @@ from fpsolve.exponent.adapt import (
     solved_p,
 )
 from fpsolve.exponent.eigen import Bordered, PrincipalPair, second_derivative, slope_rounding
-from fpsolve.exponent.error import Estimate, Failure, Moment, Solution, checked, slope_error
+from fpsolve.exponent.error import MEANINGLESS, Estimate, Failure, Moment, Solution, checked, slope_error
 from fpsolve.fem.factors import one_thread
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import ALMOST_EVERY, Code, Message, Remedy
@@ -298,7 +298,8 @@ class ExponentSolver:
             countdown = self.budget.countdown(f"Λ({p:g})")
             with suppress(NoHierarchy, NotConverged, ArithmeticError), one_thread(), counted(countdown):
                 found = even_moment(self.problem, p, 0.1 * self.tolerance(p, 0.0), MOST_EQUATIONS)
-            self._even[p] = found
+            has_meaning = found and found.error <= MEANINGLESS * max(abs(found.value), self.scale(p))
+            self._even[p] = found if has_meaning else None
         return self._even[p]
 
     def doubt(self, error: float, known: EvenMoment) -> float:

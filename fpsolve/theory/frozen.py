@@ -14,6 +14,10 @@ from fpsolve.model.problem import Problem, kept
 
 SAMPLES, SIDE_SAMPLES = 1001, 601
 """Points of steady values of a filter, and of values of a diffusion on each side."""
+FREQUENCIES = np.linspace(0, 2, 41)
+"""In those of the filter, at which its noise may swing."""
+AMPLITUDES, PHASES = 401, 32
+"""Of a swing, and in half a turn of it."""
 LARGEST_P = 25.0
 """The places for larger p may lie beyond those that are looked at."""
 CLOSE = 0.1
@@ -49,6 +53,22 @@ def steady_places(problem: Problem, p: float) -> tuple[FloatArray, FloatArray]:
     at = np.flatnonzero((rate[1:-1] > rate[:-2]) & (rate[1:-1] >= rate[2:])) + 1
     at = at[np.argsort(-rate[at])] if at.size else np.array([SAMPLES // 2])
     return xi[at] / unit, rate[at]
+
+
+def swing(problem: Problem, p: float) -> tuple[float, float]:
+    """Amplitude in z and growth rate of paths on which noise of a filter swings as ξ = a cos ωt, at the best a and ω.
+
+    The rate is p⟨G⟩ − a²/4S(ω), the mean over a turn of ωt; where S is larger than at 0 it may exceed that of
+    `steady_places`.
+    """
+    noise: Any = problem.coloured
+    peak = noise.omega * math.sqrt(max(1 - 2 * noise.zeta**2, 0.0))
+    spectrum = max(noise.spectral_density(each) for each in (peak, *(noise.omega * FREQUENCIES)))
+    a = 4 * abs(p) * noise_strength(problem.motion) * spectrum * np.linspace(0, 1, AMPLITUDES)
+    xi = a[:, None] * np.cos(math.pi * (np.arange(PHASES) + 0.5) / PHASES)
+    rate = p * np.mean(eigenvalues_at(problem, xi)[0], axis=1) - a**2 / (4 * spectrum)
+    best = int(np.argmax(rate))
+    return float(a[best]) / noise.standard_deviation, float(rate[best])
 
 
 class _Held:

@@ -4,12 +4,17 @@ Where the phase rests T is about |x|^(p−k) |v|^k for the k-th pair, x along th
 for even k its sign does not change.
 """
 
+import math
+
 import pytest
 
-from fpsolve import OrnsteinUhlenbeck, PlaneSystem, Problem
+from fpsolve import OrnsteinUhlenbeck, PlaneSystem, Problem, moment_lyapunov
 from fpsolve.arrays import identity
+from fpsolve.errors import NotConverged
+from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.model import CoefficientMatrix, Filter
+from fpsolve.theory.frozen import swing
 from tests.oracles import filtered
 from tests.oracles.moment_hierarchy import gaussian, several_exponent
 
@@ -41,3 +46,44 @@ def test_a_saddle_under_a_filter(p):
     expected = filtered.moment_lyapunov(SADDLE, DRIVEN, LAW, p, 9)
     assert found.pair.value == pytest.approx(expected, abs=1.5 * found.error)
     assert found.error < 1e-7
+
+
+def test_moments_are_given_where_elements_fail():
+    terms = [CoefficientMatrix(0, SADDLE), CoefficientMatrix(0, DRIVEN, identity)]
+    noise = Filter(**dict(zip(("omega", "zeta", "s", "c0", "c1"), LAW, strict=True)))
+    with pytest.raises(NotConverged) as failure:
+        moment_lyapunov(Problem(PlaneSystem(terms), noise), [3.0, 4.0], budget=Budget(unknowns=100))
+    found = failure.value.partial
+    assert found.p.tolist() == [4.0]
+    assert found.value[0] == pytest.approx(filtered.moment_lyapunov(SADDLE, DRIVEN, LAW, 4, 9), abs=1e-10)
+    assert math.isnan(found.derivative[0])
+    assert [each.p for each in found.failures] == [3.0]
+
+
+def test_growth_while_noise_swings():
+    """G = |ξ|: the mean over a turn is 2a/π, and the best of 2pa/π − a²/4S is 4p²S/π²; S at the peak of the filter."""
+    omega, zeta, s = 1.3, 0.2, 0.7
+    problem = Problem(PlaneSystem([CoefficientMatrix(0, ((0, 1), (1, 0)), identity)]), Filter(omega, zeta, s))
+    spectrum = s**2 / (4 * zeta**2 * omega**4 * (1 - zeta**2))
+    amplitude, rate = swing(problem, 3.0)
+    assert rate == pytest.approx(36 * spectrum / math.pi**2, rel=1e-3)
+    assert amplitude * problem.noise.standard_deviation == pytest.approx(12 * spectrum / math.pi, rel=1e-2)
+
+
+def test_a_swing_to_both_sides_outdoes_a_steady_value():
+    """By moments of orders 2 and 4 Λ(5) is above their chord, and the growth with a steady value of the noise below it.
+
+    The noise is slow and strong, and its spectrum larger where it swings than at 0.
+    """
+    steady = ((0.0, 0.029), (-0.029, -0.041))
+    driven = ((0.041, 0.9), (0.95, 0.1))
+    law = 0.018, 0.7, 4e-5, 1.0, 78.0
+    problem = Problem(PlaneSystem([CoefficientMatrix(0, steady), CoefficientMatrix(0, driven, identity)]), Filter(*law))
+    second, fourth = (filtered.moment_lyapunov(steady, driven, law, q, 26) for q in (2, 4))
+    chord = fourth + (fourth - second) / 2
+    assert 0.083 < chord < 0.085
+    try:
+        found = moment_lyapunov(problem, 5.0, rtol=1e-3, budget=Budget(unknowns=5000))
+    except NotConverged:
+        return
+    assert found.value[0] + found.error_estimate[0] > chord
