@@ -8,14 +8,21 @@ from contextlib import suppress
 from dataclasses import dataclass
 from decimal import Decimal
 from numbers import Real
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fpsolve.errors import NumericalFailure
 
+if TYPE_CHECKING:
+    from scipy.sparse import csr_matrix  # takes a while to import
+
 FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.integer[Any]]
+Mask = NDArray[np.bool_]
+Matrix: TypeAlias = "FloatArray | csr_matrix"
+"""An array, or any sparse matrix."""
 Coefficient = Callable[[Any], Any]
 """A function of φ or ξ, from an array to an array of the same shape."""
 

@@ -16,8 +16,9 @@ import numpy as np
 import scipy.sparse
 from scipy.sparse import csc_matrix, identity, issparse
 
-from fpsolve.arrays import Coefficient, FloatArray, dense, one
+from fpsolve.arrays import Coefficient, FloatArray, IntArray, Mask, Matrix, dense, one
 from fpsolve.fem.effects import ModeEffects
+from fpsolve.model.noise import NoiseDerivative
 
 NO_LINES = np.zeros(0)
 
@@ -28,27 +29,15 @@ class Axis:
     An axis is a frozen choice of functions. Its tables are made when they are first asked for, and are not pickled.
 
     Attributes:
-        cells: for each unknown the cell that it belongs to, -1 for none or two, shape (size,).
-        modes: for each unknown the degree of its polynomial, shape (size,).
         lines: the vertices of cells; none where the functions are of the whole axis.
-        nested: the matrix to coefficients of modes whose sums by degree are all functions of a lower degree; None where
-            they are that already.
-        unit: ∫ u v; None where it is the identity, or for noise.
         is_full: whether every function is coupled to most others.
-        levels: functions to be eliminated together, of which each level is coupled to its neighbours only; empty where
-            the matrices tell them, None where every function can be by itself.
         slowest: the least share of the effect of the highest modes that two more may leave, see `ModeEffects`.
         ring: its cells, a `Ring`, where only their end values couple them; None for others.
         slope: s/p of the factor exp(s z) that moves with p.
     """
 
     __dataclass_fields__: ClassVar[dict[str, Any]]
-    cells: Any
-    modes: Any
     lines = NO_LINES
-    nested: Any = None
-    levels: Any = None
-    unit: Any = None
     ring: Any = None
     is_full = False
     slowest, slope = 0.0, 0.0
@@ -60,6 +49,34 @@ class Axis:
     def size(self) -> int:
         """Number of unknowns."""
         raise NotImplementedError
+
+    @property
+    def cells(self) -> IntArray:
+        """For each unknown the cell that it belongs to, −1 for none or two, shape (size,)."""
+        raise NotImplementedError
+
+    @property
+    def modes(self) -> IntArray:
+        """For each unknown the degree of its polynomial, shape (size,)."""
+        raise NotImplementedError
+
+    @property
+    def nested(self) -> Matrix | None:
+        """To coefficients of modes whose sums by degree are all functions of a lower one; None where they are that."""
+        return None
+
+    @property
+    def levels(self) -> Sequence[IntArray] | None:
+        """Functions to be eliminated together, of which each level is coupled to its neighbours only.
+
+        Empty where the matrices tell them, None where every function can be by itself.
+        """
+        return None
+
+    @property
+    def unit(self) -> Matrix | None:
+        """∫ u v; None where it is the identity, or for noise."""
+        return None
 
     @property
     def constant(self) -> FloatArray:
@@ -77,29 +94,34 @@ class Axis:
         raise NotImplementedError
 
     @property
-    def ladders(self) -> Sequence[tuple[Any, Any, Any]]:
+    def ladders(self) -> Sequence[tuple[IntArray, IntArray, Matrix | None]]:
         """Cells, modes and `nested` of every direction, for which errors are estimated."""
         return ((self.cells, self.modes, self.nested),)
 
-    def mass(self, g: Any = one) -> Any:
+    def mass(self, g: Coefficient = one) -> Matrix:
         """∫ g u v in the weight of the axis."""
         raise NotImplementedError
 
-    def generator(self) -> Any:
+    def generator(self) -> Matrix:
         """∫ v L u in the weight of the axis, L the generator of the process along it."""
         raise NotImplementedError
 
-    def matrix(self, g: Coefficient | None) -> Any:
-        """`mass(g)`, or `generator()` for None, made once."""
-        if g not in self._matrices:
-            self._matrices[g] = self.generator() if g is None else self.mass(g)
-        return self._matrices[g]
+    def changed(self, change: NoiseDerivative, g: Coefficient | None) -> Matrix:
+        """∂/∂θ of `mass(g)`, for None of `generator()`, where the noise changes and the functions of ξ do not."""
+        raise NotImplementedError
+
+    def matrix(self, g: Coefficient | None, change: NoiseDerivative | None = None) -> Matrix:
+        """`mass(g)`, or `generator()` for None, made once; for a change of the noise `changed(change, g)`."""
+        if (g, change) not in self._matrices:
+            made = (self.generator() if g is None else self.mass(g)) if change is None else self.changed(change, g)
+            self._matrices[g, change] = made
+        return self._matrices[g, change]
 
     @cached_property
-    def _matrices(self) -> dict[Coefficient | None, Any]:
+    def _matrices(self) -> dict[tuple[Coefficient | None, NoiseDerivative | None], Matrix]:
         return {}
 
-    def projection(self, other: Any) -> Any:
+    def projection(self, other: Any) -> Matrix:
         """The matrix that takes a function on another axis to its projection on this one, shape (size, other.size)."""
         raise NotImplementedError
 
@@ -120,16 +142,16 @@ class Axis:
         return self
 
 
-def along(factors: Sequence[Any], table: FloatArray) -> FloatArray:
+def along(factors: Sequence[Matrix | None], table: FloatArray) -> FloatArray:
     """A table with a matrix applied along each of its axes, from the last; None leaves an axis as it is."""
     if table.ndim == 2:
         first, last = factors
-        table = table if last is None else table @ last.T
+        table = table if last is None else np.asarray(table @ last.T)
         return table if first is None else first @ table
     for axis in range(len(factors) - 1, -1, -1):
-        if factors[axis] is not None:
+        if (factor := factors[axis]) is not None:
             moved = np.moveaxis(table, axis, 0)
-            image = factors[axis] @ moved.reshape(len(moved), -1)
+            image = factor @ moved.reshape(len(moved), -1)
             table = np.moveaxis(image.reshape(-1, *moved.shape[1:]), 0, axis)
     return table
 
@@ -143,8 +165,8 @@ class KroneckerSum:
         unit: ∫ u v of the first axis; None where it is the identity.
     """
 
-    terms: Sequence[tuple[Any, ...]]
-    unit: Any = None
+    terms: Sequence[tuple[Matrix, ...]]
+    unit: Matrix | None = None
 
     @cached_property
     def shape(self) -> tuple[int, ...]:
@@ -190,7 +212,7 @@ class KroneckerSum:
             unit = identity(phase.shape[0], format="csr") if issparse(phase) else np.eye(phase.shape[0])
         return KroneckerSum([(phase - shift * unit, *noises), *others], self.unit)
 
-    def on(self, axis: int, kept: Any) -> KroneckerSum:
+    def on(self, axis: int, kept: Mask) -> KroneckerSum:
         """What it is on some functions of an axis, where a mask is true."""
         at = np.ix_(kept, kept)
         unit = self.unit if axis or self.unit is None else self.unit[at]
@@ -206,7 +228,7 @@ class KroneckerSum:
         return any(issparse(factor) for term in self.terms for factor in term)
 
     @cached_property
-    def pairs(self) -> Sequence[tuple[Any, Any]]:
+    def pairs(self) -> Sequence[tuple[Matrix, Matrix]]:
         """The terms with all factors but the last as one."""
         product = scipy.sparse.kron if self.is_sparse else np.kron
         return [(reduce(product, term[:-1]), term[-1]) for term in self.terms]
@@ -265,7 +287,7 @@ class KroneckerSum:
         return csc_matrix((np.concatenate(values), np.concatenate(rows), starts), shape=(m * n, m * n))
 
 
-def _on_one_pattern(matrices: Sequence[Any]) -> tuple[csc_matrix, FloatArray]:
+def _on_one_pattern(matrices: Sequence[Matrix]) -> tuple[csc_matrix, FloatArray]:
     """Where any of some matrices has an entry, and the entries of each of them there, one row for each."""
     columnwise = [csc_matrix(matrix) for matrix in matrices]
     pattern = csc_matrix(sum(abs(matrix) for matrix in columnwise))

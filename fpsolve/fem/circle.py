@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
-from fpsolve.arrays import Coefficient, FloatArray, one
+from fpsolve.arrays import Coefficient, FloatArray, IntArray, Matrix, one
 from fpsolve.fem.noise_axes import STEP, CountedAxis, Rule, Samples, form
 from fpsolve.model.noise import NoiseDerivative
 
@@ -35,11 +35,11 @@ class CircleAxis(CountedAxis):
         return 2 * self.count + 1
 
     @cached_property
-    def modes(self) -> Any:
+    def modes(self) -> IntArray:
         return (np.arange(self.size) + 1) // 2
 
     @cached_property
-    def levels(self) -> Any:
+    def levels(self) -> Sequence[IntArray]:
         return [np.flatnonzero(self.modes == k) for k in range(self.count + 1)]
 
     @cached_property
@@ -77,7 +77,7 @@ class CircleAxis(CountedAxis):
         weight, turn = np.full(self.measure.size, 0.5 / np.pi), 2 * np.pi
         return Samples(self._xi, weight, turn * self.measure, self.values, np.ones(self.measure.size))
 
-    def everywhere(self, count: int) -> tuple[FloatArray, Any]:
+    def everywhere(self, count: int) -> tuple[FloatArray, Matrix]:
         """At equidistant θ of the whole circle, the first one twice."""
         theta = np.linspace(0, 2 * np.pi, 2 * count + 1)
         return self.noise.of_angle(theta), self.values_at(theta)

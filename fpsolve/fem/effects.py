@@ -8,11 +8,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from fpsolve.arrays import FloatArray
+from fpsolve.arrays import FloatArray, IntArray
 
 HALVING = 2 * math.log(2)
 """By how much more the logarithm of an effect falls with each degree in half a cell."""
@@ -33,7 +32,7 @@ class ModeEffects:
         slowest: the least share of the effect of two modes that is thought to be left.
     """
 
-    degrees: Any
+    degrees: IntArray
     highest: FloatArray
     slowest: float = 0.0
 
@@ -75,7 +74,7 @@ class ModeEffects:
         return self.degrees + np.log(np.maximum(self.of_cells, 1e-300) / tolerance) / self.fall
 
 
-def split(lines: FloatArray, effects: ModeEffects, share: float, may_coarsen: bool) -> tuple[FloatArray, Any]:
+def split(lines: FloatArray, effects: ModeEffects, share: float, may_coarsen: bool) -> tuple[FloatArray, IntArray]:
     """Lines and a degree for each cell with which all together should lack no more than a share.
 
     A cell is halved where halves take fewer unknowns: in them the effects fall faster.

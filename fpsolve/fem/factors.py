@@ -8,15 +8,15 @@ from contextlib import contextmanager, suppress
 from functools import cache, partial
 from itertools import pairwise
 from threading import RLock
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg.blas import dgemm
-from scipy.sparse import identity
+from scipy.sparse import csc_matrix, identity
 from scipy.sparse.csgraph import connected_components, reverse_cuthill_mckee, shortest_path
 from threadpoolctl import ThreadpoolController
 
-from fpsolve.arrays import FloatArray
+from fpsolve.arrays import FloatArray, IntArray
 from fpsolve.budget import SOLVE_SECONDS, charge
 from fpsolve.errors import SingularMatrix
 from fpsolve.fem.axis import KroneckerSum
@@ -75,6 +75,10 @@ def _pools() -> ThreadpoolController:
     return ThreadpoolController()
 
 
+Levels = Sequence[Sequence[IntArray] | None]
+"""For each axis the functions that are eliminated together, see `Axis`."""
+
+
 class Plan(NamedTuple):
     """What makes factors, and what it takes: seconds of a processor and gigabytes, all that it needs for a while."""
 
@@ -84,7 +88,11 @@ class Plan(NamedTuple):
 
 
 def factorised(
-    operator: KroneckerSum, levels: Sequence[Any] = (), *, is_full: bool = False, ring: Ring | None = None
+    operator: KroneckerSum,
+    levels: Levels = (),
+    *,
+    is_full: bool = False,
+    ring: Ring | None = None,
 ) -> Factors:
     """LU factors of a sum. A pivot that vanishes is made tiny: next to an eigenvalue that is what is wanted.
 
@@ -110,7 +118,11 @@ def _made(plan: Plan, operator: KroneckerSum) -> Factors:
 
 
 def plans(
-    operator: KroneckerSum, levels: Sequence[Any] = (), *, is_full: bool = False, ring: Ring | None = None
+    operator: KroneckerSum,
+    levels: Levels = (),
+    *,
+    is_full: bool = False,
+    ring: Ring | None = None,
 ) -> list[Plan]:
     """What factors of a sum there may be, the best ones first, each in the place of those that cannot be made."""
     if operator.size <= MAX_DENSE_UNKNOWNS and not operator.is_sparse:
@@ -154,7 +166,7 @@ def _of_plane(operator: KroneckerSum, ring: Ring | None) -> list[Plan]:
     return [*sorted(found, key=lambda plan: plan.seconds), _sparse(operator)]
 
 
-def _of_full(operator: KroneckerSum, levels: Sequence[Any]) -> list[Plan]:
+def _of_full(operator: KroneckerSum, levels: Levels) -> list[Plan]:
     """By levels of the first axis or of the last one, by blocks, or dense: what takes the fewest operations."""
     (m, n), band = operator.halves, operator.band
     found = [(_dense_cost(operator.size), _dense(operator))]
@@ -191,7 +203,9 @@ def _sparse(operator: KroneckerSum) -> Plan:
     return Plan(seconds, gigabytes, lambda: SparseFactors(operator))
 
 
-def _by_levels(operator: KroneckerSum, levels: Sequence[Any], rough_cost: float = ROUGH_COST) -> tuple[float, Plan]:
+def _by_levels(
+    operator: KroneckerSum, levels: Sequence[IntArray], rough_cost: float = ROUGH_COST
+) -> tuple[float, Plan]:
     """Operations of an elimination by levels, in single precision from a number of them on."""
     sizes, entries = [level.size for level in levels], operator.entries
     cost = sum(_dense_cost(size) for size in sizes) + sum(2 * a**2 * b for a, b in pairwise(reversed(sizes)))
@@ -225,7 +239,7 @@ def pair_gigabytes(operator: KroneckerSum) -> float:
     return 12e-9 * operator.halves[0] ** 2 * len(operator.terms) * is_of_arrays
 
 
-def bandwidth(pattern: Any) -> int:
+def bandwidth(pattern: csc_matrix) -> int:
     """How far apart coupled functions are in the order of Cuthill and McKee."""
     order = reverse_cuthill_mckee((pattern + pattern.T).tocsr(), symmetric_mode=True)
     place = np.argsort(order)
@@ -298,7 +312,7 @@ class LevelFactors:
         SingularMatrix: that of one level alone is: functions of what noise moves only by way of others.
     """
 
-    def __init__(self, operator: KroneckerSum, levels: Sequence[Any], precision: type = float) -> None:
+    def __init__(self, operator: KroneckerSum, levels: Sequence[IntArray], precision: type = float) -> None:
         self._order = np.concatenate(levels)
         ends = np.cumsum([0, *(level.size for level in levels)])
         self._parts = [slice(*pair) for pair in pairwise(ends.tolist())]
@@ -335,19 +349,19 @@ class LevelFactors:
         return found
 
 
-def along_first(operator: KroneckerSum, levels: Sequence[Any]) -> list[Any]:
+def along_first(operator: KroneckerSum, levels: Sequence[IntArray]) -> list[IntArray]:
     """The unknowns of levels of the first axis."""
     others = operator.size // operator.shape[0]
     return [np.add.outer(others * level, np.arange(others)).ravel() for level in levels]
 
 
-def along_last(operator: KroneckerSum, levels: Sequence[Any]) -> list[Any]:
+def along_last(operator: KroneckerSum, levels: Sequence[IntArray]) -> list[IntArray]:
     """The unknowns of levels of the last axis."""
     m, n = operator.halves
     return [np.add.outer(level, n * np.arange(m)).ravel() for level in levels]
 
 
-def levels_of(operator: KroneckerSum) -> list[Any]:
+def levels_of(operator: KroneckerSum) -> list[IntArray]:
     """The functions of the last axis by how many of its couplings lead to the first one, or one of each part."""
     pattern = operator.patterns[-1]
     starts = np.unique(connected_components(pattern)[1], return_index=True)[1]
@@ -355,7 +369,7 @@ def levels_of(operator: KroneckerSum) -> list[Any]:
     return [np.flatnonzero(distance == d) for d in range(int(distance.max()) + 1)]
 
 
-def paired(levels: Sequence[Any]) -> list[Any]:
+def paired(levels: Sequence[IntArray]) -> list[IntArray]:
     """Two levels in one, the last two, and so on."""
     count = len(levels)
     return [np.concatenate(levels[max(end - 2, 0) : end]) for end in range(2 - count % 2, count + 1, 2)]

@@ -3,23 +3,26 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy.linalg
 
-from fpsolve.arrays import dense, one
+from fpsolve.arrays import Mask, Matrix, dense, one
 from fpsolve.fem.axis import KroneckerSum, along
 from fpsolve.fem.dense import Factors
-from fpsolve.fem.factors import factorised
+from fpsolve.fem.factors import Levels, factorised
 from fpsolve.fem.mesh import CylinderMesh, vertices_at
+from fpsolve.fem.noise_axes import NoiseAxis
 from fpsolve.fem.rings import Ring
 from fpsolve.fem.space import Space
 from fpsolve.fem.terms import ALL_ORDERS, Term, Terms, TermSum, power_of_epsilon
 from fpsolve.model.problem import ParameterDerivative, Problem
+
+if TYPE_CHECKING:
+    from fpsolve.fem.sphere import SphereTerms
 
 KEPT_SPACES = 16
 LANCZOS_STEPS = 16
@@ -43,7 +46,7 @@ class Pencil:
     p: float
     space: Space
     matrix: KroneckerSum
-    levels: Sequence[Any]
+    levels: Levels
     ring: Ring | None = None
 
     @staticmethod
@@ -51,11 +54,11 @@ class Pencil:
         """That of all functions."""
         return Pencil(p, space, matrix, [axis.levels for axis in space.axes], ring)
 
-    def on(self, axis: int, kept: Any) -> Pencil:
+    def on(self, axis: int, kept: Mask) -> Pencil:
         """What it is on some functions of an axis, where a mask is true."""
         levels, place = list(self.levels), np.cumsum(kept) - 1
-        if levels[axis]:
-            levels[axis] = [place[level[kept[level]]] for level in levels[axis]]
+        if own := levels[axis]:
+            levels[axis] = [place[level[kept[level]]] for level in own]
         return replace(self, matrix=self.matrix.on(axis, kept), levels=levels)
 
     @cached_property
@@ -148,7 +151,7 @@ class Generator:
         return tuple(self._own_terms.whole())
 
     @cached_property
-    def _own_terms(self) -> Any:
+    def _own_terms(self) -> Terms | SphereTerms:
         if self.problem.dimension == 2:
             return Terms(self.problem, self.space(0.0))
         from fpsolve.fem.sphere import SphereTerms  # scikit-fem takes a while to import
@@ -170,7 +173,7 @@ class Generator:
         axes = self.space(p).noises
         if by not in self._changes:
             self._changes[by] = tuple(self._own_terms.changed(by))
-        parts: list[tuple[Any, ...]] = [
+        parts: list[tuple[Matrix, ...]] = [
             (phase, *(axis.matrix(g) for axis, g in zip(axes, term.noises, strict=True)))
             for term in self._changes[by]
             if (phase := term.at(p, derivative)) is not None
@@ -178,13 +181,9 @@ class Generator:
         if by.noise is not None:
             (noises, phase), *others = self._sum.phases(p, derivative).items()  # the first is that of 1
             moved = [(noises, phase - rate * self.phi.identity), *others]
-            parts += [(phase, *self._changed(by, axes, noises)) for noises, phase in moved]
+            changes = [by.noise if k == by.part else None for k in range(len(axes))]
+            parts += [(phase, *map(NoiseAxis.matrix, axes, noises, changes)) for noises, phase in moved]
         return KroneckerSum(parts or [(0.0 * self.phi.identity, *(axis.matrix(one) for axis in axes))])
-
-    def _changed(self, by: ParameterDerivative, axes: Sequence[Any], noises: Sequence[Any]) -> Iterator[Any]:
-        """The factors of the noises of ∂/∂θ of a term, where one of them changes."""
-        for k, (axis, g) in enumerate(zip(axes, noises, strict=True)):
-            yield axis.changed_matrix(by.noise, g) if k == by.part else axis.matrix(g)
 
     @cached_property
     def _sum(self) -> TermSum:

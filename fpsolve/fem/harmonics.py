@@ -26,7 +26,7 @@ import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix, diags, identity
 from scipy.special import betaln, eval_jacobi, gammaln, roots_jacobi
 
-from fpsolve.arrays import FloatArray
+from fpsolve.arrays import FloatArray, IntArray, Mask, Matrix
 from fpsolve.fem.sphere import DirectionAxis, group, group_dimensions, waves_at
 
 
@@ -42,11 +42,11 @@ class Harmonics:
         values: factors of the values at some directions, of waves and in η, and the degree of each.
     """
 
-    degrees: Any
-    own: Any
-    products: dict[tuple[int, int], Any]
-    rotations: dict[tuple[int, int], Any]
-    values: list[tuple[FloatArray, FloatArray, Any]]
+    degrees: IntArray
+    own: Mask
+    products: dict[tuple[int, int], csr_matrix]
+    rotations: dict[tuple[int, int], csr_matrix]
+    values: list[tuple[FloatArray, FloatArray, IntArray]]
 
     @staticmethod
     @lru_cache(maxsize=16)
@@ -56,7 +56,7 @@ class Harmonics:
         laplace = diags(-degrees * (degrees + n - 2.0))
         even = np.flatnonzero(degrees % 2 == 0)
 
-        def on_even(matrix: Any) -> Any:
+        def on_even(matrix: csr_matrix) -> csr_matrix:
             return csr_matrix(matrix)[even][:, even]
 
         turns = {
@@ -79,7 +79,7 @@ class Harmonics:
         return table[:, by_degree[self.own]]
 
 
-def _components(n: int, most: int) -> tuple[Any, list[Any], list[tuple[FloatArray, FloatArray, Any]]]:
+def _components(n: int, most: int) -> tuple[IntArray, list[csr_matrix], list[tuple[FloatArray, FloatArray, IntArray]]]:
     """Of the harmonics of all degrees these, multiplication by e_1, …, e_n, and factors of their values."""
     dimensions = group_dimensions(n)
     groups = [group(dimension, most) for dimension in dimensions]
@@ -88,7 +88,7 @@ def _components(n: int, most: int) -> tuple[Any, list[Any], list[tuple[FloatArra
     waves = [{int(m): np.flatnonzero(each.degrees == m) for m in set(each.degrees.tolist())} for each in groups]
     pairs = [(m, k) for m in waves[0] for k in waves[1] if m + k <= most]
     radial: dict[tuple[int, int], FloatArray] = {}
-    values: list[tuple[FloatArray, FloatArray, Any]] = []
+    values: list[tuple[FloatArray, FloatArray, IntArray]] = []
     ends = [0]
     for m, k in pairs:
         orders = np.arange((most - m - k) // 2 + 1)
@@ -103,7 +103,7 @@ def _components(n: int, most: int) -> tuple[Any, list[Any], list[tuple[FloatArra
     by_degree = np.argsort(degrees, kind="stable")
     place = np.argsort(by_degree)
 
-    def component(side: int, unit: FloatArray) -> Any:
+    def component(side: int, unit: FloatArray) -> csr_matrix:
         """Multiplication by one of e_1 or of e_2: it takes a wave of its group one degree up or down."""
         entries, rows, columns = [], [], []
         for m, k in pairs:
@@ -151,7 +151,7 @@ class HarmonicAxis(DirectionAxis):
         return Harmonics.of(self.n, self.waves)
 
     @property
-    def degrees(self) -> Any:
+    def degrees(self) -> IntArray:
         return self._harmonics.degrees[self._harmonics.own]
 
     @cached_property
@@ -166,11 +166,11 @@ class HarmonicAxis(DirectionAxis):
     def inner_values(self) -> FloatArray:
         return self._harmonics.samples
 
-    def projection(self, other: HarmonicAxis) -> Any:
+    def projection(self, other: HarmonicAxis) -> Matrix:
         """Those that both have."""
         return np.eye(self.size, other.size)
 
-    def _moved(self, matrix: FloatArray) -> tuple[Any, Any]:
+    def _moved(self, matrix: FloatArray) -> tuple[csr_matrix, csr_matrix]:
         """With the symmetric part of the matrix, q, and with the antisymmetric one, rotations."""
         products, rotations, n = self._harmonics.products, self._harmonics.rotations, self.n
         growth = sum((matrix[i, j] + (i < j) * matrix[j, i]) * each for (i, j), each in products.items())
@@ -182,10 +182,10 @@ class HarmonicAxis(DirectionAxis):
         return csr_matrix(moved)[:, self._harmonics.own], csr_matrix(growth)[:, self._harmonics.own]
 
     @property
-    def _itself(self) -> Any:
+    def _itself(self) -> csr_matrix:
         return identity(self._harmonics.degrees.size, format="csr")[:, self._harmonics.own]
 
-    def _form(self, left: Any, right: Any) -> FloatArray:
+    def _form(self, left: csr_matrix, right: csr_matrix) -> FloatArray:
         return np.asarray((left.T @ right).toarray())
 
     @property
@@ -199,7 +199,7 @@ class HarmonicAxis(DirectionAxis):
         x = (sides[0] - sides[1]) * (sides[0] + sides[1])
         degrees = [group(k, most).degrees for k in dimensions]
         of_waves = waves_at(dimensions, most, points).reshape(x.size, *map(len, degrees))
-        columns, own_degrees = list[FloatArray](), list[Any]()
+        columns, own_degrees = list[FloatArray](), list[IntArray]()
         for m, k in ((m, k) for m in np.unique(degrees[0]) for k in np.unique(degrees[1])):
             if (m + k) % 2 or m + k > most:
                 continue
@@ -214,7 +214,7 @@ class HarmonicAxis(DirectionAxis):
         return np.concatenate(columns, axis=1)[:, by_degree[self._harmonics.own]]
 
 
-def _mean_squares(degrees: Any, alpha: float, beta: float, dimensions: tuple[int, int]) -> FloatArray:
+def _mean_squares(degrees: IntArray, alpha: float, beta: float, dimensions: tuple[int, int]) -> FloatArray:
     """The means of cos^2m η sin^2k η P² over the sphere, of Jacobi polynomials P of some degrees."""
     low, high = (0.5 * each for each in dimensions)
     logs = gammaln(degrees + alpha + 1) + gammaln(degrees + beta + 1) - gammaln(degrees + 1)

@@ -15,7 +15,7 @@ import skfem
 from scipy.sparse import csr_matrix, identity
 from scipy.special import beta, roots_jacobi
 
-from fpsolve.arrays import Coefficient, FloatArray, one
+from fpsolve.arrays import Coefficient, FloatArray, IntArray, Mask, one
 from fpsolve.errors import MeshError
 from fpsolve.messages import Code, Message
 from fpsolve.polynomials import EXTRA_POINTS, Rule, gauss_legendre
@@ -60,7 +60,7 @@ class LineSpace:
     def __init__(
         self,
         lines: FloatArray,
-        degree: Any,
+        degree: int | IntArray,
         weight: Coefficient = one,
         *,
         end_exponents: tuple[float, float] = (0.0, 0.0),
@@ -183,7 +183,7 @@ class LineSpace:
         return matrix
 
 
-def _orthogonalised(slopes: FloatArray, measure: FloatArray, kept: Any) -> tuple[FloatArray, FloatArray]:
+def _orthogonalised(slopes: FloatArray, measure: FloatArray, kept: Mask) -> tuple[FloatArray, FloatArray]:
     """New functions in the elements' own, shape (m, k + 1, k + 1), so that in every cell ∫ w u′v′ is diagonal.
 
     And what a vertex function holds of each bubble, shape (m, k − 1, 2).

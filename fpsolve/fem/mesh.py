@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from fpsolve.arrays import FloatArray, is_whole, real_number, shown
+from fpsolve.arrays import FloatArray, IntArray, is_whole, real_number, shown
 from fpsolve.errors import MeshError
 from fpsolve.files import atomic
 from fpsolve.messages import Code, Message, Remedy
@@ -84,7 +84,7 @@ class CylinderMesh:
         return replace(self, z_lines=np.concatenate([[lower], inside, [upper]]))
 
 
-def vertices_at(lines: FloatArray, phase: float) -> Any:
+def vertices_at(lines: FloatArray, phase: float) -> IntArray:
     """The indices of the φ-lines lines[:-1] at φ and φ + π. Raises `MeshError` where one is missing."""
     found = np.flatnonzero(np.abs(np.sin(lines[:-1] - phase)) < TOLERANCE)
     turns = round((lines[-1] - lines[0]) / math.pi)
@@ -241,7 +241,7 @@ def _as_meshio(mesh: CylinderMesh, impact: float, gmsh: bool) -> Any:
     )
 
 
-def _grid_lines(coordinates: FloatArray) -> tuple[FloatArray, Any]:
+def _grid_lines(coordinates: FloatArray) -> tuple[FloatArray, IntArray]:
     """The distinct values among coordinates, and for each point the index of its own."""
     order = np.argsort(coordinates)
     steps = np.diff(coordinates[order]) > TOLERANCE * max(np.ptp(coordinates), 1e-300)
@@ -250,7 +250,7 @@ def _grid_lines(coordinates: FloatArray) -> tuple[FloatArray, Any]:
     return coordinates[order][np.concatenate([[True], steps])], index
 
 
-def _check_tensor_grid(index: Any, quads: Any, shape: tuple[int, int]) -> None:
+def _check_tensor_grid(index: IntArray, quads: IntArray, shape: tuple[int, int]) -> None:
     """Every cell of the grid must be one quadrilateral, with the cell's four corners."""
     corners = index[:, quads]
     lower = corners.min(axis=2)

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 import numpy as np
 
-from fpsolve.arrays import Coefficient, FloatArray, dense, one
+from fpsolve.arrays import Coefficient, FloatArray, IntArray, Matrix, dense, one
 from fpsolve.fem.axis import Axis
 from fpsolve.fem.effects import ModeEffects, split
 from fpsolve.fem.mesh import MAX_DEGREE, halved
@@ -57,7 +57,7 @@ class Samples(NamedTuple):
     xi: FloatArray
     weight: FloatArray
     measure: FloatArray
-    values: Any
+    values: Matrix
     factor: FloatArray
 
 
@@ -72,7 +72,7 @@ class Rule(NamedTuple):
 
     points: FloatArray
     measure: FloatArray
-    values: Any
+    values: Matrix
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,23 +112,9 @@ class NoiseAxis(Axis):
         return self.rule.measure
 
     @property
-    def values(self) -> Any:
+    def values(self) -> Matrix:
         """The functions at the points of the rule, without factor, shape (n, size)."""
         return self.rule.values
-
-    @cached_property
-    def _changes(self) -> dict[tuple[NoiseDerivative, Coefficient | None], Any]:
-        return {}
-
-    def changed(self, change: NoiseDerivative, g: Coefficient | None) -> Any:
-        """∂/∂θ of `mass(g)`, for None of `generator()`, where the noise changes and the functions of ξ do not."""
-        raise NotImplementedError
-
-    def changed_matrix(self, change: NoiseDerivative, g: Coefficient | None) -> Any:
-        """`changed(change, g)`, made once."""
-        if (change, g) not in self._changes:
-            self._changes[change, g] = self.changed(change, g)
-        return self._changes[change, g]
 
     def generator_of_one(self) -> FloatArray:
         """`generator` with v the function 1, times the factor; shape (size,)."""
@@ -147,7 +133,7 @@ class NoiseAxis(Axis):
         weights = self.measure / self.samples().factor ** 2
         return np.asarray(weights / weights.sum())
 
-    def everywhere(self, count: int) -> tuple[FloatArray, Any]:
+    def everywhere(self, count: int) -> tuple[FloatArray, Matrix]:
         """ξ that cover a bounded support, the ends included, some `count`, and the functions there with their factor.
 
         Returns:
@@ -169,7 +155,7 @@ class CountedAxis(NoiseAxis):
     is_local = False
 
     @cached_property
-    def cells(self) -> Any:
+    def cells(self) -> IntArray:
         return np.zeros(self.size, dtype=int)
 
     @cached_property
@@ -220,11 +206,11 @@ class LineAxis(NoiseAxis):
             weight = weight + change.log_scale * (g(xi * (1 + STEP)) - g(xi * (1 - STEP))) / (2 * STEP)
         return np.asarray(weight)
 
-    def values_at(self, z: FloatArray) -> Any:
+    def values_at(self, z: FloatArray) -> Matrix:
         """The functions at any z, shape (len(z), size)."""
         raise NotImplementedError
 
-    def everywhere(self, count: int) -> tuple[FloatArray, Any]:
+    def everywhere(self, count: int) -> tuple[FloatArray, Matrix]:
         """At points that are closer to each other near the ends, as those of Chebyshev."""
         z = -self.noise.half_width / self.unit * np.cos(np.linspace(0, np.pi, count + 1))
         return self.unit * z, self.values_at(z) * self._factor(z)[:, None]
@@ -253,7 +239,7 @@ class LineAxis(NoiseAxis):
     def samples(self) -> Samples:
         return self._sampled(self.points, self.unit * self.measure / self.weight(self.points), self.values)
 
-    def _sampled(self, z: FloatArray, measure: FloatArray, values: Any) -> Samples:
+    def _sampled(self, z: FloatArray, measure: FloatArray, values: Matrix) -> Samples:
         return Samples(self.unit * z, self.weight(z) / self.unit, measure, values, self._factor(z))
 
     def projection(self, other: LineAxis) -> FloatArray:
@@ -308,7 +294,7 @@ class PolynomialAxis(CountedAxis, LineAxis):
         return float(self.measure @ self.points)
 
     @cached_property
-    def modes(self) -> Any:
+    def modes(self) -> IntArray:
         return np.arange(self.count)
 
     @property
@@ -388,7 +374,7 @@ class CellAxis(LineAxis):
     """
 
     lines: FloatArray = field()
-    degrees: Any
+    degrees: IntArray
 
     word = "cells"
 
@@ -412,7 +398,7 @@ class CellAxis(LineAxis):
         return LineSpace(self.lines, self.degrees, self.weight, end_exponents=ends)
 
     @cached_property
-    def _inner(self) -> Any:
+    def _inner(self) -> IntArray:
         """Which functions of the highest degree there are."""
         return np.flatnonzero(self.line.kept)
 
@@ -421,11 +407,11 @@ class CellAxis(LineAxis):
         return Rule(self.line.points, self.line.measure, self.line.values[:, self._inner])
 
     @cached_property
-    def cells(self) -> Any:
+    def cells(self) -> IntArray:
         return self.line.cells[self._inner]
 
     @cached_property
-    def modes(self) -> Any:
+    def modes(self) -> IntArray:
         return self.line.modes[self._inner]
 
     @cached_property
@@ -457,14 +443,14 @@ class CellAxis(LineAxis):
         lower, upper = [1.6 * self.lines[0]] if below else [], [1.6 * self.lines[-1]] if above else []
         return self.on(np.concatenate([lower, self.lines, upper]))
 
-    def mass(self, g: Coefficient = one) -> Any:
+    def mass(self, g: Coefficient = one) -> Matrix:
         return self._form(self.line.mass() if g == one else self.line.mass(lambda z: g(self.unit * z)))
 
-    def generator(self) -> Any:
+    def generator(self) -> Matrix:
         """−½ ∫ P_s σ² u′v′; at the ends no probability flux is the natural condition."""
         return self._form(-self.line.stiffness(self.rate))
 
-    def changed(self, change: NoiseDerivative, g: Coefficient | None) -> Any:
+    def changed(self, change: NoiseDerivative, g: Coefficient | None) -> Matrix:
         mean = float(self.measure @ change.log_density(self.unit * self.points) / np.sum(self.measure))
 
         def log_change(z: FloatArray) -> FloatArray:
@@ -476,16 +462,16 @@ class CellAxis(LineAxis):
         return 2 * (change.log_diffusion - change.log_scale) * self.matrix(None) - self._form(stiffness)
 
     @cached_property
-    def nested(self) -> Any:
+    def nested(self) -> Matrix:
         return self.line.nested[self._inner][:, self._inner]
 
-    def values_at(self, z: FloatArray) -> Any:
+    def values_at(self, z: FloatArray) -> Matrix:
         return self.line.at(z)[:, self._inner]
 
-    def _form(self, matrix: Any) -> Any:
+    def _form(self, matrix: Matrix) -> Matrix:
         """Of the functions that are kept; sparse where it is large."""
         inner = matrix[self._inner][:, self._inner]
-        return inner.toarray() if inner.shape[0] <= MAX_DENSE_UNKNOWNS else inner
+        return dense(inner) if inner.shape[0] <= MAX_DENSE_UNKNOWNS else inner
 
 
 @dataclass(frozen=True, eq=False)
@@ -508,11 +494,11 @@ class StateAxis(NoiseAxis):
         return Rule(self.support, self.noise.probabilities, np.eye(self.size))
 
     @cached_property
-    def cells(self) -> Any:
+    def cells(self) -> IntArray:
         return np.full(self.size, -1)
 
     @cached_property
-    def modes(self) -> Any:
+    def modes(self) -> IntArray:
         return np.zeros(self.size, dtype=int)
 
     @cached_property

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse
 
-from fpsolve.arrays import Coefficient, FloatArray, one
+from fpsolve.arrays import Coefficient, FloatArray, IntArray, one
 from fpsolve.fem.noise_axes import MORE_POINTS, STEP, CountedAxis, Rule, Samples, form
 from fpsolve.model.noise import NoiseDerivative
 from fpsolve.polynomials import hermite
@@ -48,13 +48,13 @@ class PairAxis(CountedAxis):
         return super().facts | {"tilt": self.slope * self.p}
 
     @cached_property
-    def _degrees(self) -> Any:
+    def _degrees(self) -> IntArray:
         """The total degree, and those in u₁ and u₂, of each product, shape (3, size)."""
         total, second = np.tril_indices(self.count)
         return np.stack([total, total - second, second])
 
     @property
-    def modes(self) -> Any:
+    def modes(self) -> IntArray:
         return self._degrees[0]
 
     @cached_property

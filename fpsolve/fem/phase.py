@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.sparse import csr_matrix, diags, issparse
 
-from fpsolve.arrays import FloatArray, one
+from fpsolve.arrays import FloatArray, IntArray, Mask, Matrix, dense, one
 from fpsolve.fem.axis import Axis
 from fpsolve.fem.effects import ModeEffects, split
 from fpsolve.fem.mesh import MAX_DEGREE, halved
@@ -40,10 +40,10 @@ class PhaseAxis(Axis):
     """
 
     lines: FloatArray = field()
-    degrees: Any
+    degrees: IntArray
 
     @staticmethod
-    def of(lines: FloatArray, degrees: Any) -> PhaseAxis:
+    def of(lines: FloatArray, degrees: IntArray) -> PhaseAxis:
         """The axis of lines and degrees; many problems share the tables of a small one."""
         axis = PhaseAxis(lines, np.asarray(degrees, dtype=int))
         return axis if axis.size > MOST_SHARED else _shared(lines.tobytes(), axis.degrees.tobytes())
@@ -82,24 +82,24 @@ class PhaseAxis(Axis):
         return orthonormal(int(self.degrees.max()))
 
     @cached_property
-    def _kept(self) -> Any:
+    def _kept(self) -> Mask:
         """Which modes each cell has, shape (m, largest degree + 1)."""
         return np.arange(self.degrees.max() + 1) <= self.degrees[:, None]
 
     @cached_property
-    def cells(self) -> Any:
+    def cells(self) -> IntArray:
         return np.nonzero(self._kept)[0]
 
     @cached_property
-    def modes(self) -> Any:
+    def modes(self) -> IntArray:
         return np.nonzero(self._kept)[1]
 
     @cached_property
-    def _number(self) -> Any:
+    def _number(self) -> IntArray:
         return np.cumsum(self._kept).reshape(self._kept.shape) - 1
 
     @cached_property
-    def _pairs(self) -> Any:
+    def _pairs(self) -> Mask:
         return self._kept[:, :, None] & self._kept[:, None, :]
 
     @cached_property
@@ -131,33 +131,33 @@ class PhaseAxis(Axis):
         return round(2 * math.pi / self.span)
 
     @cached_property
-    def right_trace(self) -> Any:
+    def right_trace(self) -> Matrix:
         """T(φⱼ⁺) at lines[:-1], shape (m, size)."""
         return self._trace(0)
 
     @cached_property
-    def left_trace(self) -> Any:
+    def left_trace(self) -> Matrix:
         """T(φⱼ⁻) at lines[:-1], shape (m, size); that at the seam comes from the last cell."""
         return self._trace(1)
 
     @cached_property
-    def jump(self) -> Any:
+    def jump(self) -> Matrix:
         """T(φⱼ⁺) − T(φⱼ⁻)."""
         return self.right_trace - self.left_trace
 
-    def _trace(self, side: int) -> Any:
+    def _trace(self, side: int) -> Matrix:
         values = self._table.ends[side] / np.sqrt(self._sizes)[:, None]
         return self._scattered(np.arange(self._sizes.size) + side, values)
 
-    def mass(self, f: Any = one) -> Any:
+    def mass(self, f: Any = one) -> Matrix:
         """∫ f u v of `Harmonics` f, or of 1."""
         return self.identity if f == one else self._combined(f, self._masses)
 
-    def convection(self, f: Harmonics) -> Any:
+    def convection(self, f: Harmonics) -> Matrix:
         """∫ f u′ v, cell by cell."""
         return self._combined(f, self._convections)
 
-    def diffusion(self, a: CoefficientMatrix, b: CoefficientMatrix) -> tuple[Any, Any, Any]:
+    def diffusion(self, a: CoefficientMatrix, b: CoefficientMatrix) -> tuple[Matrix, Matrix, Matrix]:
         """∫ w D_a D_b T, D = h ∂φ + p q of two matrices: the coefficients of p⁰, p¹ and p².
 
         With D* w = −(h w)′ + p q w it is, cell by cell and at the vertices,
@@ -194,13 +194,13 @@ class PhaseAxis(Axis):
         first, second, last = (self._assembled(blocks) for blocks in cells)
         return first + loads[0], second + loads[1], last
 
-    def impulses(self, of: Impulse, p: float, derivative: int = 0) -> Any:
+    def impulses(self, of: Impulse, p: float, derivative: int = 0) -> Matrix:
         """∂ᵏ/∂pᵏ of ∫ w |exp(B)e|^p T(ψ(φ)), ψ being where an impulse takes φ."""
         at, end, weights, stretch, _ = self._struck(of)
         logs = np.log(stretch)
         return self._stored(at.T @ diags(weights * np.exp(p * logs) * logs**derivative) @ end)
 
-    def changed_impulses(self, of: Impulse, by: ImpulseDerivative, p: float, derivative: int = 0) -> Any:
+    def changed_impulses(self, of: Impulse, by: ImpulseDerivative, p: float, derivative: int = 0) -> Matrix:
         """The same, differentiated by θ of which B depends."""
         at, end, weights, stretch, points = self._struck(of)
         logs = np.log(stretch)
@@ -212,9 +212,9 @@ class PhaseAxis(Axis):
         slope = end @ csr_matrix(self.convection(Harmonics(1.0, 0.0, 0.0)))
         return self._stored(at.T @ (diags(size * longer) @ end + diags(size * turned) @ slope))
 
-    def _stored(self, matrix: Any) -> Any:
+    def _stored(self, matrix: Matrix) -> Matrix:
         """An array where matrices of φ are."""
-        return matrix if self.size > MAX_DENSE_UNKNOWNS else matrix.toarray()
+        return matrix if self.size > MAX_DENSE_UNKNOWNS else dense(matrix)
 
     @cached_property
     def _strikes(self) -> dict[Impulse, tuple[Any, ...]]:
@@ -253,18 +253,18 @@ class PhaseAxis(Axis):
         return Ring(np.where(kept, self._number, -1), np.where(kept[:, :, None], ends, 0.0))
 
     @cached_property
-    def _mean_slope(self) -> Any:
+    def _mean_slope(self) -> Matrix:
         """½(T′(φⱼ⁺) + T′(φⱼ⁻)) at the vertices."""
         count = np.arange(self._sizes.size)
         slopes = self._table.end_slopes[:, None] / self._sizes[:, None] ** 1.5
         return 0.5 * (self._scattered(count, slopes[0]) + self._scattered(count + 1, slopes[1]))
 
     @cached_property
-    def identity(self) -> Any:
+    def identity(self) -> Matrix:
         """∫ u v."""
         return self._assembled(np.broadcast_to(np.eye(self._pairs.shape[1]), self._pairs.shape))
 
-    def at(self, phi: FloatArray, inside: FloatArray | None = None) -> Any:
+    def at(self, phi: FloatArray, inside: FloatArray | None = None) -> Matrix:
         """Values at points of the domain, as rows of E with u(φ) = E @ coefficients, shape (len(φ), size).
 
         A point on a line between cells is seen from the cell that holds its entry of `inside`, without it from the
@@ -285,16 +285,16 @@ class PhaseAxis(Axis):
         return points.ravel(), (sizes[:, None] * self._table.rule.weights).ravel()
 
     @cached_property
-    def values(self) -> Any:
+    def values(self) -> Matrix:
         """The basis functions at the points of the rule, shape (n, size)."""
         return self.at(self.points)
 
     @cached_property
-    def inner_values(self) -> Any:
+    def inner_values(self) -> Matrix:
         """The basis functions at five points inside each cell, shape (5 m, size)."""
         return self.at((self.lines[:-1, None] + self._sizes[:, None] * np.linspace(0.1, 0.9, 5)).ravel())
 
-    def projection(self, other: PhaseAxis) -> Any:
+    def projection(self, other: PhaseAxis) -> Matrix:
         """The matrix that takes a function of another space to its projection on this one, shape (size, other.size)."""
         return self.values.T @ (diags(self.weights) @ other.at(self.points))
 
@@ -304,41 +304,41 @@ class PhaseAxis(Axis):
         return np.stack([np.cos(2 * self._grid), np.sin(2 * self._grid)]) * self._table.rule.weights
 
     @cached_property
-    def _masses(self) -> tuple[Any, Any, Any]:
+    def _masses(self) -> tuple[Matrix, Matrix, Matrix]:
         cosine, sine = self._waves @ self._table.products
         return self.identity, self._assembled(cosine), self._assembled(sine)
 
     @cached_property
-    def _convections(self) -> tuple[Any, Any, Any]:
+    def _convections(self) -> tuple[Matrix, Matrix, Matrix]:
         weights = np.broadcast_to(self._table.rule.weights, self._grid.shape)[None]
         blocks = np.concatenate([weights, self._waves]) @ self._table.convections
         mean, cosine, sine = blocks / self._sizes[:, None]
         return self._assembled(mean), self._assembled(cosine), self._assembled(sine)
 
-    def _combined(self, f: Harmonics, parts: tuple[Any, Any, Any]) -> Any:
+    def _combined(self, f: Harmonics, parts: tuple[Matrix, Matrix, Matrix]) -> Matrix:
         total = f.mean * parts[0]
         for factor, part in ((f.cosine, parts[1]), (f.sine, parts[2])):
             if factor:
                 total = total + factor * part
         return total
 
-    def _assembled(self, blocks: Any) -> Any:
+    def _assembled(self, blocks: FloatArray) -> Matrix:
         """The matrix with a block for each cell; its rows are those of the test functions."""
         entries = blocks.reshape(self._pairs.shape)[self._pairs]
         return self._matrix(entries, *self._places, (self.size, self.size))
 
     @cached_property
-    def _places(self) -> tuple[Any, Any]:
+    def _places(self) -> tuple[IntArray, IntArray]:
         rows, columns = np.broadcast_arrays(self._number[:, :, None], self._number[:, None, :])
         return rows[self._pairs], columns[self._pairs]
 
-    def _scattered(self, vertex: Any, values: FloatArray) -> Any:
+    def _scattered(self, vertex: IntArray, values: FloatArray) -> Matrix:
         """A row for each vertex, with values for the functions of a cell."""
         kept = self._kept
         rows = np.broadcast_to((vertex % len(kept))[:, None], kept.shape)
         return self._matrix(values[kept], rows[kept], self._number[kept], (len(kept), self.size))
 
-    def _matrix(self, entries: FloatArray, rows: Any, columns: Any, shape: tuple[int, int]) -> Any:
+    def _matrix(self, entries: FloatArray, rows: IntArray, columns: IntArray, shape: tuple[int, int]) -> Matrix:
         if self.size > MAX_DENSE_UNKNOWNS:
             return csr_matrix((entries, (rows, columns)), shape=shape)
         matrix = np.zeros(shape)
@@ -346,7 +346,7 @@ class PhaseAxis(Axis):
         return matrix
 
 
-def by_rows(factors: FloatArray, matrix: Any) -> Any:
+def by_rows(factors: FloatArray, matrix: Matrix) -> Matrix:
     """A matrix with its rows multiplied."""
     return diags(factors) @ matrix if issparse(matrix) else factors[:, None] * matrix
 

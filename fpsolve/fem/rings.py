@@ -14,13 +14,13 @@ functions of the ring n (ck)³, a matrix of one cell after another c (nk)³.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from scipy.sparse import coo_matrix, issparse
 
-from fpsolve.arrays import FloatArray, dense
+from fpsolve.arrays import FloatArray, IntArray, Matrix, dense
 from fpsolve.errors import SingularMatrix
 from fpsolve.fem.axis import KroneckerSum
 from fpsolve.fem.dense import DenseFactors
@@ -38,7 +38,7 @@ class Ring:
         ends: what these are at the lower and at the upper end of the cell, shape (cells, modes, 2).
     """
 
-    number: Any
+    number: IntArray
     ends: FloatArray
 
 
@@ -138,7 +138,7 @@ class RingFactors:
         size = self._levels * self._group
         return table.transpose(0, 2, 5, 1, 3, 4, 6).reshape(cells, 2, 2, size, size)[..., : self._n, : self._n]
 
-    def _of_cells(self, phases: Any) -> tuple[FloatArray, FloatArray]:
+    def _of_cells(self, phases: Sequence[Matrix]) -> tuple[FloatArray, FloatArray]:
         """Matrices in the cells, shape (terms, cells, modes, modes), and what is between them, (terms, cells, 2)."""
         number, ends = self._ring.number, self._ring.ends
         cells, modes = number.shape
@@ -152,7 +152,7 @@ class RingFactors:
                 own = cell[entries.row] == cell[entries.col]
                 row, column = entries.row[own], entries.col[own]
                 inner[each, cell[row], mode[row], mode[column]] = entries.data[own]
-                phase = phase.tocsr()
+                phase = entries.tocsr()
             else:
                 inner[each] = phase[number[:, :, None], number[:, None, :]] * (kept[:, :, None] & kept[:, None, :])
             for side, step in enumerate((-1, 1)):

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from fpsolve.arrays import FloatArray, one
+from fpsolve.arrays import FloatArray, Matrix, one
 from fpsolve.errors import MeshError
 from fpsolve.fem.axis import Axis, KroneckerSum, along
 from fpsolve.fem.circle import CircleAxis
@@ -156,7 +156,7 @@ class Space:
         return along(self._weights, self.table(coefficients)).ravel()
 
     @cached_property
-    def _weights(self) -> tuple[Any, ...]:
+    def _weights(self) -> tuple[Matrix | None, ...]:
         """The factors of `mass`; None for that of φ where it is the identity."""
         return self.phi.unit, *(axis.matrix(one) for axis in self.noises)
 
@@ -170,6 +170,6 @@ class Space:
         matrices = [None if new is was else new.projection(was) for new, was in pairs]
         return np.ravel(along(matrices, old.table(coefficients)))
 
-    def evaluate(self, coefficients: FloatArray, *values: Any) -> FloatArray:
+    def evaluate(self, coefficients: FloatArray, *values: Matrix) -> FloatArray:
         """A function without its factor, from the values of the functions of each axis at points of it."""
         return along(values, self.table(coefficients))

@@ -27,7 +27,7 @@ import scipy.sparse.linalg
 from scipy.sparse import csr_matrix, diags
 from scipy.sparse.linalg import LinearOperator
 
-from fpsolve.arrays import FloatArray, one
+from fpsolve.arrays import Coefficient, FloatArray, IntArray, Matrix, one
 from fpsolve.fem.axis import Axis, KroneckerSum, along
 from fpsolve.fem.line import LineSpace
 from fpsolve.fem.mesh import halved
@@ -43,7 +43,7 @@ MOST_DEGREE = 10
 SIDE = 16
 """Points along each angle at which signs are looked at, at least."""
 Coordinates = tuple[tuple[float, ...], ...]
-Parts = list[tuple[FloatArray, Any]]
+Parts = list[tuple[FloatArray, csr_matrix]]
 """Σ f(η) ⊗ g: values at points of η, shape (points, nodes), and waves, shape (all, own)."""
 
 
@@ -65,12 +65,12 @@ class Waves:
         samples: their values at some angles, shape (points, waves).
     """
 
-    first: Any
-    second: Any
-    own: Any
-    along: dict[tuple[int, int], Any]
-    across: dict[tuple[int, int], Any]
-    slopes: tuple[Any, Any]
+    first: IntArray
+    second: IntArray
+    own: IntArray
+    along: dict[tuple[int, int], list[list[csr_matrix]]]
+    across: dict[tuple[int, int], list[list[csr_matrix]]]
+    slopes: tuple[csr_matrix | None, csr_matrix | None]
     samples: FloatArray
 
     @staticmethod
@@ -82,13 +82,13 @@ class Waves:
         first, second = (np.ravel(each) for each in np.meshgrid(*(each.degrees for each in groups), indexing="ij"))
         kept = np.flatnonzero(((first + second) % 2 == 0) & (first + second <= reach))
 
-        def product(*factors: Any) -> Any:
+        def product(*factors: Matrix) -> csr_matrix:
             return csr_matrix(scipy.sparse.kron(*map(csr_matrix, factors)))[kept][:, kept]
 
         ones = [np.eye(each.degrees.size) for each in groups]
 
-        def products(i: int, lefts: Sequence[FloatArray], j: int) -> list[list[Any]]:
-            def of_pair(left: FloatArray, right: FloatArray) -> Any:
+        def products(i: int, lefts: Sequence[FloatArray], j: int) -> list[list[csr_matrix]]:
+            def of_pair(left: FloatArray, right: FloatArray) -> csr_matrix:
                 factors = [*ones]
                 factors[i] = left
                 factors[j] = factors[j] @ right if i == j else right
@@ -117,7 +117,7 @@ class Waves:
 class Group:
     """Waves of one unit vector: of their degrees, multiplication by components of it and of its tangent, and ∂θ."""
 
-    degrees: Any
+    degrees: IntArray
     unit: list[FloatArray]
     tangent: list[FloatArray]
     slope: FloatArray | None
@@ -173,24 +173,24 @@ class DirectionAxis(Axis):
         return group_dimensions(self.n)
 
     @cached_property
-    def cells(self) -> Any:
+    def cells(self) -> IntArray:
         return np.full(self.size, -1)
 
     @cached_property
-    def modes(self) -> Any:
+    def modes(self) -> IntArray:
         return np.zeros(self.size, dtype=int)
 
     @property
-    def degrees(self) -> Any:
+    def degrees(self) -> IntArray:
         """The total degree of the wave, or of the harmonic, of each unknown, shape (size,)."""
         raise NotImplementedError
 
     @property
-    def identity(self) -> Any:
+    def identity(self) -> Matrix:
         """∫ u v, shape (size, size)."""
         raise NotImplementedError
 
-    def mass(self, g: Any = one) -> Any:
+    def mass(self, g: Coefficient = one) -> Matrix:
         return self.identity
 
     def _moved(self, matrix: FloatArray) -> tuple[Any, Any]:
@@ -202,20 +202,20 @@ class DirectionAxis(Axis):
         """u."""
         raise NotImplementedError
 
-    def _form(self, left: Any, right: Any) -> Any:
+    def _form(self, left: Any, right: Any) -> Matrix:
         """∫ v̂ û of functions of v and of u."""
         raise NotImplementedError
 
-    def driven(self, matrix: FloatArray) -> tuple[Any, Any]:
+    def driven(self, matrix: FloatArray) -> tuple[Matrix, Matrix]:
         """∫ v h·∇u and ∫ v q u."""
         moved, growth = self._moved(matrix)
         return self._form(self._itself, moved), self._form(self._itself, growth)
 
-    def diffusion(self, a: FloatArray, b: FloatArray) -> tuple[Any, Any, Any]:
+    def diffusion(self, a: FloatArray, b: FloatArray) -> tuple[Matrix, Matrix, Matrix]:
         """∫ v D_a D_b u, D = h·∇ + p q of two matrices, D* v = −h·∇v − tr v + (p + n) q v: by p⁰, p¹ and p²."""
         moved, growth = self._moved(a)
 
-        def by(right: Any) -> tuple[Any, Any]:
+        def by(right: Any) -> tuple[Matrix, Matrix]:
             stretched = self._form(growth, right)
             adjoint = (
                 self.n * stretched - self._form(moved, right) - float(np.trace(a)) * self._form(self._itself, right)
@@ -225,7 +225,7 @@ class DirectionAxis(Axis):
         (free, crossed), (linear, square) = map(by, self._moved(b))
         return free, linear + crossed, square
 
-    def penalty(self) -> Any:
+    def penalty(self) -> Matrix:
         """What is added against pairs that no path has."""
         return 0.0 * self.identity
 
@@ -234,7 +234,7 @@ class DirectionAxis(Axis):
         """dσ/dμ of the surface of the sphere and the measure of the inner products."""
         raise NotImplementedError
 
-    def at(self, points: FloatArray) -> Any:
+    def at(self, points: FloatArray) -> Matrix:
         """Values at any directions y, shape (n, m), as rows of E with u(y) = E @ coefficients, shape (m, size)."""
         raise NotImplementedError
 
@@ -282,7 +282,7 @@ class SphereAxis(DirectionAxis):
         """The elements in η."""
         first, second = self.dimensions
 
-        def weight(eta: Any) -> Any:
+        def weight(eta: FloatArray) -> FloatArray:
             return np.cos(eta) ** (first - 1) * np.sin(eta) ** (second - 1)
 
         return LineSpace(self.lines, self.degree, weight, end_exponents=(second - 1, first - 1), is_flat=True)
@@ -292,12 +292,12 @@ class SphereAxis(DirectionAxis):
         return Waves.of(self.dimensions, self.waves)
 
     @property
-    def _wave_degrees(self) -> tuple[Any, Any]:
+    def _wave_degrees(self) -> tuple[IntArray, IntArray]:
         """Those in θ₁ and in θ₂ of the own waves."""
         return self._waves.first[self._waves.own], self._waves.second[self._waves.own]
 
     @cached_property
-    def _kept(self) -> Any:
+    def _kept(self) -> IntArray:
         """Which products of a function of η and a wave there are: waves vanish where their vector has no say."""
         first, second = self._wave_degrees
         kept = np.ones((self.line.size, first.size), dtype=bool)
@@ -305,23 +305,24 @@ class SphereAxis(DirectionAxis):
         return np.flatnonzero(kept)
 
     @cached_property
-    def _node(self) -> Any:
+    def _node(self) -> IntArray:
         """The function of η of each unknown."""
         return self._kept // self._waves.own.size
 
     @cached_property
-    def degrees(self) -> Any:
-        return sum(self._wave_degrees)[self._kept % self._waves.own.size]
+    def degrees(self) -> IntArray:
+        first, second = self._wave_degrees
+        return (first + second)[self._kept % self._waves.own.size]
 
     @cached_property
-    def ladders(self) -> tuple[tuple[Any, Any, Any], ...]:  # type: ignore[override]
+    def ladders(self) -> tuple[tuple[IntArray, IntArray, Matrix | None], ...]:  # type: ignore[override]
         """That of the elements alone; of the waves what two degrees more change tells."""
         line, node = self.line, self._node
         of_elements = np.where(line.modes[node] == 1, -1, line.cells[node])
         return ((of_elements, line.modes[node], self._on_kept(line.nested)),)
 
     @cached_property
-    def levels(self) -> Any:
+    def levels(self) -> Sequence[IntArray]:
         return [np.flatnonzero(self.line.first_cells[self._node] == k) for k in range(self.elements)]
 
     @cached_property
@@ -331,14 +332,14 @@ class SphereAxis(DirectionAxis):
         return constant.ravel()[self._kept]
 
     @cached_property
-    def identity(self) -> Any:
+    def identity(self) -> Matrix:
         return self._form(self._itself, self._itself)
 
     @property
-    def unit(self) -> Any:
+    def unit(self) -> Matrix:
         return self.identity
 
-    def _assembled(self, of_line: Sequence[FloatArray], of_waves: Sequence[Any]) -> Any:
+    def _assembled(self, of_line: Sequence[FloatArray], of_waves: Sequence[Matrix]) -> csr_matrix:
         """Σ A_k ⊗ B_k of matrices in η and of the waves, sparse, shape (size, size)."""
         total = KroneckerSum(list(zip(of_line, of_waves, strict=True))).tocsc()
         found = total[:, self._kept].tocsr()[self._kept]
@@ -350,7 +351,7 @@ class SphereAxis(DirectionAxis):
         """The two groups of coordinates."""
         return slice(0, self.dimensions[0]), slice(self.dimensions[0], None)
 
-    def _on_kept(self, of_line: Any) -> Any:
+    def _on_kept(self, of_line: csr_matrix) -> csr_matrix:
         whole = scipy.sparse.kron(of_line, scipy.sparse.identity(self._waves.own.size), format="csr")
         return whole[self._kept][:, self._kept]
 
@@ -367,7 +368,7 @@ class SphereAxis(DirectionAxis):
         shape = points.shape[0] * len(samples), self.size
         return LinearOperator(shape, matvec=lambda v: of_columns(v.reshape(-1, 1)), matmat=of_columns, dtype=float)
 
-    def projection(self, other: SphereAxis) -> Any:
+    def projection(self, other: SphereAxis) -> Matrix:
         """In η by the inner product, of waves those that both have."""
         of_line = self.line.values.T @ diags(self.line.measure) @ other.line.at(self.line.points)
         nodes = scipy.sparse.linalg.spsolve(self.line.mass().tocsc(), csr_matrix(of_line).tocsc())
@@ -394,7 +395,7 @@ class SphereAxis(DirectionAxis):
         eta, slices = self.line.points, self._slices
         c, s = np.cos(eta)[:, None], np.sin(eta)[:, None]
 
-        def form(table: dict[tuple[int, int], Any], i: int, j: int) -> Any:
+        def form(table: dict[tuple[int, int], list[list[csr_matrix]]], i: int, j: int) -> Matrix:
             block = matrix[slices[i], slices[j]]
             return sum(size * table[i, j][k][m] for (k, m), size in np.ndenumerate(block))
 
@@ -408,7 +409,7 @@ class SphereAxis(DirectionAxis):
         growth = [(c * c * values, a[0, 0]), (c * s * values, a[0, 1] + a[1, 0]), (s * s * values, a[1, 1])]
         return [(of_eta, of[:, own]) for of_eta, of in moved], [(of_eta, of[:, own]) for of_eta, of in growth]
 
-    def _form(self, left: Parts, right: Parts) -> Any:
+    def _form(self, left: Parts, right: Parts) -> Matrix:
         """∫ v̂ û of functions of v and of u."""
         measure = self.line.measure[:, None]
         pairs = [(a, b) for a in left for b in right]
@@ -421,7 +422,7 @@ class SphereAxis(DirectionAxis):
         every = scipy.sparse.identity(self._waves.first.size, format="csc")
         return [(self.line.values.toarray(), every[:, self._waves.own])]
 
-    def penalty(self) -> Any:
+    def penalty(self) -> Matrix:
         """−Σ γ h² N⁻³ (cs)² w [∂u/∂η] [∂v/∂η] over the inner vertices."""
         inner, sizes, degree = self.line.lines[1:-1], np.diff(self.line.lines), self.degree
         first, second = self.dimensions
@@ -449,7 +450,7 @@ class SphereAxis(DirectionAxis):
         return csr_matrix((entries.ravel(), np.maximum(columns, 0).ravel(), starts), shape=(len(entries), self.size))
 
     @cached_property
-    def _of_product(self) -> Any:
+    def _of_product(self) -> IntArray:
         """Where the waves that functions have are among all products of `waves_at`."""
         reach = self.waves + 2
         first, second = (group(k, reach).degrees for k in self.dimensions)

@@ -24,7 +24,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fpsolve.arrays import Coefficient, FloatArray, one
+from fpsolve.arrays import Coefficient, FloatArray, Matrix, one
 from fpsolve.fem.axis import KroneckerSum
 from fpsolve.fem.mesh import vertices_at
 from fpsolve.fem.phase import by_rows
@@ -46,6 +46,8 @@ from fpsolve.model.plane import (
 from fpsolve.model.problem import ParameterDerivative, Problem
 
 ALL_ORDERS = slice(None)
+Noises = tuple[Coefficient | None, ...]
+"""For each noise the g of ∫P_s g u v, or None for its generator, ∫P_s v L_ξ u."""
 
 
 @dataclass(frozen=True)
@@ -94,7 +96,7 @@ class Term:
         order: the power of ε with which it begins; the power itself is in the operator.
         of_p: the coefficient.
         phase: the matrix of φ.
-        noises: for each noise the g of ∫P_s g u v, or None for its generator, ∫P_s v L_ξ u.
+        noises: its functions of the noises.
         text: the term as a reader would write it.
         phase_at: gives the k-th derivative of the matrix of φ by p, from p and k, where that is no coefficient times
             one matrix; `phase` is then 0.
@@ -102,12 +104,12 @@ class Term:
 
     order: int
     of_p: OfMoment
-    phase: Any
-    noises: tuple[Coefficient | None, ...]
+    phase: Matrix
+    noises: Noises
     text: str
-    phase_at: Callable[[float, int], Any] | None = None
+    phase_at: Callable[[float, int], Matrix] | None = None
 
-    def at(self, p: float, derivative: int = 0) -> Any:
+    def at(self, p: float, derivative: int = 0) -> Matrix | None:
         """The k-th derivative by p of the matrix of φ with its coefficient; None where that is 0."""
         if self.phase_at:
             return self.phase_at(p, derivative)
@@ -119,8 +121,8 @@ class TermSum:
     """A sum of terms, in which those with the same functions of the noises, order and coefficient are added up once."""
 
     def __init__(self, terms: Iterable[Term]) -> None:
-        sums: dict[Any, dict[tuple[int, OfMoment], Any]] = {}
-        self._others = list[tuple[Any, int, Callable[[float, int], Any]]]()
+        sums: dict[Noises, dict[tuple[int, OfMoment], Matrix]] = {}
+        self._others = list[tuple[Noises, int, Callable[[float, int], Matrix]]]()
         for term in terms:
             if term.phase_at:
                 self._others.append((term.noises, term.order, term.phase_at))
@@ -128,12 +130,12 @@ class TermSum:
             parts, key = sums.setdefault(term.noises, {}), (term.order, term.of_p)
             parts[key] = parts[key] + term.phase if key in parts else term.phase
         (noises, first), *_ = sums.items()
-        self._nothing = {(one,) * len(noises): 0.0 * next(iter(first.values()))}
+        self._nothing: dict[Noises, Matrix] = {(one,) * len(noises): 0.0 * next(iter(first.values()))}
         self._parts = [(noises, [(*key, phase) for key, phase in parts.items()]) for noises, parts in sums.items()]
         orders = [order for parts in sums.values() for order, _ in parts] + [order for _, order, _ in self._others]
         self._orders = range(1 + max(orders))
 
-    def phases(self, p: float, derivative: int = 0, orders: slice = ALL_ORDERS) -> dict[Any, Any]:
+    def phases(self, p: float, derivative: int = 0, orders: slice = ALL_ORDERS) -> dict[Noises, Matrix]:
         """For each function of the noises the matrix of φ; the first is that of 1."""
         phases, wanted = self._nothing.copy(), self._orders[orders]
         for noises, parts in self._parts:
@@ -164,7 +166,7 @@ class Wall(NamedTuple):
 
     jump: Jump
     speed: float
-    delta: Any
+    delta: Matrix
 
 
 class NoiseTerms:
@@ -178,13 +180,19 @@ class NoiseTerms:
         self._names = tuple(problem.coloured.parts)
 
     def _term(
-        self, phase: Any, g: Coefficient | None, text: str, of_p: OfMoment = OfMoment(0), order: int = 0, of: str = ""
+        self,
+        phase: Matrix,
+        g: Coefficient | None,
+        text: str,
+        of_p: OfMoment = OfMoment(0),
+        order: int = 0,
+        of: str = "",
     ) -> Term:
         """One with a function of the noise `of`, or of the first."""
         at = self._names.index(of) if of in self._names else 0
         return Term(order, of_p, phase, tuple(g if k == at else one for k in range(len(self._names))), text)
 
-    def _generators(self, identity: Any) -> Iterator[Term]:
+    def _generators(self, identity: Matrix) -> Iterator[Term]:
         """The generator of every noise."""
         for name in self._names:
             yield self._term(identity, None, f"L_ξ, the generator of the noise{f' {name}' if name else ''}", of=name)
@@ -289,7 +297,7 @@ class Terms(NoiseTerms):
     def _struck(self, of: Impulse, by: ImpulseDerivative | None = None) -> Term:
         """An impulse, or ∂/∂θ of it."""
 
-        def phase_at(p: float, derivative: int) -> Any:
+        def phase_at(p: float, derivative: int) -> Matrix:
             rate = of.rate if by is None else by.rate
             total = 0.0 if by is None else of.rate * self.phi.changed_impulses(of, by, p, derivative)
             if rate:
@@ -315,7 +323,7 @@ class Terms(NoiseTerms):
                 driven = driven + abs(speed) * math.sqrt(constant @ (square @ constant) / total)
         return np.asarray(abs(steady) + driven)
 
-    def _upwind(self, theta: Callable[[float, Xi], Any], text: str) -> Iterator[Term]:
+    def _upwind(self, theta: Callable[[float, Xi], FloatArray], text: str) -> Iterator[Term]:
         """−½ ∫ P_s θ(φ, ξ) [w] [T] where the phase runs both ways: of several noises, chains, for each other state."""
         first, *others = self._names
         for j in self._two_way:
