@@ -370,7 +370,7 @@ def _nearest(distance: Distance, axes: Sequence[Axis], units: FloatArray) -> Sam
     """The point F = 0 that is nearest to the problem."""
     low, high = np.array([axis.start for axis in axes]), np.array([axis.stop for axis in axes])
     here = np.array([float(distance.problem.values[axis.key]) for axis in axes])
-    search = _Search(distance, here, units, (low, high))
+    search = Search(distance, here, units, (low, high))
     start = np.clip(here, low, high)
     if (found := search.from_point(start)) is not None:
         return found
@@ -398,7 +398,7 @@ def _nearest(distance: Distance, axes: Sequence[Axis], units: FloatArray) -> Sam
     return _unreached(distance, axes, samples, search.reasons)
 
 
-class _Search:
+class Search:
     """The quadratic problems one after the other.
 
     Args:

@@ -30,7 +30,7 @@ from fpsolve.data import Result, dataset
 from fpsolve.drawing import add_legend, draw_bars
 from fpsolve.errors import NoSuchExponent, NotConverged
 from fpsolve.exponent.adapt import Budget
-from fpsolve.exponent.eigen import Bordered
+from fpsolve.exponent.eigen import PairDerivatives
 from fpsolve.exponent.error import Estimate, MissingModes, Solution
 from fpsolve.exponent.function import nonzero_root
 from fpsolve.exponent.solver import ExponentSolver, solver_of
@@ -137,7 +137,7 @@ class Changed:
         by: the direction of θ.
     """
 
-    def __init__(self, around: Bordered, by: ParameterDerivative) -> None:
+    def __init__(self, around: PairDerivatives, by: ParameterDerivative) -> None:
         self._around, self._pair, self._by = around, around.pair, by
         self._operators: dict[int, KroneckerSum] = {}
 
@@ -251,7 +251,7 @@ def solve_sensitivities(
     """
     problem, parameters = solver.problem, solver.problem.parameters
     notes = [Message(Code.NO_DERIVATIVE, key=key, value=value) for key, value in problem.undifferentiable.items()]
-    closing = {key: by.theta for key, by in along.items() if problem.closes(key)}
+    closing = {key: by.theta for key, by in along.items() if problem.couples_blocks(key)}
     notes += [Message(Code.CLOSES_BLOCKS, key=key, value=theta) for key, theta in closing.items()]
     along = {key: by for key, by in along.items() if key not in closing}
     found = Gradient(solver, along)
@@ -303,7 +303,7 @@ def held_by(
     """
     while solver.classes:
         for key, by in along.items():
-            if solver.problem.closes(key):
+            if solver.problem.couples_blocks(key):
                 raise NotConverged(Message(Code.CLOSES_BLOCKS, key=key, value=by.theta))
         solver = solver.leading(p)
         own = solver.problem
@@ -339,7 +339,7 @@ class Gradient:
             return {key: _times(p, each) for key, each in self._by_small_p(p).items()}
         solver, along = held_by(self._solver, p, self._along)
         solution = solver.solution(p)
-        around = Bordered(solution.pair)
+        around = PairDerivatives(solution.pair)
         changed = _changed(around, along)
         values = {key: each.value for key, each in changed.items()}
         if solution.modes_tell:
@@ -348,7 +348,9 @@ class Gradient:
             return _with_errors(values, sizes, solution.error / solver.scale(p))
         finer = solver.near.finer_pair(solution.pair)
         share = abs(finer.value - solution.pair.value) / solver.scale(p)
-        return _compared(values, {key: each.value for key, each in _changed(Bordered(finer), along).items()}, share)
+        return _compared(
+            values, {key: each.value for key, each in _changed(PairDerivatives(finer), along).items()}, share
+        )
 
     @one_number("∂λ/∂θ")
     def lyapunov_exponent(self) -> dict[str, Estimate]:
@@ -359,7 +361,7 @@ class Gradient:
         if not near.modes_tell:
             share = solver.ratio_alone(0.0)[1] / solver.scales.linear
             return _compared(values, {key: each.slope for key, each in self._finer_at_zero.items()}, share)
-        around = Bordered(near.pair)
+        around = PairDerivatives(near.pair)
         errors = changes_of_errors(near, around, _changed(around, along))
         sizes = {key: float(np.sum(np.abs(each))) / abs(near.pair.p) for key, each in errors.items()}
         return _with_errors(values, sizes, near.error / solver.scale(near.pair.p))
@@ -411,11 +413,13 @@ class Gradient:
         return _changed(solver.finer_around_zero, along)
 
 
-def _changed(around: Bordered, along: Mapping[str, ParameterDerivative]) -> dict[str, Changed]:
+def _changed(around: PairDerivatives, along: Mapping[str, ParameterDerivative]) -> dict[str, Changed]:
     return {key: Changed(around, by) for key, by in along.items()}
 
 
-def changes_of_errors(solution: Solution, around: Bordered, changed: Mapping[str, Changed]) -> dict[str, list[float]]:
+def changes_of_errors(
+    solution: Solution, around: PairDerivatives, changed: Mapping[str, Changed]
+) -> dict[str, list[float]]:
     """∂e/∂θ along some directions, for every e of `MissingModes`; but for the change of P_s in ⟨T*, T⟩, which changes e
     only by its own size.
 

@@ -18,11 +18,11 @@ from fpsolve.arrays import FloatArray, real_number, shown
 from fpsolve.budget import Countdown, OverBudget, one_number
 from fpsolve.errors import FpsolveError, NotConverged
 from fpsolve.exponent.adapt import Budget
-from fpsolve.exponent.eigen import Bordered
+from fpsolve.exponent.eigen import PairDerivatives
 from fpsolve.exponent.error import Solution
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.messages import Code, Message
-from fpsolve.model.faults import told_in_words
+from fpsolve.model.faults import with_plain_errors
 from fpsolve.model.parameters import STRICT
 from fpsolve.model.problem import Problem, checked_problem, refuse_infinite
 
@@ -50,7 +50,7 @@ def axis_faults(
             yield ("at", i), value, f"got {value}; {known}"
 
 
-@told_in_words
+@with_plain_errors
 @checked_dataclass(frozen=True, config=STRICT)
 class Axis:
     """One side of a chart.
@@ -201,7 +201,7 @@ def ratio_with_slopes(solver: ExponentSolver, p: float, keys: Sequence[str]) -> 
         return value, error, np.array([known.slope(key) for key in keys]) / p
     held, by_key = held_by(solver, p, {key: solver.problem.derivative(key) for key in keys})
     along = [by_key[key] for key in keys]
-    around = Bordered(held.near.solution(p).pair) if abs(p) >= SMALL_P else held.around_zero
+    around = PairDerivatives(held.near.solution(p).pair) if abs(p) >= SMALL_P else held.around_zero
     changed = [Changed(around, by) for by in along]
     if abs(p) >= SMALL_P:
         return value, error, np.array([each.value.value / p for each in changed])

@@ -19,21 +19,19 @@ from fpsolve.budget import Countdown, OverBudget, counted, half_the_memory, unde
 from fpsolve.errors import FpsolveError, MeshError, NotConverged, SingularMatrix
 from fpsolve.exponent.eigen import BACKWARD_ERROR_LIMIT, PrincipalPair, principal_pair
 from fpsolve.exponent.error import Solution, mode_effects
-from fpsolve.exponent.fields import noise_marginal
-from fpsolve.fem.effects import MOST_DEGREE, ModeEffects
+from fpsolve.exponent.starts import first, other_centers
+from fpsolve.fem.effects import ModeEffects
 from fpsolve.fem.factors import MAX_DENSE_UNKNOWNS, one_thread
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.mesh import CylinderMesh
-from fpsolve.fem.noise_axes import CellAxis, PolynomialAxis
-from fpsolve.fem.pairs import PairAxis
+from fpsolve.fem.noise_axes import PolynomialAxis
 from fpsolve.fem.phase import PhaseAxis
-from fpsolve.fem.space import Space, first_axis
+from fpsolve.fem.space import Space
 from fpsolve.messages import Code, Message, Remedy
-from fpsolve.model.faults import told_in_words
+from fpsolve.model.faults import with_plain_errors
 from fpsolve.model.parameters import STRICT, parameter
-from fpsolve.model.plane import System, Xi, phase_speed
 from fpsolve.model.problem import Problem
-from fpsolve.theory.frozen import frozen_noise, steady_places, swing
+from fpsolve.theory.frozen import frozen_noise
 
 MAX_STAGES = 30
 WORTH_A_TRY = MAX_DENSE_UNKNOWNS
@@ -53,15 +51,11 @@ FREE_STAGES = 4
 SHARE = 0.05
 """Share of the tolerance that a new discretisation is made for in each direction, so that it serves other p too."""
 ALONE = 0.5
-"""The same for one that serves no other p."""
+"""Share of the tolerance in each direction of a discretisation that serves one p only."""
 MOST_GAIN = 1e-3
-"""Of an error in one stage with cells of the noise: beyond, its fall is foreseen badly, and every unknown costs."""
+"""Least factor by which one stage with cells of the noise aims to reduce the error: a larger fall is foreseen badly."""
 WIDER = 4.0
 """Factor by which the interval of noise with algebraic tails is wider where it tells the error of a narrower one."""
-REACH = 12.0
-"""Standard deviations on both sides, up to which the first cells of noise with algebraic tails are."""
-COMPARABLE = 0.6
-"""Paths that hold the noise elsewhere are looked at if they grow at this share of Λ (less by the rest, for Λ < 0)."""
 SURELY_SEEN = 1e-6
 """A tolerance down from which cells are small enough for their highest modes to show what is in them."""
 MOST_HALVED = 20_000
@@ -77,7 +71,7 @@ UNSOLVED = MeshError, NotConverged, SingularMatrix, np.linalg.LinAlgError
 Found = TypeVar("Found")
 
 
-@told_in_words
+@with_plain_errors
 @pydantic_dataclass(frozen=True, config=STRICT)
 class Budget:
     """What one number may cost, and a line of a chart. A number that is given does not depend on it.
@@ -151,10 +145,10 @@ class NearPlace:
         if tolerance is None and p in self._failed:
             raise NotConverged(self._failed[p])
         allowed = tolerance or self.tolerance
-        if p not in self.known or (self.mesh is None and not self.meets(self.known[p], allowed)):
+        if p not in self.known or (self.mesh is None and not self.is_accurate(self.known[p], allowed)):
             try:
                 with one_thread():
-                    self.known[p] = _Search(self, p, allowed, under_way() or self.budget.countdown(f"Λ({p:g})")).found()
+                    self.known[p] = Search(self, p, allowed, under_way() or self.budget.countdown(f"Λ({p:g})")).solve()
             except NotConverged as failure:
                 if tolerance is None:  # a tighter one may be out of reach where this is not
                     self._failed[p] = failure.message
@@ -217,15 +211,15 @@ class NearPlace:
         except NotConverged as failure:
             raise NotConverged(Message(Code.NEAR_ZERO, p=q, reason=failure.message), failure.partial) from failure
 
-    def searched(self, search: _Search, start: Solution | None) -> Solution:
+    def solve_places(self, search: Search, start: Solution | None) -> Solution:
         """A solution within a tolerance from a first discretisation, or from a solution that does not suffice.
 
         Where slow noise may carry the moment in several places, the largest eigenvalue.
         """
-        places = [search.run(start or first(self.problem, search.p, self.rtol))]
+        places = [search.adapt(start or first(self.problem, search.p, self.rtol))]
         for center in other_centers(places[0].pair):
             search.best, search.error, search.share = None, math.inf, math.inf  # those of a lower eigenvalue, maybe
-            places.append(search.run(first(self.problem, search.p, self.rtol, center)))
+            places.append(search.adapt(first(self.problem, search.p, self.rtol, center)))
         return max(places, key=lambda each: each.pair.value)
 
     @cached_property
@@ -235,12 +229,12 @@ class NearPlace:
         generator = Generator(self.problem, self.mesh)
         return generator, generator.enriched().enriched()
 
-    def meets(self, solution: Solution, tolerance: Tolerance) -> bool:
+    def is_accurate(self, solution: Solution, tolerance: Tolerance) -> bool:
         """Whether an error is within a tolerance; for small p, where Λ has no scale, always."""
         pair = solution.pair
         return abs(pair.p) < SMALL_P or solution.error <= tolerance(pair.p, pair.value)
 
-    def trimmed(self, solution: Solution, tolerance: Tolerance) -> Space:
+    def coarsened(self, solution: Solution, tolerance: Tolerance) -> Space:
         """The discretisation of a solution, or a much smaller one that would do."""
         pair, generator = solution.pair, solution.pair.generator
         if abs(pair.p) < SMALL_P or generator.size <= WORTH_A_TRY:
@@ -248,7 +242,7 @@ class NearPlace:
         smaller = refined(solution, tolerance(pair.p, pair.value), 0)
         return smaller if smaller.size <= TRIM * generator.size else generator.chosen
 
-    def fits(self, chosen: Space, q: float, p: float) -> bool:
+    def may_reuse(self, chosen: Space, q: float, p: float) -> bool:
         """Whether what serves q is likely to serve p, or so small that it is worth a try."""
         axis, frozen = chosen.xi, frozen_noise(self.problem)
         if chosen.size > WORTH_A_TRY and abs(p - q) > max(0.5, 0.4 * min(abs(p), abs(q))):
@@ -260,8 +254,16 @@ class NearPlace:
 
 
 @dataclass
-class _Search:
-    """For the solution at one p within a tolerance; what it has cost, and the best it has found."""
+class Search:
+    """A search for the solution at one p within a tolerance: what it has cost, and the best it has found.
+
+    Attributes:
+        place: where known solutions are, and what is usual for the problem.
+        stages: how many discretisations were solved.
+        best, error, share: the solution nearest to its tolerance, its error, and this over what is allowed.
+        failure: why the last discretisation had no solution.
+        last: seconds spent before the last stage, and its unknowns.
+    """
 
     place: NearPlace
     p: float
@@ -274,13 +276,13 @@ class _Search:
     failure: Exception | None = None
     last: tuple[float, int] = (0.0, 0)
 
-    def found(self) -> Solution:
+    def solve(self) -> Solution:
         """A solution within the tolerance, or the one on the given mesh."""
         if self.countdown is under_way():
-            return self.sought()
+            return self._solve()
         try:
             with self.countdown.running():
-                return self.sought()
+                return self._solve()
         except OverBudget as failure:
             if failure.countdown is not self.countdown:
                 raise
@@ -288,22 +290,22 @@ class _Search:
                 return self.best
             return self.stop(failure.reason)
 
-    def sought(self) -> Solution:
-        """The same, which a budget may end."""
+    def _solve(self) -> Solution:
+        """A solution, unless the budget ends it."""
         if self.place.mesh is not None:
             coarse, fine = self.place.given
-            pair = self.tried(coarse).pair
+            pair = self.solve_with(coarse).pair
             return Solution(pair, self.place.pair_on(fine, self.p, pair))
         if abs(self.p) < SMALL_P:
-            return self.tried(self.place.near_zero(self.p, self.tolerance).pair.generator)
+            return self.solve_with(self.place.near_zero(self.p, self.tolerance).pair.generator)
         start = None
-        for attempt in (self.from_start, self.from_nearest):
+        for attempt in (self.try_problem_close_by, self.try_nearest_p):
             start = attempt() or start
-            if start is not None and self.place.meets(start, self.tolerance) and not other_centers(start.pair):
-                return self.confirmed(start)
-        return self.confirmed(self.place.searched(self, start))
+            if start is not None and self.place.is_accurate(start, self.tolerance) and not other_centers(start.pair):
+                return self.confirm(start)
+        return self.confirm(self.place.solve_places(self, start))
 
-    def confirmed(self, found: Solution) -> Solution:
+    def confirm(self, found: Solution) -> Solution:
         """A solution that agrees with that of halved cells of φ within its error, or within what is allowed.
 
         At a coarse tolerance a thin layer of T, as where the phase rests, may lie within a cell that is so large that
@@ -315,38 +317,38 @@ class _Search:
         halved = chosen.with_phi(chosen.phi.doubled())
         if halved.size > min(MOST_HALVED, self.place.budget.unknowns):
             return found
-        finer = self.attempt(lambda: Solution(self.pair_on(halved, found.pair))) or self.run(halved)
+        finer = self.attempt(lambda: Solution(self.pair_on(halved, found.pair))) or self.adapt(halved)
         change = abs(finer.pair.value - found.pair.value)
         if change <= found.error:
             return found
         if change + finer.error <= self.tolerance(self.p, finer.pair.value):
             return replace(finer, search=finer.search + change)
-        return self.confirmed(finer)
+        return self.confirm(finer)
 
-    def from_start(self) -> Solution | None:
+    def try_problem_close_by(self) -> Solution | None:
         """The solution with what was chosen for this p in the problem close by, or None."""
         start, problem = self.place.starts.get(self.p), self.place.problem
         if start is None:
             return None
         if _bases(start.pair.generator.problem) != _bases(problem):
             return None
-        return self.attempt(lambda: Solution(self.pair_on(self.place.trimmed(start, self.tolerance), start.pair)))
+        return self.attempt(lambda: Solution(self.pair_on(self.place.coarsened(start, self.tolerance), start.pair)))
 
-    def from_nearest(self) -> Solution | None:
+    def try_nearest_p(self) -> Solution | None:
         """The solution with what was chosen for the nearest p, where that is likely to do."""
         nearest = min(self.place.known, key=lambda q: abs(q - self.p), default=None)
         if nearest is None:
             return None
         known = self.place.known[nearest]
-        generator, chosen = known.pair.generator, self.place.trimmed(known, self.tolerance)
+        generator, chosen = known.pair.generator, self.place.coarsened(known, self.tolerance)
         if nearest == self.p and chosen is generator.chosen:
             return known
-        if not self.place.fits(chosen, nearest, self.p):
+        if not self.place.may_reuse(chosen, nearest, self.p):
             return None
         is_same, problem = chosen is generator.chosen, self.place.problem
-        return self.attempt(lambda: self.tried(generator if is_same else Generator(problem, chosen)))
+        return self.attempt(lambda: self.solve_with(generator if is_same else Generator(problem, chosen)))
 
-    def tried(self, generator: Generator) -> Solution:
+    def solve_with(self, generator: Generator) -> Solution:
         """The solution with a generator, from those around p, or from the nearest one."""
         known = (solution.pair for solution in self.place.known.values())
         near = sorted(known, key=lambda pair: abs(pair.p - self.p))[:NEIGHBOURS]
@@ -364,7 +366,7 @@ class _Search:
             self.failure = failure.with_traceback(None)  # which would keep this search, and all that it has found
             return None
 
-    def run(self, start: Solution | Space) -> Solution:
+    def adapt(self, start: Solution | Space) -> Solution:
         """A solution within the tolerance, the tilted density sought where a first discretisation, or a solution, is.
 
         Raises:
@@ -425,51 +427,7 @@ class _Search:
             last, is_thin = self.failure, isinstance(self.failure, NotConverged)
             said = last.message.advising(None) if isinstance(last, FpsolveError) else last and str(last)
             told = Message(Code.NOTHING_RESOLVED, p=self.p, reason=reason, is_thin=is_thin, last=said)
-        raise NotConverged(told, best, None if reason.code is Code.ROUNDED else Remedy.BUDGET)  # a budget rounds, too
-
-
-def first(problem: Problem, p: float, rtol: float, center: float | None = None) -> Space:
-    """A first discretisation, small, for a tilted density around some z; None for where slow noise carries it."""
-    noise, system, digits = problem.coloured, problem.motion, -math.log10(rtol)
-    if noise.basis == "cells":  # around ξ = 0, their lines on both sides, further apart further out
-        steps = np.concatenate([[0.0], 3.0 * 1.5 ** np.arange(60)])
-        side = np.append(steps[steps < 0.8 * REACH], REACH)
-        phase = _phase(system, noise.standard_deviation * np.array([-2.0, 2.0]), digits)
-        lines = np.concatenate([-side[:0:-1], side])
-        return Space((phase, CellAxis(noise, lines, np.full(lines.size - 1, round(2 + digits / 2)))))
-    frozen = frozen_noise(problem)
-    if frozen is None:  # the noise has states, or a state of its own, or there are several
-        axes = [first_axis(each, digits) for each in noise.parts.values()]
-        phase = _phase(system, problem.typical, digits, is_smooth=sum(axis.dimension for axis in axes) > 1)
-        if len(axes) == 1 and isinstance(axis := axes[0], PairAxis):
-            if center is None:
-                center = float(steady_places(problem, p)[0][0])
-            pull = noise.standard_deviation**2 * center / noise.spectral_density(0.0) if center else 0.0
-            axes = [replace(axis, slope=pull / p)]
-        return Space((phase, *axes))
-    unit, center = noise.standard_deviation, frozen.center(p) if center is None else center
-    end = noise.half_width / unit
-    phase = _phase(system, unit * np.clip(center + np.array([-2.0, 2.0]), -end, end), digits)
-    slope = frozen.tilt(center) / p if noise.may_tilt else 0.0
-    return Space((phase, PolynomialAxis(noise, round(digits / 2) + (3 if math.isinf(end) else 5), slope)))
-
-
-def _phase(system: System, xi: Xi, digits: float, is_smooth: bool = False) -> PhaseAxis:
-    """Equal cells on a half circle from one jump to where it comes again, and a line at every other jump.
-
-    There are more where the speed of the phase changes much for some of the ξ; but one, of a higher degree, where
-    several numbers move it, which leave T smoother, and each function of φ is a thousand unknowns.
-    """
-    speed = phase_speed(system, xi)
-    widest = float(np.max(speed.amplitude / np.maximum(np.abs(speed.mean), 1e-300)))
-    cells = 1 if is_smooth else 8 if widest > 1 else 4 if widest > 0.5 else 2
-    rays = [jump.phase for jump in system.jumps] or [math.pi / 2]
-    lines = rays[0] + np.linspace(0, math.pi, cells + 1)
-    others = rays[0] + np.mod(np.array(rays[1:]) - rays[0], math.pi)
-    near = np.min(np.abs(lines[1:-1, None] - others[None]), axis=1, initial=math.inf) < 0.3 * math.pi / cells
-    lines = np.sort(np.concatenate([lines[:1], lines[1:-1][~near], lines[-1:], others]))
-    degree = round(np.clip(digits + (4 if is_smooth else -2 if widest > 0.5 else 2), 4, MOST_DEGREE))
-    return PhaseAxis.of(lines, np.full(lines.size - 1, degree))
+        raise NotConverged(told, best, None if reason.code is Code.ROUNDED else Remedy.BUDGET)
 
 
 def effects_of(failure: Exception | None) -> Sequence[ModeEffects | None]:
@@ -504,48 +462,6 @@ def _bases(problem: Problem) -> list[str]:
     return [noise.basis for noise in problem.coloured.parts.values()]
 
 
-def other_centers(pair: PrincipalPair) -> list[float]:
-    """Other z, far from the tilted density of a pair, where paths that hold the noise grow about as fast.
-
-    It is 0 where they do on which the noise of a filter swings far to both sides.
-
-    Between two such places slow noise hardly ever passes: each has its own pair with T > 0 as far as that can be
-    told, and only the larger eigenvalue is Λ.
-    """
-    frozen, noise = frozen_noise(pair.generator.problem), pair.generator.problem.coloured
-    if noise.basis == "pairs":
-        center, (z, rate) = pair.space.xi.center, steady_places(pair.generator.problem, pair.p)
-        far = (np.abs(z - center) > 5) & (rate > comparable(pair.value))
-        amplitude, swinging = swing(pair.generator.problem, pair.p)
-        is_elsewhere = center and amplitude > 5 and swinging > comparable(pair.value)
-        return [*z[far][:1].tolist(), *[0.0] * bool(is_elsewhere)]
-    if frozen is None:
-        return []
-    z, rate = frozen.peaks(pair.p)
-    if z.size < 2:
-        return []
-    at, density = noise_marginal(pair)
-    mean = float(at @ density / density.sum())
-    width = math.sqrt(float((at - mean) ** 2 @ density / density.sum()))
-    far = (np.abs(z - mean) > 3 * width + 2) & (rate > comparable(pair.value))
-    return [float(z[far][np.argmax(rate[far])])] if np.any(far) else []
-
-
 def solved_p(p: float) -> float:
     """The p at which the pair for a p is solved."""
     return p if abs(p) >= NEGLIGIBLE_P else 0.0
-
-
-def misplaced(mesh: CylinderMesh | None, pairs: Sequence[PrincipalPair]) -> tuple[Message, ...]:
-    """A warning about a pair on a given mesh whose moment slow noise may carry elsewhere, or nothing."""
-    if mesh is None:  # then both places have been looked at
-        return ()
-    for pair in pairs:
-        for z in other_centers(pair):
-            return (Message(Code.CARRIED_ELSEWHERE, p=pair.p, z=z, remedy=Remedy.REACH),)
-    return ()
-
-
-def comparable(value: float) -> float:
-    """The growth rate from which on a place may outdo one with a value."""
-    return value - (1 - COMPARABLE) * abs(value)

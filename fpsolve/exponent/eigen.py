@@ -410,7 +410,7 @@ def _sign_defects(space: Space, x: FloatArray, y: FloatArray) -> tuple[float, fl
     return share(right), share(left)
 
 
-class Bordered:
+class PairDerivatives:
     """(L − Λ)v = f with ⟨T*, v⟩ = 0, where ⟨T*, f⟩ = 0, and the same with the adjoint of L.
 
     A system is solved with a shift a little off Λ, and what that leaves of T in v is removed.
@@ -487,8 +487,8 @@ class Bordered:
 
 
 def second_derivative(pair: PrincipalPair) -> float:
-    """Λ″(p), see `Bordered`."""
-    return Bordered(pair).second_derivative
+    """Λ″(p), see `PairDerivatives`."""
+    return PairDerivatives(pair).second_derivative
 
 
 def slope_rounding(pair: PrincipalPair) -> float:

@@ -21,7 +21,7 @@ import numpy as np
 from fpsolve.arrays import FloatArray
 from fpsolve.data import Quantity, Result, brief, dataset
 from fpsolve.errors import NotConverged
-from fpsolve.exponent.eigen import Bordered, PrincipalPair, slope_rounding
+from fpsolve.exponent.eigen import PairDerivatives, PrincipalPair, slope_rounding
 from fpsolve.fem.axis import KroneckerSum, along
 from fpsolve.fem.effects import ModeEffects
 from fpsolve.fem.space import Space
@@ -259,7 +259,7 @@ def slope_error(pair: PrincipalPair) -> float:
     last digit, as for even p, may lack T* and T′.
     """
     smooth, rough, operator = sides(pair)
-    around, slope = Bordered(pair), pair.generator.matrix(pair.p, derivative=1).shifted(pair.derivative)
+    around, slope = PairDerivatives(pair), pair.generator.matrix(pair.p, derivative=1).shifted(pair.derivative)
     by_p, slope = (
         ((around.adjoint_by_p, around.by_p), slope.T) if pair.p < -1 else ((around.by_p, around.adjoint_by_p), slope)
     )

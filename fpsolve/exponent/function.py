@@ -19,9 +19,10 @@ from fpsolve.arrays import FloatArray, real_array, real_numbers
 from fpsolve.budget import OverBudget, one_number, under_way
 from fpsolve.data import Result, dataset
 from fpsolve.errors import NotConverged
-from fpsolve.exponent.adapt import Budget, Tolerance, misplaced
+from fpsolve.exponent.adapt import Budget, Tolerance
 from fpsolve.exponent.error import MEANINGLESS, Absent, Estimate, Failure, Moment, checked
 from fpsolve.exponent.solver import TINY_P, ExponentSolver, MomentLyapunov, best_order, missed, of_the_start, solver_of
+from fpsolve.exponent.starts import warnings_of_other_places
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import Code, Message, Remedy, message_of
 from fpsolve.model.problem import Problem, checked_moments, negative_refused, tails_refused
@@ -181,7 +182,7 @@ class MomentLyapunovFunction(Result):
 
     def _misplaced(self) -> tuple[Message, ...]:
         mesh = self.solver.mesh
-        return misplaced(mesh, [] if mesh is None else [self.solver.pair(float(p)) for p in self.nodes])
+        return warnings_of_other_places(mesh, [] if mesh is None else [self.solver.pair(float(p)) for p in self.nodes])
 
     def root(self) -> float | None:
         """Where Λ(p)/p changes its sign in the interval, or None."""

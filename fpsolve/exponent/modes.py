@@ -24,7 +24,7 @@ import scipy.linalg
 
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import NoHierarchy, NotConverged
-from fpsolve.exponent.adapt import SHARE, NearPlace, _Search
+from fpsolve.exponent.adapt import SHARE, NearPlace, Search
 from fpsolve.exponent.eigen import PrincipalPair, principal_pair
 from fpsolve.exponent.error import Solution, mode_effects
 from fpsolve.fem.effects import ModeEffects
@@ -147,7 +147,7 @@ def left_of(degrees: Sequence[int], values: Sequence[float]) -> float:
     return left
 
 
-def _told(pair: PrincipalPair, finer: Generator, axis: int, new: Any) -> float:
+def first_order_change(pair: PrincipalPair, finer: Generator, axis: int, new: Any) -> float:
     """What the new functions of an axis of a finer space change in Λ(p), to first order."""
     pencil, space, old = finer.at(pair.p), finer.space(pair.p), pair.space
     operator = pencil.matrix.shifted(pair.eigenvalue)
@@ -166,14 +166,14 @@ class SpherePlace(NearPlace):
     _levels: list[Generator] = field(init=False, default_factory=list)
     _pairs: list[PrincipalPair] = field(init=False, default_factory=list)
 
-    def fits(self, chosen: Space, q: float, p: float) -> bool:
+    def may_reuse(self, chosen: Space, q: float, p: float) -> bool:
         """False: every p has waves of its own."""
         return False
 
-    def trimmed(self, solution: Solution, tolerance: Any) -> Space:
+    def coarsened(self, solution: Solution, tolerance: Any) -> Space:
         return solution.pair.generator.chosen
 
-    def searched(self, search: _Search, start: Solution | None) -> Solution:
+    def solve_places(self, search: Search, start: Solution | None) -> Solution:
         """From the coarsest space on."""
         if not self._levels:
             noises = (first_axis(noise, -math.log10(self.rtol)) for noise in self.problem.coloured.parts.values())
@@ -224,7 +224,7 @@ class SpherePlace(NearPlace):
     def _change(self, pair: PrincipalPair, level: int) -> float:
         """What the waves of the next level change in Λ(p), to first order."""
         generator = self._generator(level)
-        return _told(pair, generator, 0, generator.phi.degrees > pair.space.phi.waves)
+        return first_order_change(pair, generator, 0, generator.phi.degrees > pair.space.phi.waves)
 
     def _errors(self, pair: PrincipalPair, effects: Sequence[ModeEffects | None], allowed: float) -> list[float]:
         """Of the elements and of each noise: the effects of the highest modes, or the geometric mean of these and of
@@ -243,12 +243,12 @@ class SpherePlace(NearPlace):
                 finer = chosen.with_phi(replace(chosen.phi, degree=chosen.phi.degree + 2))
                 generator = Generator(self.problem, finer)
                 cells, modes, _ = generator.phi.ladders[0]
-                change = _told(pair, generator, 0, (cells >= 0) & (modes > chosen.phi.degree))
+                change = first_order_change(pair, generator, 0, (cells >= 0) & (modes > chosen.phi.degree))
             elif isinstance(axis := chosen.noises[k - count], CountedAxis):
                 axes, at = [*chosen.axes], 1 + k - count
                 axes[at] = axis.enriched()
                 generator = Generator(self.problem, Space(tuple(axes)))
-                change = _told(pair, generator, at, np.arange(axes[at].size) >= axis.size)
+                change = first_order_change(pair, generator, at, np.arange(axes[at].size) >= axis.size)
             else:
                 continue
             errors[k] = min(error, max(MEASURED * abs(change), math.sqrt(error * abs(change))))
@@ -281,7 +281,7 @@ class SpherePlace(NearPlace):
             self._levels.append(Generator(self.problem, self._chosen(len(self._levels))))
         return self._levels[level]
 
-    def _pair(self, level: int, search: _Search, coarse: PrincipalPair | None) -> PrincipalPair:
+    def _pair(self, level: int, search: Search, coarse: PrincipalPair | None) -> PrincipalPair:
         """The pair at p on one level, from that on a coarser one, or from p to p since p = 0."""
         generator, p = self._generator(level), search.p
         if coarse is not None:

@@ -22,11 +22,11 @@ from fpsolve.exponent.adapt import (
     Budget,
     NearPlace,
     Tolerance,
-    misplaced,
     solved_p,
 )
-from fpsolve.exponent.eigen import Bordered, PrincipalPair, second_derivative, slope_rounding
+from fpsolve.exponent.eigen import PairDerivatives, PrincipalPair, second_derivative, slope_rounding
 from fpsolve.exponent.error import MEANINGLESS, Estimate, Failure, Moment, Solution, checked, slope_error
+from fpsolve.exponent.starts import warnings_of_other_places
 from fpsolve.fem.factors import one_thread
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import ALMOST_EVERY, Code, Message, Remedy
@@ -420,7 +420,7 @@ class ExponentSolver:
             error_estimate=errors,
             residual=residuals,
             solver=self,
-            warnings=(*missed(self, found, value, errors), *misplaced(self.mesh, pairs)),
+            warnings=(*missed(self, found, value, errors), *warnings_of_other_places(self.mesh, pairs)),
             failures=tuple(failures),
             notes=of_the_start(self, found),
         )
@@ -500,14 +500,14 @@ class ExponentSolver:
         return checked(Estimate(better, error, scale, quantity=quantity.VARIANCE_RATE), self.refinement)
 
     @cached_property
-    def around_zero(self) -> Bordered:
+    def around_zero(self) -> PairDerivatives:
         """The pair at p = 0 and its derivatives. Raises `NotConverged`."""
-        return Bordered(self.near.solution(0.0).pair)
+        return PairDerivatives(self.near.solution(0.0).pair)
 
     @cached_property
-    def finer_around_zero(self) -> Bordered:
+    def finer_around_zero(self) -> PairDerivatives:
         """That of a finer discretisation, for algebraic tails of a wider one. Raises `NotConverged`."""
-        return Bordered(self.near.finer_pair(self.around_zero.pair))
+        return PairDerivatives(self.near.finer_pair(self.around_zero.pair))
 
     @one_number("Λ({0:g})/{0:g}")
     def ratio(self, p: float, tolerance: Tolerance | None = None) -> tuple[float, float, float]:

@@ -54,7 +54,7 @@ class TableError(ValueError):
         return TableError, (self.text, *self.path)
 
 
-def told_in_words(kind: type[Kind]) -> type[Kind]:
+def with_plain_errors(kind: type[Kind]) -> type[Kind]:
     """A pydantic dataclass that raises `ParameterError`."""
     changed: Any = kind
     made = changed.__init__

@@ -419,7 +419,7 @@ class Problem:
             return np.eye(2, dtype=bool)
         return reached(couplings(self.blocks, self._by_noise(self.system.terms)))
 
-    def closes(self, key: str) -> bool:
+    def couples_blocks(self, key: str) -> bool:
         """Whether another value of a parameter lets one of the `blocks` drive one that it is driven by.
 
         Then the derivative of Λ(p) by it is not that of one block. By one that lets uncoupled blocks drive each other
@@ -666,7 +666,7 @@ def checked_moments(p: ArrayLike, problem: Problem, *, may_be_empty: bool = Fals
     return points
 
 
-def kept(most: int) -> Callable[[Callable[P, R]], Callable[P, R]]:
+def cached_by_problem(most: int) -> Callable[[Callable[P, R]], Callable[P, R]]:
     """Keep so many values of a function of problems; none where the user's own motion or noise cannot be hashed."""
 
     def keeping(function: Callable[P, R]) -> Callable[P, R]:

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from fpsolve.arrays import FloatArray
 from fpsolve.model.plane import matrix_at, noise_strength, squared_frequency
-from fpsolve.model.problem import Problem, kept
+from fpsolve.model.problem import Problem, cached_by_problem
 
 SAMPLES, SIDE_SAMPLES = 1001, 601
 """Points of steady values of a filter, and of values of a diffusion on each side."""
@@ -160,7 +160,7 @@ class FrozenNoise:
         return -0.5 * float(np.interp(z, self.z, self._slope))
 
 
-@kept(8)
+@cached_by_problem(8)
 def frozen_noise(problem: Problem) -> FrozenNoise | None:
     """The `FrozenNoise` of a problem; None beyond the plane, where ξ is no diffusion, or has algebraic tails."""
     noise = problem.coloured

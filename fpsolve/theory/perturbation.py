@@ -35,7 +35,7 @@ from fpsolve.model.plane import (
     turning,
     written_coefficient,
 )
-from fpsolve.model.problem import Problem, kept
+from fpsolve.model.problem import Problem, cached_by_problem
 
 WEAK = 0.05
 """Share of the terms of Eq. (37) that the orders beyond may have."""
@@ -116,7 +116,7 @@ class SecondOrder:
         return Scale(sum(map(abs, self.linear_terms)), self.quadratic)
 
 
-@kept(8)  # a set asks for it five times: scales, columns and notes
+@cached_by_problem(8)  # a set asks for it five times: scales, columns and notes
 def second_order(problem: Problem) -> SecondOrder:
     """ε²Λ₂(p) of a problem.
 
@@ -135,7 +135,7 @@ def harmonic_loads(problem: Problem) -> Sequence[str]:
     return [section for section, noise in named if not noise.is_random]
 
 
-@kept(8)
+@cached_by_problem(8)
 def _of_random_noise(problem: Problem) -> SecondOrder:
     """ε²Λ₂(p) without what harmonic loads change."""
     system, noises = problem.motion, problem.noise.parts

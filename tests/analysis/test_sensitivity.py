@@ -14,7 +14,7 @@ from fpsolve.analysis.sensitivity import (
 )
 from fpsolve.arrays import identity
 from fpsolve.exponent.adapt import Budget
-from fpsolve.exponent.eigen import Bordered, principal_pair
+from fpsolve.exponent.eigen import PairDerivatives, principal_pair
 from fpsolve.exponent.error import Solution
 from fpsolve.exponent.function import nonzero_root
 from fpsolve.exponent.quantities import lyapunov_exponent
@@ -251,7 +251,7 @@ def test_errors_are_how_what_lacks_changes(p):
         return Solution(principal_pair(generator, p))
 
     solution = solved(0.8)
-    around = Bordered(solution.pair)
+    around = PairDerivatives(solution.pair)
     [found] = changes_of_errors(solution, around, {key: Changed(around, problem.derivative(key))}).values()
     more, less = (sum(each.error for each in solved(0.8 + side * h).effects) for side in (1, -1))
     assert sum(found) == pytest.approx((more - less) / (2 * h), rel=1e-4)

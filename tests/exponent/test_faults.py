@@ -58,7 +58,7 @@ def test_a_density_that_is_none_is_refused():
     ],
 )
 def test_what_numbers_do_is_not_converged(monkeypatch, failure, words):
-    monkeypatch.setattr(NearPlace, "searched", lambda *_: (_ for _ in ()).throw(failure))
+    monkeypatch.setattr(NearPlace, "solve_places", lambda *_: (_ for _ in ()).throw(failure))
     with pytest.raises(NotConverged, match=words):
         moment_lyapunov(FIG1, 2.0)
 
@@ -106,7 +106,7 @@ def test_what_failed_is_kept_in_words_alone():
 
 @pytest.mark.parametrize("failure", [ValueError("zip() argument 3 is longer"), TypeError("no"), RuntimeError("dict")])
 def test_a_fault_of_the_program_is_no_failure_to_converge(monkeypatch, failure):
-    monkeypatch.setattr(NearPlace, "searched", lambda *_: (_ for _ in ()).throw(failure))
+    monkeypatch.setattr(NearPlace, "solve_places", lambda *_: (_ for _ in ()).throw(failure))
     with pytest.raises(type(failure), match=str(failure).split()[0][:3]):
         moment_lyapunov(FIG1, 2.0)
 
@@ -135,14 +135,14 @@ def test_equal_moments_are_solved_once():
 
 
 def test_of_equal_moments_none_is_there_that_failed(monkeypatch):
-    def searched(self, at, start):
+    def solve_places(self, at, start):
         if at.p == 3.0:
             raise NotConverged("no")
         return search(self, at, start)
 
-    search = NearPlace.searched
-    monkeypatch.setattr(NearPlace, "searched", searched)
-    monkeypatch.setattr(NearPlace, "fits", lambda *_: False)
+    search = NearPlace.solve_places
+    monkeypatch.setattr(NearPlace, "solve_places", solve_places)
+    monkeypatch.setattr(NearPlace, "may_reuse", lambda *_: False)
     with pytest.raises(NotConverged, match=r"^no$") as e:
         moment_lyapunov(FIG1, [3.0, 0.5, 3.0, 1.0, 0.5])
     np.testing.assert_array_equal(e.value.partial.p, [0.5, 1.0, 0.5])
@@ -174,6 +174,6 @@ def test_near_zero_the_reason_names_the_moment_that_stands_for_it():
 
 
 def test_near_zero_the_moment_is_named_whatever_the_reason(monkeypatch):
-    monkeypatch.setattr(NearPlace, "searched", lambda *_: (_ for _ in ()).throw(np.linalg.LinAlgError("singular")))
+    monkeypatch.setattr(NearPlace, "solve_places", lambda *_: (_ for _ in ()).throw(np.linalg.LinAlgError("singular")))
     with pytest.raises(NotConverged, match=r"^Λ\(p\) near p = 0 follows from Λ\(0\.01\): Λ\(0\.01\) cannot be solved"):
         lyapunov_exponent(FIG1)

@@ -45,8 +45,8 @@ def test_each_has_the_matrices_and_the_noises_that_are_its_own():
 def test_one_coupling_more_leaves_none():
     problem = Problem(cascade(1e-9), TWO)
     assert problem.blocks == problem.classes == ()
-    assert not problem.closes("system.kappa")
-    assert Problem(cascade(), TWO).closes("system.kappa")
+    assert not problem.couples_blocks("system.kappa")
+    assert Problem(cascade(), TWO).couples_blocks("system.kappa")
 
 
 @pytest.mark.parametrize(
@@ -73,7 +73,7 @@ def test_modes_without_a_coupling():
     unlike, alike = [[1.0, 0.0], [0.0, 0.5]], [[1.0, 0.0], [0.0, 1.0]]
     names = [("q1", "q1_dot"), ("q2", "q2_dot")]
     assert named(modes(0.0, unlike)) == names
-    assert not modes(0.0, unlike).closes("system.k")  # Λ is even in what couples blocks that nothing couples
+    assert not modes(0.0, unlike).couples_blocks("system.k")  # Λ is even in what couples blocks that nothing couples
     assert named(modes(0.1, unlike)) == []
     assert named(modes(0.1, alike)) == [("y₁", "y₂"), ("y₃", "y₄")]
 

@@ -15,7 +15,7 @@ from fpsolve.arrays import identity
 from fpsolve.case.case import load_case
 from fpsolve.errors import CaseError, MeshError, NotConverged
 from fpsolve.exponent.adapt import Budget
-from fpsolve.exponent.eigen import Bordered, principal_pair
+from fpsolve.exponent.eigen import PairDerivatives, principal_pair
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem.mesh import make_mesh
 from fpsolve.fem.pairs import PairAxis
@@ -211,7 +211,7 @@ def test_derivatives_of_the_mean_square():
     for key in ("noise.omega", "noise.c1", "system.damping"):
         more, less = (problem.at({key: problem.values[key] + side * h}) for side in (1, -1))
         values = [ExponentSolver(each, rtol=1e-10).solution(2.0).pair.value for each in (more, less)]
-        slope = Changed(Bordered(pair), problem.derivative(key)).value.value
+        slope = Changed(PairDerivatives(pair), problem.derivative(key)).value.value
         assert slope == pytest.approx((values[0] - values[1]) / (2 * h), abs=1e-7)
 
 
@@ -222,7 +222,9 @@ def test_sensitivities():
     pair = ExponentSolver(problem, rtol=1e-9).solution(2.0).pair
     for key in ("omega", "zeta", "s", "c0", "c1"):
         slope = found.moment_by_theta.sel(parameter=f"noise.{key}").item()
-        assert slope == pytest.approx(Changed(Bordered(pair), problem.derivative(f"noise.{key}")).value.value, abs=1e-8)
+        assert slope == pytest.approx(
+            Changed(PairDerivatives(pair), problem.derivative(f"noise.{key}")).value.value, abs=1e-8
+        )
 
 
 def test_a_given_mesh():
@@ -283,7 +285,7 @@ def test_a_strong_slow_filter():
     for key in ("noise.zeta", "noise.c1"):
         sides = [problem.at({key: problem.values[key] + side * h}) for side in (1, -1)]
         more, less = (ExponentSolver(each, rtol=1e-9).solution(2.0).pair.value for each in sides)
-        assert Changed(Bordered(pair), problem.derivative(key)).value.value == pytest.approx(
+        assert Changed(PairDerivatives(pair), problem.derivative(key)).value.value == pytest.approx(
             (more - less) / (2 * h), rel=1e-4
         )
 

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from pydantic.dataclasses import dataclass
 
 from fpsolve.arrays import FloatArray
-from fpsolve.model.faults import told_in_words
+from fpsolve.model.faults import with_plain_errors
 from fpsolve.model.noise import Noise, NoiseDerivative
 from fpsolve.model.noises.sine_wiener import SineWiener
 from fpsolve.model.parameters import SIZE, STRICT, parameter
@@ -42,7 +42,7 @@ class TurningStep(NamedTuple):
             xi_end[i] = step.mu * math.cos(end)
 
 
-@told_in_words
+@with_plain_errors
 @dataclass(frozen=True, config=STRICT)
 class Bounded(Noise):
     """Bounded noise ξ = μ cos θ, dθ = ν dt + σ dW, θ₀ uniform: its correlation is ½μ² exp(−½σ²|t|) cos νt.

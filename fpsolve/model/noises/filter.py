@@ -13,7 +13,7 @@ from pydantic.dataclasses import dataclass
 from pydantic.fields import FieldInfo
 
 from fpsolve.arrays import FloatArray
-from fpsolve.model.faults import told_in_words
+from fpsolve.model.faults import with_plain_errors
 from fpsolve.model.noise import Noise, NoiseDerivative
 from fpsolve.model.parameters import SIZE, STRICT, parameter, stated_field
 
@@ -52,7 +52,7 @@ class FilterStep(NamedTuple):
             xi_end[i] = step.of_u * u_end + step.of_w * w_end
 
 
-@told_in_words
+@with_plain_errors
 @dataclass(frozen=True, config=STRICT)
 class Filter(Noise):
     """Filtered white noise ξ = c₀y + c₁y′ with y″ + 2ζω y′ + ω²y = s Ẇ, y and y′ stationary.

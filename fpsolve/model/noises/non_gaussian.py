@@ -17,7 +17,7 @@ from fpsolve.arrays import FloatArray
 from fpsolve.errors import NoSuchExponent
 from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.exact import ExactLaw, bounded_law, gaussian_law
-from fpsolve.model.faults import told_in_words
+from fpsolve.model.faults import with_plain_errors
 from fpsolve.model.noise import Noise, NoiseDerivative
 from fpsolve.model.noises.ornstein_uhlenbeck import GaussianNoise, LinearStep, linear_step
 from fpsolve.model.parameters import SIZE, STRICT, parameter, stated_field
@@ -116,7 +116,7 @@ class TreatedNoise(Noise):
         return (NonGaussianNoise if treatment == "exact" else ReducedNoise)(**numbers)
 
 
-@told_in_words
+@with_plain_errors
 @dataclass(frozen=True, config=STRICT)
 class NonGaussianNoise(TreatedNoise):
     """Non-Gaussian coloured noise dξ = −V′(ξ)/τ₀ dt + (√(2D₀)/τ₀) dW, Eqs. (7)-(8).
@@ -303,7 +303,7 @@ class NonGaussianNoise(TreatedNoise):
         return bounded_law((1 - r0) / tau0, 1 / (1 - r0), 2 * D0 / (tau0 * (1 - r0)))
 
 
-@told_in_words
+@with_plain_errors
 @dataclass(frozen=True, config=STRICT)
 class ReducedNoise(TreatedNoise, GaussianNoise):
     """The Ornstein-Uhlenbeck process by which Eqs. (12)-(14) replace the noise of Eq. (7): α₀ = 1/τ₁, σ₀ = √(2D₀)/τ₀.

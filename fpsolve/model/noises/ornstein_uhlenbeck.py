@@ -13,7 +13,7 @@ from pydantic.dataclasses import dataclass
 
 from fpsolve.arrays import FloatArray
 from fpsolve.model.exact import ExactLaw, gaussian_law
-from fpsolve.model.faults import told_in_words
+from fpsolve.model.faults import with_plain_errors
 from fpsolve.model.noise import Noise, NoiseDerivative
 from fpsolve.model.parameters import DERIVED, SIZE, STRICT, parameter
 
@@ -123,7 +123,7 @@ class GaussianNoise(Noise):
         return NoiseDerivative(log_sigma, lambda xi: factor * (xi / unit) ** 2)
 
 
-@told_in_words
+@with_plain_errors
 @dataclass(frozen=True, config=STRICT)
 class OrnsteinUhlenbeckByIntensity(GaussianNoise):
     """Ornstein-Uhlenbeck noise of the intensity D₀ and the correlation time τ₀: α₀ = 1/τ₀, σ₀ = √(2D₀)/τ₀.
@@ -158,7 +158,7 @@ class OrnsteinUhlenbeckByIntensity(GaussianNoise):
         return self.by_logarithms(0.5 / self.D0, 0.0) if name == "D0" else self.by_logarithms(*2 * (-1 / self.tau0,))
 
 
-@told_in_words
+@with_plain_errors
 @dataclass(frozen=True, config=STRICT)
 class OrnsteinUhlenbeckByDeviation(GaussianNoise):
     """Ornstein-Uhlenbeck noise of the relaxation rate α and a standard deviation s: σ₀ = s√(2α).
@@ -199,7 +199,7 @@ class OrnsteinUhlenbeckByDeviation(GaussianNoise):
         return self.by_logarithms(1 / self.standard_deviation, 0.0)
 
 
-@told_in_words
+@with_plain_errors
 @dataclass(frozen=True, config=STRICT)
 class OrnsteinUhlenbeck(GaussianNoise):
     """Ornstein-Uhlenbeck noise dξ = −α₀ ξ dt + σ₀ dW, Eq. (15).

@@ -10,7 +10,7 @@ from pydantic import AfterValidator
 from pydantic.dataclasses import dataclass
 
 from fpsolve.arrays import FloatArray
-from fpsolve.model.faults import told_in_words
+from fpsolve.model.faults import with_plain_errors
 from fpsolve.model.noise import Memoryless
 from fpsolve.model.parameters import SIZE, STRICT, parameter
 from fpsolve.model.plane import (
@@ -47,7 +47,7 @@ def _weights(weights: tuple[float, ...]) -> tuple[float, ...]:
     return weights
 
 
-@told_in_words
+@with_plain_errors
 @dataclass(frozen=True, config=STRICT)
 class Poisson(Memoryless):
     """Impulses ξ = Σ w_j δ(t − t_j), t_j a Poisson process, w_j independent: x of ẋ = (A₀ + ξA₁)x jumps by exp(w_j A₁).

@@ -13,7 +13,7 @@ from pydantic.dataclasses import dataclass
 
 from fpsolve.arrays import FloatArray
 from fpsolve.model.exact import ExactLaw
-from fpsolve.model.faults import told_in_words
+from fpsolve.model.faults import with_plain_errors
 from fpsolve.model.noise import Noise, NoiseDerivative
 from fpsolve.model.parameters import SIZE, STRICT, parameter
 
@@ -40,7 +40,7 @@ class CircleStep(NamedTuple):
             xi_mean[i] = step.amplitude * step.fade * math.sin(middle)
 
 
-@told_in_words
+@with_plain_errors
 @dataclass(frozen=True, config=STRICT)
 class SineWiener(Noise):
     """Bounded noise ξ = A sin(σ W(t) + θ₀), θ₀ uniform: dξ = −½σ²ξ dt + σ√(A² − ξ²) dW.

@@ -11,7 +11,7 @@ from pydantic.dataclasses import dataclass
 
 from fpsolve.arrays import FloatArray
 from fpsolve.model.exact import ExactLaw, chain_law
-from fpsolve.model.faults import told_in_words
+from fpsolve.model.faults import with_plain_errors
 from fpsolve.model.noise import NoiseDerivative
 from fpsolve.model.noises.markov_chain import Chain
 from fpsolve.model.parameters import SIZE, STRICT, parameter
@@ -19,7 +19,7 @@ from fpsolve.model.parameters import SIZE, STRICT, parameter
 FLIP = ((-1.0, 1.0), (1.0, -1.0))
 
 
-@told_in_words
+@with_plain_errors
 @dataclass(frozen=True, config=STRICT)
 class Telegraph(Chain):
     """Telegraph noise ξ = ±a, each value left at the rate k: its correlation is a² exp(−2k|t|).

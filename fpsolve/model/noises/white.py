@@ -12,7 +12,7 @@ from pydantic.dataclasses import dataclass
 
 from fpsolve.arrays import FloatArray
 from fpsolve.model.exact import ExactLaw, white_law
-from fpsolve.model.faults import told_in_words
+from fpsolve.model.faults import with_plain_errors
 from fpsolve.model.noise import Memoryless
 from fpsolve.model.parameters import SIZE, STRICT, parameter
 from fpsolve.model.plane import CoefficientMatrix, LinearMotion, System, affine, split_by_noise
@@ -49,7 +49,7 @@ class WhiteStep(NamedTuple):
             xi[i] = -xi_end[i]
 
 
-@told_in_words
+@with_plain_errors
 @dataclass(frozen=True, config=STRICT)
 class White(Memoryless):
     """White noise ξ dt = s dW, of the spectral density S = s² at all frequencies.

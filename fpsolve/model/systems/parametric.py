@@ -12,14 +12,14 @@ from pydantic.dataclasses import dataclass
 
 from fpsolve.arrays import identity
 from fpsolve.model.exact import ExactJump, ExactMotion
-from fpsolve.model.faults import told_in_words
+from fpsolve.model.faults import with_plain_errors
 from fpsolve.model.parameters import STRICT, parameter
 from fpsolve.model.plane import CoefficientMatrix, Jump, System
 
 ANY_SIGN = {"ge": -1e15, "le": 1e15}
 
 
-@told_in_words
+@with_plain_errors
 @dataclass(frozen=True, config=STRICT)
 class ParametricOscillator(System):
     """ẍ + 2·damping·ẋ + (stiffness + ξ) x = 0, and ẋ⁺ = −restitution·ẋ⁻ at a wall at x = 0.

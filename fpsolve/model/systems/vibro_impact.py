@@ -17,7 +17,7 @@ from pydantic.dataclasses import dataclass
 from fpsolve.arrays import FloatArray, identity
 from fpsolve.messages import Code, Message
 from fpsolve.model.exact import ExactJump, ExactMotion
-from fpsolve.model.faults import told_in_words
+from fpsolve.model.faults import with_plain_errors
 from fpsolve.model.parameters import SIZE, STRICT, parameter
 from fpsolve.model.plane import CoefficientMatrix, CubicTerms, Jump, System, by_epsilon
 from fpsolve.model.quantity import OSCILLATOR_RESPONSE, ResponseQuantities
@@ -38,7 +38,7 @@ DAMPING = ((0.0, 0.0), (0.0, 1.0))
 """A of the force on the velocity alone, which damps or drives: h₁ = ½ sin 2φ and q₁ = ½(1 − cos 2φ), Eq. (18)."""
 
 
-@told_in_words
+@with_plain_errors
 @dataclass(frozen=True, config=STRICT)
 class VibroImpactOscillator(System):
     """Rayleigh-Van der Pol oscillator that bounces off a wall at x = 0, Eqs. (3) and (6).
