@@ -31,6 +31,7 @@ from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigs
 
 from fpsolve.arrays import Coefficient, FloatArray, dense, one
 from fpsolve.budget import charge
+from fpsolve.data import brief
 from fpsolve.errors import NoHierarchy, SingularMatrix
 from fpsolve.model.noise import Noise
 from fpsolve.model.problem import Problem
@@ -249,7 +250,7 @@ def refuse_open_hierarchy(problem: Problem, p: float) -> None:
             raise NoHierarchy(f"got p = {p:g}; its {number:.12g} {what} are more than {limit}; use a smaller p")
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class EvenMoment:
     """Λ(p) of an even p, the rightmost eigenvalue with some functions of the noises.
 
@@ -275,6 +276,9 @@ class EvenMoment:
     moments: FloatArray
     polynomial: FloatArray
     change: float = 0.0
+
+    def __repr__(self) -> str:
+        return brief(self, f"Λ({self.equations.p}) = {self.value:.10g} ± {self.error:.0e}, {self.x.size} equations")
 
     @property
     def value(self) -> float:
