@@ -179,8 +179,8 @@ class Code(Enum):
         "not solved: {reason}; choose s on this side of {slope:.6g}"
     )
     NO_RATE_FUNCTION = (
-        "failure: there is no rate function to compute: Λ(p) has a kink, as the phase never leaves a ray; take Λ(p) "
-        "itself"
+        "failure: there is no rate function to compute: Λ(p) may have a kink, as the parts of the motion {parts} do "
+        "not all drive each other; take Λ(p) itself"
     )
     NO_PREFACTOR = (
         "failure: the law of growth in finite time is for two variables, and not for filtered noise; take rate_function"

@@ -206,7 +206,8 @@ def rate_function(
 
     Raises:
         ValueError: s is not finite, or empty, or rtol is not positive.
-        NoSuchExponent: Λ(p) has a kink: the noise has algebraic tails, or the phase never leaves a ray.
+        NoSuchExponent: Λ(p) has a kink: the noise has algebraic tails, or it is that of parts that do not all
+            drive each other.
         NotConverged: some s are not reached by Λ′ in the interval, or some p are not resolved; `partial` is the result
             for the others.
     """
@@ -311,7 +312,7 @@ class Slopes:
     def __init__(self, solver: ExponentSolver, interval: tuple[float, float]) -> None:
         refuse_tails(solver.problem, "the law of growth")
         if len(solver.classes) > 1:
-            raise NoSuchExponent(Message(Code.NO_RATE_FUNCTION))
+            raise NoSuchExponent(Message(Code.NO_RATE_FUNCTION, parts=solver.problem.block_names))
         low, high = (real_number(each, "interval") for each in interval)
         if not low < 0 < high:
             raise ValueError(f"got interval = {shown(interval)}; must be two numbers, one below 0 and one above")
