@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from fpsolve import PlaneSystem, Problem, lyapunov_exponent, moment_lyapunov, prove, sensitivities
+from fpsolve import PlaneSystem, Problem, lyapunov_exponent, moment_lyapunov, prove, sensitivities, simulate
 from fpsolve.analysis.density import furstenberg_khasminskii
 from fpsolve.arrays import identity
 from fpsolve.exponent.solver import ExponentSolver
@@ -159,3 +159,17 @@ def test_sizes_of_nothing_change_nothing():
 def test_they_are_not_proven():
     with pytest.raises(TypeError, match="got Poisson"):
         prove(of(even()), 2.0)
+
+
+def test_a_simulation_waits_for_rare_impulses():
+    """Between them the direction of x comes to rest; elements give λ, below Λ(2)/2 of the equations of the moments."""
+    steady = ((0.0, 1.0), (0.0, -0.0056544346676048905))
+    driven = ((-0.9471958820776134, -44.46489829714192), (-0.0004707644708683266, 0.26545596775608626))
+    sizes, weights = (1.140477428600101, -0.30270434321447154), (0.23437873623394545, 0.712329916975077)
+    noise = Poisson(rate=0.0028116068648218755, sizes=sizes, weights=weights)
+    problem = Problem(PlaneSystem([CoefficientMatrix(0, steady), CoefficientMatrix(0, driven, identity)]), noise)
+    found = simulate(problem, [], paths=64, seed=1)
+    expected = lyapunov_exponent(problem).value
+    assert expected < hierarchy_exponent(problem, 2.0)[0] / 2
+    assert found.lyapunov_exponent == pytest.approx(expected, abs=4 * found.lyapunov_exponent_error)
+    assert found.lyapunov_exponent_error < 0.1 * abs(expected)

@@ -102,6 +102,11 @@ class Poisson(Memoryless):
         """rate ⟨w⟩; each impulse is taken as it is, so that nothing more is added to the drift."""
         return 0.0
 
+    @property
+    def relaxation_time(self) -> float:
+        """The mean time between impulses: some of them have to pass until the motion has forgotten its start."""
+        return 1 / self.rate
+
     def spectral_density(self, omega: float) -> float:
         """S(ω) = rate ⟨w²⟩, of what differs from the mean."""
         return self.rate * float(self.shares @ np.square(self.sizes))
