@@ -105,7 +105,9 @@ def largest_step(oscillator: System, noise: Noise) -> tuple[float, str]:
 
 
 def transient(oscillator: System, noise: Noise, *, is_mixed: bool = True) -> float:
-    """The time after which ln E‖x‖^p grows like Λ(p) t: at least two half-turns π/ω and eight correlation times.
+    """The time after which ln E‖x‖^p grows like Λ(p) t: at least two half-turns π/ω and eight relaxation times.
+
+    Of impulses that is eight times the mean time between two of them.
 
     It is a whole number of half-turns, in which the oscillation cancels that the start from the stationary law leaves
     in weak noise; beside a harmonic load, with which the growth goes up and down for ever, a whole number of periods.
