@@ -64,7 +64,7 @@ def settled_directions(pair: PrincipalPair) -> SettledDirections:
     found = SettledDirections(pair.value, pair, Directions(pair).fields, math.nan)
     while not found.error <= SETTLED:
         generator = found.pair.generator
-        finer = generator.chosen.with_phi(generator.chosen.phi.enriched())
+        finer = generator.chosen.with_axis(0, generator.chosen.phi.enriched())
         if finer.phi.size > MOST_DIRECTIONS or finer.size > MOST_UNKNOWNS:
             return found
         try:

@@ -314,7 +314,7 @@ class Search:
         chosen = found.pair.generator.chosen
         if self.place.rtol <= SURELY_SEEN or not isinstance(chosen.phi, PhaseAxis):
             return found
-        halved = chosen.with_phi(chosen.phi.doubled())
+        halved = chosen.with_axis(0, chosen.phi.doubled())
         if halved.size > min(MOST_HALVED, self.place.budget.unknowns):
             return found
         finer = self.attempt(lambda: Solution(self.pair_on(halved, found.pair))) or self.adapt(halved)
@@ -443,7 +443,7 @@ def widened(generator: Generator) -> Space:
         return chosen
     steps = WIDER ** np.linspace(0, 1, 4)[1:]
     wide = np.concatenate([(lines[0] * steps)[::-1], lines, lines[-1] * steps])
-    return chosen.with_xi(chosen.xi.on(wide))
+    return chosen.with_axis(1, chosen.xi.between(wide))
 
 
 def refined(solution: Solution, tolerance: float, stages: int) -> Space:
@@ -453,7 +453,7 @@ def refined(solution: Solution, tolerance: float, stages: int) -> Space:
     new = chosen.refined(solution.effects, share, stages < FREE_STAGES)
     if chosen.xi.lines.size:
         lower, upper = solution.truncation
-        new = new.with_xi(new.xi.reaching(lower > share, upper > share))
+        new = new.with_axis(1, new.xi.reaching(lower > share, upper > share))
     return new if new.size > chosen.size or solution.error_by_modes <= tolerance else new.raised()
 
 

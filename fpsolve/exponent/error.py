@@ -199,7 +199,7 @@ class Solution:
 
 @dataclass(frozen=True, eq=False)
 class Ladder:
-    """The functions of a space by their modes along one direction.
+    """The functions of a space by their modes along one axis.
 
     Attributes:
         at: the axis.
@@ -224,16 +224,15 @@ class Ladder:
 
 
 def ladders(space: Space) -> Iterator[Ladder | None]:
-    """Those of all directions; None for one that has states."""
+    """Those of all axes; None for one without cells, as of states."""
     for at, axis in enumerate(space.axes):
-        for cells, modes, own in axis.ladders:
-            if (count := int(cells.max()) + 1) == 0:
-                yield None
-                continue
-            degrees = np.zeros(count, dtype=int)
-            np.maximum.at(degrees, cells[cells >= 0], modes[cells >= 0])
-            nested = tuple(own if k == at else None for k in range(len(space.axes)))
-            yield Ladder(at, cells, modes, degrees, nested)
+        if (count := int(axis.cells.max()) + 1) == 0:
+            yield None
+            continue
+        degrees, inside = np.zeros(count, dtype=int), axis.cells >= 0
+        np.maximum.at(degrees, axis.cells[inside], axis.modes[inside])
+        nested = tuple(axis.nested if k == at else None for k in range(len(space.axes)))
+        yield Ladder(at, axis.cells, axis.modes, degrees, nested)
 
 
 def sides(pair: PrincipalPair) -> tuple[FloatArray, FloatArray, KroneckerSum]:
@@ -247,7 +246,7 @@ def sides(pair: PrincipalPair) -> tuple[FloatArray, FloatArray, KroneckerSum]:
 
 
 def mode_effects(pair: PrincipalPair) -> tuple[ModeEffects | None, ...]:
-    """The effects along every direction of every axis; None along one that has states."""
+    """The effects along every axis; None along one without cells, as of states."""
     smooth, rough, operator = sides(pair)
     return _effects(pair, [(smooth, rough, operator)])
 

@@ -235,45 +235,37 @@ class SpherePlace(NearPlace):
         errors, chosen = [each.error if each else 0.0 for each in effects], pair.generator.chosen
         if sum(errors) <= 0.5 * allowed:
             return errors
-        count = len(effects) - len(chosen.noises)
-        for k, error in enumerate(errors):
+        for k, (axis, error) in enumerate(zip(chosen.axes, errors, strict=True)):
             if error <= SHARE * allowed:
                 continue
-            if k < count:
-                finer = chosen.with_phi(replace(chosen.phi, degree=chosen.phi.degree + 2))
-                generator = Generator(self.problem, finer)
-                cells, modes, _ = generator.phi.ladders[0]
-                change = first_order_change(pair, generator, 0, (cells >= 0) & (modes > chosen.phi.degree))
-            elif isinstance(axis := chosen.noises[k - count], CountedAxis):
-                axes, at = [*chosen.axes], 1 + k - count
-                axes[at] = axis.enriched()
-                generator = Generator(self.problem, Space(tuple(axes)))
-                change = first_order_change(pair, generator, at, np.arange(axes[at].size) >= axis.size)
+            if k == 0:
+                finer = replace(axis, degree=axis.degree + 2)
+                new = (finer.cells >= 0) & (finer.modes > axis.degree)
+            elif isinstance(axis, CountedAxis):
+                finer = axis.enriched()
+                new = np.arange(finer.size) >= axis.size
             else:
                 continue
+            change = first_order_change(pair, Generator(self.problem, chosen.with_axis(k, finer)), k, new)
             errors[k] = min(error, max(MEASURED * abs(change), math.sqrt(error * abs(change))))
         return errors
 
     def _begin(self, chosen: Space) -> None:
         """Other elements and functions of the noise, the waves from the coarsest on."""
-        coarsest = chosen.with_phi(replace(chosen.phi, waves=FIRST_WAVES))
+        coarsest = chosen.with_axis(0, replace(chosen.phi, waves=FIRST_WAVES))
         self._levels[:] = [Generator(self.problem, coarsest)]
 
     def _chosen(self, level: int) -> Space:
         first = self._levels[0].chosen
-        return first.with_phi(replace(first.phi, waves=first.phi.waves + 2 * level))
+        return first.with_axis(0, replace(first.phi, waves=first.phi.waves + 2 * level))
 
     def _finer(self, chosen: Space, effects: Sequence[Any], errors: Sequence[float], allowed: float) -> Space:
-        count, share = len(effects) - len(chosen.noises), SHARE * allowed
+        share = SHARE * allowed
         noises = (
             axis if error <= share else axis.enriched() if error < each.error else axis.refined(each, share, False)
-            for axis, each, error in zip(chosen.noises, effects[count:], errors[count:], strict=True)
+            for axis, each, error in zip(chosen.noises, effects[1:], errors[1:], strict=True)
         )
-        phi = chosen.phi
-        for error in errors[:count]:
-            if error > 0.1 * allowed:
-                phi = phi.finer_elements()
-        found = Space((phi, *noises))
+        found = Space((chosen.phi.finer_elements() if errors[0] > 0.1 * allowed else chosen.phi, *noises))
         return found if found.size > chosen.size else chosen.enriched()
 
     def _generator(self, level: int) -> Generator:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property, reduce
 from typing import Any, ClassVar, Self
 
@@ -17,7 +17,8 @@ import scipy.sparse
 from scipy.sparse import csc_matrix, identity, issparse
 
 from fpsolve.arrays import Coefficient, FloatArray, IntArray, Mask, Matrix, dense, one
-from fpsolve.fem.effects import ModeEffects
+from fpsolve.fem.effects import ModeEffects, split
+from fpsolve.fem.mesh import MAX_DEGREE, halved
 from fpsolve.model.noise import NoiseDerivative
 
 NO_LINES = np.zeros(0)
@@ -50,15 +51,15 @@ class Axis:
         """Number of unknowns."""
         raise NotImplementedError
 
-    @property
+    @cached_property
     def cells(self) -> IntArray:
-        """For each unknown the cell that it belongs to, −1 for none or two, shape (size,)."""
-        raise NotImplementedError
+        """For each unknown the cell that it belongs to, −1 for none or two, shape (size,); by default for none."""
+        return np.full(self.size, -1)
 
-    @property
+    @cached_property
     def modes(self) -> IntArray:
-        """For each unknown the degree of its polynomial, shape (size,)."""
-        raise NotImplementedError
+        """For each unknown the degree of its polynomial in a cell, shape (size,)."""
+        return np.zeros(self.size, dtype=int)
 
     @property
     def nested(self) -> Matrix | None:
@@ -78,10 +79,10 @@ class Axis:
         """∫ u v; None where it is the identity, or for noise."""
         return None
 
-    @property
+    @cached_property
     def constant(self) -> FloatArray:
-        """Coefficients of the function 1, times the factor of the axis, shape (size,)."""
-        raise NotImplementedError
+        """Coefficients of the function 1, times the factor of the axis, shape (size,); by default it is the first."""
+        return np.eye(1, self.size)[0]
 
     @property
     def turns(self) -> int:
@@ -92,11 +93,6 @@ class Axis:
     def facts(self) -> dict[str, Any]:
         """What a table says of it."""
         raise NotImplementedError
-
-    @property
-    def ladders(self) -> Sequence[tuple[IntArray, IntArray, Matrix | None]]:
-        """Cells, modes and `nested` of every direction, for which errors are estimated."""
-        return ((self.cells, self.modes, self.nested),)
 
     def mass(self, g: Coefficient = one) -> Matrix:
         """∫ g u v in the weight of the axis."""
@@ -140,6 +136,36 @@ class Axis:
     def refined(self, effects: ModeEffects, share: float, may_coarsen: bool) -> Self:
         """One that all together should lack no more than a share."""
         return self
+
+
+@dataclass(frozen=True, eq=False)
+class DividedAxis(Axis):
+    """Elements of a degree of their own in each cell.
+
+    Attributes:
+        lines: the vertices, shape (m + 1,).
+        degrees: the degree in each cell, shape (m,).
+    """
+
+    lines: FloatArray = field()
+    degrees: IntArray
+
+    def on(self, lines: FloatArray, degrees: IntArray) -> Self:
+        """That with other cells."""
+        return replace(self, lines=lines, degrees=degrees)
+
+    def enriched(self) -> Self:
+        """Two degrees more; where there are none left, cells are halved."""
+        return self.doubled() if np.max(self.degrees) + 2 > MAX_DEGREE else self.on(self.lines, self.degrees + 2)
+
+    def doubled(self) -> Self:
+        return self.on(halved(self.lines), np.repeat(self.degrees, 2))
+
+    def raised(self) -> Self:
+        return self.on(self.lines, np.minimum(self.degrees + 1, MAX_DEGREE))
+
+    def refined(self, effects: ModeEffects, share: float, may_coarsen: bool) -> Self:
+        return self.on(*split(self.lines, effects, share, may_coarsen))
 
 
 def along(factors: Sequence[Matrix | None], table: FloatArray) -> FloatArray:

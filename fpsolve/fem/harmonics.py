@@ -155,10 +155,6 @@ class HarmonicAxis(DirectionAxis):
         return self._harmonics.degrees[self._harmonics.own]
 
     @cached_property
-    def constant(self) -> FloatArray:
-        return np.eye(1, self.size).ravel()
-
-    @cached_property
     def identity(self) -> FloatArray:
         return np.eye(self.size)
 

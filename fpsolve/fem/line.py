@@ -44,8 +44,7 @@ class LineSpace:
 
     Attributes:
         degree: the highest one.
-        size: number of functions of this degree.
-        kept: which of them are those of the degrees of the cells, shape (size,).
+        size: number of functions.
         points: points of the quadrature rules, increasing, shape (n,).
         measure: their weights times w, shape (n,).
         cells: for each unknown the cell that it belongs to, -1 for one shared by two, shape (size,).
@@ -69,12 +68,14 @@ class LineSpace:
         self.lines, self._sizes, degrees = lines, np.diff(lines), np.broadcast_to(degree, lines.size - 1)
         self.degree = degree = int(np.max(degrees))
         dofs = skfem.Dofs(skfem.MeshLine(lines), _element(degree))
-        self._dofs, self.size = dofs.element_dofs.T, int(dofs.N)
-        self.cells, self.modes = np.full(self.size, -2), np.ones(self.size, dtype=int)
-        for j, own in enumerate(self._dofs):  # in each cell skfem numbers two vertex functions, then bubbles by degree
-            self.cells[own] = np.where(self.cells[own] == -2, j, -1)
-            self.modes[own[2:]] = np.arange(2, own.size)
-        self.kept = (self.modes == 1) | (self.modes <= degrees[self.cells])
+        numbers, cells, modes = dofs.element_dofs.T, np.full(int(dofs.N), -2), np.ones(int(dofs.N), dtype=int)
+        for j, own in enumerate(numbers):  # in each cell skfem numbers two vertex functions, then bubbles by degree
+            cells[own] = np.where(cells[own] == -2, j, -1)
+            modes[own[2:]] = np.arange(2, own.size)
+        kept = (modes == 1) | (modes <= degrees[cells])
+        self.cells, self.modes, self.size = cells[kept], modes[kept], int(np.count_nonzero(kept))
+        self._own = kept[numbers]  # those that there are not are zero, and go by the number 0
+        self._dofs = np.where(self._own, (np.cumsum(kept) - 1)[numbers], 0)
         self.first_cells = np.full(self.size, lines.size)
         np.minimum.at(self.first_cells, self._dofs, np.arange(lines.size - 1)[:, None])
         self.ends = self._dofs[[0, -1], [0, 1]]
@@ -87,7 +88,8 @@ class LineSpace:
         tables = [_reference(degree, rule.points.tobytes()) for rule in rules]
         values = np.stack([table[0] for table in tables])
         slopes = np.stack([table[1] for table in tables]) / self._sizes[:, None, None]
-        self._transform, shares = _orthogonalised(slopes, self._measure, self.kept[self._dofs[:, 2:]])
+        self._transform, shares = _orthogonalised(slopes, self._measure, self._own[:, 2:])
+        self._transform *= self._own[:, None, :]
         squares = np.einsum("cq,cqi->ci", self._measure, (values @ self._transform) ** 2)
         self._norms = np.sqrt(np.bincount(self._dofs.ravel(), squares.ravel(), minlength=self.size))
         self._transform /= self._norms[self._dofs][:, None, :]
@@ -133,7 +135,8 @@ class LineSpace:
         """Coefficients of the function 1, shape (size,): the vertex functions add up to it, but for first bubbles."""
         found = np.where(self.modes == 1, self._norms, 0.0)
         if self.degree > 1:
-            found[self._dofs[:, 2]] = -np.sum(self._flat * self._norms[self._dofs[:, :2]], axis=1)
+            loads, own = -np.sum(self._flat * self._norms[self._dofs[:, :2]], axis=1), self._own[:, 2]
+            found[self._dofs[own, 2]] = loads[own]
         return found
 
     @cached_property

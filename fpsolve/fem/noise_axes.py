@@ -12,16 +12,15 @@ moved by 2s, however far that is.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 import numpy as np
 
 from fpsolve.arrays import Coefficient, FloatArray, IntArray, Matrix, dense, one
-from fpsolve.fem.axis import Axis
-from fpsolve.fem.effects import ModeEffects, split
-from fpsolve.fem.mesh import MAX_DEGREE, halved
+from fpsolve.fem.axis import Axis, DividedAxis
+from fpsolve.fem.effects import ModeEffects
 from fpsolve.fem.phase import MAX_DENSE_UNKNOWNS
 from fpsolve.model.noise import Noise, NoiseDerivative
 from fpsolve.polynomials import Polynomials, gegenbauer, hermite, logarithm, stieltjes
@@ -157,10 +156,6 @@ class CountedAxis(NoiseAxis):
     @cached_property
     def cells(self) -> IntArray:
         return np.zeros(self.size, dtype=int)
-
-    @cached_property
-    def constant(self) -> FloatArray:
-        return np.eye(1, self.size)[0]
 
     def enriched(self) -> Self:
         return replace(self, count=self.count + max(3, self.count // 8))
@@ -365,16 +360,8 @@ class PolynomialAxis(CountedAxis, LineAxis):
 
 
 @dataclass(frozen=True, eq=False)
-class CellAxis(LineAxis):
-    """Continuous elements on an interval, for given meshes and algebraic tails.
-
-    Attributes:
-        lines: vertices in z, within the support of the noise, shape (n + 1,).
-        degrees: of the elements in each cell, shape (n,).
-    """
-
-    lines: FloatArray = field()
-    degrees: IntArray
+class CellAxis(DividedAxis, LineAxis):
+    """Continuous elements on an interval of z within the support, for given meshes and algebraic tails."""
 
     word = "cells"
 
@@ -398,50 +385,31 @@ class CellAxis(LineAxis):
         return LineSpace(self.lines, self.degrees, self.weight, end_exponents=ends)
 
     @cached_property
-    def _inner(self) -> IntArray:
-        """Which functions of the highest degree there are."""
-        return np.flatnonzero(self.line.kept)
-
-    @cached_property
     def rule(self) -> Rule:
-        return Rule(self.line.points, self.line.measure, self.line.values[:, self._inner])
+        return Rule(self.line.points, self.line.measure, self.line.values)
 
     @cached_property
     def cells(self) -> IntArray:
-        return self.line.cells[self._inner]
+        return self.line.cells
 
     @cached_property
     def modes(self) -> IntArray:
-        return self.line.modes[self._inner]
+        return self.line.modes
 
     @cached_property
     def constant(self) -> FloatArray:
-        return self.line.constant()[self._inner]
+        return self.line.constant()
 
-    def enriched(self) -> CellAxis:
-        if np.max(self.degrees) + 2 > MAX_DEGREE:
-            return self.doubled()
-        return replace(self, degrees=self.degrees + 2)
-
-    def doubled(self) -> CellAxis:
-        return replace(self, lines=halved(self.lines), degrees=np.repeat(self.degrees, 2))
-
-    def raised(self) -> CellAxis:
-        return replace(self, degrees=np.minimum(self.degrees + 1, MAX_DEGREE))
-
-    def refined(self, effects: ModeEffects, share: float, may_coarsen: bool) -> CellAxis:
-        return CellAxis(self.noise, *split(self.lines, effects, share, may_coarsen))
-
-    def on(self, lines: FloatArray) -> CellAxis:
+    def between(self, lines: FloatArray) -> CellAxis:
         """Those between other lines, each with the degree of the cell that its middle is in, or is next to."""
         middles = 0.5 * (lines[:-1] + lines[1:])
         own = np.clip(np.searchsorted(self.lines, middles) - 1, 0, self.degrees.size - 1)
-        return CellAxis(self.noise, lines, self.degrees[own])
+        return self.on(lines, self.degrees[own])
 
     def reaching(self, below: bool, above: bool) -> CellAxis:
         """With one more cell at the ends whose effect exceeds its share."""
         lower, upper = [1.6 * self.lines[0]] if below else [], [1.6 * self.lines[-1]] if above else []
-        return self.on(np.concatenate([lower, self.lines, upper]))
+        return self.between(np.concatenate([lower, self.lines, upper]))
 
     def mass(self, g: Coefficient = one) -> Matrix:
         return self._form(self.line.mass() if g == one else self.line.mass(lambda z: g(self.unit * z)))
@@ -463,15 +431,14 @@ class CellAxis(LineAxis):
 
     @cached_property
     def nested(self) -> Matrix:
-        return self.line.nested[self._inner][:, self._inner]
+        return self.line.nested
 
     def values_at(self, z: FloatArray) -> Matrix:
-        return self.line.at(z)[:, self._inner]
+        return self.line.at(z)
 
     def _form(self, matrix: Matrix) -> Matrix:
-        """Of the functions that are kept; sparse where it is large."""
-        inner = matrix[self._inner][:, self._inner]
-        return dense(inner) if inner.shape[0] <= MAX_DENSE_UNKNOWNS else inner
+        """An array where it is small."""
+        return dense(matrix) if self.size <= MAX_DENSE_UNKNOWNS else matrix
 
 
 @dataclass(frozen=True, eq=False)
@@ -492,14 +459,6 @@ class StateAxis(NoiseAxis):
     @cached_property
     def rule(self) -> Rule:
         return Rule(self.support, self.noise.probabilities, np.eye(self.size))
-
-    @cached_property
-    def cells(self) -> IntArray:
-        return np.full(self.size, -1)
-
-    @cached_property
-    def modes(self) -> IntArray:
-        return np.zeros(self.size, dtype=int)
 
     @cached_property
     def constant(self) -> FloatArray:

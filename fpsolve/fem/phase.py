@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import Any
 
@@ -11,9 +11,7 @@ import numpy as np
 from scipy.sparse import csr_matrix, diags, issparse
 
 from fpsolve.arrays import FloatArray, IntArray, Mask, Matrix, dense, one
-from fpsolve.fem.axis import Axis
-from fpsolve.fem.effects import ModeEffects, split
-from fpsolve.fem.mesh import MAX_DEGREE, halved
+from fpsolve.fem.axis import DividedAxis
 from fpsolve.fem.rings import Ring
 from fpsolve.model.plane import CoefficientMatrix, Harmonics, Impulse, ImpulseDerivative, changed_exponential
 from fpsolve.polynomials import Orthonormal, gauss_legendre, legendre, orthonormal
@@ -31,16 +29,11 @@ MAX_DENSE_UNKNOWNS = 600
 
 
 @dataclass(frozen=True, eq=False)
-class PhaseAxis(Axis):
+class PhaseAxis(DividedAxis):
     """Discontinuous elements on the circle or half circle; in each cell the basis is orthonormal, by degree.
 
-    Attributes:
-        lines: the ends of the cells, shape (m + 1,); the first and the last are one.
-        degrees: the degree in each cell, from 1 on, shape (m,).
+    The first and the last line are one, and degrees are from 1 on.
     """
-
-    lines: FloatArray = field()
-    degrees: IntArray
 
     @staticmethod
     def of(lines: FloatArray, degrees: IntArray) -> PhaseAxis:
@@ -59,19 +52,8 @@ class PhaseAxis(Axis):
     def facts(self) -> dict[str, Any]:
         return {"phi_cells": self.lines.size - 1, "phi_degrees": [int(degree) for degree in self.degrees]}
 
-    def enriched(self) -> PhaseAxis:
-        if np.max(self.degrees) + 2 > MAX_DEGREE:
-            return self.doubled()
-        return self.of(self.lines, self.degrees + 2)
-
-    def doubled(self) -> PhaseAxis:
-        return self.of(halved(self.lines), np.repeat(self.degrees, 2))
-
-    def raised(self) -> PhaseAxis:
-        return self.of(self.lines, np.minimum(self.degrees + 1, MAX_DEGREE))
-
-    def refined(self, effects: ModeEffects, share: float, may_coarsen: bool) -> PhaseAxis:
-        return self.of(*split(self.lines, effects, share, may_coarsen))
+    def on(self, lines: FloatArray, degrees: IntArray) -> PhaseAxis:
+        return self.of(lines, degrees)
 
     @cached_property
     def _sizes(self) -> FloatArray:

@@ -110,13 +110,9 @@ class Space:
         """That of noises, which may be of a problem close by, with the tilt for p; each has tables of its own."""
         return Space((self.phi, *(axis.of(noise, p) for axis, noise in zip(self.noises, noises, strict=True))))
 
-    def with_phi(self, axis: Axis) -> Space:
-        """That with other functions of φ, or of directions."""
-        return Space((axis, *self.noises))
-
-    def with_xi(self, axis: NoiseAxis) -> Space:
-        """That with other functions of the noise of a problem with one."""
-        return Space((self.phi, axis))
+    def with_axis(self, k: int, axis: Axis) -> Space:
+        """That with another axis in one place."""
+        return Space((*self.axes[:k], axis, *self.axes[k + 1 :]))
 
     def enriched(self) -> Space:
         """A finer one: two degrees more each way; where there are none left, cells are halved."""

@@ -160,7 +160,7 @@ class DirectionAxis(Axis):
 
     coordinates: Coordinates
 
-    is_full, ladders = True, ()
+    is_full = True
 
     @property
     def n(self) -> int:
@@ -171,14 +171,6 @@ class DirectionAxis(Axis):
     def dimensions(self) -> tuple[int, int]:
         """Of the two groups of coordinates."""
         return group_dimensions(self.n)
-
-    @cached_property
-    def cells(self) -> IntArray:
-        return np.full(self.size, -1)
-
-    @cached_property
-    def modes(self) -> IntArray:
-        return np.zeros(self.size, dtype=int)
 
     @property
     def degrees(self) -> IntArray:
@@ -315,11 +307,17 @@ class SphereAxis(DirectionAxis):
         return (first + second)[self._kept % self._waves.own.size]
 
     @cached_property
-    def ladders(self) -> tuple[tuple[IntArray, IntArray, Matrix | None], ...]:  # type: ignore[override]
-        """That of the elements alone; of the waves what two degrees more change tells."""
-        line, node = self.line, self._node
-        of_elements = np.where(line.modes[node] == 1, -1, line.cells[node])
-        return ((of_elements, line.modes[node], self._on_kept(line.nested)),)
+    def cells(self) -> IntArray:
+        """Those in η: of the waves what two degrees more change tells."""
+        return np.where(self.modes == 1, -1, self.line.cells[self._node])
+
+    @cached_property
+    def modes(self) -> IntArray:
+        return self.line.modes[self._node]
+
+    @cached_property
+    def nested(self) -> csr_matrix:
+        return self._on_kept(self.line.nested)
 
     @cached_property
     def levels(self) -> Sequence[IntArray]:

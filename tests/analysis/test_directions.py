@@ -45,7 +45,7 @@ def turning(n, coordinates):
 def enriched(pair):
     """The pair on the next finer functions of directions."""
     generator = pair.generator
-    finer = generator.chosen.with_phi(generator.chosen.phi.enriched())
+    finer = generator.chosen.with_axis(0, generator.chosen.phi.enriched())
     return principal_pair(type(generator)(generator.problem, finer), pair.p, start=pair)
 
 
