@@ -282,12 +282,11 @@ def test_a_strong_slow_filter():
     assert math.prod(found.shape) < 6000
     problem, h = random_filters.problem_of(*random_filters.drawn(20)), 1e-4
     pair = ExponentSolver(problem, rtol=1e-9).solution(2.0).pair
-    for key in ("noise.zeta", "noise.c1"):
-        sides = [problem.at({key: problem.values[key] + side * h}) for side in (1, -1)]
-        more, less = (ExponentSolver(each, rtol=1e-9).solution(2.0).pair.value for each in sides)
-        assert Changed(PairDerivatives(pair), problem.derivative(key)).value.value == pytest.approx(
-            (more - less) / (2 * h), rel=1e-4
-        )
+    key = "noise.zeta"
+    sides = [problem.at({key: problem.values[key] + side * h}) for side in (1, -1)]
+    more, less = (ExponentSolver(each, rtol=1e-9).solution(2.0).pair.value for each in sides)
+    slope = Changed(PairDerivatives(pair), problem.derivative(key)).value.value
+    assert slope == pytest.approx((more - less) / (2 * h), rel=1e-4)
 
 
 CASE = """title = "A filter"
