@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import os
 import signal
-from typing import Any, NoReturn
+
+TYPE_CHECKING = False  # without `typing`, whose import takes time in which a signal ends in a traceback
+if TYPE_CHECKING:
+    from typing import Any, NoReturn
 
 
 def main() -> NoReturn:

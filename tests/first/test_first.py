@@ -113,7 +113,10 @@ def test_a_first_case_ends_soon_and_right(name, case, tmp_path):
 
 @pytest.mark.parametrize("name", SECOND)
 def test_a_first_case_can_be_ended_at_any_time(name, case, tmp_path):
-    """What was solved is kept, and the same command goes on from there."""
+    """What was solved is kept, and the same command goes on from there, to the same Λ(2) within a tenth of its error.
+
+    The moments begin where Python itself has started: before, there is no program yet that a signal could end.
+    """
     draw = random.Random(name)
     process = begun("run", case, folder=tmp_path)
     start = time.monotonic()
@@ -123,7 +126,9 @@ def test_a_first_case_can_be_ended_at_any_time(name, case, tmp_path):
     known = 0
     for _ in range(MOMENTS):
         process = begun("run", case, folder=tmp_path)
-        time.sleep(draw.uniform(0, min(whole, 5.0)))
+        started = time.monotonic()
+        begun(folder=tmp_path, program=("-c", "import runpy, fpsolve.__main__")).communicate()  # beside it, and later
+        time.sleep(max(0.0, draw.uniform(0, min(whole, 5.0)) + started - time.monotonic()))
         process.send_signal(signal.SIGINT)
         sent = time.monotonic()
         said, _ = process.communicate(timeout=60)
@@ -135,4 +140,6 @@ def test_a_first_case_can_be_ended_at_any_time(name, case, tmp_path):
     process = begun("run", case, folder=tmp_path)
     said, _ = process.communicate(timeout=3 * SECONDS)
     assert process.returncode in (0, SOME_MISSING), said
-    assert second_moment(tmp_path, name) == value
+    again = second_moment(tmp_path, name)
+    assert (again is None) == (value is None)
+    assert value is None or again[0] == pytest.approx(value[0], abs=0.1 * max(value[1], again[1]))
