@@ -46,7 +46,6 @@ ON_IT = 1e-4
 
 _ANEW: dict[str, Any] = {"traces": (), "seconds": 0.0, "obstacles": (), "complete": False}
 """A line of which nothing is traced."""
-"""The builtin `map`, or that of an executor: results in the order of the tasks."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -25,7 +25,7 @@ from fpsolve.exponent.adapt import (
     solved_p,
 )
 from fpsolve.exponent.eigen import PairDerivatives, PrincipalPair, second_derivative, slope_rounding
-from fpsolve.exponent.error import MEANINGLESS, Estimate, Failure, Moment, Solution, checked, slope_error
+from fpsolve.exponent.error import Estimate, Failure, Moment, Solution, checked, slope_error
 from fpsolve.exponent.starts import warnings_of_other_places
 from fpsolve.fem.factors import one_thread
 from fpsolve.fem.mesh import CylinderMesh
@@ -294,12 +294,12 @@ class ExponentSolver:
         if p <= 0 or p % 2 or (is_simple and self.problem.dimension == 2) or self.classes:
             return None
         if p not in self._even:
-            found = None
             countdown = self.budget.countdown(f"Λ({p:g})")
             with suppress(NoHierarchy, NotConverged, ArithmeticError), one_thread(), counted(countdown):
                 found = even_moment(self.problem, p, 0.1 * self.tolerance(p, 0.0), MOST_EQUATIONS)
-            has_meaning = found and found.error <= MEANINGLESS * max(abs(found.value), self.scale(p))
-            self._even[p] = found if has_meaning else None
+                checked(Estimate(found.value, found.error, self.scale(p)), self.refinement, p)
+                self._even[p] = found
+            self._even.setdefault(p, None)
         return self._even[p]
 
     def doubt(self, error: float, known: EvenMoment) -> float:

@@ -82,9 +82,11 @@ def other_centers(pair: PrincipalPair) -> list[float]:
     if noise.basis == "pairs":
         center, (z, rate) = pair.space.xi.center, steady_places(pair.generator.problem, pair.p)
         far = (np.abs(z - center) > 5) & (rate > comparable(pair.value))
-        amplitude, swinging = swing(pair.generator.problem, pair.p)
-        is_elsewhere = center and amplitude > 5 and swinging > comparable(pair.value)
-        return [*z[far][:1].tolist(), *[0.0] * bool(is_elsewhere)]
+        found: list[float] = z[far][:1].tolist()
+        if center:
+            amplitude, swinging = swing(pair.generator.problem, pair.p)
+            found += [0.0] * (amplitude > 5 and swinging > comparable(pair.value))
+        return found
     if frozen is None:
         return []
     z, rate = frozen.peaks(pair.p)

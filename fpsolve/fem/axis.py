@@ -22,6 +22,8 @@ from fpsolve.fem.mesh import MAX_DEGREE, halved
 from fpsolve.model.noise import NoiseDerivative
 
 NO_LINES = np.zeros(0)
+MAX_DENSE_UNKNOWNS = 600
+"""Matrices of φ, and of ξ, are NumPy arrays for so many unknowns, and sparse beyond."""
 
 
 class Axis:
@@ -149,6 +151,10 @@ class DividedAxis(Axis):
 
     lines: FloatArray = field()
     degrees: IntArray
+
+    def stored(self, matrix: Matrix) -> Matrix:
+        """A matrix as those of the axis are: an array where it is small."""
+        return matrix if self.size > MAX_DENSE_UNKNOWNS else dense(matrix)
 
     def on(self, lines: FloatArray, degrees: IntArray) -> Self:
         """That with other cells."""

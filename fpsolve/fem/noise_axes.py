@@ -21,7 +21,6 @@ import numpy as np
 from fpsolve.arrays import Coefficient, FloatArray, IntArray, Matrix, dense, one
 from fpsolve.fem.axis import Axis, DividedAxis
 from fpsolve.fem.effects import ModeEffects
-from fpsolve.fem.phase import MAX_DENSE_UNKNOWNS
 from fpsolve.model.noise import Noise, NoiseDerivative
 from fpsolve.polynomials import Polynomials, gegenbauer, hermite, logarithm, stieltjes
 
@@ -412,11 +411,11 @@ class CellAxis(DividedAxis, LineAxis):
         return self.between(np.concatenate([lower, self.lines, upper]))
 
     def mass(self, g: Coefficient = one) -> Matrix:
-        return self._form(self.line.mass() if g == one else self.line.mass(lambda z: g(self.unit * z)))
+        return self.stored(self.line.mass() if g == one else self.line.mass(lambda z: g(self.unit * z)))
 
     def generator(self) -> Matrix:
         """−½ ∫ P_s σ² u′v′; at the ends no probability flux is the natural condition."""
-        return self._form(-self.line.stiffness(self.rate))
+        return self.stored(-self.line.stiffness(self.rate))
 
     def changed(self, change: NoiseDerivative, g: Coefficient | None) -> Matrix:
         mean = float(self.measure @ change.log_density(self.unit * self.points) / np.sum(self.measure))
@@ -425,9 +424,9 @@ class CellAxis(DividedAxis, LineAxis):
             return change.log_density(self.unit * z) - mean
 
         if g is not None:
-            return self._form(self.line.mass(lambda z: self.changed_weight(change, g, log_change(z), z)))
+            return self.stored(self.line.mass(lambda z: self.changed_weight(change, g, log_change(z), z)))
         stiffness = self.line.stiffness(lambda z: self.rate(z) * log_change(z))
-        return 2 * (change.log_diffusion - change.log_scale) * self.matrix(None) - self._form(stiffness)
+        return 2 * (change.log_diffusion - change.log_scale) * self.matrix(None) - self.stored(stiffness)
 
     @cached_property
     def nested(self) -> Matrix:
@@ -435,10 +434,6 @@ class CellAxis(DividedAxis, LineAxis):
 
     def values_at(self, z: FloatArray) -> Matrix:
         return self.line.at(z)
-
-    def _form(self, matrix: Matrix) -> Matrix:
-        """An array where it is small."""
-        return dense(matrix) if self.size <= MAX_DENSE_UNKNOWNS else matrix
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from scipy.sparse import csr_matrix, diags, issparse
 
-from fpsolve.arrays import FloatArray, IntArray, Mask, Matrix, dense, one
-from fpsolve.fem.axis import DividedAxis
+from fpsolve.arrays import FloatArray, IntArray, Mask, Matrix, one
+from fpsolve.fem.axis import MAX_DENSE_UNKNOWNS, DividedAxis
 from fpsolve.fem.rings import Ring
 from fpsolve.model.plane import CoefficientMatrix, Harmonics, Impulse, ImpulseDerivative, changed_exponential
 from fpsolve.polynomials import Orthonormal, gauss_legendre, legendre, orthonormal
@@ -24,8 +24,6 @@ KEPT_IMPULSES = 8
 """Whose matrices are kept, as many problems may share the functions."""
 MOST_SHARED = 100
 """Functions of φ that are kept for the next problem."""
-MAX_DENSE_UNKNOWNS = 600
-"""Matrices of φ, and of ξ, are NumPy arrays for so many unknowns, and sparse beyond."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,7 +178,7 @@ class PhaseAxis(DividedAxis):
         """∂ᵏ/∂pᵏ of ∫ w |exp(B)e|^p T(ψ(φ)), ψ being where an impulse takes φ."""
         at, end, weights, stretch, _ = self._struck(of)
         logs = np.log(stretch)
-        return self._stored(at.T @ diags(weights * np.exp(p * logs) * logs**derivative) @ end)
+        return self.stored(at.T @ diags(weights * np.exp(p * logs) * logs**derivative) @ end)
 
     def changed_impulses(self, of: Impulse, by: ImpulseDerivative, p: float, derivative: int = 0) -> Matrix:
         """The same, differentiated by θ of which B depends."""
@@ -192,11 +190,7 @@ class PhaseAxis(DividedAxis):
         longer = (x * dx + u * du) / stretch**2 * (p * logs**derivative + derivative * logs ** max(derivative - 1, 0))
         turned = (u * dx - x * du) / stretch**2 * logs**derivative
         slope = end @ csr_matrix(self.convection(Harmonics(1.0, 0.0, 0.0)))
-        return self._stored(at.T @ (diags(size * longer) @ end + diags(size * turned) @ slope))
-
-    def _stored(self, matrix: Matrix) -> Matrix:
-        """An array where matrices of φ are."""
-        return matrix if self.size > MAX_DENSE_UNKNOWNS else dense(matrix)
+        return self.stored(at.T @ (diags(size * longer) @ end + diags(size * turned) @ slope))
 
     @cached_property
     def _strikes(self) -> dict[Impulse, tuple[Any, ...]]:

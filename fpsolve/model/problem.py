@@ -184,11 +184,6 @@ class Problem:
         return RTOL_OF_SEVERAL if len(self.coloured.parts) > 1 else RTOL
 
     @property
-    def is_on_cylinder(self) -> bool:
-        """Whether functions of it are of φ and of one ξ, so that they make a surface, or a line for each state."""
-        return self.dimension == 2 and not self.no_picture
-
-    @property
     def no_picture(self) -> str:
         """Why functions of it cannot be drawn; empty where they can, of more than two variables over directions."""
         if self.dimension > 2:

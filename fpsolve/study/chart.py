@@ -22,6 +22,7 @@ from fpsolve.pool import Steps
 from fpsolve.theory.perturbation import second_order
 
 Map = Callable[[Callable[[Row], ScannedRow], Iterable[Row]], Iterable[ScannedRow]]
+"""The builtin `map`, or that of an executor: results in the order of the tasks."""
 CLOSED_FORM_NODES = 41
 """Of the grid, each way, on which the closed forms are evaluated."""
 

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from fpsolve.fem.phase import MAX_DENSE_UNKNOWNS, PhaseAxis
+from fpsolve.fem.axis import MAX_DENSE_UNKNOWNS
+from fpsolve.fem.phase import PhaseAxis
 from fpsolve.model.plane import Harmonics
 
 LINES = np.array([np.pi / 2, 2.0, 3.1, 4.0, 3 * np.pi / 2])
