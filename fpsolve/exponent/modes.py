@@ -14,6 +14,7 @@ modes, see `error`.
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -78,23 +79,30 @@ def modal_coordinates(problem: Problem) -> tuple[Coordinates, float, tuple[float
     """S of y = S⁻¹x whose directions are solved for, the width of the layer of T, and where T and T* have theirs.
 
     Between the groups 1 and 2 of y these lie at ln tan η = ½ ln(q₁/q₂) and ½ ln(p₂/p₁), q and p the sizes of Q and of
-    E yyᵀ on each: T is about (yᵀQy)^½p there, and T* a power of yᵀ(E yyᵀ)⁻¹y.
+    E yyᵀ on each: T is about (yᵀQy)^½p there, and T* a power of yᵀ(E yyᵀ)⁻¹y. Each mode of the motion without noise
+    has a unit in which q = p before, so that y is the same, but for rotations, whatever the coordinates x are.
     """
     free = sum(
         problem.motion.epsilon**term.order * float(term.g(problem.named_noise(term.noise).mean)) * np.array(term.matrix)
         for term in problem.motion.terms
     )
     values, vectors = np.linalg.eig(free)
-    columns: list[FloatArray] = []
-    for value, vector in zip(values, vectors.T, strict=True):
-        if value.imag > 0:
-            columns += [vector.real, vector.imag]
-        elif value.imag == 0:
-            columns.append(vector.real)
-    own = np.column_stack(columns)
-    if not np.linalg.cond(own) < WORST_CONDITION:
-        _, own = scipy.linalg.matrix_balance(free, permute=False)
+    modes = [
+        np.column_stack([vector.real, vector.imag] if value.imag else [vector.real])
+        for value, vector in zip(values, vectors.T, strict=True)
+        if value.imag >= 0
+    ]
+    own = np.column_stack(modes)
     _, q, p = second_moments(problem)
+    if np.linalg.cond(own) < WORST_CONDITION:
+        rows = np.split(np.linalg.inv(own), np.cumsum([each.shape[1] for each in modes])[:-1])
+        moments = [
+            (np.trace(back @ p @ back.T), np.trace(mode.T @ q @ mode)) for back, mode in zip(rows, modes, strict=True)
+        ]
+        of_p, of_q = (np.maximum(each, THINNEST**2 * np.sum(each)) for each in np.transpose(moments))
+        own = np.column_stack([unit * mode for unit, mode in zip((of_p / of_q) ** 0.25, modes, strict=True)])
+    else:
+        _, own = scipy.linalg.matrix_balance(free, permute=False)
     sizes, axes = np.linalg.eigh(own.T @ q @ own)
     sizes, axes = np.maximum(sizes[::-1], 1e-300), axes[:, ::-1]
     count = len(sizes) // 2
@@ -106,8 +114,8 @@ def modal_coordinates(problem: Problem) -> tuple[Coordinates, float, tuple[float
     found = own @ axes
     inverse, first = np.linalg.inv(found), group_dimensions(len(sizes))[0]
     places = []
-    for moments, sign in ((found.T @ q @ found, 0.5), (inverse @ p @ inverse.T, -0.5)):
-        one_group, other = (np.mean(each) for each in np.split(np.maximum(np.diagonal(moments), 0.0), [first]))
+    for form, sign in ((found.T @ q @ found, 0.5), (inverse @ p @ inverse.T, -0.5)):
+        one_group, other = (np.mean(each) for each in np.split(np.maximum(np.diagonal(form), 0.0), [first]))
         share = one_group / max(other, 1e-300)
         places.append(sign * math.log(min(max(share, THINNEST**2), THINNEST**-2)))
     return tuple(map(tuple, found.tolist())), max(width, THINNEST), (places[0], places[1])
@@ -203,7 +211,7 @@ class SpherePlace(NearPlace):
                 continue
             level += 1
             change = self._change(pair, level)
-            pair = replace(pair, correction=change)
+            pair = replace(pair, correction=change, rounding=pair.rounding + self._rounding(pair))
             steps.append(pair)
             left = BEYOND[min(len(steps), len(BEYOND)) - 1] * abs(change)
             if len(steps) > 1:
@@ -220,6 +228,10 @@ class SpherePlace(NearPlace):
                 if is_settled or not more:
                     return solution
             search.note(solution, solution.error, allowed)
+
+    def _rounding(self, pair: PrincipalPair) -> float:
+        """Of the rates of growth: an entry of S⁻¹AS is a sum of products twice, which may cancel."""
+        return 2 * self.problem.dimension * sys.float_info.epsilon * abs(pair.p) * pair.generator.unit_rate
 
     def _change(self, pair: PrincipalPair, level: int) -> float:
         """What the waves of the next level change in Λ(p), to first order."""

@@ -391,7 +391,8 @@ class _Equations:
         if not np.isfinite(sizes).all():
             raise NoHierarchy(f"got p = {p}; the equations of its moments are beyond floating-point numbers")
         if units is None:
-            _, (units, _) = scipy.linalg.matrix_balance(sizes, permute=False, separate=True)
+            with np.errstate(invalid="ignore"):  # of units beyond an integer, which none are taken for here
+                _, (units, _) = scipy.linalg.matrix_balance(sizes, permute=False, separate=True)
         self.units = units
         down, up = sparse.diags_array(1 / units), sparse.diags_array(units)
         self._terms, self._rest = [(down @ k @ up, g, at) for k, g, at in terms], down @ rest @ up

@@ -32,6 +32,7 @@ from fpsolve.fem.space import Space, first_axis
 from fpsolve.fem.sphere import SphereAxis
 from fpsolve.model import CoefficientMatrix, Jump, LinearSystem, Poisson, Telegraph, White
 from fpsolve.simulation.response import simulated_response
+from tests import random_units
 from tests.oracles import kronecker
 
 FREE = np.array([[0, 1, 0, 0], [-1, -0.1, 0, 0], [0, 0, 0, 1], [0, 0, -2.56, -0.16]])
@@ -153,6 +154,15 @@ def test_what_finer_waves_change_is_told_to_first_order(noise, driven):
     found = [principal_pair(place._generator(level), 1.0) for level in (1, 2)]
     told = place._change(found[0], 2)
     assert told == pytest.approx(found[1].value - found[0].value, rel=0.1)
+
+
+@pytest.mark.parametrize("seed", [7, 18, 29, 161])
+def test_coordinates_of_directions_are_those_of_the_system(seed):
+    """The layers of two modes are the same in other units and coordinates, so that a solve costs the same."""
+    _, problem, units = random_units.drawn(seed)
+    _, width, places = modal_coordinates(problem(random_units.Units(1.0, 1.0, np.eye(4))))
+    _, width_there, places_there = modal_coordinates(problem(units))
+    assert (width_there, *places_there) == pytest.approx((width, *places), rel=1e-3)
 
 
 @pytest.mark.parametrize("power", [1.5, 2.0, 4.0])
