@@ -1,8 +1,9 @@
 """Arithmetic in texts: numbers, names, + − * / **, pi, exp and sqrt.
 
-A text is parsed, and each node of its tree becomes a function here: nothing in it is ever run. A value is a polynomial
-in what the names stand for, at most of degree 3 in the state and 1 in the noise, whose coefficients are Taylor series
-in one parameter. So the matrices, their orders in ε and their derivatives are all exact.
+A text is parsed, and one walk over its tree gives its value: nothing in it is ever run. A value is a polynomial in what
+the names stand for, at most of degree 3 in the state and 1 in the noise, whose coefficients are Taylor series in one
+parameter. So the matrices, their orders in ε and their derivatives are all exact. With series of no coefficients the
+walk only reads which names there are.
 """
 
 from __future__ import annotations
@@ -11,15 +12,15 @@ import ast
 import math
 import re
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from keyword import iskeyword
 from operator import add
-from typing import Any, cast
 
 Series = tuple[float, ...]
-"""Taylor coefficients in one parameter, the value first; all in one calculation have one length."""
+"""Taylor coefficients in one parameter, the value first; all in one calculation have one length, 0 to read alone."""
 Monomial = tuple[tuple[str, ...], str, int]
 """The variables of the state that are multiplied, in order, a noise or "", and the power of ε."""
 NUMBER: Monomial = (), "", 0
@@ -30,7 +31,8 @@ CONSTANTS = {"pi": math.pi}
 _LETTERS = re.compile(r"[A-Za-z0-9_+\-*/().\s]")
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _KNOWN = "write numbers, names, + - * / **, parentheses, pi, exp() and sqrt() only"
-_SUMS, _PRODUCTS, _SIGNS = ("Add", "Sub"), ("Mult", "Div"), {"UAdd": 1.0, "USub": -1.0}
+_MINUS = ast.Sub, ast.Div, ast.USub
+"""What gives an operand the sign −1, which in a product is a division."""
 _TOO_DEEP = f"is nested too deeply; must be at most {MOST_LEVELS} levels; use fewer parentheses and signs"
 
 
@@ -107,7 +109,7 @@ class Form:
     def of(self, function: Callable[[Series], Series]) -> Form:
         """A function of it. Raises `_Unsuitable` where it is no number."""
         if (scalar := self.scalar) is not None:
-            return Form({NUMBER: function(scalar)})
+            return Form({NUMBER: function(scalar) if scalar else scalar})
         has_state, has_noise = (any(key[i] for key in self.parts) for i in (0, 1))
         raise _Unsuitable(*(NOT_LINEAR if has_state else NOT_AFFINE if has_noise else NO_POLYNOMIAL))
 
@@ -119,13 +121,6 @@ def constant(*series: float) -> Form:
 
 def _product(a: Series, b: Series) -> Series:
     return tuple(sum(a[i] * b[k - i] for i in range(k + 1)) for k in range(len(a)))
-
-
-def _inverse(a: Series) -> Series:
-    c = [1 / a[0]]
-    for k in range(1, len(a)):
-        c.append(-sum(c[i] * a[k - i] for i in range(k)) / a[0])
-    return tuple(c)
 
 
 def _exponential(a: Series) -> Series:
@@ -143,22 +138,21 @@ def _logarithm(a: Series, first: float) -> Series:
     return tuple(c)
 
 
-def _real_power(a: Series, power: float) -> Series:
-    """a^r for r that is not whole, and a^(1/2)."""
-    if a[0] < 0:
+def _power(a: Series, power: float) -> Series:
+    """a^r. Raises `_Unsuitable` where it is no real number."""
+    if a[0] < 0 and not power.is_integer():
         raise _Unsuitable(*NOT_REAL)
-    if not any(a[1:]):
-        return (a[0] ** power, *a[1:])
-    c = [a[0] ** power]
-    for k in range(1, len(a)):
+    c = [1 / a[0] if power == -1 else a[0] ** power]
+    for k in range(1, len(a)) if any(a[1:]) else ():
         c.append(sum((power * i - (k - i)) * a[i] * c[k - i] for i in range(1, k + 1)) / (k * a[0]))
-    return tuple(c)
+    return (*c, *a[len(c) :])
 
 
 FUNCTIONS: Mapping[str, Callable[[Series], Series]] = {
     "exp": _exponential,
-    "sqrt": lambda series: _real_power(series, 0.5),
+    "sqrt": partial(_power, power=0.5),
 }
+_INVERSE = partial(_power, power=-1.0)
 RESERVED = (*CONSTANTS, *FUNCTIONS)
 _WAVE = (
     'no rate may depend on the time t: state cos(nu*t) as a noise of the kind "bounded" with sigma = 0, and write its '
@@ -167,39 +161,14 @@ _WAVE = (
 _SMALL = "rates are of small amplitudes: sums of terms of degree 1, or of degree 3 in two variables"
 _REMEDIES = {"sin": _WAVE, "cos": _WAVE, "tan": _WAVE, "abs": _SMALL, "sign": _SMALL, "min": _SMALL, "max": _SMALL}
 _REMEDIES |= {"tanh": _SMALL, "log": "write its value as a parameter", "ln": "write its value as a parameter"}
-_STEPS: Mapping[str, Callable[[Form, Form], Form]] = {
-    "Add": Form.plus,
-    "Sub": lambda total, form: total.plus(form, -1.0),
-    "Mult": Form.times,
-    "Div": lambda total, form: total.times(form.of(_inverse)),
-}
-
-
-@dataclass(frozen=True)
-class _Node:
-    """A part of an expression.
-
-    Attributes:
-        written: how it is written, cut to a readable length.
-        form: its value, of what a walk knows.
-        number: itself, if it is a number with signs, else NaN.
-        summands: of a sum, each with its sign, first to last.
-        exponent: of exp().
-    """
-
-    written: str
-    form: Callable[[_Walk], Form]
-    number: float = math.nan
-    summands: Sequence[tuple[str, _Node]] = ()
-    exponent: _Node | None = None
 
 
 @lru_cache(maxsize=1024)
-def _parsed(text: str) -> tuple[_Node, frozenset[str]]:
-    """An expression in which there is nothing but arithmetic, and its names without those of functions and constants.
+def _parsed(text: str) -> tuple[str, ast.expr]:
+    """An expression in one line, and its tree.
 
     Raises:
-        ExpressionError: it is empty, too long or too deep, or something else.
+        ExpressionError: it is empty, too long or too deep, or has other characters.
     """
     if not text.strip():
         raise ExpressionError("is empty; write a number or an expression")
@@ -220,104 +189,16 @@ def _parsed(text: str) -> tuple[_Node, frozenset[str]]:
         raise ExpressionError(f"cannot be read ({error.msg}); write, for example, -omega**2 * x") from None
     except (ValueError, RecursionError, MemoryError):
         raise ExpressionError(_TOO_DEEP) from None
-    reader = _Reader(line)
-    return reader.visit(tree), frozenset(reader.names)
+    return line, tree
 
 
-class _Operator(ast.NodeVisitor):
-    """The name of a node's operator, as "Add"; empty for what has none."""
-
-    def visit_BinOp(self, node: ast.BinOp) -> str:
-        return type(node.op).__name__
-
-    def generic_visit(self, _: ast.AST) -> str:
-        return ""
-
-
-class _Reader(ast.NodeVisitor):
-    """Makes the nodes of one line; what is no arithmetic, and too many levels, are refused."""
-
-    def __init__(self, line: str) -> None:
-        self.names = set[str]()
-        self._line, self._level = line, 0
-
-    def visit(self, node: ast.AST) -> Any:
-        self._level += 1
-        if self._level > MOST_LEVELS:
-            raise ExpressionError(_TOO_DEEP)
-        made = super().visit(node)
-        self._level -= 1
-        return made
-
-    def _written(self, node: Any) -> str:
-        source = self._line[node.col_offset : node.end_col_offset]
-        return source if len(source) <= 60 else f"{source[:57]}..."
-
-    def generic_visit(self, node: ast.AST) -> _Node:
-        raise ExpressionError(f"has {self._written(node)}, which is no arithmetic; {_KNOWN}")
-
-    def visit_Constant(self, node: ast.Constant) -> _Node:
-        try:
-            number = float(self._line[node.col_offset : node.end_col_offset])
-        except ValueError:  # as of True, 1j and 0x10
-            return self.generic_visit(node)
-        return _Node(self._written(node), lambda walk: constant(number, *walk.rest), number)
-
-    def visit_Name(self, node: ast.Name) -> _Node:
-        if node.id not in RESERVED:
-            self.names.add(node.id)
-        return _Node(self._written(node), lambda walk: walk.named(node.id))
-
-    def visit_UnaryOp(self, node: ast.UnaryOp) -> _Node:
-        sign = _SIGNS.get(type(node.op).__name__)
-        if sign is None:
-            return self.generic_visit(node)
-        inner = self.visit(node.operand)
-        return _Node(self._written(node), lambda walk: Form({}).plus(walk.value(inner), sign), sign * inner.number)
-
-    def visit_BinOp(self, node: ast.BinOp) -> _Node:
-        operator = _Operator()
-        name = operator.visit(node)
-        if name == "Pow":
-            return self._power(node)
-        kinds = next((each for each in (_SUMS, _PRODUCTS) if name in each), None)
-        if kinds is None:
-            return self.generic_visit(node)
-        parts, left = list[tuple[str, _Node]](), cast("Any", node)  # of any length in one level
-        while (name := operator.visit(left)) in kinds:
-            parts.append((name, self.visit(left.right)))
-            left = left.left
-        parts = [("", self.visit(left)), *reversed(parts)]
-        summands = parts if kinds is _SUMS else ()
-        return _Node(self._written(node), lambda walk: walk.chain(parts), summands=summands)
-
-    def _power(self, node: ast.BinOp) -> _Node:
-        try:
-            power = _Reader(self._line).visit(node.right).number
-        except ExpressionError:
-            power = math.nan
-        if not abs(power) <= LARGEST_POWER:
-            must = f"must be a number from -{LARGEST_POWER} to {LARGEST_POWER}"
-            raise ExpressionError(f"has the exponent {self._written(node.right)}; {must}; write the factors")
-        base = self.visit(node.left)
-        return _Node(self._written(node), lambda walk: walk.power(walk.value(base), power))
-
-    def visit_Call(self, node: ast.Call) -> _Node:
-        name = self._written(node.func)
-        if name not in FUNCTIONS:
-            known = f"the functions are {' and '.join(FUNCTIONS)}"
-            remedy = _REMEDIES.get(name.lower(), f"{known}; write * for products")
-            raise ExpressionError(f"has {self._written(node)}, which calls no known function; {remedy}")
-        if len(node.args) != 1:
-            raise ExpressionError(f"has {self._written(node)}, but {name} takes one number; write {name}(...)")
-        inner, function = self.visit(node.args[0]), FUNCTIONS[name]
-        exponent = inner if name == "exp" else None
-        return _Node(self._written(node), lambda walk: walk.value(inner).of(function), exponent=exponent)
-
-
+@lru_cache(maxsize=1024)
 def names_in(text: str) -> frozenset[str]:
     """The names in an expression, without those of functions and constants. Raises `ExpressionError`."""
-    return _parsed(text)[1]
+    names = defaultdict[str, Form](constant, dict.fromkeys(CONSTANTS, constant()))  # series of no coefficients
+    walk = _Walk(text, names, "it")
+    walk.value(walk.tree)
+    return frozenset(names).difference(RESERVED)
 
 
 def evaluate(text: str, names: Mapping[str, Form], place: str) -> Form:
@@ -331,15 +212,15 @@ def evaluate(text: str, names: Mapping[str, Form], place: str) -> Form:
     Raises:
         ExpressionError: it is no arithmetic, has other names, is not finite, or of too high a degree.
     """
-    return _Walk(names, place).value(_parsed(text)[0])
+    walk = _Walk(text, names, place)
+    return walk.value(walk.tree)
 
 
 def summands(text: str, names: Mapping[str, Form], place: str) -> Iterator[tuple[str, Form]]:
     """The terms of an expression that is a sum, as they are written, with their values. Raises `ExpressionError`."""
-    walk, (tree, _) = _Walk(names, place), _parsed(text)
-    for sign, node in tree.summands or [("", tree)]:
-        form = walk.value(node)
-        yield node.written, Form({}).plus(form, -1.0) if sign == "Sub" else form
+    walk = _Walk(text, names, place)
+    for sign, node in _chain(walk.tree, ast.Add, ast.Sub):
+        yield walk.written(node), Form({}).plus(walk.value(node), sign)
 
 
 def log_of(text: str, names: Mapping[str, Form], place: str) -> Series:
@@ -348,35 +229,63 @@ def log_of(text: str, names: Mapping[str, Form], place: str) -> Series:
     Raises:
         ExpressionError: as `evaluate`, or it is not positive.
     """
-    walk, (tree, _) = _Walk(names, place), _parsed(text)
-    scalar = walk.value(tree).scalar
-    if tree.exponent:
-        scalar = walk.value(tree.exponent).scalar
-    elif scalar is not None:
-        if not scalar[0] > 0:
-            raise ExpressionError(f"{place} is {scalar[0]:.6g}; must be > 0; change it or its parameters")
-        each = [form.scalar or (0.0,) for _, form in summands(text, names, place)]
-        scalar = _logarithm(scalar, math.log1p(math.fsum([*(first for first, *_ in each), -1.0])))
+    walk = _Walk(text, names, place)
+    scalar = walk.value(walk.tree).scalar
     if scalar is None:
         raise ExpressionError(f"{place} must be a number or an expression in parameters; leave out the others")
-    return scalar
+    match walk.tree:
+        case ast.Call(func=ast.Name("exp"), args=[exponent]):
+            return walk.value(exponent).scalar or scalar
+    if not scalar[0] > 0:
+        raise ExpressionError(f"{place} is {scalar[0]:.6g}; must be > 0; change it or its parameters")
+    if not 0.5 < scalar[0] < 2:
+        return _logarithm(scalar, math.log(scalar[0]))
+    each = [form.scalar or (0.0,) for _, form in summands(text, names, place)]
+    return _logarithm(scalar, math.log1p(math.fsum([*(first for first, *_ in each), -1.0])))
+
+
+def _chain(node: ast.expr, *kinds: type[ast.operator]) -> list[tuple[float, ast.expr]]:
+    """The operands of a sum, or of a product, with 1 or −1 for what is subtracted, or divided by."""
+    parts = list[tuple[float, ast.expr]]()
+    while isinstance(node, ast.BinOp) and isinstance(node.op, kinds):
+        parts.append((-1.0 if isinstance(node.op, _MINUS) else 1.0, node.right))
+        node = node.left
+    return [(1.0, node), *reversed(parts)]
 
 
 class _Walk:
-    """The values of the nodes of one tree."""
+    """The values of the nodes of one text: what is no arithmetic, and too many levels, are refused."""
 
-    def __init__(self, names: Mapping[str, Form], place: str) -> None:
-        self._names, self._place = names, place
-        length = len(next((series for form in names.values() for series in form.parts.values()), (0.0,)))
-        self.rest: Series = (0.0,) * (length - 1)
+    def __init__(self, text: str, names: Mapping[str, Form], place: str) -> None:
+        self._line, self.tree = _parsed(text)
+        self._names, self._place, self._level = names, place, 0
+        self._length = len(next((series for form in names.values() for series in form.parts.values()), (0.0,)))
 
-    def value(self, node: _Node) -> Form:
-        """Of a node. Raises `ExpressionError`."""
+    def written(self, node: ast.expr) -> str:
+        """How a node is written, cut to a readable length."""
+        source = self._source(node)
+        return source if len(source) <= 60 else f"{source[:57]}..."
+
+    def _source(self, node: ast.expr) -> str:
+        return self._line[node.col_offset : node.end_col_offset]
+
+    def _read(self, node: ast.expr) -> float:
+        """A number with a sign or without; NaN for all else, as for True, 1j and 0x10."""
         try:
-            found = node.form(self)
+            return float(self._source(node).replace(" ", ""))
+        except ValueError:
+            return math.nan
+
+    def value(self, node: ast.expr) -> Form:
+        """The value of a node. Raises `ExpressionError`."""
+        self._level += 1
+        if self._level > MOST_LEVELS:
+            raise ExpressionError(_TOO_DEEP)
+        try:
+            found, (reason, remedy) = self._form(node), NOT_FINITE
             if all(math.isfinite(each) for series in found.parts.values() for each in series):
+                self._level -= 1
                 return found
-            reason, remedy = NOT_FINITE
         except (OverflowError, ZeroDivisionError):
             reason, remedy = NOT_FINITE
         except _Unsuitable as unsuitable:
@@ -385,29 +294,64 @@ class _Walk:
             ", ".join(name for name, form in self._names.items() if any(key[i] for key in form.parts)) for i in (0, 1)
         )
         told = reason.format(states=states, noises=noises)
-        raise ExpressionError(f"the term {node.written} of {self._place} {told}; {remedy}")
+        raise ExpressionError(f"the term {self.written(node)} of {self._place} {told}; {remedy}")
 
-    def named(self, name: str) -> Form:
-        """What a name stands for. Raises `ExpressionError`."""
+    def _form(self, node: ast.expr) -> Form:
+        """The value of a node from those below it. Raises `ExpressionError`, `_Unsuitable`, `ArithmeticError`."""
+        match node:
+            case ast.Constant() if not math.isnan(number := self._read(node)):
+                return self._number(number)
+            case ast.Name(id=name):
+                return self._named(name)
+            case ast.UnaryOp(op=ast.UAdd() | ast.USub() as op, operand=inner):
+                return Form({}).plus(self.value(inner), -1.0 if isinstance(op, _MINUS) else 1.0)
+            case ast.BinOp(op=ast.Add() | ast.Sub()):
+                total = Form({})
+                for sign, each in _chain(node, ast.Add, ast.Sub):
+                    total = total.plus(self.value(each), sign)
+                return total
+            case ast.BinOp(op=ast.Mult() | ast.Div()):
+                total = self._number(1.0)
+                for sign, each in _chain(node, ast.Mult, ast.Div):
+                    total = total.times(self.value(each) if sign > 0 else self.value(each).of(_INVERSE))
+                return total
+            case ast.BinOp(op=ast.Pow()):
+                return self._power(node.left, node.right)
+            case ast.Call():
+                return self._call(node)
+        raise ExpressionError(f"has {self.written(node)}, which is no arithmetic; {_KNOWN}")
+
+    def _number(self, value: float) -> Form:
+        return constant(*(value, *(0.0,) * self._length)[: self._length])
+
+    def _named(self, name: str) -> Form:
         if name in CONSTANTS:
-            return constant(CONSTANTS[name], *self.rest)
-        if name not in self._names:
+            return self._number(CONSTANTS[name])
+        try:
+            return self._names[name]
+        except KeyError:
             known = f"known names: {', '.join(self._names) or 'none'}"
-            raise ExpressionError(f"{self._place} has the unknown name {name}; {known}; add or rename it")
-        return self._names[name]
+            raise ExpressionError(f"{self._place} has the unknown name {name}; {known}; add or rename it") from None
 
-    def chain(self, parts: Sequence[tuple[str, _Node]]) -> Form:
-        """A sum or a product. Raises `_Unsuitable`."""
-        total = self.value(parts[0][1])
-        for sign, each in parts[1:]:
-            total = _STEPS[sign](total, self.value(each))
-        return total
-
-    def power(self, base: Form, power: float) -> Form:
-        """A power of a value. Raises `_Unsuitable`."""
+    def _power(self, base: ast.expr, exponent: ast.expr) -> Form:
+        power = self._read(exponent)
+        if not abs(power) <= LARGEST_POWER:
+            must = f"must be a number from -{LARGEST_POWER} to {LARGEST_POWER}"
+            raise ExpressionError(f"has the exponent {self.written(exponent)}; {must}; write the factors")
+        form = self.value(base)
         if not power.is_integer():
-            return base.of(lambda series: _real_power(series, power))
-        total = constant(1.0, *self.rest)
+            return form.of(partial(_power, power=power))
+        total = self._number(1.0)
         for _ in range(abs(int(power))):
-            total = total.times(base)
-        return total.of(_inverse) if power < 0 else total
+            total = total.times(form)
+        return total.of(_INVERSE) if power < 0 else total
+
+    def _call(self, node: ast.Call) -> Form:
+        name = self.written(node.func)
+        if name not in FUNCTIONS:
+            known = f"the functions are {' and '.join(FUNCTIONS)}"
+            remedy = _REMEDIES.get(name.lower(), f"{known}; write * for products")
+            raise ExpressionError(f"has {self.written(node)}, which calls no known function; {remedy}")
+        if len(node.args) != 1:
+            raise ExpressionError(f"has {self.written(node)}, but {name} takes one number; write {name}(...)")
+        return self.value(node.args[0]).of(FUNCTIONS[name])

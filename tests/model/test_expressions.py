@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from fpsolve.model import expressions
-from fpsolve.model.expressions import ExpressionError, Form, constant, evaluate, log_of, name_fault
+from fpsolve.model.expressions import ExpressionError, Form, constant, evaluate, log_of, name_fault, names_in
 
 VALUES = {"a": 1.3, "b": 0.7, "c": 2.1}
 STATE = {"x": Form({(("x",), "", 0): (1.0,)}), "v": Form({(("v",), "", 0): (1.0,)})}
@@ -76,6 +76,19 @@ def test_the_second_order_of_a_logarithm(law, second):
         assert value == pytest.approx(exact[law[:3]](epsilon), rel=1e-14, abs=1e-16 * ("/" in law))
 
 
+@pytest.mark.parametrize("value", [1e-300, 1e-17, 1e-9, 0.3, 0.9, 1 - 1e-12, 1.7, 40.0])
+def test_the_logarithm_of_a_number(value):
+    """Also far from 1, where R − 1 has few digits of it."""
+    assert log_of(repr(value), {}, "R")[0] == pytest.approx(math.log(value), rel=1e-15)
+
+
+def test_reading_has_no_values():
+    """The names of what could not be computed; what is no arithmetic is refused without them."""
+    assert names_in("1/(a - a) + exp(1e4)*b**-0.5 + pi") == {"a", "b"}
+    with pytest.raises(ExpressionError, match=r"has a.real, which is no arithmetic"):
+        names_in("b + a.real")
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [
@@ -96,6 +109,9 @@ def test_the_second_order_of_a_logarithm(law, second):
         ("x // a", "which is no arithmetic"),
         ("True * x", "has True, which is no arithmetic"),
         ("1j * x", "has 1j, which is no arithmetic"),
+        ("0x10 * x", "has 0x10, which is no arithmetic"),
+        ("exp(*a) * x", "has *a, which is no arithmetic"),
+        ("a**x", "has the exponent x; must be a number from -10 to 10"),
         ("__import__(a)", "has __import__(a), which calls no known function"),
         ("exp", "the unknown name exp"),
         ("pi(x)", "calls no known function"),
