@@ -46,7 +46,7 @@ def of_problem(problem: Problem, rtol: float, p: tuple[float, ...], indices: tup
             moments = solve_moments(solver, [each])
             if moments.failures:
                 continue
-            sizes = [solution.pair.generator.size for solution in solver.near.known.values()]
+            sizes = [solution.pair.generator.size for solution in solver.whole.known.values()]
             value, error = float(moments.value[0]), float(moments.error_estimate[0])
             found[f"Λ({each:g})"] = value, error, solver.scale(each), sizes[0] if len(sizes) == 1 else 0
     for name in indices:

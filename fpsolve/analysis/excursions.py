@@ -297,7 +297,7 @@ class Ladder:
             if number == len(self._pairs):
                 last = self._pairs[-1]
                 try:
-                    self._pairs.append(self._solver.near.finer_pair(last))
+                    self._pairs.append(self._solver.whole.finer_pair(last))
                 except NotConverged:
                     return
             yield self._pairs[number]

@@ -325,7 +325,7 @@ class Slopes:
         """Λ at p. Raises `NotConverged`, `NoSuchExponent`."""
         if p not in self._known:
             ratio, ratio_slope, error = self.solver.ratio(p)
-            pair = (self.solver.near if abs(p) < TINY_P else self.solver).solution(p).pair
+            pair = (self.solver.whole if abs(p) < TINY_P else self.solver).solution(p).pair
             self._known[p] = Slope(p, ratio, ratio_slope, abs(p) * error, second_derivative(pair), pair)
         return self._known[p]
 
@@ -434,7 +434,7 @@ class _Cumulants:
         """K(p) and its error, from ever finer discretisations: for small t it has layers that T has not."""
         if p in self._known:
             return self._known[p]
-        solution = self._solver.near.solution(p)
+        solution = self._solver.whole.solution(p)
         generator, last = solution.pair.generator, math.inf
         with counted(self._solver.budget.countdown(f"E‖x({self.time:g})‖^{p:g}")):
             for _ in range(MOST_FINER):
@@ -578,7 +578,7 @@ def log_moment(
 def finer_or_none(solver: ExponentSolver, pair: PrincipalPair) -> PrincipalPair | None:
     """The pair on a finer discretisation, where it is to be had."""
     with suppress(NotConverged):
-        return solver.near.finer_pair(pair)
+        return solver.whole.finer_pair(pair)
     return None
 
 

@@ -346,7 +346,7 @@ class Gradient:
             errors = changes_of_errors(solution, around, changed)
             sizes = {key: float(np.sum(np.abs(each))) for key, each in errors.items()}
             return _with_errors(values, sizes, solution.error / solver.scale(p))
-        finer = solver.near.finer_pair(solution.pair)
+        finer = solver.whole.finer_pair(solution.pair)
         share = abs(finer.value - solution.pair.value) / solver.scale(p)
         return _compared(
             values, {key: each.value for key, each in _changed(PairDerivatives(finer), along).items()}, share
@@ -356,7 +356,7 @@ class Gradient:
     def lyapunov_exponent(self) -> dict[str, Estimate]:
         """∂λ/∂θ. Raises `NotConverged`, `NoSuchExponent`."""
         solver, along = held_by(self._solver, 0.0, self._along)
-        near = solver.near.near_zero(0.0)
+        near = solver.whole.near_zero(0.0)
         values = {key: each.slope for key, each in self._at_zero.items()}
         if not near.modes_tell:
             share = solver.ratio_alone(0.0)[1] / solver.scales.linear

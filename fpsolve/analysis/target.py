@@ -117,7 +117,7 @@ class Distance:
             refuse_infinite(problem, p)
             solver = self._solver(problem)
             value, error, slopes = ratio_with_slopes(solver, p, self.keys)
-            self._starts = solver.near.known
+            self._starts = solver.whole.known
         finally:
             self._progress()
         scale = solver.scale(p) / abs(p) if p else solver.scales.linear

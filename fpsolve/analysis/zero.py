@@ -201,7 +201,7 @@ def ratio_with_slopes(solver: ExponentSolver, p: float, keys: Sequence[str]) -> 
         return value, error, np.array([known.slope(key) for key in keys]) / p
     held, by_key = held_by(solver, p, {key: solver.problem.derivative(key) for key in keys})
     along = [by_key[key] for key in keys]
-    around = PairDerivatives(held.near.solution(p).pair) if abs(p) >= SMALL_P else held.around_zero
+    around = PairDerivatives(held.whole.solution(p).pair) if abs(p) >= SMALL_P else held.around_zero
     changed = [Changed(around, by) for by in along]
     if abs(p) >= SMALL_P:
         return value, error, np.array([each.value.value / p for each in changed])
@@ -307,7 +307,7 @@ class ZeroField:
         value, error, slopes = ratio_with_slopes(solver, p, [axis.key for axis in self._axes])
         gradient = slopes * np.array([axis.slope(share) for axis, share in zip(self._axes, at, strict=True)])
         if rtol is None:
-            self._before = at, solver.near.known
+            self._before = at, solver.whole.known
         return Sample(at, value, gradient, error, solver.scale(p) / abs(p) if p else solver.scales.linear)
 
     def _between(

@@ -7,20 +7,19 @@ another place than the one that was found: then both are solved.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, field, replace
 from functools import cached_property, partial
-from typing import Annotated, NoReturn, TypeVar
+from typing import Annotated, NamedTuple, NoReturn, TypeVar
 
 import numpy as np
 from pydantic.dataclasses import dataclass as pydantic_dataclass
 
 from fpsolve.budget import Countdown, OverBudget, counted, half_the_memory, under_way
 from fpsolve.errors import FpsolveError, MeshError, NotConverged, SingularMatrix
-from fpsolve.exponent.eigen import BACKWARD_ERROR_LIMIT, PrincipalPair, principal_pair
-from fpsolve.exponent.error import Solution, mode_effects
-from fpsolve.exponent.starts import first, other_centers
-from fpsolve.fem.effects import ModeEffects
+from fpsolve.exponent.eigen import PrincipalPair, principal_pair
+from fpsolve.exponent.error import Solution
+from fpsolve.exponent.starts import Question, Start, first_place, other_centers, other_places, refined
 from fpsolve.fem.factors import MAX_DENSE_UNKNOWNS, one_thread
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.mesh import CylinderMesh
@@ -46,14 +45,6 @@ NEGLIGIBLE_P = 1e-30
 """Pairs at smaller |p| are those at p = 0, from which they differ by less than by rounding."""
 NEIGHBOURS = 6
 """How many known eigenfunctions those of another p are interpolated from."""
-FREE_STAGES = 4
-"""From this number of stages on, no cell is made coarser."""
-SHARE = 0.05
-"""Share of the tolerance that a new discretisation is made for in each direction, so that it serves other p too."""
-ALONE = 0.5
-"""Share of the tolerance in each direction of a discretisation that serves one p only."""
-MOST_GAIN = 1e-3
-"""Least factor by which one stage with cells of the noise aims to reduce the error: a larger fall is foreseen badly."""
 WIDER = 4.0
 """Factor by which the interval of noise with algebraic tails is wider where it tells the error of a narrower one."""
 SURELY_SEEN = 1e-6
@@ -106,7 +97,7 @@ class Budget:
 
 
 @dataclass(frozen=True, eq=False)
-class NearPlace:
+class WholeProblem:
     """Λ(p) of a problem that is solved as a whole, for any number of p.
 
     Args:
@@ -148,7 +139,8 @@ class NearPlace:
         if p not in self.known or (self.mesh is None and not self.is_accurate(self.known[p], allowed)):
             try:
                 with one_thread():
-                    self.known[p] = Search(self, p, allowed, under_way() or self.budget.countdown(f"Λ({p:g})")).solve()
+                    countdown = under_way() or self.budget.countdown(f"Λ({p:g})")
+                    self.known[p] = Search(self, p, allowed, countdown, not under_way()).solve()
             except NotConverged as failure:
                 if tolerance is None:  # a tighter one may be out of reach where this is not
                     self._failed[p] = failure.message
@@ -211,17 +203,6 @@ class NearPlace:
         except NotConverged as failure:
             raise NotConverged(Message(Code.NEAR_ZERO, p=q, reason=failure.message), failure.partial) from failure
 
-    def solve_places(self, search: Search, start: Solution | None) -> Solution:
-        """A solution within a tolerance from a first discretisation, or from a solution that does not suffice.
-
-        Where slow noise may carry the moment in several places, the largest eigenvalue.
-        """
-        places = [search.adapt(start or first(self.problem, search.p, self.rtol))]
-        for center in other_centers(places[0].pair):
-            search.best, search.error, search.share = None, math.inf, math.inf  # those of a lower eigenvalue, maybe
-            places.append(search.adapt(first(self.problem, search.p, self.rtol, center)))
-        return max(places, key=lambda each: each.pair.value)
-
     @cached_property
     def given(self) -> tuple[Generator, Generator]:
         """That of the given mesh, and one of four degrees more, whose error hardly counts beside it."""
@@ -237,13 +218,16 @@ class NearPlace:
     def coarsened(self, solution: Solution, tolerance: Tolerance) -> Space:
         """The discretisation of a solution, or a much smaller one that would do."""
         pair, generator = solution.pair, solution.pair.generator
-        if abs(pair.p) < SMALL_P or generator.size <= WORTH_A_TRY:
+        is_small = abs(pair.p) < SMALL_P or generator.size <= WORTH_A_TRY
+        if is_small or self.problem.dimension > 2:
             return generator.chosen
         smaller = refined(solution, tolerance(pair.p, pair.value), 0)
         return smaller if smaller.size <= TRIM * generator.size else generator.chosen
 
     def may_reuse(self, chosen: Space, q: float, p: float) -> bool:
         """Whether what serves q is likely to serve p, or so small that it is worth a try."""
+        if self.problem.dimension > 2:  # every p has waves of its own
+            return False
         axis, frozen = chosen.xi, frozen_noise(self.problem)
         if chosen.size > WORTH_A_TRY and abs(p - q) > max(0.5, 0.4 * min(abs(p), abs(q))):
             return False
@@ -253,32 +237,57 @@ class NearPlace:
         return away <= MOST_TILT_AWAY
 
 
+def directions(question: Question, found: Sequence[Solution]) -> Iterator[Start]:
+    """Directions of three or four variables."""
+    if question.problem.dimension > 2 and not found:
+        from fpsolve.exponent.modes import sphere_start  # with scikit-fem, which takes long to import
+
+        yield sphere_start(question)
+
+
+STARTS: tuple[Callable[[Question, Sequence[Solution]], Iterator[Start]], ...] = (first_place, directions, other_places)
+"""What yields the places of a question, from what was found in those before."""
+
+
+class Best(NamedTuple):
+    """The solution of a place that is nearest to the tolerance, and its error over what is allowed."""
+
+    solution: Solution
+    share: float
+
+
+class Ended(Exception):
+    """No larger space may be solved on, for a reason other than time."""
+
+    def __init__(self, reason: Message) -> None:
+        super().__init__(str(reason))
+        self.reason = reason
+
+
 @dataclass
 class Search:
-    """A search for the solution at one p within a tolerance: what it has cost, and the best it has found.
+    """A search for the solution at one p within a tolerance, and what it has cost.
 
     Attributes:
-        place: where known solutions are, and what is usual for the problem.
+        whole: where known solutions are, and what is usual for the problem.
+        is_own: whether the countdown is of this p, and not of another number that needs it.
         stages: how many discretisations were solved.
-        best, error, share: the solution nearest to its tolerance, its error, and this over what is allowed.
         failure: why the last discretisation had no solution.
         last: seconds spent before the last stage, and its unknowns.
     """
 
-    place: NearPlace
+    whole: WholeProblem
     p: float
     tolerance: Tolerance
     countdown: Countdown
+    is_own: bool
     stages: int = 0
-    best: Solution | None = None
-    error: float = math.inf
-    share: float = math.inf
     failure: Exception | None = None
     last: tuple[float, int] = (0.0, 0)
 
     def solve(self) -> Solution:
         """A solution within the tolerance, or the one on the given mesh."""
-        if self.countdown is under_way():
+        if not self.is_own:
             return self._solve()
         try:
             with self.countdown.running():
@@ -286,24 +295,41 @@ class Search:
         except OverBudget as failure:
             if failure.countdown is not self.countdown:
                 raise
-            if self.best is not None and self.share <= 1:  # within the tolerance, but for its slope
-                return self.best
-            return self.stop(failure.reason)
+            return self.stop(failure.reason, None)
 
     def _solve(self) -> Solution:
         """A solution, unless the budget ends it."""
-        if self.place.mesh is not None:
-            coarse, fine = self.place.given
+        if self.whole.mesh is not None:
+            coarse, fine = self.whole.given
             pair = self.solve_with(coarse).pair
-            return Solution(pair, self.place.pair_on(fine, self.p, pair))
+            finer = self.whole.pair_on(fine, self.p, pair)
+            return Solution(pair, measured=(abs(finer.value - pair.value),))
         if abs(self.p) < SMALL_P:
-            return self.solve_with(self.place.near_zero(self.p, self.tolerance).pair.generator)
+            return self.solve_with(self.whole.near_zero(self.p, self.tolerance).pair.generator)
         start = None
         for attempt in (self.try_problem_close_by, self.try_nearest_p):
             start = attempt() or start
-            if start is not None and self.place.is_accurate(start, self.tolerance) and not other_centers(start.pair):
+            if start is not None and self.whole.is_accurate(start, self.tolerance) and not other_centers(start.pair):
                 return self.confirm(start)
-        return self.confirm(self.place.solve_places(self, start))
+        return self.confirm(self.solve_places(start))
+
+    def solve_places(self, known: Solution | None) -> Solution:
+        """The largest of all places where the moment may be carried, the first from a solution that does not suffice.
+
+        It is the principal one, as far as the spaces can tell.
+        """
+        question = Question(self.whole.problem, self.p, self.whole.rtol, self.whole.known)
+        found = [] if known is None else [self.adapt(self.after(known), known.pair)]
+        for places in STARTS:
+            for start in places(question, found):
+                found.append(self.adapt(start))
+        return max(found, key=lambda each: each.pair.value)
+
+    def after(self, known: Solution) -> Start:
+        """The place of a solution, with a space that should be within the tolerance."""
+        start = known.start or Start(self.whole.problem, known.pair.generator.chosen)
+        allowed = self.tolerance(self.p, known.pair.value)
+        return start.refined(known, allowed, 0, self.whole.budget.unknowns)
 
     def confirm(self, found: Solution) -> Solution:
         """A solution that agrees with that of halved cells of φ within its error, or within what is allowed.
@@ -312,12 +338,13 @@ class Search:
         none of its modes shows it.
         """
         chosen = found.pair.generator.chosen
-        if self.place.rtol <= SURELY_SEEN or not isinstance(chosen.phi, PhaseAxis):
+        if self.whole.rtol <= SURELY_SEEN or not isinstance(chosen.phi, PhaseAxis):
             return found
         halved = chosen.with_axis(0, chosen.phi.doubled())
-        if halved.size > min(MOST_HALVED, self.place.budget.unknowns):
+        if halved.size > min(MOST_HALVED, self.whole.budget.unknowns):
             return found
-        finer = self.attempt(lambda: Solution(self.pair_on(halved, found.pair))) or self.adapt(halved)
+        start = Start(self.whole.problem, halved)
+        finer = self.attempt(lambda: Solution(start.pair(self.p, found.pair))) or self.adapt(start)
         change = abs(finer.pair.value - found.pair.value)
         if change <= found.error:
             return found
@@ -327,36 +354,33 @@ class Search:
 
     def try_problem_close_by(self) -> Solution | None:
         """The solution with what was chosen for this p in the problem close by, or None."""
-        start, problem = self.place.starts.get(self.p), self.place.problem
+        start, problem = self.whole.starts.get(self.p), self.whole.problem
         if start is None:
             return None
         if _bases(start.pair.generator.problem) != _bases(problem):
             return None
-        return self.attempt(lambda: Solution(self.pair_on(self.place.coarsened(start, self.tolerance), start.pair)))
+        coarsened = Start(problem, self.whole.coarsened(start, self.tolerance))
+        return self.attempt(lambda: Solution(coarsened.pair(self.p, start.pair)))
 
     def try_nearest_p(self) -> Solution | None:
         """The solution with what was chosen for the nearest p, where that is likely to do."""
-        nearest = min(self.place.known, key=lambda q: abs(q - self.p), default=None)
+        nearest = min(self.whole.known, key=lambda q: abs(q - self.p), default=None)
         if nearest is None:
             return None
-        known = self.place.known[nearest]
-        generator, chosen = known.pair.generator, self.place.coarsened(known, self.tolerance)
+        known = self.whole.known[nearest]
+        generator, chosen = known.pair.generator, self.whole.coarsened(known, self.tolerance)
         if nearest == self.p and chosen is generator.chosen:
             return known
-        if not self.place.may_reuse(chosen, nearest, self.p):
+        if not self.whole.may_reuse(chosen, nearest, self.p):
             return None
-        is_same, problem = chosen is generator.chosen, self.place.problem
+        is_same, problem = chosen is generator.chosen, self.whole.problem
         return self.attempt(lambda: self.solve_with(generator if is_same else Generator(problem, chosen)))
 
     def solve_with(self, generator: Generator) -> Solution:
         """The solution with a generator, from those around p, or from the nearest one."""
-        known = (solution.pair for solution in self.place.known.values())
+        known = (solution.pair for solution in self.whole.known.values())
         near = sorted(known, key=lambda pair: abs(pair.p - self.p))[:NEIGHBOURS]
-        return Solution(self.place.pair_on(generator, self.p, near))
-
-    def pair_on(self, chosen: Space, start: PrincipalPair | None) -> PrincipalPair:
-        """The principal pair on a discretisation."""
-        return principal_pair(Generator(self.place.problem, chosen), self.p, start=start)
+        return Solution(self.whole.pair_on(generator, self.p, near))
 
     def attempt(self, solve: Callable[[], Found]) -> Found | None:
         """What is solved, or None where a discretisation does not have it, and the `failure` tells why."""
@@ -366,74 +390,64 @@ class Search:
             self.failure = failure.with_traceback(None)  # which would keep this search, and all that it has found
             return None
 
-    def adapt(self, start: Solution | Space) -> Solution:
-        """A solution within the tolerance, the tilted density sought where a first discretisation, or a solution, is.
+    def adapt(self, start: Start, near: PrincipalPair | None = None) -> Solution:
+        """A solution within the tolerance at one place: solve, judge, and stop or refine.
+
+        Args:
+            start: the place.
+            near: a pair of another space to begin with.
 
         Raises:
             NotConverged: the budget does not suffice, or rounding is larger than the tolerance; `partial` is the best
                 `Solution`, or None.
         """
-        if isinstance(start, Solution):
-            chosen, pair = refined(start, self.tolerance(self.p, start.pair.value), 0), start.pair
-        else:
-            chosen, pair = start, None
-        while True:
-            self.check(chosen)
-            pair = self.attempt(partial(self.pair_on, chosen, pair))
-            if pair is None:
-                chosen = chosen.doubled(effects_of(self.failure))
-                continue
-            solution, allowed = Solution(pair), self.tolerance(self.p, pair.value)
-            seems_enough = solution.error_by_modes <= allowed
-            error = solution.error if seems_enough else solution.error_by_modes
-            if error <= allowed:
-                return solution
-            self.note(solution, error, allowed)
-            goal = max(allowed, MOST_GAIN * error) if chosen.xi.lines.size else allowed
-            chosen = chosen.enriched() if seems_enough else self.affordable(solution, goal)
-
-    def affordable(self, solution: Solution, goal: float) -> Space:
-        """A refined discretisation; where it takes more unknowns than there are, one that does for this p alone."""
-        found = refined(solution, goal, self.stages)
-        if found.size <= self.place.budget.unknowns:
-            return found
-        return refined(solution, ALONE / SHARE * goal, self.stages)
+        best: Best | None = None
+        try:
+            while True:
+                self.check(start.space)
+                near = self.attempt(partial(start.pair, self.p, near))
+                if near is None:
+                    start = start.doubled(self.failure)
+                    continue
+                allowed = self.tolerance(self.p, near.value)
+                solution = start.judged(near, allowed)
+                if solution.error <= allowed and start.is_enough(solution):
+                    return solution
+                if solution.error / allowed < (best.share if best else math.inf):
+                    best = Best(solution, solution.error / allowed)
+                if near.rounding > allowed:
+                    raise Ended(Message(Code.ROUNDED, size=near.rounding))
+                start = start.refined(solution, allowed, self.stages, self.whole.budget.unknowns)
+        except (OverBudget, Ended) as failure:
+            if best is not None and best.share <= 1:  # within the tolerance, but for its slope
+                return best.solution
+            if isinstance(failure, OverBudget) and not (self.is_own and failure.countdown is self.countdown):
+                raise
+            return self.stop(failure.reason, best)
 
     def check(self, chosen: Space) -> None:
         """Refuse a stage beyond the budget, and count it."""
-        size, spent = chosen.size, self.countdown.spent
-        if size > self.place.budget.unknowns:
-            self.stop(Message(Code.UNKNOWNS_SPENT, unknowns=size, most=self.place.budget.unknowns))
+        size, spent, most = chosen.size, self.countdown.spent, self.whole.budget.unknowns
+        if size > most:
+            raise Ended(Message(Code.UNKNOWNS_SPENT, unknowns=size, most=most))
         seconds = spent + (spent - self.last[0]) * (size / max(self.last[1], 1)) ** GROWTH
         if self.last[1] and seconds > self.countdown.seconds:
             raise OverBudget(self.countdown, Message(Code.SECONDS_SPENT, seconds=seconds, most=self.countdown.seconds))
         if self.stages >= MAX_STAGES:
-            self.stop(Message(Code.MESHES_SPENT, count=MAX_STAGES))
+            raise Ended(Message(Code.MESHES_SPENT, count=MAX_STAGES))
         self.last, self.stages = (spent, size), self.stages + 1
 
-    def note(self, solution: Solution, error: float, allowed: float) -> None:
-        """Keep the best solution; stop where only rounding is left."""
-        if error / allowed < self.share:
-            self.best, self.error, self.share = solution, error, error / allowed
-        if solution.pair.rounding > allowed:
-            self.stop(Message(Code.ROUNDED, size=solution.pair.rounding))
-
-    def stop(self, reason: Message) -> NoReturn:
+    def stop(self, reason: Message, best: Best | None) -> NoReturn:
         """Raise `NotConverged` with the best solution."""
-        if best := self.best:
-            reached = {"value": best.pair.value, "error": self.error, "size": self.share}
-            told = Message(Code.BUDGET_SPENT, p=self.p, reason=reason, **reached)
+        if best is not None:
+            pair, error = best.solution.pair, best.solution.error
+            told = Message(Code.BUDGET_SPENT, p=self.p, reason=reason, value=pair.value, error=error, size=best.share)
         else:
             last, is_thin = self.failure, isinstance(self.failure, NotConverged)
             said = last.message.advising(None) if isinstance(last, FpsolveError) else last and str(last)
             told = Message(Code.NOTHING_RESOLVED, p=self.p, reason=reason, is_thin=is_thin, last=said)
-        raise NotConverged(told, best, None if reason.code is Code.ROUNDED else Remedy.BUDGET)
-
-
-def effects_of(failure: Exception | None) -> Sequence[ModeEffects | None]:
-    """Those of the pair that a failed search has reached; nothing where there is none."""
-    pair = getattr(failure, "partial", None)
-    return mode_effects(pair) if pair is not None and pair.residual <= BACKWARD_ERROR_LIMIT else ()
+        remedy = None if reason.code is Code.ROUNDED else Remedy.BUDGET
+        raise NotConverged(told, best and best.solution, remedy)
 
 
 def widened(generator: Generator) -> Space:
@@ -444,17 +458,6 @@ def widened(generator: Generator) -> Space:
     steps = WIDER ** np.linspace(0, 1, 4)[1:]
     wide = np.concatenate([(lines[0] * steps)[::-1], lines, lines[-1] * steps])
     return chosen.with_axis(1, chosen.xi.between(wide))
-
-
-def refined(solution: Solution, tolerance: float, stages: int) -> Space:
-    """A discretisation on which every cell should lack no more than its share of the tolerance."""
-    pair, share = solution.pair, SHARE * tolerance
-    chosen = pair.generator.chosen
-    new = chosen.refined(solution.effects, share, stages < FREE_STAGES)
-    if chosen.xi.lines.size:
-        lower, upper = solution.truncation
-        new = new.with_axis(1, new.xi.reaching(lower > share, upper > share))
-    return new if new.size > chosen.size or solution.error_by_modes <= tolerance else new.raised()
 
 
 def _bases(problem: Problem) -> list[str]:

@@ -4,9 +4,9 @@ For a real shift σ > Λ the resolvent (σ − L)⁻¹ is a positive operator wh
 seen from the right, Λ is the nearest eigenvalue. From there, or quicker from the pair at a neighbouring p,
 two-sided Rayleigh quotient iteration converges cubically. That it found the principal pair is checked by the one
 property that no other pair has: T > 0 and T* > 0 (Perron-Frobenius; one of the two is enough), as far as a mesh can
-tell. It cannot where slow noise has two places between which it hardly ever passes; `NearPlace` looks at both. Nor can
-it for noise with states, or where the phase rests, so that every search begins on the right there, or at the pair of
-a neighbouring p and must reach its tangent: Λ is convex.
+tell. It cannot where slow noise has two places between which it hardly ever passes: both are looked at, see `starts`.
+Nor can it for noise with states, or where the phase rests, so that every search begins on the right there, or at the
+pair of a neighbouring p and must reach its tangent: Λ is convex.
 """
 
 from __future__ import annotations

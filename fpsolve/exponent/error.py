@@ -147,21 +147,38 @@ def checked(estimate: Estimate, remedy: Remedy, p: float | None = None) -> Estim
     return estimate
 
 
+class ErrorParts(NamedTuple):
+    """Estimates of |error of Λ(p)| by where it comes from.
+
+    Attributes:
+        modes: functions that the space lacks: the effects of the highest modes, or what finer functions change.
+        ends: the ends of an interval of the noise.
+        rounding: a bound.
+        search: what is left of a correction by finer functions of directions, or shown by halved cells of φ.
+    """
+
+    modes: float
+    ends: float
+    rounding: float
+    search: float
+
+
 @dataclass(frozen=True, eq=False)
 class Solution:
     """Λ(p) with the parts of its error.
 
     Attributes:
         pair: the principal pair.
-        finer: that on a finer mesh, which measures the error of a given mesh: it may have few modes.
-        search: what the value may still lack: of a correction by finer waves, or by halved cells.
-        measured: what finer functions change, in the place of the effects of the highest modes; None where these tell.
+        search: see `ErrorParts`.
+        measured: what finer functions of each axis, or of all, change; None where the effects of the highest modes
+            tell.
+        start: the place where it was found, and its functions; None where these are just those of the pair.
     """
 
     pair: PrincipalPair
-    finer: PrincipalPair | None = None
     search: float = 0.0
-    measured: float | None = None
+    measured: tuple[float, ...] | None = None
+    start: Any = None
 
     @cached_property
     def effects(self) -> tuple[ModeEffects | None, ...]:
@@ -174,27 +191,20 @@ class Solution:
         return truncation(self.pair)
 
     @cached_property
+    def parts(self) -> ErrorParts:
+        """Estimates of what the error of `pair.value` comes from."""
+        of_axes = [each.error for each in self.effects if each] if self.measured is None else self.measured
+        return ErrorParts(sum(of_axes), sum(self.truncation), self.pair.rounding, self.search)
+
+    @property
     def error(self) -> float:
-        """Estimate of the error of `pair.value`: discretisation, truncation and rounding."""
-        if self.finer is not None:
-            return abs(self.finer.value - self.pair.value) + self._other
-        return self.error_by_modes
+        """Estimate of the error of `pair.value`, the sum of its parts."""
+        return sum(self.parts)
 
     @property
     def modes_tell(self) -> bool:
-        """Whether the error is that by the highest modes."""
-        is_whole = self.measured is None and self.finer is None
-        return is_whole and not self.pair.space.xi.lines.size
-
-    @cached_property
-    def error_by_modes(self) -> float:
-        """The same from the highest modes alone."""
-        own = sum(each.error for each in self.effects if each) if self.measured is None else self.measured
-        return own + self._other
-
-    @cached_property
-    def _other(self) -> float:
-        return sum(self.truncation) + self.pair.rounding + self.search
+        """Whether the error is that by the highest modes alone, so that it has derivatives."""
+        return self.measured is None and not self.pair.space.xi.lines.size
 
 
 @dataclass(frozen=True, eq=False)

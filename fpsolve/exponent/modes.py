@@ -17,18 +17,16 @@ import math
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
 import scipy.linalg
 
 from fpsolve.arrays import FloatArray
-from fpsolve.errors import NoHierarchy, NotConverged
-from fpsolve.exponent.adapt import SHARE, NearPlace, Search
+from fpsolve.errors import NoHierarchy
 from fpsolve.exponent.eigen import PrincipalPair, principal_pair
 from fpsolve.exponent.error import Solution, mode_effects
-from fpsolve.fem.effects import ModeEffects
+from fpsolve.exponent.starts import SHARE, Question, Start
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.harmonics import HarmonicAxis
 from fpsolve.fem.noise_axes import CountedAxis
@@ -168,86 +166,115 @@ def first_order_change(pair: PrincipalPair, finer: Generator, axis: int, new: An
 
 
 @dataclass(frozen=True, eq=False)
-class SpherePlace(NearPlace):
-    """Λ(p) of a system of dimension 3 or 4; arguments as in `NearPlace`."""
+class SphereStart(Start):
+    """Directions of three or four variables, by elements, or none, and waves of a degree.
 
-    _levels: list[Generator] = field(init=False, default_factory=list)
-    _pairs: list[PrincipalPair] = field(init=False, default_factory=list)
+    Attributes:
+        before: solutions with the same elements and functions of the noise, but waves of lower degrees.
+        enough: the first solution within the tolerance.
+        generators: L(p) with the same elements, by the degree of the waves.
+        pairs: those at other p with the waves of the lowest degree.
+    """
 
-    def may_reuse(self, chosen: Space, q: float, p: float) -> bool:
-        """False: every p has waves of its own."""
-        return False
+    before: tuple[Solution, ...] = ()
+    enough: Solution | None = None
+    generators: dict[int, Generator] = field(default_factory=dict)
+    pairs: list[PrincipalPair] = field(default_factory=list)
 
-    def coarsened(self, solution: Solution, tolerance: Any) -> Space:
-        return solution.pair.generator.chosen
+    @property
+    def generator(self) -> Generator:
+        waves = self.space.phi.waves
+        if waves not in self.generators:
+            self.generators[waves] = Generator(self.problem, self.space)
+        return self.generators[waves]
 
-    def solve_places(self, search: Search, start: Solution | None) -> Solution:
-        """From the coarsest space on."""
-        if not self._levels:
-            noises = (first_axis(noise, -math.log10(self.rtol)) for noise in self.problem.coloured.parts.values())
-            self._begin(Space((first_directions(self.problem), *noises)))
-        steps = list[PrincipalPair]()
-        pair: PrincipalPair | None = None
-        enough: Solution | None = None
-        level, more = 0, MOST_FOR_SLOPES
-        while True:
-            chosen = self._chosen(level)
-            try:
-                search.check(chosen)
-            except NotConverged:
-                if enough is None:
-                    raise
-                return enough
-            pair = search.attempt(partial(self._pair, level, search, pair))
-            if pair is None:
-                level, steps = level + 1, []
-                continue
-            allowed = search.tolerance(search.p, pair.value)
-            effects = mode_effects(pair)
-            errors = self._errors(pair, effects, allowed)
-            if sum(errors) > 0.5 * allowed:
-                self._begin(self._finer(chosen, effects, errors, allowed))
-                level, steps = max(0, level - 1), []
-                continue
-            level += 1
-            change = self._change(pair, level)
-            pair = replace(pair, correction=change, rounding=pair.rounding + self._rounding(pair))
-            steps.append(pair)
-            left = BEYOND[min(len(steps), len(BEYOND)) - 1] * abs(change)
-            if len(steps) > 1:
-                waves = [each.space.phi.waves for each in steps]
-                uncorrected = left_of(waves, [each.eigenvalue for each in steps])
-                step, beyond = abs(pair.value - steps[-2].value), left_of(waves, [each.value for each in steps])
-                left = max(left, beyond, LEFT * step, LEFT * uncorrected)
-            if enough is not None:  # of Λ, not of Λ′
-                left = min(left, enough.search + abs(pair.value - enough.pair.value))
-            solution = Solution(pair, search=left, measured=sum(errors))
-            if solution.error <= allowed:
-                slopes, enough, more = [each.derivative for each in steps[-2:]], enough or solution, more - 1
-                is_settled = len(slopes) > 1 and np.ptp(slopes) <= SETTLED_SLOPE * abs(slopes[-1])
-                if is_settled or not more:
-                    return solution
-            search.note(solution, solution.error, allowed)
+    def _with(self, more: int, **changes: Any) -> SphereStart:
+        """That with waves of higher degrees."""
+        waves = max(self.space.phi.waves + more, FIRST_WAVES)
+        return replace(self, space=self.space.with_axis(0, replace(self.space.phi, waves=waves)), **changes)
+
+    def pair(self, p: float, near: PrincipalPair | None) -> PrincipalPair:
+        """The pair, from that of waves of a lower degree, or from p to p since p = 0."""
+        generator = self.generator
+        if near is not None:
+            return principal_pair(generator, p, start=near)
+        known = [pair for pair in self.pairs if pair.generator is generator] or [principal_pair(generator, 0.0)]
+        closest = min(known, key=lambda pair: abs(pair.p - p)).p
+        steps = math.ceil(abs(p - closest) / LARGEST_STEP)
+        for k in range(1, steps + 1):
+            sides = sorted(known, key=lambda pair: abs(pair.p - p))[:2]
+            known.append(principal_pair(generator, closest + k / steps * (p - closest), start=sides))
+        self.pairs[:] = known
+        return min(known, key=lambda pair: abs(pair.p - p))
+
+    def judged(self, pair: PrincipalPair, allowed: float) -> Solution:
+        """The pair, corrected by what the next waves change, with what is left then; first the other parts of it."""
+        of_axes, start = self._of_axes(pair, allowed), replace(self, before=(), enough=None)
+        if sum(of_axes) > 0.5 * allowed:
+            return Solution(pair, math.inf, of_axes, start)
+        change = self.change(pair)
+        pair = replace(pair, correction=change, rounding=pair.rounding + self._rounding(pair))
+        steps = [*(each.pair for each in self.before), pair]
+        left = BEYOND[min(len(steps), len(BEYOND)) - 1] * abs(change)
+        if len(steps) > 1:
+            waves = [each.space.phi.waves for each in steps]
+            uncorrected = left_of(waves, [each.eigenvalue for each in steps])
+            step, beyond = abs(pair.value - steps[-2].value), left_of(waves, [each.value for each in steps])
+            left = max(left, beyond, LEFT * step, LEFT * uncorrected)
+        if self.enough is not None:  # of Λ, not of Λ′
+            left = min(left, self.enough.search + abs(pair.value - self.enough.pair.value))
+        return Solution(pair, left, of_axes, start)
+
+    def is_enough(self, solution: Solution) -> bool:
+        """Whether Λ′, which is not corrected, has settled, or as many waves as it may take were added."""
+        slopes = [each.pair.derivative for each in (*self.before, solution)][-2:]
+        is_settled = len(slopes) > 1 and float(np.ptp(slopes)) <= SETTLED_SLOPE * abs(slopes[-1])
+        first = self.enough.pair.space.phi.waves if self.enough else self.space.phi.waves
+        return is_settled or self.space.phi.waves >= first + 2 * (MOST_FOR_SLOPES - 1)
+
+    def doubled(self, failure: Exception | None) -> SphereStart:
+        return self._with(2, before=())
+
+    def refined(self, solution: Solution, goal: float, stages: int, most: int) -> SphereStart:
+        """Waves of the next degree; or other elements and functions of the noise, with waves of the degree before."""
+        if solution.search < math.inf:
+            enough = self.enough or (solution if solution.error <= goal else None)
+            return self._with(2, before=(*self.before, solution), enough=enough)
+        effects, of_axes = solution.effects, solution.measured or ()
+        share, (phi, *noises) = SHARE * goal, self.space.axes
+        finer = [
+            axis
+            if error <= share or each is None
+            else axis.enriched()
+            if error < each.error
+            else axis.refined(each, share, False)
+            for axis, each, error in zip(noises, effects[1:], of_axes[1:], strict=True)
+        ]
+        found = Space((phi.finer_elements() if of_axes[0] > 0.1 * goal else phi, *finer))
+        found = found if found.size > self.space.size else self.space.enriched()
+        self.generators.clear()
+        self.pairs.clear()
+        return SphereStart(self.problem, found, enough=self.enough)._with(phi.waves - 2 - found.phi.waves)
+
+    def change(self, pair: PrincipalPair) -> float:
+        """What waves of the next degree change in Λ(p), to first order."""
+        finer = self._with(2).generator
+        return first_order_change(pair, finer, 0, finer.phi.degrees > pair.space.phi.waves)
 
     def _rounding(self, pair: PrincipalPair) -> float:
         """Of the rates of growth: an entry of S⁻¹AS is a sum of products twice, which may cancel."""
         return 2 * self.problem.dimension * sys.float_info.epsilon * abs(pair.p) * pair.generator.unit_rate
 
-    def _change(self, pair: PrincipalPair, level: int) -> float:
-        """What the waves of the next level change in Λ(p), to first order."""
-        generator = self._generator(level)
-        return first_order_change(pair, generator, 0, generator.phi.degrees > pair.space.phi.waves)
-
-    def _errors(self, pair: PrincipalPair, effects: Sequence[ModeEffects | None], allowed: float) -> list[float]:
+    def _of_axes(self, pair: PrincipalPair, allowed: float) -> tuple[float, ...]:
         """Of the elements and of each noise: the effects of the highest modes, or the geometric mean of these and of
         what finer functions change, `MEASURED` of it at least.
 
         Effects are too large where T* has layers that T, and so Λ(p), knows nothing of.
         """
-        errors, chosen = [each.error if each else 0.0 for each in effects], pair.generator.chosen
+        errors = [each.error if each else 0.0 for each in mode_effects(pair)]
         if sum(errors) <= 0.5 * allowed:
-            return errors
-        for k, (axis, error) in enumerate(zip(chosen.axes, errors, strict=True)):
+            return tuple(errors)
+        for k, (axis, error) in enumerate(zip(self.space.axes, errors, strict=True)):
             if error <= SHARE * allowed:
                 continue
             if k == 0:
@@ -258,45 +285,15 @@ class SpherePlace(NearPlace):
                 new = np.arange(finer.size) >= axis.size
             else:
                 continue
-            change = first_order_change(pair, Generator(self.problem, chosen.with_axis(k, finer)), k, new)
+            change = first_order_change(pair, Generator(self.problem, self.space.with_axis(k, finer)), k, new)
             errors[k] = min(error, max(MEASURED * abs(change), math.sqrt(error * abs(change))))
-        return errors
+        return tuple(errors)
 
-    def _begin(self, chosen: Space) -> None:
-        """Other elements and functions of the noise, the waves from the coarsest on."""
-        coarsest = chosen.with_axis(0, replace(chosen.phi, waves=FIRST_WAVES))
-        self._levels[:] = [Generator(self.problem, coarsest)]
 
-    def _chosen(self, level: int) -> Space:
-        first = self._levels[0].chosen
-        return first.with_axis(0, replace(first.phi, waves=first.phi.waves + 2 * level))
-
-    def _finer(self, chosen: Space, effects: Sequence[Any], errors: Sequence[float], allowed: float) -> Space:
-        share = SHARE * allowed
-        noises = (
-            axis if error <= share else axis.enriched() if error < each.error else axis.refined(each, share, False)
-            for axis, each, error in zip(chosen.noises, effects[1:], errors[1:], strict=True)
-        )
-        found = Space((chosen.phi.finer_elements() if errors[0] > 0.1 * allowed else chosen.phi, *noises))
-        return found if found.size > chosen.size else chosen.enriched()
-
-    def _generator(self, level: int) -> Generator:
-        while len(self._levels) <= level:
-            self._levels.append(Generator(self.problem, self._chosen(len(self._levels))))
-        return self._levels[level]
-
-    def _pair(self, level: int, search: Search, coarse: PrincipalPair | None) -> PrincipalPair:
-        """The pair at p on one level, from that on a coarser one, or from p to p since p = 0."""
-        generator, p = self._generator(level), search.p
-        if coarse is not None:
-            return principal_pair(generator, p, start=coarse)
-        near = [pair for pair in self._pairs if pair.generator is generator]
-        if not near:
-            near = [principal_pair(generator, 0.0)]
-        closest = min(near, key=lambda pair: abs(pair.p - p)).p
-        steps = math.ceil(abs(p - closest) / LARGEST_STEP)
-        for k in range(1, steps + 1):
-            sides = sorted(near, key=lambda pair: abs(pair.p - p))[:2]
-            near.append(principal_pair(generator, closest + k / steps * (p - closest), start=sides))
-        self._pairs[:] = near
-        return min(near, key=lambda pair: abs(pair.p - p))
+def sphere_start(question: Question) -> SphereStart:
+    """The coarsest waves, with the elements and functions of the noise of the nearest p if one is known."""
+    for _, known in sorted(question.known.items(), key=lambda each: abs(each[0] - question.p)):
+        if isinstance(start := known.start, SphereStart):
+            return start._with(-start.space.phi.waves)
+    noises = (first_axis(noise, -math.log10(question.rtol)) for noise in question.problem.coloured.parts.values())
+    return SphereStart(question.problem, Space((first_directions(question.problem), *noises)))

@@ -20,8 +20,8 @@ from fpsolve.data import Result, dataset
 from fpsolve.errors import NoHierarchy, NoSuchExponent, NotConverged
 from fpsolve.exponent.adapt import (
     Budget,
-    NearPlace,
     Tolerance,
+    WholeProblem,
     solved_p,
 )
 from fpsolve.exponent.eigen import PairDerivatives, PrincipalPair, second_derivative, slope_rounding
@@ -170,7 +170,7 @@ class ExponentSolver:
         mesh: a mesh for all p; None chooses a discretisation for each p that meets rtol.
         rtol: |error| ≤ rtol·max(|Λ|, the terms of Eq. (37) before they cancel).
         budget: what the choice of a discretisation may cost.
-        starts: solutions of a problem with parameters close by, by their p, see `NearPlace`.
+        starts: solutions of a problem with parameters close by, by their p, see `WholeProblem`.
 
     Attributes:
         slope_errors: of Λ′(p), by p.
@@ -209,15 +209,12 @@ class ExponentSolver:
         raise ValueError(f"rtol is {shown(self.rtol)}; it must be a positive number such as 1e-8")
 
     @cached_property
-    def near(self) -> NearPlace:
+    def whole(self) -> WholeProblem:
         """What solves Λ(p); of several classes that of the one with the largest λ."""
         if self.classes:
-            return max(self.classes, key=lambda each: each.lyapunov_exponent().value).near
-        if self.problem.dimension > 2:
-            from fpsolve.exponent.modes import SpherePlace  # with scikit-fem, which takes long to import
-
-            return SpherePlace(self.problem, **self._own)
-        return NearPlace(self.problem, mesh=self.mesh, starts=self.starts, **self._own)
+            return max(self.classes, key=lambda each: each.lyapunov_exponent().value).whole
+        starts = {} if self.problem.dimension > 2 else self.starts
+        return WholeProblem(self.problem, mesh=self.mesh, starts=starts, **self._own)
 
     @property
     def refinement(self) -> Remedy:
@@ -267,7 +264,7 @@ class ExponentSolver:
         self._refuse_negative(point)
         if not self.classes:
             try:
-                found = self.near.solution(point, tolerance)
+                found = self.whole.solution(point, tolerance)
             except NotConverged as failure:
                 if failure.reason.code is Code.BUDGET_SPENT:  # which tells a value
                     self._witness(point, failure.reason.data["value"], failure.reason.data["error"])
@@ -460,7 +457,7 @@ class ExponentSolver:
         with one_thread():
             if solution.modes_tell:
                 return slope_error(solution.pair)
-            finer = self.near.finer_pair(solution.pair)
+            finer = self.whole.finer_pair(solution.pair)
             return 2 * abs(finer.derivative - solution.pair.derivative) + slope_rounding(solution.pair)
 
     def lyapunov_exponent(self) -> Estimate:
@@ -502,25 +499,25 @@ class ExponentSolver:
     @cached_property
     def around_zero(self) -> PairDerivatives:
         """The pair at p = 0 and its derivatives. Raises `NotConverged`."""
-        return PairDerivatives(self.near.solution(0.0).pair)
+        return PairDerivatives(self.whole.solution(0.0).pair)
 
     @cached_property
     def finer_around_zero(self) -> PairDerivatives:
         """That of a finer discretisation, for algebraic tails of a wider one. Raises `NotConverged`."""
-        return PairDerivatives(self.near.finer_pair(self.around_zero.pair))
+        return PairDerivatives(self.whole.finer_pair(self.around_zero.pair))
 
     @one_number("Λ({0:g})/{0:g}")
     def ratio(self, p: float, tolerance: Tolerance | None = None) -> tuple[float, float, float]:
         """Λ(p)/p, its derivative in p, and the error of the first; λ at p = 0."""
         value, error = self.ratio_alone(p, tolerance)
         if abs(p) < TINY_P:  # ∫₀¹ s Λ″(sp) ds, by one point of Gauss
-            return value, 0.5 * second_derivative(self.near.solution(p * 2 / 3, tolerance).pair), error
+            return value, 0.5 * second_derivative(self.whole.solution(p * 2 / 3, tolerance).pair), error
         return value, (self._nearest(p, tolerance).pair.derivative - value) / p, error
 
     def _nearest(self, p: float, tolerance: Tolerance | None) -> Solution:
         if self.classes:
             return self.solution(p, tolerance)
-        return self.near.solution(p, tolerance)
+        return self.whole.solution(p, tolerance)
 
     def ratio_alone(self, p: float, tolerance: Tolerance | None = None) -> tuple[float, float]:
         """Λ(p)/p and its error.
@@ -536,8 +533,8 @@ class ExponentSolver:
         if self.classes:
             return max(each.ratio_alone(p, tolerance) for each in self.classes)
         points = {p * (0.5 + shift) for shift in (-0.5 / math.sqrt(3), 0.5 / math.sqrt(3))}
-        pairs = [self.near.solution(point, tolerance).pair for point in points]
-        near = self.near.near_zero(p, tolerance)
+        pairs = [self.whole.solution(point, tolerance).pair for point in points]
+        near = self.whole.near_zero(p, tolerance)
         error = near.error / abs(near.pair.p) + slope_rounding(pairs[0])
         return float(np.mean([pair.derivative for pair in pairs])) + near.pair.correction / near.pair.p, error
 

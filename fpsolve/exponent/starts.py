@@ -1,16 +1,22 @@
-"""Where a search for Λ(p) starts: a small space for the values of the noise that carry a moment, and other values."""
+"""Where a moment may be carried: functions that yield the places where a search for Λ(p) starts, see `adapt.STARTS`.
+
+Λ(p) is the largest over these places. A place has a first space, small, for the values of the noise, or the directions,
+that carry the moment there, and says how what is found on a space is judged, and which space is next.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fpsolve.exponent.eigen import PrincipalPair
+from fpsolve.exponent.eigen import BACKWARD_ERROR_LIMIT, PrincipalPair, principal_pair
+from fpsolve.exponent.error import Solution, mode_effects
 from fpsolve.exponent.fields import noise_marginal
-from fpsolve.fem.effects import MOST_DEGREE
+from fpsolve.fem.effects import MOST_DEGREE, ModeEffects
+from fpsolve.fem.generator import Generator
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.fem.noise_axes import CellAxis, PolynomialAxis
 from fpsolve.fem.pairs import PairAxis
@@ -23,8 +29,111 @@ from fpsolve.theory.frozen import frozen_noise, steady_places, swing
 
 REACH = 12.0
 """Standard deviations on both sides, up to which the first cells of noise with algebraic tails are."""
+FREE_STAGES = 4
+"""From this number of stages on, no cell is made coarser."""
+SHARE = 0.05
+"""Share of the tolerance that a new discretisation is made for in each direction, so that it serves other p too."""
+ALONE = 0.5
+"""Share of the tolerance in each direction of a discretisation that serves one p only."""
+MOST_GAIN = 1e-3
+"""Least factor by which one stage with cells of the noise aims to reduce the error: a larger fall is foreseen badly."""
 COMPARABLE = 0.6
 """Paths that hold the noise elsewhere are looked at if they grow at this share of Λ (less by the rest, for Λ < 0)."""
+
+
+@dataclass(frozen=True)
+class Question:
+    """Λ(p) of a problem that is asked for.
+
+    Attributes:
+        problem: a motion and its noise.
+        p: the moment.
+        rtol: about what the tolerance is relative to the size of Λ(p).
+        known: solutions at other p, or less accurate ones.
+    """
+
+    problem: Problem
+    p: float
+    rtol: float
+    known: Mapping[float, Solution]
+
+
+@dataclass(frozen=True, eq=False)
+class Start:
+    """A place where a moment may be carried, by the functions that Λ(p) is sought among; here for two variables.
+
+    Attributes:
+        problem: a motion and its noise.
+        space: the functions.
+    """
+
+    problem: Problem
+    space: Space
+
+    @property
+    def generator(self) -> Generator:
+        """L(p) on the space."""
+        return Generator(self.problem, self.space)
+
+    def pair(self, p: float, near: PrincipalPair | None) -> PrincipalPair:
+        """The principal pair on the space, from one of a space before, or none. Raises as `principal_pair`."""
+        return principal_pair(self.generator, p, start=near)
+
+    def judged(self, pair: PrincipalPair, allowed: float) -> Solution:
+        """The pair with its error, here by its highest modes; no part much less than what is allowed need be known."""
+        return Solution(pair, start=self)
+
+    def is_enough(self, solution: Solution) -> bool:
+        """Whether a solution within the tolerance needs no finer space for its slope."""
+        return True
+
+    def doubled(self, failure: Exception | None) -> Start:
+        """A place with more functions, where the space has no principal pair."""
+        return replace(self, space=self.space.doubled(_effects_of(failure)))
+
+    def refined(self, solution: Solution, goal: float, stages: int, most: int) -> Start:
+        """A place on which each cell should lack no more than its share of an error.
+
+        Args:
+            solution: that on the space.
+            goal: the error.
+            stages: how many spaces were solved on.
+            most: unknowns; where more are needed, a space is made that does for this p alone.
+        """
+        if self.space.xi.lines.size:
+            goal = max(goal, MOST_GAIN * solution.error)
+        found = refined(solution, goal, stages)
+        return replace(self, space=found if found.size <= most else refined(solution, ALONE / SHARE * goal, stages))
+
+
+def first_place(question: Question, found: Sequence[Solution]) -> Iterator[Start]:
+    """Where slow noise carries the moment of two variables, or around the mean of other noise."""
+    if question.problem.dimension == 2 and not found:
+        yield Start(question.problem, first(question.problem, question.p, question.rtol))
+
+
+def other_places(question: Question, found: Sequence[Solution]) -> Iterator[Start]:
+    """Other places of slow noise, far from the one where the moment was found to be carried."""
+    if question.problem.dimension == 2:
+        for center in other_centers(found[0].pair):
+            yield Start(question.problem, first(question.problem, question.p, question.rtol, center))
+
+
+def refined(solution: Solution, tolerance: float, stages: int) -> Space:
+    """A discretisation on which every cell should lack no more than its share of the tolerance."""
+    pair, share = solution.pair, SHARE * tolerance
+    chosen = pair.generator.chosen
+    new = chosen.refined(solution.effects, share, stages < FREE_STAGES)
+    if chosen.xi.lines.size:
+        lower, upper = solution.truncation
+        new = new.with_axis(1, new.xi.reaching(lower > share, upper > share))
+    return new if new.size > chosen.size or solution.error <= tolerance else new.raised()
+
+
+def _effects_of(failure: Exception | None) -> Sequence[ModeEffects | None]:
+    """Those of the pair that a failed search has reached; nothing where there is none."""
+    pair = getattr(failure, "partial", None)
+    return mode_effects(pair) if pair is not None and pair.residual <= BACKWARD_ERROR_LIMIT else ()
 
 
 def first(problem: Problem, p: float, rtol: float, center: float | None = None) -> Space:

@@ -528,7 +528,7 @@ def _told_of(problem: Problem, classes: Sequence[InvariantClass]) -> Message | N
 
 def _discretisation(solver: ExponentSolver) -> dict[str, Any] | None:
     """That of the p of the largest size that was solved, z in noise units; None where none was."""
-    known = solver.near.known
+    known = solver.whole.known
     p = max(known, key=abs, default=None)
     if p is None:
         return None

@@ -74,7 +74,7 @@ HEAVY = Problem(
 def test_a_finer_mesh_beyond_the_budget_costs_what_needs_it_alone(monkeypatch):
     """At p = 0 that is four times as wide as what λ itself takes."""
     rtol, made = 1e-3, list[int]()
-    size = ExponentSolver(HEAVY, rtol=rtol).near.solution(0.0).pair.generator.size
+    size = ExponentSolver(HEAVY, rtol=rtol).whole.solution(0.0).pair.generator.size
     monkeypatch.setattr(Generator, "at", lambda self, p, own=Generator.at: made.append(self.size) or own(self, p))
     found = sensitivities(HEAVY, [], rtol=rtol, budget=Budget(unknowns=size))
     assert max(made) <= 4 / 3 * size

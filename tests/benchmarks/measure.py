@@ -90,7 +90,7 @@ def fpsolve_curve(case: Case) -> tuple[FloatArray, int]:
     """Λ at the p of the case by fpsolve, and the unknowns at the p of the largest size."""
     solver = ExponentSolver(Problem(case.oscillator, case.noise), rtol=case.rtol)
     result = solve_moments(solver, case.p)
-    return result.value, max(solver.near.known.items(), key=lambda each: abs(each[0]))[1].pair.generator.size
+    return result.value, max(solver.whole.known.items(), key=lambda each: abs(each[0]))[1].pair.generator.size
 
 
 def peer_curve(method: str, case: Case, size: Any = None) -> tuple[FloatArray, int]:

@@ -13,7 +13,9 @@ from fpsolve.cli import BAD_INPUT, main
 from fpsolve.exponent.function import moment_lyapunov
 from fpsolve.measured.tables import read_table
 from fpsolve.model.faults import TableError
+from fpsolve.model.kinds import kind_classes
 from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
+from fpsolve.model.parameters import example_of
 from fpsolve.model.problem import Problem
 from fpsolve.model.systems.modal import ModalSystem
 
@@ -169,3 +171,13 @@ def test_standard_error_is_empty(tmp_path):
     (tmp_path / "mine.toml").write_text(CASE, encoding="utf-8")
     command = [sys.executable, "-W", "always", "-m", "fpsolve", "run", "mine.toml", "--quiet"]
     assert subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True).stderr == ""
+
+
+@pytest.mark.parametrize("kind", [each for room in ("systems", "noises") for each in kind_classes(room)])
+def test_every_parameter_has_an_example(kind):
+    for name, field in getattr(kind, "__pydantic_fields__", {}).items():
+        assert example_of(field).partition(" ")[0] == name or "\n" in example_of(field), name
+
+
+def test_what_is_out_of_range_has_an_example(refused):
+    assert refused("sigma = 1.0", "sigma = 0.0").endswith("write, for example, sigma = 0.5\n")

@@ -8,11 +8,13 @@ import pytest
 
 from fpsolve import budget
 from fpsolve.errors import NotConverged
+from fpsolve.exponent import adapt
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.eigen import principal_pair
 from fpsolve.exponent.error import truncation
 from fpsolve.exponent.function import moment_lyapunov
 from fpsolve.exponent.solver import ExponentSolver
+from fpsolve.exponent.starts import Start, first, other_places
 from fpsolve.fem.effects import ModeEffects
 from fpsolve.fem.generator import Generator, Pencil
 from fpsolve.fem.mesh import make_mesh
@@ -25,6 +27,7 @@ from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
 from fpsolve.model.noises.sine_wiener import SineWiener
 from fpsolve.model.problem import Problem
 from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
+from fpsolve.theory.frozen import frozen_noise
 from tests.conftest import FIG1, FIG1_NOISE, UNIT_NOISE, oracle_arguments
 from tests.oracles import fourier_hermite, perturbation
 
@@ -272,3 +275,27 @@ def test_a_start_that_is_of_no_use_gives_no_warning():
     found = solver.moments([-3.0, 8.0])
     assert np.all(found.value > 0)
     assert solver.lyapunov_exponent().value < 0
+
+
+def test_a_place_is_a_function_that_yields_a_start(monkeypatch):
+    """Of two places of slow noise the slower one alone gives a lower eigenvalue; one that is added gives Λ(p).
+
+    Noise that is held at z standard deviations grows at about the rate that `FrozenNoise.peaks` has from the frozen
+    generator, to first order in 1/τ₀.
+    """
+    oscillator = VibroImpactOscillator(**NO_LOSS, epsilon=math.sqrt(0.1))
+    problem = Problem(oscillator, NonGaussianNoise(D0=1.3, tau0=20.0, r0=1.0).ou_reduction())
+    (_, slow, fast), (_, rate, _) = frozen_noise(problem).peaks(9.0)
+
+    def slower(question, found):
+        yield Start(question.problem, first(question.problem, question.p, question.rtol, slow))
+
+    def faster(question, found):
+        assert [each.pair.p for each in found] == [9.0]
+        yield Start(question.problem, first(question.problem, question.p, question.rtol, fast))
+
+    monkeypatch.setattr(adapt, "STARTS", (slower,))
+    assert moment_lyapunov(problem, 9.0).value[0] == pytest.approx(rate, rel=0.02)
+    for other in (faster, other_places):
+        monkeypatch.setattr(adapt, "STARTS", (slower, other))
+        assert moment_lyapunov(problem, 9.0).value[0] == pytest.approx(6.336967, rel=3e-7)

@@ -18,9 +18,8 @@ from fpsolve import (
 from fpsolve.analysis import Axis
 from fpsolve.arrays import identity
 from fpsolve.errors import NoSuchExponent, NotConverged
-from fpsolve.exponent.adapt import Budget
+from fpsolve.exponent.adapt import Budget, WholeProblem
 from fpsolve.exponent.function import nonzero_root
-from fpsolve.exponent.modes import SpherePlace
 from fpsolve.exponent.solver import ExponentSolver, tolerated
 from fpsolve.messages import Code
 from fpsolve.model import CoefficientMatrix, LinearSystem, ModalSystem, Telegraph, White
@@ -63,7 +62,7 @@ def turned(noise, steady, driven):
 def as_one(own, p, rtol):
     """The solution without looking for blocks."""
     tolerance = partial(tolerated, rtol, scale_of(own))
-    return SpherePlace(own, rtol=rtol, budget=Budget(), tolerance=tolerance).solution(p)
+    return WholeProblem(own, rtol=rtol, budget=Budget(), tolerance=tolerance).solution(p)
 
 
 def by_moments(noise, steady, driven, p):
@@ -193,7 +192,7 @@ def test_a_moment_takes_no_other_solve():
     """What a message would advise needs no λ."""
     solver = ExponentSolver(problem(White(s=1.0), *PAIRS))
     assert solver.moments([2.0]).value.size == 1
-    assert [[*each.near.known] for each in solver.classes] == [[2.0], [2.0]]
+    assert [[*each.whole.known] for each in solver.classes] == [[2.0], [2.0]]
 
 
 def test_a_negative_index_is_absent():

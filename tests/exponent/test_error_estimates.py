@@ -1,5 +1,7 @@
 """Error estimates are neither larger nor smaller than they were: half of one, or twice it, is told."""
 
+from dataclasses import replace
+
 import pytest
 
 from fpsolve.exponent.solver import ExponentSolver
@@ -30,7 +32,7 @@ def test_of_moments(problem, p, chosen, of_mesh, by_modes):
     assert ExponentSolver(problem, rtol=1e-3).solution(p).error == pytest.approx(chosen, rel=0.2)
     given = ExponentSolver(problem, COARSE).solution(p)
     assert given.error == pytest.approx(of_mesh, rel=0.2)
-    assert given.error_by_modes == pytest.approx(by_modes, rel=0.2)
+    assert replace(given, measured=None).error == pytest.approx(by_modes, rel=0.2)
 
 
 @pytest.mark.parametrize(

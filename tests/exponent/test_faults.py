@@ -20,8 +20,8 @@ from fpsolve import (
 from fpsolve.analysis import adjoint_density, stationary_density
 from fpsolve.arrays import finite
 from fpsolve.errors import MeshError, NotConverged, NumericalFailure, SingularMatrix
-from fpsolve.exponent import adapt, eigen
-from fpsolve.exponent.adapt import Budget, NearPlace
+from fpsolve.exponent import adapt, eigen, starts
+from fpsolve.exponent.adapt import Budget, Search, WholeProblem
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem.factors import sparse_lu
 
@@ -58,7 +58,7 @@ def test_a_density_that_is_none_is_refused():
     ],
 )
 def test_what_numbers_do_is_not_converged(monkeypatch, failure, words):
-    monkeypatch.setattr(NearPlace, "solve_places", lambda *_: (_ for _ in ()).throw(failure))
+    monkeypatch.setattr(Search, "solve_places", lambda *_: (_ for _ in ()).throw(failure))
     with pytest.raises(NotConverged, match=words):
         moment_lyapunov(FIG1, 2.0)
 
@@ -68,8 +68,8 @@ def test_what_numbers_do_is_not_converged(monkeypatch, failure, words):
 def test_one_space_that_fails_is_passed_by(monkeypatch, kind, place):
     """Λ(2) does not depend on a space without a pair, whatever it is tried for."""
     alone, known, count = ExponentSolver(FIG1).solution(2.0), adapt.principal_pair, [0]
-    starts = {2.0: alone} if place == "next to another problem" else {}
-    solver = ExponentSolver(FIG1, rtol=1e-5 if place == "on halved cells" else 1e-8, starts=starts)
+    close_by = {2.0: alone} if place == "next to another problem" else {}
+    solver = ExponentSolver(FIG1, rtol=1e-5 if place == "on halved cells" else 1e-8, starts=close_by)
     if place == "after another p":
         solver.solution(2.2)
 
@@ -79,7 +79,8 @@ def test_one_space_that_fails_is_passed_by(monkeypatch, kind, place):
             raise kind("pivot")
         return known(*given, **named)
 
-    monkeypatch.setattr(adapt, "principal_pair", failing_once)
+    for module in (adapt, starts):
+        monkeypatch.setattr(module, "principal_pair", failing_once)
     found = solver.solution(2.0)
     assert count[0] > 1
     assert abs(found.pair.value - alone.pair.value) <= found.error + alone.error < 1e-6
@@ -106,7 +107,7 @@ def test_what_failed_is_kept_in_words_alone():
 
 @pytest.mark.parametrize("failure", [ValueError("zip() argument 3 is longer"), TypeError("no"), RuntimeError("dict")])
 def test_a_fault_of_the_program_is_no_failure_to_converge(monkeypatch, failure):
-    monkeypatch.setattr(NearPlace, "solve_places", lambda *_: (_ for _ in ()).throw(failure))
+    monkeypatch.setattr(Search, "solve_places", lambda *_: (_ for _ in ()).throw(failure))
     with pytest.raises(type(failure), match=str(failure).split()[0][:3]):
         moment_lyapunov(FIG1, 2.0)
 
@@ -135,14 +136,14 @@ def test_equal_moments_are_solved_once():
 
 
 def test_of_equal_moments_none_is_there_that_failed(monkeypatch):
-    def solve_places(self, at, start):
-        if at.p == 3.0:
+    def solve_places(self, known):
+        if self.p == 3.0:
             raise NotConverged("no")
-        return search(self, at, start)
+        return search(self, known)
 
-    search = NearPlace.solve_places
-    monkeypatch.setattr(NearPlace, "solve_places", solve_places)
-    monkeypatch.setattr(NearPlace, "may_reuse", lambda *_: False)
+    search = Search.solve_places
+    monkeypatch.setattr(Search, "solve_places", solve_places)
+    monkeypatch.setattr(WholeProblem, "may_reuse", lambda *_: False)
     with pytest.raises(NotConverged, match=r"^no$") as e:
         moment_lyapunov(FIG1, [3.0, 0.5, 3.0, 1.0, 0.5])
     np.testing.assert_array_equal(e.value.partial.p, [0.5, 1.0, 0.5])
@@ -174,6 +175,6 @@ def test_near_zero_the_reason_names_the_moment_that_stands_for_it():
 
 
 def test_near_zero_the_moment_is_named_whatever_the_reason(monkeypatch):
-    monkeypatch.setattr(NearPlace, "solve_places", lambda *_: (_ for _ in ()).throw(np.linalg.LinAlgError("singular")))
+    monkeypatch.setattr(Search, "solve_places", lambda *_: (_ for _ in ()).throw(np.linalg.LinAlgError("singular")))
     with pytest.raises(NotConverged, match=r"^Λ\(p\) near p = 0 follows from Λ\(0\.01\): Λ\(0\.01\) cannot be solved"):
         lyapunov_exponent(FIG1)

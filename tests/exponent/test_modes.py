@@ -24,9 +24,8 @@ from fpsolve import (
 from fpsolve.analysis import Axis
 from fpsolve.arrays import identity
 from fpsolve.errors import FpsolveError
-from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.eigen import principal_pair
-from fpsolve.exponent.modes import SpherePlace, left_of, modal_coordinates, second_moments
+from fpsolve.exponent.modes import SphereStart, left_of, modal_coordinates, second_moments
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem.space import Space, first_axis
 from fpsolve.fem.sphere import SphereAxis
@@ -147,12 +146,12 @@ def test_even_moments_alone_have_all_digits(seed):
 def test_what_finer_waves_change_is_told_to_first_order(noise, driven):
     """The value with the correction is nearer to that of a finer space by far, which has the next waves."""
     given = problem(noise, driven=driven)
-    place = SpherePlace(given, rtol=1e-6, budget=Budget(), tolerance=lambda p, value: 1e-6)
-    noises = (first_axis(each, 7) for each in given.coloured.parts.values())
+    noises = [first_axis(each, 7) for each in given.coloured.parts.values()]
     coordinates, *_ = modal_coordinates(given)
-    place._begin(Space((SphereAxis(coordinates, np.linspace(0, math.pi / 2, 3), 8, 2), *noises)))
-    found = [principal_pair(place._generator(level), 1.0) for level in (1, 2)]
-    told = place._change(found[0], 2)
+    axes = [SphereAxis(coordinates, np.linspace(0, math.pi / 2, 3), 8, waves) for waves in (4, 6)]
+    start, finer = (SphereStart(given, Space((axis, *noises))) for axis in axes)
+    found = [principal_pair(each.generator, 1.0) for each in (start, finer)]
+    told = start.change(found[0])
     assert told == pytest.approx(found[1].value - found[0].value, rel=0.1)
 
 

@@ -271,6 +271,8 @@ def rightmost(matrix, near=None):
 SIZES = {0: (1,), 1: (10, 20, 40, 80, 160), 2: (6, 9, 14, 21, 32, 44, 62, 88)}
 """Functions of a noise, by how many dimensions all noises have together."""
 MODES = (16, 32, 64, 128, 256, 512, 1024, 2048, 4096, 8192)
+MOST_STRUCK = 1024
+"""Modes of φ beyond which no larger number is tried under impulses, as they leave no zeros in a matrix."""
 FEWER = {0: (1,), 1: (8, 14, 22, 32, 42, 50), 2: (5, 8, 12, 16)}
 """Beside the modes of a Fourier series."""
 
@@ -283,14 +285,14 @@ def moment_exponent(system: Planar, p, dimensions):
 def fourier_exponent(system: Planar, p, dimensions):
     """Λ(p) for any p > −1, and how far it may be off."""
     sizes = FEWER[dimensions]
-    return _settled(system.balanced(), p, [(m, sizes[min(i, len(sizes) - 1)]) for i, m in enumerate(MODES)])
+    return _settled(system.balanced(), p, [(m, sizes[min(i, len(sizes) - 1)]) for i, m in enumerate(_modes(system))])
 
 
 def lyapunov_exponent(system: Planar, dimensions):
     """λ = ⟨u*, (dL/dp) 1⟩ with u*L(0) = 0, ⟨u*, 1⟩ = 1, and how far it may be off."""
     system, sizes = system.balanced(), FEWER[dimensions]
     values = Limit(1e-3 * float(np.linalg.norm(system.drift)))
-    for i, modes in enumerate(MODES):
+    for i, modes in enumerate(_modes(system)):
         total, slope, one = system.generator(0.0, modes, sizes[min(i, len(sizes) - 1)])
         if total.shape[0] > MOST_IN_BAND or values.is_settled:
             break
@@ -301,6 +303,10 @@ def lyapunov_exponent(system: Planar, dimensions):
         left = splu(sparse.csc_array(kept @ total.T + row)).solve(size * np.eye(1, count, at)[0])
         values.add(float(left @ (slope @ one)))
     return values.last, values.doubt
+
+
+def _modes(system):
+    return [each for each in MODES if each <= MOST_STRUCK or not system.impulses]
 
 
 def _settled(system, p, sizes):

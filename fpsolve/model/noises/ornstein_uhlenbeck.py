@@ -214,8 +214,10 @@ class OrnsteinUhlenbeck(GaussianNoise):
         ParameterError: a parameter is not a finite number in its range.
     """
 
-    alpha: Annotated[float, parameter("relaxation rate", "", r"$\alpha_0$", "1/time", **DERIVED)]
-    sigma: Annotated[float, parameter("intensity of its white noise", "", r"$\sigma_0$", "1/time^(3/2)", **DERIVED)]
+    alpha: Annotated[float, parameter("relaxation rate", "alpha = 1.0", r"$\alpha_0$", "1/time", **DERIVED)]
+    sigma: Annotated[
+        float, parameter("intensity of its white noise", "sigma = 0.5", r"$\sigma_0$", "1/time^(3/2)", **DERIVED)
+    ]
 
     kind: ClassVar[str] = "ornstein-uhlenbeck"
     variants: ClassVar[Sequence[type[Noise]]] = (OrnsteinUhlenbeckByIntensity, OrnsteinUhlenbeckByDeviation)
