@@ -185,7 +185,6 @@ class Code(Enum):
     NO_PREFACTOR = (
         "failure: the law of growth in finite time is for two variables, and not for filtered noise; take rate_function"
     )
-    INDEX_UNSETTLED = "failure: the search for the stability index did not converge; it ended near p = {p:g}"
     NEGATIVE_DENSITY = "failure: the {name} at p = {p:g} is not resolved: {size:.0%} of it is negative"
     SIMULATION_OVERFLOWED = "failure: the simulation overflowed: some ξ is too large for this step; use a smaller step"
 

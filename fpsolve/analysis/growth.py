@@ -60,13 +60,14 @@ from fpsolve.model.quantity import (
     TIME,
     WIDTH,
 )
+from fpsolve.roots import Missing, NoRoot, Value, increasing_root
 
 if TYPE_CHECKING:
     import xarray
     from matplotlib.axes import Axes
 
-MOST_STEPS, MOST_RETREATS = 60, 6
-"""Of Newton's method, and of the way back from a p that is not solved."""
+MOST_RETREATS = 6
+"""Largest number of halvings of an end of the p, until Λ(p) is solved there."""
 CLOSE = 1e-9
 """Steps in p with which the search ends, relative to the larger of 1 and |p|."""
 CENTRE = np.array([-3, -2, -1, 1, 2, 3]) / 3
@@ -340,31 +341,26 @@ class Slopes:
 
     def where(self, s: float) -> Slope:
         """The p with Λ′(p) = s, up to a step of Newton's method that is left. Raises `NotConverged`."""
-        ends, retreats, last = [self.low, self.high], 0, math.inf
-        here = min((*self._known.values(), self.at(0.0)), key=lambda each: abs(each.slope - s))
-        for _ in range(MOST_STEPS):
-            gap = s - here.slope
-            step = gap / here.curvature
-            is_close = abs(step) <= CLOSE * max(1.0, abs(here.p))
-            if is_close or (abs(step) < 1e3 * CLOSE and abs(step) > 0.5 * last):  # what is left is rounding
-                return here
-            side = gap > 0
-            ends[not side], last = here.p, abs(step)
-            if here.p == (self.low, self.high)[side]:
-                break
-            p = here.p + step
-            if (p - ends[side]) * (1 if side else -1) >= 0:
-                is_open = ends[side] in (self.low, self.high) and ends[side] not in self._known
-                p = ends[side] if is_open else 0.5 * (here.p + ends[side])
+
+        def gap(p: float) -> Value:
             try:
                 here = self.at(p)
             except NotConverged as failure:
-                retreats += 1
-                if retreats > MOST_RETREATS:
-                    told = {"s": s, "p": here.p, "slope": here.slope, "reason": failure.reason}
-                    raise NotConverged(Message(Code.GROWTH_UNSOLVED, **told)) from failure
-                ends[side] = 0.5 * (here.p + p)
-        raise NotConverged(Message(Code.GROWTH_BEYOND, s=s, p=here.p, slope=here.slope))
+                raise Missing(p) from failure
+            step = CLOSE * max(1.0, abs(p)) * here.curvature
+            return Value(here.slope - s, here.curvature, step, 1e3 * step)
+
+        start = min((*self._known.values(), self.at(0.0)), key=lambda each: abs(each.slope - s)).p
+        try:
+            return self.at(increasing_root(gap, start, (self.low, self.high)))
+        except (Missing, NoRoot) as failure:
+            end = min(self._known.values(), key=lambda each: abs(each.slope - s))
+            told = {"s": s, "p": end.p, "slope": end.slope}
+            missing = failure.missing if isinstance(failure, NoRoot) else failure
+            if missing is None:
+                raise NotConverged(Message(Code.GROWTH_BEYOND, **told)) from None
+            cause: Any = missing.__cause__
+            raise NotConverged(Message(Code.GROWTH_UNSOLVED, **told, reason=cause.reason)) from cause
 
 
 def _found(slopes: Slopes, s: FloatArray) -> RateFunction:

@@ -20,8 +20,8 @@ with an approximation B of the Hessian of ½x² + μF by the gradients (BFGS).
 from __future__ import annotations
 
 import math
-import sys
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import pairwise, product
 from typing import TYPE_CHECKING, Any
@@ -40,6 +40,7 @@ from fpsolve.exponent.error import Absent, Estimate
 from fpsolve.messages import Code, Message
 from fpsolve.model.problem import Problem, checked_problem
 from fpsolve.model.quantity import Quantity
+from fpsolve.roots import Missing, Value, increasing_root
 
 if TYPE_CHECKING:
     import xarray
@@ -198,12 +199,17 @@ def units_of(problem: Problem, axes: Sequence[Axis], stated: Mapping[str, float]
     return found
 
 
+def _limits(sample: Sample) -> tuple[float, float]:
+    """|F| at which a point is taken at once, and at which it is if the next one is no better."""
+    return max(EXACT * sample.scale, 0.1 * sample.error), max(CLOSE * sample.scale, sample.error)
+
+
 def _is_met(sample: Sample) -> bool:
-    return abs(sample.value) <= max(EXACT * sample.scale, 0.1 * sample.error)
+    return abs(sample.value) <= _limits(sample)[0]
 
 
 def _is_close(sample: Sample) -> bool:
-    return abs(sample.value) <= max(CLOSE * sample.scale, sample.error)
+    return abs(sample.value) <= _limits(sample)[1]
 
 
 class _Path:
@@ -252,31 +258,27 @@ class _Path:
 
     def root(self, u: float) -> Sample | None:
         """F = 0 by Newton's iteration from u, in a bracket as soon as there is one; None where it leads nowhere."""
-        start, step = u, math.inf
-        for _ in range(MOST_STEPS):
-            if (sample := self.at(u)) is None:
-                return None
-            if _is_met(sample):
+        start = u
+        while (bracket := self.crossing(start)) is None:
+            if (sample := self.at(u)) is None or _is_met(sample):
                 return sample
-            bracket = self.crossing(start)
-            if bracket is not None:  # from its better end
-                u = min(bracket, key=lambda end: abs(self._size(end)))
-                sample = self.known[u] or sample
-            rise = self.rise(u)
-            new = u - sample.value / rise if rise else math.nan
-            if bracket is None:
-                new = min(max(new, 0.0), 1.0)
-                if math.isnan(new) or new in self.known:
+            if self.crossing(start) is None:
+                rise = self.rise(u)
+                u = min(max(u - sample.value / rise, 0.0), 1.0) if rise else math.nan
+                if math.isnan(u) or u in self.known:
                     return sample if _is_close(sample) else None
-            else:
-                low, high = bracket
-                if high - low <= 4 * sys.float_info.epsilon or (_is_close(sample) and abs(new - u) >= 0.5 * step):
-                    return sample if _is_close(sample) else None
-                if not low < new < high or abs(new - u) > 0.5 * step:
-                    new = 0.5 * (low + high)
-                if new in self.known:
-                    return sample if _is_close(sample) else None
-            u, step = new, abs(new - u)
+        sign = -math.copysign(1.0, self._size(bracket[0]))  # so that it increases
+
+        def signed(u: float) -> Value:
+            if (sample := self.at(u)) is None:
+                raise Missing(u)
+            exact, close = _limits(sample)
+            return Value(sign * sample.value, sign * self.rise(u), exact, close)
+
+        with suppress(Missing):
+            better = min(bracket, key=lambda end: abs(self._size(end)))
+            sample = self.known[increasing_root(signed, better, bracket, bracket)]
+            return sample if sample is not None and _is_close(sample) else None
         return None
 
     def _size(self, u: float) -> float:

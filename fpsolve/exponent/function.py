@@ -27,18 +27,16 @@ from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import Code, Message, Remedy, message_of
 from fpsolve.model.problem import Problem, checked_moments, negative_refused, tails_refused
 from fpsolve.model.quantity import DERIVATIVE, MOMENT, SECOND_DERIVATIVE, STABILITY_INDEX, P, moment_at
+from fpsolve.roots import Missing, NoRoot, Value, increasing_root
 
 if TYPE_CHECKING:
     import xarray
 
 SEARCH_INTERVAL: tuple[float, float] = (-20.0, 20.0)
-MOST_STEPS = 100
 OUTWARD = 4.0
 """The first p at most; others are at most twice as far out as the one before, as Λ(p) costs more there."""
 ROUGH = 0.1
 """Error, over |Λ(p)|, at an end of the interval, where the sign alone counts."""
-MOST_RETREATS = 3
-"""From p of which Λ(p) is not resolved, halfway to those of which it is."""
 PRECISE = 0.5
 """Of what rtol allows δ_p, for the error of the last Λ(p)/p."""
 SHARE = 0.4
@@ -343,9 +341,8 @@ def nonzero_root(
 ) -> Estimate | Absent:
     """δ_p, the non-zero root of Λ(p), or why Λ has none in the interval.
 
-    Λ is convex, so Λ(p)/p increases and has one root at most: a Newton iteration on it, which halves the bracket where
-    its steps do not, as where Λ(p)/p bends from flat to steep. The last solve is as accurate as δ_p is to be. Where
-    Λ(p) is not resolved far out it is looked for as far as it is.
+    Λ is convex, so Λ(p)/p increases and has one root at most, see `increasing_root`. The last solve is as accurate as
+    δ_p is to be. Where Λ(p) is not resolved far out it is looked for as far as it is.
 
     Raises:
         NotConverged: no p on the way is resolved, or not one between two at which Λ(p)/p has other signs.
@@ -355,7 +352,8 @@ def nonzero_root(
     if told := tails_refused(solver.problem, STABILITY_INDEX.symbol):
         return Absent(told)
     noise = solver.problem.noise
-    ends = low, high = tuple(float(end) for end in np.clip(interval, *solver.problem.moments))
+    low, high = (float(end) for end in np.clip(interval, *solver.problem.moments))
+    ends = low, high
     if solver.classes:  # for p > 0 Λ(p) is the largest of theirs
         if len(solver.classes) > 1 and solver.lyapunov_exponent().value > 0:
             return Absent(negative_refused(solver.problem))
@@ -363,8 +361,21 @@ def nonzero_root(
         if known := [each for each in roots if each]:
             return min(known, key=lambda each: each.value)
         return Absent(Message(Code.NO_ROOT, low=ends[0], high=ends[1], is_bounded=noise.is_bounded))
-    steps, tolerance, tried, signed, beyond = [high - low] * 2, None, set[float](), set[float](), list[Message]()
-    outward = {*ends}  # where the sign is wanted
+    solved, outward = dict[float, tuple[float, float, float]](), {*ends}  # where the sign is wanted
+
+    def at(p: float, tolerance: Tolerance | None = None) -> Value:
+        is_rough = p in outward and solver.mesh is None and tolerance is None
+        try:
+            solved[p] = _rough_ratio(solver, p) if is_rough else _precise_ratio(solver, p, tolerance)
+        except (NotConverged, OverBudget) as failure:
+            raise Missing(p) from failure
+        ratio, slope, error = solved[p]
+        if not slope > 0:
+            raise NotConverged(Message(Code.NOT_INCREASING, p=p), remedy=solver.refinement)
+        outward.update((-max(OUTWARD, 2 * abs(p)), max(OUTWARD, 2 * abs(p))))
+        return Value(ratio, slope, 0.1 * error)
+
+    signed: tuple[float, ...] = ()
     if guess is None:
         if "λ" in solver.spent:  # where this begins
             raise NotConverged(solver.spent["λ"])
@@ -373,54 +384,32 @@ def nonzero_root(
         guess = min(max(guess, -OUTWARD), OUTWARD)
         outward |= {-OUTWARD, OUTWARD}
         if abs(ratio) > 2 * error and low < 0 < high:
-            low, high = (0.0, high) if ratio < 0 else (low, 0.0)
-            tried, signed = {0.0}, {0.0}
-    p = min(max(guess, low), high)
-    for _ in range(MOST_STEPS):
-        tried.add(p)
-        try:
-            is_rough = p in outward and solver.mesh is None and tolerance is None
-            ratio, slope, error = _rough_ratio(solver, p) if is_rough else _precise_ratio(solver, p, tolerance)
-        except (NotConverged, OverBudget) as failure:
-            if len(sides := signed & {low, high}) != 1 or not low < high:
-                raise
-            beyond.append(_not_resolved(p, failure))
-            if len(beyond) > MOST_RETREATS:
-                return _none_within_reach(ends, low in signed, sides.pop(), beyond[0])
-            [inner] = sides
-            low, high = (low, p) if p > inner else (p, high)
-            p = 0.5 * (inner + p)
-            continue
-        signed.add(p)
-        if not slope > 0:
-            raise NotConverged(Message(Code.NOT_INCREASING, p=p), remedy=solver.refinement)
-        new = p - ratio / slope
-        least = 1e-13 * max(1.0, abs(p))
-        if abs(new - p) <= max(least, 0.1 * error / slope) or 0 < high - low <= 10 * least:
-            found = Estimate(p, error / slope + abs(new - p), scale=1.0, quantity=STABILITY_INDEX)
-            if found.relative_error <= solver.rtol or tolerance or solver.mesh is not None:
-                curve = (np.array([number]) for number in (p, p * ratio, ratio + p * slope, abs(p) * error))
-                if obstacle := contradiction(solver, *curve):
-                    raise NotConverged(obstacle, remedy=solver.refinement)
-                return checked(found, solver.refinement)
-            tolerance = partial(_share_of, PRECISE * solver.rtol * slope * max(1.0, abs(p)))
-            low, high = max(ends[0], low - 2 * found.error_estimate), min(ends[1], high + 2 * found.error_estimate)
-            continue
-        low, high = (p, high) if ratio < 0 else (low, p)
-        if low == high:
+            (low, high), signed = (0.0, high) if ratio < 0 else (low, 0.0), (0.0,)
+    try:
+        p = increasing_root(at, guess, (low, high), signed, OUTWARD)
+        found = _index(p, *solved[p])
+        if found.relative_error > solver.rtol and solver.mesh is None:
+            tolerance = partial(_share_of, PRECISE * solver.rtol * solved[p][1] * max(1.0, abs(p)))
+            p = increasing_root(partial(at, tolerance=tolerance), p, ends)
+            found = _index(p, *solved[p])
+    except Missing as missing:
+        cause: Any = missing.__cause__
+        raise cause from None
+    except NoRoot as none:
+        if none.missing is None:
             return Absent(Message(Code.NO_ROOT, low=ends[0], high=ends[1], is_bounded=noise.is_bounded))
-        farthest = max(OUTWARD, 2 * abs(p))
-        new = min(max(new, -farthest), farthest)
-        outward |= {-farthest, farthest}
-        if not low < new < high:
-            if beyond and len(sides := signed & {low, high}) == 1:
-                return _none_within_reach(ends, low in signed, sides.pop(), beyond[0])
-            new = next((end for end in (low, high) if end not in tried), 0.5 * (low + high))
-        elif abs(new - p) > 0.5 * steps[-2]:
-            new = 0.5 * (low + high)
-        steps.append(abs(new - p))
-        p = new
-    raise NotConverged(Message(Code.INDEX_UNSETTLED, p=p), remedy=solver.refinement)
+        low, high = (ends[0], none.last) if none.is_negative else (none.last, ends[1])
+        return Absent(Message(Code.NO_ROOT_REACHED, low=low, high=high, reason=_not_resolved(none.missing)))
+    ratio, slope, error = solved[p]
+    curve = (np.array([number]) for number in (p, p * ratio, ratio + p * slope, abs(p) * error))
+    if obstacle := contradiction(solver, *curve):
+        raise NotConverged(obstacle, remedy=solver.refinement)
+    return checked(found, solver.refinement)
+
+
+def _index(p: float, ratio: float, slope: float, error: float) -> Estimate:
+    """δ_p by Λ(p)/p next to it, its slope and error."""
+    return Estimate(p, error / slope + abs(ratio / slope), scale=1.0, quantity=STABILITY_INDEX)
 
 
 def _rough_ratio(solver: ExponentSolver, p: float) -> tuple[float, float, float]:
@@ -429,20 +418,16 @@ def _rough_ratio(solver: ExponentSolver, p: float) -> tuple[float, float, float]
     return (ratio, slope, error) if abs(ratio) > 2 * error and slope > 0 else _precise_ratio(solver, p, None)
 
 
-def _not_resolved(p: float, failure: NotConverged | OverBudget) -> Message:
+def _not_resolved(missing: Missing) -> Message:
     """Why Λ(p) is not. Raises `OverBudget` where that is of more than δ_p."""
+    failure = missing.__cause__
     if isinstance(failure, NotConverged):
         return failure.message
+    assert isinstance(failure, OverBudget)
     if failure.countdown is not under_way():
         raise failure
-    told = Message(Code.NUMBER_SPENT, symbol=moment_at(p).symbol, reason=failure.reason)
+    told = Message(Code.NUMBER_SPENT, symbol=moment_at(missing.args[0]).symbol, reason=failure.reason)
     return NotConverged(told, remedy=Remedy.BUDGET).message
-
-
-def _none_within_reach(ends: tuple[float, ...], is_below: bool, p: float, reason: Message) -> Absent:
-    """That Λ has no root up to p, where the sign of Λ(p)/p is known, or down to it."""
-    low, high = (ends[0], p) if is_below else (p, ends[1])
-    return Absent(Message(Code.NO_ROOT_REACHED, low=low, high=high, reason=reason))
 
 
 def _precise_ratio(solver: ExponentSolver, p: float, tolerance: Tolerance | None) -> tuple[float, float, float]:

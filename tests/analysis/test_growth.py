@@ -14,7 +14,7 @@ from fpsolve.arrays import identity
 from fpsolve.case.case import load_case
 from fpsolve.errors import CaseError, NoSuchExponent, NotConverged
 from fpsolve.exponent import ExponentSolver, moment_lyapunov
-from fpsolve.messages import Code
+from fpsolve.messages import Code, Message
 from fpsolve.model import (
     CoefficientMatrix,
     Filter,
@@ -177,6 +177,25 @@ def test_what_is_out_of_reach_is_refused_and_the_rest_is_kept():
         rate_function(SHEAR, [0.0, 9.0], interval=(-2.0, 4.0))
     assert [each.code for each in caught.value.message.data["reasons"]] == [Code.GROWTH_BEYOND]
     assert caught.value.partial.growth.tolist() == [0.0]
+
+
+@pytest.mark.parametrize("reach", [1.0, 2.5])
+def test_growth_that_is_reached_where_moments_are_not_solved_is_refused_soon(monkeypatch, reach):
+    """Λ′(p) = a + p here, so that s = 3.3 is reached at p = 3.4."""
+    ratio, asked = ExponentSolver.ratio, []
+
+    def within_reach(self, p, tolerance=None):
+        asked.append(p)
+        if abs(p) > reach:
+            raise NotConverged(Message(Code.NOT_CONVERGED, p=p, reason="far out"))
+        return ratio(self, p, tolerance)
+
+    monkeypatch.setattr(ExponentSolver, "ratio", within_reach)
+    with pytest.raises(NotConverged, match=r"beyond it Λ\(p\) is not solved: Λ\(3.4\) did not converge") as caught:
+        rate_function(uniform(), [0.5, 3.3])
+    assert [each.code for each in caught.value.message.data["reasons"]] == [Code.GROWTH_UNSOLVED]
+    np.testing.assert_allclose(caught.value.partial.p, [0.6], rtol=1e-8)
+    assert len(asked) <= 9
 
 
 @pytest.mark.parametrize(
