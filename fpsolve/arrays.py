@@ -25,6 +25,8 @@ Matrix: TypeAlias = "FloatArray | csr_matrix"
 """An array, or any sparse matrix."""
 Coefficient = Callable[[Any], Any]
 """A function of φ or ξ, from an array to an array of the same shape."""
+ROUNDED = 1e-12
+"""Share of the largest terms of a sum below which the sum is 0 but for rounding."""
 
 
 @dataclass(frozen=True)

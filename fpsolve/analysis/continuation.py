@@ -21,24 +21,28 @@ from fpsolve.arrays import FloatArray
 from fpsolve.errors import FpsolveError
 from fpsolve.messages import Code, Message
 
-LONGEST, SHORTEST = 0.02, 1e-5
-"""Steps, in sides of the square."""
+LONGEST = 0.02
+"""Longest step unless another is asked for, in sides of the square."""
+SHORTEST = 1e-5
+"""Step, in sides of the square, below which a branch ends."""
 MOST_TURN = 0.15
-"""Of the tangent in one step, in radians."""
+"""Largest turn of the tangent in one step, in radians."""
 MOST_CORRECTIONS = 5
+"""Number of corrections after which F must fall to `SHARE_LEFT` with each."""
 SHARE_LEFT = 0.1
-"""Of F, at most, by each further correction; at a zero without a gradient a quarter is left."""
+"""Largest share of F that a further correction leaves; at a zero without a gradient it is a quarter."""
 FARTHEST = 0.1
-"""Way of Newton's method to a first point, in sides of the square."""
+"""Longest way of Newton's method to a first point, in sides of the square."""
 MOST_AWAY = 0.2
-"""Of a point from where it was predicted, in steps."""
+"""Largest distance of a point from where it was predicted, in steps."""
 MOST_POINTS = 20_000
+"""Largest number of points of half a branch."""
 BESIDE = 1e-8
-"""A point that is outside by less is on the frame."""
+"""Distance outside of the frame, in sides of the square, up to which a point is on it."""
 SAME = 1e-3
 """Distance, in sides of the square, in which a curve that runs the same way is taken for one that is known."""
 PIECES = 8
-"""Into which the cubic between two points of a branch is divided."""
+"""Number of pieces into which the cubic between two points of a branch is divided."""
 
 FRAME = "leaves the frame"
 """The label of a point where a curve leaves the frame."""

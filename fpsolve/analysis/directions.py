@@ -53,7 +53,7 @@ class SettledDirections:
     error: float
 
     def on(self, grid: DirectionGrid) -> SettledDirections:
-        """The same at other nodes."""
+        """Itself at other nodes."""
         if grid.first.size == self.fields.grid.first.size:
             return self
         return replace(self, fields=Directions(self.pair).on(grid))

@@ -62,6 +62,7 @@ CLOSE, MOST_ROUNDS = 1e-4, 4
 PARTS, POINTS = 32, 2000
 """Into how many parts a cell of φ is cut for the integral of q⁺, which has kinks, and points of ξ."""
 LEAST_SHOWN = 1e-12
+"""Smallest probability that is shown."""
 SHOWN_LEVELS = (2.0, 4.0, 8.0, 16.0, 32.0)
 
 
@@ -189,7 +190,7 @@ def excursion(
 def solve_excursion(
     solver: ExponentSolver, *, phi: Start = 0.0, xi: StartOfNoise = STATIONARY, root: float | None = None
 ) -> Excursion:
-    """The same with a solver of the problem; `root` is near δ_p, if that is known."""
+    """The excursions of a solver's problem; `root` is near δ_p, if that is known."""
     problem = solver.problem
     check_start(problem, phi, xi)
     if solver.mesh is not None:  # whose functions need not reach the ends of the noise
@@ -454,7 +455,7 @@ def _where_positive(values: FloatArray, rate: FloatArray, axes: Iterable[int]) -
 
 
 def _between(values: FloatArray, axes: Iterable[int]) -> FloatArray:
-    """By how much a function may exceed its values at two neighbours: an eighth of its second difference there."""
+    """The most by which a function exceeds its values at two neighbours: an eighth of its second difference there."""
     total = np.zeros(values.shape)
     for axis in axes:
         bent = np.abs(np.diff(values, n=2, axis=axis)) / 8

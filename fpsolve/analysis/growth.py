@@ -71,19 +71,25 @@ MOST_RETREATS = 6
 CLOSE = 1e-9
 """Steps in p with which the search ends, relative to the larger of 1 and |p|."""
 CENTRE = np.array([-3, -2, -1, 1, 2, 3]) / 3
-"""p through which the terms of P are interpolated around p = 0, where their poles cancel, in shares of a distance."""
+"""p over `AROUND`/√K″ through which the terms of P are interpolated around p = 0, where their poles cancel."""
 AROUND = 0.6
-"""This distance, times √K″."""
-VECTORS, FEWER = 80, 10
-"""Of Arnoldi's method for e^{tL}, and how many less tell its error."""
+"""Largest |p|√K″ of these."""
+VECTORS = 80
+"""Number of vectors of Arnoldi's method for e^{tL}."""
+FEWER = 10
+"""Number of vectors less that tell its error."""
 POLE = 10.0
-"""γ − Λ, times t."""
-LEVELS, DIGITS = (9, 17, 33, 65), 1e-7
-"""Numbers of p in a Chebyshev series, and the share of its largest coefficient down to which it goes."""
-MOST_FINER, FINE = 8, 1e-8
-"""Discretisations of e^{tL}, and the change from one to the next with which K is settled."""
+"""(γ − Λ)t."""
+LEVELS = (9, 17, 33, 65)
+"""Numbers of p in a Chebyshev series."""
+DIGITS = 1e-7
+"""Share of the largest coefficient of a series down to which it goes."""
+MOST_FINER = 8
+"""Largest number of discretisations of e^{tL}."""
+FINE = 1e-8
+"""Change of K from one discretisation to the next with which it is settled."""
 MOST_WIDER = 8
-"""How often an interval of p is widened for a saddle point."""
+"""Largest number of intervals of p, each wider than the last, that are tried for the saddle points."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -213,7 +219,7 @@ def rate_function(
             for the others.
     """
     solver = solver_of(problem, mesh, rtol, budget)
-    return _found(Slopes(solver, interval), real_numbers(s, "s"))
+    return _rates(Slopes(solver, interval), real_numbers(s, "s"))
 
 
 def growth_law(
@@ -249,7 +255,7 @@ def growth_law(
     if problem.dimension > 2 or any(each.basis == "pairs" for each in problem.coloured.parts.values()):
         raise NoSuchExponent(Message(Code.NO_PREFACTOR))
     slopes = Slopes(solver, interval)
-    rate = _found(slopes, real_numbers(s, "s"))
+    rate = _rates(slopes, real_numbers(s, "s"))
     pairs = [slopes.at(p).pair for p in rate.p.tolist()]
     factors, finer = (
         np.array([math.nan if each is None else prefactor(each, phase) for each in of])
@@ -363,7 +369,7 @@ class Slopes:
             raise NotConverged(Message(Code.GROWTH_UNSOLVED, **told, reason=cause.reason)) from cause
 
 
-def _found(slopes: Slopes, s: FloatArray) -> RateFunction:
+def _rates(slopes: Slopes, s: FloatArray) -> RateFunction:
     """I at several s, those near λ first. Raises `NotConverged`."""
     rows, failures = dict[int, tuple[float, ...]](), list[Message]()
     centre = slopes.at(0.0).slope

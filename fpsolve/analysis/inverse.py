@@ -29,7 +29,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.polynomial import Polynomial
 
-from fpsolve.analysis.scan import Sample
+from fpsolve.analysis.scan import TOLERANCE, Sample
 from fpsolve.analysis.target import Distance, Target, start_and_stop, target_of
 from fpsolve.analysis.zero import Axis, said
 from fpsolve.arrays import FloatArray, real_number, shown
@@ -45,19 +45,26 @@ from fpsolve.roots import Missing, Value, increasing_root
 if TYPE_CHECKING:
     import xarray
 
-EXACT, CLOSE = 1e-13, 1e-10
-"""|F| over its scale at which a point is taken at once, and at which it is if the next one is no better."""
+EXACT = 1e-13
+"""|F| over its scale at which a point is taken at once."""
 NODES = 17
-"""Of a scan over one parameter."""
+"""Number of points of a scan over one parameter."""
 POINTS = 24
-"""Of a scan over several, for each of them."""
-MOST_STEPS, MOST_REFINEMENTS, MOST_HALVINGS = 60, 12, 8
+"""Number of points of a scan over several parameters, for each of them."""
+MOST_STEPS = 60
+"""Largest number of quadratic problems."""
+MOST_REFINEMENTS = 12
+"""Largest number of points between two of a scan where |F| is least."""
+MOST_HALVINGS = 8
+"""Largest number of halvings of a step."""
 MOST_PARAMETERS = 6
-"""The quadratic problem is solved for each set of parameters at the ends of their ranges."""
-SAME, SMALL = 1e-8, 1e-3
-"""Steps of x, relative to x or 1: one that no longer counts, and one after which less |F| is progress."""
+"""Largest number of parameters, as the quadratic problem is solved for each set of them at the ends of their ranges."""
+SAME = 1e-8
+"""Step of x that no longer counts, relative to the larger of 1 and |x|."""
+SMALL = 1e-3
+"""Step of x after which less |F| is progress, relative to the larger of 1 and |x|."""
 PENALTY = 5.0
-"""Of the square of F, over that of its first gradient, beside half the square of the distance."""
+"""Weight of F² over the square of its first gradient, beside half the square of the distance."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -201,7 +208,7 @@ def units_of(problem: Problem, axes: Sequence[Axis], stated: Mapping[str, float]
 
 def _limits(sample: Sample) -> tuple[float, float]:
     """|F| at which a point is taken at once, and at which it is if the next one is no better."""
-    return max(EXACT * sample.scale, 0.1 * sample.error), max(CLOSE * sample.scale, sample.error)
+    return max(EXACT * sample.scale, 0.1 * sample.error), max(TOLERANCE * sample.scale, sample.error)
 
 
 def _is_met(sample: Sample) -> bool:
@@ -247,13 +254,13 @@ class _Path:
         return math.nan if sample is None else float(sample.gradient @ self._slope(u))
 
     @property
-    def solved(self) -> list[tuple[float, Sample]]:
+    def samples(self) -> list[tuple[float, Sample]]:
         """The samples in the order of u."""
         return [(u, sample) for u, sample in sorted(self.known.items()) if sample is not None]
 
     def crossing(self, near: float) -> tuple[float, float] | None:
         """Two neighbours at which F has both signs, those nearest to some u; None where there are none."""
-        pairs = [(a, b) for (a, one), (b, other) in pairwise(self.solved) if (one.value < 0) != (other.value < 0)]
+        pairs = [(a, b) for (a, one), (b, other) in pairwise(self.samples) if (one.value < 0) != (other.value < 0)]
         return min(pairs, key=lambda pair: max(pair[0] - near, near - pair[1]), default=None)
 
     def root(self, u: float) -> Sample | None:
@@ -291,7 +298,7 @@ class _Path:
             self.at(u)
         if (pair := self.crossing(near)) is not None:
             return self.root(pair[0])
-        for (a, _), (b, _) in list(pairwise(self.solved)):
+        for (a, _), (b, _) in list(pairwise(self.samples)):
             self._refine(a, b)
             if (pair := self.crossing(near)) is not None:
                 return self.root(pair[0])
@@ -330,7 +337,7 @@ def _along_axis(distance: Distance, axis: Axis) -> Sample | Absent:
     found = path.root(here) or path.scan(here)
     if found is not None:
         return found
-    return _unreached(distance, (axis,), [sample for _, sample in path.solved], path.reasons, path.crossing(here))
+    return _unreached(distance, (axis,), [sample for _, sample in path.samples], path.reasons, path.crossing(here))
 
 
 def _unreached(
@@ -381,7 +388,7 @@ def _nearest(distance: Distance, axes: Sequence[Axis], units: FloatArray) -> Sam
     corners, inner = product((0.0, 1.0), repeat=len(axes)), qmc.LatinHypercube(len(axes), seed=0)
     shares = [*map(np.array, corners), *inner.random(POINTS * len(axes))]
     places = [start, *(np.array([axis.value(u) for axis, u in zip(axes, each, strict=True)]) for each in shares)]
-    samples = [sample for sample in map(search.tried, places) if sample is not None]
+    samples = [sample for sample in map(search.at, places) if sample is not None]
     if samples:
         best = min(samples, key=lambda each: abs(each.value))
         others = [each for each in samples if (each.value < 0) != (best.value < 0)]
@@ -418,7 +425,7 @@ class Search:
         self._low, self._high = ((limit - origin) / units for limit in limits)
         self.reasons, self._norm = list[Message](), 1.0
 
-    def tried(self, theta: FloatArray) -> Sample | None:
+    def at(self, theta: FloatArray) -> Sample | None:
         """F at θ; None where there is none."""
         key = tuple(theta.tolist())
         if key not in self._known:
@@ -431,7 +438,7 @@ class Search:
 
     def from_point(self, theta: FloatArray) -> Sample | None:
         """The nearest point by steps from θ; None where they lead nowhere."""
-        if (sample := self.tried(theta)) is None:
+        if (sample := self.at(theta)) is None:
             return None
         hessian, self._norm = np.eye(theta.size), float(np.linalg.norm(self._reduced(sample)[1])) or 1.0
         for _ in range(MOST_STEPS):
@@ -441,7 +448,7 @@ class Search:
             share = float(np.max(np.abs(step))) / max(1.0, float(np.max(np.abs(x))))
             if share <= SAME and _is_close(sample):
                 return sample
-            new = self._shortened(sample, step, is_small=share <= SMALL)
+            new = self._shorter(sample, step, is_small=share <= SMALL)
             if new is None:
                 return sample if _is_close(sample) else None
             moved, other = self._reduced(new)
@@ -453,13 +460,13 @@ class Search:
         """x and ∂F/∂x."""
         return (sample.at - self._origin) / self._units, sample.gradient * self._units
 
-    def _shortened(self, sample: Sample, step: FloatArray, *, is_small: bool) -> Sample | None:
+    def _shorter(self, sample: Sample, step: FloatArray, *, is_small: bool) -> Sample | None:
         """The end of a step, halved until it is better than its start; None where no share of it is.
 
         That of a small step is better, too, where |F| is by far less.
         """
         for _ in range(MOST_HALVINGS):
-            new = self.tried(np.clip(sample.at + step * self._units, *self._limits))
+            new = self.at(np.clip(sample.at + step * self._units, *self._limits))
             is_better = new is not None and new is not sample and self._merit(new) < self._merit(sample)
             if new is not None and (is_better or (is_small and abs(new.value) < 0.25 * abs(sample.value))):
                 return new

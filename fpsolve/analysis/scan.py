@@ -15,9 +15,9 @@ from fpsolve.errors import FpsolveError
 from fpsolve.messages import Message
 
 TOLERANCE = 1e-10
-"""|F| over its scale on a curve; a tenth of what the solves of F leave."""
+"""|F| over its scale up to which it is 0."""
 FINE = 13
-"""Points along a cell of a scan where its interpolation is looked at."""
+"""Number of points along a cell of a scan at which its interpolation is looked at."""
 
 
 class Sample(NamedTuple):

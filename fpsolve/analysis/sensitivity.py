@@ -239,7 +239,7 @@ def solve_sensitivities(
     root: float | None = None,
     progress: Callable[[], None] = lambda: None,
 ) -> Sensitivities:
-    """The same with a solver of the problem, along some directions.
+    """The sensitivities of a solver's problem along some directions.
 
     Args:
         solver: of the problem.

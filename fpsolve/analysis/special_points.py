@@ -13,13 +13,12 @@ from fpsolve.analysis.scan import Field, Sample
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import FpsolveError, NotConverged
 
-CLOSE = 1e-9
-"""How well a point is found, as a share of the way between two points of a curve."""
 EQUAL = 1e-9
-"""Points that are closer are one, in sides of the square."""
+"""Distance of two points that are one, in sides of the square, and in ways between two points of a curve."""
 FLAT = 1e-6
-"""Smaller components of a tangent have no sign: along a straight line they are rounding."""
+"""Largest component of a tangent that has no sign: along a straight line it is rounding."""
 MOST_STEPS = 12
+"""Largest number of steps of Newton's method to a crossing."""
 Found = TypeVar("Found")
 Placed = tuple[float, Point]
 """A point, and its place: 2.5 is half way between the points 2 and 3 of a branch."""
@@ -31,8 +30,8 @@ def with_folds(field: Field, trace: Trace, names: tuple[str, str]) -> Trace:
     for axis in (0, 1):
         along = np.array([point.sample.tangent[axis] for point in trace.points])
         along[np.abs(along) < FLAT] = 0
-        for span in _changes(along, trace.closed):
-            fold = _tried(_sought, field, trace, span, lambda sample, axis=axis: float(sample.tangent[axis]))
+        for span in _sign_changes(along, trace.closed):
+            fold = _or_none(_sign_change, field, trace, span, lambda sample, axis=axis: float(sample.tangent[axis]))
             if fold is not None:
                 new.append((fold[0], Point(fold[1], f"fold in {names[axis]}")))
     return with_points(trace, new)
@@ -45,9 +44,9 @@ def with_values(field: Field, trace: Trace, axis: int, values: Sequence[tuple[fl
         beyond = np.array([point.sample.at[axis] for point in trace.points]) - value
         beyond[np.abs(beyond) < EQUAL] = 0
         new += [(float(i), Point(trace.points[i].sample, label)) for i in np.flatnonzero(beyond == 0)]
-        for i, j in _changes(beyond, trace.closed):
+        for i, j in _sign_changes(beyond, trace.closed):
             share = beyond[i] / (beyond[i] - beyond[j % beyond.size])
-            found = _tried(_valued, field, trace, i, share, axis, value) if j == i + 1 else None
+            found = _or_none(_value_on, field, trace, i, share, axis, value) if j == i + 1 else None
             if found is not None:
                 new.append((found[0], Point(found[1], label)))
     return with_points(trace, new)
@@ -60,7 +59,7 @@ def crossings(one: Trace, other: Trace, fields: tuple[Field, Field]) -> Iterator
     for i in range(len(a) - 1):
         for j, shares in _meetings(a[i], a[i + 1] - a[i], b):
             guess, way = a[i] + shares[0] * (a[i + 1] - a[i]), PIECES * float(np.linalg.norm(a[i + 1] - a[i]))
-            samples = _tried(_common, fields, guess)
+            samples = _or_none(_crossing, fields, guess)
             if samples is None or np.linalg.norm(samples[0].at - guess) > 0.5 * way:
                 continue
             if all(np.linalg.norm(samples[0].at - at) > 10 * EQUAL for at in known):
@@ -83,7 +82,7 @@ def with_points(trace: Trace, new: Sequence[Placed]) -> Trace:
     return replace(trace, points=tuple(point for _, point in sorted(placed, key=lambda each: each[0])))
 
 
-def _sought(
+def _sign_change(
     field: Field, trace: Trace, span: tuple[int, int], component: Callable[[Sample], float]
 ) -> tuple[float, Sample] | None:
     """The place between two points of a branch where something changes its sign, and F there."""
@@ -99,27 +98,27 @@ def _sought(
 
     if component(at(span[0])) * component(at(span[1])) >= 0:
         return None
-    place = float(brentq(lambda place: component(at(place)), *span, xtol=CLOSE))
+    place = float(brentq(lambda place: component(at(place)), *span, xtol=EQUAL))
     return place % len(trace.points), at(place)
 
 
-def _valued(field: Field, trace: Trace, i: int, share: float, axis: int, value: float) -> tuple[float, Sample] | None:
+def _value_on(field: Field, trace: Trace, i: int, share: float, axis: int, value: float) -> tuple[float, Sample] | None:
     """The point where u, or v, has a value, about at a share of the way from the point i to the next."""
     guess = trace.between(i, share)
     size = float(np.linalg.norm(trace.between(i, 1.0) - trace.between(i, 0.0)))
-    direct = _tried(correct_on_line, field, axis, value, guess)
+    direct = _or_none(correct_on_line, field, axis, value, guess)
     if direct is not None and np.linalg.norm(direct.at - guess) < 0.1 * size:
         return i + share, direct
-    found = _sought(field, trace, (i, i + 1), lambda sample: float(sample.at[axis]) - value)
+    found = _sign_change(field, trace, (i, i + 1), lambda sample: float(sample.at[axis]) - value)
     if found is None:
         return None
-    exact = _tried(correct_on_line, field, axis, value, found[1].at)
+    exact = _or_none(correct_on_line, field, axis, value, found[1].at)
     if exact is not None and np.linalg.norm(exact.at - found[1].at) < 0.1 * size:
         return found[0], exact
     return found
 
 
-def _common(fields: tuple[Field, Field], at: FloatArray) -> tuple[Sample, Sample] | None:
+def _crossing(fields: tuple[Field, Field], at: FloatArray) -> tuple[Sample, Sample] | None:
     """F = G = 0 near a point, by Newton's method; None where there is none, or the curves only touch."""
     for _ in range(MOST_STEPS):
         first, second = (field(at) for field in fields)
@@ -130,7 +129,7 @@ def _common(fields: tuple[Field, Field], at: FloatArray) -> tuple[Sample, Sample
     return None
 
 
-def _tried(search: Callable[..., Found | None], *arguments: Any) -> Found | None:
+def _or_none(search: Callable[..., Found | None], *arguments: Any) -> Found | None:
     """What a search finds; None where F does not exist on its way."""
     try:
         return search(*arguments)
@@ -138,7 +137,7 @@ def _tried(search: Callable[..., Found | None], *arguments: Any) -> Found | None
         return None
 
 
-def _changes(values: FloatArray, closed: bool) -> Iterator[tuple[int, int]]:
+def _sign_changes(values: FloatArray, closed: bool) -> Iterator[tuple[int, int]]:
     """The neighbours between which a sequence changes its sign, passing over zeros; of a closed one beyond its end."""
     signed = np.flatnonzero(values)
     ahead = [*signed[1:], *(signed[:1] + values.size)] if closed else signed[1:]

@@ -39,6 +39,7 @@ _SIZE = float(ndtri(0.5 + 0.5 * LEVEL))
 UNCERTAIN = (LYAPUNOV_EXPONENT.name, STABILITY_INDEX.name)
 """The quantities besides Λ(p) of which intervals are given."""
 MOST_SAMPLES = 100_000
+"""Largest number of samples."""
 
 
 class Deviation(NamedTuple):
@@ -48,7 +49,7 @@ class Deviation(NamedTuple):
     is_relative: bool = True
 
     def at(self, value: float) -> float:
-        """Of a parameter with a value."""
+        """The standard deviation of a parameter with a value."""
         return self.size * abs(value) if self.is_relative else self.size
 
 
@@ -84,7 +85,7 @@ class Law:
 
     @property
     def mean(self) -> float:
-        """Of the law that is cut."""
+        """The mean of the law that is cut."""
         return self.value + self.sd * self._moments[0]
 
     @property
@@ -166,7 +167,7 @@ def laws_of(problem: Problem, uncertain: Mapping[str, Any]) -> dict[str, Law]:
 
 
 def spread_of(value: float, slopes: Mapping[str, Estimate], laws: Mapping[str, Law]) -> Spread | None:
-    """Of a quantity by its derivatives; None where some of these are missing."""
+    """The spread of a quantity by its derivatives; None where some of these are missing."""
     if not laws.keys() <= slopes.keys():
         return None
     shift = sum(slopes[key].value * (law.mean - law.value) for key, law in laws.items())

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 SCAN_RTOL, COARSER = 1e-5, 10.0
 """Of F on the grid of a scan, relative to its scale; at least so many times that of the line."""
 NODES = 13
-"""Of a scan, each way."""
+"""Number of points of a scan, each way."""
 LINE_KEY, SCAN_SHARE = "budget.line_seconds", 0.5
 """What limits the time of a line, and its share for the scan."""
 LARGEST = 0.1
@@ -118,12 +118,12 @@ class Boundary(Result):
 
     @property
     def rtol(self) -> float:
-        """Of F on the line, relative to its scale."""
+        """The error of F on the line that is wanted, relative to its scale."""
         return line_rtol(self.problem, self.zero)
 
     @property
     def scan_rtol(self) -> float:
-        """Of F in the scan, relative to its scale."""
+        """The error of F in the scan that is wanted, relative to its scale."""
         return max(SCAN_RTOL, COARSER * self.rtol)
 
     @property
@@ -148,7 +148,7 @@ class Boundary(Result):
         return Message(Code.ONE_SIGN, side=self.zero.side(float(values[0])), is_whole=bool(exists.all()))
 
     def refined(self, step: float) -> Boundary:
-        """The same with shorter steps, in sides of the frame. Raises `ValueError`."""
+        """The boundary with shorter steps, in sides of the frame. Raises `ValueError`."""
         middles = (trace.points[len(trace.points) // 2].sample.at for trace in self.traces)
         return replace(self, step=_checked_step(step), **_ANEW)._from(middles)
 
@@ -221,7 +221,7 @@ class Boundary(Result):
         yield now._ended(zero_field)
 
     def _from(self, seeds: Iterable[FloatArray]) -> Boundary:
-        """With the branches through some points of the lines."""
+        """The boundary with the branches through some points of the lines."""
         zero_field, traces = self.zero_field, list[Trace]()
         for seed in seeds:
             if np.any((seed < 0) | (seed > 1)) or any(trace.passes(seed, ON_IT) for trace in traces):
@@ -232,7 +232,7 @@ class Boundary(Result):
         return replace(self, traces=tuple(traces))._ended(zero_field)
 
     def _ended(self, zero_field: ZeroField) -> Boundary:
-        """As it is after the last of its branches."""
+        """The boundary after the last of its branches."""
         obstacles = [] if zero_field.stopped is None else [zero_field.stopped]
         for reason in self.scan.reasons if self.scan else ():
             obstacles += [reason] * (reason.code is Code.ROW_SPENT and reason.data["key"] == LINE_KEY)

@@ -140,7 +140,7 @@ class Distance:
 
 
 def start_and_stop(problem: Problem, key: str) -> Axis | None:
-    """From half to twice the value of a parameter, within its range; None where the value is 0."""
+    """The range from half to twice the value of a parameter, within its range; None where the value is 0."""
     value, field = float(problem.values[key]), problem.parameters[key].field
     if value == 0:
         return None

@@ -27,9 +27,9 @@ from fpsolve.model.parameters import STRICT
 from fpsolve.model.problem import Problem, checked_problem, refuse_infinite
 
 RTOL, RTOL_BEYOND_PLANE = 1e-10, 1e-4
-"""Of F, relative to its scale."""
+"""Error of F that is wanted, relative to its scale: of two variables, and of more."""
 HALF = 0.5
-"""Of the time that is left, for one value."""
+"""Share of the time that is left for one value."""
 NEAR = 0.1
 """Distance, in sides of the square, up to which a solve starts from that before; farther away its mesh fits no more."""
 
@@ -131,7 +131,7 @@ class Zero:
 
     @property
     def latex(self) -> str:
-        """The same in LaTeX, with dollars."""
+        """`equation` in LaTeX, with dollars."""
         if self.kind == "stability_index":
             return rf"$\delta_p = {self.p:g}$"
         return rf"$\Lambda({self.p:g}) = 0$" if self.p else r"$\lambda = 0$"
@@ -184,7 +184,7 @@ def check_axes(problem: Problem, x: Axis, y: Axis) -> None:
 
 
 def line_rtol(problem: Problem, zero: Zero) -> float:
-    """Of F on a line, relative to its scale: coarser beyond the plane, except for moments with closed equations."""
+    """The error of F that is wanted on a line, over its scale: larger beyond the plane, unless moments are closed."""
     return RTOL if problem.dimension == 2 or (zero.p > 0 and zero.p % 2 == 0) else RTOL_BEYOND_PLANE
 
 

@@ -22,9 +22,12 @@ from fpsolve.model.noise import Noise
 CLOSE, CLOSE_SPECTRUM, CLOSE_SLOPE = 1e-6, 1e-3, 1e-5
 """Shares by which integrals, spectral densities and derivatives may differ, beside the errors of what they are compared
 with."""
-PATHS, MOST_STEPS = 4000, 8
+PATHS = 4000
+"""Number of paths of a noise."""
+MOST_STEPS = 8
+"""Largest number of steps of a path."""
 STEP = 1e-5
-"""Share by which a parameter is varied."""
+"""Share of a parameter by which it is varied."""
 SURE = 4.5
 """Standard errors beyond which a sample of paths differs."""
 KOLMOGOROV = 2.2
@@ -253,7 +256,7 @@ def _spectrum(noise: Noise, law: Law | None) -> Spectrum | MatrixSpectrum | None
 
 
 def _diffusion_spectrum(noise: Noise, law: Law) -> Spectrum:
-    """By the eigenvalues of −½(σ²P_s u′)′ = r P_s u on the grid, differences being central."""
+    """The spectrum by the eigenvalues of −½(σ²P_s u′)′ = r P_s u on the grid, differences being central."""
     from scipy.linalg import eigh_tridiagonal  # takes a while to import
 
     xi, mass = law.xi, law.measure * law.density
@@ -474,7 +477,7 @@ def _of_step(noise: Noise, law: Law | None, spectrum: Spectrum | MatrixSpectrum 
 
 
 def _of_bias(noise: Noise) -> Iterator[Message]:
-    """With one's bias b and the same random numbers ξ moves by σ²bh more, and `push` is ∫f dt."""
+    """Faults of `step` with a bias b: by the same random numbers ξ must move by σ²bh more, and `push` be ∫f dt."""
     h, std = 0.02 * noise.largest_step, noise.standard_deviation
     start = np.resize(_inner(noise), PATHS)
     square = np.broadcast_to(noise.squared_diffusion(start), start.shape)

@@ -25,8 +25,13 @@ Monomial = tuple[tuple[str, ...], str, int]
 """The variables of the state that are multiplied, in order, a noise or "", and the power of ε."""
 NUMBER: Monomial = (), "", 0
 HIGHEST_DEGREE = 3
-"""In the state."""
-MOST_LETTERS, MOST_LEVELS, LARGEST_POWER = 1000, 50, 10
+"""Highest degree of a term in the state."""
+MOST_LETTERS = 1000
+"""Largest number of characters of an expression."""
+MOST_LEVELS = 50
+"""Largest depth of an expression, whose sums and products of any length are one level each."""
+LARGEST_POWER = 10
+"""Largest exponent, and largest power of ε."""
 CONSTANTS = {"pi": math.pi}
 _LETTERS = re.compile(r"[A-Za-z0-9_+\-*/().\s]")
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")

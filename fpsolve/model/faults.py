@@ -73,7 +73,7 @@ def with_plain_errors(kind: type[Kind]) -> type[Kind]:
 
 
 def _in_words(error: ValidationError, kind: Any) -> ParameterError:
-    """The same faults, with our text."""
+    """Faults that pydantic found, in our words."""
     details: list[Any] = error.errors(include_url=False)
     told: Any = ParameterError.from_exception_data(error.title, details)
     told.text = "\n".join(f"{kind.__name__}: {_sentence(each, kind.__pydantic_fields__)}" for each in details)

@@ -36,14 +36,15 @@ from fpsolve.model.plane import (
 )
 
 MOST_PARTS = 1000
+"""Largest number of parts of a rule in the phase of the frame."""
 HARDLY = 2.0
-"""How many times larger the rates may be in a frame that is preferred."""
+"""Factor by which the rates may be larger in a frame that is preferred."""
 BARELY = 0.99
 """The share of the rates at which their search ends. S changes by powers of two in it: hardly anything is rounded."""
 MOST_STEPS = 400
-"""Of this search: some 60 for each variable and unit of 1e18."""
+"""Largest number of steps of this search: some 60 for each variable and unit of 1e18."""
 ROUNDED = 1e-14
-"""Of the terms of an entry of S⁻¹AS."""
+"""Share of the terms of an entry of S⁻¹AS that is rounding."""
 T = TypeVar("T", Impulse, ImpulseDerivative)
 
 
@@ -66,11 +67,11 @@ class Frame:
         return np.asarray(solve_triangular(self._array, np.eye(len(self._array)), lower=True))
 
     def term(self, term: CoefficientMatrix) -> CoefficientMatrix:
-        """The same term for y, S⁻¹AS."""
+        """A term for y, with the matrix S⁻¹AS."""
         return replace(term, matrix=(self._inverse @ np.array(term.matrix) @ self._array).tolist())
 
     def cubic(self, terms: CubicTerms) -> CubicTerms:
-        """The same cubic terms for y: S⁻¹ C of the products of Sy."""
+        """Cubic terms for y: S⁻¹ C of the products of Sy."""
         first, second = self._array
         products = [reduce(np.convolve, [first] * (3 - k) + [second] * k) for k in range(4)]
         return CubicTerms((self._inverse @ np.array(terms.matrix) @ np.array(products)).tolist())
@@ -80,7 +81,7 @@ class Frame:
         return replace(of, exponent=(self._inverse @ np.array(of.exponent) @ self._array).tolist())
 
     def motion(self, system: System) -> System:
-        """The same system for y, the terms of order 0 that no noise drives as one; a rotation is one exactly."""
+        """A system for y, the terms of order 0 that no noise drives as one; a rotation is one exactly."""
         others = [self.term(term) for term in system.terms if not is_free(term)]
         free = sum(
             (float(each.g(0.0)) * np.array(each.matrix) for each in system.terms if is_free(each)), 0.0 * self._array
@@ -94,7 +95,7 @@ class Frame:
 
     @property
     def parts(self) -> int:
-        """Into how many parts a cell of ψ is cut where dφ/dψ is integrated: more, the more φ and ψ differ."""
+        """The number of parts of a cell of ψ over which dφ/dψ is integrated: the more, the more φ and ψ differ."""
         return min(math.ceil(float(np.linalg.cond(self._array))), MOST_PARTS)
 
     def phase(self, phi: FloatArray) -> FloatArray:

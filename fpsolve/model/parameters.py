@@ -155,7 +155,7 @@ class Parametrised:
         return ()
 
     def at(self, values: Mapping[str, float | str]) -> Self:
-        """The same with other values of some parameters, by name. Raises `ValueError` where one is out of range."""
+        """Itself with other values of some parameters, by name. Raises `ValueError` where one is out of range."""
         return replace(self, **values)  # type: ignore[type-var]
 
 

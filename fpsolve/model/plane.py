@@ -50,7 +50,7 @@ class Harmonics:
 
     @property
     def amplitude(self) -> Any:
-        """Of the wave in 2φ."""
+        """The amplitude of the wave in 2φ."""
         return np.hypot(self.cosine, self.sine)
 
     @property

@@ -13,7 +13,7 @@ from typing import Any, ParamSpec, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fpsolve.arrays import FloatArray, real_numbers, shown
+from fpsolve.arrays import ROUNDED, FloatArray, real_numbers, shown
 from fpsolve.data import plain_unit, written
 from fpsolve.errors import NoSuchExponent
 from fpsolve.messages import Code, Message, Remedy
@@ -39,22 +39,24 @@ from fpsolve.model.plane import (
     turning,
 )
 from fpsolve.model.quantity import NOISE, Quantity, moment_at
-from fpsolve.model.subsystem import ROUNDED, Subsystem, components, couplings, hidden_blocks, reached, subsystems
+from fpsolve.model.subsystem import Subsystem, components, couplings, hidden_blocks, reached, subsystems
 
 P = ParamSpec("P")
 R = TypeVar("R")
 RATE = "1/time"
 """The unit of ξ for which those of parameters of noises are stated."""
 PHASES = 360
-"""At which it is seen which way the phase passes them."""
-RTOL, RTOL_OF_SEVERAL, RTOL_BEYOND_PLANE = 1e-8, 1e-6, 1e-5
-"""The relative error wanted where a case names none: of two variables, the same under two noises, and of more."""
+"""Number of φ at which it is seen which way the phase passes them."""
+RTOL = 1e-8
+"""Relative error that is wanted of two variables where a case names none."""
+RTOL_OF_SEVERAL = 1e-6
+"""Relative error that is wanted of two variables under two noises that are not white."""
+RTOL_BEYOND_PLANE = 1e-5
+"""Relative error that is wanted of three and four variables."""
 SUPPORT = np.linspace(-12, 12, 2401)
 """In standard deviations, where a coefficient of noise is looked at."""
-ROUNDED_SPEED = 1e-12
-"""A share of the largest speeds of the phase by all terms, below which that over a ray is 0 but for rounding."""
 LINE = 90
-"""Letters of a line of parameters at most."""
+"""Largest number of letters of a line of parameters."""
 
 
 @dataclass(frozen=True)
@@ -114,7 +116,7 @@ class Problem:
                 remedy = 'give one for each name, such as Problem(system, {"axial": ..., "lateral": ...})'
                 raise ValueError(f"{told}, but the noises given are {stated}; {remedy}")
         if any(noise.is_white for noise in given.values()):
-            _ = self._moved, self._struck  # refuses what has no meaning
+            _ = self._drift_and_diffusions, self._struck  # refuses what has no meaning
         for jump in self.system.jumps:
             self._refuse_ray(jump)
         if self.dimension > 2 and (self._struck or self.noise.has_algebraic_tails):
@@ -152,7 +154,7 @@ class Problem:
             for term, along, rate in own:
                 strengths = self.system.epsilon**term.order * term.g(xi)
                 speeds, most = speeds + along * strengths, most + rate * float(np.max(np.abs(strengths)))
-            if not np.ptp(speeds) <= ROUNDED_SPEED * most:
+            if not np.ptp(speeds) <= ROUNDED * most:
                 which = f'the noise "{name}"' if name else f"{noise.kind} noise"
                 raise ValueError(
                     f"{which} moves the phase across {ray}, which it does over no wall: x = 0, phi = pi/2 = "
@@ -160,7 +162,7 @@ class Problem:
                     "not move the phase there, or remove the jump"
                 )
             total, size = total + float(speeds[0]), size + most
-        if abs(total) <= ROUNDED_SPEED * size:
+        if abs(total) <= ROUNDED * size:
             raise ValueError(
                 f"the phase does not pass {ray}: nothing moves it there, so that no path comes to this wall; remove "
                 "the jump"
@@ -229,10 +231,11 @@ class Problem:
     @property
     def drift(self) -> System:
         """What is left of the system beside white noise."""
-        return self._moved[0]
+        return self._drift_and_diffusions[0]
 
     @cached_property
-    def _moved(self) -> tuple[System, Sequence[CoefficientMatrix]]:
+    def _drift_and_diffusions(self) -> tuple[System, Sequence[CoefficientMatrix]]:
+        """The system with the drift that white noise adds to it, and the terms of its diffusion."""
         return self.noise.motion(self.system)
 
     @cached_property
@@ -241,7 +244,7 @@ class Problem:
 
     @cached_property
     def dimension(self) -> int:
-        """Of the state."""
+        """The number of variables of the state."""
         return self.system.dimension
 
     @cached_property
@@ -256,7 +259,7 @@ class Problem:
 
     @cached_property
     def _own(self) -> tuple[Frame | None, float]:
-        drift, diffusions = self._moved
+        drift, diffusions = self._drift_and_diffusions
         return own_frame(
             self.dimension,
             drift.terms,
@@ -269,13 +272,13 @@ class Problem:
     @cached_property
     def motion(self) -> System:
         """The system along a path of ξ, in the coordinates of `frame`: what is left of it beside white noise."""
-        drift, _ = self._moved
+        drift, _ = self._drift_and_diffusions
         return drift if self.frame is None else self.frame.motion(drift)
 
     @cached_property
     def diffusions(self) -> Sequence[CoefficientMatrix]:
         """ε^order B of every Bx ∘ dW by which white noise moves the state, in the same coordinates."""
-        _, diffusions = self._moved
+        _, diffusions = self._drift_and_diffusions
         return diffusions if self.frame is None else [self.frame.term(each) for each in diffusions]
 
     @cached_property
@@ -595,7 +598,7 @@ def parameter_words(parameters: Mapping[str, Parameter], keys: Collection[str]) 
 
 
 def parameter_lines(parameters: Mapping[str, Parameter], besides: Collection[str] = ()) -> list[str]:
-    """The same of all parameters besides some, in lines for the system and for the noise, none of them long."""
+    """All parameters besides some with their units, in lines for the system and for the noise, none of them long."""
     sections = dict[str, list[str]]()
     for key, parameter in parameters.items():
         if key not in besides:

@@ -198,7 +198,7 @@ OSCILLATOR_RESPONSE = ResponseQuantities(
 
 
 def response_quantities(x: str, v: str, *, has_wall: bool) -> ResponseQuantities:
-    """Of a system with two variables of which no more than the names are known."""
+    """The quantities of the response of a system with two variables of which only the names are known."""
     unit = "unknown"
     means = _means(
         (x, f"⟨{x}⟩", f"mean of {x}", unit),
@@ -261,5 +261,5 @@ def moment_at(p: float) -> Quantity:
 
 
 def density_unit(noise: Quantity) -> str:
-    """Of a density per radian and unit of ξ."""
+    """The unit of a density per radian and unit of ξ."""
     return {"1/time": "time/rad", "1": "1/rad"}.get(noise.unit, "unknown")

@@ -14,24 +14,22 @@ from typing import Any
 
 import numpy as np
 
-from fpsolve.arrays import FloatArray
+from fpsolve.arrays import ROUNDED, FloatArray
 from fpsolve.messages import Code, Message
 from fpsolve.model.frame import amplitude_frame
 from fpsolve.model.plane import CoefficientMatrix, matrix_at
 from fpsolve.model.problem import Problem
 
 LEVEL = 1e6
-"""Of the cubic terms over the linear ones, where paths start: far, as coefficients may be of different sizes."""
+"""Cubic terms over the linear ones where paths start: far, as coefficients may be of different sizes."""
 PHASES = 8
-"""At which they start."""
+"""Number of φ at which they start."""
 LEAST, LOWER, HIGHER = 1e-3, math.log(2), 30.0
 """How far ln a must fall in a half-turn, and where the phase does not turn, and above which rise it is growing."""
 MOST = 500.0
-"""Of 2 ln a, for trial steps that go too far."""
+"""Largest 2 ln a, for trial steps that go too far."""
 MOST_STEPS = 2000
-"""Of one path; one that is not lower by then counts as growing."""
-ROUNDED = 1e-12
-"""Of the largest coefficient, below which the cubic terms do not turn a ray."""
+"""Largest number of steps of one path; one that is not lower by then counts as growing."""
 Field = Callable[[float, FloatArray], tuple[float, float]]
 
 

@@ -15,14 +15,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fpsolve.arrays import FloatArray
+from fpsolve.arrays import ROUNDED, FloatArray
 from fpsolve.model.plane import CoefficientMatrix, Jump, System
 from fpsolve.model.quantity import Quantity
 
-ROUNDED = 1e-12
-"""Share of a matrix that is rounding, in the coordinates of rays, and for eigenvectors times their condition."""
 WORST_CONDITION = 100.0
-"""Of eigenvectors in which blocks are looked for."""
+"""Largest condition of eigenvectors in which blocks are looked for."""
 
 
 @dataclass(frozen=True)
@@ -96,7 +94,7 @@ class Subsystem(System):
 
     @property
     def noise_sections(self) -> Sequence[str]:
-        """Of the noises that drive it; the first one of the whole where none does."""
+        """The sections of the noises that drive it; the first one of the whole where none does."""
         known = self.whole.noise_sections
         if len(known) == 1:
             return known

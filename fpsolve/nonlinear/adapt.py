@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import gamma
 
-from fpsolve.arrays import FloatArray
+from fpsolve.arrays import ROUNDED, FloatArray
 from fpsolve.errors import NotConverged
 from fpsolve.fem.factors import one_thread
 from fpsolve.fem.noise_axes import NoiseAxis
@@ -28,38 +28,41 @@ from fpsolve.nonlinear.operator import Circle, Flow, Height, Plane
 from fpsolve.signals import left_at_signals
 
 SHARE = 0.2
-"""Of the tolerance that one direction may lack."""
+"""Share of the tolerance that one direction may lack."""
 ABOVE = 0.02
-"""Of the tolerance that may lie above the interval of u."""
+"""Share of the tolerance that may lie above the interval of u."""
 FAR = 300.0
-"""Times the tolerance from which on it takes two steps."""
+"""Error over the tolerance from which on a direction takes two steps."""
 MOST_STAGES = 24
+"""Largest number of refinements."""
 CELLS = 2
-"""Of the phase between two impacts."""
+"""Number of cells of the phase between two impacts."""
 MOST_UNKNOWNS = 100_000
+"""Largest number of unknowns."""
 SPACING = 1.1
-"""Of the vertices of u over the standard deviation of ln a in weak noise."""
+"""Distance of the vertices of u over the standard deviation of ln a in weak noise."""
 WIDEST = 0.5
-"""Of an element in u."""
-FEWEST, HIGHEST_DEGREE = 4, 8
-"""Elements in u, and their degree; beyond it they are halved."""
+"""Length of the longest element in u."""
+FEWEST = 4
+"""Smallest number of elements in u."""
+HIGHEST_DEGREE = 8
+"""Highest degree of an element in u; beyond it elements are halved."""
 QUANTILE = 1e-2
-"""Of the tolerance that the first interval leaves out below, in weak noise; above it is the tolerance itself."""
+"""Share of the tolerance that the first interval leaves out below, in weak noise; above it is the tolerance itself."""
 LEAST_DAMPING = 0.01
-"""The least κ with which it begins, over the largest damping at a phase."""
+"""Smallest κ to begin with, over the largest damping at a phase."""
 FURTHER = 0.5
-"""How far the lower end of u moves in a step."""
+"""Step of the lower end of u."""
 SEEN = 1e-3
-"""Of E aⁿ, above which the share of an element is no wave that is not resolved, if it is certain."""
+"""Share of E aⁿ above which that of an element is no wave that is not resolved, if it is certain."""
 CERTAIN = 0.5
-"""Of a share, below which it changes with the phase and the noise if it is certain."""
+"""Change of a share with the phase and the noise, over the share, below which it is certain."""
 SLOW = 0.25
-"""The ratio of the last two shares of E a⁴ from which on the upper end is compared with one an element lower."""
+"""Ratio of the last two shares of E a⁴ from which on the upper end is compared with one an element lower."""
 MOST_HIGHER = 2
-"""Elements by which the upper end moves in a step."""
+"""Largest step of the upper end of u, in elements."""
 SAFETY = 2.0
-"""What a direction may lack over what its last level changes, where it converges slowly."""
-ROUNDING = 1e-12
+"""Factor to what the last level of a direction changes, for what it may lack where it converges slowly."""
 
 
 @dataclass(frozen=True)
@@ -83,7 +86,7 @@ class Choice:
 
     @property
     def elements(self) -> int:
-        """In u."""
+        """The number of elements in u."""
         return max(FEWEST, math.ceil((self.top - self.bottom) / self.step - 1e-9))
 
     @property
@@ -213,7 +216,7 @@ class Settled:
     lower: tuple[Solution, ...]
 
     def fall(self, n: int) -> Fall:
-        """Of E aⁿ above."""
+        """How the shares of E aⁿ fall above."""
         lines, shares = self.solution.height.lines, self.solution.shares(n)
         alike = [each for each in self.lower if np.array_equal(each.height.lines, lines)]
         changes = np.max([np.abs(shares - each.shares(n)) for each in alike], axis=0)
@@ -228,7 +231,7 @@ class Settled:
     def errors(self, changes: FloatArray, scales: Any, order: int = 4) -> FloatArray:
         """Error estimates of numbers that grow with a like its power of an order at most, and have these scales."""
         above = self.fall(order).share_above(float(self.solution.height.lines[-1]))
-        return np.asarray(SAFETY * changes.sum(axis=0) + (above + ROUNDING) * scales)
+        return np.asarray(SAFETY * changes.sum(axis=0) + (above + ROUNDED) * scales)
 
 
 @dataclass(frozen=True)
@@ -249,7 +252,7 @@ class Fall:
 
     @classmethod
     def of(cls, shares: FloatArray, is_seen: Any, lines: FloatArray) -> Fall:
-        """From the shares of elements between vertices, and which of them are no waves, whether they fall or not."""
+        """The fall of shares of elements between vertices, those that are no waves being known."""
         last, ratio = int(np.argmax(shares)), 1.0
         while last + 1 < shares.size and (shares[last + 1] < ratio * shares[last] or is_seen[last + 1]):
             last, ratio = last + 1, float(shares[last + 1] / shares[last])
@@ -257,7 +260,7 @@ class Fall:
         return cls(float(lines[last + 1]), float(lines[-1] - lines[-2]), float(share), ratio)
 
     def share_above(self, top: float) -> float:
-        """At most, above a place not below `end`."""
+        """The largest share above a place that is not below `end`."""
         return self.share * self.ratio ** ((top - self.end) / self.step)
 
     def top(self, share: float) -> float:

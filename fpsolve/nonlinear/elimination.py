@@ -25,10 +25,11 @@ from fpsolve.fem.factors import BlockFactors
 from fpsolve.nonlinear.operator import Circle, Height, Plane
 
 TAIL_TERMS = 8
-"""Of the series in e^{2u}."""
+"""Number of terms of the series in e^{2u}."""
 STEPS = 30
-"""Of the iteration for κ."""
+"""Largest number of steps of the iteration for κ."""
 SECONDS_PER_OPERATION = 1e-10
+"""Time of an operation on a matrix, in seconds."""
 Tables = Sequence[FloatArray]
 
 
@@ -158,7 +159,7 @@ class Cell:
         self._factors = BlockFactors(KroneckerSum(list(zip(own, noise, strict=True))))
 
     def values(self, others: FloatArray) -> FloatArray:
-        """Of these functions from those of the others, shape (m, n_ξ); shape (n, n_ξ)."""
+        """The values of these functions, shape (n, n_ξ), from those of the others, shape (m, n_ξ)."""
         right = _sum(table @ others @ each.T for table, each in zip(self._into, self._noise, strict=True))
         return -self._factors.solve(right.ravel()).reshape(right.shape)
 
@@ -205,7 +206,7 @@ class Element:
             self._cells.append((inner, beside, cell))
 
     def values(self, kept: FloatArray) -> FloatArray:
-        """Of all functions from those that are left, shape (functions of u, those of φ and ξ)."""
+        """The values of all functions from those that are left, shape (functions of u, those of φ and ξ)."""
         levels, phases, count = self._shape
         kept = kept.reshape(-1, count)
         values = np.zeros((levels * phases, count))

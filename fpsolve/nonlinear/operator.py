@@ -94,7 +94,7 @@ class Flow:
 
     @cached_property
     def log_factor(self) -> float:
-        """By what ln a jumps at the wall from below φ_w to above: ±ln R."""
+        """The jump of ln a at the wall from below φ_w to above: ±ln R."""
         return self.sense * float(sum(jump.log_factor for jump in self.problem.system.jumps))
 
     def gauge(self, phi: FloatArray) -> FloatArray:
@@ -109,7 +109,7 @@ class Flow:
 
     @cached_property
     def linear(self) -> Sequence[Rate]:
-        """Of the terms that do not depend on a."""
+        """The rates by the terms that do not depend on a."""
         system = self.problem.system
         return [_scaled(self.frame.term(term), system.epsilon**term.order) for term in system.terms]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 
 class NearRest:
-    """Of what has a `stability_index`, δ_p of the linear system."""
+    """What has a `stability_index`, δ_p of the linear system."""
 
     stability_index: float
 

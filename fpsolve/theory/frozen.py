@@ -12,18 +12,22 @@ from fpsolve.arrays import FloatArray
 from fpsolve.model.plane import matrix_at, noise_strength, squared_frequency
 from fpsolve.model.problem import Problem, cached_by_problem
 
-SAMPLES, SIDE_SAMPLES = 1001, 601
-"""Points of steady values of a filter, and of values of a diffusion on each side."""
+SAMPLES = 1001
+"""Number of steady values of a filter."""
+SIDE_SAMPLES = 601
+"""Number of values of a diffusion on each side."""
 FREQUENCIES = np.linspace(0, 2, 41)
 """In those of the filter, at which its noise may swing."""
-AMPLITUDES, PHASES = 401, 32
-"""Of a swing, and in half a turn of it."""
+AMPLITUDES = 401
+"""Number of amplitudes of a swing."""
+PHASES = 32
+"""Number of points of half a turn of a swing."""
 LARGEST_P = 25.0
-"""The places for larger p may lie beyond those that are looked at."""
+"""Largest p whose places are certainly among those that are looked at."""
 CLOSE = 0.1
-"""Standard deviations within which the centre of a tilted density is found."""
+"""Error of the centre of a tilted density, in standard deviations."""
 ZOOM = 41
-"""Points between two that are farther apart."""
+"""Number of points between two that are farther apart."""
 
 
 def eigenvalues_at(problem: Problem, xi: ArrayLike) -> tuple[FloatArray, FloatArray, Any]:

@@ -38,35 +38,59 @@ from fpsolve.model.problem import Problem
 from fpsolve.polynomials import gegenbauer, hermite
 from fpsolve.superlu import sparse_lu
 
-MOST, MOST_MOMENTS = 20_000, 1000
-"""Equations at most, and moments for each function of the noise."""
-FIRST, NEXT, GROWTH = 4, 2, 1.4
-"""Degrees of the functions of each noise to begin with, those that tell the error, and the factor to more of them."""
-TOLERANCE, ROUNDING = 1e-13, 10 * sys.float_info.epsilon
-"""Of the terms that Λ is the sum of: the error that is wanted where none is named, and that of rounding."""
+MOST = 20_000
+"""Largest number of equations."""
+MOST_MOMENTS = 1000
+"""Largest number of moments for each function of the noise."""
+FIRST = 4
+"""Degree of the functions of each noise to begin with."""
+NEXT = 2
+"""Number of degrees more that tell the error."""
+GROWTH = 1.4
+"""Factor from one degree to the next."""
+TOLERANCE = 1e-13
+"""Error that is wanted where none is named, over the terms that Λ is the sum of."""
+ROUNDING = 10 * sys.float_info.epsilon
+"""Error by rounding, over these terms."""
 MEANINGLESS = 1e-3
-"""Of the same, from which on an error leaves nothing of a value."""
-NEARER, NEAREST, SETTLED, MOST_STEPS, MOST_POLISHES = 0.15, 1e-3, 1e-7, 60, 5
-"""The share of σ − Λ that the next σ keeps, and the last one; what Λ may still change, over it; steps at most."""
+"""Error over these terms that leaves nothing of a value."""
+NEARER = 0.15
+"""Share of σ − Λ that the next σ keeps."""
+NEAREST = 1e-3
+"""Share of σ − Λ that the last σ keeps."""
+SETTLED = 1e-7
+"""Change of Λ over σ − Λ with which it is settled."""
+MOST_STEPS = 60
+"""Largest number of σ."""
+MOST_POLISHES = 5
+"""Largest number of steps that polish Λ from there."""
 PASSED = 10.0
-"""By how many times the last σ − Λ the next Λ is lower where rounding has put σ on the left of it: it is another."""
-KRYLOV, ROUGH, MOST_RESTARTS = 16, 1e-2, 200
-"""Vectors of one search by Arnoldi's method, its tolerance, and how often it begins again at most."""
+"""Factor to the last σ − Λ by which the next Λ is lower where rounding has put σ on the left of it: it is another."""
+KRYLOV = 16
+"""Number of vectors of one search by Arnoldi's method."""
+ROUGH = 1e-2
+"""Tolerance of this search."""
+MOST_RESTARTS = 200
+"""Largest number of its restarts."""
 STEP = 1e-5
-"""Of a parameter, by which H is differentiated."""
+"""Share of a parameter by which it is varied to differentiate H."""
 NEGATIVE = 1e-6
-"""Of the largest number, by which one may be negative that should not be."""
+"""Share of the largest number by which one may be negative that should not be."""
 DENSE = 200
-"""Equations up to which matrices are not sparse."""
+"""Number of equations up to which matrices are not sparse."""
 MOST_DEGREES = 160
-"""Of functions of one noise: with twice as many points the weights of a rule underflow."""
-SECONDS_PER_ENTRY, BYTES_PER_ENTRY, MANY_ENTRIES = 4e-6, 250, 1e5
-"""Of a sparse matrix that is factorised, and from how many on it is where a signal can leave it."""
+"""Highest degree of functions of one noise: with twice as many points the weights of a rule underflow."""
+SECONDS_PER_ENTRY = 4e-6
+"""Time to factorise a sparse matrix, in seconds for each of its entries."""
+BYTES_PER_ENTRY = 250
+"""Memory of its factors, in bytes for each of its entries."""
+MANY_ENTRIES = 1e5
+"""Number of entries from which on it is factorised where a signal can leave it."""
 REMEDY = "compare with `fpsolve simulate`"
 MORE_POINTS = 16
-"""Of a quadrature rule, beyond two for each function."""
+"""Number of points of a quadrature rule beyond two for each function."""
 PURE = 1e-9
-"""By which the logarithm of a density may differ from that of Gauss or Gegenbauer."""
+"""Difference of the logarithm of a density to that of Gauss or Gegenbauer that is rounding."""
 
 
 class Functions(NamedTuple):

@@ -192,7 +192,7 @@ def _of_random_noise(problem: Problem) -> SecondOrder:
 
 
 def second_order_or_none(problem: Problem) -> SecondOrder | None:
-    """The same; None where perturbation theory does not apply."""
+    """The terms up to the second order; None where perturbation theory does not apply."""
     try:
         return second_order(problem)
     except NoPerturbationTheory:

@@ -12,11 +12,10 @@ import numpy as np
 from pydantic import Field
 from pydantic.fields import FieldInfo
 
-from fpsolve.arrays import FloatArray, real_array, real_number, shown
+from fpsolve.arrays import ROUNDED, FloatArray, real_array, real_number, shown
 from fpsolve.model.noise import Noise
 from fpsolve.model.parameters import SIZE, parameter, stated_field
 
-_BALANCED = 1e-12
 Row = Annotated[tuple[float, ...], Field(strict=False)]
 
 
@@ -161,7 +160,7 @@ class MarkovChain(Chain):
         jumps = rates - np.diag(np.diagonal(rates))
         leaving = jumps.sum(axis=1)
         stated = -np.diagonal(rates)
-        if np.any(jumps < 0) or np.any((stated != 0) & (np.abs(stated - leaving) > _BALANCED * leaving.max())):
+        if np.any(jumps < 0) or np.any((stated != 0) & (np.abs(stated - leaving) > ROUNDED * leaving.max())):
             raise ValueError(
                 "rates from one state to another must be >= 0, and each diagonal entry 0 or minus the sum of its row"
             )

@@ -293,7 +293,7 @@ class NonGaussianNoise(TreatedNoise):
 
     @classmethod
     def exact_law(cls, decimals: Mapping[str, str]) -> ExactLaw:
-        """In units of the end of the support for r₀ < 1, of the standard deviation for r₀ = 1."""
+        """The law in units of the end of the support for r₀ < 1, of the standard deviation for r₀ = 1."""
         D0, tau0, r0 = (Fraction(decimals[name]) for name in ("D0", "tau0", "r0"))
         if r0 > 1:
             key = f"{cls.section}.r0"
@@ -344,7 +344,7 @@ class ReducedNoise(TreatedNoise, GaussianNoise):
 
     @property
     def remarks(self) -> Sequence[Message]:
-        """On the reduction (12)-(14), made for r₀ near 1: the variance that it gives, against Eq. (10)."""
+        """A remark on the reduction (12)-(14), made for r₀ near 1: the variance that it gives, against Eq. (10)."""
         departure = abs(self.r0 - 1)
         if departure <= NEAR_GAUSSIAN * (1 + 1e-9):  # to rounding
             return ()

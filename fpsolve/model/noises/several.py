@@ -191,14 +191,14 @@ class Noises(Noise):
     def _white_changes(
         self, system: System, terms: Sequence[CoefficientMatrix], name: str
     ) -> Iterable[tuple[Noise, tuple[System, Sequence[CoefficientMatrix], str]]]:
-        """For each white noise what it drives, which of the terms, and the name if it is one of its parameters."""
+        """Each white noise with what it drives, which of the terms, and the name if it is one of its parameters."""
         part, _, parameter = name.rpartition(".")
         for own, noise, of in self._white_motions(system):
             changed = [term for term in terms if is_driven(term.g) and term.noise == of]
             yield noise, (own, changed, parameter if part == of else "")
 
     def _white_motions(self, system: System) -> Iterable[tuple[System, Noise, str]]:
-        """For each white noise what it drives."""
+        """Each white noise with what it drives."""
         for name, noise in self.named:
             if noise.is_white:
                 own = tuple(term for term in system.terms if is_driven(term.g) and term.noise == name)

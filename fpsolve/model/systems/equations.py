@@ -13,7 +13,7 @@ import numpy as np
 from pydantic import AfterValidator, BaseModel, BeforeValidator, Field
 from pydantic.fields import FieldInfo
 
-from fpsolve.arrays import FloatArray, identity, one, real_number, shown
+from fpsolve.arrays import ROUNDED, FloatArray, identity, one, real_number, shown
 from fpsolve.messages import Code, Message, is_control
 from fpsolve.model.expressions import (
     HIGHEST_DEGREE,
@@ -32,12 +32,14 @@ from fpsolve.model.plane import CoefficientMatrix, CubicTerms, Jump, System, by_
 from fpsolve.model.quantity import AMPLITUDE, JOINT_DENSITY, Quantity
 
 EPSILON = "epsilon"
-MOST_VARIABLES, MOST_PARAMETERS = 4, 200
-_LAW = 1e-12
-"""How near to 1 a wall's R is for a coefficient of restitution of 1."""
+MOST_VARIABLES = 4
+"""Largest number of variables."""
+MOST_PARAMETERS = 200
+"""Largest number of parameters."""
 _NEWTON = 60
+"""Largest number of steps of Newton's method for the coefficient of restitution, which is cheap."""
 OTHER = 0.7310585786300049
-"""By how much another value of a parameter is more, to see what depends on it: no round number."""
+"""Difference to another value of a parameter that shows what depends on it: no round number."""
 
 
 def _printed(text: str) -> str:
@@ -502,7 +504,7 @@ class EquationSystem(System):
             at_one, slope = self._log_factor(0, name, 1.0)
         except TableError:
             return ""
-        return name if abs(at_one) <= _LAW and slope > 0 else ""
+        return name if abs(at_one) <= ROUNDED and slope > 0 else ""
 
     @property
     def impact_symbol(self) -> str:
@@ -526,7 +528,7 @@ class EquationSystem(System):
             if abs(step) <= 4e-16 * max(1.0, abs(value)):
                 return value
             value += step
-        return value if abs(step) <= _LAW * max(1.0, abs(value)) else math.nan
+        return value if abs(step) <= ROUNDED * max(1.0, abs(value)) else math.nan
 
     def impact_slope(self, log_factor: float) -> float:
         if not (name := self._law):

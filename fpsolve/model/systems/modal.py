@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import Field
 from pydantic.fields import FieldInfo
 
-from fpsolve.arrays import FloatArray, shown
+from fpsolve.arrays import ROUNDED, FloatArray, shown
 from fpsolve.model.expressions import ExpressionError, constant, evaluate, names_in
 from fpsolve.model.faults import TableError
 from fpsolve.model.parameters import parameter, stated_field
@@ -25,8 +25,7 @@ _Stated = Annotated[tuple[_Row, ...], Field(strict=False, min_length=1, max_leng
 SINGULAR = 1e12
 """Condition of a mass matrix, its rows and columns of the size 1, from which on it counts as singular."""
 SMALLEST = 1e-300
-"""Of masses."""
-_SKEW = 1e-12
+"""Size of the smallest mass that has an inverse."""
 
 
 def _matrix(meaning: str, example: str, *, is_noise: bool = False, default: Any = ...) -> FieldInfo:
@@ -170,7 +169,7 @@ class _Rates:
 
     @property
     def count(self) -> int:
-        """Of modes."""
+        """The number of modes."""
         mass = self.matrices["mass"]
         if not isinstance(mass, list | tuple) or len(mass) not in (1, 2):
             raise TableError(f"got {shown(mass)}; must be a matrix of one row or two, one for each mode", "mass")
@@ -221,20 +220,20 @@ class _Rates:
         return rows
 
     def _numbers(self, matrix: list[list[Entry]]) -> FloatArray:
-        """With the parameters as they are."""
+        """The entries of a matrix at the values of the parameters."""
         names = {name: constant(value) for name, value in self.parameters.items()}
         values = [[evaluate(e, names, "").scalar if isinstance(e, str) else (e,) for e in row] for row in matrix]
         return np.array([[each[0] if each else 0.0 for each in row] for row in values])
 
     def _refuse_symmetric(self, matrix: list[list[Entry]], key: str) -> None:
         values = self._numbers(matrix)
-        if np.max(np.abs(values + values.T)) > _SKEW * np.max(np.abs(values)):
+        if np.max(np.abs(values + values.T)) > ROUNDED * np.max(np.abs(values)):
             other = "damping" if key == "gyroscopic" else "stiffness"
             must = "must be skew-symmetric, each entry minus the one across the diagonal"
             raise TableError(f"got {shown(values.tolist())}; {must}; write the rest into {other}", key)
 
     def _inverse(self, mass: list[list[Entry]]) -> list[list[Entry]]:
-        """Of the masses, as text where they have names."""
+        """The inverse of the masses, as text where they have names."""
         values = self._numbers(mass)
         scaled = values / np.maximum(np.max(np.abs(values), axis=1, keepdims=True), SMALLEST)
         scaled = scaled / np.maximum(np.max(np.abs(scaled), axis=0), SMALLEST)  # whatever the units of the modes

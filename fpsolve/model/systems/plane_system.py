@@ -21,8 +21,12 @@ from fpsolve.model.systems.equations import EquationSystem, Wall
 
 Parts = Sequence[CoefficientMatrix] | tuple[Sequence[CoefficientMatrix], Sequence[Jump]]
 """The terms of a system, or these and its jumps."""
-NODES, REACH, LEAST = 9, 0.05, 0.05
-"""Values of a parameter for a derivative, how far they go in shares of it, and the least size that it counts as."""
+NODES = 9
+"""Number of values of a parameter that give a derivative by it."""
+REACH = 0.05
+"""Distance of the farthest of these values, as a share of the parameter."""
+LEAST = 0.05
+"""Size that a smaller parameter counts as."""
 
 
 @dataclass(frozen=True)
@@ -259,7 +263,7 @@ class PlaneSystem(System):
 
     @property
     def noise_sections(self) -> Sequence[str]:
-        """As the terms name the noises."""
+        """The sections of the noises that the terms name."""
         names = dict.fromkeys(term.noise for term in self.terms if is_driven(term.g))
         return tuple(f"noise.{name}" if name else "noise" for name in names) or super().noise_sections
 

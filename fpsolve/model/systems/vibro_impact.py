@@ -125,7 +125,7 @@ class VibroImpactOscillator(System):
 
     @property
     def remarks(self) -> Sequence[Message]:
-        """On the delta law where the bounce of Eq. (3) cannot be: 1 − ε²(1 − r) ≤ 0."""
+        """A remark on the delta law where the bounce of Eq. (3) cannot be: 1 − ε²(1 − r) ≤ 0."""
         left = 1 - self._loss
         return () if left > 0 else (Message(Code.IMPOSSIBLE_BOUNCE, left=left, factor=self.impact_factor()),)
 
