@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import KW_ONLY, dataclass, field, replace
 from functools import cached_property, partial
 from typing import Annotated, NamedTuple, NoReturn, TypeVar
@@ -287,31 +288,29 @@ class Search:
 
     def solve(self) -> Solution:
         """A solution within the tolerance, or the one on the given mesh."""
-        if not self.is_own:
-            return self._solve()
         try:
-            with self.countdown.running():
-                return self._solve()
+            with self.countdown.running() if self.is_own else nullcontext():
+                if self.whole.mesh is not None:
+                    coarse, fine = self.whole.given
+                    pair = self.solve_with(coarse).pair
+                    finer = self.whole.pair_on(fine, self.p, pair)
+                    return Solution(pair, measured=(abs(finer.value - pair.value),))
+                if abs(self.p) < SMALL_P:
+                    return self.solve_with(self.whole.near_zero(self.p, self.tolerance).pair.generator)
+                known = None
+                for attempt in (self.try_problem_close_by, self.try_nearest_p):
+                    known = attempt() or known
+                    if known and self.whole.is_accurate(known, self.tolerance) and not other_centers(known.pair):
+                        return self.confirm(known)
+                return self.confirm(self.solve_places(known))
         except OverBudget as failure:
-            if failure.countdown is not self.countdown:
+            if not self.has_spent(failure):
                 raise
             return self.stop(failure.reason, None)
 
-    def _solve(self) -> Solution:
-        """A solution, unless the budget ends it."""
-        if self.whole.mesh is not None:
-            coarse, fine = self.whole.given
-            pair = self.solve_with(coarse).pair
-            finer = self.whole.pair_on(fine, self.p, pair)
-            return Solution(pair, measured=(abs(finer.value - pair.value),))
-        if abs(self.p) < SMALL_P:
-            return self.solve_with(self.whole.near_zero(self.p, self.tolerance).pair.generator)
-        start = None
-        for attempt in (self.try_problem_close_by, self.try_nearest_p):
-            start = attempt() or start
-            if start is not None and self.whole.is_accurate(start, self.tolerance) and not other_centers(start.pair):
-                return self.confirm(start)
-        return self.confirm(self.solve_places(start))
+    def has_spent(self, failure: OverBudget) -> bool:
+        """Whether it is the budget of this p that has ended, and not that of another number."""
+        return self.is_own and failure.countdown is self.countdown
 
     def solve_places(self, known: Solution | None) -> Solution:
         """The largest of all places where the moment may be carried, the first from a solution that does not suffice.
@@ -421,7 +420,7 @@ class Search:
         except (OverBudget, Ended) as failure:
             if best is not None and best.share <= 1:  # within the tolerance, but for its slope
                 return best.solution
-            if isinstance(failure, OverBudget) and not (self.is_own and failure.countdown is self.countdown):
+            if isinstance(failure, OverBudget) and not self.has_spent(failure):
                 raise
             return self.stop(failure.reason, best)
 
