@@ -12,6 +12,8 @@ from fpsolve.analysis.directions import settled_directions
 from fpsolve.arrays import identity
 from fpsolve.exponent import principal_pair
 from fpsolve.exponent.directions import DirectionGrid, Directions, oscillators, pair_names
+from fpsolve.fem.generator import Generator
+from fpsolve.fem.harmonics import HarmonicAxis
 from fpsolve.model import CoefficientMatrix, LinearSystem, ModalSystem, White
 from fpsolve.output.eigenfunctions import draw_eigenfunction
 from tests.exponent.test_modes import COUPLED, FREE, problem
@@ -54,8 +56,13 @@ def enriched(pair):
 def test_isotropic_systems_in_any_coordinates(n, p):
     """‖y‖ falls as exp(−0.1t) and its directions are uniform, so that those of x = Gy have 1/(|S| |det G| ‖G⁻¹e‖ⁿ)."""
     coordinates = np.eye(n) + 0.4 * np.random.default_rng(7).uniform(-1, 1, (n, n))
-    pair = ExponentSolver(turning(n, coordinates), rtol=1e-8).pair(p)
-    assert pair.value == pytest.approx(-0.1 * p, abs=1e-9)
+    problem = turning(n, coordinates)
+    own = ExponentSolver(problem, rtol=1e-8).pair(p)  # in coordinates in which it is alike in all directions, too
+    near = coordinates @ (np.eye(n) + 0.05 * np.random.default_rng(9).uniform(-1, 1, (n, n)))
+    axis = HarmonicAxis(tuple(map(tuple, near.tolist())), 8)
+    pair = principal_pair(Generator(problem, own.generator.chosen.with_axis(0, axis)), p)
+    assert own.value == pytest.approx(-0.1 * p, abs=1e-14)
+    assert pair.value == pytest.approx(-0.1 * p, abs=1e-4)
     points = np.random.default_rng(8).standard_normal((n, 40))
     points /= np.linalg.norm(points, axis=0)
     length = np.linalg.norm(np.linalg.solve(coordinates, points), axis=0)
@@ -66,6 +73,7 @@ def test_isotropic_systems_in_any_coordinates(n, p):
         ratios = product / (size * length**-n), right * length**-p, adjoint * length ** (n + p)
         return max(np.max(np.abs(each / np.mean(each) - 1)) for each in ratios) + abs(np.mean(ratios[0]) - 1)
 
+    assert error(own) < 1e-12
     assert (first := error(pair)) < 1e-3
     assert error(enriched(pair)) < 0.1 * first
     assert error(enriched(enriched(pair))) < 0.01 * first

@@ -39,7 +39,9 @@ def test_a_lower_best_value_is_seen(node):
     for value, code in ((known - 0.3, Code.NOT_PRINCIPAL), (known + 1e-5, Code.BUDGET_SPENT)):
         told = Message(Code.BUDGET_SPENT, p=4.0, reason="", value=value, error=1e-4, size=2.0)
         solver = ExponentSolver(node.problem)
-        object.__setattr__(solver, "near", SimpleNamespace(solution=lambda *_, told=told: _fail(told), refinement=None))
+        object.__setattr__(
+            solver, "whole", SimpleNamespace(solution=lambda *_, told=told: _fail(told), refinement=None)
+        )
         with pytest.raises(NotConverged) as raised:
             solver.solution(4.0)
         assert raised.value.reason.code is code
@@ -68,7 +70,7 @@ def test_values_beyond_the_plane(rng):
     assert np.isfinite(found.derivative[0])
     system = LinearSystem([CoefficientMatrix(0, free), CoefficientMatrix(0, matrix, identity)])
     solver = ExponentSolver(Problem(system, White(s=0.5, interpretation="stratonovich")), rtol=1e-3)
-    object.__setattr__(solver, "near", SimpleNamespace(solution=lambda *_: _fail(), refinement=None))
+    object.__setattr__(solver, "whole", SimpleNamespace(solution=lambda *_: _fail(), refinement=None))
     found = solver.moments([1.0, 2.0])
     assert found.value.tolist() == [pytest.approx(expected, abs=1e-11)]
     assert np.isnan(found.derivative[0])
