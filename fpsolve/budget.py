@@ -19,10 +19,12 @@ from typing import Any, TypeVar
 from fpsolve.errors import NotConverged
 from fpsolve.messages import Code, Message, Remedy
 
-OVERHEAD_SECONDS = 1e-3
-"""Of what goes with a factorisation."""
-SOLVE_SECONDS = 2.0
-"""Of some forty solves with factors of one gigabyte."""
+SECONDS_PER_OPERATION = 5e-11
+"""Seconds of a processor that an operation of an elimination in a large array counts for."""
+OVERHEAD_OPERATIONS = 2e7
+"""Operations that take the time of what goes with a factorisation, 1 ms."""
+SOLVE_OPERATIONS = 4e10
+"""Operations that take the time of some forty solves with factors of one gigabyte, 2 s."""
 SMALL = 0.002
 """Gigabytes that are not worth to ask what the process has already."""
 UNKNOWN_MACHINE = 8.0
@@ -121,8 +123,13 @@ def watched(watch: Callable[[Countdown], object]) -> Iterator[None]:
         _watch.reset(token)
 
 
-def charge(seconds: float, gigabytes: float = 0.0, unknowns: int = 0) -> None:
+def charge(operations: float, gigabytes: float = 0.0, unknowns: int = 0) -> None:
     """Count what comes next for every number under way, a factorisation if it has unknowns.
+
+    Args:
+        operations: how many there are, of a time that an elimination in a large array takes for one.
+        gigabytes: memory that they need.
+        unknowns: those of a factorisation.
 
     Raises:
         OverBudget: it is too much for one of them.
@@ -130,7 +137,8 @@ def charge(seconds: float, gigabytes: float = 0.0, unknowns: int = 0) -> None:
     if not (running := _running.get()):
         return
     if unknowns:
-        seconds += OVERHEAD_SECONDS + SOLVE_SECONDS * gigabytes
+        operations += OVERHEAD_OPERATIONS + SOLVE_OPERATIONS * gigabytes
+    seconds = SECONDS_PER_OPERATION * operations
     peak = gigabytes + (resident() if gigabytes > SMALL else 0.0)
     for each in running:
         if peak > each.memory:

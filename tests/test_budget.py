@@ -15,7 +15,7 @@ from fpsolve import OrnsteinUhlenbeck, PlaneSystem, Problem
 from fpsolve.analysis.excursions import solve_excursion
 from fpsolve.analysis.growth import Slopes
 from fpsolve.analysis.sensitivity import Gradient
-from fpsolve.budget import Countdown, charge, counted, under_way, watched
+from fpsolve.budget import SECONDS_PER_OPERATION, Countdown, charge, counted, under_way, watched
 from fpsolve.errors import NotConverged
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.function import nonzero_root
@@ -93,14 +93,14 @@ def test_parts_of_a_number_are_counted_with_it():
     seen, inner = [], Countdown(1.0, name="inner")
     with watched(lambda each: seen.append((each.name, each.unknowns, each.seconds))), Countdown(9.0).running() as line:
         with counted(Countdown(5.0, name="outer")), counted(inner):
-            charge(2.0, unknowns=70)
+            charge(2.0 / SECONDS_PER_OPERATION, unknowns=70)
             assert under_way().name == "outer"
         with (
             pytest.raises(NotConverged, match=r"^outer did not converge: .* some 6 s .* budget\.seconds = 5; use a"),
             counted(Countdown(5.0, name="outer")),
             counted(inner),
         ):
-            charge(6.0)
+            charge(6.0 / SECONDS_PER_OPERATION)
     assert inner.spent == 0
     assert line.spent == pytest.approx(2.0, abs=0.01)
     assert seen == [("outer", 70, 5.0)]

@@ -6,7 +6,7 @@ import re
 import pytest
 from rich.console import Console
 
-from fpsolve.budget import charge
+from fpsolve.budget import SECONDS_PER_OPERATION, charge
 from fpsolve.exponent.adapt import Budget
 from fpsolve.workflow.progress import MOMENTS, PERCENT, POINTS, SETS, SILENT, Bars, Phase, counted, seconds_left
 
@@ -159,7 +159,7 @@ def spend(number=3):
     """Some factorisations of Λ″(0)."""
     with Budget(seconds=60.0).countdown("Λ″(0)").running():
         for _ in range(number):
-            charge(13.0, unknowns=12_400)
+            charge(13.0 / SECONDS_PER_OPERATION, unknowns=12_400)
 
 
 def test_a_file_is_told_what_a_long_number_waits_for(clock):

@@ -21,7 +21,7 @@ from fpsolve.errors import FpsolveError, MeshError, NotConverged, SingularMatrix
 from fpsolve.exponent.eigen import PrincipalPair, principal_pair
 from fpsolve.exponent.error import Solution
 from fpsolve.exponent.starts import Question, Start, first_place, other_centers, other_places, refined
-from fpsolve.fem.factors import MAX_DENSE_UNKNOWNS, one_thread
+from fpsolve.fem.factors import FEW_UNKNOWNS, one_thread
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.fem.noise_axes import PolynomialAxis
@@ -34,7 +34,7 @@ from fpsolve.model.problem import Problem
 from fpsolve.theory.frozen import frozen_noise
 
 MAX_STAGES = 30
-WORTH_A_TRY = MAX_DENSE_UNKNOWNS
+WORTH_A_TRY = FEW_UNKNOWNS
 """Unknowns of a system that takes less time than finding another one."""
 MOST_TILT_AWAY = 0.7
 """How far the tilt of a space may be from the best one at another p."""

@@ -251,9 +251,13 @@ class KroneckerSum:
         terms = [tuple(each[at] if k == axis else each for k, each in enumerate(term)) for term in self.terms]
         return KroneckerSum(terms, unit)
 
-    def with_dense_first(self) -> KroneckerSum:
-        """The same, the factors of the first axis as arrays."""
-        return KroneckerSum([(dense(first), *others) for first, *others in self.terms], self.unit)
+    def with_last(self, axis: int) -> KroneckerSum:
+        """The sum with another axis as the last one."""
+        count = len(self.shape)
+        if axis % count == count - 1:
+            return self
+        order = [*(k for k in range(count) if k != axis), axis]
+        return KroneckerSum([tuple(term[k] for k in order) for term in self.terms])
 
     @cached_property
     def is_sparse(self) -> bool:
@@ -268,9 +272,10 @@ class KroneckerSum:
     @cached_property
     def patterns(self) -> Sequence[csc_matrix]:
         """For each axis where any of its factors has an entry."""
-        return [csc_matrix(sum(abs(csc_matrix(each)) for each in of_axis)) for of_axis in zip(*self.terms, strict=True)]
+        kind = csc_matrix if self.is_sparse else np.asarray
+        return [csc_matrix(sum(abs(kind(each)) for each in of_axis)) for of_axis in zip(*self.terms, strict=True)]
 
-    @property
+    @cached_property
     def entries(self) -> int:
         """Of the sparse matrix, at most."""
         return math.prod(pattern.nnz for pattern in self.patterns)
@@ -289,12 +294,11 @@ class KroneckerSum:
         rows, columns = np.nonzero(sum(abs(term[-1]) for term in self.terms))
         return int(np.max(np.abs(rows - columns), initial=0))
 
-    def blocks(self, offset: int) -> FloatArray:
-        """The matrices between the functions i and i + offset of the last axis, by the lesser; Fortran order each."""
-        m, n = self.halves
-        befores = np.stack([before.T.ravel() for before, _ in self.pairs])
-        lasts = np.stack([np.diagonal(last, offset) for _, last in self.pairs], axis=1)
-        return (lasts @ befores).reshape(n - abs(offset), m, m).transpose(0, 2, 1)
+    @property
+    def pair_gigabytes(self) -> float:
+        """Memory that `pairs` takes of more than two axes, as arrays and as sparse matrices."""
+        is_of_arrays = len(self.shape) > 2 and not self.is_sparse
+        return 12e-9 * self.halves[0] ** 2 * len(self.terms) * is_of_arrays
 
     def toarray(self) -> FloatArray:
         """The dense matrix, shape (size, size)."""

@@ -80,7 +80,7 @@ class Pencil:
         return float(ritz[-1] + abs(ends[-1, -1]) * math.sqrt(rest @ space.weighed(rest)))
 
     def factorised(self, shift: float) -> Factors:
-        """LU factors of L(p) − σM: dense, by blocks along an axis, or sparse."""
+        """LU factors of L(p) − σM, of the kind that takes the fewest operations."""
         return factorised(self.matrix.shifted(shift), self.levels, is_full=self.space.phi.is_full, ring=self.ring)
 
 

@@ -14,6 +14,10 @@ REFINEMENTS, ROUNDING = 5, 1e-16
 """Of a solution, at most, and the backward error below which there are no more."""
 LEAST_GAIN = 0.1
 """Of the backward error by each of them."""
+CALL_OPERATIONS = 1e7
+"""Operations that take the time of the calls of four solutions, 0.5 ms."""
+GIGABYTE_OPERATIONS = 2e10
+"""Operations that take the time of refining four solutions with factors of one gigabyte, 1 s."""
 LEAST_SHARE = 1e-8
 """Of a load, that of the vector of an eigenvalue close by in its solution."""
 
@@ -22,8 +26,13 @@ class RefinedFactors:
     """Factors of a sum, and the sum itself, by which their solutions are corrected."""
 
     def __init__(self, operator: KroneckerSum, factors: Factors) -> None:
-        self._operator, self._factors = operator, factors
+        self._operator, self._factors, self.gigabytes = operator, factors, factors.gigabytes
+        self.operations = factors.operations + CALL_OPERATIONS + GIGABYTE_OPERATIONS * factors.gigabytes
         self._vectors = dict[bool, FloatArray]()  # right and left, of an eigenvalue close by
+
+    def make(self) -> None:
+        """Eliminate."""
+        self._factors.make()
 
     def solve(self, b: FloatArray, *, transposed: bool = False) -> FloatArray:
         """x of A x = b, or of Aᵀx = b, refined until only rounding is left.

@@ -23,10 +23,18 @@ from scipy.sparse import coo_matrix, issparse
 from fpsolve.arrays import FloatArray, IntArray, Matrix, dense
 from fpsolve.errors import SingularMatrix
 from fpsolve.fem.axis import KroneckerSum
-from fpsolve.fem.dense import DenseFactors
+from fpsolve.fem.dense import ArrayFactors
 
 LARGEST_GROWTH = 1e10
 """Of an inverse, over one over the norm of all, in an elimination that does not exchange rows of different cells."""
+CELL_OPERATIONS = 4e4
+"""Operations that take the time of a cell and level, beside its products, 2 µs."""
+INVERSE_OPERATIONS = 40.0
+"""Operations that take the time of a small inverse and its products over the third power of its side."""
+LEVEL_OPERATIONS = 7e5
+"""Operations that take the time of the calls for a level, 35 µs."""
+ROUND_OPERATIONS = 2e6
+"""Operations that take the time of the calls by which each second segment is joined to the next one, 0.1 ms."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,15 +81,26 @@ class RingFactors:
     Args:
         operator: the sum of two factors, that of the last axis with few diagonals or not.
         ring: the cells of the first axis, two of them at least.
-
-    Raises:
-        SingularMatrix: a part of the matrix alone is.
     """
 
     def __init__(self, operator: KroneckerSum, ring: Ring) -> None:
-        self._operator, self._ring, (_, self._n) = operator, ring, operator.shape
-        self._group = max(operator.band, 1)
-        self._levels = -(-self._n // self._group)
+        self._operator, self._ring, (_, n) = operator, ring, operator.shape
+        self._n, self._group = n, max(operator.band, 1)
+        self._levels = -(-n // self._group)
+        cells, modes = ring.number.shape
+        side = modes * self._group
+        within = cells * self._levels * (CELL_OPERATIONS + INVERSE_OPERATIONS * side**3 + 8 * side**2 * n)
+        calls = LEVEL_OPERATIONS * self._levels + ROUND_OPERATIONS * math.log2(cells)
+        self.operations = 2 * (calls + within + 2 / 3 * (18 * cells + 16) * n**3)
+        self.gigabytes = 8e-9 * cells * (5 * n * self._group * modes**2 + n**2 * (modes + 30))
+
+    def make(self) -> None:
+        """Eliminate.
+
+        Raises:
+            SingularMatrix: a part of the matrix alone is.
+        """
+        operator = self._operator
         size, most = self._levels * self._group, LARGEST_GROWTH / operator.norm
         noises = np.zeros((len(operator.terms), size, size))
         for padded, (_, noise) in zip(noises, operator.terms, strict=True):
@@ -179,7 +198,7 @@ class RingFactors:
             self._rounds.append(_Round(a12, a22, b11, b12, b21, inverse, h1, h2))
             scattering = np.concatenate([joined, scattering[2 * pairs :]])
         whole = scattering[0].transpose(0, 2, 1, 3)[:, :, ::-1].reshape(2 * self._n, 2 * self._n)
-        self._closed = DenseFactors(np.eye(2 * self._n) - whole)
+        self._closed = ArrayFactors(np.eye(2 * self._n) - whole)
 
     def solve(self, b: FloatArray, *, transposed: bool = False) -> FloatArray:
         """x of A x = b, or of Aᵀx = b, as far as an elimination that does not exchange rows of cells rounds it."""
@@ -264,20 +283,6 @@ class RingFactors:
             pairs = np.stack([first, second], axis=1)
             values = np.concatenate([pairs.reshape(-1, 2, self._n), values[len(v) :]])
         return values
-
-
-def ring_seconds(operator: KroneckerSum, ring: Ring) -> float:
-    """About how long an elimination takes."""
-    (cells, modes), n, band = ring.number.shape, operator.shape[-1], max(operator.band, 1)
-    levels, rounds, side = math.ceil(n / band), math.log2(cells), modes * band
-    within = cells * levels * (2e-6 + 2e-9 * side**3 + 4e-10 * side**2 * n)
-    return 3.5e-5 * levels + 1e-4 * rounds + within + (18 * cells + 16) * n**3 / 3e10
-
-
-def ring_gigabytes(operator: KroneckerSum, ring: Ring) -> float:
-    """What an elimination needs: A by groups, images of all loads, and what joins the cells."""
-    (cells, modes), n, band = ring.number.shape, operator.shape[-1], max(operator.band, 1)
-    return 8e-9 * cells * (5 * n * band * modes**2 + n**2 * (modes + 30))
 
 
 def _inverse(matrices: FloatArray, most: float) -> FloatArray:

@@ -586,10 +586,10 @@ class Worked:
     def __init__(self, monkeypatch, cost):
         self.now, self.cost = 0.0, cost
         monkeypatch.setattr(ZeroField, "_sample", lambda _, at, problem, rtol: self.sample(at))
-        monkeypatch.setattr(budget, "OVERHEAD_SECONDS", 0.0)
+        monkeypatch.setattr(budget, "OVERHEAD_OPERATIONS", 0.0)
 
     def sample(self, at):
-        charge(self.cost(at))
+        charge(self.cost(at) / budget.SECONDS_PER_OPERATION)
         self.now += self.cost(at)
         return Sample(at, at[0] + at[1] - 0.8, np.ones(2), 0.0, 1.0)
 

@@ -225,7 +225,7 @@ def test_a_budget_holds(monkeypatch):
         return found
 
     monkeypatch.setattr(Pencil, "factorised", counted)
-    monkeypatch.setattr(budget, "OVERHEAD_SECONDS", 1.0)
+    monkeypatch.setattr(budget, "OVERHEAD_OPERATIONS", 1.0 / budget.SECONDS_PER_OPERATION)
     oscillator = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.5, epsilon=0.1)
     with pytest.raises(NotConverged, match=r"more than budget.seconds = 6"):
         moment_lyapunov(Problem(oscillator, FIG1_NOISE.ou_reduction()), 1e5, budget=Budget(seconds=6.0))

@@ -1,4 +1,4 @@
-"""LU factors of Kronecker sums, dense, by blocks and sparse, against one dense solve."""
+"""LU factors of Kronecker sums, dense, by levels and sparse, against one dense solve."""
 
 import os
 import sys
@@ -13,17 +13,9 @@ from fpsolve import NonGaussianNoise, OrnsteinUhlenbeck, Problem, VibroImpactOsc
 from fpsolve.errors import SingularMatrix
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem.axis import KroneckerSum
-from fpsolve.fem.factors import (
-    MAX_BLOCK,
-    MAX_DENSE_UNKNOWNS,
-    BlockFactors,
-    DenseFactors,
-    LevelFactors,
-    SparseFactors,
-    along_first,
-    factorised,
-)
+from fpsolve.fem.factors import FEW_UNKNOWNS, DenseFactors, SparseFactors, factorised, kinds
 from fpsolve.fem.generator import Generator
+from fpsolve.fem.levels import LevelFactors, neighbours, paired
 from fpsolve.fem.noise_axes import PolynomialAxis, StateAxis
 from fpsolve.fem.phase import PhaseAxis
 from fpsolve.fem.refined import RefinedFactors
@@ -85,11 +77,22 @@ def operator(request, rng):
     return KroneckerSum(terms)
 
 
-@pytest.mark.parametrize("kind", [lambda each: DenseFactors(each.toarray()), BlockFactors, SparseFactors])
+def by_levels(operator, axis=1):
+    return LevelFactors(operator, neighbours(operator, axis, None), axis)
+
+
+def made(factors):
+    factors.make()
+    return factors
+
+
+@pytest.mark.parametrize("kind", [DenseFactors, by_levels, SparseFactors])
 def test_all_kinds_solve_the_same_systems(operator, kind, rng):
-    factors, matrix, b = kind(operator), operator.toarray(), rng.standard_normal(operator.size)
+    factors, matrix, b = made(kind(operator)), operator.toarray(), rng.standard_normal(operator.size)
     np.testing.assert_allclose(factors.solve(b), np.linalg.solve(matrix, b), rtol=1e-8, atol=1e-10)
     np.testing.assert_allclose(factors.solve(b, transposed=True), np.linalg.solve(matrix.T, b), rtol=1e-8, atol=1e-10)
+    several = rng.standard_normal((operator.size, 3))
+    np.testing.assert_allclose(factors.solve(several), np.linalg.solve(matrix, several), rtol=1e-8, atol=1e-10)
 
 
 def test_products_transposes_and_bounds(operator, rng):
@@ -114,22 +117,32 @@ def test_the_sparse_matrix_is_that_of_the_products(rng):
         np.testing.assert_allclose(found.toarray(), expected, atol=1e-14)
 
 
-def test_the_kind_follows_from_the_factors(rng):
+def test_the_kind_follows_from_the_operations(rng):
     def sum_of(m, n, band):
         return KroneckerSum([(np.eye(m) + 0.1 * rng.standard_normal((m, m)), banded(rng, n, band) + 5 * np.eye(n))])
 
     assert isinstance(factorised(sum_of(10, 5, 4)), DenseFactors)
-    m = MAX_DENSE_UNKNOWNS // 10
-    assert isinstance(factorised(sum_of(m, 12, 1)), BlockFactors)
-    assert isinstance(factorised(sum_of(m, 12, 11)), SparseFactors)
-    many = KroneckerSum([(identity(MAX_BLOCK + 1, format="csr"), banded(rng, 5, 1) + 5 * np.eye(5))])
+    m = FEW_UNKNOWNS // 10
+    assert isinstance(factorised(sum_of(m, 12, 1)), LevelFactors)
+    many = KroneckerSum([(identity(800, format="csr"), banded(rng, 5, 1) + 5 * np.eye(5))])
     assert isinstance(factorised(many), SparseFactors)
+
+
+def test_operations_are_counted(rng):
+    """A dense LU has ⅔N³; of n equal levels of m functions each but the last has two products of 2m³ beside its own."""
+    m, n = 400, 10
+    operator = KroneckerSum([(rng.standard_normal((m, m)), banded(rng, n, 1))])
+    plain, chosen = DenseFactors(operator), by_levels(operator)
+    assert plain.operations == pytest.approx(2 / 3 * (m * n) ** 3)
+    assert chosen.operations == pytest.approx((2 / 3 * n + 4 * (n - 1)) * m**3, rel=0.01)
+    found = list(kinds(operator, (), False, None))
+    assert min(found, key=lambda each: each.operations).operations <= chosen.operations
 
 
 def test_a_singular_matrix_gives_its_null_vector():
     phase = np.diag([0.0, 1.0, 2.0])
-    for kind in (lambda each: DenseFactors(each.toarray()), BlockFactors, SparseFactors):
-        found = kind(KroneckerSum([(phase, np.eye(2))])).solve(np.ones(6))
+    for kind in (DenseFactors, by_levels, SparseFactors):
+        found = made(kind(KroneckerSum([(phase, np.eye(2))]))).solve(np.ones(6))
         assert np.all(np.isfinite(found))
         assert abs(found[0]) > 1e10 * abs(found[-1])
 
@@ -144,9 +157,8 @@ def test_levels_that_are_singular_alone_go_in_pairs(rng):
     operator = KroneckerSum([(phase, np.eye(count)), (np.eye(12), noise)])
     levels = [np.array([k]) for k in range(count)]
     with pytest.raises(SingularMatrix):
-        LevelFactors(operator, levels)
-    found, b = factorised(operator, [None, levels]), rng.standard_normal(operator.size)
-    assert isinstance(found, LevelFactors)
+        LevelFactors(operator, levels).make()
+    found, b = made(LevelFactors(operator, paired(levels))), rng.standard_normal(operator.size)
     matrix = operator.toarray()
     np.testing.assert_allclose(found.solve(b), np.linalg.solve(matrix, b), rtol=1e-9, atol=1e-11)
     np.testing.assert_allclose(found.solve(b, transposed=True), np.linalg.solve(matrix.T, b), rtol=1e-9, atol=1e-11)
@@ -160,13 +172,12 @@ def test_single_precision_is_refined(rng):
         [(phase - 30 * identity(60), np.eye(7)), (csr_matrix(rng.standard_normal((60, 60))), noise)]
     )
     value = np.max(np.linalg.eigvals(operator.toarray()).real)
-    levels = [np.arange(k, operator.size, 7) for k in range(7)]
     b = rng.standard_normal(operator.size)
     for shift in (0.0, value + 1e-3, value + 1e-9):
         shifted = operator.shifted(shift)
         matrix = shifted.toarray()
-        rough = LevelFactors(shifted, levels, np.float32)
-        factors = RefinedFactors(shifted, rough)
+        rough = LevelFactors(shifted, neighbours(shifted, 1, None), precision=np.float32)
+        factors = made(RefinedFactors(shifted, rough))
         for transposed, expected in ((False, matrix), (True, matrix.T)):
             x = factors.solve(b, transposed=transposed)
             error = np.linalg.norm(expected @ x - b) / (np.linalg.norm(expected) * np.linalg.norm(x))
@@ -176,20 +187,16 @@ def test_single_precision_is_refined(rng):
 
 
 def test_levels_of_the_first_axis(rng):
-    """Taken where they are many: a thin band of the first axis, each of its functions with all of the noise's."""
+    """A thin band of the first axis, each of its functions with all of the noise's."""
     first = [banded(rng, 90, 3) + 9 * np.eye(90) for _ in range(2)]
     noises = [np.eye(6), banded(rng, 6, 1)]
     operator = KroneckerSum([(csr_matrix(phase), noise) for phase, noise in zip(first, noises, strict=True)])
     levels = np.split(np.arange(90), range(3, 90, 3))
-    found, matrix = factorised(operator, [levels, None], is_full=True), operator.toarray()
-    assert isinstance(found, LevelFactors)
-    assert [level.size for level in along_first(operator, levels)] == [18] * 30
+    found, matrix = made(LevelFactors(operator, levels, 0)), operator.toarray()
+    assert found.operations in [each.operations for each in kinds(operator, [levels, None], True, None)]
     b = rng.standard_normal(operator.size)
-    np.testing.assert_allclose(found.solve(b), np.linalg.solve(matrix, b), rtol=1e-9, atol=1e-12)
-    np.testing.assert_allclose(found.solve(b, transposed=True), np.linalg.solve(matrix.T, b), rtol=1e-9, atol=1e-12)
-    few = factorised(operator, [np.split(np.arange(90), 2), None], is_full=True)
-    assert isinstance(few, BlockFactors)
-    np.testing.assert_allclose(few.solve(b), found.solve(b), rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(found.solve(b), np.linalg.solve(matrix, b), rtol=1e-8, atol=1e-10)
+    np.testing.assert_allclose(found.solve(b, transposed=True), np.linalg.solve(matrix.T, b), rtol=1e-8, atol=1e-10)
 
 
 @pytest.mark.parametrize(
@@ -205,7 +212,7 @@ def test_cells_of_a_ring_one_after_the_other(noise, degrees, rng):
     axis = StateAxis(noise) if noise.has_states else PolynomialAxis(noise, 9, 0.2)
     pencil = Generator(problem, Space((PhaseAxis(lines, np.array(degrees)), axis))).at(1.3)
     operator, b = pencil.matrix.shifted(0.7), rng.standard_normal(pencil.space.size)
-    factors, matrix = RefinedFactors(operator, RingFactors(operator, pencil.ring)), operator.toarray()
+    factors, matrix = made(RefinedFactors(operator, RingFactors(operator, pencil.ring))), operator.toarray()
     for transposed, expected in ((False, matrix), (True, matrix.T)):
         np.testing.assert_allclose(factors.solve(b, transposed=transposed), np.linalg.solve(expected, b), rtol=1e-9)
 
@@ -218,7 +225,7 @@ def test_a_ring_next_to_an_eigenvalue():
     pencil = pair.generator.at(-3.0)
     for off, (b, transposed) in product((0.0, 1e-9), ((pair.right, False), (pair.left, True))):
         operator = pencil.matrix.shifted(pair.eigenvalue * (1 + off))
-        factors = RefinedFactors(operator, RingFactors(operator, pencil.ring))
+        factors = made(RefinedFactors(operator, RingFactors(operator, pencil.ring)))
         x = factors.solve(pair.space.weighed(b), transposed=transposed)
         rest = (operator.T if transposed else operator) @ x - pair.space.weighed(b)
         assert np.linalg.norm(rest) < 1e-15 * operator.norm * np.linalg.norm(x)

@@ -8,8 +8,9 @@ from fpsolve import OrnsteinUhlenbeck, PlaneSystem, Problem
 from fpsolve.arrays import identity
 from fpsolve.exponent.eigen import rayleigh_iteration
 from fpsolve.fem.axis import KroneckerSum
-from fpsolve.fem.factors import BlockFactors, DenseFactors, SparseFactors
+from fpsolve.fem.factors import DenseFactors, SparseFactors
 from fpsolve.fem.generator import Pencil
+from fpsolve.fem.levels import LevelFactors, neighbours
 from fpsolve.fem.noise_axes import PolynomialAxis
 from fpsolve.fem.phase import PhaseAxis
 from fpsolve.fem.space import Space
@@ -79,7 +80,9 @@ def test_sums_of_three_factors(operator, rng):
     assert operator.norm >= np.abs(matrix).sum(axis=0).max() - 1e-9
     rest = np.kron(*operator.terms[0][1:])
     np.testing.assert_allclose(operator.shifted(0.3).toarray(), matrix - 0.3 * np.kron(np.eye(4), rest), atol=1e-12)
-    for factors in (DenseFactors(operator.toarray()), BlockFactors(operator), SparseFactors(operator)):
+    by_levels = [LevelFactors(operator, neighbours(operator, axis, None), axis) for axis in (1, 2)]
+    for factors in (DenseFactors(operator), *by_levels, SparseFactors(operator)):
+        factors.make()
         np.testing.assert_allclose(factors.solve(v), np.linalg.solve(matrix, v), rtol=1e-8, atol=1e-10)
         np.testing.assert_allclose(
             factors.solve(v, transposed=True), np.linalg.solve(matrix.T, v), rtol=1e-8, atol=1e-10

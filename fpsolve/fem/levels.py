@@ -1,0 +1,171 @@
+"""Block elimination of a Kronecker sum along one of its axes.
+
+With the functions of the axis in levels, each coupled to its neighbours only, the matrix is block tridiagonal: D_k,
+with U_k above and L_k below. From the last level on, of the functions that noise damps the most,
+
+    P_k = D_k − U_k P_{k+1}⁻¹ L_k.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+
+import numpy as np
+from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import connected_components, shortest_path
+
+from fpsolve.arrays import FloatArray, IntArray, Matrix, dense
+from fpsolve.errors import SingularMatrix
+from fpsolve.fem.axis import KroneckerSum
+from fpsolve.fem.dense import ArrayFactors, dense_operations
+
+LARGEST_GROWTH = 1e3
+"""Largest entry of a P_k over the norm of the matrix, as rows of different levels are not exchanged."""
+DENSE_SHARE = 0.1
+"""Share of the entries of all blocks that do not vanish, from which on blocks are arrays."""
+LEVEL_OPERATIONS = 6e5
+"""Operations that take the time of the calls for a level of arrays, 30 µs."""
+SPARSE_LEVEL_OPERATIONS = 1e7
+"""Operations that take the time of the calls for a level of sparse matrices, 0.5 ms."""
+ENTRY_OPERATIONS = 2000.0
+"""Operations that take the time of making an entry of a sparse matrix and sorting it into levels, 0.1 µs."""
+ENTRY_BYTES = 40
+"""Bytes of an entry of a sparse matrix, while it is sorted."""
+
+Blocks = tuple[FloatArray, Matrix, Matrix]
+"""D_k, U_k and L_k; the last two are empty for the last level."""
+
+
+class LevelFactors:
+    """LU factors by levels along an axis.
+
+    Args:
+        operator: the sum.
+        groups: the functions of an axis in each level.
+        axis: this axis.
+        precision: of the factors.
+    """
+
+    def __init__(
+        self, operator: KroneckerSum, groups: Sequence[IntArray], axis: int = -1, precision: type = float
+    ) -> None:
+        self._operator, self._axis, self._groups = operator.with_last(axis), axis, groups
+        self._shape, self._precision = operator.shape, precision
+        (m, _), entries, terms = self._operator.halves, operator.entries, len(operator.terms)
+        sizes = [m * group.size for group in groups]
+        self._parts = [slice(*pair) for pair in pairwise(np.cumsum([0, *sizes]).tolist())]
+        squares, beside = sum(size**2 for size in sizes), sum(a * b for a, b in pairwise(sizes))
+        self._is_dense = entries >= DENSE_SHARE * (squares + 2 * beside)
+        share = 1.0 if precision is float else 0.5
+        operations = sum(map(dense_operations, sizes)) + sum(2 * a * b**2 for a, b in pairwise(sizes))
+        if self._is_dense:
+            operations += sum(2 * a**2 * b for a, b in pairwise(sizes))
+            self.operations = share * operations + LEVEL_OPERATIONS * len(sizes)
+            self.gigabytes = 8e-9 * (share * squares + 2 * beside + terms * m**2 + 3 * max(sizes) ** 2)
+        else:
+            self.operations = share * operations + ENTRY_OPERATIONS * entries + SPARSE_LEVEL_OPERATIONS * len(sizes)
+            self.gigabytes = 8e-9 * share * (squares + 5 * max(sizes) ** 2) + 1e-9 * ENTRY_BYTES * entries
+            self.gigabytes += operator.pair_gigabytes
+
+    def make(self) -> None:
+        """Eliminate.
+
+        Raises:
+            SingularMatrix: a P_k is singular, of functions that noise moves only by way of those of another level.
+        """
+        most, self._pivots = LARGEST_GROWTH * self._operator.norm, list[ArrayFactors]()
+        self._up, self._quotients = list[Matrix](), list[Matrix]()
+        for rest, up, down in self._arrays() if self._is_dense else self._rows():
+            if self._pivots:
+                touched = slice(None) if isinstance(down, np.ndarray) else np.unique(down.indices)
+                below: FloatArray = np.asarray(dense(down[:, touched]), dtype=self._precision, order="F")
+                quotient = self._pivots[-1].solve(below)
+                rest.T[touched] -= np.asarray(quotient.T @ up.T)
+                self._up.append(up)
+                self._quotients.append(quotient if self._is_dense else down)
+            if not np.abs(rest).max() < most:
+                raise SingularMatrix("the pivot of a level is singular")
+            self._pivots.append(ArrayFactors(rest))
+        for each in (self._pivots, self._up, self._quotients):
+            each.reverse()
+
+    def _arrays(self) -> Iterator[Blocks]:
+        """The blocks as arrays in Fortran order, from the last level on."""
+        m, _ = self._operator.halves
+        befores = np.stack([dense(before).T.ravel() for before, _ in self._operator.pairs])
+        lasts = np.stack([dense(last) for _, last in self._operator.pairs])
+
+        def between(rows: IntArray, columns: IntArray) -> FloatArray:
+            table = lasts[:, rows[:, None], columns].reshape(len(lasts), -1).T @ befores
+            ordered = table.reshape(rows.size, columns.size, m, m).transpose(1, 2, 0, 3)
+            return np.asarray(ordered.reshape(m * columns.size, m * rows.size).T, dtype=self._precision, order="F")
+
+        after = self._groups[-1][:0]
+        for group in reversed(self._groups):
+            yield between(group, group), between(group, after), between(after, group)
+            after = group
+
+    def _rows(self) -> Iterator[Blocks]:
+        """D_k as an array, U_k and L_k sparse, from the last level on."""
+        order = self._unknowns
+        matrix = csr_matrix(self._operator.tocsc()[:, order].tocsr()[order], dtype=self._precision)
+        after = slice(0, 0)
+        for part in reversed(self._parts):
+            rows = matrix[part]
+            yield rows[:, part].toarray(order="F"), rows[:, after], matrix[after][:, part]
+            after = part
+
+    @property
+    def _unknowns(self) -> IntArray:
+        """Of the operator, in the order of the levels, by functions of the axis."""
+        m, n = self._operator.halves
+        return np.add.outer(np.concatenate(self._groups), n * np.arange(m)).ravel()
+
+    def solve(self, b: FloatArray, *, transposed: bool = False) -> FloatArray:
+        """x of A x = b, or of Aᵀx = b; several b are columns."""
+        order, axis = np.concatenate(self._groups), self._axis % len(self._shape)
+        table = np.moveaxis(b.reshape(*self._shape, *b.shape[1:]), axis, 0)
+        sorted_b = table[order].reshape(b.shape).astype(self._precision)
+        rest = [sorted_b[part] for part in self._parts]
+        for i in range(len(rest) - 1, -1, -1):
+            if not transposed:
+                rest[i] = self._pivots[i].solve(rest[i])
+            if i:
+                rest[i - 1] -= self._quotient(i, rest[i], True) if transposed else self._up[i - 1] @ rest[i]
+        for i, pivot in enumerate(self._pivots):
+            if i:
+                rest[i] -= self._up[i - 1].T @ rest[i - 1] if transposed else self._quotient(i, rest[i - 1], False)
+            if transposed:
+                rest[i] = pivot.solve(rest[i], transposed=True)
+        found = np.empty(table.shape)
+        found[order] = np.concatenate(rest).reshape(table.shape)
+        return np.moveaxis(found, 0, axis).reshape(b.shape)
+
+    def _quotient(self, i: int, x: FloatArray, transposed: bool) -> FloatArray:
+        """P_i⁻¹ L_(i−1) x, or the transpose; of sparse matrices only L is kept."""
+        kept = self._quotients[i - 1]
+        if self._is_dense:
+            return np.asarray((kept.T if transposed else kept) @ x)
+        pivot = self._pivots[i]
+        return np.asarray(kept.T @ pivot.solve(x, transposed=True) if transposed else pivot.solve(kept @ x))
+
+
+def neighbours(operator: KroneckerSum, axis: int, levels: Sequence[IntArray] | None) -> list[IntArray]:
+    """The functions of an axis in levels: those given, if there are none by their distance, for None by the band."""
+    pattern = operator.patterns[axis]
+    if levels is None:
+        rows, columns = pattern.nonzero()
+        band = max(int(np.max(np.abs(rows - columns), initial=0)), 1)
+        return np.split(np.arange(operator.shape[axis]), range(band, operator.shape[axis], band))
+    if levels:
+        return list(levels)
+    starts = np.unique(connected_components(pattern)[1], return_index=True)[1]
+    distance = np.min(shortest_path(pattern + pattern.T, method="D", unweighted=True, indices=starts), axis=0)
+    return [np.flatnonzero(distance == d) for d in range(int(distance.max()) + 1)]
+
+
+def paired(groups: Sequence[IntArray]) -> list[IntArray]:
+    """Two levels in one, the last two, and so on."""
+    count = len(groups)
+    return [np.concatenate(groups[max(end - 2, 0) : end]) for end in range(2 - count % 2, count + 1, 2)]
