@@ -23,7 +23,7 @@ from fpsolve.model.noise import NoiseDerivative
 
 NO_LINES = np.zeros(0)
 MAX_DENSE_UNKNOWNS = 600
-"""Matrices of φ, and of ξ, are NumPy arrays for so many unknowns, and sparse beyond."""
+"""Largest number of functions of an axis with cells whose matrices are arrays: of more they are sparse."""
 
 
 class Axis:
@@ -157,7 +157,7 @@ class DividedAxis(Axis):
         return matrix if self.size > MAX_DENSE_UNKNOWNS else dense(matrix)
 
     def on(self, lines: FloatArray, degrees: IntArray) -> Self:
-        """That with other cells."""
+        """The axis with other cells."""
         return replace(self, lines=lines, degrees=degrees)
 
     def enriched(self) -> Self:

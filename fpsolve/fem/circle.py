@@ -13,7 +13,7 @@ from fpsolve.fem.noise_axes import STEP, CountedAxis, Rule, Samples, form
 from fpsolve.model.noise import NoiseDerivative
 
 MORE_POINTS = 64
-"""Of a rule of equidistant points, beyond four for each wave: it is exact for g(ξ(θ)) of that many harmonics."""
+"""Number of equidistant points beyond four for each wave: a rule of them is exact for g(ξ(θ)) of so many harmonics."""
 
 
 @dataclass(frozen=True, eq=False)

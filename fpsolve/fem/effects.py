@@ -14,12 +14,17 @@ import numpy as np
 from fpsolve.arrays import FloatArray, IntArray
 
 HALVING = 2 * math.log(2)
-"""By how much more the logarithm of an effect falls with each degree in half a cell."""
-LEAST_DEGREE, SPLIT_DEGREE, MOST_DEGREE = 4, 6, 14
+"""Rate per degree by which the logarithm of an effect falls faster in half a cell."""
+LEAST_DEGREE = 4
+"""Lowest degree to which a cell is made coarser."""
+SPLIT_DEGREE = 6
+"""Lowest degree at which the highest modes tell whether halves of a cell take fewer functions."""
+MOST_DEGREE = 14
+"""Highest degree of a cell: beyond, it is halved."""
 STILL = 3 / 7
 """Ratio of the effects of two and of four modes where no fall is seen: then thrice the first may be left."""
 SPARE = 1.0
-"""Degrees beyond what seems to be enough that a cell keeps where none should be made coarser."""
+"""Number of degrees beyond what seems to be enough that a cell keeps where none should be made coarser."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +43,7 @@ class ModeEffects:
 
     @property
     def two(self) -> FloatArray:
-        """Those of the two highest modes, shape (cells,)."""
+        """Effects of the two highest modes, shape (cells,)."""
         return self.highest[1]
 
     @property

@@ -24,11 +24,9 @@ from fpsolve.signals import left_at_signals
 from fpsolve.superlu import sparse_lu
 
 FEW_UNKNOWNS = 350
-"""Unknowns up to which one dense matrix is taken without counting what others take."""
+"""Largest number of unknowns of one dense matrix that is taken without counting what others take."""
 LONG = 1e10
-"""Operations of a factorisation, half a second, from which on it runs where it can be left."""
-ROUGH = 1e10
-"""Operations of an elimination by levels, half a second, from which on single precision and refinements are faster."""
+"""Number of operations, half a second, from which on a factorisation runs where it can be left, and may be rough."""
 FRONT_OPERATIONS = 5.0
 """Number of operations that take the time of SuperLU for an unknown and the square of the width of a front, 0.25 ns."""
 FRONT_BYTES = 24.0
@@ -118,7 +116,7 @@ def _ordered(operator: KroneckerSum, levels: Levels, ring: Ring | None) -> Itera
             groups = neighbours(operator, axis, own)
             for each in (groups, paired(groups)) if len(groups) > 2 else ():
                 yield (by_levels := LevelFactors(operator, each, axis))
-                if by_levels.operations > ROUGH:
+                if by_levels.operations > LONG:
                     yield RefinedFactors(operator, LevelFactors(operator, each, axis, np.float32))
 
 

@@ -25,7 +25,9 @@ if TYPE_CHECKING:
     from fpsolve.fem.sphere import SphereTerms
 
 KEPT_SPACES = 16
+"""Number of spaces, of the last p, whose matrices are kept."""
 LANCZOS_STEPS = 16
+"""Number of steps of Lanczos after which the end of a spectrum is known to a bound."""
 LEFT_BY_STATES = 1.0
 """Share of the effect of two modes that is left at least where T is not analytic, as where the phase rests in a state,
 or at φ that white noise does not move: there it falls unevenly, and ever more slowly."""
@@ -51,7 +53,7 @@ class Pencil:
 
     @staticmethod
     def of(p: float, space: Space, matrix: KroneckerSum, ring: Ring | None = None) -> Pencil:
-        """That of all functions."""
+        """The pencil of all functions."""
         return Pencil(p, space, matrix, [axis.levels for axis in space.axes], ring)
 
     def on(self, axis: int, kept: Mask) -> Pencil:
@@ -143,7 +145,7 @@ class Generator:
         return None if self.problem.diffusions or self.problem.impulses else self.phi.ring
 
     def enriched(self) -> Generator:
-        """That of the next finer space."""
+        """The generator on the next finer space."""
         return Generator(self.problem, self.chosen.enriched())
 
     def terms(self) -> tuple[Term, ...]:

@@ -51,7 +51,7 @@ class Harmonics:
     @staticmethod
     @lru_cache(maxsize=16)
     def of(n: int, most: int) -> Harmonics:
-        """Those of functions up to an even degree."""
+        """The harmonics of functions up to an even degree."""
         degrees, factors, values = _components(n, most + 2)
         laplace = diags(-degrees * (degrees + n - 2.0))
         even = np.flatnonzero(degrees % 2 == 0)
@@ -186,7 +186,7 @@ class HarmonicAxis(DirectionAxis):
 
     @property
     def area(self) -> float:
-        """That of the sphere, as harmonics are orthonormal in the mean."""
+        """The area of the sphere, as harmonics are orthonormal in the mean."""
         return 2 * math.pi ** (self.n / 2) / math.gamma(self.n / 2)
 
     def at(self, points: FloatArray) -> FloatArray:

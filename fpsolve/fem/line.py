@@ -127,7 +127,7 @@ class LineSpace:
         return right - left
 
     def _slopes_at_ends(self) -> FloatArray:
-        """Those of the functions of each cell at both of its ends, shape (m, 2, k + 1)."""
+        """Slopes of the functions of each cell at both of its ends, shape (m, 2, k + 1)."""
         _, slopes = _reference(self.degree, np.array([0.0, 1.0]).tobytes())
         return np.asarray((slopes / self._sizes[:, None, None]) @ self._transform)
 

@@ -19,8 +19,11 @@ from fpsolve.files import atomic
 from fpsolve.messages import Code, Message, Remedy
 
 MAX_DEGREE = 20
+"""Highest degree of the polynomials in a cell."""
 MAX_CELLS = 1000
+"""Largest number of cells along an axis of a mesh."""
 TOLERANCE = 1e-9
+"""Distance of two lines, over the length of the axis or in radians, up to which they are one."""
 NO_ZERO = "the noise interval [{:g}, {:g}] must contain 0 inside, where the noise lives; choose xi_min < 0 < xi_max"
 MARKERS = {"domain": 0, "impact": 1, "seam": 2, "truncation": 3}
 """Cell data `marker` of a .vtu; the physical groups of a .msh have the same names, and numbers greater by 1."""

@@ -28,17 +28,19 @@ if TYPE_CHECKING:
     from fpsolve.fem.line import LineSpace
 
 REACH = 9.0
-"""Noise units on either side of its centre, beyond which nothing is left of a weight that falls like a Gaussian."""
+"""Distance from its centre, in standard deviations, beyond which nothing is left of a weight like a Gaussian."""
 SHARP_ENDS = 50.0
-"""Exponents from which on P_s leaves next to nothing at the ends of its support."""
-NEAR_END, VANISHES = 1e-9, 1e-6
-"""σ² vanishes at the ends of the support where so near to one it is less than this share of that at ξ = 0."""
+"""Least exponent a of P_s ~ (1 − |z|)^a that leaves next to nothing at the ends of its support."""
+NEAR_END = 1e-9
+"""Distance from an end of the support, over its half width, at which σ² is asked whether it vanishes there."""
+VANISHES = 1e-6
+"""Largest share of σ² at ξ = 0 that is taken for none."""
 STEP = 1e-5
-"""Of ln ξ, by which a coefficient is differentiated."""
+"""Step of ln ξ by which a coefficient is differentiated."""
 MORE_POINTS = 16
-"""Quadrature points beyond the number of polynomials."""
+"""Number of points of a quadrature beyond the number of polynomials."""
 MAX_COUNT = 200
-"""Number of polynomials, or highest degree of others, beyond which none are added."""
+"""Largest number of polynomials, or highest degree of other functions: beyond, none are added."""
 
 
 class Samples(NamedTuple):

@@ -17,13 +17,15 @@ from fpsolve.model.plane import CoefficientMatrix, Harmonics, Impulse, ImpulseDe
 from fpsolve.polynomials import Orthonormal, gauss_legendre, legendre, orthonormal
 
 PENALTY = 2.0
-"""η of the interior penalty method times size/(degree + 1)²."""
-STRIPS, MORE_POINTS = 32, 8
-"""Of an impulse: parts of the domain before and after it, in which a rule of Gauss has points beyond the degree."""
+"""Factor η·size/(degree + 1)² of the interior penalty method."""
+STRIPS = 32
+"""Number of parts of the domain in each of which an impulse is integrated before and after it."""
+MORE_POINTS = 8
+"""Number of Gauss points in such a part beyond the degree."""
 KEPT_IMPULSES = 8
-"""Whose matrices are kept, as many problems may share the functions."""
+"""Number of impulses whose matrices are kept, as many problems may share the functions."""
 MOST_SHARED = 100
-"""Functions of φ that are kept for the next problem."""
+"""Largest number of functions of φ that are kept for the next problem."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +96,7 @@ class PhaseAxis(DividedAxis):
 
     @cached_property
     def weights(self) -> FloatArray:
-        """Those of the points, shape (m n,)."""
+        """Weights of the points, shape (m n,)."""
         return (self._sizes[:, None] * self._table.rule.weights).ravel()
 
     @cached_property
@@ -181,7 +183,7 @@ class PhaseAxis(DividedAxis):
         return self.stored(at.T @ diags(weights * np.exp(p * logs) * logs**derivative) @ end)
 
     def changed_impulses(self, of: Impulse, by: ImpulseDerivative, p: float, derivative: int = 0) -> Matrix:
-        """The same, differentiated by θ of which B depends."""
+        """∂/∂θ of what `impulses` gives, where B depends on θ."""
         at, end, weights, stretch, points = self._struck(of)
         logs = np.log(stretch)
         e = np.stack([np.cos(points), -np.sin(points)])

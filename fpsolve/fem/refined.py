@@ -10,16 +10,18 @@ from fpsolve.arrays import FloatArray
 from fpsolve.fem.axis import KroneckerSum
 from fpsolve.fem.dense import Factors
 
-REFINEMENTS, ROUNDING = 5, 1e-16
-"""Of a solution, at most, and the backward error below which there are no more."""
+REFINEMENTS = 5
+"""Largest number of refinements of a solution."""
+ROUNDING = 1e-16
+"""Backward error below which a solution is not refined."""
 LEAST_GAIN = 0.1
-"""Of the backward error by each of them."""
+"""Largest share of the backward error that a refinement may leave, or there are no more of its kind."""
 CALL_OPERATIONS = 1e7
-"""Operations that take the time of the calls of four solutions, 0.5 ms."""
+"""Number of operations that take the time of the calls of four solutions, 0.5 ms."""
 GIGABYTE_OPERATIONS = 2e10
-"""Operations that take the time of refining four solutions with factors of one gigabyte, 1 s."""
+"""Number of operations that take the time of refining four solutions with factors of one gigabyte, 1 s."""
 LEAST_SHARE = 1e-8
-"""Of a load, that of the vector of an eigenvalue close by in its solution."""
+"""Least share in a load of the vector of an eigenvalue close by, from which on it is in the solution."""
 
 
 class RefinedFactors:

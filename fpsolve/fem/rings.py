@@ -24,17 +24,16 @@ from fpsolve.arrays import FloatArray, IntArray, Matrix, dense
 from fpsolve.errors import SingularMatrix
 from fpsolve.fem.axis import KroneckerSum
 from fpsolve.fem.dense import ArrayFactors
+from fpsolve.fem.levels import LEVEL_OPERATIONS
 
 LARGEST_GROWTH = 1e10
-"""Of an inverse, over one over the norm of all, in an elimination that does not exchange rows of different cells."""
+"""Largest entry of an inverse times the norm of the matrix, as rows of different cells are not exchanged."""
 CELL_OPERATIONS = 4e4
-"""Operations that take the time of a cell and level, beside its products, 2 µs."""
+"""Number of operations that take the time of a cell and level, beside its products, 2 µs."""
 INVERSE_OPERATIONS = 40.0
-"""Operations that take the time of a small inverse and its products over the third power of its side."""
-LEVEL_OPERATIONS = 7e5
-"""Operations that take the time of the calls for a level, 35 µs."""
+"""Number of operations that take the time of a small inverse and its products over the third power of its side."""
 ROUND_OPERATIONS = 2e6
-"""Operations that take the time of the calls by which each second segment is joined to the next one, 0.1 ms."""
+"""Number of operations that take the time of the calls that join each second segment to the next one, 0.1 ms."""
 
 
 @dataclass(frozen=True, eq=False)

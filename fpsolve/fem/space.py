@@ -107,11 +107,11 @@ class Space:
         return any(axis.slope for axis in self.axes)
 
     def at(self, p: float, noises: Iterable[Noise]) -> Space:
-        """That of noises, which may be of a problem close by, with the tilt for p; each has tables of its own."""
+        """The space of noises, which may be of a problem close by, with the tilt for p; each has tables of its own."""
         return Space((self.phi, *(axis.of(noise, p) for axis, noise in zip(self.noises, noises, strict=True))))
 
     def with_axis(self, k: int, axis: Axis) -> Space:
-        """That with another axis in one place."""
+        """The space with another axis in one place."""
         return Space((*self.axes[:k], axis, *self.axes[k + 1 :]))
 
     def enriched(self) -> Space:

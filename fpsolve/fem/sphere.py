@@ -37,11 +37,11 @@ from fpsolve.model.plane import CoefficientMatrix, written_coefficient
 from fpsolve.model.problem import ParameterDerivative, Problem
 
 PENALTY = 0.02
-"""γ of the penalty on jumps of ∂u/∂η."""
+"""Factor γ of the penalty on jumps of ∂u/∂η."""
 MOST_DEGREE = 10
-"""Of an element in η; beyond, elements are halved."""
+"""Highest degree of an element in η: beyond, elements are halved."""
 SIDE = 16
-"""Points along each angle at which signs are looked at, at least."""
+"""Least number of points along each angle at which signs are looked at."""
 Coordinates = tuple[tuple[float, ...], ...]
 Parts = list[tuple[FloatArray, csr_matrix]]
 """Σ f(η) ⊗ g: values at points of η, shape (points, nodes), and waves, shape (all, own)."""
@@ -285,7 +285,7 @@ class SphereAxis(DirectionAxis):
 
     @property
     def _wave_degrees(self) -> tuple[IntArray, IntArray]:
-        """Those in θ₁ and in θ₂ of the own waves."""
+        """Degrees in θ₁ and in θ₂ of the own waves."""
         return self._waves.first[self._waves.own], self._waves.second[self._waves.own]
 
     @cached_property
@@ -308,7 +308,7 @@ class SphereAxis(DirectionAxis):
 
     @cached_property
     def cells(self) -> IntArray:
-        """Those in η: of the waves what two degrees more change tells."""
+        """Elements in η: of the waves what two degrees more change tells."""
         return np.where(self.modes == 1, -1, self.line.cells[self._node])
 
     @cached_property
