@@ -290,6 +290,8 @@ def numbers(system: Drawn, seed: int, *, has_others: bool = True) -> Iterator[Nu
     found = dict(zip(orders, solved(system.problem, orders, seed % 2 == 0, RTOL[system.dimensions]), strict=True))
     for p in EVEN:
         truth, doubt = planar.moment_exponent(system.known, p, system.dimensions)
+        if not doubt < DOUBTED * abs(truth):  # as where the largest eigenvalues still grow with the functions
+            truth = doubt = math.nan
         yield _number(f"Λ({p:g})", found[p], truth / system.unit, doubt / system.unit, "moments")
     if not has_others:
         return
@@ -317,6 +319,8 @@ def _number(name, found, truth, doubt, method, deviations=1.0) -> Number:
 SETTLED = 1e-3
 """Of a number, how far a Fourier series may be off; where it is further, as where bounded noise leaves the phase
 between two rays, the simulation is the second method."""
+DOUBTED = 0.1
+"""Of an even moment, how far that of the second method may be off; where it is further, it is none."""
 SOME = 4
 """Of the systems under two noises one of so many has Λ(p) of other p and λ, as paths take seconds."""
 STEPS = 2e6

@@ -2,6 +2,7 @@
 
 import math
 import time
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,13 +15,14 @@ from fpsolve.exponent.eigen import principal_pair
 from fpsolve.exponent.error import truncation
 from fpsolve.exponent.function import moment_lyapunov
 from fpsolve.exponent.solver import ExponentSolver
-from fpsolve.exponent.starts import Start, first, other_places
+from fpsolve.exponent.starts import Start, first, first_place, other_places
 from fpsolve.fem.effects import ModeEffects
 from fpsolve.fem.generator import Generator, Pencil
 from fpsolve.fem.mesh import make_mesh
 from fpsolve.fem.noise_axes import PolynomialAxis
 from fpsolve.fem.phase import PhaseAxis
 from fpsolve.fem.space import Space
+from fpsolve.messages import Code, Message
 from fpsolve.model.noises.markov_chain import MarkovChain
 from fpsolve.model.noises.non_gaussian import NonGaussianNoise
 from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
@@ -32,6 +34,8 @@ from tests.conftest import FIG1, FIG1_NOISE, UNIT_NOISE, oracle_arguments
 from tests.oracles import fourier_hermite, perturbation
 
 WEAK_NOISE = FIG1_NOISE.ou_reduction()
+WEAK = Problem(FIG1, WEAK_NOISE)
+OWN = {"omega": 1.0, "restitution": 0.8, "c1": 0.1, "epsilon": 0.8}
 NO_LOSS = {"omega": 1.0, "restitution": 1.0, "c1": 0.0}
 
 
@@ -299,3 +303,46 @@ def test_a_place_is_a_function_that_yields_a_start(monkeypatch):
     for other in (faster, other_places):
         monkeypatch.setattr(adapt, "STARTS", (slower, other))
         assert moment_lyapunov(problem, 9.0).value[0] == pytest.approx(6.336967, rel=3e-7)
+
+
+def test_a_space_without_a_pair_is_followed_by_a_larger_one():
+    start = Start(WEAK, first(WEAK, 2.0, 1e-8))
+    assert start.doubled(None).space.size > start.space.size
+
+
+def test_the_best_of_a_search_is_told(monkeypatch):
+    """Whatever the order in which solutions were found."""
+    pair, left = ExponentSolver(WEAK).solution(2.0).pair, iter((4.0, 2.0, 3.0))
+
+    class Stub(Start):
+        def pair(self, p, near):
+            return pair
+
+        def judged(self, pair, allowed):
+            if (size := next(left, None)) is None:
+                raise adapt.Ended(Message(Code.MESHES_SPENT, count=3))
+            return SimpleNamespace(pair=pair, error=size * allowed)
+
+        def refined(self, *_):
+            return self
+
+    monkeypatch.setattr(adapt, "STARTS", (lambda *_: iter([Stub(WEAK, first(WEAK, 2.0, 1e-8))]),))
+    with pytest.raises(NotConverged) as caught:
+        ExponentSolver(WEAK).solution(2.0)
+    assert caught.value.partial.error == pytest.approx(2.0 * ExponentSolver(WEAK).tolerance(2.0, pair.value))
+
+
+def test_a_place_that_fails_tells_nothing_of_another(monkeypatch):
+    """What was found at the first place may be a lower eigenvalue."""
+    problem, budget = Problem(VibroImpactOscillator(**OWN), UNIT_NOISE), Budget(unknowns=3000)
+
+    def too_large(question, found):
+        space = first(question.problem, question.p, question.rtol)
+        while space.size <= budget.unknowns:
+            space = space.doubled()
+        yield Start(question.problem, space)
+
+    monkeypatch.setattr(adapt, "STARTS", (first_place, too_large))
+    with pytest.raises(NotConverged) as caught:
+        ExponentSolver(problem, rtol=1e-6, budget=budget).solution(2.0)
+    assert caught.value.partial is None

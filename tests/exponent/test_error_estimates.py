@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import pytest
 
+from fpsolve.exponent.function import MomentLyapunovFunction, nonzero_root
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem.mesh import make_mesh
 from fpsolve.model.noises.non_gaussian import NonGaussianNoise
@@ -42,6 +43,21 @@ def test_of_indices(problem, exponent, variance):
     solver = ExponentSolver(problem, rtol=1e-4)
     assert solver.lyapunov_exponent().error_estimate == pytest.approx(exponent, rel=0.2)
     assert solver.variance_rate().error_estimate == pytest.approx(variance, rel=0.2)
+
+
+def test_of_a_root_and_between_moments():
+    assert nonzero_root(ExponentSolver(GAUSSIAN, rtol=1e-4)).error_estimate == pytest.approx(1.315e-5, rel=0.2)
+    function = MomentLyapunovFunction(GAUSSIAN, (-1.0, 2.0), rtol=1e-4)
+    assert function.interpolation_error == pytest.approx(1.037e-8, rel=0.2)
+
+
+@pytest.mark.parametrize(
+    ("mesh", "rtol", "errors"), [(None, 1e-3, (4.009e-4, 6.928e-6)), (COARSE, 1e-8, (8.518e-4, 5.631e-6))]
+)
+def test_of_slopes(mesh, rtol, errors):
+    """Of a discretisation that is chosen, by its highest modes; of a given mesh, by a finer one."""
+    solver = ExponentSolver(GAUSSIAN, mesh, rtol=rtol)
+    assert (solver.slope_error(2.0), solver.slope_error(-1.0)) == pytest.approx(errors, rel=0.2)
 
 
 def test_where_effects_fall_unevenly():

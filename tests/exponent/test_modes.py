@@ -3,7 +3,9 @@
 import gc
 import math
 import weakref
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -25,7 +27,7 @@ from fpsolve.analysis import Axis
 from fpsolve.arrays import identity
 from fpsolve.errors import FpsolveError
 from fpsolve.exponent.eigen import principal_pair
-from fpsolve.exponent.modes import SphereStart, left_of, modal_coordinates, second_moments
+from fpsolve.exponent.modes import BEYOND, SphereStart, first_directions, left_of, modal_coordinates, second_moments
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem.space import Space, first_axis
 from fpsolve.fem.sphere import SphereAxis
@@ -151,8 +153,27 @@ def test_what_finer_waves_change_is_told_to_first_order(noise, driven):
     axes = [SphereAxis(coordinates, np.linspace(0, math.pi / 2, 3), 8, waves) for waves in (4, 6)]
     start, finer = (SphereStart(given, Space((axis, *noises))) for axis in axes)
     found = [principal_pair(each.generator, 1.0) for each in (start, finer)]
+    change, solution = found[1].value - found[0].value, start.judged(found[0], 1.0)
+    assert solution.pair.value == pytest.approx(found[1].value, abs=0.1 * abs(change))
+    assert solution.search == pytest.approx(BEYOND[0] * abs(change), rel=0.1)
     told = start.change(found[0])
     assert told == pytest.approx(found[1].value - found[0].value, rel=0.1)
+
+
+def test_waves_are_added_until_the_slope_has_settled():
+    """And where a space has no principal pair."""
+    given = problem(White(s=1.0))
+    noises = [first_axis(each, 7) for each in given.coloured.parts.values()]
+    start = SphereStart(given, Space((first_directions(given), *noises)))
+
+    def of(slope):
+        return SimpleNamespace(pair=SimpleNamespace(derivative=slope))
+
+    later = replace(start, before=(of(1.0),))
+    assert not start.is_enough(of(1.0))
+    assert not later.is_enough(of(1.01))
+    assert later.is_enough(of(1.001))
+    assert start.doubled(None).space.size > start.space.size
 
 
 @pytest.mark.parametrize("seed", [7, 18, 29, 161])

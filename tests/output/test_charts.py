@@ -65,3 +65,9 @@ def test_regions_have_their_names_where_these_have_room(picture, ends, names):
     letters = [text.get_text() for text in axes.texts if text not in texts]
     assert len(letters) == len(ends) + 1 - len(names)
     assert [word.partition(":")[0] for word in words(figure)[1:]] == letters
+
+
+@pytest.mark.parametrize("value", [-1.0, 2.0])
+def test_a_line_is_called_by_its_equation(value):
+    zero = Zero("stability_index", value)
+    assert zero.latex.strip("$").replace(r"\delta_p", "δ_p") == zero.equation == f"δ_p = {value:g}"

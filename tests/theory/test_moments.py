@@ -281,3 +281,10 @@ def test_slopes_by_parameters(rng):
     assert found.slope("noise.r0") == pytest.approx((found.value - before) / 1e-4, rel=1e-3)
     with pytest.raises(KeyError):
         found.slope("noise.none")
+
+
+def test_the_error_is_what_few_functions_lack():
+    """At a coarse tolerance, against the value with many functions."""
+    given = driven(FREE, STIFFNESS, OrnsteinUhlenbeck(1.0, 1.0))
+    exact, found = even_moment(given, 4).value, even_moment(given, 4, 1e-3)
+    assert found.error == pytest.approx(abs(found.eigenvalue - exact), rel=0.2)
