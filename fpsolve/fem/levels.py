@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
 import numpy as np
-from scipy.sparse import csr_matrix
+from scipy.sparse import csr_matrix, issparse
 from scipy.sparse.csgraph import connected_components, shortest_path
 
 from fpsolve.arrays import FloatArray, IntArray, Matrix, dense
@@ -56,7 +56,8 @@ class LevelFactors:
         sizes = [m * group.size for group in groups]
         self._parts = [slice(*pair) for pair in pairwise(np.cumsum([0, *sizes]).tolist())]
         squares, beside = sum(size**2 for size in sizes), sum(a * b for a, b in pairwise(sizes))
-        self._is_dense = entries >= DENSE_SHARE * (squares + 2 * beside)
+        is_filled = entries >= DENSE_SHARE * (squares + 2 * beside)
+        self._is_dense = is_filled and not any(issparse(term[-1]) for term in self._operator.terms)
         share = 1.0 if precision is float else 0.5
         operations = sum(map(dense_operations, sizes)) + sum(2 * a * b**2 for a, b in pairwise(sizes))
         if self._is_dense:
