@@ -237,10 +237,10 @@ class SphereStart(Start):
 
     def refined(self, solution: Solution, goal: float, stages: int, most: int) -> SphereStart:
         """Waves of the next degree; or other elements and functions of the noise, with waves of the degree before."""
-        if solution.search < math.inf:
+        effects, of_axes = solution.effects, solution.measured or ()
+        if sum(of_axes) <= 0.5 * goal:
             enough = self.enough or (solution if solution.error <= goal else None)
             return self._with(2, before=(*self.before, solution), enough=enough)
-        effects, of_axes = solution.effects, solution.measured or ()
         share, (phi, *noises) = SHARE * goal, self.space.axes
         finer = [
             axis

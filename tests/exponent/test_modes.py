@@ -156,6 +156,8 @@ def test_what_finer_waves_change_is_told_to_first_order(noise, driven):
     change, solution = found[1].value - found[0].value, start.judged(found[0], 1.0)
     assert solution.pair.value == pytest.approx(found[1].value, abs=0.1 * abs(change))
     assert solution.search == pytest.approx(BEYOND[0] * abs(change), rel=0.1)
+    assert start.refined(replace(solution, search=math.inf), 1.0, 1, 10**6).space.phi.waves == 6  # no other elements
+    assert start.refined(solution, 1e-20, 1, 10**6).space.phi.waves == 2
     told = start.change(found[0])
     assert told == pytest.approx(found[1].value - found[0].value, rel=0.1)
 
