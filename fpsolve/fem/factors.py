@@ -29,6 +29,10 @@ LONG = 1e10
 """Number of operations, half a second, from which on a factorisation runs where it can be left, and may be rough."""
 FRONT_OPERATIONS = 5.0
 """Number of operations that take the time of SuperLU for an unknown and the square of the width of a front, 0.25 ns."""
+CELL_OPERATIONS = 6e3
+"""Number of operations that take the time of SuperLU for an entry of a matrix of cells of φ and ξ, 0.3 µs."""
+CELL_BYTES = 90.0
+"""Bytes of SuperLU for such an entry."""
 FRONT_BYTES = 24.0
 """Bytes of an unknown times the width of a front in SuperLU."""
 
@@ -100,15 +104,19 @@ def kinds(operator: KroneckerSum, levels: Levels, is_full: bool, ring: Ring | No
     """All kinds that there may be, by their operations: of a small matrix one dense array alone."""
     if operator.size <= FEW_UNKNOWNS and not operator.is_sparse:
         return [DenseFactors(operator)]
-    found = sorted(_ordered(operator, levels, ring), key=lambda each: each.operations)
-    whole = DenseFactors(operator) if is_full else SparseFactors(operator)
+    found = sorted(_ordered(operator, levels, is_full, ring), key=lambda each: each.operations)
+    is_of_cells = len(operator.shape) == 2 and (not levels or levels[-1] is None)
+    whole = DenseFactors(operator) if is_full else SparseFactors(operator, is_of_cells=is_of_cells)
     if found and found[0].operations < ENTRY_OPERATIONS * operator.entries:  # so many are all that is sure of SuperLU
         return [*found, whole]
     return sorted([*found, whole], key=lambda each: each.operations)
 
 
-def _ordered(operator: KroneckerSum, levels: Levels, ring: Ring | None) -> Iterator[Factors]:
-    """What goes cell by cell, or level by level along any axis, in single precision, too, where there is much to do."""
+def _ordered(operator: KroneckerSum, levels: Levels, is_full: bool, ring: Ring | None) -> Iterator[Factors]:
+    """What goes cell by cell, or level by level along any axis, of directions in single precision, too.
+
+    Levels of the functions of a filter have pivots that are too small for that.
+    """
     if ring is not None and len(operator.shape) == 2 and len(ring.number) > 2:
         yield RefinedFactors(operator, RingFactors(operator, ring))
     for axis, own in enumerate(levels or [None] * len(operator.shape)):
@@ -116,7 +124,7 @@ def _ordered(operator: KroneckerSum, levels: Levels, ring: Ring | None) -> Itera
             groups = neighbours(operator, axis, own)
             for each in (groups, paired(groups)) if len(groups) > 2 else ():
                 yield (by_levels := LevelFactors(operator, each, axis))
-                if by_levels.operations > LONG:
+                if is_full and by_levels.operations > LONG:
                     yield RefinedFactors(operator, LevelFactors(operator, each, axis, np.float32))
 
 
@@ -136,19 +144,24 @@ class DenseFactors:
 class SparseFactors:
     """SuperLU, ordered for a symmetric pattern and pivoting only where it must: half the time and the fill-in.
 
-    It is about as good as an elimination along the axis that makes narrow fronts.
+    It is about as good as an elimination along the axis that makes narrow fronts, but fills in little of cells of a
+    plane.
     """
 
-    def __init__(self, operator: KroneckerSum) -> None:
-        self._operator = operator
+    def __init__(self, operator: KroneckerSum, *, is_of_cells: bool = False) -> None:
+        self._operator, self._is_of_cells = operator, is_of_cells
 
     @cached_property
     def operations(self) -> float:
+        if self._is_of_cells:
+            return CELL_OPERATIONS * self._operator.entries
         return FRONT_OPERATIONS * self._operator.size * self._width**2 + ENTRY_OPERATIONS * self._operator.entries
 
     @cached_property
     def gigabytes(self) -> float:
         operator = self._operator
+        if self._is_of_cells:
+            return 1e-9 * CELL_BYTES * operator.entries
         numbers = FRONT_BYTES * operator.size * self._width + ENTRY_BYTES * operator.entries
         return 1e-9 * numbers + operator.pair_gigabytes
 
