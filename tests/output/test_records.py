@@ -12,12 +12,23 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from fpsolve.case.sections import MonteCarloSection
 from fpsolve.cli import main
 from fpsolve.errors import OutputError
 from fpsolve.exponent.adapt import Budget
 from fpsolve.fem.mesh import make_mesh
 from fpsolve.output import records as plain
-from fpsolve.output.records import Records, Results, _packed, append, key_of, record_of, result_of
+from fpsolve.output.records import (
+    Records,
+    Results,
+    _packed,
+    append,
+    growing_key,
+    key_of,
+    record_of,
+    result_of,
+    simulation_key,
+)
 from fpsolve.study.solve import Numerics, Wanted, everything, solve_curve
 from tests.output.test_datasets import HOPELESS, PRODUCT, TEXT
 from tests.solving import ALL, case_in, solve_case
@@ -140,8 +151,10 @@ def test_a_key_follows_from_all_that_changes_a_result(tmp_path, monkeypatch):
     curve, other, *_ = case_in(tmp_path, TEXT + PRODUCT).curves()
     wanted, numerics = Wanted(np.array([1.0, 2.0]), ("lyapunov_exponent",)), Numerics(1e-8, Budget(), None)
     asked = [{"p": np.array([1.0, 3.0])}, {"indices": ()}, {"shown": (1.0,)}, {"density": True}]
+    asked += [{"is_stated": not wanted.is_stated}, {"start": (0.3, 0.4)}]
     meshes = [make_mesh(phi_cells=2, xi_cells=4), make_mesh(phi_cells=2, xi_cells=4, xi_max=8.5)]
     solved = [{"rtol": 1e-9}, {"budget": Budget(unknowns=500)}, {"budget": Budget(seconds=5.0)}]
+    solved.append({"budget": Budget(memory=1.0)})
     keys = [
         key_of(curve, wanted, numerics),
         key_of(other, wanted, numerics),
@@ -152,6 +165,21 @@ def test_a_key_follows_from_all_that_changes_a_result(tmp_path, monkeypatch):
     assert keys[0] == key_of(curve, wanted, numerics)
     monkeypatch.setattr(plain, "RESULT_VERSION", 0)
     assert key_of(curve, wanted, numerics) not in keys
+
+
+def test_other_keys_follow_from_what_they_are_of(tmp_path):
+    """The moments of a curve that is not finished do not depend on the budget; a simulation has no tolerance."""
+    curve, other, *_ = case_in(tmp_path, TEXT + PRODUCT).curves()
+    numerics, mesh = Numerics(1e-8, Budget(), None), make_mesh(phi_cells=2, xi_cells=4)
+    known = growing_key(curve, numerics)
+    changed = [growing_key(curve, replace(numerics, **each)) for each in ({"rtol": 1e-9}, {"mesh": mesh})]
+    assert len({known, growing_key(other, numerics), *changed}) == 4
+    assert growing_key(curve, replace(numerics, budget=Budget(seconds=5.0, memory=1.0))) == known
+    setting = MonteCarloSection()
+    settings = [setting, *(setting.model_copy(update=each) for each in ({"seed": 7}, {"paths": 5000}))]
+    simulated = [simulation_key(curve, (1.0, 2.0), each) for each in settings]
+    simulated += [simulation_key(curve, (1.0,), setting), simulation_key(other, (1.0, 2.0), setting)]
+    assert len(set(simulated)) == len(simulated)
 
 
 def rewritten(folder, change):
