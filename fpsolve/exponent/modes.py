@@ -237,20 +237,15 @@ class SphereStart(Start):
 
     def refined(self, solution: Solution, goal: float, stages: int, most: int) -> SphereStart:
         """Waves of the next degree; or other elements and functions of the noise, with waves of the degree before."""
-        effects, of_axes = solution.effects, solution.measured or ()
+        of_axes = solution.measured or ()
         if sum(of_axes) <= 0.5 * goal:
             enough = self.enough or (solution if solution.error <= goal else None)
             return self._with(2, before=(*self.before, solution), enough=enough)
         share, (phi, *noises) = SHARE * goal, self.space.axes
-        finer = [
-            axis
-            if error <= share or each is None
-            else axis.enriched()
-            if error < each.error
-            else axis.refined(each, share, False)
-            for axis, each, error in zip(noises, effects[1:], of_axes[1:], strict=True)
-        ]
-        found = Space((phi.finer_elements() if of_axes[0] > 0.1 * goal else phi, *finer))
+        for k, (axis, effects, error) in enumerate(zip(noises, solution.effects[1:], of_axes[1:], strict=True)):
+            if effects is not None and error > share:
+                noises[k] = axis.enriched() if error < effects.error else axis.refined(effects, share, False)
+        found = Space((phi.finer_elements() if of_axes[0] > 0.1 * goal else phi, *noises))
         found = found if found.size > self.space.size else self.space.enriched()
         self.generators.clear()
         self.pairs.clear()

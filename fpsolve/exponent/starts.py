@@ -81,7 +81,7 @@ class Start:
 
     def judged(self, pair: PrincipalPair, allowed: float) -> Solution:
         """The pair with its error, here by its highest modes; no part much less than what is allowed need be known."""
-        return Solution(pair, start=self)
+        return Solution(pair)
 
     def is_enough(self, solution: Solution) -> bool:
         """Whether a solution within the tolerance needs no finer space for its slope."""
