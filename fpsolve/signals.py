@@ -11,13 +11,10 @@ import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import copy_context
-from functools import partial
 from queue import SimpleQueue
 from typing import Any, NoReturn, TypeVar
 
 ENDING = ("SIGHUP", "SIGTERM")
-REPEAT_SECONDS = 0.02
-"""After which an interrupt that Python lost comes again."""
 LOOK_SECONDS = 0.1
 """How often a main thread looks for signals that waits for another one, where the system does not wake it."""
 SIGNALLED, INTERRUPTED = 128, 130
@@ -39,7 +36,7 @@ def ended_by_signals() -> Iterator[list[int]]:
             received.append(number)
             raise KeyboardInterrupt
 
-    with _handled(ENDING, interrupt, lambda former: former is signal.SIG_DFL), _interrupts_repeated(received):
+    with _handled(ENDING, interrupt, lambda former: former is signal.SIG_DFL):
         yield received
 
 
@@ -79,37 +76,6 @@ def _handled(
     finally:
         for number, each in former.items():
             signal.signal(number, each)
-
-
-@contextmanager
-def _interrupts_repeated(received: list[int]) -> Iterator[None]:
-    """An interrupt that Python loses in the body, as in what runs when an object is freed, comes once more.
-
-    Python gives such an exception to `sys.unraisablehook` and to nothing else.
-
-    Args:
-        received: the signal that ends the body; empty after Ctrl-C. It is received again when it comes once more.
-    """
-    former, main, timers = sys.unraisablehook, threading.main_thread(), list[threading.Timer]()
-    # pthread_kill also wakes a main thread that waits; Windows does not have it
-    send = partial(signal.pthread_kill, main.ident or 0) if hasattr(signal, "pthread_kill") else signal.raise_signal
-
-    def repeat(unraisable: Any) -> None:
-        if unraisable.exc_type is not KeyboardInterrupt:
-            former(unraisable)
-            return
-        timers.append(threading.Timer(REPEAT_SECONDS, lambda: send(received.pop() if received else signal.SIGINT)))
-        timers[-1].daemon = True
-        timers[-1].start()
-
-    sys.unraisablehook = repeat
-    try:
-        yield
-    finally:
-        sys.unraisablehook = former
-        for timer in timers:
-            timer.cancel()
-            timer.join()  # what it has sent already still meets the handlers of the body
 
 
 _away: list[threading.Thread] = []

@@ -37,25 +37,6 @@ def test_only_the_first_signal_that_ends_interrupts():
     assert received == [signal.SIGTERM]
 
 
-@pytest.mark.usefixtures("_interrupts")
-@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
-def test_an_interrupt_that_is_lost_comes_again(name, capsys):
-    """Python prints what is raised as an object is freed, and goes on."""
-
-    class Freed:
-        def __del__(self):
-            signal.raise_signal(getattr(signal, name))
-
-    def free_and_wait():
-        Freed()
-        time.sleep(20)
-
-    with ended_by_signals() as received, pytest.raises(KeyboardInterrupt):
-        free_and_wait()
-    assert received == ([signal.SIGTERM] if name == "SIGTERM" else [])
-    assert capsys.readouterr().err == ""
-
-
 @pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
 def test_a_held_signal_comes_after_the_body(name):
     number, calls = getattr(signal, name), []
