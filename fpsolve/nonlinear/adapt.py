@@ -24,7 +24,7 @@ from fpsolve.fem.noise_axes import NoiseAxis
 from fpsolve.fem.space import first_axis
 from fpsolve.messages import Code, Message
 from fpsolve.nonlinear.elimination import Solution, Tail, mean_damping, solved, solved_tail
-from fpsolve.nonlinear.operator import Circle, Flow, Height, Plane
+from fpsolve.nonlinear.operator import Elements, Flow, Plane
 from fpsolve.signals import left_at_signals
 
 SHARE = 0.2
@@ -182,8 +182,8 @@ class Search:
         step = min(SPACING * 0.5 / math.sqrt(shape), WIDEST, (top - bottom) / FEWEST)
         return Choice(CELLS, degree, plane.axis, bottom, top, step, 4)
 
-    def _circle(self, degree: int) -> Circle:
-        return Circle(CELLS, degree, self.flow.half_turn)
+    def _circle(self, degree: int) -> Elements:
+        return Elements(self.flow.phases(CELLS + 1), degree, is_closed=True)
 
     def solve(self, levels: Levels, top: float) -> Solution:
         """The density on one discretisation. Raises `NotConverged` where it is too large."""
@@ -200,7 +200,7 @@ class Search:
                 plane = Plane(self.flow, self._circle(choice.phi_degree), choice.xi)
                 self._planes[levels[:2]] = plane, solved_tail(plane, self.index)
             plane, tail = self._planes[levels[:2]]
-            return left_at_signals(partial(solved, plane, Height(choice.lines, choice.degree), tail))
+            return left_at_signals(partial(solved, plane, Elements(choice.lines, choice.degree), tail))
 
 
 @dataclass(frozen=True, eq=False)

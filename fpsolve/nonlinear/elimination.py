@@ -22,7 +22,7 @@ from fpsolve.arrays import FloatArray, one
 from fpsolve.budget import charge
 from fpsolve.fem.axis import KroneckerSum
 from fpsolve.fem.levels import LevelFactors, neighbours
-from fpsolve.nonlinear.operator import Circle, Height, Plane
+from fpsolve.nonlinear.operator import Elements, Plane
 
 TAIL_TERMS = 8
 """Number of terms of the series in e^{2u}."""
@@ -106,7 +106,7 @@ class Solution:
     """
 
     plane: Plane
-    height: Height
+    height: Elements
     tail: Tail
     values: FloatArray
 
@@ -117,14 +117,14 @@ class Solution:
     def moments(self, n: float) -> FloatArray:
         """∫ e^{n u} ρ du over all u, shape (plane.size,)."""
         height = self.height
-        inside = (height.weights * np.exp(n * height.points)) @ (height.line.values @ self.values)
+        inside = (height.weights * np.exp(n * height.points)) @ (height.values @ self.values)
         return np.asarray(inside + self.tail.moments(n, self.left))
 
     def shares(self, n: float) -> FloatArray:
         """E aⁿ by elements of u."""
         phi = self.plane.circle.points
         vector = self.plane.integrals(np.exp(n * self.plane.flow.gauge(phi)), one)
-        density = self.height.line.values @ (self.values @ vector)
+        density = self.height.values @ (self.values @ vector)
         inside = self.height.weights * np.exp(n * self.height.points) * density
         return np.asarray(inside.reshape(self.height.lines.size - 1, -1).sum(axis=1))
 
@@ -134,7 +134,7 @@ class Solution:
 
     def at(self, u: FloatArray, of: Callable[[FloatArray], FloatArray] = np.asarray) -> FloatArray:
         """Coefficients of the density at some u, shape (len(u), plane.size), or what a linear map makes of them."""
-        found = np.asarray(self.height.line.at(u) @ of(self.values))
+        found = np.asarray(self.height.at(u) @ of(self.values))
         found[u > self.height.lines[-1]] = 0
         below = np.flatnonzero(u < self.left)
         found[below] = np.exp(np.multiply.outer(u[below], self.tail.powers)) @ of(self.tail.terms)
@@ -184,7 +184,7 @@ class Element:
         between: the matrix between the functions that are left, in the same order, those of ξ fastest.
     """
 
-    def __init__(self, tables: Tables, noise: Tables, circle: Circle) -> None:
+    def __init__(self, tables: Tables, noise: Tables, circle: Elements) -> None:
         pairs = np.arange(len(tables[0])).reshape(-1, circle.size)
         self._shape = *pairs.shape, len(noise[0])
         inside = [pairs[1:-1][:, bubbles].ravel() for bubbles in circle.bubbles]
@@ -216,7 +216,7 @@ class Element:
         return values.reshape(levels, phases * count)
 
 
-def solved(plane: Plane, height: Height, tail: Tail) -> Solution:
+def solved(plane: Plane, height: Elements, tail: Tail) -> Solution:
     """The density on an interval, from below to above.
 
     A vertex of u and what is left of the element above it are coupled to the next vertex only. They are eliminated
@@ -232,11 +232,11 @@ def solved(plane: Plane, height: Height, tail: Tail) -> Solution:
 
     def tables(functions: Any) -> Tables:
         """W_g between some functions of u and all of φ."""
-        some = [(matrix[functions][:, functions].toarray(), factors) for matrix, factors in parts]
+        some = [(matrix[np.ix_(functions, functions)], factors) for matrix, factors in parts]
         return [_sum(np.kron(matrix, each[g]) for matrix, each in some if g in each) for g in plane.noise]
 
     noise, size = list(plane.noise.values()), plane.size
-    (first, last), (below, above) = height.end_values[[0, -1]], np.exp(2 * height.lines[[0, -1]])
+    (first, last), (below, above) = 1 / height.constant[height.vertices[[0, -1]]], np.exp(2 * height.lines[[0, -1]])
     front = -(first**2) * plane.outflow(below, -1)
     right = -first * (plane.outflow(below, 1) @ tail.at(height.lines[0]))
     stack: list[tuple[Any, Element, FloatArray]] = []

@@ -25,7 +25,7 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.sparse import csr_matrix, diags
+from scipy.sparse import csr_matrix
 
 from fpsolve.arrays import Coefficient, FloatArray, dense, identity, one
 from fpsolve.fem.line import LineSpace
@@ -134,40 +134,39 @@ Factors = dict[Coefficient | None, Any]
 """Matrices of functions of φ, for functions of ξ."""
 
 
-class Circle:
-    """Continuous elements in φ over a half-turn, whose ends are one.
+class Elements:
+    """Continuous elements in φ or in u.
 
     Args:
-        cells: their number.
+        lines: the vertices, shape (m + 1,).
         degree: of the elements.
-        half_turn: the first and the last φ.
+        is_closed: whether both ends are one point, as those of a half-turn are; the elements then have one length.
 
     Attributes:
         size: number of unknowns.
         points, weights: a quadrature rule.
         values, slopes: the functions there, shape (n, size).
-        seam: their values at both ends, shape (size,).
-        bubbles: the functions of each cell that vanish at its ends.
+        vertices: the unknowns of the vertices, in order.
+        bubbles: those of each cell that vanish at its ends.
         constant: coefficients of 1.
     """
 
-    def __init__(self, cells: int, degree: int, half_turn: FloatArray = HALF_TURN) -> None:
-        self._line = LineSpace(np.linspace(half_turn[0], half_turn[1], cells + 1), degree)
-        first, last = self._line.ends
-        kept = np.delete(np.arange(self._line.size), last)
-        columns = np.where(np.arange(self._line.size) == last, first, np.arange(self._line.size))
-        columns = np.searchsorted(kept, columns)  # equal cells, so that both functions at the seam have one norm
-        self._merge = csr_matrix((np.ones(columns.size), (np.arange(columns.size), columns)))
-        self.size, self.points, self.weights = kept.size, self._line.points, self._line.measure
-        self.values, self.slopes = dense(self._line.values @ self._merge), dense(self._line.slopes @ self._merge)
-        self.constant = self._line.constant()[kept]
-        self.seam = self.at(half_turn[:1])[0]
-        inner = self._line.modes[kept] > 1
-        self.bubbles = [np.flatnonzero(inner & (self._line.cells[kept] == j)) for j in range(cells)]
+    def __init__(self, lines: FloatArray, degree: int, *, is_closed: bool = False) -> None:
+        self.lines, self._line = lines, LineSpace(lines, degree)
+        line, (first, last) = self._line, self._line.ends
+        number = np.arange(line.size)
+        kept = np.delete(number, last) if is_closed else number
+        columns = np.searchsorted(kept, np.where(number == last, first, number)) if is_closed else number
+        self._merge = csr_matrix((np.ones(number.size), (number, columns)))
+        self.size, self.points, self.weights = kept.size, line.points, line.measure
+        self.values, self.slopes = dense(line.values @ self._merge), dense(line.slopes @ self._merge)
+        self.constant, is_vertex = line.constant()[kept], line.modes[kept] == 1
+        self.vertices = np.flatnonzero(is_vertex)
+        self.bubbles = [np.flatnonzero(~is_vertex & (line.cells[kept] == j)) for j in range(lines.size - 1)]
 
-    def at(self, phi: FloatArray) -> FloatArray:
-        """The functions at any φ, shape (len(phi), size)."""
-        return dense(self._line.at(phi) @ self._merge)
+    def at(self, x: FloatArray) -> FloatArray:
+        """The functions at any places, shape (len(x), size)."""
+        return dense(self._line.at(x) @ self._merge)
 
     def mass(self, f: FloatArray) -> FloatArray:
         """∫ f w ρ, f at the points."""
@@ -176,37 +175,6 @@ class Circle:
     def convection(self, f: FloatArray) -> FloatArray:
         """∫ f w′ ρ."""
         return np.asarray((self.slopes * (self.weights * f)[:, None]).T @ self.values)
-
-
-class Height:
-    """Continuous elements in u.
-
-    Args:
-        lines: the vertices, shape (m + 1,).
-        degree: of the elements.
-
-    Attributes:
-        size: number of unknowns.
-        vertices: the unknowns of the vertices, in order.
-        bubbles: those of each cell.
-    """
-
-    def __init__(self, lines: FloatArray, degree: int) -> None:
-        self.line, self.lines = LineSpace(lines, degree), lines
-        self.size, self.points, self.weights = self.line.size, self.line.points, self.line.measure
-        self.vertices = np.flatnonzero(self.line.modes == 1)
-        inner = self.line.modes > 1
-        self.bubbles = [np.flatnonzero(inner & (self.line.cells == j)) for j in range(lines.size - 1)]
-        self.constant = self.line.constant()
-        self.end_values = 1 / self.constant[self.vertices]
-
-    def mass(self, f: FloatArray) -> csr_matrix:
-        """∫ f w ρ, f at the points."""
-        return csr_matrix(self.line.values.T @ diags(self.weights * f) @ self.line.values)
-
-    def convection(self, f: FloatArray) -> csr_matrix:
-        """∫ f w′ ρ."""
-        return csr_matrix(self.line.slopes.T @ diags(self.weights * f) @ self.line.values)
 
 
 class Plane:
@@ -226,7 +194,7 @@ class Plane:
         unit: ∫P_s w ρ.
     """
 
-    def __init__(self, flow: Flow, circle: Circle, axis: NoiseAxis) -> None:
+    def __init__(self, flow: Flow, circle: Elements, axis: NoiseAxis) -> None:
         self.flow, self.circle, self.axis = flow, circle, axis
         phi = circle.points
         self.shape = circle.size, axis.size
@@ -271,7 +239,7 @@ class Plane:
         """∫P_s φ̇ρ at the wall, where no noise changes φ̇, of coefficients of φ and ξ."""
         end, mean = self.flow.half_turn[1:], self.flow.problem.coloured.mean
         speed = sum(float(rate.g(mean)) * float(rate.h(end)[0]) for rate in self.flow.linear)
-        return float(speed * (np.kron(self.circle.seam, self.xi_mean) @ values))
+        return float(speed * (np.kron(self.circle.at(end)[0], self.xi_mean) @ values))
 
     def integrals(self, f: FloatArray, g: Coefficient = identity) -> FloatArray:
         """∫ f(φ) P_s g(ξ) ρ as a vector over the functions, f at the points of φ."""

@@ -12,7 +12,7 @@ from fpsolve.fem.noise_axes import PolynomialAxis
 from fpsolve.model import NonGaussianNoise, OrnsteinUhlenbeck, Problem, VibroImpactOscillator
 from fpsolve.nonlinear import stationary_response
 from fpsolve.nonlinear.elimination import Tail, solved
-from fpsolve.nonlinear.operator import Circle, Flow, Height, Plane
+from fpsolve.nonlinear.operator import Elements, Flow, Plane
 from tests.oracles.upwind_chain import Chain
 from tests.random_responses import distances, drawn
 
@@ -89,10 +89,12 @@ def test_without_an_imposed_tail_the_density_falls_as_that_of_the_linear_system(
     """On a deep interval, with any inflow from below, ln ρ = −δ_p u + b e^{2u} + … far from its lower end."""
     system = VibroImpactOscillator(omega=1.0, epsilon=0.5, restitution=0.97, c1=0.1, c2=0.5, c3=0.2)
     problem = Problem(system, noise_of(0.3, 0.5))
-    plane = Plane(Flow(problem), Circle(2, 14), PolynomialAxis(problem.coloured, 16))
+    plane = Plane(
+        Flow(problem), Elements(Flow(problem).phases(3), 14, is_closed=True), PolynomialAxis(problem.coloured, 16)
+    )
     any_inflow = Tail(1.0, plane.constant[None])
     with one_thread():
-        found = solved(plane, Height(np.linspace(-10, 1.8, 48), 8), any_inflow)
+        found = solved(plane, Elements(np.linspace(-10, 1.8, 48), 8), any_inflow)
     u = np.linspace(-5.5, -3, 101)
     logs = np.log(found.at(u) @ plane.unit @ plane.constant)
     shapes = np.stack([np.ones_like(u), u, np.exp(2 * u), np.exp(4 * u)], axis=1)
