@@ -53,7 +53,7 @@ def write_eigenfunctions(
     T, which ParaView shows first, has mean 1 over P_s(ξ)/2π, see `fields`, and is cut off beyond e^±600;
     ∫T T* dφ dξ = 1. Where the noise has states `z` is the number of one, and densities are per radian.
     Field data: `p`; `Lambda`, Λ(p); each of the parameters; and in words, with units, `varied`, those
-    that are varied, and `held`, the others.
+    that are varied, and `held`, the others; `impacts`, where T jumps, and `along_y`, what stands along y.
 
     Args:
         directory: the folder, made where it is missing.
@@ -67,7 +67,8 @@ def write_eigenfunctions(
         The files written, the collection first.
     """
     names = {pair.p: _name(stem, pair.p) for pair in sorted(pairs, key=lambda pair: pair.p)}
-    facts = _facts(parameters, varied, stationary.generator.problem)
+    problem = stationary.generator.problem
+    facts = {**_frame(problem), **_facts(parameters, varied, problem)}
     for pair in pairs:
         grid = Nodes.of(pair)
         found = grid.fields(pair)
@@ -103,8 +104,9 @@ def write_density(
         "xi_marginal": space.turns * xi_marginal(stationary, grid.samples(stationary)),
         "z": grid.z,
     }
-    known = {"p": 0.0, "Lambda": 0.0, "lyapunov_exponent": stationary.derivative}
-    _write_grid(path, grid, data, {**known, **_facts(parameters, varied, stationary.generator.problem)})
+    problem = stationary.generator.problem
+    known = {"p": 0.0, "Lambda": 0.0, "lyapunov_exponent": stationary.derivative, **_frame(problem)}
+    _write_grid(path, grid, data, {**known, **_facts(parameters, varied, problem)})
     return path
 
 
@@ -114,7 +116,7 @@ def write_functions(solved: Solved, curve: Curve, folder: Path, *, has_density: 
         write_directions(solved.directions, curve, folder)
     if solved.stationary is None:
         return
-    about = ({**curve.parameters, "curve": float(curve.number), **_frame(curve.problem)}, curve.varied)
+    about = ({**curve.parameters, "curve": float(curve.number)}, curve.varied)
     if curve.number == 1 and has_density:
         write_density(folder / "density.vtu", solved.stationary, *about)
     if solved.eigenpairs:
@@ -257,9 +259,9 @@ def write_stationary_response(result: CurveResult, folder: Path) -> None:
 
 
 def copy_show_script(directory: Path) -> Path:
-    """Put `show.py`, which draws the collection in ParaView, into the folder; it remembers which one that was."""
-    target, text = directory / "show.py", files("fpsolve.output").joinpath("show.py").read_text(encoding="utf-8")
-    write_text(target, text.replace('FOLDER = ""', f"FOLDER = {str(directory.resolve())!r}", 1))
+    """Put `show.py`, which draws a collection in ParaView, into the folder."""
+    target = directory / "show.py"
+    write_text(target, files("fpsolve.output").joinpath("show.py").read_text(encoding="utf-8"))
     return target
 
 

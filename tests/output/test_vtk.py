@@ -106,7 +106,8 @@ def test_at_p_zero(grids):
 
 def test_field_data(solver, grids):
     for p, grid in grids.items():
-        assert set(grid.field_data) == {"p", "Lambda"}
+        assert set(grid.field_data) == {"p", "Lambda", "impacts", "along_y"}
+        assert grid.field_data["impacts"] == pytest.approx([np.pi / 2, 3 * np.pi / 2])
         assert grid.field_data["Lambda"][0] == solver.pair(p).value
 
 
@@ -318,7 +319,7 @@ def test_collection(tmp_path, fig1_solver):
 def test_density_file(tmp_path, solver):
     grid = pyvista.read(write_density(tmp_path / "density.vtu", solver.pair(0.0)))
     assert set(grid.point_data) == {"stationary_density", "phi_marginal", "xi_marginal", "z"}
-    found = {name: float(values[0]) for name, values in grid.field_data.items()}
+    found = {name: float(values[0]) for name, values in grid.field_data.items() if values.size == 1}
     assert found == {"p": 0, "Lambda": 0, "lyapunov_exponent": solver.pair(0.0).derivative}
     assert integral(grid, "stationary_density") == pytest.approx(1, abs=1e-6)
     width = 16 * UNIT_NOISE.standard_deviation
