@@ -34,6 +34,7 @@ from fpsolve.model.problem import Problem
 from fpsolve.theory.frozen import frozen_noise
 
 MAX_STAGES = 30
+"""Number of spaces of a search, of all its places."""
 WORTH_A_TRY = FEW_UNKNOWNS
 """Unknowns of a system that takes less time than finding another one."""
 MOST_TILT_AWAY = 0.7
@@ -99,7 +100,7 @@ class Budget:
 
 @dataclass(frozen=True, eq=False)
 class WholeProblem:
-    """Λ(p) of a problem that is solved as a whole, for any number of p.
+    """Λ(p) of a problem at any number of p, in spaces that are chosen for each; its classes are not solved apart.
 
     Args:
         problem: a motion and its noise.
@@ -247,7 +248,7 @@ def directions(question: Question, found: Sequence[Solution]) -> Iterator[Start]
 
 
 STARTS: tuple[Callable[[Question, Sequence[Solution]], Iterator[Start]], ...] = (first_place, directions, other_places)
-"""What yields the places of a question, from what was found in those before."""
+"""Functions that yield the places where Λ(p) may be carried, called in order, from what was found in those before."""
 
 
 class Best(NamedTuple):
@@ -409,7 +410,7 @@ class Search:
                     start = start.doubled(self.failure)
                     continue
                 allowed = self.tolerance(self.p, near.value)
-                solution = start.judged(near, allowed)
+                solution = start.with_error(near, allowed)
                 if solution.error <= allowed and start.is_enough(solution):
                     return solution
                 if solution.error / allowed < (best.share if best else math.inf):

@@ -28,8 +28,10 @@ from fpsolve.model.plane import is_driven
 from fpsolve.model.problem import Problem
 from fpsolve.model.quantity import Quantity
 
-FEWEST_NODES, MOST_NODES = 48, 192
-"""Of the first coordinate, twice as many of the second, unless that resolves the tilted density no better."""
+FEWEST_NODES = 48
+"""Number of nodes of the first coordinate to begin with; the second has twice as many."""
+MOST_NODES = 192
+"""Largest number of nodes of the first coordinate, where the tilted density is not resolved with fewer."""
 PHASES = 16
 """Half turns of both phases together are looked at from so many."""
 RESOLVED = 1e-3

@@ -34,9 +34,12 @@ from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.problem import Problem
 from fpsolve.theory.frozen import frozen_noise
 
-BACKWARD_ERROR_GOAL, BACKWARD_ERROR_OF_RATE = 1e-14, 1e-7
-"""Of the norm of L, and of ω."""
+BACKWARD_ERROR_GOAL = 1e-14
+"""Backward error, over the norm of L, at which the iteration ends."""
+BACKWARD_ERROR_OF_RATE = 1e-7
+"""Backward error, over ω, at which the iteration ends, where that is less."""
 BACKWARD_ERROR_LIMIT = 1e-11
+"""Backward error, over the norm of L, up to which a pair is one."""
 POSITIVE = 1e-2
 """T, or T*, is taken for positive where no more than this share of it has the wrong sign, the least of all found."""
 SURELY_POSITIVE = 1e-4
@@ -47,15 +50,23 @@ DOUBT = 1e-3
 """Share of its terms by which a tangent of Λ may lie too high: the errors of its p."""
 _EPS = float(np.finfo(float).eps)
 REFINEMENTS = 3
-"""Of T′."""
+"""Number of times that T′ is improved by its residual."""
 MAX_ITERATIONS = 12
-MAX_SHIFTS, STEP, NEAR_ENOUGH = 12, 0.15, 1e-3
+"""Number of LU factors in an iteration."""
+MAX_SHIFTS = 12
+"""Number of shifts of a search from the right."""
+SHIFT_RATIO = 0.15
+"""Distance of a shift from the value found with the one before, over the distance of that one."""
+NEAR_ENOUGH = 1e-3
+"""Change of the value, over its distance from the shift, at which a search from the right ends."""
 NEIGHBOURS = 6
 """Eigenvalues nearest to a shift among which the real one is looked for."""
 STEPS_PER_FACTOR = 5
+"""Number of steps of an iteration with the same LU factors."""
 SLOW = 1e-2
 """A step that lowers the backward error by less than this factor calls for new LU factors."""
-MAX_DENSE_UNKNOWNS = 4000
+MAX_SPECTRUM_UNKNOWNS = 4000
+"""Largest number of unknowns of which all eigenvalues are computed."""
 LARGEST_NORM = 1e150
 """Of L(p): vectors of this size have lengths."""
 OPERATIONS_OF_SOLVE = 5000.0
@@ -129,11 +140,11 @@ def principal_pair(
     pairs, pencil = [start] if isinstance(start, PrincipalPair) else start or [], generator.at(p)
     if not pencil.matrix.norm < LARGEST_NORM:
         raise NumericalFailure(f"L(p) has the size {pencil.matrix.norm:.0e}")
-    is_doubtful, mixes_slowly = _has_other_positive(generator, p), generator.problem.noise.mixes_slowly
+    has_others, mixes_slowly = _has_other_positive(generator, p), generator.problem.noise.mixes_slowly
     tangents, found = _tangents(generator.problem, p, pairs), list[PrincipalPair]()
 
     def solved(x: FloatArray, y: FloatArray) -> PrincipalPair:
-        pair = _pair(generator, pencil, rayleigh_iteration(pencil, x, y, generator.unit_rate))
+        pair = _pair(generator, pencil, rayleigh_iteration(pencil, x, y, generator.problem.unit_rate))
         if pair.residual <= BACKWARD_ERROR_LIMIT:
             found.append(pair)
         return pair
@@ -144,7 +155,7 @@ def principal_pair(
             x, y = _carried(pairs, pencil, generator)
         pair = solved(x, y)
         goes_on = bool(pairs) and _share(pencil.space, pair, x, y) > MOSTLY
-        is_told = goes_on or not is_doubtful or math.isfinite(tangents)
+        is_told = goes_on or not has_others or math.isfinite(tangents)
         most = POSITIVE if goes_on else SURELY_POSITIVE
         is_right = is_told and pair.value >= tangents and min(pair.sign_defects) <= most
         return pair if is_right and pair.residual <= BACKWARD_ERROR_LIMIT else None
@@ -160,7 +171,7 @@ def principal_pair(
         return pair
 
     pair = None
-    if (pairs and not mixes_slowly) or not is_doubtful:
+    if (pairs and not mixes_slowly) or not has_others:
         pair = from_a_start()
     if pair is None:
         pair = from_the_right()
@@ -168,7 +179,7 @@ def principal_pair(
         if mixes_slowly and generator.size <= SURVEYED_UNKNOWNS:
             others.append(float(spectrum(generator, p, 1)[0].real))
         rightmost = max(others)
-        if is_doubtful and rightmost - pair.value > 1e-6 * max(abs(rightmost), generator.unit_rate):
+        if has_others and rightmost - pair.value > 1e-6 * max(abs(rightmost), generator.problem.unit_rate):
             told = Message(Code.LARGER_EIGENVALUE, p=p, rightmost=rightmost, value=pair.value)
             raise NotConverged(told, pair, Remedy.PHASE)
     return pair
@@ -209,11 +220,13 @@ def spectrum(generator: Generator, p: float, k: int = 10) -> Any:
     full-circle mesh for the whole spectrum, a half-circle one has the π-periodic part of it only.
 
     Raises:
-        ValueError: k is not from 1 to the number of unknowns, or these exceed `MAX_DENSE_UNKNOWNS`.
+        ValueError: k is not from 1 to the number of unknowns, or these exceed `MAX_SPECTRUM_UNKNOWNS`.
     """
     size = generator.size
-    if size > MAX_DENSE_UNKNOWNS:
-        raise ValueError(f"{size} unknowns; the whole spectrum takes at most {MAX_DENSE_UNKNOWNS}: use a coarser mesh")
+    if size > MAX_SPECTRUM_UNKNOWNS:
+        raise ValueError(
+            f"{size} unknowns; the whole spectrum takes at most {MAX_SPECTRUM_UNKNOWNS}: use a coarser mesh"
+        )
     if not 1 <= k <= size:
         raise ValueError(f"k is {k}; it must be from 1 to the number of unknowns, {size}")
     values = scipy.linalg.eigvals(_standard(generator, p)[1], overwrite_a=True)
@@ -244,15 +257,15 @@ def _from_the_right(pencil: Pencil, generator: Generator) -> tuple[FloatArray, F
     """Vectors T and T*, and the value, of the rightmost real eigenvalue, seen from the right; and its error at most.
 
     For a real shift σ > Λ no eigenvalue of L is nearer to σ than Λ. The first shift is the largest eigenvalue of the
-    symmetric part of L, which lies to the right of all eigenvalues of the discrete L; each further one keeps `STEP` of
-    the distance. Complex pairs that come of the truncation may be nearer; they are passed over.
+    symmetric part of L, which lies to the right of all eigenvalues of the discrete L; each further one keeps
+    `SHIFT_RATIO` of the distance. Complex pairs that come of the truncation may be nearer; they are passed over.
     """
     space, value = pencil.space, math.inf
     right = left = space.constant
-    shift = pencil.numerical_abscissa + 0.1 * generator.unit_rate
+    shift = pencil.numerical_abscissa + 0.1 * generator.problem.unit_rate
     for step in range(MAX_SHIFTS):
         if step:
-            shift = value + STEP * (shift - value)
+            shift = value + SHIFT_RATIO * (shift - value)
         factor: Any = None  # there is room for the next ones
         factor, last = pencil.factorised(shift), value
         right, value = _nearest(lambda v, lu=factor: -lu.solve(space.weighed(v)), right, shift, pencil.p)
@@ -432,7 +445,7 @@ class PairDerivatives:
 
     @cached_property
     def _factor(self) -> Factors:
-        return self._pencil.factorised(self.pair.eigenvalue + 1e-6 * self.pair.generator.unit_rate)
+        return self._pencil.factorised(self.pair.eigenvalue + 1e-6 * self.pair.generator.problem.unit_rate)
 
     def solve(self, source: FloatArray, *, adjoint: bool = False, refinements: int = REFINEMENTS) -> FloatArray:
         """v from the load f, in `one_thread`; each refinement leaves 1e-6 of a rate over the gap of the spectrum."""

@@ -245,7 +245,7 @@ def ladders(space: Space) -> Iterator[Ladder | None]:
         yield Ladder(at, axis.cells, axis.modes, degrees, nested)
 
 
-def sides(pair: PrincipalPair) -> tuple[FloatArray, FloatArray, KroneckerSum]:
+def smoother_first(pair: PrincipalPair) -> tuple[FloatArray, FloatArray, KroneckerSum]:
     """T, T* and L − Λ; for p < −1 T*, T and the adjoint: whichever of both is the smoother one comes first.
 
     T for p and T* for −2 − p solve the same equation but for the direction of time: that of the paths for p < −1 has
@@ -257,7 +257,7 @@ def sides(pair: PrincipalPair) -> tuple[FloatArray, FloatArray, KroneckerSum]:
 
 def mode_effects(pair: PrincipalPair) -> tuple[ModeEffects | None, ...]:
     """The effects along every axis; None along one without cells, as of states."""
-    smooth, rough, operator = sides(pair)
+    smooth, rough, operator = smoother_first(pair)
     return _effects(pair, [(smooth, rough, operator)])
 
 
@@ -267,7 +267,7 @@ def slope_error(pair: PrincipalPair) -> float:
     These are the effects on ⟨T*, LT⟩ of T′ beside T*, of T beside T*′, and of both beside L′. A space that has T to the
     last digit, as for even p, may lack T* and T′.
     """
-    smooth, rough, operator = sides(pair)
+    smooth, rough, operator = smoother_first(pair)
     around, slope = PairDerivatives(pair), pair.generator.matrix(pair.p, derivative=1).shifted(pair.derivative)
     by_p, slope = (
         ((around.adjoint_by_p, around.by_p), slope.T) if pair.p < -1 else ((around.by_p, around.adjoint_by_p), slope)
@@ -323,7 +323,7 @@ class MissingModes:
     def of(cls, solution: Solution) -> Iterator[MissingModes]:
         """Those of a pair and its effects: of the even and of the odd cells along every direction."""
         pair, space = solution.pair, solution.pair.space
-        smooth, rough, operator = sides(pair)
+        smooth, rough, operator = smoother_first(pair)
         for ladder, effects in zip(ladders(space), solution.effects, strict=True):
             if ladder is None or effects is None:
                 continue

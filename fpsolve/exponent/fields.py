@@ -12,8 +12,11 @@ from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.fem.noise_axes import Samples
 
 MOST_TILT = 1.5
-UNRESOLVED, MOST_NEGATIVE = 0.1, 0.02
-"""The share of an eigenfunction, and of a density, with the wrong sign from which on it misleads."""
+"""Slope of the tilt in z beyond which rounding leaves nothing of T around the mean of the noise."""
+UNRESOLVED = 0.1
+"""Share of an eigenfunction with the wrong sign from which on it misleads."""
+MOST_NEGATIVE = 0.02
+"""Share of a density with the wrong sign from which on it misleads."""
 
 
 class Fields(NamedTuple):

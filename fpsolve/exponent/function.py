@@ -524,7 +524,7 @@ def _at(result: MomentLyapunov, p: FloatArray) -> MomentLyapunov:
 def _one_by_one(
     solver: ExponentSolver, p: FloatArray, progress: Callable[[], None], known: dict[float, Moment] | None
 ) -> MomentLyapunov:
-    """Λ(0) = 0 needs no solve; where its eigenpair failed, Λ′ and residual are NaN."""
+    """Λ at each p by a solve of its own, if these are convex; Λ(0) = 0 even where its eigenpair failed."""
     result = solver.moments(p, progress=progress, known=known)
     columns = result.p, result.value, result.derivative, result.error_estimate
     obstacle = None

@@ -35,23 +35,30 @@ from fpsolve.fem.sphere import Coordinates, DirectionAxis, SphereAxis, group_dim
 from fpsolve.model.problem import Problem
 from fpsolve.theory.moments import even_moment, moment_form
 
-FIRST_WAVES, FIRST_DEGREE = 2, 6
+FIRST_WAVES = 2
+"""Number of waves of the first space in each angle."""
+FIRST_DEGREE = 6
+"""Degree of the polynomials of the first space."""
 LARGEST_STEP = 1.0
-"""Of p, from one pair to the next one on the coarsest space."""
+"""Difference in p from one pair to the next one on the coarsest space."""
 ROUND = 0.6
 """Width of a layer from which on there is none to speak of, and harmonics of the sphere settle the soonest."""
-WEAK, STEP = 0.2, 1.3
-"""Width of a layer of T or T* for which elements are graded, and their size in ln tan η."""
+WEAK = 0.2
+"""Width of a layer of T or T* up to which elements are graded."""
+GRADED_STEP = 1.3
+"""Size of graded elements in ln tan η."""
 THINNEST = 1e-3
 """The least width: of modes that nothing couples the layer has none."""
 WORST_CONDITION = 100.0
 """Of the eigenvectors of the motion without noise, up to which they are the coordinates."""
 BEYOND = (10.0, 1.5, 1.0)
 """What is left after the correction by a change, over this change, by how many spaces agree: one, two, and more."""
-SETTLED_SLOPE, MOST_FOR_SLOPES = 3e-3, 4
-"""Share of Λ′ by which it may change from one level to the next, and levels that may be added for it."""
+SETTLED_SLOPE = 3e-3
+"""Share of Λ′ by which it may change from one level to the next."""
+MOST_FOR_SLOPES = 4
+"""Number of levels that may be added for Λ′."""
 LEFT = 0.5
-"""The same, over what two degrees more changed in the corrected value, or will change in the other, see `left_of`."""
+"""What is left, over what two degrees more changed in the corrected value, or will change in the other: `left_of`."""
 MEASURED = 3.0
 """What is left after elements or polynomials of the noise, over what two degrees more of them change."""
 
@@ -127,7 +134,7 @@ def first_directions(problem: Problem) -> DirectionAxis:
     lines = np.linspace(0, math.pi / 2, 3)
     if max(map(abs, places)) > math.log(1 / WEAK):
         low, high = min(places) - 1, max(places) + 1
-        inner = np.linspace(low, high, max(2, round((high - low) / STEP)) + 1)
+        inner = np.linspace(low, high, max(2, round((high - low) / GRADED_STEP)) + 1)
         lines = np.concatenate([[0.0], np.arctan(np.exp(inner)), [math.pi / 2]])
     return SphereAxis(coordinates, lines, FIRST_DEGREE, FIRST_WAVES)
 
@@ -207,7 +214,7 @@ class SphereStart(Start):
         self.pairs[:] = known
         return min(known, key=lambda pair: abs(pair.p - p))
 
-    def judged(self, pair: PrincipalPair, allowed: float) -> Solution:
+    def with_error(self, pair: PrincipalPair, allowed: float) -> Solution:
         """The pair, corrected by what the next waves change, with what is left then; first the other parts of it."""
         of_axes, start = self._of_axes(pair, allowed), replace(self, before=(), enough=None)
         if sum(of_axes) > 0.5 * allowed:
@@ -258,7 +265,7 @@ class SphereStart(Start):
 
     def _rounding(self, pair: PrincipalPair) -> float:
         """Of the rates of growth: an entry of S⁻¹AS is a sum of products twice, which may cancel."""
-        return 2 * self.problem.dimension * sys.float_info.epsilon * abs(pair.p) * pair.generator.unit_rate
+        return 2 * self.problem.dimension * sys.float_info.epsilon * abs(pair.p) * pair.generator.problem.unit_rate
 
     def _of_axes(self, pair: PrincipalPair, allowed: float) -> tuple[float, ...]:
         """Of the elements and of each noise: the effects of the highest modes, or the geometric mean of these and of

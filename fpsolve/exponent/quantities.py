@@ -71,7 +71,7 @@ def impact_rate(solver: ExponentSolver, jump: int | None = None) -> Estimate | A
         return _not_one_ray(solver)
     value, better = (_flux(each.pair, number) for each in (solver.around_zero, solver.finer_around_zero))
     generator = solver.finer_around_zero.pair.generator
-    usual = generator.unit_rate / math.pi
+    usual = generator.problem.unit_rate / math.pi
     rounding, lost = 10 * _EPS * max(usual, better), _EPS * generator.loss * usual
     error = abs(better - value) + (rounding if better > lost else lost)
     return checked(Estimate(better, error, usual, quantity=quantity.IMPACT_RATE), solver.refinement)

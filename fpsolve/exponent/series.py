@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 MOST_ORDERS = 40
+"""Largest order of a series."""
 GROWN = 2.0
 """From this multiple of the smallest term on, terms are those that grow."""
 MOST_FUNCTIONS = 300

@@ -47,8 +47,10 @@ if TYPE_CHECKING:
 
 MOST_EQUATIONS = 8000
 """Of even moments."""
-SURELY, ROUNDED = 10.0, 1e-6
-"""Of the errors of two values, and of the values themselves, from which on they contradict each other."""
+SURELY = 10.0
+"""Multiple of the errors of two values from which on they contradict each other."""
+ROUNDED = 1e-6
+"""Share of the values themselves that is added to that."""
 TINY_P = 1e-3
 """Below it Λ(p)/p is a mean of Λ′, as rounding is not proportional to p."""
 TINIEST_P = 1e-9

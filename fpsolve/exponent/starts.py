@@ -79,7 +79,7 @@ class Start:
         """The principal pair on the space, from one of a space before, or none. Raises as `principal_pair`."""
         return principal_pair(self.generator, p, start=near)
 
-    def judged(self, pair: PrincipalPair, allowed: float) -> Solution:
+    def with_error(self, pair: PrincipalPair, allowed: float) -> Solution:
         """The pair with its error, here by its highest modes; no part much less than what is allowed need be known."""
         return Solution(pair)
 

@@ -82,16 +82,16 @@ def factorised(
     Raises:
         OverBudget: what it takes is more than a number may still cost.
     """
-    *others, last = kinds(operator, levels, is_full, ring)
+    *others, last = candidates(operator, levels, is_full, ring)
     for kind in others:
         try:
-            return _made(kind, operator)
+            return _factorise(kind, operator)
         except SingularMatrix:
             continue
-    return _made(last, operator)
+    return _factorise(last, operator)
 
 
-def _made(kind: Factors, operator: KroneckerSum) -> Factors:
+def _factorise(kind: Factors, operator: KroneckerSum) -> Factors:
     charge(kind.operations, kind.gigabytes, operator.size)
     if kind.operations > LONG:
         left_at_signals(kind.make)
@@ -100,7 +100,7 @@ def _made(kind: Factors, operator: KroneckerSum) -> Factors:
     return kind
 
 
-def kinds(operator: KroneckerSum, levels: Levels, is_full: bool, ring: Ring | None) -> list[Factors]:
+def candidates(operator: KroneckerSum, levels: Levels, is_full: bool, ring: Ring | None) -> list[Factors]:
     """All kinds that there may be, by their operations: of a small matrix one dense array alone."""
     if operator.size <= FEW_UNKNOWNS and not operator.is_sparse:
         return [DenseFactors(operator)]

@@ -51,11 +51,6 @@ class Pencil:
     levels: Levels
     ring: Ring | None = None
 
-    @staticmethod
-    def of(p: float, space: Space, matrix: KroneckerSum, ring: Ring | None = None) -> Pencil:
-        """The pencil of all functions."""
-        return Pencil(p, space, matrix, [axis.levels for axis in space.axes], ring)
-
     def on(self, axis: int, kept: Mask) -> Pencil:
         """What it is on some functions of an axis, where a mask is true."""
         levels, place = list(self.levels), np.cumsum(kept) - 1
@@ -130,7 +125,8 @@ class Generator:
     def at(self, p: float) -> Pencil:
         """What is solved at p; the last one is kept."""
         if self._last is None or self._last.p != p:
-            self._last = Pencil.of(p, self.space(p), self.matrix(p), self._ring)
+            space = self.space(p)
+            self._last = Pencil(p, space, self.matrix(p), [axis.levels for axis in space.axes], self._ring)
         return self._last
 
     @cached_property
@@ -181,7 +177,7 @@ class Generator:
             if (phase := term.at(p, derivative)) is not None
         ]
         if by.noise is not None:
-            (noises, phase), *others = self._sum.phases(p, derivative).items()  # the first is that of 1
+            (noises, phase), *others = self._sum.phase_matrices(p, derivative).items()  # the first is that of 1
             moved = [(noises, phase - rate * self.phi.identity), *others]
             changes = [by.noise if k == by.part else None for k in range(len(axes))]
             parts += [(phase, *map(NoiseAxis.matrix, axes, noises, changes)) for noises, phase in moved]
@@ -191,18 +187,13 @@ class Generator:
     def _sum(self) -> TermSum:
         return TermSum(self.terms())
 
-    @property
-    def unit_rate(self) -> float:
-        """The system's own unit of rates, ω."""
-        return self.problem.unit_rate
-
     @cached_property
     def loss(self) -> float:
         """About how many times its rounding elimination may harm T − 1: the size of L, free of forcing, over a rate."""
         orders = ALL_ORDERS if self.problem.diffusions or self.problem.impulses else slice(0, 1)
         space = self.space(0.0)
         free = [self.matrix(0.0, orders=orders).terms[0][0], *(axis.matrix(None) for axis in space.noises)]
-        return 30 * sum(float(abs(each).sum(axis=0).max()) for each in free) / self.unit_rate
+        return 30 * sum(float(abs(each).sum(axis=0).max()) for each in free) / self.problem.unit_rate
 
     @cached_property
     def keeps_constants(self) -> bool:

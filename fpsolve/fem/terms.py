@@ -135,7 +135,7 @@ class TermSum:
         orders = [order for parts in sums.values() for order, _ in parts] + [order for _, order, _ in self._others]
         self._orders = range(1 + max(orders))
 
-    def phases(self, p: float, derivative: int = 0, orders: slice = ALL_ORDERS) -> dict[Noises, Matrix]:
+    def phase_matrices(self, p: float, derivative: int = 0, orders: slice = ALL_ORDERS) -> dict[Noises, Matrix]:
         """For each function of the noises the matrix of φ; the first is that of 1."""
         phases, wanted = self._nothing.copy(), self._orders[orders]
         for noises, parts in self._parts:
@@ -155,7 +155,7 @@ class TermSum:
         return KroneckerSum(
             [
                 (phase, *(axis.matrix(g) for axis, g in zip(space.noises, noises, strict=True)))
-                for noises, phase in self.phases(p, derivative, orders).items()
+                for noises, phase in self.phase_matrices(p, derivative, orders).items()
             ],
             space.phi.unit,
         )

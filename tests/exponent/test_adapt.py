@@ -318,7 +318,7 @@ def test_the_best_of_a_search_is_told(monkeypatch):
         def pair(self, p, near):
             return pair
 
-        def judged(self, pair, allowed):
+        def with_error(self, pair, allowed):
             if (size := next(left, None)) is None:
                 raise adapt.Ended(Message(Code.MESHES_SPENT, count=3))
             return SimpleNamespace(pair=pair, error=size * allowed)

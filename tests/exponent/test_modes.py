@@ -153,7 +153,7 @@ def test_what_finer_waves_change_is_told_to_first_order(noise, driven):
     axes = [SphereAxis(coordinates, np.linspace(0, math.pi / 2, 3), 8, waves) for waves in (4, 6)]
     start, finer = (SphereStart(given, Space((axis, *noises))) for axis in axes)
     found = [principal_pair(each.generator, 1.0) for each in (start, finer)]
-    change, solution = found[1].value - found[0].value, start.judged(found[0], 1.0)
+    change, solution = found[1].value - found[0].value, start.with_error(found[0], 1.0)
     assert solution.pair.value == pytest.approx(found[1].value, abs=0.1 * abs(change))
     assert solution.search == pytest.approx(BEYOND[0] * abs(change), rel=0.1)
     assert start.refined(replace(solution, search=math.inf), 1.0, 1, 10**6).space.phi.waves == 6  # no other elements

@@ -13,7 +13,7 @@ from fpsolve import NonGaussianNoise, OrnsteinUhlenbeck, Problem, VibroImpactOsc
 from fpsolve.errors import SingularMatrix
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem.axis import KroneckerSum
-from fpsolve.fem.factors import FEW_UNKNOWNS, DenseFactors, SparseFactors, factorised, kinds
+from fpsolve.fem.factors import FEW_UNKNOWNS, DenseFactors, SparseFactors, candidates, factorised
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.levels import LevelFactors, neighbours, paired
 from fpsolve.fem.noise_axes import PolynomialAxis, StateAxis
@@ -135,7 +135,7 @@ def test_operations_are_counted(rng):
     plain, chosen = DenseFactors(operator), by_levels(operator)
     assert plain.operations == pytest.approx(2 / 3 * (m * n) ** 3)
     assert chosen.operations == pytest.approx((2 / 3 * n + 4 * (n - 1)) * m**3, rel=0.01)
-    found = list(kinds(operator, (), False, None))
+    found = list(candidates(operator, (), False, None))
     assert min(found, key=lambda each: each.operations).operations <= chosen.operations
 
 
@@ -193,7 +193,7 @@ def test_levels_of_the_first_axis(rng):
     operator = KroneckerSum([(csr_matrix(phase), noise) for phase, noise in zip(first, noises, strict=True)])
     levels = np.split(np.arange(90), range(3, 90, 3))
     found, matrix = made(LevelFactors(operator, levels, 0)), operator.toarray()
-    assert found.operations in [each.operations for each in kinds(operator, [levels, None], True, None)]
+    assert found.operations in [each.operations for each in candidates(operator, [levels, None], True, None)]
     b = rng.standard_normal(operator.size)
     np.testing.assert_allclose(found.solve(b), np.linalg.solve(matrix, b), rtol=1e-8, atol=1e-10)
     np.testing.assert_allclose(found.solve(b, transposed=True), np.linalg.solve(matrix.T, b), rtol=1e-8, atol=1e-10)

@@ -34,7 +34,8 @@ def pencil(p, cells=4, degree=8, count=11):
         CoefficientMatrix(1, DAMPING, identity, "lateral"),
     ]
     problem = Problem(PlaneSystem(terms), dict(zip(("axial", "lateral"), NOISES, strict=True)))
-    return Pencil.of(p, space, TermSum(Terms(problem, space).whole()).matrix(space, p))
+    matrix = TermSum(Terms(problem, space).whole()).matrix(space, p)
+    return Pencil(p, space, matrix, [axis.levels for axis in space.axes])
 
 
 def test_two_noises_against_the_moment_hierarchy():
