@@ -80,34 +80,25 @@ class Law:
     high: float = math.inf
 
     @property
-    def _ends(self) -> tuple[float, float]:
-        return (self.low - self.value) / self.sd, (self.high - self.value) / self.sd
+    def _cut(self) -> Any:
+        """The law that is cut."""
+        from scipy.stats import truncnorm  # not before it is needed, as it takes a while
+
+        return truncnorm((self.low - self.value) / self.sd, (self.high - self.value) / self.sd, self.value, self.sd)
 
     @property
     def mean(self) -> float:
         """The mean of the law that is cut."""
-        return self.value + self.sd * self._moments[0]
+        return float(self._cut.mean())
 
     @property
     def deviation(self) -> float:
         """The standard deviation of the law that is cut."""
-        return self.sd * math.sqrt(self._moments[1])
-
-    @property
-    def _moments(self) -> tuple[float, float]:
-        """Mean and variance in units of `sd`."""
-        a, b = self._ends
-        whole = float(ndtr(b) - ndtr(a))
-        first, second = (math.exp(-0.5 * end * end) / math.sqrt(2 * math.pi) / whole for end in (a, b))
-        mean = first - second
-        edge = (a * first if math.isfinite(a) else 0.0) - (b * second if math.isfinite(b) else 0.0)
-        return mean, 1 + edge - mean * mean
+        return float(self._cut.std())
 
     def quantile(self, share: FloatArray) -> FloatArray:
         """The values below which these shares of the law are."""
-        a, b = self._ends
-        below = ndtr(a) + share * (ndtr(b) - ndtr(a))
-        return np.clip(self.value + self.sd * ndtri(below), np.nextafter(self.low, math.inf), self.high)
+        return np.clip(self._cut.ppf(share), np.nextafter(self.low, math.inf), self.high)
 
 
 @dataclass(frozen=True)
