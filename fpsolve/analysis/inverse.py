@@ -10,11 +10,8 @@ Several parameters: of all θ with F(θ) = 0 the one that is nearest to the θ�
     minimise ½ Σ xᵢ²,  xᵢ = (θᵢ − θᵢ⁰)/sᵢ,  with F(θ) = 0 and each θᵢ within its range,
 
 where sᵢ is what a change of θᵢ is measured by, |θᵢ⁰| where nothing else is stated. x + μ ∇F = 0 holds there but for the
-parameters at an end of their range, μ being the multiplier of Lagrange. Each step solves the quadratic problem
-
-    minimise ½ dᵀB d + xᵀd  with F + ∇F·d = 0,
-
-with an approximation B of the Hessian of ½x² + μF by the gradients (BFGS).
+parameters at an end of their range, μ being the multiplier of Lagrange. It is found by sequential quadratic programming
+(SLSQP, D. Kraft, DFVLR-FB 88-28, 1988) with the exact gradients.
 """
 
 from __future__ import annotations
@@ -28,13 +25,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.polynomial import Polynomial
+from scipy.optimize import minimize
 
 from fpsolve.analysis.scan import TOLERANCE, Sample
 from fpsolve.analysis.target import Distance, Target, start_and_stop, target_of
 from fpsolve.analysis.zero import Axis, said
 from fpsolve.arrays import FloatArray, real_number, shown
 from fpsolve.data import Result, dataset, written
-from fpsolve.errors import FpsolveError, NoSuchExponent, NotConverged
+from fpsolve.errors import NoSuchExponent, NotConverged
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.error import Absent, Estimate
 from fpsolve.messages import Code, Message
@@ -55,16 +53,14 @@ MOST_STEPS = 60
 """Largest number of quadratic problems."""
 MOST_REFINEMENTS = 12
 """Largest number of points between two of a scan where |F| is least."""
-MOST_HALVINGS = 8
-"""Largest number of halvings of a step."""
 MOST_PARAMETERS = 6
-"""Largest number of parameters, as the quadratic problem is solved for each set of them at the ends of their ranges."""
+"""Largest number of parameters, as all corners of their ranges are points of a scan."""
 SAME = 1e-8
-"""Step of x that no longer counts, relative to the larger of 1 and |x|."""
-SMALL = 1e-3
-"""Step of x after which less |F| is progress, relative to the larger of 1 and |x|."""
-PENALTY = 5.0
-"""Weight of F² over the square of its first gradient, beside half the square of the distance."""
+"""Distance of x from the nearest point that no longer counts, relative to the larger of 1 and |x|."""
+FALL = 1e-15
+"""Change of ½|x|² with which the quadratic problems end."""
+FARTHER = 10.0
+"""Factor to the largest |F| that is known, for what stands for F where it has no value, so that steps are shortened."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -229,23 +225,18 @@ class _Path:
 
     Attributes:
         known: the samples by u; None where there is none.
-        reasons: why there is none.
     """
 
     def __init__(
         self, distance: Distance, value: Callable[[float], FloatArray], slope: Callable[[float], FloatArray]
     ) -> None:
         self._distance, self._value, self._slope = distance, value, slope
-        self.known, self.reasons = dict[float, Sample | None](), list[Message]()
+        self.known = dict[float, Sample | None]()
 
     def at(self, u: float) -> Sample | None:
         """F at u; None where there is none."""
         if u not in self.known:
-            try:
-                self.known[u] = self._distance(self._value(u))
-            except FpsolveError as failure:
-                self.known[u] = None
-                self.reasons.append(failure.message)
+            self.known[u] = self._distance.tried(self._value(u))
         return self.known[u]
 
     def rise(self, u: float) -> float:
@@ -337,22 +328,17 @@ def _along_axis(distance: Distance, axis: Axis) -> Sample | Absent:
     found = path.root(here) or path.scan(here)
     if found is not None:
         return found
-    return _unreached(distance, (axis,), [sample for _, sample in path.samples], path.reasons, path.crossing(here))
+    return _unreached(distance, (axis,), path.crossing(here) is not None)
 
 
-def _unreached(
-    distance: Distance,
-    axes: Sequence[Axis],
-    samples: Sequence[Sample],
-    reasons: Sequence[Message],
-    crossing: tuple[float, float] | None = None,
-) -> Absent:
-    """That F is nowhere 0. Raises `FpsolveError` where that is not known, as F is missing at some points."""
+def _unreached(distance: Distance, axes: Sequence[Axis], is_crossed: bool) -> Absent:
+    """That F is nowhere 0. Raises `FpsolveError` where that is not known, as F is missing, or changes its sign."""
+    samples, reasons = distance.samples, distance.reasons
     target = distance.target
     if not samples:
         raise NoSuchExponent(reasons[0]) if all(map(_is_none, reasons)) else NotConverged(reasons[0])
     missing = [reason for reason in reasons if not _is_none(reason)]
-    if missing or crossing is not None:
+    if missing or is_crossed:
         reason = missing[0] if missing else Message(Code.NEWTON_UNSETTLED)
         raise NotConverged(Message(Code.DESIGN_GAPS, target=str(target), count=len(missing) or None, reason=reason))
     nearest = min(samples, key=lambda each: abs(each.value))
@@ -377,158 +363,69 @@ _INFINITE = (Code.TAILS, Code.INFINITE_VARIANCE)
 
 def _nearest(distance: Distance, axes: Sequence[Axis], units: FloatArray) -> Sample | Absent:
     """The point F = 0 that is nearest to the problem."""
-    low, high = np.array([axis.start for axis in axes]), np.array([axis.stop for axis in axes])
     here = np.array([float(distance.problem.values[axis.key]) for axis in axes])
-    search = Search(distance, here, units, (low, high))
-    start = np.clip(here, low, high)
-    if (found := search.from_point(start)) is not None:
+    start = np.clip(here, *np.array([(axis.start, axis.stop) for axis in axes]).T)
+    if (found := _nearest_from(distance, start, axes, here, units)) is not None:
         return found
     from scipy.stats import qmc  # not before it is needed, as it takes a while
 
     corners, inner = product((0.0, 1.0), repeat=len(axes)), qmc.LatinHypercube(len(axes), seed=0)
-    shares = [*map(np.array, corners), *inner.random(POINTS * len(axes))]
-    places = [start, *(np.array([axis.value(u) for axis, u in zip(axes, each, strict=True)]) for each in shares)]
-    samples = [sample for sample in map(search.at, places) if sample is not None]
-    if samples:
-        best = min(samples, key=lambda each: abs(each.value))
-        others = [each for each in samples if (each.value < 0) != (best.value < 0)]
-        if others:
-            step = min((each.at - best.at for each in others), key=lambda step: float(np.linalg.norm(step / units)))
-            path = _Path(distance, lambda u: best.at + u * step, lambda u: step)
-            path.at(1.0)
-            on_path = path.root(0.0)
-            best = best if on_path is None else on_path
-        if (found := search.from_point(best.at)) is not None:
-            return found
-        if others:
-            raise NotConverged(
-                Message(Code.DESIGN_GAPS, target=str(distance.target), reason=Message(Code.NEWTON_UNSETTLED))
-            )
-    return _unreached(distance, axes, samples, search.reasons)
+    for each in (*corners, *inner.random(POINTS * len(axes)).tolist()):
+        distance.tried(np.array([axis.value(u) for axis, u in zip(axes, each, strict=True)]))
+    samples = distance.samples
+    best = min(samples, key=lambda each: abs(each.value), default=None)
+    others = [each for each in samples if best is not None and (each.value < 0) != (best.value < 0)]
+    if best is not None and others:
+        step = min((each.at - best.at for each in others), key=lambda step: float(np.linalg.norm(step / units)))
+        first = best.at
+        path = _Path(distance, lambda u: first + u * step, lambda u: step)
+        path.at(1.0)
+        best = path.root(0.0) or best
+    if best is not None and (found := _nearest_from(distance, best.at, axes, here, units)) is not None:
+        return found
+    return _unreached(distance, axes, bool(others))
 
 
-class Search:
-    """The quadratic problems one after the other.
-
-    Args:
-        distance: F.
-        origin: θ⁰.
-        units: s.
-        limits: the least and the largest θ.
-    """
-
-    def __init__(
-        self, distance: Distance, origin: FloatArray, units: FloatArray, limits: tuple[FloatArray, FloatArray]
-    ) -> None:
-        self._distance, self._origin, self._units = distance, origin, units
-        self._limits, self._known = limits, dict[tuple[float, ...], Sample | None]()
-        self._low, self._high = ((limit - origin) / units for limit in limits)
-        self.reasons, self._norm = list[Message](), 1.0
-
-    def at(self, theta: FloatArray) -> Sample | None:
-        """F at θ; None where there is none."""
-        key = tuple(theta.tolist())
-        if key not in self._known:
-            try:
-                self._known[key] = self._distance(theta)
-            except FpsolveError as failure:
-                self._known[key] = None
-                self.reasons.append(failure.message)
-        return self._known[key]
-
-    def from_point(self, theta: FloatArray) -> Sample | None:
-        """The nearest point by steps from θ; None where they lead nowhere."""
-        if (sample := self.at(theta)) is None:
-            return None
-        hessian, self._norm = np.eye(theta.size), float(np.linalg.norm(self._reduced(sample)[1])) or 1.0
-        for _ in range(MOST_STEPS):
-            x, slope = self._reduced(sample)
-            room = self._low - x, self._high - x
-            step, multiplier = _quadratic(hessian, x, slope, -sample.value, room)
-            share = float(np.max(np.abs(step))) / max(1.0, float(np.max(np.abs(x))))
-            if share <= SAME and _is_close(sample):
-                return sample
-            new = self._shorter(sample, step, is_small=share <= SMALL)
-            if new is None:
-                return sample if _is_close(sample) else None
-            moved, other = self._reduced(new)
-            hessian = _updated(hessian, moved - x, moved - x + multiplier * (other - slope))
-            sample = new
+def _nearest_from(
+    distance: Distance, start: FloatArray, axes: Sequence[Axis], origin: FloatArray, units: FloatArray
+) -> Sample | None:
+    """The nearest point to θ⁰, the origin, by steps from θ; None where they lead nowhere."""
+    if (first := distance.tried(start)) is None:
         return None
+    low, high = np.array([(axis.start, axis.stop) for axis in axes]).T
+    size, before = float(np.linalg.norm(first.gradient * units)) or 1.0, (start - origin) / units
 
-    def _reduced(self, sample: Sample) -> tuple[FloatArray, FloatArray]:
-        """x and ∂F/∂x."""
-        return (sample.at - self._origin) / self._units, sample.gradient * self._units
+    def sample(x: FloatArray) -> Sample | None:
+        return distance.tried(np.clip(origin + x * units, low, high))
 
-    def _shorter(self, sample: Sample, step: FloatArray, *, is_small: bool) -> Sample | None:
-        """The end of a step, halved until it is better than its start; None where no share of it is.
+    def value(x: FloatArray) -> float:
+        if (here := sample(x)) is None:
+            return FARTHER * max(abs(each.value) for each in distance.samples) / size
+        return 0.0 if _is_met(here) else here.value / size
 
-        That of a small step is better, too, where |F| is by far less.
-        """
-        for _ in range(MOST_HALVINGS):
-            new = self.at(np.clip(sample.at + step * self._units, *self._limits))
-            is_better = new is not None and new is not sample and self._merit(new) < self._merit(sample)
-            if new is not None and (is_better or (is_small and abs(new.value) < 0.25 * abs(sample.value))):
-                return new
-            step = 0.5 * step
-        return None
+    def slope(x: FloatArray) -> FloatArray:
+        here = sample(x)
+        return np.zeros(x.size) if here is None else here.gradient * units / size
 
-    def _merit(self, sample: Sample) -> float:
-        """½|x|² where the linear F is 0, and the square of F, over that of the first gradient.
+    def refuse_rest(x: FloatArray) -> None:
+        nonlocal before
+        here = sample(x)
+        if np.max(np.abs(x - before)) <= SAME and (here is None or not _is_close(here)):
+            raise StopIteration
+        before = x.copy()
 
-        Newton's step to there leaves alone what is at an end of its range.
-        """
-        x, slope = self._reduced(sample)
-        is_free = (sample.at > self._limits[0]) & (sample.at < self._limits[1])
-        slope = np.where(is_free, slope, 0.0) if np.any(is_free) else slope
-        norm = float(slope @ slope)
-        if not norm > 0:
-            return math.inf
-        back = sample.value / norm * slope
-        return 0.5 * float((x - back) @ (x - back)) + PENALTY * (sample.value / self._norm) ** 2
-
-
-def _quadratic(
-    hessian: FloatArray, x: FloatArray, slope: FloatArray, wanted: float, room: tuple[FloatArray, FloatArray]
-) -> tuple[FloatArray, float]:
-    """The d with the least ½dᵀBd + xᵀd of those with slope·d = wanted in a box, and the multiplier.
-
-    Where no d in the box has that slope·d, it is the one that comes nearest to it.
-    """
-    low, high = room
-    farthest = np.where(slope * wanted > 0, high, np.where(slope * wanted < 0, low, 0.0))
-    if abs(float(slope @ farthest)) <= abs(wanted):
-        return farthest, 0.0
-    n, best = x.size, (math.inf, farthest, 0.0)
-    for ends in product((None, low, high), repeat=n):
-        free = [i for i in range(n) if ends[i] is None]
-        if not free:
-            continue
-        d = np.array([0.0 if end is None else end[i] for i, end in enumerate(ends)])
-        size = len(free)
-        matrix = np.zeros((size + 1, size + 1))
-        matrix[:size, :size] = hessian[np.ix_(free, free)]
-        matrix[:size, size] = matrix[size, :size] = slope[free]
-        right = np.append(-x[free] - (hessian @ d)[free], wanted - slope @ d)
-        try:
-            *inner, multiplier = np.linalg.solve(matrix, right)
-        except np.linalg.LinAlgError:
-            continue
-        d[free] = inner
-        slack = 1e-12 * (high - low)
-        value = float(0.5 * d @ hessian @ d + x @ d)
-        if np.all((d >= low - slack) & (d <= high + slack)) and value < best[0]:
-            best = value, np.clip(d, low, high), float(multiplier)
-    return best[1], best[2]
-
-
-def _updated(hessian: FloatArray, step: FloatArray, change: FloatArray) -> FloatArray:
-    """BFGS, damped so that it stays positive (Powell)."""
-    image = hessian @ step
-    curvature, known = float(step @ change), float(step @ image)
-    if not known > 0:
-        return hessian
-    if curvature < 0.2 * known:
-        share = 0.8 * known / (known - curvature)
-        change = share * change + (1 - share) * image
-    return hessian - np.outer(image, image) / known + np.outer(change, change) / float(step @ change)
+    with suppress(StopIteration):
+        found = minimize(
+            lambda x: 0.5 * x @ x,
+            before,
+            jac=lambda x: x,
+            method="SLSQP",
+            bounds=list(zip((low - origin) / units, (high - origin) / units, strict=True)),
+            constraints={"type": "eq", "fun": value, "jac": slope},
+            callback=refuse_rest,
+            options={"ftol": FALL, "maxiter": MOST_STEPS},
+        )
+        last = sample(found.x)
+        if found.success and last is not None and _is_close(last):
+            return last
+    return None

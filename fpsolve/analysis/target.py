@@ -86,6 +86,7 @@ class Distance:
 
     Attributes:
         solves: how many there were.
+        reasons: why F has no value where it was `tried`.
     """
 
     def __init__(
@@ -101,6 +102,23 @@ class Distance:
         zero = zero_of({"moment": target.order}) if target.order else zero_of("lyapunov_exponent")
         self._rtol = line_rtol(problem, zero)
         self._starts: dict[float, Solution] | Any = {}
+        self._known, self.reasons = dict[tuple[float, ...], Sample | None](), list[Message]()
+
+    @property
+    def samples(self) -> list[Sample]:
+        """F wherever it was `tried` and has a value."""
+        return [each for each in self._known.values() if each is not None]
+
+    def tried(self, theta: FloatArray) -> Sample | None:
+        """F at θ, once; None where there is none."""
+        key = tuple(theta.tolist())
+        if key not in self._known:
+            self._known[key] = None
+            try:
+                self._known[key] = self(theta)
+            except FpsolveError as failure:
+                self.reasons.append(failure.message)
+        return self._known[key]
 
     def at(self, theta: FloatArray) -> Problem:
         """The problem at θ. Raises `FpsolveError` where there is none."""
