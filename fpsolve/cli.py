@@ -23,7 +23,7 @@ from cyclopts import App, CycloptsError, CycloptsPanel, Parameter, Token
 from fpsolve import __version__
 from fpsolve.arrays import shown
 from fpsolve.case.remedies import CASE_WORDS
-from fpsolve.errors import CaseError, FpsolveError, NotConverged
+from fpsolve.errors import CaseError, FpsolveError, NotConverged, WorkersDied
 from fpsolve.messages import Severity, escaped, message_of
 from fpsolve.output.letters import HANDLER
 from fpsolve.signals import INTERRUPTED, ended_by_signals
@@ -130,7 +130,7 @@ def _run(argv: Sequence[str] | None) -> int:
             sys.stdout.flush()
     except CycloptsError:  # cyclopts has said what is wrong
         return BAD_INPUT
-    except NotConverged as failure:
+    except (NotConverged, WorkersDied) as failure:
         print_error(failure.message)
         return NOT_CONVERGED
     except FpsolveError as failure:

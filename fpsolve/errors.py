@@ -46,6 +46,10 @@ class OutputError(FpsolveError):
     """A place where results cannot be written."""
 
 
+class WorkersDied(FpsolveError):
+    """Processes that solve have ended before their work."""
+
+
 class NotConverged(FpsolveError):
     """The eigenvalue iteration did not settle.
 

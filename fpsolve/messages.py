@@ -405,7 +405,6 @@ class Code(Enum):
     NO_PICTURE = "note: this picture could not be drawn: {reason}"
 
     NO_MEMORY = "failure: not enough memory"
-    WORKER_DIED = "failure: its worker process died, perhaps for lack of memory; {remedy}, and run it again"
     FAULT = "failure: {kind}: {text} (a fault of fpsolve, in {file}:{line})"
     BEING_WRITTEN = "failure: {place} is being written by another run; wait for it, or {remedy}"
 

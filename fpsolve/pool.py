@@ -1,4 +1,4 @@
-"""Tasks in this process, in several of this machine, or on a cluster.
+"""Tasks in this process, in several of this machine, or on a cluster, by the interface of `concurrent.futures`.
 
 A task is a function of one item; both can be pickled. Its result must not depend on who runs it.
 """
@@ -15,71 +15,36 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, ProcessPoolExecutor, wait
-from concurrent.futures.process import BrokenProcessPool
+from concurrent import futures
+from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import partial
-from itertools import islice
+from itertools import chain, islice
 from multiprocessing import resource_tracker
 from types import ModuleType
-from typing import Any, Generic, TypeVar
+from typing import Any, TypeVar
 
 from fpsolve.arrays import is_whole, shown
 from fpsolve.budget import share_memory
-from fpsolve.errors import FpsolveError
+from fpsolve.errors import FpsolveError, WorkersDied
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 PROCESSORS = "FPSOLVE_PROCESSORS"
 """The environment variable that limits how many processors a process and its children use."""
-AHEAD = 2
-"""Tasks that are submitted for each worker, so that none waits for the next."""
-LOOK_SECONDS = 0.2
-"""How often the steps of tasks in other processes are looked at."""
-SLOTS = 1021
-"""For the counts of processes, whose numbers rarely agree but for multiples of it."""
-AHEAD_IN_ORDER = 64
-"""The same where results are wanted in order, so that no worker waits while the caller is busy with one result."""
+SUBMITTED = 64
+"""Least number of tasks that are submitted at once, so that no worker waits while the caller is busy with a result."""
 START_SECONDS = 1.5
-"""Of work that this process does itself before it starts others, as their start takes as long."""
+"""Seconds of work that this process does itself before it starts others, as their start takes as long."""
 CONNECT_SECONDS = 20
+"""Seconds after which a scheduler that does not answer, or that has no worker any more, is given up."""
+LOOK_SECONDS = 1.0
+"""Seconds after which one looks whether a scheduler has workers, as long as no result comes."""
 MOST_JOBS = 1000
-"""Processes on this machine; each needs an open file."""
-_TURN = threading.Lock()
+"""Largest number of processes on this machine; each needs an open file."""
 _limits: list[int] = []
-_counters: list[Any] = []
-"""In a worker of this machine, where it counts the steps of its tasks."""
-
-
-class Steps:
-    """What a task calls for each of its steps; in another process it counts them there, for `Pool.map` to look at.
-
-    Args:
-        told: what it calls in this process.
-    """
-
-    def __init__(self, told: Callable[[], object]) -> None:
-        self._told = told
-
-    def __call__(self) -> bool:
-        """Whether somebody is told of a step."""
-        self._told()
-        return True
-
-    def __reduce__(self) -> tuple[Callable[[], Callable[[], bool]], tuple[()]]:
-        return _elsewhere, ()
-
-
-def _elsewhere() -> Callable[[], bool]:
-    return _count_step
-
-
-def _count_step() -> bool:
-    """The same in another process; on another machine nobody is told."""
-    for counter in _counters:
-        counter[os.getpid() % SLOTS] += 1
-    return bool(_counters)
+ANEW = "what was finished is kept, and the same command goes on"
 
 
 def processors() -> int:
@@ -101,27 +66,8 @@ def processors() -> int:
 
 
 def limit_processors(count: int) -> None:
-    """Let this process use at most so many processors from now on. Raises `ValueError` if `count` is not ≥ 1."""
-    if not is_whole(count, 1):
-        raise ValueError(f"got count = {shown(count)}; must be a whole number >= 1")
+    """Let this process use at most so many processors from now on."""
     _limits[:] = [count]
-
-
-@dataclass(frozen=True)
-class Done(Generic[Item, Result]):
-    """An item and what became of it.
-
-    Attributes:
-        number: of the item among those of a run, from 0 on.
-        item: what the task was given.
-        result: what it returned.
-        is_lost: whether its worker died on it while no other task was under way that may have been the reason.
-    """
-
-    number: int
-    item: Item
-    result: Result | None
-    is_lost: bool = False
 
 
 @dataclass
@@ -129,130 +75,84 @@ class Pool:
     """Runs tasks on an executor of `concurrent.futures`; as a context it ends the workers.
 
     Attributes:
-        start: makes an executor; called again after a worker died, which breaks the executor.
-        stop: ends an executor and its running tasks.
-        ahead: how many tasks are submitted at once.
+        start: makes the executor.
+        stop: ends it, and the tasks that run there.
+        size: how many tasks run at once.
         own_seconds: how long this process works before the executor is made; with inf it does all.
+        has_workers: whether there are still workers, where they come and go.
         is_elsewhere: whether other machines work.
-        counter: where workers count the steps of their tasks, see `Steps`; in a slot each, as a lock would stay locked
-            where one dies.
     """
 
     start: Callable[[], Executor]
     stop: Callable[[Executor], None] = lambda executor: executor.shutdown(cancel_futures=True)
-    ahead: int = 1
+    size: int = 1
     own_seconds: float = 0.0
+    has_workers: Callable[[], bool] = lambda: True
     is_elsewhere: bool = False
-    counter: Any = None
-    _told: int = field(default=0, init=False, repr=False)
     _executor: Executor | None = field(default=None, init=False, repr=False)
 
     def __enter__(self) -> Pool:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._end()
-
-    def run(
-        self,
-        task: Callable[[Item], Result],
-        items: Iterable[Item],
-        ahead: int = 0,
-        stepped: Callable[[int], object] | None = None,
-    ) -> Iterator[Done[Item, Result]]:
-        """The results as they come; an exception of a task is raised here, and ends the run.
-
-        An item is taken when it can be given to a worker: there may be many, and they may follow from results.
-        `stepped` is called with how many `Steps` other processes have done, before their results are there.
-        """
-        source = enumerate(items)
-        until = time.monotonic() + self.own_seconds
-        while self._executor is None and time.monotonic() < until:
-            for number, item in islice(source, 1):
-                yield Done(number, item, task(item))
-                break
-            else:
-                return
-        while True:
-            waiting = {self._submit(task, each[1]): each for each in islice(source, ahead or self.ahead)}
-            suspects: list[tuple[int, Item]] = []
-            if not waiting:
-                return
-            while waiting:
-                for future in self._finished(waiting, stepped):
-                    number, item = waiting.pop(future)
-                    try:
-                        yield Done(number, item, future.result())
-                    except BrokenProcessPool:
-                        suspects.append((number, item))
-                        continue
-                    except CancelledError:
-                        raise FpsolveError(
-                            "the scheduler has stopped; the same command goes on where this one stopped"
-                        ) from None
-                    except Exception as failure:
-                        if type(failure).__name__ != "KilledWorker":  # of Dask, where several workers died on the task
-                            raise
-                        yield Done(number, item, None, is_lost=True)
-                    if not suspects:
-                        waiting |= {self._submit(task, each[1]): each for each in islice(source, 1)}
-            if suspects:  # under way as a worker died; one by one they show which one was the reason
-                self._end()
-            for number, item in suspects:
-                try:
-                    yield Done(number, item, self._submit(task, item).result())
-                except BrokenProcessPool:
-                    yield Done(number, item, None, is_lost=True)
-                    self._end()
-
-    def map(
-        self,
-        task: Callable[[Item], Result],
-        items: Iterable[Item],
-        stepped: Callable[[int], object] | None = None,
-    ) -> Iterator[Result]:
-        """The results in the order of the items, see `run`. Raises `FpsolveError` where a worker dies."""
-        early: dict[int, Any] = {}
-        due = 0
-        for done in self.run(task, items, max(self.ahead, AHEAD_IN_ORDER), stepped):
-            if done.is_lost:
-                raise FpsolveError("a worker died, perhaps for lack of memory; use fewer workers, or a smaller budget")
-            early[done.number] = done.result
-            while due in early:
-                yield early.pop(due)
-                due += 1
-
-    def _finished(
-        self, waiting: Iterable[Future[Result]], stepped: Callable[[int], object] | None
-    ) -> set[Future[Result]]:
-        """Those that are done first; until then the steps of all are told."""
-        while True:
-            found = wait(waiting, LOOK_SECONDS if stepped and self.counter else None, FIRST_COMPLETED).done
-            count = sum(self.counter or ()) - self._told
-            if stepped and count:
-                stepped(count)
-            self._told += count
-            if found:
-                return found
-
-    def _submit(self, task: Callable[[Item], Result], item: Item) -> Future[Result]:
-        """Give a task to the executor; where that is broken the future says so."""
-        try:
-            with _signals_blocked(), _without_main():
-                self._executor = self._executor or self.start()
-                return self._executor.submit(_in_turn, task, item)
-        except BrokenProcessPool as failure:
-            broken: Future[Result] = Future()
-            broken.set_exception(failure)
-            return broken
-        except OSError as failure:
-            reason = failure.strerror or failure
-            raise FpsolveError(f"the processes cannot be started: {reason}; use fewer jobs") from failure
-
-    def _end(self) -> None:
         if self._executor is not None:
             executor, self._executor = self._executor, None
             self.stop(executor)
+
+    def run(
+        self, task: Callable[[Item], Result], items: Iterable[Item], *, in_order: bool = False
+    ) -> Iterator[tuple[Item, Result]]:
+        """Each item with its result, as they come or in order; an exception of a task is raised here, and ends the run.
+
+        An item is taken when it can be given to a worker, as there may be many.
+
+        Raises:
+            WorkersDied: a worker has died, or none is left.
+        """
+        source, until = iter(items), time.monotonic() + self.own_seconds
+        for item in source:
+            if self._executor is not None or time.monotonic() >= until:
+                source = chain([item], source)
+                break
+            yield item, task(item)
+        waiting = dict[Future[Result], Item]()
+        try:
+            while True:
+                for item in islice(source, max(SUBMITTED, 2 * self.size) - len(waiting)):
+                    waiting[self._submit(task, item)] = item
+                if not waiting:
+                    return
+                for future in self._done([next(iter(waiting))] if in_order else waiting):
+                    yield waiting.pop(future), future.result()
+        except CancelledError:
+            raise WorkersDied("the scheduler has stopped; the same command goes on where this one stopped") from None
+        except Exception as failure:
+            if isinstance(failure, BrokenExecutor) or type(failure).__name__ == "KilledWorker":  # as Dask calls it
+                raise WorkersDied(f"a worker has died, perhaps for lack of memory; {ANEW}") from None
+            raise
+
+    def map(self, task: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
+        """The results in the order of the items, see `run`."""
+        return (result for _, result in self.run(task, items, in_order=True))
+
+    def _done(self, waiting: Iterable[Future[Result]]) -> set[Future[Result]]:
+        """Those that are done first."""
+        until = math.inf
+        while not (found := futures.wait(waiting, LOOK_SECONDS, futures.FIRST_COMPLETED).done):
+            until = math.inf if self.has_workers() else min(until, time.monotonic() + CONNECT_SECONDS)
+            if time.monotonic() >= until:
+                raise WorkersDied(f"no worker is left at the scheduler; {ANEW}")
+        return found
+
+    def _submit(self, task: Callable[[Item], Result], item: Item) -> Future[Result]:
+        """Give a task to the executor."""
+        try:
+            with _for_workers():
+                self._executor = self._executor or self.start()
+                return self._executor.submit(task, item)
+        except OSError as failure:
+            reason = failure.strerror or failure
+            raise FpsolveError(f"the processes cannot be started: {reason}; use fewer jobs") from failure
 
 
 def serial() -> Pool:
@@ -276,26 +176,21 @@ def parallel(count: int | None = None, tasks: int = MOST_JOBS) -> Pool:
     size = min(count or processors(), tasks)
     if size == 1:
         return serial()
-    counter = multiprocessing.get_context("spawn").RawArray("Q", SLOTS)
-    start, own_seconds = partial(_processes, size, counter), START_SECONDS if count is None else 0.0
-    return Pool(start, _kill, AHEAD * size, own_seconds, counter=counter)
+    return Pool(partial(_processes, size), _kill, size, START_SECONDS if count is None else 0.0)
 
 
 def cluster(address: str) -> Pool:
-    """The workers of a Dask scheduler, such as "tcp://host:8786"; they need this version of fpsolve.
+    """The workers of a Dask scheduler, such as "tcp://host:8786", with this version of fpsolve and one thread each.
 
     Raises:
         FpsolveError: Dask is not installed, nothing answers, or the workers cannot run fpsolve.
     """
-    if type(address) is not str:
-        raise FpsolveError(f'scheduler: got {shown(address)}; must be an address, such as "tcp://host:8786"')
-    clients: list[Any] = []
-    with _client(address) as client:
-        threads = sum(client.nthreads().values())
+    clients = [_client(address)]
+    size = len(clients[0].nthreads())
+    clients.pop().close()
 
     def start() -> Executor:
         clients.append(_client(address))
-        clients[-1].run(_limit_to_threads)
         executor: Executor = clients[-1].get_executor(pure=False)
         return executor
 
@@ -303,7 +198,7 @@ def cluster(address: str) -> Pool:
         executor.shutdown(wait=False)  # cancels what is not done
         clients.pop().close()
 
-    return Pool(start, stop, max(AHEAD * threads, 32), is_elsewhere=True)
+    return Pool(start, stop, size, has_workers=lambda: bool(clients[-1].nthreads()), is_elsewhere=True)
 
 
 def _client(address: str) -> Any:
@@ -314,58 +209,48 @@ def _client(address: str) -> Any:
         import distributed
     except ImportError:
         raise FpsolveError("Dask is not installed; install it with: pip install 'fpsolve[cluster]'") from None
-    connect: Callable[..., Any] = distributed.Client
     for name in ("distributed", "distributed.client", "tornado.application"):  # they report workers that come and go
         logging.getLogger(name).setLevel(logging.CRITICAL)
-    if not re.fullmatch(r"(tcp://)?[^/\s:]+:\d+", address):
-        raise FpsolveError(f'got "{address}" as the address of a scheduler; must be one such as tcp://host:8786')
+    if type(address) is not str or not re.fullmatch(r"(tcp://)?[^/\s:]+:\d+", address):
+        raise FpsolveError(f"scheduler: got {shown(address)}; must be an address such as tcp://host:8786")
     try:
-        client: Any = connect(address, timeout=CONNECT_SECONDS, set_as_default=False)
+        connect: Any = distributed.Client
+        client = connect(address, timeout=CONNECT_SECONDS, set_as_default=False)
     except OSError as failure:
         remedy = "start one with: dask scheduler"
         raise FpsolveError(f"no scheduler answers at {address} ({failure}); {remedy}") from failure
     try:
-        versions = set(client.run(_version).values())
+        versions, threads = set(client.run(_version).values()), set(client.nthreads().values())
     except Exception as failure:
         client.close()
         raise FpsolveError(f"the workers of {address} cannot run fpsolve: {failure}; install it there") from failure
-    if versions != {__version__}:
+    if versions != {__version__} or threads != {1}:
         client.close()
-        others = ", ".join(versions - {__version__})
-        state = f"have fpsolve {others}, not {__version__}" if others else "are not there"
+        state = f"have fpsolve {', '.join(versions)}, not {__version__}" if versions else "are not there"
+        state = state if versions != {__version__} else "have several threads"
         remedy = f"dask worker {address} --nworkers -1 --nthreads 1"
         raise FpsolveError(f"workers of {address} {state}; start them with: {remedy}")
     return client
 
 
 def _version() -> str:
+    """That of fpsolve in a worker, which uses one processor from now on."""
     from fpsolve import __version__
 
+    limit_processors(1)
     return __version__
 
 
-def _limit_to_threads(dask_worker: Any) -> None:
-    """A worker uses as many processors as it has threads, and leaves the others to others."""
-    limit_processors(dask_worker.state.nthreads)
-
-
-def _in_turn(task: Callable[[Item], Result], item: Item) -> Result:
-    """One task at a time in a process: a worker of a cluster may have several threads."""
-    with _TURN:
-        return task(item)
-
-
-def _processes(count: int, *counters: Any) -> Executor:
+def _processes(count: int) -> Executor:
     """New processes, in which nothing of this one is copied, neither its locks nor its threads."""
     context = multiprocessing.get_context("spawn")
-    return ProcessPoolExecutor(count, mp_context=context, initializer=_begin_worker, initargs=(count, *counters))
+    return futures.ProcessPoolExecutor(count, mp_context=context, initializer=_begin_worker, initargs=(count,))
 
 
-def _begin_worker(count: int, *counters: Any) -> None:
+def _begin_worker(count: int) -> None:
     """A worker has one processor, one share of the memory, and ends when what started it does, however that ends."""
     limit_processors(1)
     share_memory(count)
-    _counters[:] = counters
     parent = multiprocessing.parent_process()
 
     def end_with_parent() -> None:
@@ -383,28 +268,20 @@ def _kill(executor: Executor) -> None:
 
 
 @contextmanager
-def _without_main() -> Iterator[None]:
-    """Processes that are started in the body do not run the script of this one, of which no task needs anything.
+def _for_workers() -> Iterator[None]:
+    """Processes that are started in the body neither run the script of this one nor get the signals of a terminal.
 
-    `multiprocessing` looks for the script in `sys.modules` and has no option that says otherwise.
+    No task needs anything of the script, which `multiprocessing` looks for in `sys.modules` without an option that says
+    otherwise; signals of a terminal are for this process.
     """
-    main = sys.modules["__main__"]
+    main, has_masks, before = sys.modules["__main__"], hasattr(signal, "pthread_sigmask"), set[Any]()
+    if has_masks:  # not on Windows
+        resource_tracker.ensure_running()  # whose start would let signals through again
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT, signal.SIGHUP))
     sys.modules["__main__"] = ModuleType("__main__")
     try:
         yield
     finally:
         sys.modules["__main__"] = main
-
-
-@contextmanager
-def _signals_blocked() -> Iterator[None]:
-    """Processes that are started in the body never get the signals of a terminal, which are for this process."""
-    if not hasattr(signal, "pthread_sigmask"):  # on Windows
-        yield
-        return
-    resource_tracker.ensure_running()  # whose start would let them through again
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT, signal.SIGHUP))
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        if has_masks:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)

@@ -27,7 +27,3 @@ def faulty(number):
 def whereabouts(_):
     time.sleep(0.05)
     return os.getpid(), processors()
-
-
-def in_three_steps(item, told):
-    return [told() for _ in range(3)] + [item]

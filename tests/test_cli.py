@@ -715,7 +715,7 @@ def test_json_of_several_cases_is_a_line_each_and_warnings_are_apart(case, tmp_p
         (["--jobs", "0"], "jobs: got 0; must be a whole number from 1 to 1000"),
         (["--jobs", "-3"], "jobs: got -3; must be a whole number from 1 to 1000"),
         (["--jobs", "2", "--scheduler", "tcp://host:8786"], "name one of them"),
-        (["--scheduler", "host"], 'got "host" as the address of a scheduler; must be one such as tcp://host:8786'),
+        (["--scheduler", "host"], "scheduler: got 'host'; must be an address such as tcp://host:8786"),
         (["--jobs", "2.5"], 'got "2.5"; must be a whole number'),
     ],
 )

@@ -9,20 +9,23 @@ import socket
 import subprocess
 import sys
 import time
-from contextlib import chdir, contextmanager, suppress
+from contextlib import chdir, contextmanager, nullcontext, suppress
 from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray as xr
 
+from fpsolve import pool
 from fpsolve.case.case import load_case
 from fpsolve.cli import main
+from fpsolve.errors import WorkersDied
 from fpsolve.output import records
 from fpsolve.output.records import Records
 from fpsolve.pool import cluster
 from fpsolve.study import solve
 from fpsolve.workflow import run_case
+from fpsolve.workflow.progress import Watch
 from fpsolve.workflow.sets import SOLVED_RECORDS
 from tests.conftest import heed_signals, sampled, started
 from tests.solving import case_text
@@ -262,13 +265,21 @@ def test_signals_of_a_terminal_reach_no_worker(place):
 
 @pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="finds processes as Linux tells them")
-def test_a_killed_worker_costs_its_batch_only(place):
+def test_a_killed_worker_ends_a_run_and_the_same_command_goes_on(place):
     process = begun(place, "orphan", "--jobs", "2")
     wait_for_records(place, "orphan", 4, process)
     os.kill(children(process)[0], signal.SIGKILL)
-    said = process.communicate(timeout=120)
-    assert process.returncode == 0, said
+    _, said = process.communicate(timeout=120)
+    assert process.returncode == 3
+    assert said == (
+        "a worker has died, perhaps for lack of memory; what was finished is kept, and the same command goes on\n"
+    )
+    done = len(lines(place, "orphan"))
+    summary = json.loads((place / "orphan/sweep/summary.json").read_text(encoding="utf-8"))
+    assert 4 <= summary["done"] == done < SIZE**2
+    run(place, "orphan", "--jobs", "2")
     assert_same_results(place, "orphan")
+    assert len(lines(place, "orphan")) == SIZE**2
 
 
 @pytest.mark.slow
@@ -317,8 +328,8 @@ def test_a_cluster_gives_the_same_results(place):
     pytest.importorskip("distributed")
     case = load_case(place / "sweep.toml", ["vary={}"])
     with dask_cluster() as (address, workers, _):
-        pool = cluster(address)  # works for one case after the other, as its client ends with each
-        numbers = [run_case(case, place / out, pool=pool).results[0].moments.value for out in ("first", "second")]
+        workers_of = cluster(address)  # works for one case after the other, as its client ends with each
+        numbers = [run_case(case, place / out, pool=workers_of).results[0].moments.value for out in ("first", "second")]
         np.testing.assert_array_equal(*numbers)
         process = begun(place, "cluster", "--scheduler", address)
         wait_for_records(place, "cluster", 4, process)
@@ -343,8 +354,23 @@ def test_a_scheduler_that_dies_is_told_in_one_sentence(place):
         wait_for_records(place, "headless", 1, process)
         scheduler.kill()
         _, said = process.communicate(timeout=120)
-    assert process.returncode == 2
+    assert process.returncode == 3
     assert said == "the scheduler has stopped; the same command goes on where this one stopped\n"
+
+
+@pytest.mark.slow
+def test_a_cluster_that_loses_all_workers_is_told_in_one_sentence(place, monkeypatch):
+    pytest.importorskip("distributed")
+    monkeypatch.setattr(pool, "CONNECT_SECONDS", 5)
+    seen = []
+
+    def advance(*_, **__):
+        seen.append(workers[0].kill() if not seen else None)
+
+    watch = Watch(bar=lambda _: nullcontext(advance))
+    with dask_cluster(1) as (address, workers, _), pytest.raises(WorkersDied, match="no worker is left"):
+        run_case(load_case(place / "sweep.toml"), place / "deserted", pool=cluster(address), watch=watch)
+    assert 0 < len(lines(place, "deserted")) < SIZE**2
 
 
 def test_batches_follow_from_the_case_alone(place):

@@ -143,23 +143,17 @@ class ScannedRow:
         gradients: ∂F/∂(u, v), shape (n, 2).
         reasons: why F does not exist at some nodes, each once.
         seconds: of the processor.
-        told: the number of its nodes that progress was shown of.
     """
 
     values: FloatArray
     gradients: FloatArray
     reasons: tuple[Message, ...] = ()
     seconds: float = 0.0
-    told: int = 0
 
 
-def scan_row(row: Row, told: Callable[[], bool] = lambda: False) -> ScannedRow:
-    """F on a row from one end to the other, so that each node is close to the one before.
-
-    Args:
-        told: called after each node, such as `pool.Steps`; whether that shows progress.
-    """
-    whole, shown, field, reasons = Countdown(math.inf), 0, row.begin(), dict[Message, None]()
+def scan_row(row: Row) -> ScannedRow:
+    """F on a row from one end to the other, so that each node is close to the one before."""
+    whole, field, reasons = Countdown(math.inf), row.begin(), dict[Message, None]()
     values, gradients = np.full(row.count, np.nan), np.full((row.count, 2), np.nan)
     shares = np.linspace(0, 1, row.count)
     for k in range(row.count):
@@ -169,14 +163,13 @@ def scan_row(row: Row, told: Callable[[], bool] = lambda: False) -> ScannedRow:
             values[k], gradients[k] = sample.value, sample.gradient
         except FpsolveError as failure:
             reasons.setdefault(failure.message)
-        shown += told()
-    return ScannedRow(values, gradients, tuple(reasons), whole.spent, shown)
+    return ScannedRow(values, gradients, tuple(reasons), whole.spent)
 
 
 def scanned(rows: Sequence[Row], found: Iterator[ScannedRow], progress: Callable[[], None] = lambda: None) -> Scan:
     """The scan of all rows of a grid, from what is found on them, in their order; no more of that is taken.
 
-    `progress` is called for each node of which none was shown.
+    `progress` is called for each node.
     """
     count, seconds = len(rows), 0.0
     values, gradients, reasons = np.empty((count, count)), np.empty((count, count, 2)), dict[Message, None]()
@@ -186,7 +179,7 @@ def scanned(rows: Sequence[Row], found: Iterator[ScannedRow], progress: Callable
         values[place], gradients[place] = result.values, result.gradients
         reasons.update(dict.fromkeys(result.reasons))
         seconds += result.seconds
-        for _ in range(count - result.told):
+        for _ in range(count):
             progress()
     return Scan(np.linspace(0, 1, count), values, gradients, tuple(reasons), seconds)
 

@@ -27,7 +27,6 @@ from fpsolve.exponent.adapt import Budget
 from fpsolve.messages import Code, Message
 from fpsolve.model.problem import Problem
 from fpsolve.model.quantity import POINTS
-from fpsolve.pool import Steps
 
 if TYPE_CHECKING:
     import xarray
@@ -210,7 +209,7 @@ class Boundary(Result):
             stepped: called once for each point of a branch.
         """
         tasks = self.rows()
-        scan = scanned(tasks, map(partial(scan_row, told=Steps(progress)), tasks) if rows is None else rows, progress)
+        scan = scanned(tasks, map(scan_row, tasks) if rows is None else rows, progress)
         now = replace(self, scan=scan, **{**_ANEW, "seconds": scan.seconds})
         yield now
         zero_field = now.zero_field

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
@@ -18,7 +17,6 @@ from fpsolve.case.sections import ChartSection
 from fpsolve.errors import FpsolveError, NoPerturbationTheory
 from fpsolve.messages import Code, Message, message_of
 from fpsolve.model.problem import Problem
-from fpsolve.pool import Steps
 from fpsolve.theory.perturbation import second_order
 
 Map = Callable[[Callable[[Row], ScannedRow], Iterable[Row]], Iterable[ScannedRow]]
@@ -103,7 +101,6 @@ def solve_chart(
         progress: called once for each node of each scan, see `chart_work`.
         stepped: called once for each point that is traced.
         map: computes the rows of all scans, as the builtin does or in other processes, while branches are traced here.
-            It calls `progress` itself for the `Steps` of other processes, or they are told row by row.
         known: gives a line that an earlier run has finished.
     """
     frame = charted(case)
@@ -115,7 +112,7 @@ def solve_chart(
     begun = [Boundary(zero, x, y, problem, scan=scan, budget=case.budget) for zero in frame.zero]
     finished = [known(line) for line in begun]
     tasks = [row for line, earlier in zip(begun, finished, strict=True) if earlier is None for row in line.rows()]
-    rows = iter(map(partial(scan_row, told=Steps(progress)), tasks))
+    rows = iter(map(scan_row, tasks))
     for each, earlier in zip(begun, finished, strict=True):
         done = chart.lines
         if earlier is not None:

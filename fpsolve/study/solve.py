@@ -645,11 +645,6 @@ def failed(curve: Curve, reason: str) -> CurveResult:
     return CurveResult(curve, MomentColumns(*[nothing] * 7), dict.fromkeys(INDICES), failures=failures)
 
 
-def lost(curve: Curve) -> CurveResult:
-    """The result of a set on which its worker died."""
-    return failed(curve, Message(Code.WORKER_DIED, remedy=Remedy.MEMORY))
-
-
 def result_alone(order: Order, curve: Curve, solved: Solved) -> CurveResult | None:
     """For a `solve_batch` that keeps nothing but the numbers."""
     return solved.result

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from fpsolve.case.case import Case, load_case
 from fpsolve.case.sections import Varied
-from fpsolve.errors import NotConverged
+from fpsolve.errors import NotConverged, WorkersDied
 from fpsolve.files import writable
 from fpsolve.messages import Code, Message
 from fpsolve.model.kinds import is_ours
@@ -29,7 +29,7 @@ from fpsolve.study.design import DesignOutcome, refuse_no_design, solve_design
 from fpsolve.study.hierarchy import compare_with_hierarchy, even_moments
 from fpsolve.study.results import Comparison, CurveResult, SimulatedCurve
 from fpsolve.study.simulate import refuse_obstacles, simulation_work
-from fpsolve.study.solve import Numerics, Order, Wanted, batches, compare, expected, lost, result_alone, solve_batch
+from fpsolve.study.solve import Numerics, Order, Wanted, batches, compare, expected, result_alone, solve_batch
 from fpsolve.study.uncertain import Samples, sampled_case, samples_of
 from fpsolve.testing import check_noise
 from fpsolve.workflow.folders import (
@@ -287,10 +287,9 @@ def chart_case(
         writable(folder),
         pool or serial() as workers,
     ):
-        rows = partial(workers.map, stepped=progress)
         lines = Lines(case, folder)
         with shown_at_the_end(show):
-            for chart in solve_chart(case, progress=progress, stepped=stepped, map=rows, known=lines.find):
+            for chart in solve_chart(case, progress=progress, stepped=stepped, map=workers.map, known=lines.find):
                 write_chart(case, chart, folder)
                 lines.keep(chart.lines[-1])
     return chart
@@ -335,9 +334,7 @@ def check_case(case: Case, *, by_hierarchy: bool = False, pool: Pool | None = No
         pool or serial() as workers,
     ):
         task = partial(solve_batch, problem=case.problem, numerics=Numerics.of(case), keep=result_alone)
-        for done in workers.run(task, batches(case, order)):
-            dead = [each.number for each in done.item] if done.result is None else []
-            results = done.result or [lost(curve) for number in dead for curve in case.curves(number - 1, number)]
+        for _, results in workers.run(task, batches(case, order)):
             for result in filter(None, results):
                 found.append(result)
                 progress(failed=result.status.fails)
@@ -360,7 +357,7 @@ def _solve(case: Case, folder: Path, pool: Pool, watch: Watch, *, is_fresh: bool
         try:
             with watch.bar(sweep.phase) as progress:
                 sweep.solve(pool, progress)
-        except KeyboardInterrupt:
+        except (KeyboardInterrupt, WorkersDied):
             sweep.find()
             sweep.find_unfinished()
             sweep.write_all()

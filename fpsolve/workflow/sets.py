@@ -5,7 +5,6 @@ They are simulated one after the other, here or on a cluster, and kept alike.
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Iterable, Iterator
 from contextlib import nullcontext
 from dataclasses import replace
@@ -42,7 +41,7 @@ from fpsolve.output.vtk import write_curves, write_functions, write_stationary_r
 from fpsolve.pool import Pool, serial
 from fpsolve.study.results import CurveResult, SimulatedCurve, Solved
 from fpsolve.study.simulate import simulate_curve, simulate_curves, simulation_steps, simulation_work
-from fpsolve.study.solve import Numerics, Order, Wanted, batches, everything, lost, solve_batch, without_failed
+from fpsolve.study.solve import Numerics, Order, Wanted, batches, everything, solve_batch, without_failed
 from fpsolve.workflow.progress import MOMENTS, SETS, Advance, Phase
 
 Found = tuple[int, Address | CurveResult | None, bool]
@@ -156,15 +155,14 @@ class Sweep(_Kept):
         is_alone = self.case.planned == 1 and not pool.is_elsewhere
         if self._settled:
             progress(self._settled * self._steps_each, known=True)
-        queue = _Queue(batches(self.case, self._order))
         kept = partial(keep, self.folder, self.numerics)
         growing = self._grow if is_alone else partial(grow, self.folder, self.numerics)
         task = partial(solve_batch, problem=self.case.problem, numerics=self.numerics, keep=kept, grow=growing)
         if is_alone:
             task = partial(task, progress=progress)
         with serial() if is_alone else pool as workers:
-            for done in workers.run(task, queue):
-                for number, found, is_failed in self._lost(done.item, queue) if done.result is None else done.result:
+            for _, solved in workers.run(task, batches(self.case, self._order)):
+                for number, found, is_failed in solved:
                     if isinstance(found, Address):
                         self.records.expect(found)
                     if found is not None:
@@ -204,27 +202,6 @@ class Sweep(_Kept):
     def _curve(self, order: Order) -> Curve:
         [curve] = self.case.curves(order.number - 1, order.number)
         return curve
-
-    def _lost(self, batch: Orders, queue: _Queue) -> list[Found]:
-        """What is known of a batch whose worker died; the rest is tried again, set by set, which shows the reason."""
-        self.records.look()
-        keys = {order: key_of(self._curve(order), order.wanted, self.numerics) for order in batch}
-        places = {order: self.records.address(key) for order, key in keys.items()}
-        left = [order for order, place in places.items() if place is None or order.is_known]
-        if len(batch) > 1:
-            queue.again += [(order,) for order in left]
-            return [(order.number, place, False) for order, place in places.items() if order not in left]
-        return [(order.number, None if order.is_known else lost(self._curve(order)), True) for order in left]
-
-
-class _Queue(Iterator[Orders]):
-    """Batches, among which some may come again."""
-
-    def __init__(self, source: Iterator[Orders]) -> None:
-        self.source, self.again = source, deque[Orders]()
-
-    def __next__(self) -> Orders:
-        return self.again.popleft() if self.again else next(self.source)
 
 
 class Lines:
