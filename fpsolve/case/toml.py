@@ -40,8 +40,6 @@ class Scanner:
         lines: line of each dotted key, table and list entry.
         assigned: path of each `key = value` outside inline tables, in order.
         repeated: the dotted key that is set twice first, and its second line; None where there is none.
-        spans: where the value of each dotted key begins and ends in the text.
-        headers: of each section its path, and where it begins.
     """
 
     def __init__(self, text: str) -> None:
@@ -49,8 +47,6 @@ class Scanner:
         self.lines: dict[str, int] = {}
         self.assigned: list[Keys] = []
         self.repeated: tuple[str, int] | None = None
-        self.spans: dict[str, tuple[int, int]] = {}
-        self.headers: list[tuple[Keys, int]] = []
         self._newlines = [match.start() for match in re.finditer("\n", text)]
         self._explicit: set[str] = set()
         self._entries: dict[Keys, int] = {}  # the last one of each list of tables
@@ -101,7 +97,7 @@ class Scanner:
         return parts
 
     def _header(self) -> Keys:
-        start, is_list = self.at, self.text.startswith("[[", self.at)
+        is_list = self.text.startswith("[[", self.at)
         self.at += 1 + is_list
         path: Keys = ()
         keys = self._key()
@@ -112,7 +108,6 @@ class Scanner:
             if path in self._entries:
                 path = (*path, self._entries[path])
         self._note(path)
-        self.headers.append((path, start))
         self.at += 1 + is_list
         return path
 
@@ -125,12 +120,6 @@ class Scanner:
         return path
 
     def _value(self, path: Keys) -> None:
-        self._peek()
-        start = self.at
-        self._walk(path)
-        self.spans[dotted(path)] = start, start + len(self.text[start : self.at].rstrip())
-
-    def _walk(self, path: Keys) -> None:
         if self._skip("["):
             index = 0
             while not self._skip("]"):

@@ -86,6 +86,15 @@ def test_what_changes_more_than_values_is_written_anew(tmp_path):
     assert tomllib.loads(text)["moments"]["p"] == [1.0, 2.0]
 
 
+def test_new_sections_come_in_the_order_of_the_changes(tmp_path):
+    """Not in one that the hash of their names tells, which is another in every process."""
+    changes = ["monte_carlo.seed=1", "budget.unknowns=5000", 'output.quantities="all"', "excursions.levels=[2.0]"]
+    text, _ = written(tmp_path, PLAIN, ["vary={}", "expect=[]", *changes], {})
+    starts = [text.index(f"[{each.partition('.')[0]}]") for each in changes]
+    assert starts == sorted(starts)
+    assert text.startswith(PLAIN[: PLAIN.index("[vary]")].rstrip())
+
+
 def test_a_mesh_is_named_from_the_new_place(tmp_path):
     mesh = (ROOT / "meshes/default.vtu").read_text(encoding="utf-8")
     (tmp_path / "m.vtu").write_text(mesh, encoding="utf-8")
