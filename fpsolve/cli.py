@@ -240,7 +240,7 @@ def new(
 
     Example: fpsolve new my.toml --frequency 2 --damping-ratio 0.01 --restitution 0.9
     """
-    from fpsolve.case.templates import modes_of
+    from fpsolve.case.new import modes_of
     from fpsolve.workflow.noise import modes_from
     from fpsolve.workflow.shipped import copy_case, described_cases, write_case
 

@@ -14,9 +14,9 @@ from scipy.special import chdtri
 from fpsolve import __version__
 from fpsolve.analysis.spreads import LEVEL, Spread
 from fpsolve.arrays import FloatArray
+from fpsolve.case.new import case_text, sum_text
 from fpsolve.case.remedies import CASE_WORDS
 from fpsolve.case.rewrite import with_noise
-from fpsolve.case.templates import case_text, sum_text
 from fpsolve.drawing import COLOURS, figure_for, label_axes, plain_numbers
 from fpsolve.files import write_json, write_text
 from fpsolve.measured.fit import NAMES, NoiseFit

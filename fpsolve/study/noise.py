@@ -11,7 +11,7 @@ import numpy as np
 
 from fpsolve.arrays import FloatArray, one
 from fpsolve.case.case import Case
-from fpsolve.case.templates import Modes
+from fpsolve.case.new import Modes
 from fpsolve.errors import FpsolveError, NotConverged
 from fpsolve.measured import (
     NoiseFit,

@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 
 from fpsolve.case.case import Case
-from fpsolve.case.templates import Modes, modes_of
+from fpsolve.case.new import Modes, modes_of
 from fpsolve.errors import FpsolveError
 from fpsolve.fem.factors import one_thread
 from fpsolve.files import alone, writable

@@ -10,8 +10,8 @@ from importlib.resources import files
 from pathlib import Path
 
 from fpsolve.case.messages import nearest, shown
+from fpsolve.case.new import Modes, case_text
 from fpsolve.case.schema import SCHEMA, schema_text
-from fpsolve.case.templates import Modes, case_text
 from fpsolve.errors import FpsolveError
 from fpsolve.files import write_text
 
