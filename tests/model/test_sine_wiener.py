@@ -107,11 +107,12 @@ def test_a_step_has_the_transition_of_the_noise(rng):
     """ξ₁ and ξ̄ given ξ₀: E ξ₁ = ξ₀ e^{−½σ²h}, E ξ̄ = ξ₀ (1 − e^{−½σ²h})/(½σ²h) to O(h²), and P_s is kept."""
     noise, h, n = SineWiener(amplitude=0.8, sigma=1.1), 0.08, 400_000
     decay = math.exp(-0.5 * 1.1**2 * h)
-    xi, mean, end, push = np.full(n, 0.5), np.empty(n), np.empty(n), np.zeros(n)
+    angles = np.where(rng.random(n) < 0.5, 1.0, -1.0) * math.acos(0.5 / 0.8)  # both of the same ξ
+    xi, mean, end, push = np.stack([np.full(n, 0.5), angles]), np.empty(n), np.empty(n), np.zeros(n)
     draw(noise.step(h), xi, mean, end, push, rng)
     assert end.mean() == pytest.approx(0.5 * decay, abs=4 * end.std() / math.sqrt(n))
     assert mean.mean() == pytest.approx(0.5 * (1 - decay) / (0.5 * 1.1**2 * h), abs=4 * mean.std() / math.sqrt(n))
-    start = noise.sample(n, rng)
+    start = noise.start(n, rng)
     draw(noise.step(1.0), start, mean, end, push, rng)
     assert kstest(end[::4], lambda x: 0.5 + np.arcsin(np.clip(x / 0.8, -1, 1)) / math.pi).pvalue > 1e-3
     assert np.max(np.abs(end)) <= 0.8

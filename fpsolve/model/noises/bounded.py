@@ -2,49 +2,20 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from functools import cached_property
-from typing import Annotated, ClassVar, Literal, NamedTuple
+from typing import Annotated, ClassVar
 
-import numpy as np
-from numpy.typing import ArrayLike
 from pydantic.dataclasses import dataclass
 
-from fpsolve.arrays import FloatArray
 from fpsolve.model.faults import with_plain_errors
-from fpsolve.model.noise import Noise, NoiseDerivative
-from fpsolve.model.noises.sine_wiener import SineWiener
+from fpsolve.model.noise import NoiseDerivative
+from fpsolve.model.noises.sine_wiener import NoiseOfAngle
 from fpsolve.model.parameters import SIZE, STRICT, parameter
-
-
-class TurningStep(NamedTuple):
-    """θ₁ = θ₀ + turn + kick ζ₁ and, of weak order 2, ξ̄ = μ fade cos θ̄, ζ normal.
-
-    θ̄ = ½(θ₀ + θ₁) + spread ζ₂ is the mean of θ over the step, and fade that of cos(θ − θ̄).
-    """
-
-    mu: float
-    turn: float
-    kick: float
-    spread: float
-    fade: float
-
-    @staticmethod
-    def draw(step, xi, xi_mean, xi_end, push, rng):  # type: ignore[no-untyped-def]
-        """One step, see `Noise.step`; the rows of `xi` are ξ and θ."""
-        for i in range(xi_end.size):
-            start = xi[1, i]
-            end = start + step.turn + step.kick * rng.standard_normal()
-            middle = 0.5 * (start + end) + step.spread * rng.standard_normal()
-            xi[1, i] = end % (2 * math.pi)
-            xi_mean[i] = step.mu * step.fade * math.cos(middle)
-            xi_end[i] = step.mu * math.cos(end)
 
 
 @with_plain_errors
 @dataclass(frozen=True, config=STRICT)
-class Bounded(Noise):
+class Bounded(NoiseOfAngle):
     """Bounded noise ξ = μ cos θ, dθ = ν dt + σ dW, θ₀ uniform: its correlation is ½μ² exp(−½σ²|t|) cos νt.
 
     See W.-C. Xie, J. Sound Vib. 263, 2003. ξ has the stationary density of sine-Wiener noise, but is no Markov process
@@ -75,101 +46,15 @@ class Bounded(Noise):
 
     kind: ClassVar[str] = "bounded"
     of_xi: ClassVar[Sequence[str]] = ("mu",)
-    may_tilt: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         if not (self.nu or self.sigma):
             raise ValueError("got nu = 0 and sigma = 0; ξ would be constant; let nu or sigma be positive")
 
-    @cached_property
-    def _still(self) -> SineWiener:
-        """The noise of the same law whose phase does not turn."""
-        return SineWiener(self.mu, self.sigma)
-
     @property
-    def basis(self) -> Literal["polynomials", "waves"]:
-        return "waves" if self.nu else "polynomials"
-
-    @property
-    def has_peak(self) -> bool:  # type: ignore[override]
-        """Whether ν > 0, so that the spectral density has peaks at ±ν."""
-        return self.nu > 0
-
-    @property
-    def is_random(self) -> bool:
-        return self.sigma > 0
-
-    @property
-    def period(self) -> float:
-        """2π/ν for a harmonic load, σ = 0; else 0."""
-        return 0.0 if self.sigma else 2 * math.pi / self.nu
-
-    @property
-    def half_width(self) -> float:
+    def amplitude(self) -> float:  # type: ignore[override]
+        """μ."""
         return self.mu
-
-    @property
-    def end_exponent(self) -> float:
-        return -0.5
-
-    @property
-    def standard_deviation(self) -> float:
-        """μ/√2."""
-        return self.mu / math.sqrt(2)
-
-    @property
-    def correlation_time(self) -> float:
-        """2/σ², the time in which the phase is forgotten; ∞ for a harmonic load."""
-        return 2 / self.sigma**2 if self.sigma else math.inf
-
-    relaxation_time = correlation_time
-
-    def spectral_density(self, omega: float) -> float:
-        """S(ω) = ½μ²σ²(ω² + ν² + ¼σ⁴)/((ω² − ν² − ¼σ⁴)² + σ⁴ω²), the sum of a peak at ν and one at −ν.
-
-        For a harmonic load it is ∞ at |ω| = ν and 0 at all other frequencies.
-        """
-        half = 0.5 * self.sigma**2
-        if not half:
-            return math.inf if abs(omega) == self.nu else 0.0
-        sizes = [math.hypot(half, omega - side * self.nu) for side in (1, -1)]
-        return 0.5 * self.mu**2 * sum(half / size / size for size in sizes)
-
-    @property
-    def diffusion(self) -> float:
-        return self._still.diffusion
-
-    def squared_diffusion(self, xi: ArrayLike) -> FloatArray:
-        return self._still.squared_diffusion(xi)
-
-    def log_density(self, xi: ArrayLike) -> FloatArray:
-        return self._still.log_density(xi)
-
-    def holding_cost(self, xi: FloatArray) -> FloatArray:
-        return self._still.holding_cost(xi)
-
-    def of_angle(self, theta: FloatArray) -> FloatArray:
-        """ξ = μ cos θ, in the shape of θ."""
-        return np.asarray(self.mu * np.cos(theta))
-
-    def sample(self, size: int, rng: np.random.Generator) -> FloatArray:
-        return self.of_angle(rng.uniform(0, 2 * math.pi, size))
-
-    def start(self, size: int, rng: np.random.Generator) -> FloatArray:
-        """ξ and θ, shape (2, size)."""
-        theta = rng.uniform(0, 2 * math.pi, size)
-        return np.array([self.of_angle(theta), theta])
-
-    def step(self, h: float, bias: float = 0.0) -> TurningStep:
-        """One step of length h for the simulation, see `Noise.step`; this noise takes no bias."""
-        kick = self.sigma * math.sqrt(h)
-        fade = math.exp(-(kick**2) / 12) * float(np.sinc(0.5 * self.nu * h / math.pi))
-        return TurningStep(self.mu, self.nu * h, kick, kick / math.sqrt(12), fade)
-
-    @property
-    def largest_step(self) -> float:
-        """The smaller of 0.1/σ² and 0.1π/ν, a tenth of the times in which the phase diffuses by 1 or turns by π."""
-        return min(0.1 / self.sigma**2 if self.sigma else math.inf, 0.1 * math.pi / self.nu if self.nu else math.inf)
 
     def derivative(self, name: str) -> NoiseDerivative:
         """The derivative by μ, ν or σ: μ scales ξ, ν changes the speed of the phase, σ its diffusion.
