@@ -258,7 +258,7 @@ def _no_eigenfunction(problem: Problem) -> Message | None:
     """Why T is not looked at, or None."""
     if problem.dimension > 2:
         return Message(Code.EXCURSION_PLANE, count=problem.dimension)
-    return Message(Code.EXCURSION_RAY, phase=problem.invariant_ray) if problem.classes else None
+    return Message(Code.EXCURSION_RAY, phase=problem.invariant_rays[0]) if problem.classes else None
 
 
 class Crossing(NamedTuple):
@@ -274,11 +274,9 @@ class Crossing(NamedTuple):
 
     @classmethod
     def of(cls, problem: Problem) -> Crossing:
-        system, noise = problem.system, problem.noise
-        factors = [math.exp(jump.log_factor) for jump in system.jumps]
-        impulses = noise.impulses(system)
+        factors = [math.exp(jump.log_factor) for jump in problem.system.jumps]
+        _, diffusions, impulses = problem.noise.motion(problem.system)
         factors += [float(np.linalg.norm(each.matrix, 2)) for each in impulses]
-        _, diffusions = noise.motion(system)
         overshoot = max(1.0, *factors, 1.0)
         diffuses = any(not each.q.vanishes for each in diffusions)
         return cls(overshoot, overshoot == 1.0 and not impulses and not diffuses)

@@ -140,7 +140,7 @@ def principal_pair(
     pairs, pencil = [start] if isinstance(start, PrincipalPair) else start or [], generator.at(p)
     if not pencil.matrix.norm < LARGEST_NORM:
         raise NumericalFailure(f"L(p) has the size {pencil.matrix.norm:.0e}")
-    has_others, mixes_slowly = _has_other_positive(generator, p), generator.problem.noise.mixes_slowly
+    has_others, has_states = _has_other_positive(generator, p), _has_states(generator.problem)
     tangents, found = _tangents(generator.problem, p, pairs), list[PrincipalPair]()
 
     def solved(x: FloatArray, y: FloatArray) -> PrincipalPair:
@@ -171,18 +171,23 @@ def principal_pair(
         return pair
 
     pair = None
-    if (pairs and not mixes_slowly) or not has_others:
+    if (pairs and not has_states) or not has_others:
         pair = from_a_start()
     if pair is None:
         pair = from_the_right()
         others = [each.value for each in found]
-        if mixes_slowly and generator.size <= SURVEYED_UNKNOWNS:
+        if has_states and generator.size <= SURVEYED_UNKNOWNS:
             others.append(float(spectrum(generator, p, 1)[0].real))
         rightmost = max(others)
         if has_others and rightmost - pair.value > 1e-6 * max(abs(rightmost), generator.problem.unit_rate):
             told = Message(Code.LARGER_EIGENVALUE, p=p, rightmost=rightmost, value=pair.value)
             raise NotConverged(told, pair, Remedy.PHASE)
     return pair
+
+
+def _has_states(problem: Problem) -> bool:
+    """Whether a noise jumps between states: where some of these are hardly left, they have a positive pair each."""
+    return any(noise.has_states for noise in problem.noise.parts.values())
 
 
 def _has_other_positive(generator: Generator, p: float) -> bool:
@@ -194,8 +199,10 @@ def _has_other_positive(generator: Generator, p: float) -> bool:
     problem = generator.problem
     if problem.dimension > 2:  # each search begins at a neighbouring p
         return False
-    if problem.noise.mixes_slowly or (frozen := frozen_noise(problem)) is None:
-        return problem.noise.mixes_slowly or problem.may_rest
+    if _has_states(problem):
+        return True
+    if (frozen := frozen_noise(problem)) is None:
+        return problem.may_rest
     lines = generator.chosen.xi.lines
     return frozen.rests(p, lines[0], lines[-1]) if lines.size else frozen.rests(p)
 

@@ -231,9 +231,9 @@ class ExponentSolver:
     def pair(self, p: float) -> PrincipalPair:
         """The principal eigenpair at p. Raises `NotConverged`, `NoSuchExponent`."""
         if self.classes:
-            if (phase := self.problem.invariant_ray) is None:
+            if self.problem.dimension > 2:
                 raise NotConverged(Message(Code.NO_EIGENFUNCTION_OF_BLOCKS, p=p, blocks=self.problem.block_names))
-            raise NotConverged(Message(Code.NO_EIGENFUNCTION, p=p, phase=phase))
+            raise NotConverged(Message(Code.NO_EIGENFUNCTION, p=p, phase=self.problem.invariant_rays[0]))
         return self.solution(p).pair
 
     @cached_property

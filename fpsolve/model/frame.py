@@ -28,9 +28,9 @@ from fpsolve.model.plane import (
     ImpulseDerivative,
     LinearMotion,
     Matrix,
+    Motion,
     System,
     affine,
-    combined,
     is_driven,
     rotating_coordinates,
 )
@@ -83,9 +83,7 @@ class Frame:
     def motion(self, system: System) -> System:
         """A system for y, the terms of order 0 that no noise drives as one; a rotation is one exactly."""
         others = [self.term(term) for term in system.terms if not is_free(term)]
-        free = sum(
-            (float(each.g(0.0)) * np.array(each.matrix) for each in system.terms if is_free(each)), 0.0 * self._array
-        )
+        free = _free(system.terms, len(self.matrix))
         a = self._inverse @ free @ self._array
         turned = 0.5 * (np.trace(a) * np.eye(len(a)) + a - a.T)
         is_turn = np.all(abs(a - turned) <= ROUNDED * (abs(self._inverse) @ abs(free) @ abs(self._array)))
@@ -125,14 +123,7 @@ def is_free(term: CoefficientMatrix) -> bool:
     return term.order == 0 and not is_driven(term.g)
 
 
-def own_frame(
-    n: int,
-    drift: Sequence[CoefficientMatrix],
-    diffusions: Sequence[CoefficientMatrix],
-    impulses: Sequence[Impulse],
-    epsilon: float,
-    spread: Callable[[str], tuple[float, float]],
-) -> tuple[Frame | None, float]:
+def own_frame(n: int, motion: Motion, spread: Callable[[str], tuple[float, float]]) -> tuple[Frame | None, float]:
     """The frame in which a motion is small, None where x itself is hardly worse; and its size there, a rate.
 
     That is ‖A‖ + Σ‖B‖² + Σ r‖C‖ + Σ min(s‖D‖, τs²‖D‖²), A all that no noise drives, B of white noise, C of impulses
@@ -142,12 +133,12 @@ def own_frame(
 
     Args:
         n: the dimension of the state.
-        drift, diffusions, impulses: what moves the state along a path of ξ, by white noise, and at random times.
-        epsilon: ε.
+        motion: what moves the state.
         spread: by the name of a noise the standard deviation of ξ and about how long it remembers its value.
     """
+    (drift, diffusions, impulses), epsilon = motion, motion.drift.epsilon
     sums = dict[str | None, FloatArray]()
-    for term in drift:
+    for term in drift.terms:
         for name, c in zip((None, term.noise), affine(term.g) or (0.0, 1.0), strict=True):
             if c:
                 sums[name] = sums.get(name, 0.0) + c * epsilon**term.order * np.array(term.matrix)
@@ -176,7 +167,7 @@ def own_frame(
         else:  # as what is nilpotent, which is as small as one likes
             least, best = size(own), own
         choice.append(best)
-    if n == 2 and (rotating := rotating_coordinates(np.reshape(_free(drift), (2, 2)))) is not None:
+    if n == 2 and (rotating := rotating_coordinates(_free(drift.terms, n))) is not None:
         (first, _), (lower, last) = rotating
         choice.insert(0, np.array([[1.0, 0.0], [lower / first, last / abs(first)]]))
     chosen = next((each for each in choice if size(each) <= HARDLY * least), own)
@@ -193,9 +184,9 @@ def _steps(n: int, is_scaling: bool) -> Iterator[FloatArray]:
                 yield step
 
 
-def _free(terms: Sequence[CoefficientMatrix]) -> tuple[float, float, float, float]:
-    """The matrix of those of order 0 that no noise drives, row by row."""
-    return combined((float(term.g(0.0)), term) for term in terms if is_free(term))
+def _free(terms: Sequence[CoefficientMatrix], n: int) -> FloatArray:
+    """The sum of the matrices of order 0 that no noise drives, shape (n, n)."""
+    return sum((float(term.g(0.0)) * np.array(term.matrix) for term in terms if is_free(term)), np.zeros((n, n)))
 
 
 def _unit(phi: FloatArray) -> FloatArray:

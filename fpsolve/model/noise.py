@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 from fpsolve.arrays import Coefficient, FloatArray, nothing
 from fpsolve.model.exact import ExactLaw
 from fpsolve.model.parameters import Parametrised
-from fpsolve.model.plane import CoefficientMatrix, Impulse, ImpulseDerivative, System
+from fpsolve.model.plane import CoefficientMatrix, Motion, MotionDerivative, System
 
 
 @dataclass(frozen=True)
@@ -55,21 +55,18 @@ class Noise(Parametrised):
     Attributes:
         has_states: whether ξ jumps between states. Such noise has no density, so that `log_density`, `diffusion` and
             what follows from them do not apply.
-        mixes_slowly: whether ξ may stay among some of its states almost for ever, so that these states have a positive
-            eigenpair of their own.
         approximates_spectrum: whether `spectral_density` is that of a simpler process which replaces this one.
         tails_beyond: the name of a parameter, the value above which P_s has algebraic tails, and what to do then; None
             for noise that never has such tails.
         may_tilt: whether a factor exp(s ξ) makes functions of ξ easier to resolve, as where P_s has a single peak.
         has_peak: whether the spectral density may have a high peak at a frequency of the noise itself.
         is_white: whether ξ has no value, as for white noise and impulses. Solvers see such noise as a chain with the
-            only state ξ = 0; it moves the system by diffusion, see `motion`, or by `impulses`.
+            only state ξ = 0; it moves the system by diffusion or by impulses, see `motion`.
         of_xi: the names of the parameters whose unit contains that of ξ. Their declared unit is that for ξ in 1/time.
     """
 
     section: ClassVar[str] = "noise"
     has_states: ClassVar[bool] = False
-    mixes_slowly: ClassVar[bool] = False
     approximates_spectrum: ClassVar[bool] = False
     tails_beyond: ClassVar[tuple[str, float, str] | None] = None
     may_tilt: ClassVar[bool] = True
@@ -135,7 +132,7 @@ class Noise(Parametrised):
     @property
     def is_random(self) -> bool:
         """Whether ξ is random after its start; False for a harmonic load with a random phase."""
-        return True
+        return not self.period
 
     @property
     def period(self) -> float:
@@ -247,31 +244,19 @@ class Noise(Parametrised):
         """Whether this kind states a `step`."""
         return type(self).step is not Noise.step
 
-    def motion(self, system: System) -> tuple[System, Sequence[CoefficientMatrix]]:
-        """The motion of a system along a path of ξ, and the matrices B of the diffusions Bx ∘ dW by white noise."""
-        return system, ()
+    def motion(self, system: System) -> Motion:
+        """How this noise moves a system; by default only along a path of ξ."""
+        return Motion(system)
 
-    def changed_motion(
-        self, system: System, terms: Sequence[CoefficientMatrix], name: str = ""
-    ) -> tuple[Sequence[CoefficientMatrix], Sequence[CoefficientMatrix]]:
-        """The derivative ∂/∂θ of both parts of `motion`.
+    def changed_motion(self, system: System, terms: Sequence[CoefficientMatrix], name: str = "") -> MotionDerivative:
+        """The derivative ∂/∂θ of the `motion`.
 
         Args:
             system: the system.
             terms: ∂/∂θ of its terms; empty if θ is a parameter of the noise.
             name: the name of θ if it is a parameter of the noise, else empty.
         """
-        return terms, ()
-
-    def impulses(self, system: System) -> Sequence[Impulse]:
-        """The independent impulses by which this noise multiplies the state of a system; by default none."""
-        return ()
-
-    def changed_impulses(
-        self, system: System, terms: Sequence[CoefficientMatrix], name: str = ""
-    ) -> Sequence[ImpulseDerivative]:
-        """The derivative ∂/∂θ of each of the `impulses`. The arguments are those of `changed_motion`."""
-        return ()
+        return MotionDerivative(terms)
 
     @property
     def replaces(self) -> Noise | None:
@@ -301,7 +286,6 @@ class Memoryless(Noise):
     """Noise that has no value, see `is_white`: to solvers a chain that rests in its only state, ξ = 0."""
 
     is_white: ClassVar[bool] = True
-    mixes_slowly: ClassVar[bool] = True
     has_states: ClassVar[bool] = True
     states: ClassVar[Sequence[float]] = (0.0,)
     rates: ClassVar[Sequence[Sequence[float]]] = ((0.0,),)

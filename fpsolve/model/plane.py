@@ -10,11 +10,11 @@ dφ = h dt and d ln a = q dt with h = e′ᵀA e, q = eᵀA e, e′ = de/dφ: a 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -57,16 +57,6 @@ class Harmonics:
     def vanishes(self) -> bool:
         parts = self.mean, self.cosine, self.sine
         return not any(part.any() if isinstance(part, np.ndarray) else part for part in parts)
-
-
-def combined(parts: Iterable[tuple[float, CoefficientMatrix]]) -> tuple[float, float, float, float]:
-    """Σ c A of some terms, row by row."""
-    a = b = c = d = 0.0
-    for size, term in parts:
-        if size:
-            (p, q), (r, s) = term.matrix
-            a, b, c, d = a + size * p, b + size * q, c + size * r, d + size * s
-    return a, b, c, d
 
 
 def turning(a: FloatArray) -> Harmonics:
@@ -422,7 +412,7 @@ class System(Parametrised):
 
     def impact_slope(self, log_factor: float) -> float:
         """Its derivative by ln R at a given ln R."""
-        return math.exp(log_factor)
+        return self.impact_value(log_factor)
 
     def log_factors_by_order(self, most: int) -> FloatArray:
         """The sum of all ln R in powers of ε, up to one of them, shape (most + 1,): here all of it is of order ε²."""
@@ -438,6 +428,28 @@ class LinearMotion(System):
     epsilon: float
     terms: tuple[CoefficientMatrix, ...]
     jumps: tuple[Jump, ...] = ()
+
+
+class Motion(NamedTuple):
+    """How a noise moves a system.
+
+    Attributes:
+        drift: the motion along a path of ξ.
+        diffusions: ε^order B of every Bx ∘ dW by which white noise moves the state.
+        impulses: what multiplies the state at random times.
+    """
+
+    drift: System
+    diffusions: Sequence[CoefficientMatrix] = ()
+    impulses: Sequence[Impulse] = ()
+
+
+class MotionDerivative(NamedTuple):
+    """∂/∂θ of a `Motion`: of the sum of the terms of its drift, of each of its diffusions and of its impulses."""
+
+    terms: Sequence[CoefficientMatrix]
+    diffusions: Sequence[CoefficientMatrix] = ()
+    impulses: Sequence[ImpulseDerivative] = ()
 
 
 def _direction(phi: ArrayLike) -> FloatArray:

@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache, wraps
+from itertools import chain
 from textwrap import wrap
 from typing import Any, ParamSpec, TypeVar
 
@@ -28,11 +29,11 @@ from fpsolve.model.plane import (
     Impulse,
     ImpulseDerivative,
     Jump,
+    Motion,
     System,
     Xi,
     affine,
     angular_frequency,
-    combined,
     is_driven,
     matrix_at,
     phase_speed,
@@ -55,6 +56,8 @@ RTOL_BEYOND_PLANE = 1e-5
 """Relative error that is wanted of three and four variables."""
 SUPPORT = np.linspace(-12, 12, 2401)
 """In standard deviations, where a coefficient of noise is looked at."""
+OF_ENTRIES = 1e-15
+"""Share of the largest speed of a term that is rounding of its entries, as of a matrix that keeps two rays."""
 LINE = 90
 """Largest number of letters of a line of parameters."""
 
@@ -116,10 +119,10 @@ class Problem:
                 remedy = 'give one for each name, such as Problem(system, {"axial": ..., "lateral": ...})'
                 raise ValueError(f"{told}, but the noises given are {stated}; {remedy}")
         if any(noise.is_white for noise in given.values()):
-            _ = self._drift_and_diffusions, self._struck  # refuses what has no meaning
+            _ = self._moved  # refuses what has no meaning
         for jump in self.system.jumps:
             self._refuse_ray(jump)
-        if self.dimension > 2 and (self._struck or self.noise.has_algebraic_tails):
+        if self.dimension > 2 and (self._moved.impulses or self.noise.has_algebraic_tails):
             raise ValueError(
                 f"got {self.noise.kind} noise for {self.dimension} variables; impulses and noise with algebraic tails "
                 "are for two variables only: take another kind, or r0 <= 1"
@@ -133,35 +136,35 @@ class Problem:
 
     def _refuse_ray(self, jump: Jump) -> None:
         """Refuse a jump at a ray over which a noise moves the phase, or nothing does. Raises `ValueError`."""
-        ray, terms, names = f"the ray of a jump, phi = {jump.phase:.6g}", self.system.terms, [*self.noise.parts]
-        by = [(term.noise if len(names) > 1 else names[0]) if is_driven(term.g) else None for term in terms]
-        rates = [(float(term.matrix[0][1]), abs(term.matrix[0][1])) for term in terms]
-        is_turned = any(rate and name is not None for name, (_, rate) in zip(by, rates, strict=True))
-        # over x = 0, the wall of thousands of sets, the first row tells all in any units of x, over others `frame`
-        if abs(math.cos(jump.phase)) > 1e-15 or is_turned:
-            turned, phase = terms, jump.phase
-            if self.frame is not None:
-                turned, phase = [self.frame.term(term) for term in terms], float(self.frame.phase(np.array(phase)))
-            rates = [(float(term.h(phase)), term.fastest[0]) for term in turned]
+        ray, names = f"the ray of a jump, phi = {jump.phase:.6g}", [*self.noise.parts]
+        x, u = (0.0 if abs(each) < 1e-15 else each for each in (math.cos(jump.phase), -math.sin(jump.phase)))
+        shares = u * x, u * u, -x * x, -x * u  # h = e′ᵀA e is the sum of these times the entries of A, in any units
+        driven = dict[str | None, list[tuple[CoefficientMatrix, list[float]]]]()
+        for term in self.system.terms:
+            parts = [share * entry for share, entry in zip(shares, chain(*term.matrix), strict=True)]
+            if any(parts):
+                by = (term.noise if len(names) > 1 else names[0]) if is_driven(term.g) else None
+                driven.setdefault(by, []).append((term, parts))
         total = size = 0.0
-        for name, noise in ((None, self.noise), *self.noise.parts.items()):
-            own = [(term, *rate) for term, of, rate in zip(terms, by, rates, strict=True) if of == name and rate[1]]
-            xi = np.array([0.0, 1.0])
-            if any(affine(term.g) is None for term, *_ in own):
+        for name, own in driven.items():
+            noise, xi = self.noise.parts.get(name or "", self.noise), np.array([0.0, 1.0])
+            if any(affine(term.g) is None for term, _ in own):
                 xi = np.array(noise.states) if noise.has_states else noise.standard_deviation * SUPPORT  # type: ignore[attr-defined]
                 xi = np.unique(np.clip(xi, -noise.half_width, noise.half_width))
-            speeds, most = np.zeros(xi.size), 0.0
-            for term, along, rate in own:
+            speeds, rounded = np.zeros(xi.size), 0.0
+            for term, parts in own:
                 strengths = self.system.epsilon**term.order * term.g(xi)
-                speeds, most = speeds + along * strengths, most + rate * float(np.max(np.abs(strengths)))
-            if not np.ptp(speeds) <= ROUNDED * most:
+                speeds, most = speeds + sum(parts) * strengths, float(np.max(np.abs(strengths)))
+                size += sum(map(abs, parts)) * most
+                rounded += (ROUNDED * sum(map(abs, parts)) + OF_ENTRIES * term.fastest[0]) * most
+            if name is not None and not np.ptp(speeds) <= rounded:
                 which = f'the noise "{name}"' if name else f"{noise.kind} noise"
                 raise ValueError(
                     f"{which} moves the phase across {ray}, which it does over no wall: x = 0, phi = pi/2 = "
                     "1.5707963267948966, is passed with the speed v whatever the noise; let it drive terms that do "
                     "not move the phase there, or remove the jump"
                 )
-            total, size = total + float(speeds[0]), size + most
+            total += float(speeds[0])
         if abs(total) <= ROUNDED * size:
             raise ValueError(
                 f"the phase does not pass {ray}: nothing moves it there, so that no path comes to this wall; remove "
@@ -231,16 +234,12 @@ class Problem:
     @property
     def drift(self) -> System:
         """What is left of the system beside white noise."""
-        return self._drift_and_diffusions[0]
+        return self._moved.drift
 
     @cached_property
-    def _drift_and_diffusions(self) -> tuple[System, Sequence[CoefficientMatrix]]:
-        """The system with the drift that white noise adds to it, and the terms of its diffusion."""
+    def _moved(self) -> Motion:
+        """How the noise moves the system, in the coordinates of the system."""
         return self.noise.motion(self.system)
-
-    @cached_property
-    def _struck(self) -> Sequence[Impulse]:
-        return self.noise.impulses(self.system)
 
     @cached_property
     def dimension(self) -> int:
@@ -259,37 +258,28 @@ class Problem:
 
     @cached_property
     def _own(self) -> tuple[Frame | None, float]:
-        drift, diffusions = self._drift_and_diffusions
         return own_frame(
             self.dimension,
-            drift.terms,
-            diffusions,
-            self._struck,
-            drift.epsilon,
+            self._moved,
             lambda name: ((noise := self.named_noise(name)).standard_deviation, noise.correlation_time),
         )
 
     @cached_property
     def motion(self) -> System:
         """The system along a path of ξ, in the coordinates of `frame`: what is left of it beside white noise."""
-        drift, _ = self._drift_and_diffusions
-        return drift if self.frame is None else self.frame.motion(drift)
+        return self.drift if self.frame is None else self.frame.motion(self.drift)
 
     @cached_property
     def diffusions(self) -> Sequence[CoefficientMatrix]:
         """ε^order B of every Bx ∘ dW by which white noise moves the state, in the same coordinates."""
-        _, diffusions = self._drift_and_diffusions
-        return diffusions if self.frame is None else [self.frame.term(each) for each in diffusions]
+        own = self._moved.diffusions
+        return own if self.frame is None else [self.frame.term(each) for each in own]
 
     @cached_property
     def impulses(self) -> Sequence[Impulse]:
         """What multiplies the state at random times, in the same coordinates."""
-        return self._struck if self.frame is None else [self.frame.exponent(each) for each in self._struck]
-
-    @property
-    def invariant_ray(self) -> float | None:
-        """The first of the `invariant_rays`; None where there is none."""
-        return next(iter(self.invariant_rays), None)
+        own = self._moved.impulses
+        return own if self.frame is None else [self.frame.exponent(each) for each in own]
 
     @cached_property
     def invariant_rays(self) -> tuple[float, ...]:
@@ -308,16 +298,6 @@ class Problem:
         """The phases of the `invariant_rays` in the coordinates of `frame`."""
         if self.dimension > 2:
             return ()
-        terms = self.motion.terms
-        lines = [affine(term.g) for term in terms]
-        if None not in lines:  # most turn without noise: numbers are quicker than arrays
-            a, b, c, d = combined(
-                (line[0] * self.motion.epsilon**each.order, each)
-                for line, each in zip(lines, terms, strict=True)
-                if line
-            )
-            if abs(b - c) > math.hypot(a - d, b + c) * (1 + 1e-12):
-                return ()
         if not (turns := self._turns):
             return (0.0,)
         first, _ = turns[0]
@@ -557,8 +537,7 @@ class Problem:
                 refuse_wrong_derivative(own, name)
                 noise = own.derivative(name)
             changed = "" if section == self.system.section else name if len(self.noise.parts) == 1 else f"{part}.{name}"
-            impulses = self.noise.changed_impulses(self.system, terms, changed)
-            terms, diffusions = self.noise.changed_motion(self.system, terms, changed)
+            terms, diffusions, impulses = self.noise.changed_motion(self.system, terms, changed)
             if self.frame is not None:
                 terms, diffusions = ([self.frame.term(each) for each in part] for part in (terms, diffusions))
                 impulses = [self.frame.exponent(each) for each in impulses]
@@ -647,7 +626,7 @@ def refuse_infinite(problem: Problem, p: float) -> None:
     if p:
         refuse_tails(problem, moment_at(p).symbol)
     if problem.invariant_rays and any(jump.log_factor for jump in problem.motion.jumps):
-        raise NoSuchExponent(Message(Code.INVARIANT_RAY, p=p, phase=problem.invariant_ray))
+        raise NoSuchExponent(Message(Code.INVARIANT_RAY, p=p, phase=problem.invariant_rays[0]))
 
 
 def negative_refused(problem: Problem) -> Message:

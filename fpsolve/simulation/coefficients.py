@@ -137,7 +137,7 @@ class SplitCoefficients(Coefficients):
 
 def split_coefficients(system: System, noise: Noise) -> SplitCoefficients:
     """The matrices of a system under several noises."""
-    moved, _ = noise.motion(system)
+    moved = noise.motion(system).drift
     zero = np.zeros((system.dimension, system.dimension))
     steady, driven, sizes = zero.copy(), list[FloatArray](), list[tuple[float, bool]]()
     for term in moved.terms:
@@ -183,7 +183,7 @@ def coefficients(system: System, noise: Any) -> Coefficients:
     """The matrices of a system under a noise that can be simulated."""
     if len(noise.parts) > 1:
         return split_coefficients(system, noise)
-    moved, diffusions = noise.motion(system)
+    moved, diffusions, struck = noise.motion(system)
     is_switched = noise.has_states and not noise.is_white
     driven = zero = np.zeros((system.dimension, system.dimension))
     if is_switched:
@@ -201,7 +201,6 @@ def coefficients(system: System, noise: Any) -> Coefficients:
     back = np.linalg.inv(even)
     free, steady, driven = even @ free @ back, even @ steady @ back, even @ driven @ back
     around = steady - np.tensordot(noise.probabilities, steady, 1) if is_switched else steady
-    struck = noise.impulses(system)
     impulses = even @ np.array([each.matrix for each in struck]) @ back if struck else None
     if struck:
         strength = fluctuation = math.sqrt(sum(each.rate * each.strength**2 for each in struck))

@@ -395,7 +395,7 @@ class _Equations:
         self.problem, self.p = problem, p
         named = problem.coloured.parts
         self.noises, names = list(named.values()), list(named)
-        drift, diffusions = problem.noise.motion(problem.system)
+        drift, diffusions, impulses = problem.noise.motion(problem.system)
         terms = []
         for term in drift.terms:
             k = moved(drift.epsilon**term.order * np.array(term.matrix), p)
@@ -404,7 +404,7 @@ class _Equations:
         for each in diffusions:
             k = moved(drift.epsilon**each.order * np.array(each.matrix), p)
             rest = rest + 0.5 * k @ k
-        for impulse in problem.noise.impulses(problem.system):
+        for impulse in impulses:
             gain = scipy.linalg.expm(moved(np.array(impulse.exponent), p).toarray())
             rest = rest + sparse.csr_array(impulse.rate * (gain - np.eye(len(gain))))
         sizes = abs(rest).toarray()

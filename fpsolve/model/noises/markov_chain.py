@@ -43,7 +43,6 @@ class Chain(Noise):
     rates: Sequence[Sequence[float]]
 
     has_states: ClassVar[bool] = True
-    mixes_slowly: ClassVar[bool] = True
 
     @property
     def probabilities(self) -> FloatArray:

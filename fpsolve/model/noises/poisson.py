@@ -18,6 +18,8 @@ from fpsolve.model.plane import (
     Impulse,
     ImpulseDerivative,
     LinearMotion,
+    Motion,
+    MotionDerivative,
     System,
     split_by_noise,
 )
@@ -119,41 +121,32 @@ class Poisson(Memoryless):
     def marks(self) -> Sequence[float]:
         return self.sizes
 
-    def motion(self, system: System) -> tuple[System, Sequence[CoefficientMatrix]]:
-        """The motion between impulses. Raises `ValueError` where a coefficient is no a + bξ."""
-        drift, _ = split_by_noise(system, system.terms)
-        return LinearMotion(system.epsilon, tuple(drift), tuple(system.jumps)), ()
-
-    def impulses(self, system: System) -> Sequence[Impulse]:
-        """One for each size, in their order, by which the simulation draws them.
+    def motion(self, system: System) -> Motion:
+        """The motion between impulses, and one impulse for each size, in their order, by which the simulation draws.
 
         Raises:
-            ValueError: they multiply the state by more than floating-point numbers hold.
+            ValueError: a coefficient is no a + bξ, or impulses multiply the state by more than numbers hold.
         """
-        _, driven = split_by_noise(system, system.terms)
+        terms, driven = split_by_noise(system, system.terms)
+        drift = LinearMotion(system.epsilon, tuple(terms), tuple(system.jumps))
         if not driven.any():
-            return ()
+            return Motion(drift)
         if float(np.max(np.abs(np.linalg.eigvals(driven)))) * max(map(abs, self.sizes)) > LARGEST:
             raise ValueError(f"an impulse multiplies the state by up to e^{LARGEST:g} or more; use smaller sizes")
-        return [
+        impulses = [
             Impulse(self.rate * float(share), (size * driven).tolist())
             for size, share in zip(self.sizes, self.shares, strict=True)
         ]
+        return Motion(drift, (), impulses)
 
-    def changed_motion(
-        self, system: System, terms: Sequence[CoefficientMatrix], name: str = ""
-    ) -> tuple[Sequence[CoefficientMatrix], Sequence[CoefficientMatrix]]:
-        return split_by_noise(system, terms)[0], ()
-
-    def changed_impulses(
-        self, system: System, terms: Sequence[CoefficientMatrix], name: str = ""
-    ) -> Sequence[ImpulseDerivative]:
-        _, changed = split_by_noise(system, terms)
+    def changed_motion(self, system: System, terms: Sequence[CoefficientMatrix], name: str = "") -> MotionDerivative:
+        drift, changed = split_by_noise(system, terms)
         by_rate = 1.0 / self.rate if name == "rate" else 0.0
-        return [
+        impulses = [
             ImpulseDerivative(by_rate * each.rate, (size * changed).tolist())
-            for each, size in zip(self.impulses(system), self.sizes, strict=False)  # none where nothing is driven
+            for each, size in zip(self.motion(system).impulses, self.sizes, strict=False)  # none of what is not driven
         ]
+        return MotionDerivative(drift, (), impulses)
 
 
 LARGEST = 100.0

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import chain
 from typing import ClassVar
 
 import numpy as np
@@ -12,7 +13,7 @@ import numpy as np
 from fpsolve.arrays import FloatArray, shown
 from fpsolve.messages import Message
 from fpsolve.model.noise import Noise
-from fpsolve.model.plane import CoefficientMatrix, Impulse, ImpulseDerivative, LinearMotion, System, is_driven
+from fpsolve.model.plane import CoefficientMatrix, LinearMotion, Motion, MotionDerivative, System, is_driven
 
 MOST_WITH_AXES = 2
 """Noises that have values at most: each of them is a dimension more."""
@@ -112,11 +113,6 @@ class Noises(Noise):
         return any(noise.is_random for _, noise in self.named)
 
     @property
-    def mixes_slowly(self) -> bool:  # type: ignore[override]
-        """Whether one of the noises may stay among some of its states almost for ever."""
-        return any(noise.mixes_slowly for _, noise in self.named)
-
-    @property
     def approximates_spectrum(self) -> bool:  # type: ignore[override]
         """Whether the `spectral_density` of one of the noises is that of a simpler process which replaces it."""
         return any(noise.approximates_spectrum for _, noise in self.named)
@@ -160,57 +156,44 @@ class Noises(Noise):
     def largest_step(self) -> float:
         return min(noise.largest_step for _, noise in self.named)
 
-    def motion(self, system: System) -> tuple[System, Sequence[CoefficientMatrix]]:
-        """The motion besides the white noises, and the diffusions by all white noises, each in its own `sense`."""
-        drift, diffusions = list(_besides(system.terms, self.named)), list[CoefficientMatrix]()
-        for own, noise, _ in self._white_motions(system):
-            moved, more = noise.motion(own)
-            drift += moved.terms
-            diffusions += more
-        return LinearMotion(system.epsilon, tuple(drift), tuple(system.jumps)), diffusions
+    def motion(self, system: System) -> Motion:
+        """The motion besides the white noises, and what all white noises add, each in its own `sense`."""
+        moved = [
+            noise.motion(LinearMotion(system.epsilon, _driven(system.terms, name), tuple(system.jumps)))
+            for name, noise in self._white
+        ]
+        terms = [*self._others(system.terms), *chain.from_iterable(each.drift.terms for each in moved)]
+        drift = LinearMotion(system.epsilon, tuple(terms), tuple(system.jumps))
+        return Motion(
+            drift,
+            list(chain.from_iterable(each.diffusions for each in moved)),
+            list(chain.from_iterable(each.impulses for each in moved)),
+        )
 
-    def changed_motion(
-        self, system: System, terms: Sequence[CoefficientMatrix], name: str = ""
-    ) -> tuple[Sequence[CoefficientMatrix], Sequence[CoefficientMatrix]]:
-        drift, diffusions = list(_besides(terms, self.named)), list[CoefficientMatrix]()
-        for noise, change in self._white_changes(system, terms, name):
-            less, more = noise.changed_motion(*change)
-            drift += less
-            diffusions += more
-        return drift, diffusions
-
-    def impulses(self, system: System) -> Sequence[Impulse]:
-        return [each for own, noise, _ in self._white_motions(system) for each in noise.impulses(own)]
-
-    def changed_impulses(
-        self, system: System, terms: Sequence[CoefficientMatrix], name: str = ""
-    ) -> Sequence[ImpulseDerivative]:
-        changes = self._white_changes(system, terms, name)
-        return [each for noise, change in changes for each in noise.changed_impulses(*change)]
-
-    def _white_changes(
-        self, system: System, terms: Sequence[CoefficientMatrix], name: str
-    ) -> Iterable[tuple[Noise, tuple[System, Sequence[CoefficientMatrix], str]]]:
-        """Each white noise with what it drives, which of the terms, and the name if it is one of its parameters."""
+    def changed_motion(self, system: System, terms: Sequence[CoefficientMatrix], name: str = "") -> MotionDerivative:
         part, _, parameter = name.rpartition(".")
-        for own, noise, of in self._white_motions(system):
-            changed = [term for term in terms if is_driven(term.g) and term.noise == of]
-            yield noise, (own, changed, parameter if part == of else "")
+        changed = [MotionDerivative(self._others(terms))]
+        for own, noise in self._white:
+            driven = LinearMotion(system.epsilon, _driven(system.terms, own))
+            changed.append(noise.changed_motion(driven, _driven(terms, own), parameter if part == own else ""))
+        return MotionDerivative(*(list(chain.from_iterable(parts)) for parts in zip(*changed, strict=True)))
 
-    def _white_motions(self, system: System) -> Iterable[tuple[System, Noise, str]]:
-        """Each white noise with what it drives."""
-        for name, noise in self.named:
-            if noise.is_white:
-                own = tuple(term for term in system.terms if is_driven(term.g) and term.noise == name)
-                yield LinearMotion(system.epsilon, own, tuple(system.jumps)), noise, name
+    @property
+    def _white(self) -> list[tuple[str, Noise]]:
+        """The white noises with their names."""
+        return [(name, noise) for name, noise in self.named if noise.is_white]
+
+    def _others(self, terms: Sequence[CoefficientMatrix]) -> list[CoefficientMatrix]:
+        """The terms that no white noise drives."""
+        white = {name for name, _ in self._white}
+        return [term for term in terms if not (is_driven(term.g) and term.noise in white)]
+
+
+def _driven(terms: Sequence[CoefficientMatrix], name: str) -> tuple[CoefficientMatrix, ...]:
+    """The terms that a noise drives."""
+    return tuple(term for term in terms if is_driven(term.g) and term.noise == name)
 
 
 def noises_of(named: Mapping[str, Noise]) -> Noise:
     """A noise of a mapping from names: `Noises`, or the only one. Raises as `Noises`."""
     return next(iter(named.values())) if len(named) == 1 else Noises(named)  # type: ignore[arg-type]
-
-
-def _besides(terms: Sequence[CoefficientMatrix], named: Sequence[tuple[str, Noise]]) -> Iterable[CoefficientMatrix]:
-    """The terms that no white noise drives."""
-    white = {name for name, noise in named if noise.is_white}
-    return (term for term in terms if not (is_driven(term.g) and term.noise in white))

@@ -15,7 +15,15 @@ from fpsolve.model.exact import ExactLaw, white_law
 from fpsolve.model.faults import with_plain_errors
 from fpsolve.model.noise import Memoryless
 from fpsolve.model.parameters import SIZE, STRICT, parameter
-from fpsolve.model.plane import CoefficientMatrix, LinearMotion, System, affine, split_by_noise
+from fpsolve.model.plane import (
+    CoefficientMatrix,
+    LinearMotion,
+    Motion,
+    MotionDerivative,
+    System,
+    affine,
+    split_by_noise,
+)
 
 
 class Interpretation(StrEnum):
@@ -91,7 +99,7 @@ class White(Memoryless):
         """That of dW, without a bias; s is with the matrix that it drives."""
         return WhiteStep(1 / math.sqrt(h), math.sqrt(3 / h))
 
-    def motion(self, system: System) -> tuple[System, Sequence[CoefficientMatrix]]:
+    def motion(self, system: System) -> Motion:
         """The drift in the sense of Stratonovich, and s A of the term that the noise drives, as one matrix.
 
         Raises:
@@ -101,22 +109,20 @@ class White(Memoryless):
         diffusions = [_term(system, self.s * driven, _order(system))] if driven.any() else []
         if self.interpretation == Interpretation.ITO and diffusions:
             drift.append(_term(system, -0.5 * self.s**2 * driven @ driven, 2 * _order(system)))
-        return LinearMotion(system.epsilon, tuple(drift), tuple(system.jumps)), diffusions
+        return Motion(LinearMotion(system.epsilon, tuple(drift), tuple(system.jumps)), diffusions)
 
     @classmethod
     def exact_law(cls, decimals: Mapping[str, str]) -> ExactLaw:
         return white_law(Fraction(decimals["s"]) ** 2, decimals["interpretation"])
 
-    def changed_motion(
-        self, system: System, terms: Sequence[CoefficientMatrix], name: str = ""
-    ) -> tuple[Sequence[CoefficientMatrix], Sequence[CoefficientMatrix]]:
+    def changed_motion(self, system: System, terms: Sequence[CoefficientMatrix], name: str = "") -> MotionDerivative:
         _, driven = split_by_noise(system, system.terms)
         drift, changed = split_by_noise(system, terms)
         by_s = 1.0 if name == "s" else 0.0
         if self.interpretation == Interpretation.ITO:
             square = changed @ driven + driven @ changed
             drift.append(_term(system, -0.5 * self.s**2 * square - by_s * self.s * driven @ driven, 0))
-        return drift, [_term(system, by_s * driven + self.s * changed, 0)] if driven.any() else []
+        return MotionDerivative(drift, [_term(system, by_s * driven + self.s * changed, 0)] if driven.any() else [])
 
 
 def _order(system: System) -> int:

@@ -81,9 +81,3 @@ class ParametricOscillator(System):
         stiffness, damping, factor = (Fraction(decimals[name]) for name in ("stiffness", "damping", "restitution"))
         still, driven = np.array([[[0, 1], [-stiffness, -2 * damping]], [[0, 0], [-1, 0]]], dtype=object)
         return ExactMotion(still, driven, (ExactJump(np.array([0, -1], dtype=object), factor, Fraction(0)),))
-
-    def impact_value(self, log_factor: float) -> float:
-        return math.exp(log_factor) if log_factor < math.log(1e300) else math.inf
-
-    def impact_slope(self, log_factor: float) -> float:
-        return self.impact_value(log_factor)
