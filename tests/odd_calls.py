@@ -30,8 +30,8 @@ from fpsolve.errors import FpsolveError
 from fpsolve.exponent.adapt import Budget
 from fpsolve.fem.mesh import read_mesh, write_mesh
 from fpsolve.model.faults import ParameterError
+from fpsolve.model.noises.bounded import SineWiener
 from fpsolve.model.noises.markov_chain import MarkovChain
-from fpsolve.model.noises.sine_wiener import SineWiener
 from fpsolve.model.plane import CoefficientMatrix, Jump
 from fpsolve.model.problem import Problem
 from tests.solving import case_text

@@ -10,7 +10,6 @@ from typing import Any, Literal
 
 import numpy as np
 from pydantic import ValidationError
-from pydantic.dataclasses import dataclass as checked_dataclass
 
 from fpsolve.analysis.scan import Sample
 from fpsolve.analysis.sensitivity import SMALL_P, Changed, held_by
@@ -22,8 +21,7 @@ from fpsolve.exponent.eigen import PairDerivatives
 from fpsolve.exponent.error import Solution
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.messages import Code, Message
-from fpsolve.model.faults import with_plain_errors
-from fpsolve.model.parameters import STRICT
+from fpsolve.model.faults import strict_dataclass
 from fpsolve.model.problem import Problem, checked_problem, refuse_infinite
 
 RTOL, RTOL_BEYOND_PLANE = 1e-10, 1e-4
@@ -50,8 +48,7 @@ def axis_faults(
             yield ("at", i), value, f"got {value}; {known}"
 
 
-@with_plain_errors
-@checked_dataclass(frozen=True, config=STRICT)
+@strict_dataclass
 class Axis:
     """One side of a chart.
 

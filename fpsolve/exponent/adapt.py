@@ -14,7 +14,6 @@ from functools import cached_property, partial
 from typing import Annotated, NamedTuple, NoReturn, TypeVar
 
 import numpy as np
-from pydantic.dataclasses import dataclass as pydantic_dataclass
 
 from fpsolve.budget import Countdown, OverBudget, counted, half_the_memory, under_way
 from fpsolve.errors import FpsolveError, MeshError, NotConverged, SingularMatrix
@@ -28,8 +27,8 @@ from fpsolve.fem.noise_axes import PolynomialAxis
 from fpsolve.fem.phase import PhaseAxis
 from fpsolve.fem.space import Space
 from fpsolve.messages import Code, Message, Remedy
-from fpsolve.model.faults import with_plain_errors
-from fpsolve.model.parameters import STRICT, parameter
+from fpsolve.model.faults import strict_dataclass
+from fpsolve.model.parameters import parameter
 from fpsolve.model.problem import Problem
 from fpsolve.theory.frozen import frozen_noise
 
@@ -64,8 +63,7 @@ UNSOLVED = MeshError, NotConverged, SingularMatrix, np.linalg.LinAlgError
 Found = TypeVar("Found")
 
 
-@with_plain_errors
-@pydantic_dataclass(frozen=True, config=STRICT)
+@strict_dataclass
 class Budget:
     """What one number may cost, and a line of a chart. A number that is given does not depend on it.
 

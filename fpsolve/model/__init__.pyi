@@ -2,8 +2,10 @@ from .kinds import noise_kind as noise_kind
 from .kinds import system_kind as system_kind
 from .noise import Noise as Noise
 from .noises.bounded import Bounded as Bounded
+from .noises.bounded import SineWiener as SineWiener
 from .noises.filter import Filter as Filter
 from .noises.markov_chain import MarkovChain as MarkovChain
+from .noises.markov_chain import Telegraph as Telegraph
 from .noises.non_gaussian import NonGaussianNoise as NonGaussianNoise
 from .noises.non_gaussian import ReducedNoise as ReducedNoise
 from .noises.ornstein_uhlenbeck import OrnsteinUhlenbeck as OrnsteinUhlenbeck
@@ -11,8 +13,6 @@ from .noises.ornstein_uhlenbeck import OrnsteinUhlenbeckByDeviation as OrnsteinU
 from .noises.ornstein_uhlenbeck import OrnsteinUhlenbeckByIntensity as OrnsteinUhlenbeckByIntensity
 from .noises.poisson import Poisson as Poisson
 from .noises.several import Noises as Noises
-from .noises.sine_wiener import SineWiener as SineWiener
-from .noises.telegraph import Telegraph as Telegraph
 from .noises.white import Interpretation as Interpretation
 from .noises.white import White as White
 from .plane import CoefficientMatrix as CoefficientMatrix
@@ -21,9 +21,9 @@ from .plane import Jump as Jump
 from .plane import System as System
 from .problem import Problem as Problem
 from .systems.equations import EquationSystem as EquationSystem
-from .systems.linear_system import LinearSystem as LinearSystem
 from .systems.modal import ModalSystem as ModalSystem
 from .systems.parametric import ParametricOscillator as ParametricOscillator
+from .systems.plane_system import LinearSystem as LinearSystem
 from .systems.plane_system import PlaneSystem as PlaneSystem
 from .systems.vibro_impact import ImpactLaw as ImpactLaw
 from .systems.vibro_impact import VibroImpactOscillator as VibroImpactOscillator

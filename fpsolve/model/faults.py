@@ -10,13 +10,14 @@ from fractions import Fraction
 from functools import wraps
 from itertools import chain
 from types import NoneType, UnionType
-from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
+from typing import Annotated, Any, Literal, TypeVar, Union, cast, dataclass_transform, get_args, get_origin
 
-from pydantic import ValidationError
+from pydantic import Field, ValidationError
+from pydantic.dataclasses import dataclass
 from pydantic.fields import FieldInfo
 
 from fpsolve.arrays import shown
-from fpsolve.model.parameters import meaning_of
+from fpsolve.model.parameters import STRICT, meaning_of
 
 Kind = TypeVar("Kind")
 _BOUNDS = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
@@ -54,9 +55,10 @@ class TableError(ValueError):
         return TableError, (self.text, *self.path)
 
 
-def with_plain_errors(kind: type[Kind]) -> type[Kind]:
-    """A pydantic dataclass that raises `ParameterError`."""
-    changed: Any = kind
+@dataclass_transform(frozen_default=True, kw_only_default=False, field_specifiers=(Field,))
+def strict_dataclass(kind: type[Kind]) -> type[Kind]:
+    """A frozen pydantic dataclass of `STRICT` parameters that raises `ParameterError`."""
+    changed: Any = dataclass(frozen=True, config=STRICT)(kind)
     made = changed.__init__
 
     @wraps(made)
@@ -65,11 +67,11 @@ def with_plain_errors(kind: type[Kind]) -> type[Kind]:
             made(self, *arguments, **named)
             return
         except ValidationError as error:
-            told = _in_words(error, kind)
+            told = _in_words(error, changed)
         raise told  # out here, where it has no context: that does not pickle, and Dask pickles it
 
     changed.__init__ = __init__
-    return kind
+    return cast("type[Kind]", changed)
 
 
 def _in_words(error: ValidationError, kind: Any) -> ParameterError:

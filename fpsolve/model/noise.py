@@ -168,11 +168,6 @@ class Noise(Parametrised):
         return np.asarray(min(self.half_width, 1e6 * self.standard_deviation) * np.linspace(-1, 1, 1001))
 
     @property
-    def longest_jump(self) -> int:
-        """The largest difference of the numbers of two states between which ξ jumps; 0 for continuous paths."""
-        return 0
-
-    @property
     def diffusion(self) -> float:
         """σ, the coefficient of dW; where it is not constant, its value at ξ = 0."""
         raise NotImplementedError

@@ -15,10 +15,9 @@ from fpsolve.case.vary import legend
 from fpsolve.cli import main
 from fpsolve.errors import CaseError
 from fpsolve.model.kinds import noise_kind, source_of, version_of
-from fpsolve.model.noises.markov_chain import MarkovChain
+from fpsolve.model.noises.markov_chain import MarkovChain, Telegraph
 from fpsolve.model.noises.non_gaussian import NonGaussianNoise, ReducedNoise
 from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
-from fpsolve.model.noises.telegraph import Telegraph
 from fpsolve.model.problem import Problem
 from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
 from fpsolve.output.records import key_of

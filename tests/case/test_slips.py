@@ -123,17 +123,6 @@ def test_matrices_of_numpy():
     assert arrays.terms == lists.terms
 
 
-def test_the_long_entry_is_blamed():
-    entry = "+".join(498 * "a")
-    for key, place in (("damping", ("damping", 0, 0)), ("stiffness_noise", ("stiffness_noise", 0, 0))):
-        with pytest.raises(TableError, match="must be at most 1000; use parameters") as failure:
-            ModalSystem.of(
-                **{"mass": [["b"]], "stiffness": [["c*c"]], "stiffness_noise": [[1.0]], **{key: [[entry]]}},
-                parameters=dict.fromkeys("abc", 1.0),
-            )
-        assert failure.value.path == place
-
-
 def test_libraries_do_not_warn_of_a_spectrum(tmp_path, recwarn):
     f = np.linspace(0.1, 5, 50)
     kept = {"_FillValue": -1.0, "missing_value": -2.0}

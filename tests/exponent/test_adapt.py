@@ -23,10 +23,10 @@ from fpsolve.fem.noise_axes import PolynomialAxis
 from fpsolve.fem.phase import PhaseAxis
 from fpsolve.fem.space import Space
 from fpsolve.messages import Code, Message
+from fpsolve.model.noises.bounded import SineWiener
 from fpsolve.model.noises.markov_chain import MarkovChain
 from fpsolve.model.noises.non_gaussian import NonGaussianNoise
 from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
-from fpsolve.model.noises.sine_wiener import SineWiener
 from fpsolve.model.problem import Problem
 from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
 from fpsolve.theory.frozen import frozen_noise

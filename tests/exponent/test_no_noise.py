@@ -13,19 +13,17 @@ from fpsolve.exponent.function import moment_lyapunov, nonzero_root
 from fpsolve.exponent.quantities import critical_impact_factor, impact_rate
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.messages import Code
-from fpsolve.model.noises.bounded import Bounded
+from fpsolve.model.noises.bounded import Bounded, SineWiener
 from fpsolve.model.noises.filter import Filter
 from fpsolve.model.noises.markov_chain import MarkovChain
 from fpsolve.model.noises.non_gaussian import NonGaussianNoise
 from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
 from fpsolve.model.noises.poisson import Poisson
-from fpsolve.model.noises.sine_wiener import SineWiener
 from fpsolve.model.noises.white import White
 from fpsolve.model.plane import CoefficientMatrix, Jump
 from fpsolve.model.problem import Problem
-from fpsolve.model.systems.linear_system import LinearSystem
 from fpsolve.model.systems.modal import ModalSystem
-from fpsolve.model.systems.plane_system import PlaneSystem
+from fpsolve.model.systems.plane_system import LinearSystem, PlaneSystem
 
 NOISES = {
     "OU": OrnsteinUhlenbeck(alpha=1.0, sigma=1.0),

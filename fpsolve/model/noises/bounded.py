@@ -1,20 +1,181 @@
-"""Bounded noise: a wave whose phase turns steadily and diffuses; without the diffusion a harmonic load."""
+"""Bounded noise that is a wave of an angle which turns and diffuses; sine-Wiener noise, whose angle does not turn."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Annotated, ClassVar
+import math
+from collections.abc import Mapping, Sequence
+from fractions import Fraction
+from typing import Annotated, ClassVar, Literal, NamedTuple
 
-from pydantic.dataclasses import dataclass
+import numpy as np
+from numpy.typing import ArrayLike
 
-from fpsolve.model.faults import with_plain_errors
-from fpsolve.model.noise import NoiseDerivative
-from fpsolve.model.noises.sine_wiener import NoiseOfAngle
-from fpsolve.model.parameters import SIZE, STRICT, parameter
+from fpsolve.arrays import FloatArray
+from fpsolve.model.exact import ExactLaw
+from fpsolve.model.faults import strict_dataclass
+from fpsolve.model.noise import Noise, NoiseDerivative
+from fpsolve.model.parameters import SIZE, parameter
 
 
-@with_plain_errors
-@dataclass(frozen=True, config=STRICT)
+class AngleStep(NamedTuple):
+    """θ₁ = θ₀ + turn + kick ζ₁ and, of weak order 2, ξ̄ = A fade cos θ̄, ζ normal.
+
+    θ̄ = ½(θ₀ + θ₁) + spread ζ₂ is the mean of θ over the step, and fade that of cos(θ − θ̄).
+    """
+
+    amplitude: float
+    turn: float
+    kick: float
+    spread: float
+    fade: float
+
+    @staticmethod
+    def draw(step, xi, xi_mean, xi_end, push, rng):  # type: ignore[no-untyped-def]
+        """One step, see `Noise.step`; the rows of `xi` are ξ and θ."""
+        for i in range(xi_end.size):
+            start = xi[1, i]
+            end = start + step.turn + step.kick * rng.standard_normal()
+            middle = 0.5 * (start + end) + step.spread * rng.standard_normal()
+            xi[1, i] = end % (2 * math.pi)
+            xi_mean[i] = step.amplitude * step.fade * math.cos(middle)
+            xi_end[i] = step.amplitude * math.cos(end)
+
+
+class NoiseOfAngle(Noise):
+    """Bounded noise ξ = A cos θ, dθ = ν dt + σ dW, θ₀ uniform: its correlation is ½A² exp(−½σ²|t|) cos νt.
+
+    Its stationary density is 1/(π√(A² − ξ²)). For ν = 0 it obeys dξ = −½σ²ξ dt + σ√(A² − ξ²) dW. For ν > 0 it is no
+    Markov process by itself, so that functions of the noise are functions of θ.
+    """
+
+    amplitude: float
+    sigma: float
+    nu: float
+
+    may_tilt: ClassVar[bool] = False
+
+    @property
+    def basis(self) -> Literal["polynomials", "waves"]:
+        return "waves" if self.nu else "polynomials"
+
+    @property
+    def has_peak(self) -> bool:  # type: ignore[override]
+        """Whether ν > 0, so that the spectral density has peaks at ±ν."""
+        return self.nu > 0
+
+    @property
+    def period(self) -> float:
+        """2π/ν for a harmonic load, σ = 0; else 0."""
+        return 0.0 if self.sigma else 2 * math.pi / self.nu
+
+    @property
+    def half_width(self) -> float:
+        return self.amplitude
+
+    @property
+    def end_exponent(self) -> float:
+        return -0.5
+
+    @property
+    def standard_deviation(self) -> float:
+        """A/√2."""
+        return self.amplitude / math.sqrt(2)
+
+    @property
+    def correlation_time(self) -> float:
+        """2/σ², the time in which the angle is forgotten; ∞ for a harmonic load."""
+        return 2 / self.sigma**2 if self.sigma else math.inf
+
+    relaxation_time = correlation_time
+
+    def spectral_density(self, omega: float) -> float:
+        """S(ω) = ½A²σ²(ω² + ν² + ¼σ⁴)/((ω² − ν² − ¼σ⁴)² + σ⁴ω²), the sum of a peak at ν and one at −ν.
+
+        For a harmonic load it is ∞ at |ω| = ν and 0 at all other frequencies.
+        """
+        half = 0.5 * self.sigma**2
+        if not half:
+            return math.inf if abs(omega) == self.nu else 0.0
+        sizes = [math.hypot(half, omega - side * self.nu) for side in (1, -1)]
+        return 0.5 * self.amplitude**2 * sum(half / size / size for size in sizes)
+
+    @property
+    def diffusion(self) -> float:
+        """σA."""
+        return self.sigma * self.amplitude
+
+    def squared_diffusion(self, xi: ArrayLike) -> FloatArray:
+        """σ²(A² − ξ²)."""
+        return np.asarray(self.sigma**2 * (self.amplitude**2 - np.asarray(xi, dtype=float) ** 2))
+
+    def log_density(self, xi: ArrayLike) -> FloatArray:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            logs = -0.5 * np.log1p(-((np.asarray(xi, dtype=float) / self.amplitude) ** 2))
+        return np.nan_to_num(logs, nan=-math.inf, posinf=math.inf) - math.log(math.pi * self.amplitude)
+
+    def holding_cost(self, xi: FloatArray) -> FloatArray:
+        """0: θ has no drift but ν."""
+        return np.zeros_like(xi)
+
+    def of_angle(self, theta: FloatArray) -> FloatArray:
+        """ξ = A cos θ, in the shape of θ."""
+        return np.asarray(self.amplitude * np.cos(theta))
+
+    def sample(self, size: int, rng: np.random.Generator) -> FloatArray:
+        return self.start(size, rng)[0]
+
+    def start(self, size: int, rng: np.random.Generator) -> FloatArray:
+        """ξ and θ, shape (2, size)."""
+        theta = rng.uniform(0, 2 * math.pi, size)
+        return np.array([self.of_angle(theta), theta])
+
+    def step(self, h: float, bias: float = 0.0) -> AngleStep:
+        """One step of length h for the simulation, see `Noise.step`; this noise takes no bias."""
+        kick = self.sigma * math.sqrt(h)
+        fade = math.exp(-(kick**2) / 12) * float(np.sinc(0.5 * self.nu * h / math.pi))
+        return AngleStep(self.amplitude, self.nu * h, kick, kick / math.sqrt(12), fade)
+
+    @property
+    def largest_step(self) -> float:
+        """The smaller of 0.1/σ² and 0.1π/ν, a tenth of the times in which the angle diffuses by 1 or turns by π."""
+        return min(0.1 / self.sigma**2 if self.sigma else math.inf, 0.1 * math.pi / self.nu if self.nu else math.inf)
+
+
+@strict_dataclass
+class SineWiener(NoiseOfAngle):
+    """Bounded noise ξ = A sin(σ W(t) + θ₀), θ₀ uniform: dξ = −½σ²ξ dt + σ√(A² − ξ²) dW.
+
+    Its stationary density is 1/(π√(A² − ξ²)), its correlation ½A² exp(−½σ²|t|); the Chebyshev polynomials T_k(ξ/A) are
+    the eigenfunctions of its generator, with −½σ²k² (R. V. Bobryk and A. Chrzeszczyk, Physica A 358, 2005).
+
+    Args:
+        amplitude: A, 1e-15 to 1e15, in the unit of ξ.
+        sigma: σ, 1e-15 to 1e15, in time^(-1/2).
+
+    Raises:
+        ParameterError: a parameter is not a finite number in its range.
+    """
+
+    amplitude: Annotated[float, parameter("amplitude", "amplitude = 1.0", "$A$", "1/time", **SIZE)]
+    sigma: Annotated[
+        float, parameter("intensity of the noise in the phase", "sigma = 1.0", r"$\sigma$", "1/time^(1/2)", **SIZE)
+    ]
+
+    kind: ClassVar[str] = "sine-wiener"
+    nu: ClassVar[float] = 0.0  # type: ignore[misc]
+    of_xi: ClassVar[Sequence[str]] = ("amplitude",)
+
+    @classmethod
+    def exact_law(cls, decimals: Mapping[str, str]) -> ExactLaw:
+        return ExactLaw(("circle",), Fraction(decimals["amplitude"]) ** 2, Fraction(decimals["sigma"]) ** 2)
+
+    def derivative(self, name: str) -> NoiseDerivative:
+        """∂/∂A stretches ξ, and ∂/∂σ is that of σ alone."""
+        a = 1 / self.amplitude
+        return NoiseDerivative(a, log_scale=a) if name == "amplitude" else NoiseDerivative(1 / self.sigma)
+
+
+@strict_dataclass
 class Bounded(NoiseOfAngle):
     """Bounded noise ξ = μ cos θ, dθ = ν dt + σ dW, θ₀ uniform: its correlation is ½μ² exp(−½σ²|t|) cos νt.
 

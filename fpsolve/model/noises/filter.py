@@ -9,13 +9,12 @@ from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import Field
-from pydantic.dataclasses import dataclass
 from pydantic.fields import FieldInfo
 
 from fpsolve.arrays import FloatArray
-from fpsolve.model.faults import with_plain_errors
+from fpsolve.model.faults import strict_dataclass
 from fpsolve.model.noise import Noise, NoiseDerivative
-from fpsolve.model.parameters import SIZE, STRICT, parameter, stated_field
+from fpsolve.model.parameters import SIZE, parameter, stated_field
 
 ANY_SIGN = {"ge": -1e15, "le": 1e15}
 Pair = Annotated[tuple[float, float], Field(strict=False)]
@@ -52,8 +51,7 @@ class FilterStep(NamedTuple):
             xi_end[i] = step.of_u * u_end + step.of_w * w_end
 
 
-@with_plain_errors
-@dataclass(frozen=True, config=STRICT)
+@strict_dataclass
 class Filter(Noise):
     """Filtered white noise ξ = c₀y + c₁y′ with y″ + 2ζω y′ + ω²y = s Ẇ, y and y′ stationary.
 

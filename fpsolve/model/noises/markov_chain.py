@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import Annotated, ClassVar, NamedTuple
 
 import numpy as np
@@ -13,7 +14,9 @@ from pydantic import Field
 from pydantic.fields import FieldInfo
 
 from fpsolve.arrays import ROUNDED, FloatArray, real_array, real_number, shown
-from fpsolve.model.noise import Noise
+from fpsolve.model.exact import ExactLaw, chain_law
+from fpsolve.model.faults import strict_dataclass
+from fpsolve.model.noise import Noise, NoiseDerivative
 from fpsolve.model.parameters import SIZE, parameter, stated_field
 
 Row = Annotated[tuple[float, ...], Field(strict=False)]
@@ -59,11 +62,6 @@ class Chain(Noise):
     @property
     def reached(self) -> FloatArray:
         return np.array(self.states)
-
-    @property
-    def longest_jump(self) -> int:
-        first, last = np.nonzero(np.array(self.rates))
-        return int(np.max(np.abs(first - last)))
 
     @property
     def standard_deviation(self) -> float:
@@ -173,3 +171,49 @@ class MarkovChain(Chain):
         """ξ = ±amplitude, each state left at this rate."""
         size, rate = real_number(amplitude, "amplitude"), real_number(rate, "rate")
         return cls((-size, size), ((-rate, rate), (rate, -rate)))
+
+
+FLIP = ((-1.0, 1.0), (1.0, -1.0))
+"""Rates of telegraph noise, in units of k."""
+
+
+@strict_dataclass
+class Telegraph(Chain):
+    """Telegraph noise ξ = ±a, each value left at the rate k: its correlation is a² exp(−2k|t|).
+
+    >>> Telegraph(a=0.5, k=1.0).spectral_density(0.0)  # S(ω) = 4ka²/(4k² + ω²)
+    0.25
+
+    Args:
+        a: 1e-15 to 1e15, in the unit of ξ.
+        k: 1e-15 to 1e15, in 1/time.
+
+    Raises:
+        ParameterError: a parameter is not a finite number in its range.
+    """
+
+    a: Annotated[float, parameter("amplitude", "a = 0.5", "$a$", "1/time", **SIZE)]
+    k: Annotated[float, parameter("rate of leaving each value", "k = 1.0", "$k$", "1/time", **SIZE)]
+
+    kind: ClassVar[str] = "telegraph"
+    of_xi: ClassVar[Sequence[str]] = ("a",)
+
+    @property
+    def states(self) -> Sequence[float]:  # type: ignore[override]
+        return -self.a, self.a
+
+    @property
+    def rates(self) -> Sequence[Sequence[float]]:  # type: ignore[override]
+        return tuple(tuple(self.k * each for each in row) for row in FLIP)
+
+    @property
+    def probabilities(self) -> FloatArray:
+        return np.array([0.5, 0.5])
+
+    @classmethod
+    def exact_law(cls, decimals: Mapping[str, str]) -> ExactLaw:
+        a, k = Fraction(decimals["a"]), Fraction(decimals["k"])
+        return chain_law(np.array([-a, a]), np.array([[-k, k], [k, -k]]))
+
+    def derivative(self, name: str) -> NoiseDerivative:
+        return NoiseDerivative(states=(-1.0, 1.0)) if name == "a" else NoiseDerivative(rates=FLIP)

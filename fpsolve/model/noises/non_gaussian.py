@@ -10,17 +10,16 @@ from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import Field
-from pydantic.dataclasses import dataclass
 from pydantic.fields import FieldInfo
 
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import NoSuchExponent
 from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.exact import ExactLaw, bounded_law, gaussian_law
-from fpsolve.model.faults import with_plain_errors
+from fpsolve.model.faults import strict_dataclass
 from fpsolve.model.noise import Noise, NoiseDerivative
 from fpsolve.model.noises.ornstein_uhlenbeck import GaussianNoise, LinearStep, linear_step
-from fpsolve.model.parameters import SIZE, STRICT, parameter, stated_field
+from fpsolve.model.parameters import SIZE, parameter, stated_field
 
 Departure = Annotated[
     float,
@@ -84,7 +83,7 @@ class ImplicitStep(NamedTuple):
             xi_mean[i] = 0.5 * (xi[i] + xi_end[i])
 
 
-@dataclass(frozen=True, config=STRICT)
+@strict_dataclass
 class TreatedNoise(Noise):
     """The noise of Eq. (7), taken as it stands or replaced by its reduction: a word, the treatment, tells which."""
 
@@ -116,8 +115,7 @@ class TreatedNoise(Noise):
         return (NonGaussianNoise if treatment == "exact" else ReducedNoise)(**numbers)
 
 
-@with_plain_errors
-@dataclass(frozen=True, config=STRICT)
+@strict_dataclass
 class NonGaussianNoise(TreatedNoise):
     """Non-Gaussian coloured noise dξ = −V′(ξ)/τ₀ dt + (√(2D₀)/τ₀) dW, Eqs. (7)-(8).
 
@@ -303,8 +301,7 @@ class NonGaussianNoise(TreatedNoise):
         return bounded_law((1 - r0) / tau0, 1 / (1 - r0), 2 * D0 / (tau0 * (1 - r0)))
 
 
-@with_plain_errors
-@dataclass(frozen=True, config=STRICT)
+@strict_dataclass
 class ReducedNoise(TreatedNoise, GaussianNoise):
     """The Ornstein-Uhlenbeck process by which Eqs. (12)-(14) replace the noise of Eq. (7): α₀ = 1/τ₁, σ₀ = √(2D₀)/τ₀.
 

@@ -9,13 +9,12 @@ from typing import Annotated, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydantic.dataclasses import dataclass
 
 from fpsolve.arrays import FloatArray
 from fpsolve.model.exact import ExactLaw, gaussian_law
-from fpsolve.model.faults import with_plain_errors
+from fpsolve.model.faults import strict_dataclass
 from fpsolve.model.noise import Noise, NoiseDerivative
-from fpsolve.model.parameters import DERIVED, SIZE, STRICT, parameter
+from fpsolve.model.parameters import DERIVED, SIZE, parameter
 
 
 class LinearStep(NamedTuple):
@@ -123,8 +122,7 @@ class GaussianNoise(Noise):
         return NoiseDerivative(log_sigma, lambda xi: factor * (xi / unit) ** 2)
 
 
-@with_plain_errors
-@dataclass(frozen=True, config=STRICT)
+@strict_dataclass
 class OrnsteinUhlenbeckByIntensity(GaussianNoise):
     """Ornstein-Uhlenbeck noise of the intensity D₀ and the correlation time τ₀: α₀ = 1/τ₀, σ₀ = √(2D₀)/τ₀.
 
@@ -158,8 +156,7 @@ class OrnsteinUhlenbeckByIntensity(GaussianNoise):
         return self.by_logarithms(0.5 / self.D0, 0.0) if name == "D0" else self.by_logarithms(*2 * (-1 / self.tau0,))
 
 
-@with_plain_errors
-@dataclass(frozen=True, config=STRICT)
+@strict_dataclass
 class OrnsteinUhlenbeckByDeviation(GaussianNoise):
     """Ornstein-Uhlenbeck noise of the relaxation rate α and a standard deviation s: σ₀ = s√(2α).
 
@@ -199,8 +196,7 @@ class OrnsteinUhlenbeckByDeviation(GaussianNoise):
         return self.by_logarithms(1 / self.standard_deviation, 0.0)
 
 
-@with_plain_errors
-@dataclass(frozen=True, config=STRICT)
+@strict_dataclass
 class OrnsteinUhlenbeck(GaussianNoise):
     """Ornstein-Uhlenbeck noise dξ = −α₀ ξ dt + σ₀ dW, Eq. (15).
 

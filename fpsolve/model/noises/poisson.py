@@ -7,12 +7,11 @@ from typing import Annotated, ClassVar, NamedTuple
 
 import numpy as np
 from pydantic import AfterValidator
-from pydantic.dataclasses import dataclass
 
 from fpsolve.arrays import FloatArray
-from fpsolve.model.faults import with_plain_errors
+from fpsolve.model.faults import strict_dataclass
 from fpsolve.model.noise import Memoryless
-from fpsolve.model.parameters import SIZE, STRICT, parameter
+from fpsolve.model.parameters import SIZE, parameter
 from fpsolve.model.plane import (
     CoefficientMatrix,
     Impulse,
@@ -49,8 +48,7 @@ def _weights(weights: tuple[float, ...]) -> tuple[float, ...]:
     return weights
 
 
-@with_plain_errors
-@dataclass(frozen=True, config=STRICT)
+@strict_dataclass
 class Poisson(Memoryless):
     """Impulses ξ = Σ w_j δ(t − t_j), t_j a Poisson process, w_j independent: x of ẋ = (A₀ + ξA₁)x jumps by exp(w_j A₁).
 

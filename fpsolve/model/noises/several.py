@@ -127,11 +127,6 @@ class Noises(Noise):
         """The longest correlation time of the noises."""
         return max(noise.correlation_time for _, noise in self.named)
 
-    @property
-    def relaxation_time(self) -> float:
-        """The longest relaxation time of the noises."""
-        return max(noise.relaxation_time for _, noise in self.named)
-
     def spectral_density(self, omega: float) -> float:
         """Raises `NotImplementedError`, as each noise has its own spectral density, see `parts`."""
         raise NotImplementedError("several noises have a spectral density each, see `parts`")
@@ -139,10 +134,6 @@ class Noises(Noise):
     @property
     def is_bounded(self) -> bool:
         return all(noise.is_bounded for noise in self._valued)
-
-    @property
-    def longest_jump(self) -> int:
-        return max(noise.longest_jump for noise in self._valued)
 
     def start(self, size: int, rng: np.random.Generator) -> FloatArray:
         """The initial values of all noises, one below the other, shape (rows, size)."""

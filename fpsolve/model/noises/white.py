@@ -8,13 +8,11 @@ from enum import StrEnum
 from fractions import Fraction
 from typing import Annotated, ClassVar, NamedTuple
 
-from pydantic.dataclasses import dataclass
-
 from fpsolve.arrays import FloatArray
 from fpsolve.model.exact import ExactLaw, white_law
-from fpsolve.model.faults import with_plain_errors
+from fpsolve.model.faults import strict_dataclass
 from fpsolve.model.noise import Memoryless
-from fpsolve.model.parameters import SIZE, STRICT, parameter
+from fpsolve.model.parameters import SIZE, parameter
 from fpsolve.model.plane import (
     CoefficientMatrix,
     LinearMotion,
@@ -57,8 +55,7 @@ class WhiteStep(NamedTuple):
             xi[i] = -xi_end[i]
 
 
-@with_plain_errors
-@dataclass(frozen=True, config=STRICT)
+@strict_dataclass
 class White(Memoryless):
     """White noise ξ dt = s dW, of the spectral density S = s² at all frequencies.
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from operator import itemgetter
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
@@ -115,7 +114,7 @@ class ModalSystem(EquationSystem):
             if error.path[:1] == ("variables",):
                 raise TableError(error.text, "modes") from None
             if error.path[:1] == ("drift",):
-                raise TableError(f"with the other matrices: {error.text}", *_longest(still | driven)) from None
+                raise TableError(f"with the other matrices: {error.text}", "stiffness") from None
             raise
 
     @classmethod
@@ -260,19 +259,6 @@ def _listed(given: Any) -> Any:
     if isinstance(given, np.ndarray | np.generic):
         return given.tolist()
     return type(given)(map(_listed, given)) if isinstance(given, list | tuple) else given
-
-
-def _longest(matrices: Mapping[str, Any]) -> Sequence[str | int]:
-    """Where the longest text of some matrices stands."""
-
-    def texts(given: Any, place: tuple[str | int, ...]) -> Iterator[tuple[int, tuple[str | int, ...]]]:
-        if isinstance(given, str):
-            yield len(given), place
-        elif isinstance(given, Mapping | list | tuple):
-            for key, each in given.items() if isinstance(given, Mapping) else enumerate(given):
-                yield from texts(each, (*place, key))
-
-    return max(texts(matrices, ()), key=itemgetter(0), default=(0, ("stiffness",)))[1]
 
 
 def _product(a: Entry, b: Entry) -> str:

@@ -8,19 +8,17 @@ from fractions import Fraction
 from typing import Annotated, ClassVar
 
 import numpy as np
-from pydantic.dataclasses import dataclass
 
 from fpsolve.arrays import identity
 from fpsolve.model.exact import ExactJump, ExactMotion
-from fpsolve.model.faults import with_plain_errors
-from fpsolve.model.parameters import STRICT, parameter
+from fpsolve.model.faults import strict_dataclass
+from fpsolve.model.parameters import parameter
 from fpsolve.model.plane import CoefficientMatrix, Jump, System
 
 ANY_SIGN = {"ge": -1e15, "le": 1e15}
 
 
-@with_plain_errors
-@dataclass(frozen=True, config=STRICT)
+@strict_dataclass
 class ParametricOscillator(System):
     """ẍ + 2·damping·ẋ + (stiffness + ξ) x = 0, and ẋ⁺ = −restitution·ẋ⁻ at a wall at x = 0.
 

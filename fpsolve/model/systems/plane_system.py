@@ -311,6 +311,28 @@ class PlaneSystem(System):
         return tuple(changed), tuple(slopes.tolist()) if slopes.any() else ()
 
 
+@dataclass(frozen=True)
+class LinearSystem(PlaneSystem):
+    """ẋ = Σ ε^k g(ξ) A x for a state x of n = 2 to 4 numbers, from its coefficient matrices; see `PlaneSystem`.
+
+    >>> from fpsolve.model import CoefficientMatrix
+    >>> free = CoefficientMatrix(0, ((0, 1, 0), (-1, -0.2, 0.5), (0, -0.5, -1)))  # an oscillator with a voltage
+    >>> LinearSystem([free]).dimension
+    3
+
+    Args:
+        terms: one at least, all of the same n.
+        jumps: stretches at rays, for n = 2 alone: a wall of more dimensions holds many directions, not one.
+        epsilon, build, named: as in `PlaneSystem`.
+
+    Raises:
+        ValueError: as `PlaneSystem`, or the matrices differ in their size, or there are jumps beyond the plane.
+    """
+
+    kind: ClassVar[str] = "linear"
+    dimensions: ClassVar[Sequence[int]] = (2, 3, 4)
+
+
 def _parts(
     build: Callable[..., Parts], named: Mapping[str, float]
 ) -> tuple[Sequence[CoefficientMatrix], Sequence[Jump]]:

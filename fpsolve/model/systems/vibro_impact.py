@@ -12,13 +12,12 @@ from typing import Annotated, ClassVar, Self
 import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import model_validator
-from pydantic.dataclasses import dataclass
 
 from fpsolve.arrays import FloatArray, identity
 from fpsolve.messages import Code, Message
 from fpsolve.model.exact import ExactJump, ExactMotion
-from fpsolve.model.faults import with_plain_errors
-from fpsolve.model.parameters import SIZE, STRICT, parameter
+from fpsolve.model.faults import strict_dataclass
+from fpsolve.model.parameters import SIZE, parameter
 from fpsolve.model.plane import CoefficientMatrix, CubicTerms, Jump, System, by_epsilon
 from fpsolve.model.quantity import OSCILLATOR_RESPONSE, ResponseQuantities
 
@@ -38,8 +37,7 @@ DAMPING = ((0.0, 0.0), (0.0, 1.0))
 """A of the force on the velocity alone, which damps or drives: h₁ = ½ sin 2φ and q₁ = ½(1 − cos 2φ), Eq. (18)."""
 
 
-@with_plain_errors
-@dataclass(frozen=True, config=STRICT)
+@strict_dataclass
 class VibroImpactOscillator(System):
     """Rayleigh-Van der Pol oscillator that bounces off a wall at x = 0, Eqs. (3) and (6).
 
