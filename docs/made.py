@@ -40,6 +40,7 @@ ROOMS = {
     "theory": "what is known in closed form",
     "fem": "meshes and the matrices of the generator",
     "case": "case files",
+    "results": "the numbers of many curves as one table",
     "study": "cases become results",
     "output": "results become files and pictures",
     "workflow": "run, simulate, chart and check a case",

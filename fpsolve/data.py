@@ -93,6 +93,11 @@ class Quantity:
         comment = f"from {self.error_source}" if kind == "estimated error" and self.error_source else ""
         return replace(self._plain, name=f"{self.name}_error", words=f"{kind} of the {self.words}", comment=comment)
 
+    def end(self, which: str, level: float) -> Quantity:
+        """The "low" or the "high" end of an interval that holds it with a probability."""
+        words = f"{which} end of the interval that holds the {self.words} with {level:.0%}"
+        return replace(self._plain, name=f"{self.name}_{which}", words=words)
+
     @property
     def perturbation(self) -> Quantity:
         """What perturbation theory makes of it."""

@@ -152,7 +152,7 @@ def test_why_there_is_no_critical_restitution_is_a_note(case, tmp_path, capsys, 
     assert "warning" not in err
     (curve,) = json.loads((tmp_path / "results/test/summary.json").read_text(encoding="utf-8"))["curves"]
     assert curve["critical_restitution"] is None
-    assert curve["critical_impact_factor"]["value"] > 0
+    assert curve["critical_impact_factor"] > 0
     assert any(text.startswith(f"no r_c: {words}") for text in curve["notes"])
 
 

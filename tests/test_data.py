@@ -223,7 +223,7 @@ def test_numbers_of_moments(results):
     found = moments.to_xarray()
     same(found, "p", [2.0, -1.0, 0.0])
     same(found, "moment", moments.value, moments.error_estimate)
-    same(found, "derivative", moments.derivative)
+    same(found, "moment_derivative", moments.derivative)
     same(found, "residual", moments.residual)
     assert found.attrs["oscillator.omega"] == 1.0
     assert found.attrs["oscillator.impact"] == "delta"
@@ -238,8 +238,8 @@ def test_numbers_of_a_function(results):
     found = function.to_xarray(p)
     same(found, "p", p)
     same(found, "moment", function(p), function.error_estimate(p))
-    same(found, "derivative", function.derivative(p))
-    same(found, "second_derivative", function.second_derivative(p))
+    same(found, "moment_derivative", function.derivative(p))
+    same(found, "moment_second_derivative", function.second_derivative(p))
     assert function.to_xarray().p.values[[0, -1]].tolist() == [-1.0, 2.0]
 
 

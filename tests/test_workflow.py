@@ -106,16 +106,17 @@ def test_summary_has_the_promised_form_and_the_computed_values(whole):
         assert curve["parameters"]["oscillator.impact"] == "delta"
         assert curve["parameters"]["noise.treatment"] == "ou-reduction"
         assert [row["p"] for row in curve["moments"]] == [2.0, 0.0, -1.0]
-        keys = {"p", "value", "derivative", "derivative_error", "perturbation", "error_estimate", "residual"}
+        keys = {"p", "residual", *(f"moment{each}" for each in ("", "_error", "_perturbation"))}
+        keys |= {"moment_derivative", "moment_derivative_error"}
         assert all(set(row) == keys for row in curve["moments"])
-        np.testing.assert_array_equal([row["value"] for row in curve["moments"]], result.moments.value)
-        assert curve["lyapunov_exponent"]["value"] == result.lyapunov_exponent.value
-        assert set(curve["stability_index"]) >= {"value", "perturbation"}
-        assert curve["variance_rate"]["value"] > 0
+        np.testing.assert_array_equal([row["moment"] for row in curve["moments"]], result.moments.value)
+        assert curve["lyapunov_exponent"] == result.lyapunov_exponent.value
+        assert {"stability_index", "stability_index_error", "stability_index_perturbation"} < set(curve)
+        assert curve["variance_rate"] > 0
         for name in ("impact_rate", "critical_impact_factor", "critical_restitution"):
-            assert set(curve[name]) == {"value", "error_estimate", "perturbation"}
-            assert curve[name]["value"] == result.estimates[name].value
-            assert curve[name]["value"] == pytest.approx(curve[name]["perturbation"], rel=5e-3)
+            assert curve[f"{name}_error"] == result.estimates[name].error_estimate
+            assert curve[name] == result.estimates[name].value
+            assert curve[name] == pytest.approx(curve[f"{name}_perturbation"], rel=5e-3)
         used = curve["discretisation"]
         assert used == result.discretisation
         assert used["xi"] == "polynomials"
@@ -124,8 +125,8 @@ def test_summary_has_the_promised_form_and_the_computed_values(whole):
         assert used["tilt"] > 0
         assert (curve["status"], curve["warnings"]) == ("converged", [])
         assert curve["seconds"] == pytest.approx(result.seconds, abs=1e-6)
-    assert summary["curves"][1]["moments"][0]["value"] == pytest.approx(0.0141631436533, rel=1e-10)
-    assert summary["curves"][1]["moments"][0]["perturbation"] == pytest.approx(0.014149421727, rel=1e-10)
+    assert summary["curves"][1]["moments"][0]["moment"] == pytest.approx(0.0141631436533, rel=1e-10)
+    assert summary["curves"][1]["moments"][0]["moment_perturbation"] == pytest.approx(0.014149421727, rel=1e-10)
 
 
 def test_writing_tables_makes_no_curves(case, tmp_path, monkeypatch):
@@ -140,9 +141,9 @@ def test_table_holds_every_curve_and_moment(whole):
     with (whole.folder / "moments.csv").open(newline="", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == 6
-    assert list(rows[0])[:3] == ["noise.D0", "p", "value"]
+    assert list(rows[0])[:3] == ["noise.D0", "p", "moment"]
     values = np.concatenate([result.moments.value for result in whole.results])
-    np.testing.assert_array_equal([float(row["value"]) for row in rows], values)
+    np.testing.assert_array_equal([float(row["moment"]) for row in rows], values)
 
 
 def test_all_files_are_there_and_no_temporary_ones(whole):
@@ -263,13 +264,13 @@ def test_what_fails_for_small_p_is_said_once(tmp_path, small):
     (curve,) = json.loads((tmp_path / "out/test/summary.json").read_text(encoding="utf-8"))["curves"]
     assert [failure.p for failure in outcome.results[0].failures] == [9.0, small][: 2 if small else 1]
     assert sum("the next mesh has" in text for text in curve["warnings"]) == 2
-    row = {"p": 0.0, "value": 0.0, "perturbation": 0.0, "error_estimate": 0.0}
-    row |= dict.fromkeys(["derivative", "derivative_error", "residual"])
+    row = {"p": 0.0, "moment": 0.0, "moment_perturbation": 0.0, "moment_error": 0.0}
+    row |= dict.fromkeys(["moment_derivative", "moment_derivative_error", "residual"])
     assert curve["moments"] == ([] if small else [row])
     assert curve["warnings"][0].startswith("no λ, δ_p, Λ″(0), N, R_c, r_c: ")
     assert curve["warnings"][0].endswith("there is no Λ(0.001)") == bool(small)
     with (tmp_path / "out/test/moments.csv").open(newline="", encoding="utf-8") as file:
-        assert [row["derivative"] for row in csv.DictReader(file)] == [""] * (not small)
+        assert [row["moment_derivative"] for row in csv.DictReader(file)] == [""] * (not small)
 
 
 @pytest.mark.parametrize(("p", "status"), [([], "failed"), ([0.0], "partly")])
@@ -542,8 +543,8 @@ def test_a_text_is_varied_in_every_file(tmp_path):
         rows = list(csv.DictReader(stream))
     assert [row["noise.treatment"] for row in rows] == ["ou-reduction"] * 3 + ["exact"] * 3
     reduced, exact = rows[:3], rows[3:]
-    assert [row["perturbation"] for row in reduced] == [row["perturbation"] for row in exact]
-    assert float(reduced[0]["value"]) != pytest.approx(float(exact[0]["value"]), rel=1e-3)
+    assert [row["moment_perturbation"] for row in reduced] == [row["moment_perturbation"] for row in exact]
+    assert float(reduced[0]["moment"]) != pytest.approx(float(exact[0]["moment"]), rel=1e-3)
     summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
     assert [curve["varied"] for curve in summary["curves"]] == [
         {"noise.treatment": "ou-reduction"},
@@ -688,7 +689,7 @@ def test_sensitivities_are_written(tmp_path):
     case = write(tmp_path, TEXT, sets)
     fpsolve.run(case, tmp_path)
     [curve] = json.loads((tmp_path / "test/summary.json").read_text(encoding="utf-8"))["curves"]
-    found, errors = curve["sensitivities"], curve["sensitivities"]["error_estimates"]
+    found, errors = curve["sensitivities"], curve["sensitivities"]["errors"]
     assert [row["p"] for row in found["moments"]] == [-2.0, -1.0, 0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0]
     [solved] = case.curves()
     known = fpsolve.sensitivities(solved.problem, 2.0)

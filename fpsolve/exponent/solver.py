@@ -150,7 +150,7 @@ class MomentLyapunov(Result):
     def to_xarray(self) -> xarray.Dataset:
         """Λ(p), Λ′(p), their errors and residuals over p."""
         columns = ("value", "error_estimate", "derivative", "derivative_error", "residual")
-        numbers = {quantity.MOMENTS[name]: getattr(self, name) for name in columns}
+        numbers = {quantity.OVER_P[name]: getattr(self, name) for name in columns}
         failures, values = [each.reason for each in self.failures], self.solver.problem.values
         more = {"warnings": self.warnings, "notes": self.notes, "failures": failures}
         title, places = quantity.MOMENT.words, {quantity.P: self.p}

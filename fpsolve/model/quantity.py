@@ -19,11 +19,18 @@ MOMENT = Quantity(
     "moment", "Λ(p)", "moment Lyapunov exponent", r"$\Lambda(p)$", "1/time", ("p",), "(1), (19)", "(37)", _MODES
 )
 DERIVATIVE = Quantity(
-    "derivative", "Λ′(p)", "slope of the moment Lyapunov exponent", r"$\Lambda'(p)$", "1/time", ("p",), "(19)", "(37)"
+    "moment_derivative",
+    "Λ′(p)",
+    "slope of the moment Lyapunov exponent",
+    r"$\Lambda'(p)$",
+    "1/time",
+    ("p",),
+    "(19)",
+    "(37)",
 )
 SECOND_DERIVATIVE = replace(
     DERIVATIVE,
-    name="second_derivative",
+    name="moment_second_derivative",
     symbol="Λ″(p)",
     words="curvature of the moment Lyapunov exponent",
     latex=r"$\Lambda''(p)$",
@@ -233,26 +240,15 @@ POINTS = {
     }.items()
 }
 """What is known of a point of a line of stability besides the two parameters."""
-MOMENTS: Mapping[str, Quantity] = {
-    "p": P,
+OVER_P: Mapping[str, Quantity] = {
     "value": MOMENT,
+    "error_estimate": MOMENT.error(),
     "derivative": DERIVATIVE,
     "derivative_error": DERIVATIVE.error(),
     "perturbation": MOMENT.perturbation,
-    "error_estimate": MOMENT.error(),
     "residual": RESIDUAL,
 }
-"""The columns of a table over p, by their names in moments.csv, in summary.json and as attributes of results."""
-STORED_MOMENTS = {
-    "value": MOMENT,
-    "error_estimate": MOMENT.error(),
-    "derivative": replace(DERIVATIVE, name="moment_derivative"),
-    "derivative_error": replace(DERIVATIVE, name="moment_derivative").error(),
-    "perturbation": MOMENT.perturbation,
-}
-"""Those of them that results.nc holds, by the same names, as they are called there."""
-OF_RATE = {RATE_FUNCTION.name: replace(RATE_FUNCTION, dims=("p",), comment="at s = Λ′(p), the moment_derivative")}
-"""What it holds where the rate function is asked for; the error is that of the moment."""
+"""What is known of Λ at each p, by the attributes of results that hold it."""
 
 
 def moment_at(p: float) -> Quantity:

@@ -21,16 +21,9 @@ from fpsolve.case.case import Case
 from fpsolve.errors import FpsolveError
 from fpsolve.exponent.quantities import MOMENT
 from fpsolve.files import atomic
-from fpsolve.model.quantity import (
-    OF_RATE,
-    RATE_FUNCTION,
-    SECONDS,
-    STATUS,
-    STORED_MOMENTS,
-    P,
-    Quantity,
-)
-from fpsolve.output.tables import asked, response_columns
+from fpsolve.model.quantity import STATUS, P
+from fpsolve.results.table import Table
+from fpsolve.study.columns import columns_of, row_of
 from fpsolve.study.results import CurveResult, Status
 
 if TYPE_CHECKING:
@@ -39,6 +32,7 @@ if TYPE_CHECKING:
 SET = "set"
 """The dimension of parameter sets that are no product."""
 RESULTS = "results.nc"
+NO_P = np.zeros(0)
 ROW = "row"
 """The dimension of many runs."""
 MOST_COMPRESSED = 1000
@@ -100,40 +94,23 @@ def _variables(case: Case, results: Iterable[CurveResult]) -> dict[str, Variable
     is_list = bool(vary) and vary.mode != "product"
     over: tuple[str, ...] = (SET,) if is_list else vary.keys
     shape = (planned,) if is_list else tuple(len(vary.values(key)) for key in over)
-    places = {p: i for i, p in enumerate(case.p.tolist())} if MOMENT.name in case.asked else {}
-    stored = STORED_MOMENTS | (OF_RATE if RATE_FUNCTION.name in case.asked else {})
-    moments = {name: np.full((planned, len(places)), math.nan) for name in stored if places}
-    indices = {index: np.full((3, planned), math.nan) for index in asked(case)}
-    status, seconds = np.full(planned, Status.MISSING, dtype=np.int8), np.full(planned, math.nan)
-    settled = {name: np.full((2, planned), math.nan) for name in response_columns(case)}
+    table = Table(columns_of(case), planned, case.p if MOMENT.name in case.asked else NO_P)
     for result in results:
-        row, found = result.curve.number - 1, result.moments
-        for name, values in moments.items():
-            values[row, [places[p] for p in found.p.tolist()]] = getattr(found, name)
-        for index, values in indices.items():
-            if numbers := result.index(index):
-                values[:, row] = [*numbers.values()]
-        for name, estimate in (result.response.numbers if result.response else {}).items():
-            settled[name][:, row] = estimate.value, estimate.error_estimate
-        status[row], seconds[row] = result.status, result.seconds
-    columns: list[tuple[Quantity, Any]] = [(stored[name], values) for name, values in moments.items()]
-    for index, three in indices.items():
-        columns += zip((index, index.error(), index.perturbation), three, strict=True)
-    for name, two in settled.items():
-        number = response_columns(case)[name]
-        columns += zip((number, number.error()), two, strict=True)
-    columns += [(STATUS, status), (SECONDS, seconds)]
+        table.put(result.curve.number - 1, row_of(case, result))
+    found = {name: (each.quantity, each.values) for name, each in table.items()}
+    status = np.where(np.isnan(table[STATUS.name].values), Status.MISSING, table[STATUS.name].values)
+    found[STATUS.name] = STATUS, status.astype(np.int8)
     flags = {
         "flag_values": np.array([int(each) for each in Status], dtype=np.int8),
         "flag_meanings": " ".join(each.name.lower() for each in Status),
     }
     return {
-        each.name: Variable(
-            (*over, *each.dims),
+        name: Variable(
+            (*over, *about.dims),
             values.reshape(shape + values.shape[1:]),
-            each.timed(case.units.time).attributes | (flags if each is STATUS else {}),
+            about.timed(case.units.time).attributes | (flags if about is STATUS else {}),
         )
-        for each, values in columns
+        for name, (about, values) in found.items()
     }
 
 

@@ -28,17 +28,16 @@ from fpsolve.case.case import Case, Curve
 from fpsolve.case.remedies import CASE_WORDS
 from fpsolve.case.sections import EXCURSIONS, RESPONSE, SENSITIVITIES
 from fpsolve.exponent.error import MEANINGLESS, Estimate
-from fpsolve.exponent.quantities import INDICES, Index
 from fpsolve.files import draft, write_csv, write_json
 from fpsolve.messages import message_of
 from fpsolve.model.kinds import version_of
-from fpsolve.model.quantity import MOMENT, MOMENTS, RATE_FUNCTION, Quantity
+from fpsolve.model.quantity import MOMENT
+from fpsolve.results.table import Row, plain, rows_over_p
+from fpsolve.study.columns import ENDS, columns_of, pair, row_of
 from fpsolve.study.response import CurveResponse
-from fpsolve.study.results import CurveResult, SimulatedCurve
+from fpsolve.study.results import CurveResult, SimulatedCurve, Status
 from fpsolve.study.uncertain import SAMPLE, Samples, spreads_of
 
-ENDS = ("low", "high")
-"""Of an interval."""
 MOST_INDENTED = 100
 """Curves of a summary that is made for eyes, too."""
 MOST_SUMMARISED = 1000
@@ -81,34 +80,29 @@ def write_results(
         facts: on the run, see `facts_of`.
         finished: how many of them are; all if None.
     """
-    has_moments, names = MOMENT.name in case.asked, columns_of(case)
-    indices = [column.name for each in asked(case) for column in (each, each.error())]
-    settled = [column.name for each in response_columns(case).values() for column in (each, each.error())]
-    ends = [f"{each.name}_{part}" for each in _uncertain(case) for part in ENDS]
-    more = ENDS if case.uncertain else ()
-    is_short = case.planned > MOST_SUMMARISED
+    columns, is_short = columns_of(case), case.planned > MOST_SUMMARISED
+    over_p = ["p", *(each.name for each in columns if each.dims)]
+    of_curve = [each.name for each in columns if not (each.dims or each.name.endswith("_perturbation"))]
     with ExitStack() as stack:
         summary, moments, curves = (
             stack.enter_context(draft(folder / name)) for name in ("summary.json", "moments.csv", "curves.csv")
         )
         by_moment, by_curve = csv.writer(moments), csv.writer(curves)
-        by_moment.writerow([*case.vary.keys, *names, *more])
-        by_curve.writerow([*case.vary.keys, *indices, *settled, *ends, "p_solved", "p_failed", "status", "seconds"])
+        by_moment.writerow([*case.vary.keys, *over_p])
+        by_curve.writerow([*case.vary.keys, *of_curve])
         summary.write(_beginning(case, len(results) if finished is None else finished, facts, held=is_short))
         for number, result in enumerate(results):
-            varied, done, rows = result.curve.varied.values(), result.moments, _rows(result, names)
-            summary.write(_entry(case, number, _short_summary(case, result) if is_short else _summary(case, result)))
-            spreads = spreads_of(case, result)
-            for row in rows:
-                by_moment.writerow([*varied, *row, *(_ends(spreads.moments.get(float(row[0] or 0.0))) if more else ())])
-            intervals = [end for each in _uncertain(case) for end in _ends(spreads.indices.get(each.name))]
-            found = [result.estimates[each.name] for each in asked(case)]
-            stationary = result.response.numbers if result.response else {}
-            found += [stationary.get(name) for name in response_columns(case)]
-            numbers = [number for each in found for number in ((each.value, each.error_estimate) if each else ("", ""))]
-            counts = [done.p.size, (case.p.size if has_moments else 0) - done.p.size]
-            by_curve.writerow([*varied, *numbers, *intervals, *counts, result.status.word, round(result.seconds, 6)])
+            row, varied = row_of(case, result, has_theory=not is_short), result.curve.varied.values()
+            content = _short_summary(case, result) if is_short else _summary(case, result, row)
+            summary.write(_entry(case, number, content))
+            by_moment.writerows([*varied, *each] for each in rows_over_p(row, over_p))
+            by_curve.writerow([*varied, *(_cell(row.get(name)) for name in of_curve)])
         summary.write(_END)
+
+
+def _cell(number: Any) -> Any:
+    """What stands in a table: the word of a status, nothing where there is no number."""
+    return number.word if isinstance(number, Status) else plain(number)
 
 
 def whole_summary(case: Case, results: Sequence[CurveResult], facts: Mapping[str, Any]) -> str:
@@ -117,7 +111,9 @@ def whole_summary(case: Case, results: Sequence[CurveResult], facts: Mapping[str
     Args:
         facts: on the run, see `facts_of`.
     """
-    entries = (_entry(case, number, _summary(case, result)) for number, result in enumerate(results))
+    entries = (
+        _entry(case, number, _summary(case, result, row_of(case, result))) for number, result in enumerate(results)
+    )
     lines = "".join([_beginning(case, len(results), facts), *entries, _END]).splitlines()
     return " ".join(line.strip() for line in lines)
 
@@ -135,22 +131,6 @@ def _entry(case: Case, number: int, content: Mapping[str, Any]) -> str:
     indent = 1 if case.planned <= MOST_INDENTED else None
     text = json.dumps(content, indent=indent, allow_nan=False, ensure_ascii=False).replace("\n", "\n  ")
     return (",\n  " if number else "\n  ") + text
-
-
-def _rows(result: CurveResult, names: Sequence[str]) -> list[list[float | None]]:
-    """The moments of a curve, a row for each p; None where there is no number."""
-    columns = [getattr(result.moments, name).tolist() for name in names]
-    return [[None if math.isnan(each) else each for each in row] for row in zip(*columns, strict=True)]
-
-
-def _uncertain(case: Case) -> list[Index]:
-    """The indices whose intervals are asked for."""
-    return [each for each in asked(case) if each.name in UNCERTAIN] if case.uncertain else []
-
-
-def _ends(spread: Spread | None) -> list[Any]:
-    """The ends of an interval; nothing in their places where there is none."""
-    return ["", ""] if spread is None else [getattr(spread, part) for part in ENDS]
 
 
 def _spread(spread: Spread) -> dict[str, float]:
@@ -191,21 +171,6 @@ def write_samples(case: Case, samples: Samples, folder: Path) -> None:
         "warnings": in_case_words(samples.remarks),
     }
     write_json(folder / f"{SAMPLE}.json", content)
-
-
-def columns_of(case: Case) -> list[str]:
-    """The names of what a case asks for at every p."""
-    return [*MOMENTS, *[RATE_FUNCTION.name] * (RATE_FUNCTION.name in case.asked)]
-
-
-def asked(case: Case) -> list[Index]:
-    """The indices that a case asks for."""
-    return [index for name, index in INDICES.items() if name in case.asked]
-
-
-def response_columns(case: Case) -> Mapping[str, Quantity]:
-    """The numbers of the stationary response by their names, if a case asks for them."""
-    return case.system.response.numbers if case.has_response else {}
 
 
 def write_response(result: CurveResult, folder: Path) -> None:
@@ -258,23 +223,20 @@ def _parameters(curve: Curve) -> dict[str, dict[str, Any]]:
     return {"parameters": dict(curve.parameters), "varied": dict(curve.varied)}
 
 
-def _summary(case: Case, result: CurveResult) -> dict[str, Any]:
-    """What a case asks for of a curve."""
-    names = columns_of(case)
-    found: dict[str, Any] = {}
-    if MOMENT.name in case.asked:
-        found["moments"] = [dict(zip(names, row, strict=True)) for row in _rows(result, names)]
-    for index in asked(case):
-        numbers = result.index(index)
-        found[index.name] = numbers and {key: value if math.isfinite(value) else None for key, value in numbers.items()}
+def _summary(case: Case, result: CurveResult, row: Row) -> dict[str, Any]:
+    """What a case asks for of a curve, by the names of the columns; those over p are in a list of `moments`."""
+    columns = columns_of(case)
+    over_p = ["p", *(each.name for each in columns if each.dims)]
+    is_asked = MOMENT.name in case.asked
+    of_p = [dict(zip(over_p, each, strict=True)) for each in rows_over_p(row, over_p)] if is_asked else []
+    of_curve = [each.name for each in columns if not each.dims]
     return {
         **_parameters(result.curve),
-        "status": result.status.word,
-        **found,
+        **({"moments": of_p} if is_asked else {}),
+        **{name: _cell(row.get(name)) for name in of_curve},
         **_beyond_tables(case, result),
         "discretisation": result.discretisation,
         **_told(result),
-        "seconds": round(result.seconds, 6),
     }
 
 
@@ -297,23 +259,16 @@ def _beyond_tables(case: Case, result: CurveResult) -> dict[str, Any]:
     found: dict[str, Any] = {}
     if result.jumps:
         found["jumps"] = [
-            {"phase": ray.phase, "log_factor": ray.log_factor}
-            | {
-                name: each and {"value": each.value, "error_estimate": each.error_estimate}
-                for name, each in of_ray.items()
-            }
+            {"phase": ray.phase, "log_factor": ray.log_factor, **_pairs(of_ray)}
             for ray, of_ray in zip(result.curve.problem.system.jumps, result.jumps, strict=True)
         ]
     if result.classes:
         found["classes"] = [
             {
                 "name": each.name,
-                "lyapunov_exponent": {
-                    "value": each.lyapunov_exponent.value,
-                    "error_estimate": each.lyapunov_exponent.error_estimate,
-                },
+                **pair("lyapunov_exponent", each.lyapunov_exponent),
                 "moments": [
-                    {"p": p, "value": value, "error_estimate": error}
+                    {"p": p, "moment": value, "moment_error": error}
                     for p, value, error in zip(
                         each.p.tolist(), each.value.tolist(), each.error_estimate.tolist(), strict=True
                     )
@@ -332,18 +287,19 @@ def _beyond_tables(case: Case, result: CurveResult) -> dict[str, Any]:
     return found
 
 
-def _number(each: Estimate | None) -> dict[str, float] | None:
-    return each and {"value": each.value, "error_estimate": each.error_estimate}
+def _pairs(numbers: Mapping[str, Estimate | None]) -> dict[str, float | None]:
+    """Numbers and their errors by their names."""
+    return {key: each for name, number in numbers.items() for key, each in pair(name, number).items()}
 
 
 def _response(found: CurveResponse) -> dict[str, Any]:
     """The means and impacts with their errors, what the density does near rest, and how far these are to be trusted."""
     return {
-        "means": {name: _number(each) for name, each in found.means.items()},
-        **({} if found.impact_rate is None else {"impact_rate": _number(found.impact_rate)}),
+        "means": _pairs(found.means),
+        **({} if found.impact_rate is None else pair("impact_rate", found.impact_rate)),
         "has_hump": found.has_hump,
         "has_crater": found.has_crater,
-        "balance": _number(found.balance),
+        **pair("balance", found.balance),
         "least_over_largest_density": found.least,
         "unknowns": found.unknowns,
     }
@@ -357,10 +313,10 @@ def _excursion(case: Case, found: Excursion) -> dict[str, Any]:
     return {
         "start": {"phi": found.phi, "xi": found.xi},
         "is_certain": found.is_certain,
-        "stability_index": _number(found.stability_index),
-        "lower": _number(found.lower),
-        "upper": _number(found.upper),
-        "upcrossings": _number(found.upcrossings),
+        **pair("stability_index", found.stability_index),
+        **pair("lower", found.lower),
+        **pair("upper", found.upper),
+        **pair("upcrossings", found.upcrossings),
         "levels": [
             {"level": level, "least_probable": low, "most_probable": high, "upcrossings": count}
             for (level, low, high), count in zip(rows, many, strict=True)
@@ -379,8 +335,7 @@ def _sensitivities(found: Sensitivities) -> dict[str, Any]:
         indices = {name: row(found.indices[name]) if name in found.indices else None for name in DIFFERENTIATED}
         return {"moments": [{"p": p, **row(slopes)} for p, slopes in moments], **indices}
 
-    errors = numbers(lambda each: each.error_estimate)
-    return {**numbers(lambda each: each.value), "error_estimates": errors}
+    return {**numbers(lambda each: each.value), "errors": numbers(lambda each: each.error_estimate)}
 
 
 def _with_errors(numbers: Mapping[str, tuple[float, float]]) -> dict[str, dict[str, float]]:

@@ -18,10 +18,10 @@ from fpsolve.case.sections import Expectation, Varied
 from fpsolve.data import Quantity, Result, dataset
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.error import Estimate, Failure
-from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, STABILITY_INDEX, VARIANCE_RATE, Index
+from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, STABILITY_INDEX, VARIANCE_RATE
 from fpsolve.exponent.solver import InvariantClass
 from fpsolve.messages import Code, Message, Severity, message_of
-from fpsolve.model.quantity import MOMENT, MOMENTS, P
+from fpsolve.model.quantity import MOMENT, OVER_P, P
 from fpsolve.study.response import CurveResponse
 
 if TYPE_CHECKING:  # which take half a second to import
@@ -124,13 +124,6 @@ class CurveResult(Result):
         """Λ″(0)."""
         return self.estimates[VARIANCE_RATE.name]
 
-    def index(self, index: Index) -> dict[str, float] | None:
-        """The value, the error estimate and the perturbation theory of an index; None where it was not found."""
-        if not (found := self.estimates[index.name]):
-            return None
-        theory = index.theory(self.curve.problem)
-        return {"value": found.value, "error_estimate": found.error_estimate, "perturbation": theory}
-
     @property
     def status(self) -> Status:
         """Whether all that was asked for is there, within rtol."""
@@ -150,8 +143,7 @@ class CurveResult(Result):
     def to_xarray(self) -> xarray.Dataset:
         """Λ(p) and Λ′(p) over p, Eq. (37), and the indices that were found, with their errors."""
         found = self.moments
-        columns = ("value", "error_estimate", "derivative", "derivative_error", "perturbation")
-        numbers: dict[Quantity, Any] = {MOMENTS[name]: getattr(found, name) for name in columns}
+        numbers: dict[Quantity, Any] = {each: getattr(found, name) for name, each in OVER_P.items()}
         for name, each in self.estimates.items():
             if each:
                 numbers |= {INDICES[name]: each.value, INDICES[name].error(): each.error_estimate}

@@ -70,7 +70,7 @@ def write(folder: Path, *parts: str) -> Path:
 def curves_of(path: Path, *options: str) -> list[dict[str, float]]:
     assert main(["run", str(path), "--out", str(path.parent), *options]) == 0
     summary = json.loads((path.parent / "mine/summary.json").read_text(encoding="utf-8"))
-    return [{**curve["parameters"], "moment": curve["moments"][0]["value"]} for curve in summary["curves"]]
+    return [{**curve["parameters"], "moment": curve["moments"][0]["moment"]} for curve in summary["curves"]]
 
 
 def test_a_case_of_ones_own_equation(tmp_path: Path) -> None:
@@ -170,7 +170,7 @@ def test_a_case_of_three_variables(tmp_path: Path, capsys: pytest.CaptureFixture
     assert main(["run", str(path), "--out", str(tmp_path), "--report"]) == 0
     [curve] = json.loads((tmp_path / "mine/summary.json").read_text(encoding="utf-8"))["curves"]
     expected, [found] = kronecker.white(STEADY, DRIVEN, 2), curve["moments"]
-    assert abs(found["value"] - expected) <= found["error_estimate"] <= 1e-5
+    assert abs(found["moment"] - expected) <= found["moment_error"] <= 1e-5
     assert curve["discretisation"]["waves"] >= 2
     assert "du/dt = −0.5 v − u" in (tmp_path / "mine/report.html").read_text(encoding="utf-8")
     assert main(["prove", str(path), "--out", str(tmp_path)]) == BAD_INPUT

@@ -117,7 +117,7 @@ def solved(path: Path, out: Path) -> dict[str, float]:
     """Λ(2) of the curves by their labels."""
     assert main(["run", str(path), "--out", str(out)]) == 0
     curves = json.loads((out / "kinds/summary.json").read_text(encoding="utf-8"))["curves"]
-    return {str(curve["parameters"]): curve["moments"][0]["value"] for curve in curves}
+    return {str(curve["parameters"]): curve["moments"][0]["moment"] for curve in curves}
 
 
 def test_the_system_has_two_names(tmp_path: Path) -> None:
@@ -260,7 +260,7 @@ def test_a_plane_system_from_a_file(tmp_path: Path, order: str, has_theory: bool
     assert first == pytest.approx(-0.0773243898649, abs=1e-10)
     assert second < first
     summary = json.loads((tmp_path / "out/kinds/summary.json").read_text(encoding="utf-8"))
-    assert (summary["curves"][0]["moments"][0]["perturbation"] is not None) == has_theory
+    assert (summary["curves"][0]["moments"][0]["moment_perturbation"] is not None) == has_theory
     case = load_case(path)
     refuse_unprovable_case(case, None)  # it can be proven, and simulated
     assert simulated_parts(case.problem)

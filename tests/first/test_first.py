@@ -94,8 +94,8 @@ def second_moment(folder, name):
         text = (folder / f"results/{name}/moments.csv").read_text(encoding="utf-8")
     except FileNotFoundError:
         return None
-    rows = [row for row in csv.DictReader(text.splitlines()) if float(row["p"]) == 2.0 and row["value"]]
-    return (float(rows[0]["value"]), float(rows[0]["error_estimate"])) if rows else None
+    rows = [row for row in csv.DictReader(text.splitlines()) if float(row["p"]) == 2.0 and row["moment"]]
+    return (float(rows[0]["moment"]), float(rows[0]["moment_error"])) if rows else None
 
 
 @pytest.mark.parametrize("name", SECOND)

@@ -61,9 +61,9 @@ def test_the_summary_holds_them(written):
     [curve] = json.loads((folder / "summary.json").read_text(encoding="utf-8"))["curves"]
     found = curve["excursions"]
     assert found["start"] == {"phi": 0.0, "xi": "stationary"}
-    assert found["stability_index"]["value"] == pytest.approx(1.302367339, abs=1e-8)
-    assert found["lower"]["value"] == pytest.approx(0.712, abs=5e-4)
-    assert found["upcrossings"]["value"] == pytest.approx(4.10, abs=5e-3)
+    assert found["stability_index"] == pytest.approx(1.302367339, abs=1e-8)
+    assert found["lower"] == pytest.approx(0.712, abs=5e-4)
+    assert found["upcrossings"] == pytest.approx(4.10, abs=5e-3)
     assert [each["level"] for each in found["levels"]] == [2.0, 4.0, 8.0]
     assert all(0 < each["least_probable"] < each["most_probable"] < 1 for each in found["levels"])
 

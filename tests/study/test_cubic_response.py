@@ -60,7 +60,7 @@ def test_names_are_those_of_the_variables(folder):
     found = curve["response"]
     assert [*found["means"]] == NUMBERS
     assert "impact_rate" not in found
-    amplitude, q, w = (found["means"][name]["value"] for name in ("amplitude_squared", "q_squared", "w_squared"))
+    amplitude, q, w = (found["means"][name] for name in ("amplitude_squared", "q_squared", "w_squared"))
     assert amplitude == pytest.approx(q + w / 4, rel=1e-12)
     with (folder / "curves.csv").open(encoding="utf-8") as file:
         [row] = csv.DictReader(file)

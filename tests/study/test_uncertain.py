@@ -131,7 +131,7 @@ def test_files_and_the_terminal_say_it(tmp_path, capsys):
     assert float(row["lyapunov_exponent_low"]) == pytest.approx(-0.3 - size, abs=1e-9)
     with (tmp_path / "case/moments.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
-    assert float(rows[1]["low"]) == pytest.approx(-0.6 + 0.5 / 0.64 - 2 * size, abs=1e-9)
+    assert float(rows[1]["moment_low"]) == pytest.approx(-0.6 + 0.5 / 0.64 - 2 * size, abs=1e-9)
     told = json.loads((tmp_path / "case/sample.json").read_text(encoding="utf-8"))
     assert (told["planned"], told["seed"], told["failed"]) == (20, 0, 0)
     with (tmp_path / "case/sample/curves.csv").open(encoding="utf-8") as file:
