@@ -14,7 +14,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from fpsolve import cli
+from fpsolve import cli, run
 from fpsolve.case.case import load_case
 from fpsolve.case.sections import QUANTITY_NAMES
 from fpsolve.cli import BAD_INPUT, CHECK_FAILED, CLOSED_PIPE, INTERRUPTED, NOT_CONVERGED, main
@@ -667,6 +667,13 @@ def test_json_prints_the_summary_and_nothing_else(case, tmp_path, capsys):
     assert out.count("\n") == 1
     assert json.loads(out) == json.loads((tmp_path / "results/test/summary.json").read_text(encoding="utf-8"))
     assert err == ""
+
+
+def test_a_run_where_there_is_no_command_line(tmp_path, monkeypatch):
+    """As where Python is embedded."""
+    monkeypatch.setattr(sys, "argv", [])
+    run(CASES / "minimal.toml", tmp_path)
+    assert json.loads((tmp_path / "minimal/summary.json").read_text(encoding="utf-8"))["complete"]
 
 
 def test_many_curves_leave_their_numbers_to_results_nc(case, tmp_path, monkeypatch, capsys):

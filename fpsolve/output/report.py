@@ -293,7 +293,8 @@ def _eigenfunctions(case: Case, results: Sequence[CurveResult], folder: Path, pl
     pictures = [(curve, path, place / f"{curve.number}.png") for curve, path in there if path.is_file()]
     if not pictures:
         return
-    command = [sys.executable or "python", "-m", "fpsolve.output.pictures"]
+    # with -P no file of the working folder is taken for a module
+    command = [sys.executable or "python", "-P", "-m", "fpsolve.output.pictures"]
     command += [str(each) for _, *pair in pictures for each in pair]
     reason = "nothing was drawn"
     try:

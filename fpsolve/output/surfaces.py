@@ -121,7 +121,7 @@ class Surface:
 @lru_cache(maxsize=1)
 def can_render() -> bool:
     """Whether this machine can render; a child process finds out, as without OpenGL that ends in a crash."""
-    command = [sys.executable or "python", "-c", PROBE]
+    command = [sys.executable or "python", "-P", "-c", PROBE]
     try:
         done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, timeout=PATIENCE)
     except (OSError, subprocess.TimeoutExpired):

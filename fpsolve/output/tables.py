@@ -47,7 +47,7 @@ _END = "\n ]\n}\n"
 
 def facts_of(case: Case, started: datetime, seconds: float) -> dict[str, Any]:
     """Of a run: versions, the command, the machine, when it began and how long it takes, and the case as written."""
-    name, *rest = sys.argv
+    name, *rest = sys.argv or [""]  # empty where Python is embedded
     kinds = filter(None, (version_of(type(half)) for half in case.problem.halves))  # type: ignore[arg-type]
     packages = _packages() | dict(each.rsplit(" ", 1) for each in kinds)
     return {
@@ -111,18 +111,19 @@ def whole_summary(case: Case, results: Sequence[CurveResult], facts: Mapping[str
     Args:
         facts: on the run, see `facts_of`.
     """
-    entries = (
-        _entry(case, number, _summary(case, result, row_of(case, result))) for number, result in enumerate(results)
-    )
-    lines = "".join([_beginning(case, len(results), facts), *entries, _END]).splitlines()
-    return " ".join(line.strip() for line in lines)
+    curves = [_summary(case, result, row_of(case, result)) for result in results]
+    content = {**_state(case, len(results)), **facts, "curves": curves}
+    return json.dumps(content, allow_nan=False, ensure_ascii=False)
+
+
+def _state(case: Case, done: int) -> dict[str, Any]:
+    return {**head(case), "complete": done == case.planned, "planned": case.planned, "done": done}
 
 
 def _beginning(case: Case, done: int, facts: Mapping[str, Any], *, held: bool = False) -> str:
     """What summary.json has before its curves; with the parameters that these have in common, if they are held."""
-    state = {"complete": done == case.planned, "planned": case.planned, "done": done}
     common = {"parameters": dict(case.held)} if held else {}
-    start = json.dumps({**head(case), **state, **facts, **common}, indent=1, ensure_ascii=False)
+    start = json.dumps({**_state(case, done), **facts, **common}, indent=1, ensure_ascii=False)
     return start.removesuffix("\n}") + ',\n "curves": ['
 
 

@@ -152,9 +152,13 @@ def test_where_the_noise_has_states_each_is_a_line(tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("pictures")
-def test_eigenfunctions_are_pictures_where_this_machine_renders(tmp_path):
+def test_eigenfunctions_are_pictures_where_this_machine_renders(tmp_path, monkeypatch):
+    """Files of the working folder that are called as modules are no modules."""
     from fpsolve.output.surfaces import can_render
 
+    (tmp_path / "colorsys.py").write_text("raise SystemExit(1)", encoding="utf-8")
+    (tmp_path / "pyvista.py").write_text("raise SystemExit(1)", encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
     assert run(tmp_path, ONE, "--report") == 0
     page = (tmp_path / "test/report.html").read_text(encoding="utf-8")
     assert ("data:image/png;base64," in page) == can_render()
