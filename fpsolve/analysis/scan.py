@@ -124,14 +124,12 @@ class Row:
     Attributes:
         begin: gives F; a task for another process needs one that pickles.
         count: of the nodes of the grid, each way.
-        number: of the row, from 0 on.
-        axis: along which it runs, 0 for u and 1 for v.
+        number: of the row, from 0 on: it runs along v.
     """
 
     begin: Callable[[], Field]
     count: int
     number: int
-    axis: int = 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,7 +157,7 @@ def scan_row(row: Row) -> ScannedRow:
     for k in range(row.count):
         try:
             with whole.running():
-                sample = field(shares[[k, row.number] if row.axis == 0 else [row.number, k]])
+                sample = field(shares[[row.number, k]])
             values[k], gradients[k] = sample.value, sample.gradient
         except FpsolveError as failure:
             reasons.setdefault(failure.message)
@@ -175,8 +173,7 @@ def scanned(rows: Sequence[Row], found: Iterator[ScannedRow], progress: Callable
     values, gradients, reasons = np.empty((count, count)), np.empty((count, count, 2)), dict[Message, None]()
     for row in rows:
         result = next(found)
-        place = (slice(None), row.number) if row.axis == 0 else row.number
-        values[place], gradients[place] = result.values, result.gradients
+        values[row.number], gradients[row.number] = result.values, result.gradients
         reasons.update(dict.fromkeys(result.reasons))
         seconds += result.seconds
         for _ in range(count):

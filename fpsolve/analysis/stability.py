@@ -192,8 +192,7 @@ class Boundary(Result):
         spent = Message(Code.ROW_SPENT, most=seconds, key=key)
         frame = self.zero, self.problem, (self.x, self.y)
         rough = partial(ZeroField, *frame, self.budget, self.scan_rtol, seconds, spent)
-        axis = rough().easy_axis
-        return [Row(rough, count, number, axis) for number in range(count)]
+        return [Row(rough, count, number) for number in range(count)]
 
     def solve(
         self,

@@ -209,9 +209,6 @@ def ratio_with_slopes(solver: ExponentSolver, p: float, keys: Sequence[str]) -> 
 class ZeroField:
     """F over the unit square: λ or Λ(p)/p, with its gradient.
 
-    λ and its slopes are affine in ln R where nothing else changes: a bounce multiplies the whole state and leaves the
-    phase alone. So two of its values at different r give all others.
-
     Args:
         zero: which of them.
         problem: the problem with the values of all other parameters.
@@ -241,18 +238,6 @@ class ZeroField:
         self._seconds, self._spent = seconds, spent or Message(Code.LINE_SPENT, most=seconds)
         self.spent_seconds, self.stopped = 0.0, None if seconds > 0 else self._spent
         self._before: tuple[FloatArray, Mapping[float, Solution]] = np.full(2, math.inf), {}
-        keys, system = [axis.key for axis in axes], problem.system
-        loss = f"{system.section}.{system.impact_parameter}"
-        is_affine = (
-            zero.p == 0 and loss in keys and not any(problem.derivative(key).jumps for key in keys if key != loss)
-        )  # ln R changes with one of them
-        self._bounce = keys.index(loss) if is_affine else None
-        self._solved: dict[tuple[float, float], dict[float, Sample]] = {}
-
-    @property
-    def easy_axis(self) -> int:
-        """Along which F of one point says most of the next, 0 for u and 1 for v: along r λ is affine."""
-        return 1 if self._bounce is None else self._bounce
 
     def __call__(self, at: FloatArray, rtol: float | None = None) -> Sample:
         """F at (u, v); with an rtol to that alone, begun anew.
@@ -279,22 +264,12 @@ class ZeroField:
         return NotConverged(self.stopped)
 
     def _at(self, at: FloatArray, rtol: float | None) -> Sample:
-        """F at (u, v)."""
+        """F at (u, v), from a solve. Raises `FpsolveError`."""
         values = {axis.key: float(axis.value(share)) for axis, share in zip(self._axes, at, strict=True)}
         try:
             problem = self._problem.at(values)
         except ValueError as failure:
             raise FpsolveError(Message(Code.NO_PROBLEM, reason=said(failure))) from failure
-        if self._bounce is None:
-            return self._sample(at, problem, rtol)
-        known = self._solved.setdefault((rtol or self._rtol, float(at[1 - self._bounce])), {})
-        log_factor = problem.system.jumps[0].log_factor
-        if len(known) < 2 and log_factor not in known:
-            known[log_factor] = self._sample(at, problem, rtol)
-        return known[log_factor] if log_factor in known else self._between(at, problem, log_factor, known, self._bounce)
-
-    def _sample(self, at: FloatArray, problem: Problem, rtol: float | None) -> Sample:
-        """F from a solve. Raises as `ratio_with_slopes`."""
         p = self._zero.p
         refuse_infinite(problem, p)
         own: Any = {"rtol": rtol or self._rtol, "budget": self._budget}
@@ -306,17 +281,3 @@ class ZeroField:
         if rtol is None:
             self._before = at, solver.whole.known
         return Sample(at, value, gradient, error, solver.scale(p) / abs(p) if p else solver.scales.linear)
-
-    def _between(
-        self, at: FloatArray, problem: Problem, log_factor: float, known: Mapping[float, Sample], bounce: int
-    ) -> Sample:
-        """λ from two of its values at other r."""
-        (first, one), (second, other) = known.items()
-        share = (log_factor - first) / (second - first)
-        gradient = one.gradient + share * (other.gradient - one.gradient)
-        [rise] = problem.derivative(self._axes[bounce].key).jumps
-        impacts = (other.value - one.value) / (second - first)
-        gradient[bounce] = impacts * rise * self._axes[bounce].slope(float(at[bounce]))
-        value = one.value + share * (other.value - one.value)
-        error = (abs(share) + abs(1 - share)) * max(one.error, other.error)
-        return Sample(at, value, gradient, error, max(one.scale, other.scale))

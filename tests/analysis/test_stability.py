@@ -543,17 +543,6 @@ def test_a_row_does_not_depend_on_others():
         assert np.array_equal(one.gradients, other.gradients)
 
 
-@pytest.mark.parametrize("is_first", [True, False])
-def test_the_scan_of_lambda_over_r_solves_two_nodes_of_a_row(is_first, monkeypatch):
-    """λ is affine in ln R: rows run along r, whichever axis it is on."""
-    solved, sample = [], ZeroField._sample
-    monkeypatch.setattr(ZeroField, "_sample", lambda self, *given: (solved.append(1), sample(self, *given))[1])
-    r = Axis("oscillator.restitution", 0.5, 1.0)
-    of = Boundary(zero_of(LAMBDA), *((r, C1) if is_first else (C1, r)), Problem(oscillator(), NOISE))
-    scan_row(of.rows()[3])
-    assert len(solved) == 2
-
-
 def test_f_is_solved_in_one_thread(monkeypatch):
     """More only wait for each other: with two λ of strong noise took four times as long."""
     threads = []
@@ -573,8 +562,8 @@ def test_f_is_solved_in_one_thread(monkeypatch):
 
 
 def test_each_row_and_each_point_is_told_as_it_is_found(monkeypatch):
-    told, seen, sample = [], [], ZeroField._sample
-    monkeypatch.setattr(ZeroField, "_sample", lambda self, *given: (seen.append(len(told)), sample(self, *given))[1])
+    told, seen, sample = [], [], ZeroField._at
+    monkeypatch.setattr(ZeroField, "_at", lambda self, *given: (seen.append(len(told)), sample(self, *given))[1])
     found = line(progress=lambda: told.append(1))
     assert seen[:9] == [0, 0, 0, 3, 3, 3, 6, 6, 6]
     assert len(told) == 9 + sum(branch.x.size for branch in found.branches)
@@ -585,7 +574,7 @@ class Worked:
 
     def __init__(self, monkeypatch, cost):
         self.now, self.cost = 0.0, cost
-        monkeypatch.setattr(ZeroField, "_sample", lambda _, at, problem, rtol: self.sample(at))
+        monkeypatch.setattr(ZeroField, "_at", lambda _, at, rtol: self.sample(at))
         monkeypatch.setattr(budget, "OVERHEAD_OPERATIONS", 0.0)
 
     def sample(self, at):
