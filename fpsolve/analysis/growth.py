@@ -35,6 +35,7 @@ from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 from scipy.stats import norm
 
+from fpsolve.analysis.excursions import fine_phases, own_phase, start_functional
 from fpsolve.arrays import FloatArray, real_number, real_numbers, shown
 from fpsolve.budget import counted, one_number
 from fpsolve.data import Quantity, Result, dataset
@@ -45,7 +46,6 @@ from fpsolve.exponent.function import SEARCH_INTERVAL
 from fpsolve.exponent.solver import TINY_P, ExponentSolver, solver_of
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.mesh import CylinderMesh
-from fpsolve.fem.space import Space
 from fpsolve.messages import Code, Message
 from fpsolve.model.problem import Problem, refuse_tails
 from fpsolve.model.quantity import (
@@ -596,26 +596,11 @@ def prefactor(pair: PrincipalPair, start: float) -> float:
 
 def _ends(generator: Generator, p: float, start: float) -> tuple[FloatArray, FloatArray]:
     """The coefficients of the mean of T over the start, and of ⟨T*, 1⟩, shape (size,) each."""
-    space, frame = generator.space(p), generator.problem.frame
-    phi, at, own, weights = space.phi, np.array([start]), 1.0, None
-    if frame is not None:
-        own = float(frame.length(at)[0]) ** p
-        at = frame.phase(at)
-        points, weights = phi.finer_rule(frame.parts)
-        weights = weights * frame.length(frame.own_phase(points)) ** -p
-    table = phi.values if weights is None else phi.at(points)
-    last = table.T @ (phi.weights if weights is None else weights)
-    first = own * np.ravel(phi.at(phi.lines[0] + np.mod(at - phi.lines[0], phi.span)).T @ np.ones(1))
-    noise, total = _of_noises(space)
-    return space.product([first / total, *noise]), space.product([np.ravel(last), *noise])
-
-
-def _of_noises(space: Space) -> tuple[list[FloatArray], float]:
-    """∫ P_s u for every function u of each noise, P_s scaled as the weight of the space is, and ∫ P_s."""
-    found, total = list[FloatArray](), 1.0
+    space = generator.space(p)
+    points, weights = fine_phases(generator, space)
+    _, stretch = own_phase(generator, p, points)
+    at_phi, noises = space.phi.at(points).T @ (weights / stretch), list[FloatArray]()
     for axis in space.noises:
         at = axis.samples()
-        weight = at.measure * at.weight / at.factor
-        found.append(np.ravel(at.values.T @ weight))
-        total *= float(weight @ (1 / at.factor))
-    return found, total
+        noises.append(np.ravel(at.values.T @ (at.measure * at.weight / at.factor)))
+    return start_functional(generator, p, start), space.product([np.ravel(at_phi), *noises])
