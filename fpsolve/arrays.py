@@ -52,7 +52,7 @@ one, identity, nothing = Constant(), Linear(), Constant(0.0)
 
 
 def finite(array: FloatArray) -> FloatArray:
-    """The same array. Raises `NumericalFailure` where a number in it is infinite or NaN."""
+    """The array itself. Raises `NumericalFailure` where a number in it is infinite or NaN."""
     if not np.isfinite(array).all():
         raise NumericalFailure("array must not contain infs or NaNs")
     return array

@@ -20,7 +20,7 @@ if TYPE_CHECKING:  # each takes some tenths of a second to import
     from matplotlib.axes import Axes
 
 LONGEST = 100
-"""Characters of a `repr`."""
+"""Largest number of characters of a `repr`."""
 Parameters = Mapping[str, float | str]
 """Parameters of a problem by their keys, such as "noise.D0"."""
 
@@ -75,7 +75,7 @@ class Quantity:
         return self.latex or self.name.rpartition(".")[2]
 
     def timed(self, unit: str) -> Self:
-        """The same with a unit of time: "1/s" instead of "1/time"."""
+        """The quantity with a unit of time: "1/s" instead of "1/time"."""
         return replace(self, unit=re.sub(r"\btime(?=\b|²)", unit, self.unit))
 
     def stated(self, value: float | str) -> str:
@@ -85,7 +85,7 @@ class Quantity:
 
     @property
     def _plain(self) -> Quantity:
-        """The same without what a subclass adds."""
+        """The quantity without what a subclass adds."""
         return Quantity(**{each.name: getattr(self, each.name) for each in fields(Quantity)})
 
     def error(self, kind: str = "estimated error") -> Quantity:

@@ -25,11 +25,11 @@ if TYPE_CHECKING:
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")  # Okabe and Ito
 STYLE: dict[Any, Any] = {"font.size": 13, "mathtext.fontset": "cm", "axes.titlesize": 12}
 SIZE = (7.2, 5.0)
-"""Inches of a figure of `plot`."""
+"""Width and height of a figure of `plot`, in inches."""
 MARKED = 40
-"""Points up to which each point of a line has a marker."""
+"""Largest number of points of a line that each have a marker."""
 MOST_LINES = 10
-"""Lines that a legend names."""
+"""Largest number of lines that a legend names."""
 QUARTERS = np.pi * np.arange(5) / 2, ["0", r"$\pi/2$", r"$\pi$", r"$3\pi/2$", r"$2\pi$"]
 """Ticks of a phase, and what they say."""
 
@@ -196,7 +196,7 @@ def title_of(attributes: Mapping[str, Any]) -> str:
 
 
 def label_of(attributes: Mapping[str, Any], letters: int = 40) -> str:
-    """The same in several lines, of at most so many letters, where it is long."""
+    """The title of a variable in several lines, of at most so many letters each, where it is long."""
     words, rest = str(attributes["long_name"]), title_of({**attributes, "long_name": ""})
     drawn = re.sub(r"\\[A-Za-z]+ ?", "x", rest).translate(dict.fromkeys(map(ord, "${}^_")))
     return f"{fill(words, letters)}{' ' if len(words) + 1 + len(drawn) <= letters else chr(10)}{rest}".strip()

@@ -17,14 +17,15 @@ from fpsolve.errors import OutputError
 from fpsolve.messages import Code, Message, Remedy
 
 LOCK = ".fpsolve.lock"
+"""The name of the file that is locked."""
 LOCK_SECONDS = 0.1
-"""For which a run tries to lock a folder; it tries again where another run has just removed the file of its lock."""
+"""Seconds for which a run tries to lock a folder: another run may just have removed the file of its lock."""
 NO_LOCKS = (errno.ENOSYS, errno.ENOLCK, errno.ENOTSUP, errno.EOPNOTSUPP)
-"""What file systems answer that have no locks."""
+"""Numbers of the errors of file systems that have no locks."""
 TEMPORARY = r"\.fpsolve-[a-z0-9_]{8}(\.\w+)?"
 """The pattern of the names of unfinished files, which a killed run leaves."""
 LARGEST = 2**29
-"""Bytes of a file that is read as a whole."""
+"""Largest size of a file that is read as a whole, in bytes."""
 
 
 @contextmanager

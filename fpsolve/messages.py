@@ -171,12 +171,9 @@ class Code(Enum):
     )
     NOT_INCREASING = "failure: Λ(p)/p does not increase at p = {p:g}, while it must, as Λ is convex"
     GROWTH_BEYOND = (
-        "failure: the growth rate s = {s:.6g} is not reached: Λ′ is {slope:.6g} at p = {p:g}, the end of the interval; "
-        "choose s on this side of {slope:.6g}, or a wider interval"
-    )
-    GROWTH_UNSOLVED = (
-        "failure: the growth rate s = {s:.6g} is not reached: Λ′ is {slope:.6g} at p = {p:g}, and beyond it Λ(p) is "
-        "not solved: {reason}; choose s on this side of {slope:.6g}"
+        "failure: the growth rate s = {s:.6g} is not reached: Λ′ is {slope:.6g} at p = {p:g}, {reason:?and beyond it "
+        "Λ(p) is not solved: {reason}¦the end of the interval}; choose s on this side of {slope:.6g}{reason:?¦, or a "
+        "wider interval}"
     )
     NO_RATE_FUNCTION = (
         "failure: there is no rate function to compute: Λ(p) may have a kink, as the parts of the motion {parts} do "
@@ -314,12 +311,8 @@ class Code(Enum):
     LINE_STOPPED = "note: the line {line} is not traced to its end, and may have more branches: {reason}"
 
     UNREACHED = (
-        "warning: {target} cannot be reached with {frame}: {symbol} is from {least:.6g} to {most:.6g} there, and "
-        "nearest at {place}; use a wider range, or other parameters"
-    )
-    INDEX_UNREACHED = (
-        "warning: {target} cannot be reached with {frame}: {side} everywhere there, and nearest at {place}; use a "
-        "wider range, or other parameters"
+        "warning: {target} cannot be reached with {frame}: {side:?{side} everywhere¦{symbol} is from {least:.6g} to "
+        "{most:.6g}} there, and nearest at {place}; use a wider range, or other parameters"
     )
     CURVED = (
         "warning: the first-order interval of {symbol}, {low:.6g} to {high:.6g}, does not serve: that of {count} "
@@ -390,13 +383,9 @@ class Code(Enum):
     RESPONSE_NO_INDEX = (
         "note: no stationary density by finite elements: there is no δ_p: {reason}; simulate the response instead"
     )
-    RESPONSE_TOO_LARGE = (
-        "failure: the stationary response did not converge: its means still change by {size:.1e} of them, and the next "
-        "discretisation has {unknowns} unknowns, more than {most}; use a larger rtol"
-    )
     RESPONSE_OPEN = (
-        "failure: the stationary response did not converge: its means still change by {size:.1e} of them; use a larger "
-        "rtol"
+        "failure: the stationary response did not converge: its means still change by {size:.1e} of them{unknowns:?, "
+        "and the next discretisation has {unknowns} unknowns, more than {most}}; use a larger rtol"
     )
     RESPONSE_STOPPED = "warning: the simulation of the response was stopped early, after the time {time:.3g}"
     RESPONSE_NOT_REACHED = "warning: no stationary response: stopped before it was reached"
@@ -462,7 +451,7 @@ class Message(str):
         return _words(self.code, self.data, audience)
 
     def advising(self, remedy: str | None) -> Message:
-        """The same with another remedy, or without one."""
+        """The message with another remedy, or without one."""
         others = {key: value for key, value in self.data.items() if key != "remedy"}
         return Message(self.code, **others, **({"remedy": remedy} if remedy else {}))
 

@@ -15,10 +15,13 @@ from queue import SimpleQueue
 from typing import Any, NoReturn, TypeVar
 
 ENDING = ("SIGHUP", "SIGTERM")
+"""Signals that end a run as Ctrl-C does."""
 LOOK_SECONDS = 0.1
-"""How often a main thread looks for signals that waits for another one, where the system does not wake it."""
-SIGNALLED, INTERRUPTED = 128, 130
-"""What exit codes after signals are above, and that after Ctrl-C."""
+"""Seconds after which a main thread that waits for another one looks for signals, where the system does not wake it."""
+SIGNALLED = 128
+"""Number to which that of a signal is added in an exit code."""
+INTERRUPTED = 130
+"""Exit code after Ctrl-C."""
 Result = TypeVar("Result")
 
 

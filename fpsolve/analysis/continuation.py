@@ -134,15 +134,9 @@ def cubic(
 
 
 def find_branches(
-    field: Field,
-    scan: Scan,
-    longest: float = LONGEST,
-    stepped: Callable[[], None] = lambda: None,
-    coarse: Field | None = None,
+    field: Field, scan: Scan, longest: float = LONGEST, stepped: Callable[[], None] = lambda: None
 ) -> Iterator[Trace]:
     """Every branch that a scan shows, one after the other; each of its points is told as it is found.
-
-    Where a coarse F is given, which costs less, it tells whether a zero of the scan leads to a branch that is known.
 
     A closed one is seen for certain if a circle inside it is wider than the diagonal of a cell of the finer grid, 1/100
     of the square for 13 nodes, and its cell misses no node.
@@ -153,13 +147,7 @@ def find_branches(
         rough = find_zero(scan, seed)
         if rough is not None and any(trace.holds(rough, near) or _shows(scan, trace, rough, near) for trace in known):
             continue
-        at = seed if rough is None else rough.at
-        if coarse is not None:
-            close = find_zero(coarse, at)
-            if close is None or any(trace.holds(close, SAME - close.width) for trace in known):
-                continue
-            at = close.at
-        start = find_zero(field, at)
+        start = find_zero(field, seed if rough is None else rough.at)
         if start is None or any(trace.holds(start) for trace in known):
             continue
         known.append(trace_branch(field, start, longest, stepped))

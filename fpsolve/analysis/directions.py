@@ -28,10 +28,12 @@ if TYPE_CHECKING:
 
 SETTLED = 0.02
 """Total variation between two densities in turn from which on the finer one is taken."""
-MOST_DIRECTIONS, MOST_UNKNOWNS = 1700, 15000
-"""Functions of directions, and all functions, that are made for a density alone: seconds of work."""
+MOST_DIRECTIONS = 1700
+"""Largest number of functions of directions that are made for a density alone: seconds of work."""
+MOST_UNKNOWNS = 15_000
+"""Largest number of unknowns that are made for a density alone."""
 SHARES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
-"""Of the second pair in ‖z‖², at which the axis of η has ticks."""
+"""Shares of the second pair in ‖z‖² at which the axis of η has ticks."""
 LATITUDES = np.pi * np.arange(-2, 3) / 4, [r"$-\pi/2$", r"$-\pi/4$", "0", r"$\pi/4$", r"$\pi/2$"]
 DENSITY = Quantity("density", "ρ", "density")
 
@@ -53,7 +55,7 @@ class SettledDirections:
     error: float
 
     def on(self, grid: DirectionGrid) -> SettledDirections:
-        """Itself at other nodes."""
+        """These fields at other nodes."""
         if grid.first.size == self.fields.grid.first.size:
             return self
         return replace(self, fields=Directions(self.pair).on(grid))

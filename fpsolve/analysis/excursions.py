@@ -57,12 +57,18 @@ STATIONARY: Literal["stationary"] = "stationary"
 UNIFORM: Literal["uniform"] = "uniform"
 Start = float | Literal["uniform"]
 StartOfNoise = float | Literal["stationary"]
-FINE, MOST_POINTS = 8, 4_000_000
-"""Points of T for each polynomial degree, either way; fewer where they would be more than so many."""
-CLOSE, MOST_ROUNDS = 1e-4, 4
-"""The relative error of T, at its extremes, that finer discretisations are made for, and how many."""
-PARTS, POINTS = 32, 2000
-"""Into how many parts a cell of φ is cut for the integral of q⁺, which has kinks, and points of ξ."""
+FINE = 8
+"""Number of points, for each polynomial degree either way, at which T is looked at."""
+MOST_POINTS = 4_000_000
+"""Largest number of these points, and of those of an integral."""
+CLOSE = 1e-4
+"""Relative error of T at its extremes, and of C, down to which finer discretisations are made."""
+MOST_ROUNDS = 4
+"""Largest number of finer discretisations."""
+PARTS = 32
+"""Number of parts into which a cell of φ is cut for the integral of q⁺, which has kinks."""
+POINTS = 2000
+"""Number of points of ξ in this integral."""
 LEAST_SHOWN = 1e-12
 """Smallest probability that is shown."""
 SHOWN_LEVELS = (2.0, 4.0, 8.0, 16.0, 32.0)
@@ -466,20 +472,14 @@ def _where_positive(values: FloatArray, rate: FloatArray, axes: Iterable[int]) -
 
 def _between(values: FloatArray, axes: Iterable[int]) -> FloatArray:
     """The most by which a function exceeds its values at two neighbours: an eighth of its second difference there."""
+    from scipy.ndimage import maximum_filter1d  # not before it is needed, as it takes a while
+
     total = np.zeros(values.shape)
     for axis in axes:
-        bent = np.abs(np.diff(values, n=2, axis=axis)) / 8
-        ends = [(0, 0)] * values.ndim
-        ends[axis] = (1, 1)
-        padded = np.pad(bent, ends, mode="edge")
-        total += reduce(np.maximum, (_moved(padded, axis, step) for step in (-1, 0, 1)))
+        ends = [(int(each == axis),) * 2 for each in range(values.ndim)]
+        bent = np.pad(np.abs(np.diff(values, n=2, axis=axis)) / 8, ends, mode="edge")
+        total += maximum_filter1d(bent, 3, axis=axis, mode="nearest")
     return total
-
-
-def _moved(table: Any, axis: int, step: int) -> Any:
-    """A table moved by one point, its ends repeated."""
-    count = table.shape[axis]
-    return np.take(table, np.clip(np.arange(count) + step, 0, count - 1), axis=axis)
 
 
 def _upcrossings(ladder: Ladder, start: Callable[[PrincipalPair], float]) -> Estimate:

@@ -79,7 +79,7 @@ VECTORS = 80
 FEWER = 10
 """Number of vectors less that tell its error."""
 POLE = 10.0
-"""(γ − Λ)t."""
+"""(γ − Λ)t: how far to the right of Λ the pole γ of Arnoldi's method is, in units of 1/t."""
 LEVELS = (9, 17, 33, 65)
 """Numbers of p in a Chebyshev series."""
 DIGITS = 1e-7
@@ -361,12 +361,10 @@ class Slopes:
             return self.at(increasing_root(gap, start, (self.low, self.high)))
         except (Missing, NoRoot) as failure:
             end = min(self._known.values(), key=lambda each: abs(each.slope - s))
-            told = {"s": s, "p": end.p, "slope": end.slope}
             missing = failure.missing if isinstance(failure, NoRoot) else failure
-            if missing is None:
-                raise NotConverged(Message(Code.GROWTH_BEYOND, **told)) from None
-            cause: Any = missing.__cause__
-            raise NotConverged(Message(Code.GROWTH_UNSOLVED, **told, reason=cause.reason)) from cause
+            cause: Any = missing and missing.__cause__
+            told = {"p": end.p, "slope": end.slope, "reason": cause and cause.reason}
+            raise NotConverged(Message(Code.GROWTH_BEYOND, s=s, **told)) from cause
 
 
 def _rates(slopes: Slopes, s: FloatArray) -> RateFunction:
@@ -455,7 +453,7 @@ class _Cumulants:
         return _Saddle(p, *(float(each(p)) for each in self._derivatives))
 
     def where(self, s: float) -> _Saddle:
-        """The p with K′(p) = ts. Raises `NotConverged`."""
+        """The saddle point K′(p) = ts. Raises `NotConverged`."""
         if not self.slopes[0] < s < self.slopes[1]:
             side = int(s > self.slopes[0])
             raise NotConverged(

@@ -149,7 +149,7 @@ def design(
     errors = (abs(found.value) + found.error) * np.abs(scaled) / float(scaled @ scaled) * unit
     if len(axes) > 1:  # how near to the nearest point of F = 0
         errors += SAME * np.maximum(unit, np.abs(found.at))
-    parameters, solved = problem.parameters, distance.at(found.at)
+    parameters, solved = problem.parameters, distance.ratio.at(found.at)
     return Design(
         target=wanted,
         problem=solved,
@@ -324,7 +324,7 @@ def _turn(one: float, other: float, rise: float, fall: float) -> float:
 def _along_axis(distance: Distance, axis: Axis) -> Sample | Absent:
     """F = 0 over one parameter."""
     path = _Path(distance, lambda u: np.array([axis.value(u)]), lambda u: np.array([axis.slope(u)]))
-    here = min(max(axis.share(float(distance.problem.values[axis.key])), 0.0), 1.0)
+    here = min(max(axis.share(float(distance.ratio.problem.values[axis.key])), 0.0), 1.0)
     found = path.root(here) or path.scan(here)
     if found is not None:
         return found
@@ -350,7 +350,7 @@ def _unreached(distance: Distance, axes: Sequence[Axis], is_crossed: bool) -> Ab
     else:
         values = [target.level + each.value for each in samples]
         about |= {"symbol": target.quantity.symbol, "least": min(values), "most": max(values)}
-    return Absent(Message(Code.UNREACHED if "side" not in about else Code.INDEX_UNREACHED, **about))
+    return Absent(Message(Code.UNREACHED, **about))
 
 
 def _is_none(reason: Message) -> bool:
@@ -363,7 +363,7 @@ _INFINITE = (Code.TAILS, Code.INFINITE_VARIANCE)
 
 def _nearest(distance: Distance, axes: Sequence[Axis], units: FloatArray) -> Sample | Absent:
     """The point F = 0 that is nearest to the problem."""
-    here = np.array([float(distance.problem.values[axis.key]) for axis in axes])
+    here = np.array([float(distance.ratio.problem.values[axis.key]) for axis in axes])
     start = np.clip(here, *np.array([(axis.start, axis.stop) for axis in axes]).T)
     if (found := _nearest_from(distance, start, axes, here, units)) is not None:
         return found

@@ -13,7 +13,7 @@ from fpsolve.analysis.zero import Zero
 from fpsolve.arrays import FloatArray
 
 FINE = 16
-"""Pieces into which a cell of a scan is divided for a picture."""
+"""Number of pieces, each way, into which a cell of a scan is divided for a picture."""
 _ORDINALS = {1.0: "first", 2.0: "second", 3.0: "third", 4.0: "fourth"}
 P_BIFURCATIONS = {-1.0: "hump of the amplitude density", -2.0: "crater of the joint density"}
 """What the stationary response of the nonlinear oscillator shows where λ > 0 and δ_p is below a value.

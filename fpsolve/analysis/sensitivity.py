@@ -58,10 +58,11 @@ _EPS = sys.float_info.epsilon
 SMALL_P = 1e-4
 """For smaller |p| ∂Λ/∂θ / p is taken from its derivatives at p = 0."""
 RECORDS = {each.name: each for each in (LYAPUNOV_EXPONENT, STABILITY_INDEX, VARIANCE_RATE)}
+"""The quantities besides Λ(p) that have sensitivities, by their names."""
 DIFFERENTIATED = tuple(RECORDS)
 """The quantities that are no function of p."""
 MOST_BARS = 4
-"""Of so many p sensitivities are drawn."""
+"""Largest number of p whose sensitivities are drawn."""
 Slopes = Mapping[str, Estimate]
 """∂/∂θ by the key of θ."""
 

@@ -32,12 +32,16 @@ if TYPE_CHECKING:
     import xarray
     from matplotlib.axes import Axes
 
-SCAN_RTOL, COARSER = 1e-5, 10.0
-"""Of F on the grid of a scan, relative to its scale; at least so many times that of the line."""
+SCAN_RTOL = 1e-5
+"""Smallest error of F on the grid of a scan that is asked for, relative to its scale."""
+COARSER = 10.0
+"""Smallest factor from the error of F on the line to that on the grid."""
 NODES = 13
 """Number of points of a scan, each way."""
-LINE_KEY, SCAN_SHARE = "budget.line_seconds", 0.5
-"""What limits the time of a line, and its share for the scan."""
+LINE_KEY = "budget.line_seconds"
+"""The key of a case that limits the time of a line."""
+SCAN_SHARE = 0.5
+"""Share of this time for the scan."""
 LARGEST = 0.1
 """Step that may be asked for, in sides of the frame."""
 ON_IT = 1e-4
@@ -212,8 +216,7 @@ class Boundary(Result):
         now = replace(self, scan=scan, **{**_ANEW, "seconds": scan.seconds})
         yield now
         zero_field = now.zero_field
-        coarse = partial(zero_field, rtol=self.scan_rtol)
-        for trace in find_branches(zero_field, scan, self.step, stepped, coarse):
+        for trace in find_branches(zero_field, scan, self.step, stepped):
             now = replace(now, traces=with_branch(now.traces, self._special(zero_field, trace)))
             yield now
         yield now._ended(zero_field)

@@ -7,17 +7,16 @@ import re
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 from fpsolve.analysis.scan import Sample
-from fpsolve.analysis.zero import Axis, line_rtol, ratio_with_slopes, said, zero_of
+from fpsolve.analysis.zero import Axis, Ratio, line_rtol, zero_of
 from fpsolve.arrays import FloatArray, shown
 from fpsolve.errors import FpsolveError
 from fpsolve.exponent.adapt import Budget
-from fpsolve.exponent.error import Estimate, Solution
-from fpsolve.exponent.solver import ExponentSolver
-from fpsolve.messages import Code, Message
-from fpsolve.model.problem import Problem, refuse_infinite
+from fpsolve.exponent.error import Estimate
+from fpsolve.messages import Message
+from fpsolve.model.problem import Problem
 from fpsolve.model.quantity import LYAPUNOV_EXPONENT, STABILITY_INDEX, Quantity, moment_at
 
 EXAMPLES = '"lyapunov_exponent = -0.01", "moment(2) = 0" or "stability_index = 1"'
@@ -85,6 +84,7 @@ class Distance:
         progress: called after each solve.
 
     Attributes:
+        ratio: Λ(p)/p, or λ.
         solves: how many there were.
         reasons: why F has no value where it was `tried`.
     """
@@ -97,11 +97,9 @@ class Distance:
         budget: Budget,
         progress: Callable[[], None] = lambda: None,
     ) -> None:
-        self.problem, self.target, self.keys = problem, target, tuple(keys)
-        self._budget, self._progress, self.solves = budget, progress, 0
+        self.target, self._progress, self.solves = target, progress, 0
         zero = zero_of({"moment": target.order}) if target.order else zero_of("lyapunov_exponent")
-        self._rtol = line_rtol(problem, zero)
-        self._starts: dict[float, Solution] | Any = {}
+        self.ratio = Ratio(problem, target.order, keys, budget, line_rtol(problem, zero))
         self._known, self.reasons = dict[tuple[float, ...], Sample | None](), list[Message]()
 
     @property
@@ -120,41 +118,24 @@ class Distance:
                 self.reasons.append(failure.message)
         return self._known[key]
 
-    def at(self, theta: FloatArray) -> Problem:
-        """The problem at θ. Raises `FpsolveError` where there is none."""
-        try:
-            return self.problem.at(dict(zip(self.keys, map(float, theta), strict=True)))
-        except ValueError as failure:
-            raise FpsolveError(Message(Code.NO_PROBLEM, reason=said(failure))) from failure
-
     def __call__(self, theta: FloatArray) -> Sample:
         """F at θ, shape (n,). Raises `FpsolveError` where there is none."""
-        p, problem = self.target.order, self.at(theta)
         self.solves += 1
         try:
-            refuse_infinite(problem, p)
-            solver = self._solver(problem)
-            value, error, slopes = ratio_with_slopes(solver, p, self.keys)
-            self._starts = solver.whole.known
+            found = self.ratio(theta)
         finally:
             self._progress()
-        scale = solver.scale(p) / abs(p) if p else solver.scales.linear
-        factor = p if self.target.kind == "moment" else 1.0
-        distance = factor * value - self.target.level
-        return Sample(theta, distance, factor * slopes, abs(factor) * error, max(abs(factor) * scale, 1e-300))
+        factor = self.target.order if self.target.kind == "moment" else 1.0
+        value, scale = factor * found.value - self.target.level, max(abs(factor) * found.scale, 1e-300)
+        return Sample(theta, value, factor * found.gradient, abs(factor) * found.error, scale)
 
     def found(self, sample: Sample) -> Estimate:
         """The quantity at θ. Raises `NotConverged`."""
-        error = abs(sample.error)
-        value, scale = self.target.level + sample.value, sample.scale
+        value, error, scale = self.target.level + sample.value, sample.error, sample.scale
         if self.target.kind == "stability_index":
-            ratio, slope, error = self._solver(self.at(sample.at)).ratio(self.target.value)
+            ratio, slope, error = self.ratio.solver(sample.at).ratio(self.target.value)
             value, error, scale = self.target.value - ratio / slope, error / slope, 1.0
         return Estimate(value, error, scale, quantity=self.target.quantity)
-
-    def _solver(self, problem: Problem) -> ExponentSolver:
-        own: Any = {"rtol": self._rtol, "budget": self._budget}
-        return ExponentSolver(problem, starts=self._starts, **own)
 
 
 def start_and_stop(problem: Problem, key: str) -> Axis | None:

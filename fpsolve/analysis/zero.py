@@ -24,8 +24,10 @@ from fpsolve.messages import Code, Message
 from fpsolve.model.faults import strict_dataclass
 from fpsolve.model.problem import Problem, checked_problem, refuse_infinite
 
-RTOL, RTOL_BEYOND_PLANE = 1e-10, 1e-4
-"""Error of F that is wanted, relative to its scale: of two variables, and of more."""
+RTOL = 1e-10
+"""Error of F that is wanted of two variables, relative to its scale."""
+RTOL_BEYOND_PLANE = 1e-4
+"""Error of F that is wanted of more variables, relative to its scale."""
 HALF = 0.5
 """Share of the time that is left for one value."""
 NEAR = 0.1
@@ -206,6 +208,42 @@ def ratio_with_slopes(solver: ExponentSolver, p: float, keys: Sequence[str]) -> 
     return value, error, np.array([each.slope.value for each in changed]) + more
 
 
+class Ratio:
+    """Λ(p)/p, at p = 0 λ, over some parameters θ, with its gradient; each solve starts from the one before.
+
+    Args:
+        problem: with the values of all other parameters.
+        p: the order of the moment; 0 for λ.
+        keys: of the parameters.
+        budget: for a solve.
+        rtol: of Λ(p)/p, relative to its scale.
+    """
+
+    def __init__(self, problem: Problem, p: float, keys: Sequence[str], budget: Budget, rtol: float) -> None:
+        self.problem, self.p, self.keys = problem, p, tuple(keys)
+        self._own: Any = {"rtol": rtol, "budget": budget}
+        self._starts: Mapping[float, Solution] = {}
+
+    def at(self, theta: FloatArray) -> Problem:
+        """The problem at θ. Raises `FpsolveError` where there is none."""
+        try:
+            return self.problem.at(dict(zip(self.keys, theta.tolist(), strict=True)))
+        except ValueError as failure:
+            raise FpsolveError(Message(Code.NO_PROBLEM, reason=said(failure))) from failure
+
+    def solver(self, theta: FloatArray, *, is_near: bool = True) -> ExponentSolver:
+        """A solver at θ; its starts are those of the last θ if this is near."""
+        return ExponentSolver(self.at(theta), starts=self._starts if is_near else {}, **self._own)
+
+    def __call__(self, theta: FloatArray, *, is_near: bool = True) -> Sample:
+        """Λ(p)/p at θ. Raises `FpsolveError` where there is none."""
+        p, solver = self.p, self.solver(theta, is_near=is_near)
+        refuse_infinite(solver.problem, p)
+        value, error, slopes = ratio_with_slopes(solver, p, self.keys)
+        self._starts = solver.whole.known
+        return Sample(theta, value, slopes, error, solver.scale(p) / abs(p) if p else solver.scales.linear)
+
+
 class ZeroField:
     """F over the unit square: λ or Λ(p)/p, with its gradient.
 
@@ -233,14 +271,14 @@ class ZeroField:
         seconds: float = math.inf,
         spent: Message | None = None,
     ) -> None:
-        self._zero, self._problem, self._axes, self._budget = zero, problem, axes, budget
-        self._rtol = line_rtol(problem, zero) if rtol is None else rtol
+        rtol = line_rtol(problem, zero) if rtol is None else rtol
+        self._axes, self._ratio = axes, Ratio(problem, zero.p, [axis.key for axis in axes], budget, rtol)
         self._seconds, self._spent = seconds, spent or Message(Code.LINE_SPENT, most=seconds)
         self.spent_seconds, self.stopped = 0.0, None if seconds > 0 else self._spent
-        self._before: tuple[FloatArray, Mapping[float, Solution]] = np.full(2, math.inf), {}
+        self._before = np.full(2, math.inf)
 
-    def __call__(self, at: FloatArray, rtol: float | None = None) -> Sample:
-        """F at (u, v); with an rtol to that alone, begun anew.
+    def __call__(self, at: FloatArray) -> Sample:
+        """F at (u, v).
 
         Raises:
             FpsolveError: there is none, or the time does not suffice.
@@ -251,7 +289,7 @@ class ZeroField:
         share = Countdown(HALF * left)
         try:
             with share.running():
-                return self._at(at, rtol)
+                return self._at(at)
         except OverBudget as failure:
             if failure.countdown is not share:
                 raise
@@ -263,21 +301,11 @@ class ZeroField:
         self.stopped = self._spent
         return NotConverged(self.stopped)
 
-    def _at(self, at: FloatArray, rtol: float | None) -> Sample:
+    def _at(self, at: FloatArray) -> Sample:
         """F at (u, v), from a solve. Raises `FpsolveError`."""
-        values = {axis.key: float(axis.value(share)) for axis, share in zip(self._axes, at, strict=True)}
-        try:
-            problem = self._problem.at(values)
-        except ValueError as failure:
-            raise FpsolveError(Message(Code.NO_PROBLEM, reason=said(failure))) from failure
-        p = self._zero.p
-        refuse_infinite(problem, p)
-        own: Any = {"rtol": rtol or self._rtol, "budget": self._budget}
-        place, known = self._before
-        is_near = rtol is None and bool(np.linalg.norm(at - place) <= NEAR)
-        solver = ExponentSolver(problem, starts=known if is_near else {}, **own)
-        value, error, slopes = ratio_with_slopes(solver, p, [axis.key for axis in self._axes])
-        gradient = slopes * np.array([axis.slope(share) for axis, share in zip(self._axes, at, strict=True)])
-        if rtol is None:
-            self._before = at, solver.whole.known
-        return Sample(at, value, gradient, error, solver.scale(p) / abs(p) if p else solver.scales.linear)
+        places = list(zip(self._axes, at.tolist(), strict=True))
+        theta = np.array([axis.value(share) for axis, share in places])
+        slopes = np.array([axis.slope(share) for axis, share in places])
+        found = self._ratio(theta, is_near=bool(np.linalg.norm(at - self._before) <= NEAR))
+        self._before = at
+        return found._replace(at=at, gradient=found.gradient * slopes)

@@ -193,7 +193,7 @@ class Search:
                 choice = finer(choice)
         if choice.size > MOST_UNKNOWNS:
             data = {"unknowns": choice.size, "most": MOST_UNKNOWNS, "size": self._reached}
-            raise NotConverged(Message(Code.RESPONSE_TOO_LARGE, **data))
+            raise NotConverged(Message(Code.RESPONSE_OPEN, **data))
         self.unknowns = max(self.unknowns, choice.size)
         with one_thread():
             if levels[:2] not in self._planes:

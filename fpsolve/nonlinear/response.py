@@ -39,8 +39,6 @@ if TYPE_CHECKING:
 
 AT_ONE_PHASE = 2.0
 """By what the error estimate of the flux at the impacts is larger: it converges like n^(−3/2) or slower in φ."""
-SEEN = 1e-8
-"""Of the largest density, above which its sign counts."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -37,7 +37,7 @@ class DesignOutcome:
     @property
     def is_out_of_reach(self) -> bool:
         """Whether there is none, and that is known."""
-        return self.reason is not None and self.reason.code in (Code.UNREACHED, Code.INDEX_UNREACHED)
+        return self.reason is not None and self.reason.code is Code.UNREACHED
 
     def expectation(self, case: Case) -> dict[str, Any] | None:
         """What a case with these values expects, as its file states it; None where its p are others."""

@@ -17,7 +17,7 @@ SAMPLES = 1001
 SIDE_SAMPLES = 601
 """Number of values of a diffusion on each side."""
 FREQUENCIES = np.linspace(0, 2, 41)
-"""In those of the filter, at which its noise may swing."""
+"""Frequencies at which the noise of a filter may swing, over that of the filter."""
 AMPLITUDES = 401
 """Number of amplitudes of a swing."""
 PHASES = 32

@@ -524,22 +524,6 @@ def test_newton_s_method_goes_on_while_it_gains_a_digit_a_step(height):
     assert correct(steep(), np.array([0.5, 0.58]), np.array([1.0, 0.0])) is None
 
 
-@pytest.mark.slow
-def test_zeros_of_a_scan_are_told_apart_by_a_coarse_function():
-    """The scan of a steep F shows zeros off its line, which cost coarse values; a branch costs one way to its start."""
-    fine, coarse = [], []
-    scan = scan_of(steep())
-    exact, off = steep(fine), steep(coarse)
-    [branch] = find_branches(exact, scan, coarse=lambda at: off(at)._replace(error=1e-6))
-    check(branch, exact)
-    in_branch = len(branch.points) * 3
-    assert len(fine) < in_branch
-    [same] = find_branches(steep(alone := []), scan)
-    assert apart(branch, same.at) < 1e-9
-    assert len(fine) < len(alone)
-    assert list(find_branches(exact, scan, coarse=lambda at: Sample(at, 1.0, np.ones(2), 0.0, 1.0))) == []
-
-
 def met(one, other):
     """Crossings of all branches of two curves, as sorted points; each is checked."""
     found_there = []

@@ -193,7 +193,7 @@ def test_growth_that_is_reached_where_moments_are_not_solved_is_refused_soon(mon
     monkeypatch.setattr(ExponentSolver, "ratio", within_reach)
     with pytest.raises(NotConverged, match=r"beyond it Λ\(p\) is not solved: Λ\(3.4\) did not converge") as caught:
         rate_function(uniform(), [0.5, 3.3])
-    assert [each.code for each in caught.value.message.data["reasons"]] == [Code.GROWTH_UNSOLVED]
+    assert [each.code for each in caught.value.message.data["reasons"]] == [Code.GROWTH_BEYOND]
     np.testing.assert_allclose(caught.value.partial.p, [0.6], rtol=1e-8)
     assert len(asked) <= 9
 

@@ -574,7 +574,7 @@ class Worked:
 
     def __init__(self, monkeypatch, cost):
         self.now, self.cost = 0.0, cost
-        monkeypatch.setattr(ZeroField, "_at", lambda _, at, rtol: self.sample(at))
+        monkeypatch.setattr(ZeroField, "_at", lambda _, at: self.sample(at))
         monkeypatch.setattr(budget, "OVERHEAD_OPERATIONS", 0.0)
 
     def sample(self, at):
