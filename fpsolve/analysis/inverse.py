@@ -2,8 +2,7 @@
 
 One parameter: Newton's iteration on F(θ) = 0 of `Distance`, within a bracket as soon as F has both signs. Where it
 leads out of the range, or F cannot be solved on its way, F is scanned over the range, and where it turns between two
-points the least |F| is sought by the cubic that has their values and slopes. If F has one sign everywhere, the target
-cannot be reached.
+points the least |F| is sought, at which the slope is 0. If F has one sign everywhere, the target cannot be reached.
 
 Several parameters: of all θ with F(θ) = 0 the one that is nearest to the θ⁰ of the problem,
 
@@ -24,8 +23,7 @@ from itertools import pairwise, product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.polynomial import Polynomial
-from scipy.optimize import minimize
+from scipy.optimize import brentq, minimize
 
 from fpsolve.analysis.scan import TOLERANCE, Sample
 from fpsolve.analysis.target import Distance, Target, start_and_stop, target_of
@@ -53,6 +51,8 @@ MOST_STEPS = 60
 """Largest number of quadratic problems."""
 MOST_REFINEMENTS = 12
 """Largest number of points between two of a scan where |F| is least."""
+TURN = 1e-4
+"""Error of the place of the least |F|, over the distance of these two points."""
 MOST_PARAMETERS = 6
 """Largest number of parameters, as all corners of their ranges are points of a scan."""
 SAME = 1e-8
@@ -296,29 +296,18 @@ class _Path:
         return None
 
     def _refine(self, a: float, b: float) -> None:
-        """Look for the value of F next to 0 between two neighbours, until F changes its sign."""
-        for _ in range(MOST_REFINEMENTS):
-            one, other = self._size(a), self._size(b)
-            sign = math.copysign(1.0, one)
-            if not (sign * self.rise(a) < 0 < sign * self.rise(b)):
-                return
-            u = a + (b - a) * _turn(one, other, self.rise(a) * (b - a), self.rise(b) * (b - a))
-            last = min(abs(one), abs(other))
-            if not a < u < b or self.at(u) is None:
-                return
-            now = self._size(u)
-            if now * sign <= 0 or abs(abs(now) - last) <= 1e-6 * last:
-                return
-            a, b = (u, b) if sign * self.rise(u) < 0 else (a, u)
+        """Look for the value of F next to 0 between two neighbours, where its slope is 0, until F changes its sign."""
+        sign = math.copysign(1.0, self._size(a))
 
+        def rise(u: float) -> float:
+            sample = self.at(u)
+            if sample is None or sign * sample.value <= 0:
+                raise StopIteration
+            return sign * self.rise(u)
 
-def _turn(one: float, other: float, rise: float, fall: float) -> float:
-    """Where on [0, 1] the cubic with two values and two slopes at the ends turns."""
-    second, third = 3 * (other - one) - 2 * rise - fall, 2 * (one - other) + rise + fall
-    cubic = Polynomial([one, rise, second, third])
-    roots = [complex(root) for root in Polynomial([rise, 2 * second, 3 * third]).roots()]
-    turns = [root.real for root in roots if abs(root.imag) < 1e-9 and 0 < root.real < 1]
-    return min(turns, key=lambda u: abs(float(cubic(u))), default=0.5)
+        with suppress(StopIteration):
+            if rise(a) < 0 < rise(b):
+                brentq(rise, a, b, xtol=TURN * (b - a), maxiter=MOST_REFINEMENTS, disp=False)
 
 
 def _along_axis(distance: Distance, axis: Axis) -> Sample | Absent:
