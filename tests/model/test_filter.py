@@ -280,11 +280,11 @@ def test_a_strong_slow_filter():
     """The functions carry a factor, with which a twentieth of the unknowns does; and ∂Λ/∂θ where they do."""
     assert (found := random_filters.compared(20)).is_within, found
     assert math.prod(found.shape) < 6000
-    problem, h = random_filters.problem_of(*random_filters.drawn(20)), 1e-4
-    pair = ExponentSolver(problem, rtol=1e-9).solution(2.0).pair
+    problem, h = random_filters.problem_of(*random_filters.drawn(20)), 3e-3
+    pair = ExponentSolver(problem, rtol=1e-7).solution(2.0).pair
     key = "noise.zeta"
     sides = [problem.at({key: problem.values[key] + side * h}) for side in (1, -1)]
-    more, less = (ExponentSolver(each, rtol=1e-9).solution(2.0).pair.value for each in sides)
+    more, less = (ExponentSolver(each, rtol=1e-7).solution(2.0).pair.value for each in sides)
     slope = Changed(PairDerivatives(pair), problem.derivative(key)).value.value
     assert slope == pytest.approx((more - less) / (2 * h), rel=1e-4)
 

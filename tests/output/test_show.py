@@ -100,6 +100,18 @@ for path in sys.argv[2:]:
 print(json.dumps({"single": single, "jumps": jumps, "fields": fields, "kinds": sorted(kinds)}))
 """
 
+REFUSED = """
+import json, runpy, sys
+codes = []
+for arguments in json.loads(sys.argv[1]):
+    sys.argv = arguments
+    try:
+        runpy.run_path(arguments[0], run_name="__main__")
+    except SystemExit as ended:
+        codes.append(ended.code)
+print(json.dumps(codes))
+"""
+
 
 def test_paraview_reads_a_series_a_density_and_a_mesh(paraview, tmp_path):
     solver = ExponentSolver(Problem(HARD, UNIT_NOISE), MESHES["half circle"])
@@ -141,19 +153,19 @@ def test_show_script_draws_a_field(paraview, results):
     assert {file: file.read_bytes() for file in before} == before
 
 
-@pytest.mark.parametrize("p", ["1.9", "nan"])
-def test_show_script_refuses_a_p_that_is_not_there(paraview, results, p):
-    done = paraview(results, "show.py", "--p", p)
-    assert done.returncode != 0
-    assert f"--p {p}: " in done.stderr
-    assert "choose one of -1, 0, 2" in done.stderr
-    assert not (results / "eigenfunctions.png").exists()
-
-
-def test_show_script_refuses_a_folder_without_a_series(paraview, tmp_path):
-    done = paraview(tmp_path, copy_show_script(tmp_path))
-    assert done.returncode != 0
+def test_show_script_refuses_what_is_not_there(paraview, results, tmp_path):
+    """A p, and a folder without a series; one ParaView runs the script three times."""
+    alone, script = copy_show_script(tmp_path), tmp_path / "three.py"
+    script.write_text(REFUSED)
+    asked = ["show.py", "--p", "1.9"], ["show.py", "--p", "nan"], [str(alone)]
+    done = paraview(results, script, json.dumps(asked))
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout) == [2, 2, 2]
+    for p in ("1.9", "nan"):
+        assert f"--p {p}: " in done.stderr
+    assert done.stderr.count("choose one of -1, 0, 2") == 2
     assert f"there is no {tmp_path / 'eigenfunctions.pvd'}; name the collection with --collection" in done.stderr
+    assert not (results / "eigenfunctions.png").exists()
 
 
 def test_the_command_without_a_display_is_the_same_everywhere():

@@ -3,6 +3,7 @@
 import re
 import sys
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -26,7 +27,6 @@ from fpsolve.output.terminal import (
 from fpsolve.study.results import Comparison, CurveResult, MomentColumns
 from fpsolve.study.simulate import simulate_curves
 from fpsolve.study.solve import failed
-from tests.conftest import sampled
 from tests.solving import ALL, case_in, solve_case
 from tests.test_workflow import TEXT
 
@@ -54,15 +54,17 @@ def terminal(monkeypatch):
     return begin
 
 
-@pytest.mark.parametrize("width", sampled(80, 60, 200))
-def test_quantities_are_whole(case, width, capsys, terminal):
+def test_quantities_are_whole(case, capsys, terminal):
     results, simulated = solve_case(case), tuple(simulate_curves(case))
-    terminal(width)
-    for show, names in (
-        (lambda: print_results(case, results), {"λ", "δ_p", "Λ″(0)", "N", "R_c", *MEANS} - {"⟨x⟩"}),
-        (lambda: print_simulation(case, simulated), {"λ", "Λ″(0)", *MEANS} - {"⟨A²⟩", "⟨A⁴⟩"}),
-        (lambda: print_simulation(case, simulated, results), {"λ", "Λ″(0)", *MEANS} - {"⟨A²⟩", "⟨A⁴⟩"}),
+    for width, (show, names) in product(
+        (60, 80, 200),
+        (
+            (lambda: print_results(case, results), {"λ", "δ_p", "Λ″(0)", "N", "R_c", *MEANS} - {"⟨x⟩"}),
+            (lambda: print_simulation(case, simulated), {"λ", "Λ″(0)", *MEANS} - {"⟨A²⟩", "⟨A⁴⟩"}),
+            (lambda: print_simulation(case, simulated, results), {"λ", "Λ″(0)", *MEANS} - {"⟨A²⟩", "⟨A⁴⟩"}),
+        ),
     ):
+        terminal(width)
         show()
         lines = capsys.readouterr().out.splitlines()
         assert {name for line in lines for name in QUANTITY.findall(line)} == names

@@ -194,7 +194,7 @@ def test_an_oscillator_with_what_it_drives(noise):
         return [[*row, 0.0] for row in matrix] + [[own, 0.0, -own]]
 
     pair = PlaneSystem(terms(lambda matrix, own: matrix)), LinearSystem(terms(wider))
-    (one, [first]), (other, [second]) = (outcome(Problem(each, noise), [1.0], time=100.0, paths=4096) for each in pair)
+    (one, [first]), (other, [second]) = (outcome(Problem(each, noise), [1.0], time=50.0, paths=4096) for each in pair)
     assert abs(first[0] - second[0]) < 4 * math.hypot(first[1], second[1])
     assert max(first[1], second[1]) < 5e-3
     gap = one.lyapunov_exponent - other.lyapunov_exponent
