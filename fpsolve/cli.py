@@ -6,6 +6,7 @@ import math
 import os
 import re
 import sys
+import traceback
 import warnings
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -16,14 +17,15 @@ from shlex import quote
 from textwrap import fill
 from time import monotonic
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any
 
-from cyclopts import App, CycloptsError, CycloptsPanel, Parameter, Token
+from cyclopts import App, CycloptsError, CycloptsPanel, Parameter
 
 from fpsolve import __version__
 from fpsolve.arrays import shown
 from fpsolve.case.remedies import CASE_WORDS
 from fpsolve.errors import CaseError, FpsolveError, NotConverged, WorkersDied
+from fpsolve.measured.statement import Count, ModeRows, ModesFile, Statement
 from fpsolve.messages import Severity, escaped, message_of
 from fpsolve.output.letters import HANDLER
 from fpsolve.signals import INTERRUPTED, ended_by_signals
@@ -35,6 +37,9 @@ if TYPE_CHECKING:
     from fpsolve.workflow.progress import Watch
 
 CHECK_FAILED, BAD_INPUT, NOT_CONVERGED, CLOSED_PIPE = 1, 2, 3, 141
+TRACEBACK = "--traceback"
+"""What any command takes to print also where an error was raised."""
+NOTHING_STATED = Statement()
 
 app = App(
     name="fpsolve",
@@ -59,15 +64,6 @@ SET = f"Another value for a key of the case, e.g. oscillator.omega=2.0 or system
 Overrides = Annotated[list[str] | None, Parameter(name="--set", help=SET, negative="")]
 
 
-def _whole(_: type, tokens: Sequence[Token]) -> int:
-    """A whole number; cyclopts alone would take 2.5 for 2."""
-    try:
-        return int(tokens[0].value)
-    except ValueError:
-        raise ValueError(f'got "{tokens[0].value}"; must be a whole number') from None
-
-
-Count = Annotated[int, Parameter(converter=_whole)]
 Jobs = Annotated[Count | None, Parameter(help="Number of processes; if omitted, the number of processors.")]
 Out = Annotated[Path, Parameter(help="Folder for the results.")]
 Scheduler = Annotated[
@@ -97,12 +93,6 @@ Interactive = Annotated[
 ]
 
 
-Modes = Annotated[
-    Path | None, Parameter(help="A table of natural frequencies and damping ratios, Fn and Xi, as pyOMA writes it.")
-]
-Mode = Annotated[list[Count] | None, Parameter(help="A row of this table; of two modes twice.", negative="")]
-
-
 def main(argv: Sequence[str] | None = None) -> int:
     """Run a command, and return its exit code, see the help of `app`.
 
@@ -120,22 +110,22 @@ def _run(argv: Sequence[str] | None) -> int:
     for stream in (sys.stdout, sys.stderr):  # a terminal that has no Greek shows its names
         if isinstance(stream, TextIOWrapper):
             stream.reconfigure(errors=HANDLER)
+    given = sys.argv[1:] if argv is None else argv
     try:
         try:
             Path.cwd()
         except OSError:
             raise FpsolveError("the working folder does not exist any more; change to another folder") from None
-        code = _called(sys.argv[1:] if argv is None else argv)
+        code = _called([each for each in given if each != TRACEBACK])
         if sys.stdout is not None:  # as it is where the output is closed
             sys.stdout.flush()
     except CycloptsError:  # cyclopts has said what is wrong
         return BAD_INPUT
-    except (NotConverged, WorkersDied) as failure:
-        print_error(failure.message)
-        return NOT_CONVERGED
     except FpsolveError as failure:
+        if TRACEBACK in given:
+            traceback.print_exc()
         print_error(failure.message)
-        return BAD_INPUT
+        return NOT_CONVERGED if isinstance(failure, NotConverged | WorkersDied) else BAD_INPUT
     except KeyboardInterrupt as interrupt:
         print_error(str(interrupt) or "interrupted")
         return INTERRUPTED
@@ -175,6 +165,7 @@ def _overview() -> str:
     about = [filled(part) for part in ["Usage: fpsolve COMMAND", *app.help.split("\n\n")]]
     told = [filled(text, f"  {name:{width}}  ", " " * (width + 4)) for name, text in commands.items()]
     told += ["", "fpsolve COMMAND --help tells of its arguments, fpsolve --version of the version."]
+    told += ["With --traceback a command also prints where an error was raised."]
     return "\n".join(["\n\n".join(about), "", "Commands:", *told])
 
 
@@ -226,8 +217,8 @@ def new(
         list[float] | None,
         Parameter(help="Its damping as a share of critical damping; 0.01 if omitted.", negative=""),
     ] = None,
-    modes: Modes = None,
-    mode: Mode = None,
+    modes: ModesFile = None,
+    mode: ModeRows = None,
     restitution: Annotated[
         float | None, Parameter(help="Speed after a bounce off its wall over that before; no wall if omitted.")
     ] = None,
@@ -677,66 +668,7 @@ def noise(
         ),
     ] = None,
     *,
-    record: Annotated[
-        Path | None,
-        Parameter(
-            help="A record of values over time instead, also .wav; beside a spectrum its variance is compared with it."
-        ),
-    ] = None,
-    per: Annotated[
-        Literal["Hz", "rad/s"] | None,
-        Parameter(help="The unit of the frequencies; if omitted that of the file, which must state it."),
-    ] = None,
-    sided: Annotated[
-        Literal["one", "two"] | None,
-        Parameter(help="Whether the integral over f > 0 is the variance, one, or half of it, two."),
-    ] = None,
-    frequency: Annotated[
-        list[float] | None,
-        Parameter(
-            help="Natural frequency in the unit of --per, Hz if that is omitted; of two modes twice.", negative=""
-        ),
-    ] = None,
-    damping_ratio: Annotated[
-        float | None,
-        Parameter(help="Damping as a share of critical damping: states an oscillator, whose verdict is told."),
-    ] = None,
-    restitution: Annotated[
-        float | None, Parameter(help="Speed after a bounce off its wall over that before; no wall if omitted.")
-    ] = None,
-    case: Annotated[Path | None, Parameter(help="A case instead, whose noise is replaced.")] = None,
-    modes: Modes = None,
-    mode: Mode = None,
-    noise_in: Annotated[
-        Literal["stiffness", "damping"] | None,
-        Parameter(help="Where the noise is; stiffness if neither this nor --of is stated."),
-    ] = None,
-    of: Annotated[
-        Literal["stiffness", "damping", "acceleration", "height"] | None,
-        Parameter(
-            help="What was measured: the relative stiffness, the damping in 1/s, the vertical acceleration of the "
-            "support of a pendulum in m/s^2, or the metacentric height of a ship in m; that of --noise-in if omitted."
-        ),
-    ] = None,
-    length: Annotated[
-        float | None, Parameter(help="Length of the pendulum in m, from which its natural frequency follows.")
-    ] = None,
-    gm: Annotated[float | None, Parameter(help="Mean metacentric height in m, for --of height.")] = None,
-    kind: Annotated[
-        Literal["ornstein-uhlenbeck", "filter", "bounded", "non-gaussian"], Parameter(help="The kind of noise.")
-    ] = "ornstein-uhlenbeck",
-    terms: Annotated[Count, Parameter(help="How many noises of the kind are added, 1 to 3.")] = 1,
-    method: Annotated[
-        Literal["spectrum", "whittle"],
-        Parameter(help="Of a record: its spectrum by Welch's method, or Whittle's likelihood."),
-    ] = "spectrum",
-    column: Annotated[str | None, Parameter(help="The column of values, if the file has several.")] = None,
-    rate: Annotated[
-        float | None, Parameter(help="Values of the record per second, if the file states no times.")
-    ] = None,
-    averages: Annotated[
-        float | None, Parameter(help="How many independent periodograms the spectrum is the mean of: tells its errors.")
-    ] = None,
+    stated: Statement = NOTHING_STATED,
     out: Out = Path("results"),
     json: Annotated[bool, Parameter(help="Print noise.json in one line.", negative="")] = False,
 ) -> int:
@@ -752,17 +684,12 @@ def noise(
     """
     from fpsolve.output.noises import Convention, print_noise
     from fpsolve.output.terminal import print_written
-    from fpsolve.workflow.noise import Statement, measurement_of, noise_case
+    from fpsolve.workflow.noise import measurement_of, noise_case
 
     start = monotonic()
-    stated = Statement(
-        spectrum=spectrum, record=record, per=per, sided=sided, frequency=tuple(frequency or ()),
-        damping_ratio=damping_ratio, restitution=restitution, case=load([case], None)[0] if case else None, modes=modes,
-        mode=tuple(mode or ()), noise_in=noise_in, of=of, length=length, gm=gm, kind=kind, terms=terms, method=method,
-        column=column, rate=rate, averages=averages,
-    )  # fmt: skip
-    data, wanted, source = measurement_of(stated)
-    shown = Convention(per or "Hz", sided or "one")
+    case = load([stated.case], None)[0] if stated.case else None
+    data, wanted, source = measurement_of(spectrum, stated, case)
+    shown = Convention(stated.per or "Hz", stated.sided or "one")
     outcome, folder, names = noise_case(data, wanted, source, shown, out, _watch(is_json=json))
     if json:
         print(" ".join(line.strip() for line in (folder / names[0]).read_text(encoding="utf-8").splitlines()))

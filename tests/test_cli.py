@@ -669,6 +669,17 @@ def test_json_prints_the_summary_and_nothing_else(case, tmp_path, capsys):
     assert err == ""
 
 
+def test_traceback_shows_where_an_error_was_raised(tmp_path, capsys):
+    command = ["run", str(tmp_path / "nothing.toml")]
+    assert main(command) == BAD_INPUT
+    plain = capsys.readouterr().err
+    assert "Traceback" not in plain
+    assert main([*command, "--traceback"]) == BAD_INPUT
+    traced = capsys.readouterr().err
+    assert traced.startswith("Traceback")
+    assert traced.endswith(plain)
+
+
 def test_a_run_where_there_is_no_command_line(tmp_path, monkeypatch):
     """As where Python is embedded."""
     monkeypatch.setattr(sys, "argv", [])

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 
@@ -16,11 +15,10 @@ from fpsolve.errors import FpsolveError
 from fpsolve.fem.factors import one_thread
 from fpsolve.files import alone, writable
 from fpsolve.measured import Record, Spectrum, read_modes, read_record, read_spectrum
-from fpsolve.measured.reading import Per, Sided
 from fpsolve.measured.signals import SIGNALS
 from fpsolve.measured.spectrum import UNITS
+from fpsolve.measured.statement import Statement
 from fpsolve.measured.units import GRAVITY
-from fpsolve.measured.weak import Where
 from fpsolve.output.noises import Convention, write_noise
 from fpsolve.study.noise import (
     CLOSE,
@@ -64,33 +62,9 @@ def noise_case(
     return outcome, folder, names
 
 
-@dataclass(frozen=True)
-class Statement:
-    """What a user says of a measurement, by the options of `fpsolve noise`."""
-
-    spectrum: Path | None = None
-    record: Path | None = None
-    per: Per | None = None
-    sided: Sided | None = None
-    frequency: tuple[float, ...] = ()
-    damping_ratio: float | None = None
-    restitution: float | None = None
-    case: Case | None = None
-    modes: Path | None = None
-    mode: tuple[int, ...] = ()
-    noise_in: Where | None = None
-    of: str | None = None
-    length: float | None = None
-    gm: float | None = None
-    kind: str = "ornstein-uhlenbeck"
-    terms: int = 1
-    method: Literal["spectrum", "whittle"] = "spectrum"
-    column: str | None = None
-    rate: float | None = None
-    averages: float | None = None
-
-
-def measurement_of(stated: Statement) -> tuple[Spectrum | Record, Wanted, Path]:
+def measurement_of(
+    spectrum: Path | None, stated: Statement, case: Case | None = None
+) -> tuple[Spectrum | Record, Wanted, Path]:
     """What was measured, in the unit of its signal, what is to be fitted, and the file.
 
     Raises:
@@ -100,31 +74,31 @@ def measurement_of(stated: Statement) -> tuple[Spectrum | Record, Wanted, Path]:
     place = SIGNALS[of].noise_in
     if stated.noise_in not in (None, place):
         raise FpsolveError(f"got --of {of} and --noise-in {stated.noise_in}; {of} is in the {place}; leave one out")
-    source = stated.spectrum or stated.record
+    source = spectrum or stated.record
     if source is None:
         raise FpsolveError("name a file: that of a spectrum, or of a record by --record")
-    modes = _modes(stated, of)
-    if stated.case:
-        refuse_wrong_case(stated.case, of, stated.terms)
+    modes = _modes(stated, of, case)
+    if case:
+        refuse_wrong_case(case, of, stated.terms)
     if (of == "height") != (stated.gm is not None):
         remedy = "leave it out" if stated.gm is not None else "state the mean metacentric height in m by --gm"
         raise FpsolveError(f"--gm belongs to --of height; {remedy}")
     if stated.gm is not None and not 0 < stated.gm < math.inf:
         raise FpsolveError(f"got --gm {stated.gm}; must be > 0, in m")
-    wanted = Wanted(of, stated.kind, stated.terms, stated.method, modes, stated.gm, stated.case)
+    wanted = Wanted(of, stated.kind, stated.terms, stated.method, modes, stated.gm, case)
     record = read_record(stated.record, rate=stated.rate, of=of, column=stated.column) if stated.record else None
-    if stated.spectrum is not None:
+    if spectrum is not None:
         if stated.method == "whittle":
             raise FpsolveError("--method whittle is for a record, and a spectrum was named; leave it out")
         if stated.rate is not None and record is None:
             raise FpsolveError("--rate is for a record, and a spectrum was named; leave it out, or name it by --record")
-    if stated.spectrum is None and record is not None:
+    if spectrum is None and record is not None:
         for name in ("sided", "averages"):
             if getattr(stated, name) is not None:
                 raise FpsolveError(f"--{name} is for a spectrum, and a record was named; leave it out")
         return record, wanted, source
     data = read_spectrum(
-        stated.spectrum or source,
+        spectrum or source,
         per=stated.per,
         sided=stated.sided,
         of=of,
@@ -135,14 +109,14 @@ def measurement_of(stated: Statement) -> tuple[Spectrum | Record, Wanted, Path]:
     return data, wanted, source
 
 
-def _modes(stated: Statement, of: str) -> Modes:
+def _modes(stated: Statement, of: str, case: Case | None) -> Modes:
     """The natural frequencies and the damping by the one option that states them."""
     restitution, zeta = stated.restitution, stated.damping_ratio
     if zeta is not None and math.isnan(zeta):
         raise FpsolveError("got --damping-ratio nan; must be -1 < value < 1; leave it out if it is not known")
     if stated.mode and stated.modes is None:
         raise FpsolveError("--mode is for the table that --modes names; name one, or leave it out")
-    if stated.case and (zeta is not None or restitution is not None or stated.modes is not None):
+    if case and (zeta is not None or restitution is not None or stated.modes is not None):
         raise FpsolveError("--case states the system; leave out --damping-ratio, --restitution and --modes")
     if stated.restitution is not None and zeta is None and stated.modes is None:
         raise FpsolveError("--restitution needs the damping of the oscillator, too; state --damping-ratio")
@@ -154,13 +128,11 @@ def _modes(stated: Statement, of: str) -> Modes:
         if of != "acceleration" or not 0 < stated.length < math.inf:
             raise FpsolveError(f"got --length {stated.length}; must be > 0, in m, and is for --of acceleration")
         found["--length"] = (math.sqrt(GRAVITY / stated.length) / (2 * math.pi),)
-    if stated.case:
-        found["--case"] = tuple(each / (2 * math.pi) for each in natural_frequencies(stated.case.system)[:2])
+    if case:
+        found["--case"] = tuple(each / (2 * math.pi) for each in natural_frequencies(case.system)[:2])
         if not found["--case"]:
-            raise FpsolveError(
-                f"{stated.case.path}: does not oscillate without noise, so that no frequency matters most"
-            )
-    table = modes_from(stated.modes, stated.mode, restitution) if stated.modes else None
+            raise FpsolveError(f"{case.path}: does not oscillate without noise, so that no frequency matters most")
+    table = modes_from(stated.modes, stated.mode or (), restitution) if stated.modes else None
     if table is not None:
         found["--modes"] = tuple(each / (2 * math.pi) for each in table.omega)
     if not found:
