@@ -194,20 +194,20 @@ class HarmonicAxis(DirectionAxis):
         sides = np.linalg.norm(points[: dimensions[0]], axis=0), np.linalg.norm(points[dimensions[0] :], axis=0)
         x = (sides[0] - sides[1]) * (sides[0] + sides[1])
         degrees = [group(k, most).degrees for k in dimensions]
-        of_waves = waves_at(dimensions, most, points).reshape(x.size, *map(len, degrees))
-        columns, own_degrees = list[FloatArray](), list[IntArray]()
+        first, second = waves_at(dimensions, most, points)
+        values, own_degrees = list[FloatArray](), list[IntArray]()
         for m, k in ((m, k) for m in np.unique(degrees[0]) for k in np.unique(degrees[1])):
             if (m + k) % 2 or m + k > most:
                 continue
             rows = np.arange((most - m - k) // 2 + 1)
             alpha, beta = k + dimensions[1] / 2 - 1, m + dimensions[0] / 2 - 1
-            own = (sides[0] ** m * sides[1] ** k)[:, None] * eval_jacobi(rows, alpha, beta, x[:, None])
-            own = own / np.sqrt(_mean_squares(rows, alpha, beta, dimensions))
-            of_pair = of_waves[:, degrees[0] == m][:, :, degrees[1] == k].reshape(x.size, -1)
-            columns.append((of_pair[:, :, None] * own[:, None, :]).reshape(x.size, -1))
-            own_degrees.append(np.tile(m + k + 2 * rows, of_pair.shape[1]))
+            own = sides[0] ** m * sides[1] ** k * eval_jacobi(rows[:, None], alpha, beta, x)
+            own = own / np.sqrt(_mean_squares(rows, alpha, beta, dimensions))[:, None]
+            of_pair = (first[degrees[0] == m][:, None] * second[degrees[1] == k]).reshape(-1, 1, x.size)
+            values.append((of_pair * own).reshape(-1, x.size))
+            own_degrees.append(np.tile(m + k + 2 * rows, len(of_pair)))
         by_degree = np.argsort(np.concatenate(own_degrees), kind="stable")
-        return np.concatenate(columns, axis=1)[:, by_degree[self._harmonics.own]]
+        return np.concatenate(values)[by_degree[self._harmonics.own]].T
 
 
 def _mean_squares(degrees: IntArray, alpha: float, beta: float, dimensions: tuple[int, int]) -> FloatArray:

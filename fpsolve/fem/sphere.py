@@ -437,7 +437,9 @@ class SphereAxis(DirectionAxis):
     def at(self, points: FloatArray) -> csr_matrix:
         first, second = (points[each] for each in self._slices)
         on_line = self.line.at(np.arctan2(np.linalg.norm(second, axis=0), np.linalg.norm(first, axis=0)))
-        of_waves = waves_at(self.dimensions, self.waves + 2, points)[:, self._of_product]
+        first_waves, second_waves = waves_at(self.dimensions, self.waves + 2, points)
+        of_first, of_second = np.divmod(self._of_product, len(second_waves))
+        of_waves = (first_waves[of_first] * second_waves[of_second]).T
         shape = len(of_waves), self.degree + 1
         nodes, values = (each.reshape(shape) for each in (on_line.indices, on_line.data))
         place = np.full(self.line.size * self._waves.own.size, -1)
@@ -449,26 +451,25 @@ class SphereAxis(DirectionAxis):
 
     @cached_property
     def _of_product(self) -> IntArray:
-        """Where the waves that functions have are among all products of `waves_at`."""
+        """Where the waves that functions have are among all products of one of `waves_at` of each group."""
         reach = self.waves + 2
         first, second = (group(k, reach).degrees for k in self.dimensions)
         sums = np.add.outer(first, second).ravel()
         return np.flatnonzero((sums % 2 == 0) & (sums <= reach))[self._waves.own]
 
 
-def waves_at(dimensions: tuple[int, int], most: int, points: FloatArray) -> FloatArray:
-    """The products of the waves of both groups up to a degree, at directions; shape (m, products)."""
+def waves_at(dimensions: tuple[int, int], most: int, points: FloatArray) -> list[FloatArray]:
+    """The waves of each of both groups up to a degree, at directions; shape (waves, m)."""
     tables, start = list[FloatArray](), 0
     for dimension in dimensions:
         own, start = points[start : start + dimension], start + dimension
         if dimension == 1:
-            tables.append(np.stack([np.ones(own.shape[1]), np.where(own[0] < 0, -1.0, 1.0)], axis=1))
+            tables.append(np.stack([np.ones(own.shape[1]), np.where(own[0] < 0, -1.0, 1.0)]))
             continue
-        turns = np.outer(np.arctan2(own[1], own[0]), np.arange(1, most + 1))
-        waves = math.sqrt(2) * np.stack([np.cos(turns), np.sin(turns)], axis=2)
-        tables.append(np.column_stack([np.ones(len(turns)), waves.reshape(len(turns), -1)]))
-    first, second = tables
-    return (first[:, :, None] * second[:, None, :]).reshape(len(first), -1)
+        turns = np.outer(np.arange(1, most + 1), np.arctan2(own[1], own[0]))
+        waves = math.sqrt(2) * np.stack([np.cos(turns), np.sin(turns)], axis=1)
+        tables.append(np.vstack([np.ones(turns.shape[1]), waves.reshape(-1, turns.shape[1])]))
+    return tables
 
 
 class SphereTerms(NoiseTerms):
