@@ -57,10 +57,12 @@ MOST_PARAMETERS = 6
 """Largest number of parameters, as all corners of their ranges are points of a scan."""
 SAME = 1e-8
 """Distance of x from the nearest point that no longer counts, relative to the larger of 1 and |x|."""
+BEYOND = 0.1
+"""Rise of |F| with the distance from the last point, over |∇F|, that is assumed where F has no value."""
+NEAREST = 1e-6
+"""Largest component of x + μ ∇F, but for what leads out of a range, at the nearest point."""
 FALL = 1e-15
 """Change of ½|x|² with which the quadratic problems end."""
-FARTHER = 10.0
-"""Factor to the largest |F| that is known, for what stands for F where it has no value, so that steps are shortened."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -381,40 +383,44 @@ def _nearest_from(
     """The nearest point to θ⁰, the origin, by steps from θ; None where they lead nowhere."""
     if (first := distance.tried(start)) is None:
         return None
-    low, high = np.array([(axis.start, axis.stop) for axis in axes]).T
-    size, before = float(np.linalg.norm(first.gradient * units)) or 1.0, (start - origin) / units
+    low, high = (
+        (np.array(ends) - origin) / units for ends in zip(*((axis.start, axis.stop) for axis in axes), strict=True)
+    )
+    size, taken = float(np.linalg.norm(first.gradient * units)) or 1.0, [first]
 
-    def sample(x: FloatArray) -> Sample | None:
-        return distance.tried(np.clip(origin + x * units, low, high))
+    def x_of(sample: Sample) -> FloatArray:
+        return (sample.at - origin) / units
+
+    def at(x: FloatArray) -> Sample | None:
+        return distance.tried(origin + np.clip(x, low, high) * units)
 
     def value(x: FloatArray) -> float:
-        if (here := sample(x)) is None:
-            return FARTHER * max(abs(each.value) for each in distance.samples) / size
+        """F; where there is none more than at the last point, so that a step to there is made shorter."""
+        if (here := at(x)) is None:
+            return abs(taken[-1].value) / size + BEYOND * float(np.linalg.norm(x - x_of(taken[-1])))
         return 0.0 if _is_met(here) else here.value / size
 
     def slope(x: FloatArray) -> FloatArray:
-        here = sample(x)
-        return np.zeros(x.size) if here is None else here.gradient * units / size
-
-    def refuse_rest(x: FloatArray) -> None:
-        nonlocal before
-        here = sample(x)
-        if np.max(np.abs(x - before)) <= SAME and (here is None or not _is_close(here)):
+        """∇F at a point that is taken. Raises `StopIteration` where the steps end before F is 0."""
+        here = at(x)
+        is_rest = len(taken) > 1 and here and np.max(np.abs(x_of(here) - x_of(taken[-1]))) <= SAME
+        if here is None or (is_rest and not _is_close(here)):
             raise StopIteration
-        before = x.copy()
+        taken.append(here)
+        return here.gradient * units / size
 
     with suppress(StopIteration):
-        found = minimize(
+        minimize(
             lambda x: 0.5 * x @ x,
-            before,
+            x_of(first),
             jac=lambda x: x,
             method="SLSQP",
-            bounds=list(zip((low - origin) / units, (high - origin) / units, strict=True)),
+            bounds=list(zip(low, high, strict=True)),
             constraints={"type": "eq", "fun": value, "jac": slope},
-            callback=refuse_rest,
             options={"ftol": FALL, "maxiter": MOST_STEPS},
         )
-        last = sample(found.x)
-        if found.success and last is not None and _is_close(last):
-            return last
-    return None
+    x, gradient = x_of(taken[-1]), taken[-1].gradient * units
+    free = gradient * ((x > low) & (x < high))
+    multiplier = -(x @ free) / ((free @ free) or 1.0)
+    is_nearest = not free.any() or np.max(np.abs(x - np.clip(-multiplier * gradient, low, high))) <= NEAREST
+    return taken[-1] if is_nearest and _is_close(taken[-1]) else None

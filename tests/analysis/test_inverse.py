@@ -234,3 +234,15 @@ def test_parameters_that_are_none_are_refused(by, said):
         design(uniform(a=0.0), "moment(2) = 0", "system.a")
     with pytest.raises(ValueError, match="no parameter of the design"):
         design(uniform(), "moment(2) = 0", "system.a", units={"noise.sigma": 1.0})
+
+
+def test_a_range_beyond_which_there_is_no_moment():
+    """For r₀ > 1 there is no Λ(2), where the first step leads: the nearest point is that of a narrower range."""
+    system = VibroImpactOscillator(epsilon=0.3, omega=1.0, restitution=0.9, c1=0.1)
+    problem = Problem(system, NonGaussianNoise(D0=0.5, tau0=0.5, r0=0.9))
+    for other in (Axis("noise.tau0", 0.3, 0.8), Axis("oscillator.c1", -0.5, 0.5)):
+        wide, narrow = (
+            design(problem, "moment(2) = 0.0708", [Axis("noise.r0", 0.5, end), other]) for end in (1.3, 1.0)
+        )
+        assert wide.distance == pytest.approx(narrow.distance, rel=1e-7)
+        assert wide.solves <= 30
