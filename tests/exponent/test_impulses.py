@@ -12,6 +12,7 @@ from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.model import CoefficientMatrix, Jump, Poisson, White, noise_kind
 from fpsolve.model.systems.parametric import ParametricOscillator
 from fpsolve.simulation.coefficients import coefficients
+from fpsolve.simulation.setup import transient
 from fpsolve.theory.moments import hierarchy_exponent
 from tests.oracles import moment_hierarchy, phase_circle
 
@@ -168,7 +169,7 @@ def test_a_simulation_waits_for_rare_impulses():
     sizes, weights = (1.140477428600101, -0.30270434321447154), (0.23437873623394545, 0.712329916975077)
     noise = Poisson(rate=0.0028116068648218755, sizes=sizes, weights=weights)
     problem = Problem(PlaneSystem([CoefficientMatrix(0, steady), CoefficientMatrix(0, driven, identity)]), noise)
-    found = simulate(problem, [], paths=64, seed=1)
+    found = simulate(problem, [], paths=64, seed=1, time=32 * transient(problem.system, noise))
     expected = lyapunov_exponent(problem).value
     assert expected < hierarchy_exponent(problem, 2.0)[0] / 2
     assert found.lyapunov_exponent == pytest.approx(expected, abs=4 * found.lyapunov_exponent_error)
