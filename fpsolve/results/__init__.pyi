@@ -1,0 +1,2 @@
+from .table import Column as Column
+from .table import Table as Table

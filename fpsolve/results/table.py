@@ -1,0 +1,74 @@
+"""The numbers of a case as one table: a column for each quantity, over the curves, or over these and p.
+
+A row is what one curve adds: a number for each column by its name, or several, one for each p of its own under "p".
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from fpsolve.arrays import FloatArray
+from fpsolve.data import Quantity
+
+Row = Mapping[str, Any]
+
+
+@dataclass(frozen=True, eq=False)
+class Column:
+    """The values of a quantity.
+
+    Attributes:
+        quantity: with its unit, and "p" among its `dims` where it is a function of p.
+        values: shape (curves,), or (curves, p); NaN where there is none.
+    """
+
+    quantity: Quantity
+    values: FloatArray
+
+
+class Table(Mapping[str, Column]):
+    """Columns by the names of their quantities.
+
+    Args:
+        quantities: of the columns, in order.
+        count: how many curves there are.
+        p: all that a curve may have.
+    """
+
+    def __init__(self, quantities: Sequence[Quantity], count: int, p: FloatArray) -> None:
+        self._places = {each: place for place, each in enumerate(p.tolist())}
+        self._columns = {
+            each.name: Column(each, np.full((count, p.size) if each.dims else count, math.nan)) for each in quantities
+        }
+
+    def __getitem__(self, name: str) -> Column:
+        return self._columns[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._columns)
+
+    def __len__(self) -> int:
+        return len(self._columns)
+
+    def put(self, curve: int, row: Row) -> None:
+        """Fill in what a curve adds, counted from 0."""
+        places = [self._places[p] for p in row["p"].tolist()] if self._places else []
+        for name, column in self._columns.items():
+            if (found := row.get(name)) is not None:
+                column.values[(curve, places) if column.quantity.dims else curve] = found
+
+
+def rows_over_p(row: Row, names: Sequence[str]) -> list[list[float | None]]:
+    """What a curve has of some columns over p, a list for each p; None where there is no number."""
+    columns = [row[name].tolist() if name in row else [None] * row["p"].size for name in names]
+    return [[plain(each) for each in of_p] for of_p in zip(*columns, strict=True)]
+
+
+def plain(number: Any) -> Any:
+    """A number as JSON and CSV have it: None where there is none."""
+    return None if isinstance(number, float) and not math.isfinite(number) else number
