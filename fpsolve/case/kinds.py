@@ -18,7 +18,7 @@ from pydantic_core import InitErrorDetails
 
 from fpsolve.case.messages import UNBOUNDED, Refusal, details_of, nearest, refuse, shown_with_kind
 from fpsolve.model.faults import TableError, fields_of, table_of
-from fpsolve.model.kinds import kind_names, noise_kind, system_kind
+from fpsolve.model.kinds import is_kind, kind_names, noise_kind, system_kind
 from fpsolve.model.noises.several import noises_of
 from fpsolve.model.parameters import STRICT, Parametrised
 from fpsolve.model.problem import Problem
@@ -116,7 +116,9 @@ def _kind(half: Half, table: Mapping[str, Any]) -> type[Parametrised]:
     name = table.get("kind")
     if name is None and half == "system" and any(key in table for key in STATING):
         name = EQUATIONS
-    if name is not None and name not in (names := kind_names("systems" if half == "system" else "noises")):
+    room: Literal["systems", "noises"] = "systems" if half == "system" else "noises"
+    if name is not None and not is_kind(name, room):
+        names = kind_names(room)
         text = f"got {shown_with_kind(name, but=str)}; must be one of {', '.join(names)};{nearest(name, names)}"
         refuse([(("kind",), name, f'{text} write, for example, kind = "{names[0]}"')])
     try:

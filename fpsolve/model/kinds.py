@@ -69,6 +69,11 @@ def kind_names(room: Literal["systems", "noises"]) -> tuple[str, ...]:
     return (*ours, *sorted({entry.name for entry in entry_points(group=f"fpsolve.{room}")} - set(ours)))
 
 
+def is_kind(name: object, room: Literal["systems", "noises"]) -> bool:
+    """Whether there is such a kind. What is installed is looked through for a name that is none of ours alone."""
+    return name in tuple(SYSTEMS if room == "systems" else NOISES) or name in kind_names(room)
+
+
 @cache
 def version_of(kind: type[Parametrised]) -> str:
     """The package and version that a kind of others comes from; empty for ours, and where no package is known."""
