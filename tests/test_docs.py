@@ -2,8 +2,12 @@
 
 import ast
 import re
+from contextlib import chdir, redirect_stdout
 from datetime import UTC, datetime
+from functools import cache
+from io import StringIO
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import matplotlib.pyplot as plt
 import pytest
@@ -30,25 +34,31 @@ def named(pages, language):
     return [pytest.param(page, id=name, marks=[pytest.mark.slow] * (name in LONG)) for page, name in known.items()]
 
 
-@pytest.mark.parametrize("page", named(PAGES, "python"))
-def test_blocks_of_python_run(page, tmp_path, monkeypatch, capsys):
-    """Each number that a comment says of what is printed is printed."""
+@cache
+def typed(page):
+    """What the blocks of Python of a page name and print, in a folder of its own."""
     plt.switch_backend("Agg")
-    monkeypatch.chdir(tmp_path)
-    names: dict[str, object] = {}
-    for block in blocks(page, "python"):
-        if "results/fig1" in block:
-            numbers = "output={ figure = false, quantities = ['moment', 'lyapunov_exponent', 'stability_index'] }"
-            fpsolve.run(fpsolve.load_case(ROOT / "cases/fig1.toml", [numbers]))
-        text = block.replace("paths=4096", "paths=64, time=100.0")
-        text = re.sub(r"( = boundary\(.*)\)\n", r"\1, nodes=5)\n", text)  # which takes a fifth of the time
-        exec(text, names)
-    printed = capsys.readouterr().out
+    names, printed = dict[str, object](), StringIO()
+    with TemporaryDirectory() as folder, chdir(folder), redirect_stdout(printed):
+        for block in blocks(page, "python"):
+            if "results/fig1" in block:
+                numbers = "output={ figure = false, quantities = ['moment', 'lyapunov_exponent', 'stability_index'] }"
+                fpsolve.run(fpsolve.load_case(ROOT / "cases/fig1.toml", [numbers]))
+            text = block.replace("paths=4096", "paths=64, time=100.0")
+            text = re.sub(r"( = boundary\(.*)\)\n", r"\1, nodes=5)\n", text)  # which takes a fifth of the time
+            exec(text, names)
+    plt.close("all")
+    return names, printed.getvalue()
+
+
+@pytest.mark.parametrize("page", named(PAGES, "python"))
+def test_blocks_of_python_run(page):
+    """Each number that a comment says of what is printed is printed."""
+    _, printed = typed(page)
     for block in blocks(page, "python"):
         for comment in re.findall(r"print\(.*\)  # (-?\d.*)", block):
             for number in re.findall(r"-?\d+\.\d{6,}", comment):
                 assert number[:-2] in printed, number
-    plt.close("all")
 
 
 @pytest.mark.parametrize("page", named(PAGES, "toml"))
@@ -82,9 +92,7 @@ def test_every_room_has_a_page_of_reference():
 
 def test_a_quantity_of_the_walk_through_is_solved_and_tabulated(monkeypatch, tmp_path):
     """As the page on contributing says: once it is one of the `INDICES`, tables are loops over these."""
-    names: dict[str, object] = {}
-    for block in blocks(ROOT / "docs/contributing.md", "python"):
-        exec(block, names)
+    names, _ = typed(ROOT / "docs/contributing.md")
     index = names["index"]
     monkeypatch.setitem(INDICES, index.name, index)
     case = fpsolve.load_case(ROOT / "cases/theorem.toml", ["expect=[]", "figure={}"])

@@ -33,6 +33,11 @@ def agrees(mean, value, doubt=0.0):
 
 
 @pytest.fixture(scope="module")
+def smooth():
+    return response(SMOOTH, 0.1, 0.5, 1e-4)
+
+
+@pytest.fixture(scope="module")
 def rough():
     return response(BOUNCING, 0.05, 0.5, 1e-2)
 
@@ -60,9 +65,9 @@ def test_moments_have_errors(rough):
 
 
 @pytest.mark.slow
-def test_a_chain_approaches_it_with_the_first_order():
+def test_a_chain_approaches_it_with_the_first_order(smooth):
     """The chain's law is positive, and its differences are halved with its steps."""
-    means = response(SMOOTH, 0.1, 0.5, 1e-3).means
+    means = smooth.means
     chain = Chain(1.0, 0.5, 0.4, 0.5, 0.2, 0.0, 2.0, math.sqrt(0.2) / 0.5)
     coarse, fine = (chain.means((-2.5, 1.6), (20 * n, 16 * n, 10 * n)) for n in (1, 2))
     assert min(coarse["minimum"], fine["minimum"]) >= 0
@@ -115,8 +120,8 @@ def test_what_has_no_response_is_refused():
 
 
 @pytest.mark.slow
-def test_values_of_two_other_codes():
-    means = response(SMOOTH, 0.1, 0.5, 1e-4).means
+def test_values_of_two_other_codes(smooth):
+    means = smooth.means
     assert agrees(means["amplitude_squared"], 1.54568, 1e-5)
     assert agrees(means["x_squared"], 0.776597, 4e-6)
     assert agrees(means["v_squared"], 0.769092, 4e-6)
