@@ -92,26 +92,30 @@ def keeping(first, second, sizes=(0.7, -0.6)):
 
 
 LONGEST = (
-    "output/test_show.py",
-    "output/test_terminal.py",
-    "exponent/test_heavy_tails.py",
-    "simulation/test_accuracy.py",
+    "simulation/test_spaces.py",
     "test_sweeps.py",
-    "proofs/test_prove.py",
-    "test_workflow.py",
-    "test_cli.py",
-    "proofs/test_certificate_checker.py",
-    "analysis/test_continuation.py",
-    "analysis/test_stability.py",
-    "test_readme.py",
+    "analysis/test_growth.py",
+    "test_budget.py",
+    "nonlinear/test_response.py",
+    "test_docs.py",
+    "study/test_systems.py",
     "output/test_many_curves.py",
-    "proofs/test_claims.py",
-    "exponent/test_symmetry.py",
+    "exponent/test_heavy_tails.py",
+    "exponent/test_slopes.py",
+    "analysis/test_stability.py",
+    "exponent/test_blocks.py",
+    "study/test_figures.py",
+    "study/test_uncertain.py",
+    "test_cli.py",
+    "nonlinear/test_cubic.py",
+    "proofs/test_excursions.py",
     "exponent/test_solver.py",
-    "analysis/test_sensitivity.py",
-    "simulation/test_agreement.py",
-    "study/test_simulate.py",
     "study/test_chart.py",
+    "analysis/test_continuation.py",
+    "simulation/test_random_simulations.py",
+    "simulation/test_estimators.py",
+    "test_data.py",
+    "test_workflow.py",
 )
 """Files that begin first, so that no processor is left with a long one while the others have nothing to do."""
 
@@ -120,6 +124,7 @@ gc.disable()  # what is collected stays, so that looking through it again finds 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     place = {f"tests/{name}": k for k, name in enumerate(LONGEST)}
+    assert all((Path(__file__).parent / name).is_file() for name in LONGEST)
     items.sort(key=lambda item: place.get(item.nodeid.partition("::")[0], len(place)))
 
 

@@ -34,7 +34,3 @@ def test_public_names(room):
         assert not (folder / name).is_dir(), name
         assert getattr(package, name).__doc__, name
     assert not hasattr(package, "no_such_name")
-
-
-def test_public_surface():
-    assert len(fpsolve.__all__) <= 24

@@ -41,6 +41,11 @@ def case(tmp_path_factory):
     return case_in(tmp_path_factory.mktemp("terminal"), TEXT, NONLINEAR)
 
 
+@pytest.fixture(scope="module")
+def solved(case):
+    return solve_case(case)
+
+
 @pytest.fixture
 def terminal(monkeypatch):
     """Makes the standard streams a terminal of a width."""
@@ -54,14 +59,14 @@ def terminal(monkeypatch):
     return begin
 
 
-def test_quantities_are_whole(case, capsys, terminal):
-    results, simulated = solve_case(case), tuple(simulate_curves(case))
+def test_quantities_are_whole(case, solved, capsys, terminal):
+    simulated = tuple(simulate_curves(case))
     for width, (show, names) in product(
         (60, 80, 200),
         (
-            (lambda: print_results(case, results), {"λ", "δ_p", "Λ″(0)", "N", "R_c", *MEANS} - {"⟨x⟩"}),
+            (lambda: print_results(case, solved), {"λ", "δ_p", "Λ″(0)", "N", "R_c", *MEANS} - {"⟨x⟩"}),
             (lambda: print_simulation(case, simulated), {"λ", "Λ″(0)", *MEANS} - {"⟨A²⟩", "⟨A⁴⟩"}),
-            (lambda: print_simulation(case, simulated, results), {"λ", "Λ″(0)", *MEANS} - {"⟨A²⟩", "⟨A⁴⟩"}),
+            (lambda: print_simulation(case, simulated, solved), {"λ", "Λ″(0)", *MEANS} - {"⟨A²⟩", "⟨A⁴⟩"}),
         ),
     ):
         terminal(width)
@@ -116,9 +121,9 @@ def test_tables_without_indices_stand_apart(tmp_path, capsys):
     assert [lines[i + 1] for i in ends] == ["", ""]
 
 
-def test_what_is_missing_is_told_before_what_is_only_remarkable(case, capsys, monkeypatch):
+def test_what_is_missing_is_told_before_what_is_only_remarkable(case, solved, capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "200")
-    (result,) = solve_case(case)
+    (result,) = solved
     noted = replace(result, notes=tuple(Message(Code.NO_MOMENT, p=i) for i in range(25)), warnings=())
     failed = replace(
         noted, notes=(Message(Code.NO_MOMENT, p=7),), warnings=("a warning",), failures=(Failure(2.0, "a reason"),)
