@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from functools import lru_cache
 from typing import Any, NamedTuple, cast
 
 import numpy as np
@@ -18,6 +17,7 @@ from fpsolve.arrays import FloatArray
 from fpsolve.errors import NoDerivative
 from fpsolve.messages import Code, Message
 from fpsolve.model.noise import Noise
+from fpsolve.model.parameters import cached_by_problem
 
 CLOSE, CLOSE_SPECTRUM, CLOSE_SLOPE = 1e-6, 1e-3, 1e-5
 """Shares by which integrals, spectral densities and derivatives may differ, beside the errors of what they are compared
@@ -63,21 +63,23 @@ class Spectrum(NamedTuple):
 
 
 class MatrixSpectrum(NamedTuple):
-    """C(t) = variance · (e^{−Mt})₁₁; M may have one eigenvector only."""
+    """C(t) = left·e^{−Mt}·right; M may have fewer eigenvectors than rows."""
 
-    variance: float
+    left: FloatArray
     matrix: FloatArray
+    right: FloatArray
 
     def density(self, omega: float) -> float:
         """S(ω), as of a `Spectrum`."""
-        inverse = np.linalg.inv(self.matrix + 1j * omega * np.eye(len(self.matrix)))
-        return float(2 * self.variance * inverse[0, 0].real)
+        return float(
+            2 * (self.left @ np.linalg.solve(self.matrix + 1j * omega * np.eye(self.left.size), self.right)).real
+        )
 
     def correlation(self, t: float) -> float:
         """C(t)."""
         from scipy.linalg import expm  # takes a while to import
 
-        return float(self.variance * expm(-t * self.matrix)[0, 0])
+        return float(self.left @ expm(-t * self.matrix) @ self.right)
 
 
 def check_noise(noise: Noise) -> tuple[Message, ...]:
@@ -112,19 +114,11 @@ def refuse_wrong_derivative(noise: Noise, name: str) -> None:
     """
     if type(noise).__module__.partition(".")[0] == "fpsolve":
         return
-    try:
-        faults = _known_slopes(noise, name)
-    except TypeError:  # parameters that cannot be hashed
-        faults = _slopes(noise, name)
-    if faults:
+    if faults := _slopes(noise, name):
         raise NoDerivative(Message(Code.NOISE_REFUSED, kind=noise.kind, reason=faults[0]))
 
 
-@lru_cache(maxsize=1024)
-def _known_slopes(noise: Noise, name: str) -> tuple[Message, ...]:
-    return _slopes(noise, name)
-
-
+@cached_by_problem(1024)
 def _slopes(noise: Noise, name: str) -> tuple[Message, ...]:
     with np.errstate(all="ignore"):
         return tuple(_tried(f'derivative("{name}")', lambda: _derivative(noise, name)))
@@ -140,11 +134,16 @@ def _tried(member: str, faults: Callable[[], Iterator[Message]]) -> Iterator[Mes
 
 
 def _differs(
-    member: str, value: float, source: str, must: float, tolerance: float, xi: float | None = None
+    member: str, values: Any, source: str, must: Any, tolerance: Any, xi: FloatArray | None = None
 ) -> Iterator[Message]:
-    """A fault where a member is not what it must be, or no number."""
-    if not abs(value - must) <= tolerance and value != must:
-        yield Message(Code.NOISE_DIFFERS, member=member, xi=xi, value=float(value), source=source, must=float(must))
+    """The worst difference of a member from what it must be, beyond a tolerance."""
+    values, must, most = np.broadcast_arrays(*(np.asarray(each, dtype=float) for each in (values, must, tolerance)))
+    shares = np.where(values == must, 0.0, np.abs(values - must) / most)
+    at = np.unravel_index(int(np.argmax(shares)), shares.shape)  # a NaN, if there is one
+    if not shares[at] <= 1:
+        place = None if xi is None else float(xi[at])
+        found, other = float(values[at]), float(must[at])
+        yield Message(Code.NOISE_DIFFERS, member=member, xi=place, value=found, source=source, must=other)
 
 
 def _faults(noise: Noise) -> Iterator[Message]:
@@ -212,7 +211,9 @@ def _of_law(noise: Noise, law: Law) -> Iterator[Message]:
             source = "the slope of log_density over the logarithm of the distance from the end"
             yield from _differs("end_exponent", noise.end_exponent, source, found, 1e-3 * (1 + abs(found)))
         beyond = float(np.max(noise.log_density(1.01 * width * np.array([-1.0, 1.0]))))
-        yield from _differs("log_density", beyond, "half_width, beyond which P_s is 0,", -math.inf, 0, 1.01 * width)
+        yield from _differs(
+            "log_density", beyond, "half_width, beyond which P_s is 0,", -math.inf, 1.0, np.array(1.01 * width)
+        )
     total, error = finer.mean(1.0), abs(finer.mean(1.0) - law.mean(1.0)) + 2 * law.rest
     yield from _differs("the integral of exp(log_density)", total, "a density", 1.0, CLOSE + 3 * error)
     if not abs(total - 1) <= CLOSE + 3 * error:
@@ -239,19 +240,19 @@ def _spectrum(noise: Noise, law: Law | None) -> Spectrum | MatrixSpectrum | None
     some = cast("Any", noise)
     match noise.basis:
         case "states":
-            rates, states = np.array(some.rates), np.array(some.states)
-            weights, deviations = some.probabilities, states - some.probabilities @ states
-            values, vectors = np.linalg.eig(-rates)
-            parts = ((weights * deviations) @ vectors) * np.linalg.solve(vectors, deviations)
-            keep = np.abs(values) > 1e-12 * np.abs(values).max()
-            return Spectrum(parts[keep], values[keep])
+            weights = some.probabilities
+            deviations = np.array(some.states) - weights @ some.states
+            return MatrixSpectrum(
+                weights * deviations, np.ones_like(weights)[:, None] * weights - some.rates, deviations
+            )
         case "waves":
             angles = 2 * math.pi * np.arange(256) / 256
             waves = np.fft.fft(some.of_angle(angles)) / 256
             k = np.fft.fftfreq(256, 1 / 256)
             return Spectrum(np.abs(waves[1:]) ** 2, 0.5 * some.sigma**2 * k[1:] ** 2 + 1j * some.nu * k[1:])
         case "pairs":
-            return MatrixSpectrum(noise.standard_deviation**2, np.array(some.drift_matrix))
+            first = noise.standard_deviation * np.eye(2)[0]
+            return MatrixSpectrum(first, np.array(some.drift_matrix), first)
     return _diffusion_spectrum(noise, law) if law is not None else None
 
 
@@ -296,7 +297,7 @@ def _of_spectrum(noise: Noise, law: Law | None, spectrum: Spectrum | MatrixSpect
         if callable(getattr(some, "drift", None)):
             logs, squares = ((f(xi + h) - f(xi - h)) / (2 * h) for f in (noise.log_density, noise.squared_diffusion))
             must, size = 0.5 * (square * logs + squares), std / noise.correlation_time
-            yield from _worst("drift", some.drift(xi), "½(σ²P_s)′/P_s", must, 1e-4 * (np.abs(must) + size), xi)
+            yield from _differs("drift", some.drift(xi), "½(σ²P_s)′/P_s", must, 1e-4 * (np.abs(must) + size), xi)
         finer = _diffusion_spectrum(noise, cast("Law", _law(noise, 128)))
         unit = law.mean(noise.squared_diffusion(law.xi)) / (2 * std**2)
         error += 3 * abs(finer.density(unit) / spectrum.density(unit) - 1)
@@ -316,19 +317,6 @@ def _of_spectrum(noise: Noise, law: Law | None, spectrum: Spectrum | MatrixSpect
             return
 
 
-def _worst(
-    member: str, values: Any, source: str, must: Any, tolerance: Any, xi: FloatArray | None = None
-) -> Iterator[Message]:
-    """The worst difference of several; none where what it must be is not known."""
-    values, must = np.broadcast_arrays(np.asarray(values, dtype=float), np.asarray(must, dtype=float))
-    share = np.where(np.isfinite(must), np.abs(values - must) / np.broadcast_to(tolerance, must.shape), 0.0)
-    share = np.where(np.isnan(share), math.inf, share)
-    if share.size and np.max(share) > 1:
-        at = np.unravel_index(int(np.argmax(share)), share.shape)
-        place = float(xi[at]) if xi is not None else None
-        yield from _differs(member, float(values[at]), source, float(must[at]), 0.0, place)
-
-
 def _derivative(noise: Noise, name: str) -> Iterator[Message]:
     """Each part of a `derivative` against differences of the noise with other values of this parameter."""
     try:
@@ -343,8 +331,9 @@ def _derivative(noise: Noise, name: str) -> Iterator[Message]:
 
     def compared(field: str, value: Any, f: Callable[[Any, float], Any], what: str, xi: Any = None) -> Any:
         must, error, size = _difference(noise, name, f)
+        must = np.where(np.isfinite(must), must, value)  # where the difference is not known
         tolerance = CLOSE_SLOPE * (np.abs(must) + unit * min(1.0, size)) + 3 * error
-        return _worst(f"{part}.{field}", value, f"the difference of {what}", must, tolerance, xi)
+        return _differs(f"{part}.{field}", value, f"the difference of {what}", must, tolerance, xi)
 
     some = cast("Any", noise)
     if noise.has_states:

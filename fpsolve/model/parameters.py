@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from enum import Enum
-from functools import cache
-from typing import Any, ClassVar, NamedTuple, Self, cast
+from functools import cache, lru_cache, wraps
+from typing import Any, ClassVar, NamedTuple, ParamSpec, Self, TypeVar, cast
 
 from pydantic import ConfigDict, Field
 from pydantic.fields import FieldInfo
@@ -16,6 +16,8 @@ from fpsolve.data import plain_unit
 from fpsolve.messages import Message
 from fpsolve.model.quantity import Quantity
 
+P = ParamSpec("P")
+R = TypeVar("R")
 SIZE = {"ge": 1e-15, "le": 1e15}
 """The range of a positive parameter: whatever the others are, no formula overflows or divides by nothing."""
 DERIVED = {"ge": 1e-32, "le": 1e32}
@@ -174,3 +176,21 @@ def quantities_of(kind: type[Parametrised]) -> Mapping[str, Quantity]:
 def unknown_parameter(key: str) -> Quantity:
     """A parameter of which no more than its key is known."""
     return Quantity(key, key, key, "", "unknown")
+
+
+def cached_by_problem(most: int) -> Callable[[Callable[P, R]], Callable[P, R]]:
+    """Keep so many values of a function of problems or noises; none where the user's own ones cannot be hashed."""
+
+    def keeping(function: Callable[P, R]) -> Callable[P, R]:
+        known: Any = lru_cache(most)(function)
+
+        @wraps(function)
+        def value(*args: P.args, **kwargs: P.kwargs) -> R:
+            try:
+                return known(*args, **kwargs)
+            except TypeError:
+                return function(*args, **kwargs)
+
+        return value
+
+    return keeping

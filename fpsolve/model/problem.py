@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache, wraps
+from functools import cached_property
 from itertools import chain
 from textwrap import wrap
-from typing import Any, ParamSpec, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -42,8 +42,6 @@ from fpsolve.model.plane import (
 from fpsolve.model.quantity import NOISE, Quantity, moment_at
 from fpsolve.model.subsystem import Subsystem, components, couplings, hidden_blocks, reached, subsystems
 
-P = ParamSpec("P")
-R = TypeVar("R")
 RATE = "1/time"
 """The unit of ξ for which those of parameters of noises are stated."""
 PHASES = 360
@@ -641,21 +639,3 @@ def checked_moments(p: ArrayLike, problem: Problem, *, may_be_empty: bool = Fals
     for point in points:
         refuse_infinite(problem, float(point))
     return points
-
-
-def cached_by_problem(most: int) -> Callable[[Callable[P, R]], Callable[P, R]]:
-    """Keep so many values of a function of problems; none where the user's own motion or noise cannot be hashed."""
-
-    def keeping(function: Callable[P, R]) -> Callable[P, R]:
-        known: Any = lru_cache(most)(function)
-
-        @wraps(function)
-        def value(*args: P.args, **kwargs: P.kwargs) -> R:
-            try:
-                return known(*args, **kwargs)
-            except TypeError:
-                return function(*args, **kwargs)
-
-        return value
-
-    return keeping

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fpsolve.arrays import FloatArray
+from fpsolve.model.parameters import cached_by_problem
 from fpsolve.model.plane import matrix_at, noise_strength, squared_frequency
-from fpsolve.model.problem import Problem, cached_by_problem
+from fpsolve.model.problem import Problem
 
 SAMPLES = 1001
 """Number of steady values of a filter."""

@@ -25,6 +25,7 @@ from numpy.typing import ArrayLike
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import NoPerturbationTheory
 from fpsolve.messages import Code, Message
+from fpsolve.model.parameters import cached_by_problem
 from fpsolve.model.plane import (
     Harmonics,
     affine,
@@ -35,7 +36,7 @@ from fpsolve.model.plane import (
     turning,
     written_coefficient,
 )
-from fpsolve.model.problem import Problem, cached_by_problem
+from fpsolve.model.problem import Problem
 
 WEAK = 0.05
 """Share of the terms of Eq. (37) that the orders beyond may have."""
