@@ -336,7 +336,7 @@ def _of_axis(axis: ChartAxis, problem: Problem, ranges: Mapping[str, FieldInfo])
     """A key that is none to differentiate by, or ends that are out of its range, or not in order."""
     known = problem.differentiable
     if axis.key not in known:
-        inert = [name for half in problem.halves for name in half.inert]
+        inert = [name for half in problem.sections.values() for name in half.inert]
         is_inert = any(axis.key == f"{key}.{name}" for key, half in problem.sections.items() for name in half.inert)
         told = f"; {' and '.join(inert)} are not in the linear theory" if is_inert else ""
         text = f'got "{axis.key}";{nearest(axis.key, known)} must be one of {", ".join(known)}{told}'

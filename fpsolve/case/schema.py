@@ -146,7 +146,7 @@ def _table(half: Half, kind: type[Parametrised], variant: int = 0, *, is_named: 
     if is_named:
         known = {"kind": (Literal[kind.kind], _described(f"the kind of the {half}", f'kind = "{kind.kind}"'))} | known
     own = kind.__mro__[: kind.__mro__.index(Parametrised)]
-    is_open = kind.takes_any or any("takes" in vars(each) for each in own)
+    is_open = any("takes" in vars(each) for each in own)
     base: dict[str, Any] = {"__base__": NamedParameters} if is_open else {"__config__": STRICT}
     doc = (kind.__doc__ or kind.kind).strip().partition("\n")[0]
     return create_model(name, __doc__=doc, **base, **known)

@@ -13,7 +13,7 @@ from scipy.sparse import csr_matrix, diags, issparse
 from fpsolve.arrays import FloatArray, IntArray, Mask, Matrix, one
 from fpsolve.fem.axis import MAX_DENSE_UNKNOWNS, DividedAxis
 from fpsolve.fem.rings import Ring
-from fpsolve.model.plane import CoefficientMatrix, Harmonics, Impulse, ImpulseDerivative, changed_exponential
+from fpsolve.model.plane import CoefficientMatrix, Harmonics, Impulse, changed_exponential
 from fpsolve.polynomials import Orthonormal, gauss_legendre, legendre, orthonormal
 
 PENALTY = 2.0
@@ -182,7 +182,7 @@ class PhaseAxis(DividedAxis):
         logs = np.log(stretch)
         return self.stored(at.T @ diags(weights * np.exp(p * logs) * logs**derivative) @ end)
 
-    def changed_impulses(self, of: Impulse, by: ImpulseDerivative, p: float, derivative: int = 0) -> Matrix:
+    def changed_impulses(self, of: Impulse, by: Impulse, p: float, derivative: int = 0) -> Matrix:
         """∂/∂θ of what `impulses` gives, where B depends on θ."""
         at, end, weights, stretch, points = self._struck(of)
         logs = np.log(stretch)

@@ -33,7 +33,6 @@ from fpsolve.model.plane import (
     CoefficientMatrix,
     Harmonics,
     Impulse,
-    ImpulseDerivative,
     Jump,
     LinearMotion,
     Xi,
@@ -294,7 +293,7 @@ class Terms(NoiseTerms):
         for power, total in enumerate(totals):
             yield self._term(total, one, ("", "p ", "p² ")[power] + text, OfMoment(power), order)
 
-    def _struck(self, of: Impulse, by: ImpulseDerivative | None = None) -> Term:
+    def _struck(self, of: Impulse, by: Impulse | None = None) -> Term:
         """An impulse, or ∂/∂θ of it."""
 
         def phase_at(p: float, derivative: int) -> Matrix:

@@ -14,7 +14,6 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, reduce
-from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -25,7 +24,6 @@ from fpsolve.model.plane import (
     CoefficientMatrix,
     CubicTerms,
     Impulse,
-    ImpulseDerivative,
     LinearMotion,
     Matrix,
     Motion,
@@ -45,7 +43,6 @@ MOST_STEPS = 400
 """Largest number of steps of this search: some 60 for each variable and unit of 1e18."""
 ROUNDED = 1e-14
 """Share of the terms of an entry of S⁻¹AS that is rounding."""
-T = TypeVar("T", Impulse, ImpulseDerivative)
 
 
 @dataclass(frozen=True)
@@ -76,7 +73,7 @@ class Frame:
         products = [reduce(np.convolve, [first] * (3 - k) + [second] * k) for k in range(4)]
         return CubicTerms((self._inverse @ np.array(terms.matrix) @ np.array(products)).tolist())
 
-    def exponent(self, of: T) -> T:
+    def exponent(self, of: Impulse) -> Impulse:
         """An impulse, or its derivative, for y."""
         return replace(of, exponent=(self._inverse @ np.array(of.exponent) @ self._array).tolist())
 

@@ -104,7 +104,6 @@ class Parametrised:
         section: the first part of the keys of its parameters, such as "noise".
         words: parameters that the class itself decides, by their names.
         stated: what case files say of it besides its `fields`, such as the `words`, by its names.
-        takes_any: whether any other key of such a table is a parameter.
         inert: names of parameters on which the linear problem does not depend.
         variants: other classes of this kind, with other parameters; a table of a case file tells by its keys which.
     """
@@ -113,7 +112,6 @@ class Parametrised:
     section: ClassVar[str]
     words: ClassVar[Mapping[str, str]] = {}
     stated: ClassVar[Mapping[str, FieldInfo]] = {}
-    takes_any: ClassVar[bool] = False
     inert: ClassVar[Sequence[str]] = ()
     variants: ClassVar[Sequence[type[Parametrised]]] = ()
 
@@ -125,7 +123,7 @@ class Parametrised:
     @classmethod
     def takes(cls, key: str, table: Mapping[str, Any]) -> bool:
         """Whether a table of a case file may have a key besides the `fields` and what is `stated`."""
-        return cls.takes_any
+        return False
 
     @classmethod
     def from_table(cls, table: Mapping[str, Any]) -> Parametrised:

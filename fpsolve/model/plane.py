@@ -272,17 +272,6 @@ class Impulse:
         return float(np.max(np.abs(np.log(np.linalg.svd(self.matrix, compute_uv=False)))))
 
 
-@dataclass(frozen=True)
-class ImpulseDerivative:
-    """∂/∂θ of an `Impulse`: of its rate and of B."""
-
-    rate: float
-    exponent: Matrix
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "exponent", tuple(map(tuple, self.exponent)))
-
-
 @lru_cache(maxsize=64)
 def _exponential(exponent: Matrix) -> FloatArray:
     return np.asarray(expm(np.array(exponent)))
@@ -445,11 +434,11 @@ class Motion(NamedTuple):
 
 
 class MotionDerivative(NamedTuple):
-    """∂/∂θ of a `Motion`: of the sum of the terms of its drift, of each of its diffusions and of its impulses."""
+    """∂/∂θ of a `Motion`: of the sum of the terms of its drift, of each diffusion, and of each rate and exponent."""
 
     terms: Sequence[CoefficientMatrix]
     diffusions: Sequence[CoefficientMatrix] = ()
-    impulses: Sequence[ImpulseDerivative] = ()
+    impulses: Sequence[Impulse] = ()
 
 
 def _direction(phi: ArrayLike) -> FloatArray:

@@ -27,7 +27,6 @@ from fpsolve.model.plane import (
     CoefficientMatrix,
     Harmonics,
     Impulse,
-    ImpulseDerivative,
     Jump,
     Motion,
     System,
@@ -70,7 +69,7 @@ class ParameterDerivative:
         jumps: ∂ ln R/∂θ of each of the jumps of the motion; empty where none changes.
         noise: that of the noise; None where it does not change.
         diffusions: that of each of the `diffusions`; empty where none changes.
-        impulses: that of each of the `impulses`; empty where none changes.
+        impulses: that of each of the `impulses`, of its rate and of its exponent; empty where none changes.
         part: which of the `coloured` noises changes.
     """
 
@@ -79,7 +78,7 @@ class ParameterDerivative:
     jumps: tuple[float, ...] = ()
     noise: NoiseDerivative | None = None
     diffusions: tuple[CoefficientMatrix, ...] = ()
-    impulses: tuple[ImpulseDerivative, ...] = ()
+    impulses: tuple[Impulse, ...] = ()
     part: int = 0
 
 
@@ -438,11 +437,6 @@ class Problem:
         return (0.0 if len(self.blocks) > 1 and self.is_driven else -math.inf), math.inf
 
     @property
-    def halves(self) -> tuple[Parametrised, ...]:
-        """The system and the noise, or all noises."""
-        return (self.system, *self.noise.parts.values())
-
-    @property
     def sections(self) -> Mapping[str, Parametrised]:
         """The system and the noise by what the keys of their parameters begin with, such as "noise.axial"."""
         parts = self.noise.parts
@@ -515,35 +509,28 @@ class Problem:
         """∂/∂θ by one of the `differentiable` parameters. Raises `ValueError` for others."""
         if key not in self.differentiable:
             raise ValueError(f"got {key}; the parameters to differentiate by are {', '.join(self.differentiable)}")
-        return self._derivatives([key])[key]
+        section, _, name = key.rpartition(".")
+        terms: Sequence[CoefficientMatrix] = ()
+        jumps: Sequence[float] = ()
+        noise, part, changed = None, section.removeprefix("noise."), ""
+        if section == self.system.section:
+            terms, jumps = self.system.derivative(name)
+        else:
+            changed = name if len(self.noise.parts) == 1 else f"{part}.{name}"
+            if not (own := self.named_noise(part)).is_white:
+                refuse_wrong_derivative(own, name)
+                noise = own.derivative(name)
+        terms, diffusions, impulses = self.noise.changed_motion(self.system, terms, changed)
+        if self.frame is not None:
+            terms, diffusions = ([self.frame.term(each) for each in parts] for parts in (terms, diffusions))
+            impulses = [self.frame.exponent(each) for each in impulses]
+        axis = [*self.coloured.parts].index(part) if noise and len(self.coloured.parts) > 1 else 0
+        theta = float(self.values[key])
+        return ParameterDerivative(theta, tuple(terms), tuple(jumps), noise, tuple(diffusions), tuple(impulses), axis)
 
     def derivatives(self) -> Mapping[str, ParameterDerivative]:
         """∂/∂θ by all of the `differentiable` parameters, by their keys."""
-        return self._derivatives(self.differentiable)
-
-    def _derivatives(self, keys: Sequence[str]) -> Mapping[str, ParameterDerivative]:
-        values, found = self.values, {}
-        for key in keys:
-            section, _, name = key.rpartition(".")
-            theta = float(values[key])
-            terms: Sequence[CoefficientMatrix] = ()
-            jumps: Sequence[float] = ()
-            noise, part = None, section.removeprefix("noise.")
-            if section == self.system.section:
-                terms, jumps = self.system.derivative(name)
-            elif not (own := self.named_noise(part)).is_white:
-                refuse_wrong_derivative(own, name)
-                noise = own.derivative(name)
-            changed = "" if section == self.system.section else name if len(self.noise.parts) == 1 else f"{part}.{name}"
-            terms, diffusions, impulses = self.noise.changed_motion(self.system, terms, changed)
-            if self.frame is not None:
-                terms, diffusions = ([self.frame.term(each) for each in part] for part in (terms, diffusions))
-                impulses = [self.frame.exponent(each) for each in impulses]
-            axis = [*self.coloured.parts].index(part) if noise and len(self.coloured.parts) > 1 else 0
-            found[key] = ParameterDerivative(
-                theta, tuple(terms), tuple(jumps), noise, tuple(diffusions), tuple(impulses), axis
-            )
-        return found
+        return {key: self.derivative(key) for key in self.differentiable}
 
     @property
     def noise_quantity(self) -> Quantity:

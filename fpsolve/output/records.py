@@ -306,7 +306,7 @@ def line_of(record: Record, line: Boundary) -> Boundary:
 def _of_curve(curve: Curve) -> dict[str, Any]:
     """The parameters, and the system and the noise as they are written, with versions and files of others' kinds."""
     kinds = []
-    for half in curve.problem.halves:
+    for half in curve.problem.sections.values():
         kind: Any = type(half)
         kinds.append([repr(half), version_of(kind), *filter(None, [source_of(kind)])])
     return {"parameters": dict(curve.parameters), "kinds": kinds}

@@ -48,7 +48,7 @@ _END = "\n ]\n}\n"
 def facts_of(case: Case, started: datetime, seconds: float) -> dict[str, Any]:
     """Of a run: versions, the command, the machine, when it began and how long it takes, and the case as written."""
     name, *rest = sys.argv or [""]  # empty where Python is embedded
-    kinds = filter(None, (version_of(type(half)) for half in case.problem.halves))  # type: ignore[arg-type]
+    kinds = filter(None, (version_of(type(half)) for half in case.problem.sections.values()))  # type: ignore[arg-type]
     packages = _packages() | dict(each.rsplit(" ", 1) for each in kinds)
     return {
         "versions": {"fpsolve": __version__, "python": platform.python_version(), **packages},

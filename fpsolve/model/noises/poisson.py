@@ -15,7 +15,6 @@ from fpsolve.model.parameters import SIZE, parameter
 from fpsolve.model.plane import (
     CoefficientMatrix,
     Impulse,
-    ImpulseDerivative,
     LinearMotion,
     Motion,
     MotionDerivative,
@@ -141,7 +140,7 @@ class Poisson(Memoryless):
         drift, changed = split_by_noise(system, terms)
         by_rate = 1.0 / self.rate if name == "rate" else 0.0
         impulses = [
-            ImpulseDerivative(by_rate * each.rate, (size * changed).tolist())
+            Impulse(by_rate * each.rate, (size * changed).tolist())
             for each, size in zip(self.motion(system).impulses, self.sizes, strict=False)  # none of what is not driven
         ]
         return MotionDerivative(drift, (), impulses)

@@ -105,7 +105,6 @@ class PlaneSystem(System):
 
     kind: ClassVar[str] = "plane"
     dimensions: ClassVar[Sequence[int]] = (2,)
-    takes_any: ClassVar[bool] = True
     stated: ClassVar[Mapping[str, FieldInfo]] = {
         "terms": stated_field(
             Annotated[
@@ -250,6 +249,11 @@ class PlaneSystem(System):
         named, noise = (tuple(each.items()) for each in known.values())
         places = tuple(Wall(**wall) for wall in walls)  # type: ignore[arg-type]
         return EquationSystem(variables, drift, named, noise, places)  # type: ignore[arg-type]
+
+    @classmethod
+    def takes(cls, key: str, table: Mapping[str, Any]) -> bool:
+        """Any key: it is a parameter."""
+        return True
 
     @classmethod
     def from_table(cls, table: Mapping[str, Any]) -> PlaneSystem:
