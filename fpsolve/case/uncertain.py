@@ -14,7 +14,7 @@ from fpsolve.case.kinds import parameters_of, problem_of
 from fpsolve.case.messages import DEPENDENT, Refusal, nearest, refuse, shown, shown_with_kind
 from fpsolve.case.sections import flat
 from fpsolve.case.vary import Vary
-from fpsolve.model.parameters import STRICT, parameter, stated_field
+from fpsolve.model.parameters import STRICT, parameter
 from fpsolve.model.problem import Problem
 
 _EXAMPLE = '"noise.D0" = 0.05 or "oscillator.restitution" = { sd = 0.02 }'
@@ -34,7 +34,10 @@ class Uncertain:
         seed: of the sample.
     """
 
-    stated: ClassVar[Mapping[str, FieldInfo]] = {"sample": stated_field(Count), "seed": stated_field(Seed)}
+    stated: ClassVar[Mapping[str, FieldInfo]] = {
+        "sample": FieldInfo.from_annotation(Count),
+        "seed": FieldInfo.from_annotation(Seed),
+    }
     deviations: Mapping[str, Deviation] = field(default_factory=dict)
     sample: int = 0
     seed: int = 0

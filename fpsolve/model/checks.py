@@ -19,9 +19,12 @@ from fpsolve.messages import Code, Message
 from fpsolve.model.noise import Noise
 from fpsolve.model.parameters import cached_by_problem
 
-CLOSE, CLOSE_SPECTRUM, CLOSE_SLOPE = 1e-6, 1e-3, 1e-5
-"""Shares by which integrals, spectral densities and derivatives may differ, beside the errors of what they are compared
-with."""
+CLOSE = 1e-6
+"""Share by which integrals may differ, beside the errors of what they are compared with."""
+CLOSE_SPECTRUM = 1e-3
+"""Share by which spectral densities may differ so."""
+CLOSE_SLOPE = 1e-5
+"""Share by which derivatives may differ so."""
 PATHS = 4000
 """Number of paths of a noise."""
 MOST_STEPS = 8
@@ -236,7 +239,7 @@ def _inner(noise: Noise, count: int = 41) -> FloatArray:
 
 
 def _spectrum(noise: Noise, law: Law | None) -> Spectrum | MatrixSpectrum | None:
-    """That of the generator, as P_s and σ², the rates or the matrix of a filter state it."""
+    """The spectrum of the generator, made of P_s and σ², of the rates of a chain or of the matrix of a filter."""
     some = cast("Any", noise)
     match noise.basis:
         case "states":

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 Exact = NDArray[Any]
 """An array of fractions."""
 BasisKind = Literal["core", "whole", "circle", "states"]
-"""Of what the functions of the noise in a proof may be made, see `fpsolve.proofs.basis`."""
+"""Kinds of functions that a function of the noise in a proof may be made of, see `fpsolve.proofs.basis`."""
 
 
 @dataclass(frozen=True)
@@ -91,18 +91,18 @@ def gaussian_law(alpha: Fraction, squared_sigma: Fraction) -> ExactLaw:
 
 
 def chain_law(states: Exact, rates: Exact) -> ExactLaw:
-    """That of a chain, whatever stands on the diagonal of its rates."""
+    """The law of a chain, whatever stands on the diagonal of its rates."""
     jumps = rates - np.diag(np.diagonal(rates))
     return ExactLaw(("states",), states=states, rates=jumps - np.diag(jumps.sum(axis=1)))
 
 
 def white_law(squared_intensity: Fraction, interpretation: str) -> ExactLaw:
-    """That of white noise, in units of s."""
+    """The law of white noise, in units of s."""
     nothing = np.array([Fraction(0)])
     sense: Literal["stratonovich", "ito"] = "ito" if interpretation == "ito" else "stratonovich"
     return ExactLaw(("states",), squared_intensity, states=nothing, rates=np.diag(nothing), white=sense)
 
 
 def bounded_law(nu: Fraction, slope: Fraction, squared_unit: Fraction) -> ExactLaw:
-    """That of bounded noise with b = slope z/(1 − z²)."""
+    """The law of bounded noise with b = slope z/(1 − z²)."""
     return ExactLaw(("core", "whole"), squared_unit, nu, slope)

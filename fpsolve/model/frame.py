@@ -36,9 +36,9 @@ from fpsolve.model.plane import (
 MOST_PARTS = 1000
 """Largest number of parts of a rule in the phase of the frame."""
 HARDLY = 2.0
-"""Factor by which the rates may be larger in a frame that is preferred."""
+"""Largest factor by which rates may be larger in a frame that is preferred."""
 BARELY = 0.99
-"""The share of the rates at which their search ends. S changes by powers of two in it: hardly anything is rounded."""
+"""Share of the rates at which the search for a frame ends. S changes by powers of two: hardly anything is rounded."""
 MOST_STEPS = 400
 """Largest number of steps of this search: some 60 for each variable and unit of 1e18."""
 ROUNDED = 1e-14

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from enum import Enum
 from functools import cache, lru_cache, wraps
-from typing import Any, ClassVar, NamedTuple, ParamSpec, Self, TypeVar, cast
+from typing import Annotated, Any, ClassVar, NamedTuple, ParamSpec, Self, TypeVar, cast
 
 from pydantic import ConfigDict, Field
 from pydantic.fields import FieldInfo
@@ -20,8 +20,10 @@ P = ParamSpec("P")
 R = TypeVar("R")
 SIZE = {"ge": 1e-15, "le": 1e15}
 """The range of a positive parameter: whatever the others are, no formula overflows or divides by nothing."""
+ANY_SIGN = {"ge": -SIZE["le"], "le": SIZE["le"]}
+"""The range of a parameter of any sign."""
 DERIVED = {"ge": 1e-32, "le": 1e32}
-"""That of what is made of such parameters."""
+"""The range of a positive parameter that is made of such parameters."""
 STRICT: ConfigDict = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
 
 
@@ -72,9 +74,10 @@ def _extra(field: FieldInfo) -> Mapping[str, str]:
     return cast("Mapping[str, str]", field.json_schema_extra or {})
 
 
-def stated_field(annotation: Any, default: Any = ...) -> FieldInfo:
-    """The field of an entry of a table that is no parameter, from `Annotated[type, parameter(…)]`."""
-    return FieldInfo.from_annotated_attribute(annotation, PydanticUndefined if default is ... else default)
+def stated_field(annotation: Any, meaning: str, example: str, default: Any = PydanticUndefined) -> FieldInfo:
+    """The field of an entry of a table that is no parameter, with what is said about it as of a `parameter`."""
+    annotated: Any = Annotated[annotation, parameter(meaning, example)]
+    return FieldInfo.from_annotated_attribute(annotated, default)
 
 
 class Parameter(NamedTuple):
@@ -127,11 +130,11 @@ class Parametrised:
 
     @classmethod
     def from_table(cls, table: Mapping[str, Any]) -> Parametrised:
-        """What a table of a case file says. Raises `ValueError` where a parameter is out of range."""
+        """What a table of a case file states. Raises `ValueError` where a parameter is out of range."""
         return cls(**table)
 
     def quantity_of(self, name: str) -> Quantity:
-        """What a parameter is."""
+        """The name, the words and the unit of a parameter."""
         return quantities_of(type(self))[name]  # type: ignore[arg-type]
 
     @property
@@ -155,13 +158,13 @@ class Parametrised:
         return ()
 
     def at(self, values: Mapping[str, float | str]) -> Self:
-        """Itself with other values of some parameters, by name. Raises `ValueError` where one is out of range."""
+        """The same kind with other values of some parameters. Raises `ValueError` where one is out of range."""
         return replace(self, **values)  # type: ignore[type-var]
 
 
 @cache
 def quantities_of(kind: type[Parametrised]) -> Mapping[str, Quantity]:
-    """What the parameters of a kind are, by their names."""
+    """The names, words and units of the parameters of a kind, by their names."""
     known = {
         name: Quantity(
             key := f"{kind.section}.{name}", key, field.title or key, symbol_of(field), unit_of(field) or "1"

@@ -29,7 +29,7 @@ Matrix = Sequence[Sequence[float]]
 Xi = ArrayLike | Mapping[str, ArrayLike]
 """ξ, or with several noises that of each by its name."""
 SHAPES = [(n, n) for n in (2, 3, 4)]
-"""Of matrices."""
+"""Shapes that matrices of terms may have."""
 
 
 @dataclass(frozen=True)
@@ -344,7 +344,7 @@ class System(Parametrised):
 
     @property
     def states(self) -> Sequence[str]:
-        """What its variables are called."""
+        """The names of its variables."""
         return tuple(f"x{'₁₂₃₄'[k]}" for k in range(self.dimension))
 
     @property
@@ -368,7 +368,7 @@ class System(Parametrised):
 
     @property
     def response(self) -> ResponseQuantities:
-        """What a stationary response of it is of."""
+        """The quantities of its stationary response."""
         x, v = self.states[:2]
         return response_quantities(x, v, has_wall=bool(self.jumps))
 
@@ -391,7 +391,7 @@ class System(Parametrised):
 
     @property
     def impact_symbol(self) -> str:
-        """What its coefficient of restitution is called in sentences."""
+        """The symbol of its coefficient of restitution in sentences."""
         return "R"
 
     def impact_value(self, log_factor: float) -> float:

@@ -42,9 +42,9 @@ from fpsolve.model.quantity import NOISE, Quantity, moment_at
 from fpsolve.model.subsystem import Subsystem, components, couplings, hidden_blocks, reached, subsystems
 
 RATE = "1/time"
-"""The unit of ξ for which those of parameters of noises are stated."""
+"""Unit of ξ for which the units of parameters of noises are stated."""
 PHASES = 360
-"""Number of φ at which it is seen which way the phase passes them."""
+"""Number of φ at which the direction of the phase is looked at."""
 RTOL = 1e-8
 """Relative error that is wanted of two variables where a case names none."""
 RTOL_OF_SEVERAL = 1e-6
@@ -52,7 +52,7 @@ RTOL_OF_SEVERAL = 1e-6
 RTOL_BEYOND_PLANE = 1e-5
 """Relative error that is wanted of three and four variables."""
 SUPPORT = np.linspace(-12, 12, 2401)
-"""In standard deviations, where a coefficient of noise is looked at."""
+"""Values of ξ at which a coefficient is looked at that is no a + bξ, in standard deviations."""
 OF_ENTRIES = 1e-15
 """Share of the largest speed of a term that is rounding of its entries, as of a matrix that keeps two rays."""
 LINE = 90
@@ -175,7 +175,7 @@ class Problem:
 
     @cached_property
     def coloured(self) -> Noise:
-        """What ξ is: the noise; of several those that have values, one noise or several, of white ones alone one."""
+        """The noise, or of several those that have values; where all are white, the first of them."""
         return self.noise if len(self.noise.parts) == 1 else self.noise.coloured  # type: ignore[attr-defined]
 
     @property
@@ -230,7 +230,7 @@ class Problem:
 
     @property
     def drift(self) -> System:
-        """What is left of the system beside white noise."""
+        """The system along a path of ξ, with the drift that white noise adds."""
         return self._moved.drift
 
     @cached_property
@@ -274,7 +274,7 @@ class Problem:
 
     @cached_property
     def impulses(self) -> Sequence[Impulse]:
-        """What multiplies the state at random times, in the same coordinates."""
+        """The impulses that multiply the state at random times, in the same coordinates."""
         own = self._moved.impulses
         return own if self.frame is None else [self.frame.exponent(each) for each in own]
 
@@ -336,7 +336,7 @@ class Problem:
 
     @cached_property
     def blocks(self) -> tuple[Subsystem, ...]:
-        """What can be solved by itself, as the matrices of the system are block triangular; nothing where they are not.
+        """The blocks that can be solved by themselves, as all matrices are block triangular; empty where they are not.
 
         Of three and four variables groups of these, of which each drives later ones alone: the strongly connected
         components of the union of the patterns of all matrices. Where there is one group, those of coordinates y that
@@ -368,7 +368,7 @@ class Problem:
 
     @cached_property
     def classes(self) -> tuple[Problem, ...]:
-        """Those of the `blocks`, each with the noises that drive it."""
+        """The `blocks`, each with the noises that drive it."""
         return tuple(Problem(block, self._noise_of(block)) for block in self.blocks)
 
     @property
@@ -409,7 +409,7 @@ class Problem:
         return bool(np.any(self.is_driven_by.T[couplings(self.blocks, changes)]))
 
     def _by_noise(self, terms: Sequence[CoefficientMatrix]) -> list[FloatArray]:
-        """What is steady in some terms, and what each noise drives, each as one matrix; of other g all matrices."""
+        """The sum of what no noise drives, and of what each noise drives; with a g that is no a + bξ all matrices."""
         lines = [affine(term.g) for term in terms]
         if None in lines:
             return [np.array(term.matrix) for term in terms]
@@ -484,7 +484,7 @@ class Problem:
     @property
     def remarks(self) -> list[Message]:
         """What limits the meaning of its parameters: of the noise, then of the system."""
-        return [*self.noise.remarks, *self.system.remarks]
+        return [remark for half in (*self.noise.parts.values(), self.system) for remark in half.remarks]
 
     def at(self, values: Mapping[str, float | str]) -> Problem:
         """The problem with other values of some parameters, by their keys. Raises `ValueError`."""
@@ -500,7 +500,7 @@ class Problem:
         return self.made_of([half.at(new[section]) if section in new else half for section, half in known.items()])
 
     def made_of(self, halves: Sequence[Parametrised]) -> Problem:
-        """One of other values of what is in `sections`, in the same order."""
+        """The problem of another system and other noises, in the order of `sections`."""
         system, *noises = halves
         made = noises[0] if len(noises) == 1 else dict(zip(self.noise.parts, noises, strict=True))
         return Problem(system, made)  # type: ignore[arg-type]
@@ -539,7 +539,7 @@ class Problem:
 
 
 def _keyed(quantity: Quantity, key: str) -> Quantity:
-    """What a parameter is, by its key in a problem."""
+    """The quantity of a parameter, with its key in a problem."""
     return quantity if quantity.name == key else replace(quantity, name=key, symbol=key)
 
 
@@ -579,7 +579,7 @@ def _valued(parameter: Parameter) -> str:
 
 
 def checked_problem(problem: object) -> Problem:
-    """What is given as a problem. Raises `TypeError` for anything else, such as a system alone."""
+    """The problem that is given. Raises `TypeError` for anything else, such as a system alone."""
     if isinstance(problem, Problem):
         return problem
     remedy = "must be a Problem, made of a system and a noise: Problem(system, noise)"

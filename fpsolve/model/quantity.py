@@ -8,12 +8,13 @@ from dataclasses import dataclass, replace
 from fpsolve.data import Quantity as Quantity
 
 UNNAMED = Quantity("value", "value", "number", "", "unknown")
-"""Of a number of which nothing more is known."""
+"""A number of which nothing more is known."""
 P = Quantity("p", "p", "order of the moment", "$p$", dims=("p",))
 PHASE = Quantity("phi", "φ", "phase", r"$\varphi$", "rad", ("phi",))
 NOISE = Quantity("xi", "ξ", "noise", r"$\xi$", "1/time", ("xi",))
 _MODES = "the highest modes of the cells, the ends of a noise interval, rounding"
-_FINER, _RATIO = "the difference from a finer or wider discretisation, rounding", "the errors of λ and N"
+_FINER = "the difference from a finer or wider discretisation, rounding"
+_RATIO = "the errors of λ and N"
 _ROOT = "the error of Λ(p)/p at p = δ_p over its slope"
 MOMENT = Quantity(
     "moment", "Λ(p)", "moment Lyapunov exponent", r"$\Lambda(p)$", "1/time", ("p",), "(1), (19)", "(37)", _MODES
@@ -153,7 +154,7 @@ AMPLITUDE_DENSITY = Quantity("amplitude_density", "ρ(A)", "density of the ampli
 
 @dataclass(frozen=True)
 class ResponseQuantities:
-    """What a stationary response is of.
+    """The quantities of a stationary response.
 
     Attributes:
         first, second: the variables of the system.
@@ -175,7 +176,7 @@ class ResponseQuantities:
 
     @property
     def numbers(self) -> Mapping[str, Quantity]:
-        """What finite elements give of it; the names are those beside the numbers of the linear system."""
+        """The numbers that finite elements give, by the names that they have beside those of the linear system."""
         known = {name: each for name, each in self.means.items() if name not in (self.first.name, self.second.name)}
         return {
             name: replace(
@@ -201,7 +202,7 @@ OSCILLATOR_RESPONSE = ResponseQuantities(
         ("energy", "⟨E⟩", "mean of the energy ½ẋ² + ½ω²x²", "length²/time²"),
     ),
 )  # fmt: skip
-"""Of the nonlinear oscillator."""
+"""The quantities of the response of the paper's oscillator."""
 
 
 def response_quantities(x: str, v: str, *, has_wall: bool) -> ResponseQuantities:
@@ -239,7 +240,7 @@ POINTS = {
         "label": "what is special about the point",
     }.items()
 }
-"""What is known of a point of a line of stability besides the two parameters."""
+"""The quantities of a point of a line of stability besides the two parameters."""
 OVER_P: Mapping[str, Quantity] = {
     "value": MOMENT,
     "error_estimate": MOMENT.error(),
@@ -248,7 +249,7 @@ OVER_P: Mapping[str, Quantity] = {
     "perturbation": MOMENT.perturbation,
     "residual": RESIDUAL,
 }
-"""What is known of Λ at each p, by the attributes of results that hold it."""
+"""The quantities that are known of Λ at each p, by the attributes of results that hold them."""
 
 
 def moment_at(p: float) -> Quantity:

@@ -24,8 +24,12 @@ LEVEL = 1e6
 """Cubic terms over the linear ones where paths start: far, as coefficients may be of different sizes."""
 PHASES = 8
 """Number of φ at which they start."""
-LEAST, LOWER, HIGHER = 1e-3, math.log(2), 30.0
-"""How far ln a must fall in a half-turn, and where the phase does not turn, and above which rise it is growing."""
+LEAST = 1e-3
+"""Smallest fall of ln a in a half-turn."""
+LOWER = math.log(2)
+"""Fall of ln a that suffices where the phase does not turn."""
+HIGHER = 30.0
+"""Rise of ln a from which on a path grows."""
 MOST = 500.0
 """Largest 2 ln a, for trial steps that go too far."""
 MOST_STEPS = 2000

@@ -112,7 +112,7 @@ class Subsystem(System):
         return self.whole.quantity_of(name)
 
     def derivative(self, name: str) -> tuple[tuple[CoefficientMatrix, ...], tuple[float, ...]]:
-        """That of the whole, in the same coordinates."""
+        """The derivative of the whole system, in the coordinates of this block."""
         terms, _ = self.whole.derivative(name)
         return self.part(terms), ()
 

@@ -14,9 +14,8 @@ from pydantic.fields import FieldInfo
 from fpsolve.arrays import FloatArray
 from fpsolve.model.faults import strict_dataclass
 from fpsolve.model.noise import Noise, NoiseDerivative
-from fpsolve.model.parameters import SIZE, parameter, stated_field
+from fpsolve.model.parameters import ANY_SIGN, SIZE, parameter, stated_field
 
-ANY_SIGN = {"ge": -1e15, "le": 1e15}
 Pair = Annotated[tuple[float, float], Field(strict=False)]
 
 
@@ -84,7 +83,7 @@ class Filter(Noise):
     of_xi: ClassVar[Sequence[str]] = ("s",)
     may_tilt: ClassVar[bool] = False
     stated: ClassVar[Mapping[str, FieldInfo]] = {
-        "output": stated_field(Annotated[Pair, parameter("c0 and c1 in ξ = c0 y + c1 y′", "output = [1.0, 0.0]")], None)
+        "output": stated_field(Pair, "c0 and c1 in ξ = c0 y + c1 y′", "output = [1.0, 0.0]", None)
     }
 
     def __post_init__(self) -> None:

@@ -130,12 +130,11 @@ class MarkovChain(Chain):
 
     kind: ClassVar[str] = "markov-chain"
     stated: ClassVar[Mapping[str, FieldInfo]] = {
-        "states": stated_field(Annotated[Row, parameter("the values of the noise", "states = [-0.5, 0.5]")]),
+        "states": stated_field(Row, "the values of the noise", "states = [-0.5, 0.5]"),
         "rates": stated_field(
-            Annotated[
-                Annotated[tuple[Row, ...], Field(strict=False)],
-                parameter("rates from each state to each", "rates = [[-1.0, 1.0], [1.0, -1.0]]"),
-            ]
+            Annotated[tuple[Row, ...], Field(strict=False)],
+            "rates from each state to each",
+            "rates = [[-1.0, 1.0], [1.0, -1.0]]",
         ),
     }
 

@@ -93,10 +93,9 @@ class TreatedNoise(Noise):
 
     stated: ClassVar[Mapping[str, FieldInfo]] = {
         "treatment": stated_field(
-            Annotated[
-                Literal["ou-reduction", "exact"],
-                parameter("the reduction of Eqs. (12)-(14), or Eq. (7) itself", 'treatment = "ou-reduction"'),
-            ],
+            Literal["ou-reduction", "exact"],
+            "the reduction of Eqs. (12)-(14), or Eq. (7) itself",
+            'treatment = "ou-reduction"',
             "ou-reduction",
         )
     }

@@ -44,7 +44,7 @@ class LinearStep(NamedTuple):
 
 
 def linear_step(alpha: float, sigma: float, h: float, bias: float) -> LinearStep:
-    """That of dξ = (−αξ + σ²b) dt + σ dW."""
+    """The exact step of dξ = (−αξ + σ²b) dt + σ dW of length h."""
     std, a, force = sigma / math.sqrt(2 * alpha), alpha * h, sigma**2 * bias
     decay, mean = math.exp(-a), -math.expm1(-a) / a
     # Variances of ξ₁ and ξ̄ and their covariance, in units of std²; the series avoids cancellation.

@@ -11,7 +11,6 @@ from typing import ClassVar
 import numpy as np
 
 from fpsolve.arrays import FloatArray, shown
-from fpsolve.messages import Message
 from fpsolve.model.noise import Noise
 from fpsolve.model.plane import CoefficientMatrix, LinearMotion, Motion, MotionDerivative, System, is_driven
 
@@ -84,14 +83,6 @@ class Noises(Noise):
     def values(self) -> Mapping[str, float | str]:
         """The values of the parameters of all noises, by keys such as "axial.alpha"."""
         return {f"{name}.{key}": value for name, noise in self.named for key, value in noise.values.items()}
-
-    @property
-    def differentiable(self) -> Sequence[str]:
-        return [f"{name}.{key}" for name, noise in self.named for key in noise.differentiable]
-
-    @property
-    def remarks(self) -> Sequence[Message]:
-        return [remark for _, noise in self.named for remark in noise.remarks]
 
     @property
     def is_white(self) -> bool:  # type: ignore[override]

@@ -93,7 +93,7 @@ class White(Memoryless):
         return self.s**2
 
     def step(self, h: float, bias: float = 0.0) -> WhiteStep:
-        """That of dW, without a bias; s is with the matrix that it drives."""
+        """One step of dW, without a bias; s is in the matrix that the noise drives."""
         return WhiteStep(1 / math.sqrt(h), math.sqrt(3 / h))
 
     def motion(self, system: System) -> Motion:

@@ -86,6 +86,9 @@ def _as_table(value: Any) -> Any:
     return value if isinstance(value, dict | StatedParameter) else {"value": value}
 
 
+Parameters = dict[
+    str, Annotated[StatedParameter, BeforeValidator(_as_table, json_schema_input_type=float | StatedParameter)]
+]
 Texts = Annotated[tuple[str, ...], Field(strict=False, min_length=2, max_length=MOST_VARIABLES)]
 
 
@@ -131,35 +134,19 @@ class EquationSystem(System):
 
     kind: ClassVar[str] = "equations"
     stated: ClassVar[Mapping[str, FieldInfo]] = {
-        "variables": stated_field(
-            Annotated[Texts, parameter("the names of the two to four variables", 'variables = ["x", "v"]')]
-        ),
-        "drift": stated_field(
-            Annotated[Texts, parameter("the rates of the variables", 'drift = ["v", "-omega**2 * x - xi * x"]')]
-        ),
-        "parameters": stated_field(
-            Annotated[
-                dict[
-                    str,
-                    Annotated[
-                        StatedParameter, BeforeValidator(_as_table, json_schema_input_type=float | StatedParameter)
-                    ],
-                ],
-                parameter("the parameters by their names", "parameters = { omega = 1.0 }"),
-            ],
-            {},
-        ),
+        "variables": stated_field(Texts, "the names of the two to four variables", 'variables = ["x", "v"]'),
+        "drift": stated_field(Texts, "the rates of the variables", 'drift = ["v", "-omega**2 * x - xi * x"]'),
+        "parameters": stated_field(Parameters, "the parameters by their names", "parameters = { omega = 1.0 }", {}),
         "noises": stated_field(
-            Annotated[
-                dict[str, str], parameter("the names of the noises, with their sections", 'noises = { xi = "noise" }')
-            ],
+            dict[str, str],
+            "the names of the noises, with their sections",
+            'noises = { xi = "noise" }',
             {"xi": "noise"},
         ),
         "walls": stated_field(
-            Annotated[
-                Annotated[tuple[StatedWall, ...], Field(strict=False)],
-                parameter("where the state is reflected", 'walls = [{ at = "x = 0", restitution = 0.8 }]'),
-            ],
+            Annotated[tuple[StatedWall, ...], Field(strict=False)],
+            "where the state is reflected",
+            'walls = [{ at = "x = 0", restitution = 0.8 }]',
             (),
         ),
     }
@@ -537,7 +524,7 @@ class EquationSystem(System):
 
 
 def _quantity(name: str, stated: StatedParameter) -> Quantity:
-    """What a parameter is."""
+    """The name, the words and the unit of a parameter, as far as they are stated."""
     key = f"{EquationSystem.section}.{name}"
     plain = Quantity(key, key, "small parameter", r"$\varepsilon$") if name == EPSILON else unknown_parameter(key)
     return replace(

@@ -13,7 +13,7 @@ from pydantic.fields import FieldInfo
 from fpsolve.arrays import ROUNDED, FloatArray, shown
 from fpsolve.model.expressions import ExpressionError, constant, evaluate, names_in
 from fpsolve.model.faults import TableError
-from fpsolve.model.parameters import parameter, stated_field
+from fpsolve.model.parameters import stated_field
 from fpsolve.model.systems.equations import EPSILON, EquationSystem
 
 Entry = float | str
@@ -27,11 +27,6 @@ SMALLEST = 1e-300
 """Size of the smallest mass that has an inverse."""
 
 
-def _matrix(meaning: str, example: str, *, is_noise: bool = False, default: Any = ...) -> FieldInfo:
-    kind: Any = _Stated | dict[str, _Stated] if is_noise else _Stated
-    return stated_field(Annotated[kind, parameter(meaning, example)], default)
-
-
 @dataclass(frozen=True)
 class ModalSystem(EquationSystem):
     """One or two modes by their mass, damping and stiffness; noise in stiffness and damping. See `ModalSystem.of`.
@@ -41,28 +36,28 @@ class ModalSystem(EquationSystem):
 
     kind: ClassVar[str] = "modes"
     stated: ClassVar[Mapping[str, FieldInfo]] = {
-        "mass": _matrix("M, a row for each mode, numbers or expressions in the parameters", "mass = [[1.0]]"),
-        "stiffness": _matrix("K", 'stiffness = [["omega**2"]]'),
-        "damping": _matrix("C", 'damping = [["2*zeta*omega"]]', default=()),
-        "gyroscopic": _matrix("G, skew-symmetric, added to C", "gyroscopic = [[0, -1.0], [1.0, 0]]", default=()),
-        "circulatory": _matrix("H, skew-symmetric, added to K", "circulatory = [[0, 0.2], [-0.2, 0]]", default=()),
-        "stiffness_noise": _matrix(
-            "what the noise multiplies in the stiffness; of several noises a table of matrices by their names",
-            "stiffness_noise = [[1.0]]",
-            is_noise=True,
-            default=(),
+        "mass": stated_field(
+            _Stated, "M, a row for each mode, numbers or expressions in the parameters", "mass = [[1.0]]"
         ),
-        "damping_noise": _matrix(
-            "what the noise multiplies in the damping; of several noises a table of matrices by their names",
-            "damping_noise = [[1.0]]",
-            is_noise=True,
-            default=(),
+        "stiffness": stated_field(_Stated, "K", 'stiffness = [["omega**2"]]'),
+        "damping": stated_field(_Stated, "C", 'damping = [["2*zeta*omega"]]', ()),
+        "gyroscopic": stated_field(_Stated, "G, skew-symmetric, added to C", "gyroscopic = [[0, -1.0], [1.0, 0]]", ()),
+        "circulatory": stated_field(
+            _Stated, "H, skew-symmetric, added to K", "circulatory = [[0, 0.2], [-0.2, 0]]", ()
         ),
+        **{
+            f"{part}_noise": stated_field(
+                _Stated | dict[str, _Stated],
+                f"what the noise multiplies in the {part}; of several noises a table of matrices by their names",
+                f"{part}_noise = [[1.0]]",
+                (),
+            )
+            for part in ("stiffness", "damping")
+        },
         "modes": stated_field(
-            Annotated[
-                Annotated[tuple[str, ...], Field(strict=False, min_length=1, max_length=2)],
-                parameter("the names of the modes", 'modes = ["heave", "pitch"]'),
-            ],
+            Annotated[tuple[str, ...], Field(strict=False, min_length=1, max_length=2)],
+            "the names of the modes",
+            'modes = ["heave", "pitch"]',
             (),
         ),
         **{key: EquationSystem.stated[key] for key in ("parameters", "noises")},

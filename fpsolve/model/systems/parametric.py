@@ -12,10 +12,8 @@ import numpy as np
 from fpsolve.arrays import identity
 from fpsolve.model.exact import ExactJump, ExactMotion
 from fpsolve.model.faults import strict_dataclass
-from fpsolve.model.parameters import parameter
+from fpsolve.model.parameters import ANY_SIGN, parameter
 from fpsolve.model.plane import CoefficientMatrix, Jump, System
-
-ANY_SIGN = {"ge": -1e15, "le": 1e15}
 
 
 @strict_dataclass

@@ -107,16 +107,14 @@ class PlaneSystem(System):
     dimensions: ClassVar[Sequence[int]] = (2,)
     stated: ClassVar[Mapping[str, FieldInfo]] = {
         "terms": stated_field(
-            Annotated[
-                Annotated[tuple[StatedTerm, ...], Field(strict=False, min_length=1)],
-                parameter("the terms of the motion", "terms = [{ matrix = [[0.0, 1.0], [-1.0, 0.0]] }]"),
-            ]
+            Annotated[tuple[StatedTerm, ...], Field(strict=False, min_length=1)],
+            "the terms of the motion",
+            "terms = [{ matrix = [[0.0, 1.0], [-1.0, 0.0]] }]",
         ),
         "jumps": stated_field(
-            Annotated[
-                Annotated[tuple[StatedJump, ...], Field(strict=False)],
-                parameter("jumps of the state at rays", "jumps = [{ phase = 1.5707963267948966, log_factor = -0.1 }]"),
-            ],
+            Annotated[tuple[StatedJump, ...], Field(strict=False)],
+            "jumps of the state at rays",
+            "jumps = [{ phase = 1.5707963267948966, log_factor = -0.1 }]",
             (),
         ),
     }
@@ -346,7 +344,7 @@ def _parts(
 
 
 def _form(parts: tuple[Sequence[CoefficientMatrix], Sequence[Jump]]) -> tuple[Any, ...]:
-    """What must not change with a parameter."""
+    """The orders of the terms and the rays of the jumps, which must not change with a parameter."""
     terms, jumps = parts
     return tuple(term.order for term in terms), tuple(jump.phase for jump in jumps)
 

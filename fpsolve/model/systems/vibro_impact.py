@@ -17,7 +17,7 @@ from fpsolve.arrays import FloatArray, identity
 from fpsolve.messages import Code, Message
 from fpsolve.model.exact import ExactJump, ExactMotion
 from fpsolve.model.faults import strict_dataclass
-from fpsolve.model.parameters import SIZE, parameter
+from fpsolve.model.parameters import ANY_SIGN, SIZE, parameter
 from fpsolve.model.plane import CoefficientMatrix, CubicTerms, Jump, System, by_epsilon
 from fpsolve.model.quantity import OSCILLATOR_RESPONSE, ResponseQuantities
 
@@ -60,9 +60,7 @@ class VibroImpactOscillator(System):
     ]
     c1: Annotated[
         float,
-        parameter(
-            "linear damping coefficient", "c1 = 0.1", "$c_1$", "1/time", name="damping coefficient", ge=-1e15, le=1e15
-        ),
+        parameter("linear damping coefficient", "c1 = 0.1", "$c_1$", "1/time", name="damping coefficient", **ANY_SIGN),
     ]
     epsilon: Annotated[
         float,
