@@ -74,9 +74,8 @@ class MatrixSpectrum(NamedTuple):
 
     def density(self, omega: float) -> float:
         """S(ω), as of a `Spectrum`."""
-        return float(
-            2 * (self.left @ np.linalg.solve(self.matrix + 1j * omega * np.eye(self.left.size), self.right)).real
-        )
+        shifted = self.matrix + 1j * omega * np.eye(self.left.size)
+        return float(2 * (self.left @ np.linalg.solve(shifted, self.right)).real)
 
     def correlation(self, t: float) -> float:
         """C(t)."""
@@ -214,9 +213,8 @@ def _of_law(noise: Noise, law: Law) -> Iterator[Message]:
             source = "the slope of log_density over the logarithm of the distance from the end"
             yield from _differs("end_exponent", noise.end_exponent, source, found, 1e-3 * (1 + abs(found)))
         beyond = float(np.max(noise.log_density(1.01 * width * np.array([-1.0, 1.0]))))
-        yield from _differs(
-            "log_density", beyond, "half_width, beyond which P_s is 0,", -math.inf, 1.0, np.array(1.01 * width)
-        )
+        source, place = "half_width, beyond which P_s is 0,", np.array(1.01 * width)
+        yield from _differs("log_density", beyond, source, -math.inf, 1.0, place)
     total, error = finer.mean(1.0), abs(finer.mean(1.0) - law.mean(1.0)) + 2 * law.rest
     yield from _differs("the integral of exp(log_density)", total, "a density", 1.0, CLOSE + 3 * error)
     if not abs(total - 1) <= CLOSE + 3 * error:
@@ -245,9 +243,8 @@ def _spectrum(noise: Noise, law: Law | None) -> Spectrum | MatrixSpectrum | None
         case "states":
             weights = some.probabilities
             deviations = np.array(some.states) - weights @ some.states
-            return MatrixSpectrum(
-                weights * deviations, np.ones_like(weights)[:, None] * weights - some.rates, deviations
-            )
+            ranks = np.tile(weights, (weights.size, 1))  # what is constant decays, too, and is not in C(t)
+            return MatrixSpectrum(weights * deviations, ranks - some.rates, deviations)
         case "waves":
             angles = 2 * math.pi * np.arange(256) / 256
             waves = np.fft.fft(some.of_angle(angles)) / 256

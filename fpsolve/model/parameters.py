@@ -158,7 +158,7 @@ class Parametrised:
         return ()
 
     def at(self, values: Mapping[str, float | str]) -> Self:
-        """The same kind with other values of some parameters. Raises `ValueError` where one is out of range."""
+        """A system or a noise with other values of some parameters. Raises `ValueError` where one is out of range."""
         return replace(self, **values)  # type: ignore[type-var]
 
 
