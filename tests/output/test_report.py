@@ -323,7 +323,13 @@ figure = false
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("pictures")
-def test_charts_have_a_page(tmp_path):
+def test_charts_have_a_page(tmp_path, monkeypatch):
+    for name, nodes in (
+        ("analysis.stability.NODES", 7),
+        ("study.chart.NODES", 7),
+        ("study.chart.CLOSED_FORM_NODES", 31),
+    ):
+        monkeypatch.setattr(f"fpsolve.{name}", nodes)
     assert run(tmp_path, CHARTED, "--report", "--interactive", command="chart", name="plane.toml") == 0
     page = Page(tmp_path / "plane/report.html")
     assert "almost surely stable" in page.text

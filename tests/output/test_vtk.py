@@ -218,21 +218,24 @@ def test_periodic_by_pi(grids):
     np.testing.assert_allclose(one, other, rtol=1e-4)
 
 
+def at_random(grid):
+    """A grid as VTK itself interpolates it, at 300 random points."""
+    rng = np.random.default_rng(5)
+    points = np.column_stack([rng.uniform(0, 2 * np.pi, 300), rng.uniform(-2, 2, 300), np.zeros(300)])
+    return pyvista.PolyData(points).sample(grid)
+
+
 @pytest.fixture(scope="module")
 def reference(tmp_path_factory):
-    return written(
-        tmp_path_factory.mktemp("reference"), ExponentSolver(Problem(HARD, UNIT_NOISE), MESHES["full circle"])
-    )
+    solver = ExponentSolver(Problem(HARD, UNIT_NOISE), MESHES["full circle"])
+    return at_random(written(tmp_path_factory.mktemp("reference"), solver, [2.0])[2.0])
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["T", "T_adjoint", "stationary_density"])
-def test_every_mesh_shows_the_same_field(grids, reference, name):
-    """Interpolated by VTK itself, at random points."""
-    rng = np.random.default_rng(5)
-    points = np.column_stack([rng.uniform(0, 2 * np.pi, 300), rng.uniform(-2, 2, 300), np.zeros(300)])
-    one, other = (pyvista.PolyData(points).sample(grid[2.0])[name] for grid in (grids, reference))
-    np.testing.assert_allclose(one, other, atol=2e-4 * np.abs(other).max())
+def test_every_mesh_shows_the_same_field(grids, reference):
+    found = at_random(grids[2.0])
+    for name in ("T", "T_adjoint", "stationary_density"):
+        np.testing.assert_allclose(found[name], reference[name], atol=2e-4 * np.abs(reference[name]).max())
 
 
 def test_nodes_are_on_the_polynomials(tmp_path):
@@ -331,7 +334,10 @@ def test_density_file(tmp_path, solver):
 def test_meshio_reads_what_has_been_written(tmp_path):
     """Eigenfunctions, densities over directions and of responses: the same numbers as VTK reads, and the parameters."""
     run(load_case(ROOT / "cases/minimal.toml", ["expect=[]", ALL, NO_FIGURE]), tmp_path)
-    run(load_case(ROOT / "cases/response.toml", ["expect=[]", NO_FIGURE, "moments.p=[2.0]"]), tmp_path)
+    run(
+        load_case(ROOT / "cases/response.toml", ["expect=[]", NO_FIGURE, "moments.p=[2.0]", "response.rtol=0.1"]),
+        tmp_path,
+    )
     run(load_case(ROOT / "cases/systems/coupled.toml", ["expect=[]", NO_FIGURE, "moments.p=[2.0]"]), tmp_path)
     files = sorted(tmp_path.rglob("*.vtu"))
     assert {"density.vtu", "response.vtu", "response_3d.vtu"} < {file.name for file in files}
