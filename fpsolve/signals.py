@@ -81,9 +81,8 @@ def _handled(
             signal.signal(number, each)
 
 
-_away: list[threading.Thread] = []
-"""The thread that long calls are made in, once there is one."""
-_calls: SimpleQueue[Any] = SimpleQueue()
+_away: list[tuple[threading.Thread, SimpleQueue[Any]]] = []
+"""The thread that long calls are made in, once there is one, and its calls: one that was left must not take others."""
 
 
 def left_at_signals(function: Callable[[], Result]) -> Result:
@@ -104,16 +103,19 @@ def left_at_signals(function: Callable[[], Result]) -> Result:
         finally:
             done.set()
 
-    if not (_away and _away[0].is_alive()):
-        _away[:] = [threading.Thread(target=_call_away, daemon=True)]
-        _away[0].start()
-        atexit.register(_end_thread, _away[0])
-    _calls.put(call)
+    if not (_away and _away[0][0].is_alive()):
+        calls = SimpleQueue[Any]()
+        thread = threading.Thread(target=_call_away, args=[calls], daemon=True)
+        _away[:] = [(thread, calls)]
+        thread.start()
+        atexit.register(_end_thread, thread)
+    _away[0][1].put(call)
     try:
         while not done.wait(LOOK_SECONDS):
             pass
     except BaseException:
-        thread = _away.pop()
+        thread, calls = _away.pop()
+        calls.put(None)
         ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread.ident or 0), ctypes.py_object(SystemExit))
         raise
     if failures:
@@ -121,8 +123,8 @@ def left_at_signals(function: Callable[[], Result]) -> Result:
     return found.pop()
 
 
-def _call_away() -> None:
-    while (call := _calls.get()) is not None:
+def _call_away(calls: SimpleQueue[Any]) -> None:
+    while (call := calls.get()) is not None:
         if callable(call):
             call()
         del call  # what is no call ends here
@@ -130,19 +132,20 @@ def _call_away() -> None:
 
 def _end_thread(thread: threading.Thread) -> None:
     """End it before Python does, which would report what SuperLU leaves behind there."""
-    if thread in _away:
-        _calls.put(None)
+    if _away and _away[0][0] is thread:
+        _away[0][1].put(None)
         thread.join()
 
 
 def is_away() -> bool:
     """Whether this is the thread that long calls are made in."""
-    return threading.current_thread() in _away
+    return bool(_away) and _away[0][0] is threading.current_thread()
 
 
 def end_away(thing: object) -> None:
     """Let a thing end in that thread, if nothing else holds it."""
-    _calls.put(thing)
+    if _away:
+        _away[0][1].put(thing)
 
 
 def is_interrupt(failure: BaseException | None) -> bool:

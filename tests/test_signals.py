@@ -75,13 +75,17 @@ def test_ignored_signals_and_other_threads_are_left_alone():
 @pytest.mark.usefixtures("_interrupts")
 def test_a_call_that_obeys_no_signal_is_left():
     """A held lock takes the place of a library."""
-    held, started = threading.Lock(), time.monotonic()
+    held, started, before = threading.Lock(), time.monotonic(), threading.enumerate()
     held.acquire()
     threading.Timer(0.2, lambda: signal.pthread_kill(threading.main_thread().ident, signal.SIGINT)).start()
     with pytest.raises(KeyboardInterrupt):
         left_at_signals(lambda: held.acquire(timeout=60))
     assert time.monotonic() - started < SECONDS
+    left = [each for each in threading.enumerate() if each not in before]
     held.release()
+    for each in left:
+        each.join(timeout=10)
+    assert not any(each.is_alive() for each in left)  # or it would take the calls of the next one
 
 
 def test_what_is_called_in_another_thread_is_as_here():
