@@ -32,7 +32,7 @@ import numpy as np
 import fpsolve
 from fpsolve.cli import main as command
 from fpsolve.errors import FpsolveError
-from tests.solving import case_text
+from tests.kit import case_text
 
 COUNTS = {"folders": 500, "netcdf": 300, "records": 500}
 PATIENCE = 120

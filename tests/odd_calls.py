@@ -34,7 +34,7 @@ from fpsolve.model.noises.bounded import SineWiener
 from fpsolve.model.noises.markov_chain import MarkovChain
 from fpsolve.model.plane import CoefficientMatrix, Jump
 from fpsolve.model.problem import Problem
-from tests.solving import case_text
+from tests.kit import case_text
 
 LIMIT = 60
 """Seconds after which a call hangs."""

@@ -25,7 +25,7 @@ from fpsolve.output import figures, tables
 from fpsolve.output.terminal import digits
 from fpsolve.study import solve
 from tests.conftest import FIG1, FIG1_NOISE, heed_signals, sampled, started
-from tests.test_workflow import DRAWN, HOPELESS, LEAN, TABLES, TEXT, files
+from tests.kit import DRAWN, HOPELESS, LEAN, TABLES, TEXT, files
 
 CASES = Path(__file__).parents[1] / "cases"
 BARE = ["--set", "output.eigenfunctions=[]"]

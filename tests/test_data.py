@@ -30,7 +30,7 @@ from fpsolve.nonlinear import stationary_response
 from fpsolve.simulation import MomentEstimate, MonteCarlo, Response
 from fpsolve.study.solve import Numerics, Wanted, solve_curve
 from tests.conftest import FIG1, FIG1_NOISE, UNIT_NOISE
-from tests.solving import case_text
+from tests.kit import case_text
 
 matplotlib.use("Agg")
 REDUCED = FIG1_NOISE.ou_reduction()

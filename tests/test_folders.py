@@ -10,7 +10,7 @@ from fpsolve.analysis.zero import Zero
 from fpsolve.errors import OutputError
 from fpsolve.output.charts import read_line
 from fpsolve.workflow.folders import SOLVED, own_folder
-from tests.solving import case_in, case_text
+from tests.kit import case_in, case_text
 
 NESTED = "[" * 100_000
 TABLES = {

@@ -10,7 +10,7 @@ import pytest
 
 from fpsolve.pool import processors
 from tests.conftest import started
-from tests.solving import case_text
+from tests.kit import case_text
 
 VARIED = '[vary]\n"noise.D0" = { start = 0.5, stop = 1.6, num = 4 }\n'
 CASE = case_text(f"[moments]\np = [-1.0, 2.0]\n{VARIED}", "Killed", {"D0": 1.0}, epsilon=0.3)

@@ -13,7 +13,7 @@ from fpsolve.case.case import load_case
 from fpsolve.case.schema import SCHEMA
 from fpsolve.cli import BAD_INPUT, main
 from fpsolve.workflow.shipped import described_cases, shipped_cases
-from tests.test_workflow import files
+from tests.kit import files
 
 ROOT = Path(__file__).parents[1]
 

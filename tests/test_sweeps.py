@@ -28,7 +28,7 @@ from fpsolve.workflow import run_case
 from fpsolve.workflow.progress import Watch
 from fpsolve.workflow.sets import SOLVED_RECORDS
 from tests.conftest import heed_signals, sampled, started
-from tests.solving import case_text
+from tests.kit import case_text
 
 SIZE = 4
 """Sets each way."""

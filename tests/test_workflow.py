@@ -29,60 +29,21 @@ from fpsolve.study import solve
 from fpsolve.study.solve import compare, solve_curve
 from fpsolve.workflow import Watch, check_case, run_case, sets, simulate_case
 from tests.conftest import painted
-from tests.solving import INDICES, solve_case, solve_sets
-
-TEXT = """
-title = "A test"
-[oscillator]
-epsilon = 0.1
-omega = 1.0
-restitution = 0.8
-c1 = 0.1
-[noise]
-D0 = 0.5
-tau0 = 0.5
-r0 = 0.95
-treatment = "ou-reduction"
-[moments]
-p = [2.0, 0.0, -1.0]
-[vary]
-"noise.D0" = [0.1, 1.0]
-[output]
-figure = false
-eigenfunctions = [2.0]
-"""
-DRAWN = TEXT.replace("figure = false", f"figure = true\nquantities = {INDICES}")
+from tests.kit import DRAWN, HOPELESS, INDICES, LEAN, TABLES, TEXT, case_in, files, solve_case, solve_sets
 
 
 @pytest.fixture
 def case(tmp_path):
-    return write(tmp_path, TEXT)
-
-
-def write(folder, text, overrides=()):
-    path = folder / "test.toml"
-    path.write_text(text, encoding="utf-8")
-    return fpsolve.load_case(path, overrides)
+    return case_in(tmp_path, TEXT)
 
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory):
     """The results and the folder of a case that is run once, by the name of its file, for tests that only look."""
     folder = tmp_path_factory.mktemp("whole")
-    write(folder, DRAWN)
+    case_in(folder, DRAWN)
     with painted():
         return SimpleNamespace(results=fpsolve.run(str(folder / "test.toml"), folder), folder=folder / "test")
-
-
-LEAN = "output={ quantities = ['lyapunov_exponent'] }"
-
-
-def files(folder):
-    return {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
-
-
-TABLES = {"summary.json", "moments.csv", "curves.csv", "results.nc"}
-"""Of what is solved."""
 
 
 def beside_records(folder):
@@ -169,7 +130,7 @@ def without_times(folder):
 
 def test_tables_are_the_same_twice(whole, tmp_path):
     """Of a case, and of the name of its file."""
-    case = write(tmp_path, DRAWN)
+    case = case_in(tmp_path, DRAWN)
     assert [each.curve for each in fpsolve.run(case, tmp_path)] == [each.curve for each in whole.results]
     assert without_times(tmp_path / "test") == without_times(whole.folder)
     first, second = (xarray.load_dataset(folder / "results.nc") for folder in (whole.folder, tmp_path / "test"))
@@ -179,7 +140,7 @@ def test_tables_are_the_same_twice(whole, tmp_path):
 
 
 def test_no_eigenfunctions_where_none_are_asked_for(tmp_path):
-    case = write(tmp_path, TEXT.replace("[2.0]\n", "[]\n"))
+    case = case_in(tmp_path, TEXT.replace("[2.0]\n", "[]\n"))
     fpsolve.run(case, tmp_path / "out")
     assert not [name for name in files(tmp_path / "out") if "eigenfunctions" in name]
 
@@ -188,7 +149,7 @@ MANY = 'vary."noise.D0"={start=0.1, stop=1.0, num=11}'
 
 
 def test_of_many_curves_only_an_eigenfunction_of_the_first_is_written(tmp_path):
-    case, calls = write(tmp_path, TEXT.replace("eigenfunctions = [2.0]", ""), [MANY, "moments.p=[2.0]"]), []
+    case, calls = case_in(tmp_path, TEXT.replace("eigenfunctions = [2.0]", ""), [MANY, "moments.p=[2.0]"]), []
     fpsolve.run(case, tmp_path / "out", progress=lambda: calls.append(1))
     assert len(calls) == 11
     written = {name for name in files(tmp_path / "out/test") if "vt" in name or "pv" in name}
@@ -196,7 +157,7 @@ def test_of_many_curves_only_an_eigenfunction_of_the_first_is_written(tmp_path):
 
 
 def test_without_vary_there_is_one_curve(tmp_path):
-    case = write(tmp_path, TEXT.replace('[vary]\n"noise.D0" = [0.1, 1.0]\n', ""), [LEAN])
+    case = case_in(tmp_path, TEXT.replace('[vary]\n"noise.D0" = [0.1, 1.0]\n', ""), [LEAN])
     (result,) = fpsolve.run(case, tmp_path / "out")
     summary = json.loads((tmp_path / "out/test/summary.json").read_text(encoding="utf-8"))
     assert summary["curves"][0]["varied"] == {}
@@ -206,7 +167,7 @@ def test_without_vary_there_is_one_curve(tmp_path):
 def test_missing_stability_index_is_null_and_said(tmp_path):
     overrides = ["oscillator.omega=10.0", "oscillator.c1=-1.0", "oscillator.restitution=0.5"]
     overrides += ["output={ quantities = ['stability_index'] }"]
-    case = write(tmp_path, TEXT, overrides)
+    case = case_in(tmp_path, TEXT, overrides)
     result = fpsolve.run(case, tmp_path / "out")[0]
     curve = json.loads((tmp_path / "out/test/summary.json").read_text(encoding="utf-8"))["curves"][0]
     assert curve["stability_index"] is None
@@ -216,13 +177,10 @@ def test_missing_stability_index_is_null_and_said(tmp_path):
     assert curve["warnings"] == ["no stability index: Λ(p) has no root p ≠ 0 in [-20, 20]"]
 
 
-HOPELESS = "mesh={ phi_cells = 1, phi_degree = 2, xi_cells = 2, xi_degree = 3 }"
-
-
 def test_a_failure_half_way_loses_nothing_that_was_finished(tmp_path):
     """The strong-noise curve fails at p = 2 and −1; the weak one and p = 0 are kept."""
     text = DRAWN.replace('"noise.D0" = [0.1, 1.0]', '"oscillator.epsilon" = [0.01, 1.5]')
-    case = write(tmp_path, text, [HOPELESS])
+    case = case_in(tmp_path, text, [HOPELESS])
     with pytest.raises(NotConverged, match="use more cells") as caught:
         fpsolve.run(case, tmp_path / "out")
     assert len(caught.value.partial) == 2
@@ -237,7 +195,7 @@ def test_a_failure_half_way_loses_nothing_that_was_finished(tmp_path):
 def test_failures_are_values(tmp_path):
     text = TEXT.replace('"noise.D0" = [0.1, 1.0]', '"oscillator.epsilon" = [0.01, 1.5]')
     text += '[[expect]]\nquantity = "moment"\np = 2.0\nvalue = 0.0\natol = 10.0\nsource = "any"\n'
-    case = write(tmp_path, text, [HOPELESS])
+    case = case_in(tmp_path, text, [HOPELESS])
     outcome, checked = run_case(case, tmp_path / "out"), check_case(case)
     for results, failed in ((outcome.results, [2.0, -1.0]), (checked.results, [2.0])):  # what is not expected is left
         found = [[each.p for each in result.failures if each.p is not None] for result in results]
@@ -260,7 +218,7 @@ def test_what_fails_for_small_p_is_said_once(tmp_path, small):
     """λ, Λ″(0) and δ_p need the same solve; Λ(0) = 0 needs none."""
     sets = [f"moments.p=[9.0, {small}]", "oscillator.epsilon=2.0", "budget.unknowns=100", "output.eigenfunctions=[]"]
     sets += [f"output.quantities={INDICES}"]
-    outcome = run_case(write(tmp_path, TEXT, [*sets, 'vary={"noise.D0"=[1.0]}']), tmp_path / "out")
+    outcome = run_case(case_in(tmp_path, TEXT, [*sets, 'vary={"noise.D0"=[1.0]}']), tmp_path / "out")
     (curve,) = json.loads((tmp_path / "out/test/summary.json").read_text(encoding="utf-8"))["curves"]
     assert [failure.p for failure in outcome.results[0].failures] == [9.0, small][: 2 if small else 1]
     assert sum("the next mesh has" in text for text in curve["warnings"]) == 2
@@ -284,7 +242,7 @@ def test_an_index_that_does_not_converge_is_a_failure(tmp_path, p, status):
         "budget.unknowns=100",
     ]
     text = TEXT.replace("eigenfunctions = [2.0]", "")
-    case = write(
+    case = case_in(
         tmp_path, text, [*(sets if p else sets[:1] + sets[2:]), f"moments.p={p or [1.0]}", 'vary={"noise.D0"=[1.0]}']
     )
     with pytest.raises(NotConverged, match=r"no λ: .*use a larger rtol"):
@@ -301,7 +259,7 @@ def test_zero_has_no_sign(tmp_path):
         "oscillator.restitution=1.0",
         "output.eigenfunctions=[-0.0]",
     ]
-    run_case(write(tmp_path, TEXT, [*sets, "monte_carlo={ paths = 64, time = 40.0 }"]), tmp_path, monte_carlo=True)
+    run_case(case_in(tmp_path, TEXT, [*sets, "monte_carlo={ paths = 64, time = 40.0 }"]), tmp_path, monte_carlo=True)
     for name in ("summary.json", "moments.csv", "curves.csv", "monte_carlo.json", "eigenfunctions.pvd"):
         text = (tmp_path / "test" / name).read_text(encoding="utf-8")
         if name == "summary.json":  # what was written is kept as it was
@@ -366,7 +324,7 @@ def test_tables_are_whole_where_an_interruption_comes_as_they_are_written(case, 
 
 def test_a_run_goes_on_where_it_was_interrupted(whole, tmp_path, monkeypatch):
     """With the numbers of a run that nobody interrupts; files but records are made anew."""
-    case = write(tmp_path, DRAWN)
+    case = case_in(tmp_path, DRAWN)
     interrupt_curve(monkeypatch, 2)
     with pytest.raises(KeyboardInterrupt):
         fpsolve.run(case, tmp_path / "out")
@@ -454,20 +412,22 @@ def test_a_run_and_a_simulation_of_the_same_parameters_stay_together(case, tmp_p
 
 def test_infinite_moments_are_refused_before_anything_is_written(tmp_path):
     with pytest.raises(CaseError, match=r"test\.toml:\d+: moments: Λ\(2\) is not computed"):
-        write(tmp_path, TEXT, ["noise.treatment='exact'", "noise.r0=1.1", "vary={}"])
+        case_in(tmp_path, TEXT, ["noise.treatment='exact'", "noise.r0=1.1", "vary={}"])
     text = TEXT.replace('"noise.D0" = [0.1, 1.0]', '"noise.r0" = [0.9, 1.1]')
-    write(tmp_path, text, ["noise.treatment='exact'"])  # of a sweep these sets alone fail
-    write(tmp_path, TEXT.replace("r0 = 0.95", "r0 = 1.1").replace('"noise.D0" = [0.1, 1.0]', '"noise.r0" = [0.9, 0.8]'))
+    case_in(tmp_path, text, ["noise.treatment='exact'"])  # of a sweep these sets alone fail
+    case_in(
+        tmp_path, TEXT.replace("r0 = 0.95", "r0 = 1.1").replace('"noise.D0" = [0.1, 1.0]', '"noise.r0" = [0.9, 0.8]')
+    )
 
 
 def test_a_value_that_vary_would_replace_is_refused(tmp_path):
     with pytest.raises(CaseError, match=r"--set noise\.D0=7: noise\.D0: has no effect, as the case varies noise\.D0"):
-        write(tmp_path, TEXT, ["noise.D0=7"])
+        case_in(tmp_path, TEXT, ["noise.D0=7"])
 
 
 def test_a_second_run_leaves_no_eigenfunctions_of_the_first(whole, tmp_path):
     shutil.copytree(whole.folder, tmp_path / "out/test")
-    fpsolve.run(write(tmp_path, TEXT, ["vary={}", "output.eigenfunctions=[-1.0]"]), tmp_path / "out")
+    fpsolve.run(case_in(tmp_path, TEXT, ["vary={}", "output.eigenfunctions=[-1.0]"]), tmp_path / "out")
     names = {name for name in files(tmp_path / "out/test") if name.startswith("eigenfunctions")}
     assert names == {"eigenfunctions.pvd", "eigenfunctions/p-1.0.vtu"}
     assert not (tmp_path / "out/test/eigenfunctions-2").exists()
@@ -500,7 +460,7 @@ os.kill(os.getpid(), signal.SIGKILL)
 @pytest.mark.parametrize("start", [fpsolve.run, simulate_case])
 def test_what_a_killed_run_left_unfinished_is_removed(tmp_path, start):
     """Of the user's files none is, nor one that a run in a folder below is writing."""
-    case = write(tmp_path, TEXT, [LEAN, "monte_carlo={ paths = 64, time = 40.0 }"])
+    case = case_in(tmp_path, TEXT, [LEAN, "monte_carlo={ paths = 64, time = 40.0 }"])
     folder = tmp_path / "test"
     ours = [str(folder / name) for name in ("summary.json", "eigenfunctions-2/p+2.0.vtu", "lower/summary.json")]
     killed = subprocess.run([sys.executable, "-c", KILLED, *ours], check=False)
@@ -515,7 +475,7 @@ def test_what_a_killed_run_left_unfinished_is_removed(tmp_path, start):
 
 
 def test_titles_are_plain_text(tmp_path):
-    case = write(tmp_path, TEXT.replace('"A test"', r"'see [/b] and $\foo$ of [vary]'"))
+    case = case_in(tmp_path, TEXT.replace('"A test"', r"'see [/b] and $\foo$ of [vary]'"))
     fpsolve.run(case, tmp_path / "out")
 
 
@@ -526,8 +486,8 @@ def test_a_place_that_cannot_be_written_is_an_output_error(case, tmp_path):
 
 
 def test_exact_noise_is_compared_with_the_theory_of_its_reduction(tmp_path):
-    case = write(tmp_path, TEXT, ["noise.treatment='exact'"])
-    result, reduced = solve_case(case)[0], solve_case(write(tmp_path, TEXT))[0]
+    case = case_in(tmp_path, TEXT, ["noise.treatment='exact'"])
+    result, reduced = solve_case(case)[0], solve_case(case_in(tmp_path, TEXT))[0]
     np.testing.assert_array_equal(result.moments.perturbation, reduced.moments.perturbation)
     assert result.curve.is_exact
     assert not reduced.curve.is_exact
@@ -536,7 +496,7 @@ def test_exact_noise_is_compared_with_the_theory_of_its_reduction(tmp_path):
 def test_a_text_is_varied_in_every_file(tmp_path):
     """Of curves with either noise the theory is that of the reduced one."""
     sets = ['vary={ noise.treatment = ["ou-reduction", "exact"] }', "output={ figure = false, eigenfunctions = [2.0] }"]
-    case = write(tmp_path, TEXT, sets)
+    case = case_in(tmp_path, TEXT, sets)
     fpsolve.run(case, tmp_path / "out")
     folder = tmp_path / "out/test"
     with (folder / "moments.csv").open(encoding="utf-8", newline="") as stream:
@@ -591,7 +551,7 @@ def test_a_folder_that_another_run_writes_into_is_refused(case, tmp_path, start)
 )
 def test_progress_is_called_once_for_each_set_or_for_each_p_of_one(tmp_path, sets):
     """Also of what is known, and of a single curve whose eigenfunctions are drawn again."""
-    case = write(tmp_path, TEXT, sets)
+    case = case_in(tmp_path, TEXT, sets)
     for _ in range(2):
         calls = []
         fpsolve.run(case, tmp_path, progress=lambda calls=calls: calls.append(1))
@@ -613,7 +573,7 @@ value = 0.5
 atol = 1e-3
 source = "wrong on purpose"
 """
-    case = write(tmp_path, TEXT + expect)
+    case = case_in(tmp_path, TEXT + expect)
     comparisons = compare(case, solve_case(case))
     assert [(item.varied["noise.D0"], item.met) for item in comparisons] == [(1.0, True), (0.1, False), (1.0, False)]
 
@@ -622,7 +582,7 @@ def test_tilted_densities_that_python_refuses_are_warned_of(tmp_path):
     """Each shown p is judged, by the measure of `tilted_density`."""
     overrides = ["oscillator.epsilon=1.0", "oscillator.restitution=1.0", "noise.r0=1.0", "noise.tau0=1.0"]
     overrides += ["moments={p=[1.0, 3.0, 4.0], rtol=1e-5}", "output.eigenfunctions=[1.0, 3.0, 4.0]", "vary={}"]
-    [solved] = solve_sets(write(tmp_path, TEXT.replace("c1 = 0.1", "c1 = 0.0"), overrides))
+    [solved] = solve_sets(case_in(tmp_path, TEXT.replace("c1 = 0.1", "c1 = 0.0"), overrides))
     refused = []
     for pair in solved.eigenpairs:
         try:
@@ -642,7 +602,7 @@ def test_unresolved_eigenfunctions_are_warned_of(tmp_path):
         "noise.tau0=1.0",
         "noise.r0=1.0",
     ]
-    case = write(
+    case = case_in(
         tmp_path,
         TEXT,
         [*sets, "moments.p=[4.0]", "output.eigenfunctions=[4.0]", "moments.rtol=1e-5", 'vary={"noise.D0"=[0.5]}'],
@@ -658,7 +618,7 @@ def test_unresolved_eigenfunctions_are_warned_of(tmp_path):
 
 def test_no_cells_are_asked_for_without_a_mesh(tmp_path, monkeypatch):
     monkeypatch.setattr("fpsolve.analysis.density.MOST_NEGATIVE", -1.0)
-    for result in fpsolve.run(write(tmp_path, TEXT, ["vary={}"]), tmp_path):
+    for result in fpsolve.run(case_in(tmp_path, TEXT, ["vary={}"]), tmp_path):
         assert result.warnings[-1].endswith("0% of it is negative; use a smaller rtol")
 
 
@@ -667,7 +627,7 @@ def test_a_density_that_python_refuses_is_not_written(tmp_path, intensity):
     """Of files that are not written nothing else is said."""
     sets = ["oscillator.epsilon=2.0", "noise.tau0=20.0", f'vary={{"noise.D0"=[{intensity}]}}', "moments.p=[0.0]"]
     mesh = "mesh={phi_cells=1, xi_cells=2, phi_degree=8, xi_degree=8}"
-    case = write(tmp_path, TEXT, [*sets, "output.eigenfunctions=[0.0]", mesh])
+    case = case_in(tmp_path, TEXT, [*sets, "output.eigenfunctions=[0.0]", mesh])
     (curve,) = case.curves()
     with pytest.raises(NotConverged, match=r"\d% of it is negative") as refused:
         stationary_density(ExponentSolver(curve.problem, case.cylinder_mesh()).pair(0.0))
@@ -686,7 +646,7 @@ def test_sensitivities_are_written(tmp_path):
         "output.sensitivities=true",
         "output.quantities='all'",
     ]
-    case = write(tmp_path, TEXT, sets)
+    case = case_in(tmp_path, TEXT, sets)
     fpsolve.run(case, tmp_path)
     [curve] = json.loads((tmp_path / "test/summary.json").read_text(encoding="utf-8"))["curves"]
     found, errors = curve["sensitivities"], curve["sensitivities"]["errors"]
@@ -718,7 +678,7 @@ def table(folder):
 @pytest.mark.parametrize("at", [1, 2, 3])
 def test_an_interrupted_curve_keeps_its_moments_and_goes_on(tmp_path, monkeypatch, sets, at):
     """Those that are solved are in the table, and no p is solved twice; interpolated ones within their errors."""
-    case = write(tmp_path, TEXT, sets)
+    case = case_in(tmp_path, TEXT, sets)
     whole = fpsolve.run(case, tmp_path / "whole")[0]
     solution, asked = ExponentSolver.solution, list[float]()
 
@@ -754,7 +714,7 @@ def test_an_interrupted_curve_keeps_its_moments_and_goes_on(tmp_path, monkeypatc
 @pytest.mark.parametrize("name", ["stability_index", "critical_impact_factor"])
 def test_an_interrupted_curve_keeps_its_indices(tmp_path, monkeypatch, name):
     """λ comes before δ_p, and what was found is not sought again."""
-    case, order = write(tmp_path, TEXT, [*GROWING, "moments.p=[2.0]"]), list[str]()
+    case, order = case_in(tmp_path, TEXT, [*GROWING, "moments.p=[2.0]"]), list[str]()
     index = solve.INDICES[name]
 
     def interrupting(*_):
@@ -786,7 +746,7 @@ def test_a_quantity_that_fails_takes_no_other_with_it(tmp_path, monkeypatch, fai
     def fails(*_, **__):
         raise failure
 
-    case = write(tmp_path, TEXT, [*GROWING, "moments.p=[2.0]", 'output.quantities="all"'])
+    case = case_in(tmp_path, TEXT, [*GROWING, "moments.p=[2.0]", 'output.quantities="all"'])
     for name in ("solve_sensitivities", "solve_excursion", "solve_response", "settled_directions"):
         monkeypatch.setattr(solve, name, fails)
     monkeypatch.setattr(ExponentSolver, "variance_rate", fails)
@@ -804,7 +764,7 @@ def test_each_moment_is_in_the_table_as_soon_as_it_is_solved(tmp_path, monkeypat
     """With nothing waiting for a second."""
     monkeypatch.setattr(solve, "SOON", 0.0)
     monkeypatch.setattr("fpsolve.workflow.sets.REST", 0)
-    case, seen = write(tmp_path, TEXT, GROWING), list[int]()
+    case, seen = case_in(tmp_path, TEXT, GROWING), list[int]()
 
     def progress():
         seen.append(len(table(tmp_path / "out/test")))

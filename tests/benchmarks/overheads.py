@@ -26,8 +26,8 @@ from fpsolve.proofs import prove
 from fpsolve.theory.perturbation import scale_of
 from fpsolve.workflow.cases import run_case
 from tests.benchmarks.rows import Row, print_rows
+from tests.kit import case_text
 from tests.random_proofs import SHARES, drawn
-from tests.solving import case_text
 
 ROUNDS, PROOFS = 5, 100
 FIRST = """

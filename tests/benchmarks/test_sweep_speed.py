@@ -8,7 +8,7 @@ import time
 import pytest
 
 from fpsolve import load_case, moment_lyapunov
-from tests.solving import case_text
+from tests.kit import case_text
 from tests.test_sweeps import CASE, MAIN, SIZE, dask_cluster
 
 WEAK = case_text(

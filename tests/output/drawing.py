@@ -12,7 +12,7 @@ from fpsolve.exponent.quantities import INDICES
 from fpsolve.output.figures import draw
 from fpsolve.study.results import CurveResult, MomentColumns
 from fpsolve.theory.perturbation import second_order
-from tests.solving import case_in, case_text
+from tests.kit import case_in, case_text
 
 MOMENTS = "[moments]\np = { start = -2.0, stop = 4.0, num = 13 }\n"
 CASE = case_text(MOMENTS, "Moment Lyapunov exponents of a vibro-impact oscillator", {"D0": 0.1})

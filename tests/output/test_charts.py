@@ -8,8 +8,8 @@ import pytest
 from fpsolve.analysis.regions import Region, Regions
 from fpsolve.analysis.zero import Zero
 from fpsolve.output.charts import draw_chart
+from tests.kit import case_in, case_text
 from tests.output.drawing import words
-from tests.solving import case_in, case_text
 
 pytestmark = pytest.mark.usefixtures("pictures")
 CHART = """[moments]

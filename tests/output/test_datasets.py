@@ -17,7 +17,7 @@ from fpsolve.errors import FpsolveError, NotConverged
 from fpsolve.exponent.quantities import INDICES
 from fpsolve.model.quantity import MOMENT
 from fpsolve.output.datasets import write_dataset
-from tests.solving import ALL, case_in, case_text
+from tests.kit import ALL, case_in, case_text
 
 TEXT = case_text("[moments]\np = [2.0, 0.0, -1.0]\n[output]\neigenfunctions = []\nfigure = false\n")
 PRODUCT = '[vary]\n"noise.D0" = [1.0, 0.1]\n"noise.treatment" = ["exact", "ou-reduction"]\n'

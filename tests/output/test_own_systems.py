@@ -35,8 +35,8 @@ from fpsolve.output.vtk import write_eigenfunctions, write_functions
 from fpsolve.simulation import MonteCarlo
 from fpsolve.simulation.estimators import MomentEstimate
 from fpsolve.workflow import run
+from tests.kit import ALL, case_in, solve_case, solve_sets
 from tests.output.eigenfunctions import integral
-from tests.solving import ALL, case_in, solve_case, solve_sets
 
 OWN = """
 title = "mine"

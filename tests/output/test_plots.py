@@ -12,7 +12,7 @@ from fpsolve.case.case import load_case
 from fpsolve.drawing import figure_for
 from fpsolve.output.figures import Series, draw, draw_response, draw_series
 from fpsolve.simulation.response import Response
-from tests.solving import solve_case
+from tests.kit import solve_case
 
 pytestmark = pytest.mark.usefixtures("pictures")
 MEANS = "x", "x_squared", "v_squared", "amplitude", "energy"

@@ -30,8 +30,8 @@ from fpsolve.output.records import (
     simulation_key,
 )
 from fpsolve.study.solve import Numerics, Wanted, everything, solve_curve
+from tests.kit import ALL, case_in, solve_case
 from tests.output.test_datasets import HOPELESS, PRODUCT, TEXT
-from tests.solving import ALL, case_in, solve_case
 
 VALUES = {"numbers": [0.1, 1 / 3, 1e-300, math.inf, -0.0], "text": 'Λ(2) "quoted" , "record": {}\n', "nothing": None}
 

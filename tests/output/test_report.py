@@ -23,10 +23,9 @@ from fpsolve.output.tables import facts_of
 from fpsolve.workflow.folders import CHART, PROVEN, SIMULATED, SOLVED, own_folder
 from fpsolve.workflow.reports import shown_at_the_end
 from tests.conftest import painted
+from tests.kit import DRAWN, files, solve_case
 from tests.proofs.case import CASE as PROVABLE
-from tests.solving import solve_case
 from tests.study.test_chart import CASE as CHARTED
-from tests.test_workflow import DRAWN, files
 
 CASES = Path(__file__).parents[2] / "cases"
 NASTY = "<script>alert(1)</script>"

@@ -8,7 +8,7 @@ import pytest
 
 from fpsolve.cli import main
 from fpsolve.output.sentences import bounds_text, sentence
-from tests.solving import case_in, solve_case
+from tests.kit import case_in, solve_case
 
 TEXT = """
 title = "Telegraph"

@@ -27,8 +27,7 @@ from fpsolve.output.terminal import (
 from fpsolve.study.results import Comparison, CurveResult, MomentColumns
 from fpsolve.study.simulate import simulate_curves
 from fpsolve.study.solve import failed
-from tests.solving import ALL, case_in, solve_case
-from tests.test_workflow import TEXT
+from tests.kit import ALL, TEXT, case_in, solve_case
 
 NONLINEAR = ["vary={}", "oscillator.c1=0.8", "oscillator.c2=0.5", "response.rtol=0.01"]
 NONLINEAR += ["monte_carlo={ paths = 64, time = 100.0 }", "output.quantities='all'"]

@@ -24,9 +24,9 @@ from fpsolve.output.vtk import write_density, write_eigenfunctions, write_simula
 from fpsolve.study import solve
 from fpsolve.workflow import run
 from tests.conftest import FIG1, UNIT_NOISE, sampled
+from tests.kit import ALL
 from tests.oracles.perturbation import first_order_eigenfunction
 from tests.output.eigenfunctions import HARD, MESHES, MOMENTS, integral, written
-from tests.solving import ALL
 
 ROOT = Path(__file__).parents[2]
 NO_FIGURE = "output.figure=false"

@@ -15,7 +15,7 @@ from fpsolve.output.charts import read_line
 from fpsolve.study.chart import chart_work, solve_chart
 from fpsolve.workflow import Watch, chart_case, run
 from tests.conftest import painted
-from tests.solving import case_text
+from tests.kit import case_text
 
 CHART = """[moments]
 p = [2.0]

@@ -14,7 +14,7 @@ from fpsolve.messages import Code
 from fpsolve.study.results import Status
 from fpsolve.study.solve import Numerics, everything, solve_curve
 from fpsolve.workflow import simulate_case
-from tests.solving import case_in
+from tests.kit import case_in
 
 CASE = """title = "test"
 [system]

@@ -6,7 +6,7 @@ import pytest
 
 from fpsolve.case.case import CaseError, load_case
 from fpsolve.cli import main
-from tests.solving import case_in, case_text, solve_case
+from tests.kit import case_in, case_text, solve_case
 
 SECTIONS = "[moments]\np = [-0.4, 0.0]\n[vary]\n'noise.r0' = [0.9, 1.1]\n"
 TAILS = {"tau0": 1.0, "r0": 1.0, "treatment": "exact"}

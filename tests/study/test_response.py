@@ -23,7 +23,7 @@ from fpsolve.study import solve
 from fpsolve.study.results import Status
 from fpsolve.study.solve import Numerics, compare, everything, expected, solve_curve
 from fpsolve.study.uncertain import sampled_case
-from tests.solving import case_in, case_text
+from tests.kit import case_in, case_text
 
 SECTIONS = """[moments]
 p = [1.0]

@@ -11,7 +11,7 @@ from fpsolve.cli import main
 from fpsolve.output.records import record_of, result_of
 from fpsolve.study.simulate import simulate_curves
 from fpsolve.study.solve import compare
-from tests.solving import ALL, INDICES, case_in, case_text, solve_sets
+from tests.kit import ALL, INDICES, case_in, case_text, solve_sets
 
 SECTIONS = """[moments]
 p = [1.0]

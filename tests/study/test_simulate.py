@@ -20,8 +20,8 @@ from fpsolve.output import figures
 from fpsolve.simulation import response
 from fpsolve.study import simulate as simulated
 from tests.conftest import heed_signals
+from tests.kit import case_text
 from tests.oracles import closed_forms
-from tests.solving import case_text
 
 SECTIONS = "[moments]\np = [-1.0, 1.0]\n[monte_carlo]\npaths = 6400\ntime = 40.0\nseed = 7\n"
 CASE = case_text(SECTIONS, epsilon=0.5)

@@ -1,4 +1,4 @@
-"""Solving all curves of a case in this process, without a folder; and parameters for cases that are solved at once."""
+"""What tests of cases share: cases that are solved at once, solving them without a folder, and files of a run."""
 
 from __future__ import annotations
 
@@ -18,6 +18,35 @@ INDICES += ', "critical_restitution", "eigenfunctions"]'
 """All that is one number, Λ(p), and eigenfunctions."""
 OSCILLATOR = {"epsilon": 0.1, "omega": 1.0, "restitution": 0.8, "c1": 0.1}
 NOISE = {"D0": 0.5, "tau0": 0.5, "r0": 0.95}
+TEXT = """
+title = "A test"
+[oscillator]
+epsilon = 0.1
+omega = 1.0
+restitution = 0.8
+c1 = 0.1
+[noise]
+D0 = 0.5
+tau0 = 0.5
+r0 = 0.95
+treatment = "ou-reduction"
+[moments]
+p = [2.0, 0.0, -1.0]
+[vary]
+"noise.D0" = [0.1, 1.0]
+[output]
+figure = false
+eigenfunctions = [2.0]
+"""
+"""Two curves with three p and an eigenfunction."""
+DRAWN = TEXT.replace("figure = false", f"figure = true\nquantities = {INDICES}")
+"""The same with a figure and all that is one number."""
+LEAN = "output={ quantities = ['lyapunov_exponent'] }"
+"""Sets what is solved in the least time."""
+HOPELESS = "mesh={ phi_cells = 1, phi_degree = 2, xi_cells = 2, xi_degree = 3 }"
+"""Sets a mesh that resolves nothing."""
+TABLES = {"summary.json", "moments.csv", "curves.csv", "results.nc"}
+"""The files of what is solved."""
 
 
 def case_text(more: str = "", title: str = "A test", noise: Mapping[str, Any] = NOISE, **oscillator: Any) -> str:
@@ -47,3 +76,8 @@ def solve_sets(case: Case) -> list[Solved]:
 def solve_case(case: Case) -> list[CurveResult]:
     """The numbers alone."""
     return [solved.result for solved in solve_sets(case) if solved.result is not None]
+
+
+def files(folder: Path) -> set[str]:
+    """All files below a folder, by their paths from there."""
+    return {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
