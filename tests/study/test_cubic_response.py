@@ -58,7 +58,7 @@ def folder(tmp_path_factory):
 def test_names_are_those_of_the_variables(folder):
     [curve] = json.loads((folder / "summary.json").read_text(encoding="utf-8"))["curves"]
     found = curve["response"]
-    assert [*found["means"]] == NUMBERS
+    assert [*found["means"]] == [f"{name}{end}" for name in NUMBERS for end in ("", "_error")]
     assert "impact_rate" not in found
     amplitude, q, w = (found["means"][name] for name in ("amplitude_squared", "q_squared", "w_squared"))
     assert amplitude == pytest.approx(q + w / 4, rel=1e-12)
