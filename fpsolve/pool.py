@@ -45,6 +45,7 @@ MOST_JOBS = 1000
 """Largest number of processes on this machine; each needs an open file."""
 _limits: list[int] = []
 ANEW = "what was finished is kept, and the same command goes on"
+"""What is said where workers have died."""
 
 
 def processors() -> int:

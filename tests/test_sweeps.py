@@ -393,7 +393,7 @@ def test_the_first_sets_come_one_by_one(place):
 
 
 def test_records_are_read_once(tmp_path, monkeypatch):
-    """However often one looks, as after each set on which a worker died."""
+    """However often one looks, as after an interrupt."""
     parsed = []
     original = records._parsed
     monkeypatch.setattr(records, "_parsed", lambda line: parsed.append(line) or original(line))

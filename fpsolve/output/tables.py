@@ -31,7 +31,7 @@ from fpsolve.exponent.error import MEANINGLESS, Estimate
 from fpsolve.files import draft, write_csv, write_json
 from fpsolve.messages import message_of
 from fpsolve.model.kinds import version_of
-from fpsolve.model.quantity import MOMENT
+from fpsolve.model.quantity import MOMENT, Quantity
 from fpsolve.results.table import Row, plain, rows_over_p
 from fpsolve.study.columns import ENDS, columns_of, pair, row_of
 from fpsolve.study.response import CurveResponse
@@ -81,8 +81,8 @@ def write_results(
         finished: how many of them are; all if None.
     """
     columns, is_short = columns_of(case), case.planned > MOST_SUMMARISED
-    over_p = ["p", *(each.name for each in columns if each.dims)]
-    of_curve = [each.name for each in columns if not (each.dims or each.name.endswith("_perturbation"))]
+    over_p, of_curve = _names(columns)
+    of_curve = [name for name in of_curve if not name.endswith("_perturbation")]  # which take the problem of each curve
     with ExitStack() as stack:
         summary, moments, curves = (
             stack.enter_context(draft(folder / name)) for name in ("summary.json", "moments.csv", "curves.csv")
@@ -93,11 +93,16 @@ def write_results(
         summary.write(_beginning(case, len(results) if finished is None else finished, facts, held=is_short))
         for number, result in enumerate(results):
             row, varied = row_of(case, result, has_theory=not is_short), result.curve.varied.values()
-            content = _short_summary(case, result) if is_short else _summary(case, result, row)
+            content = _short_summary(case, result) if is_short else _summary(case, result, row, columns)
             summary.write(_entry(case, number, content))
             by_moment.writerows([*varied, *each] for each in rows_over_p(row, over_p))
             by_curve.writerow([*varied, *(_cell(row.get(name)) for name in of_curve)])
         summary.write(_END)
+
+
+def _names(columns: Sequence[Quantity]) -> tuple[list[str], list[str]]:
+    """Of the columns over p, which comes first, and of the others."""
+    return ["p", *(each.name for each in columns if each.dims)], [each.name for each in columns if not each.dims]
 
 
 def _cell(number: Any) -> Any:
@@ -111,7 +116,8 @@ def whole_summary(case: Case, results: Sequence[CurveResult], facts: Mapping[str
     Args:
         facts: on the run, see `facts_of`.
     """
-    curves = [_summary(case, result, row_of(case, result)) for result in results]
+    columns = columns_of(case)
+    curves = [_summary(case, result, row_of(case, result), columns) for result in results]
     content = {**_state(case, len(results)), **facts, "curves": curves}
     return json.dumps(content, allow_nan=False, ensure_ascii=False)
 
@@ -224,16 +230,13 @@ def _parameters(curve: Curve) -> dict[str, dict[str, Any]]:
     return {"parameters": dict(curve.parameters), "varied": dict(curve.varied)}
 
 
-def _summary(case: Case, result: CurveResult, row: Row) -> dict[str, Any]:
+def _summary(case: Case, result: CurveResult, row: Row, columns: Sequence[Quantity]) -> dict[str, Any]:
     """What a case asks for of a curve, by the names of the columns; those over p are in a list of `moments`."""
-    columns = columns_of(case)
-    over_p = ["p", *(each.name for each in columns if each.dims)]
-    is_asked = MOMENT.name in case.asked
-    of_p = [dict(zip(over_p, each, strict=True)) for each in rows_over_p(row, over_p)] if is_asked else []
-    of_curve = [each.name for each in columns if not each.dims]
+    over_p, of_curve = _names(columns)
+    moments = [dict(zip(over_p, each, strict=True)) for each in rows_over_p(row, over_p)]
     return {
         **_parameters(result.curve),
-        **({"moments": of_p} if is_asked else {}),
+        **({"moments": moments} if MOMENT.name in case.asked else {}),
         **{name: _cell(row.get(name)) for name in of_curve},
         **_beyond_tables(case, result),
         "discretisation": result.discretisation,
@@ -242,7 +245,7 @@ def _summary(case: Case, result: CurveResult, row: Row) -> dict[str, Any]:
 
 
 def _short_summary(case: Case, result: CurveResult) -> dict[str, Any]:
-    """The same without what results.nc has, and without the discretisation."""
+    """The state of a curve among many, its messages, and what no other table has."""
     varied = dict(result.curve.varied)
     return {"varied": varied, "status": result.status.word, **_beyond_tables(case, result), **_told(result)}
 

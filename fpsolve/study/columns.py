@@ -7,6 +7,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from fpsolve.analysis.spreads import LEVEL, UNCERTAIN
 from fpsolve.case.case import Case
 from fpsolve.exponent.quantities import INDICES, Index
@@ -43,9 +45,8 @@ def columns_of(case: Case) -> tuple[Quantity, ...]:
     found: list[Quantity] = []
     if MOMENT.name in case.asked:
         found += OVER_P.values()
-        found += [replace(RATE_FUNCTION, dims=MOMENT.dims, comment="at s = Λ′(p); its error is moment_error")] * (
-            RATE_FUNCTION.name in case.asked
-        )
+        if RATE_FUNCTION.name in case.asked:
+            found.append(replace(RATE_FUNCTION, dims=MOMENT.dims, comment="at s = Λ′(p); its error is moment_error"))
         found += [MOMENT.end(each, LEVEL) for each in ENDS if case.uncertain]
     for index in asked(case):
         found += [index, index.error(), index.perturbation]
@@ -70,13 +71,14 @@ def row_of(case: Case, result: CurveResult, *, has_theory: bool = True) -> Row:
     if case.uncertain:
         of_p = [spreads.moments.get(p) for p in moments.p.tolist()]
         for end in ENDS:
-            found[f"{MOMENT.name}_{end}"] = moments.p * 0 + [getattr(each, end, math.nan) for each in of_p]
+            found[f"{MOMENT.name}_{end}"] = np.array([getattr(each, end, math.nan) for each in of_p], dtype=float)
     for index in asked(case):
         found |= pair(index.name, result.estimates[index.name])
         if has_theory and result.estimates[index.name]:
             found[index.perturbation.name] = index.theory(result.curve.problem)
+    settled = response_columns(case)
     for name, number in (result.response.numbers if result.response else {}).items():
-        found |= pair(response_columns(case)[name].name, number)
+        found |= pair(settled[name].name, number)
     for index in uncertain(case):
         found |= {f"{index.name}_{end}": getattr(spreads.indices.get(index.name), end, None) for end in ENDS}
     count = case.p.size if MOMENT.name in case.asked else 0
