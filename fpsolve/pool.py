@@ -46,6 +46,8 @@ MOST_JOBS = 1000
 _limits: list[int] = []
 ANEW = "what was finished is kept, and the same command goes on"
 """What is said where workers have died."""
+STOPPED = "the scheduler has stopped; the same command goes on where this one stopped"
+"""What is said where nobody gives tasks to workers any more."""
 
 
 def processors() -> int:
@@ -126,7 +128,7 @@ class Pool:
                 for future in self._done([next(iter(waiting))] if in_order else waiting):
                     yield waiting.pop(future), future.result()
         except CancelledError:
-            raise WorkersDied("the scheduler has stopped; the same command goes on where this one stopped") from None
+            raise WorkersDied(STOPPED) from None
         except Exception as failure:
             if isinstance(failure, BrokenExecutor) or type(failure).__name__ == "KilledWorker":  # as Dask calls it
                 raise WorkersDied(f"a worker has died, perhaps for lack of memory; {ANEW}") from None
@@ -199,7 +201,13 @@ def cluster(address: str) -> Pool:
         executor.shutdown(wait=False)  # cancels what is not done
         clients.pop().close()
 
-    return Pool(start, stop, size, has_workers=lambda: bool(clients[-1].nthreads()), is_elsewhere=True)
+    def has_workers() -> bool:
+        try:
+            return bool(clients[-1].nthreads())
+        except OSError:  # it stopped while it was asked
+            raise WorkersDied(STOPPED) from None
+
+    return Pool(start, stop, size, has_workers=has_workers, is_elsewhere=True)
 
 
 def _client(address: str) -> Any:

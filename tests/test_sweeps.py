@@ -354,8 +354,19 @@ def test_a_scheduler_that_dies_is_told_in_one_sentence(place):
         wait_for_records(place, "headless", 1, process)
         scheduler.kill()
         _, said = process.communicate(timeout=120)
-    assert process.returncode == 3
-    assert said == "the scheduler has stopped; the same command goes on where this one stopped\n"
+    assert (process.returncode, said) == (3, f"{pool.STOPPED}\n")
+
+
+@pytest.mark.slow
+def test_a_scheduler_that_dies_while_it_is_asked_for_its_workers(place):
+    pytest.importorskip("distributed")
+    with dask_cluster(1) as (address, _, scheduler), cluster(address) as workers:
+        assert list(workers.map(abs, [-1])) == [1]
+        assert workers.has_workers()
+        scheduler.kill()
+        with pytest.raises(WorkersDied, match="scheduler has stopped"):
+            while workers.has_workers():
+                pass
 
 
 @pytest.mark.slow
