@@ -7,6 +7,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
+from hashlib import sha256
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -23,7 +24,7 @@ from pydantic import (
 )
 
 from fpsolve.arrays import FloatArray, shown
-from fpsolve.case.kinds import half_of, kinds_of, parameters_of, sections_of, varying
+from fpsolve.case.kinds import half_of, kinds_of, parameters_of, sections_of
 from fpsolve.case.messages import explain, refuse, shortened
 from fpsolve.case.refusals import REFUSALS
 from fpsolve.case.sections import (
@@ -87,17 +88,22 @@ _NO_FOLDER = re.compile(r".*[. ]|(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNOR
 
 @dataclass(frozen=True)
 class Curve:
-    """One parameter set of a case.
+    """One parameter set of a case; its problem is made when it is asked for, which may raise `ValueError`.
 
     Attributes:
-        problem: what the solver takes.
+        base: the problem of the case, without what is varied.
         varied: the parameters that [vary] names, by their dotted keys, such as "noise.D0".
         number: its place among the curves of its case, from 1 on.
     """
 
-    problem: Problem
+    base: Problem
     varied: Varied
     number: int = 1
+
+    @cached_property
+    def problem(self) -> Problem:
+        """What the solver takes."""
+        return self.base.at(self.varied) if self.varied else self.base
 
     @property
     def oscillator(self) -> Any:
@@ -112,7 +118,13 @@ class Curve:
     @cached_property
     def parameters(self) -> Varied:
         """The values of all parameters by their dotted keys."""
-        return self.problem.values
+        return {**self.base.values, **self.varied}
+
+    @property
+    def digest(self) -> str:
+        """What tells it from all parameter sets of all cases, in 64 letters; its problem is not made for that."""
+        stated = [self.base.form, sorted(self.parameters.items())]
+        return sha256(json.dumps(stated).encode()).hexdigest()
 
     @property
     def key(self) -> tuple[tuple[str, Value], ...]:
@@ -307,8 +319,7 @@ class Case(Section):
     @cached_property
     def is_nonlinear(self) -> bool:
         """Whether some of the first curves are."""
-        problem = varying(self.problem)
-        return any(problem(varied).system.is_nonlinear for varied in self.vary.sets(0, MOST_DRAWN))
+        return any(self.problem.at(varied).system.is_nonlinear for varied in self.vary.sets(0, MOST_DRAWN))
 
     @property
     def differentiated(self) -> FloatArray:
@@ -335,15 +346,15 @@ class Case(Section):
 
     def curves(self, start: int = 0, stop: int | None = None) -> Iterator[Curve]:
         """One curve for each set of the varied values, from one place to another; each is made when it is asked for."""
-        places, problem = range(self.planned)[start:stop], varying(self.problem)
+        places = range(self.planned)[start:stop]
         return (
-            Curve(problem(varied), varied, place + 1)
+            Curve(self.problem, varied, place + 1)
             for place, varied in zip(places, self.vary.sets(start, stop), strict=True)
         )
 
     def curve(self, varied: Varied) -> Curve:
         """The case's parameter set with some parameters replaced, by their dotted keys."""
-        return Curve(self.problem.at(varied), varied)
+        return Curve(self.problem, varied)
 
     @property
     def headline(self) -> str:

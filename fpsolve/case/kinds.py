@@ -7,9 +7,8 @@ may be several.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from copy import copy
-from functools import lru_cache
 from typing import Any, Literal
 
 from pydantic import ValidationError, ValidationInfo, create_model
@@ -200,19 +199,3 @@ def parameters_of(valid: Mapping[str, Any], context: Mapping[str, Any]) -> dict[
 def problem_of(valid: Mapping[str, Any]) -> Problem | None:
     """The problem of the sections that are valid, if both halves are."""
     return Problem(valid["system"], valid["noise"]) if {"system", "noise"} <= valid.keys() else None
-
-
-def varying(problem: Problem) -> Callable[[Mapping[str, float | str]], Problem]:
-    """Gives the problem with other values of some parameters, as `Problem.at`; halves that are the same are shared."""
-
-    @lru_cache(maxsize=1024)
-    def half(section: str, values: tuple[tuple[str, float | str], ...]) -> Any:
-        return problem.at(dict(values)).sections[section]
-
-    def at(varied: Mapping[str, float | str]) -> Problem:
-        of_half = {section: list[tuple[str, float | str]]() for section in problem.sections}
-        for key, value in varied.items():
-            of_half[key.rpartition(".")[0]].append((key, value))
-        return problem.made_of([half(section, tuple(values)) for section, values in of_half.items()])
-
-    return at

@@ -21,7 +21,7 @@ from pydantic.fields import FieldInfo
 from fpsolve.analysis.excursions import STATIONARY, check_start
 from fpsolve.analysis.zero import axis_faults, said
 from fpsolve.arrays import FloatArray, is_log_spaced
-from fpsolve.case.kinds import parameters_of, problem_of, varying
+from fpsolve.case.kinds import parameters_of, problem_of
 from fpsolve.case.messages import Refusal, faults_in, nearest, quoted, shown
 from fpsolve.case.remedies import CASE_WORDS
 from fpsolve.case.sections import (
@@ -77,7 +77,7 @@ def _unsolvable(valid: Known, vary: Vary, *, with_moments: bool = False) -> Iter
     problem = problem_of(valid)
     if problem is None or "moments" not in valid:
         return
-    p, at = valid["moments"].values, varying(problem)
+    p, at = valid["moments"].values, problem.at
     for place, varied in enumerate(vary.sets()):
         reason = _obstacle(at, varied, p, with_moments=with_moments)
         if reason:
@@ -257,10 +257,9 @@ def _of_excursions(section: ExcursionSection, valid: Known, context: Known) -> I
     problem = problem_of(valid)
     if problem is None or section.xi == STATIONARY:
         return
-    at = varying(problem)
     for varied in valid.get("vary", Vary()).sets():
         with suppress(ValueError):  # another fault tells why
-            curve = at(varied)
+            curve = problem.at(varied)
             try:
                 check_start(curve, section.phi, section.xi)
             except ValueError as error:

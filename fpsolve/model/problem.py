@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import cached_property
 from itertools import chain
 from textwrap import wrap
@@ -20,9 +20,10 @@ from fpsolve.errors import NoSuchExponent
 from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.checks import refuse_wrong_derivative
 from fpsolve.model.frame import Frame, own_frame
+from fpsolve.model.kinds import source_of, version_of
 from fpsolve.model.noise import Noise, NoiseDerivative
 from fpsolve.model.noises.several import noises_of
-from fpsolve.model.parameters import Parameter, Parametrised
+from fpsolve.model.parameters import Parameter, Parametrised, cached_by_problem
 from fpsolve.model.plane import (
     CoefficientMatrix,
     Harmonics,
@@ -444,12 +445,31 @@ class Problem:
             return {self.system.section: self.system, self.system.noise_sections[0]: self.noise}
         return {self.system.section: self.system, **{f"noise.{name}": noise for name, noise in parts.items()}}
 
-    @property
+    @cached_property
     def values(self) -> Mapping[str, float | str]:
         """The values of all parameters, numbers and words, by their keys."""
         return {
             f"{section}.{name}": value for section, half in self.sections.items() for name, value in half.values.items()
         }
+
+    @cached_property
+    def form(self) -> str:
+        """All that it is but for the values of its parameters, as text.
+
+        A kind of another package is named with its version and a digest of its files. The class of one that has words
+        follows from these, which are among the values.
+        """
+        kinds = list[Any]()
+        for section, half in self.sections.items():
+            kind: Any = type(half)
+            values, name = repr(tuple(half.values.items())), "" if half.words else kind.__qualname__
+            stated: Any = repr(half)
+            if is_dataclass(kind):
+                names = [each.name for each in fields(kind) if each.repr and each.name not in half.values]
+                others = {each: repr(getattr(half, each)) for each in names}
+                stated = {each: other for each, other in others.items() if other != values}
+            kinds.append((section, name, version_of(kind), source_of(kind), stated))
+        return repr(kinds)
 
     @property
     def parameters(self) -> Mapping[str, Parameter]:
@@ -497,7 +517,9 @@ class Problem:
             if section not in known:
                 raise ValueError(f"got {key}; the parameters are {', '.join(self.values)}")
             new.setdefault(section, {})[name] = value
-        return self.made_of([half.at(new[section]) if section in new else half for section, half in known.items()])
+        return self.made_of(
+            [_at(half, tuple(new[section].items())) if section in new else half for section, half in known.items()]
+        )
 
     def made_of(self, halves: Sequence[Parametrised]) -> Problem:
         """The problem of another system and other noises, in the order of `sections`."""
@@ -536,6 +558,12 @@ class Problem:
     def noise_quantity(self) -> Quantity:
         """ξ, whose unit the system decides."""
         return replace(NOISE, unit=self.system.noise_unit)
+
+
+@cached_by_problem(1024)  # sets of a sweep share the halves that are alike, and what these know
+def _at(half: Parametrised, values: tuple[tuple[str, float | str], ...]) -> Parametrised:
+    """A system or a noise with other values of some parameters."""
+    return half.at(dict(values))
 
 
 def _keyed(quantity: Quantity, key: str) -> Quantity:

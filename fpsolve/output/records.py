@@ -33,7 +33,6 @@ from fpsolve.analysis.scan import Scan
 from fpsolve.analysis.stability import Boundary
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case, Curve
-from fpsolve.case.kinds import varying
 from fpsolve.case.remedies import CASE_WORDS
 from fpsolve.case.sections import MonteCarloSection
 from fpsolve.data import Quantity
@@ -42,7 +41,6 @@ from fpsolve.exponent.quantities import BY_JUMP, INDICES
 from fpsolve.exponent.solver import InvariantClass
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import Message, message_of
-from fpsolve.model.kinds import source_of, version_of
 from fpsolve.model.quantity import ResponseQuantities
 from fpsolve.study.chart import charted
 from fpsolve.study.response import CurveResponse
@@ -163,7 +161,6 @@ class Results(Sequence[CurveResult]):
 
     def __init__(self, case: Case, records: Records) -> None:
         self._case, self._records, self._asked = case, records, everything(case).p.tolist()
-        self._problem_of = varying(case.problem)
         self._found: dict[int, Address | CurveResult] = {}
         self._order: list[int] = []
         self._kept: dict[int, CurveResult] = {}
@@ -208,7 +205,7 @@ class Results(Sequence[CurveResult]):
         if not isinstance(found, Address):
             return found
         [varied] = self._case.vary.sets(number - 1, number)
-        result = result_of(self._records.read(found), Curve(self._problem_of(varied), varied, number))
+        result = result_of(self._records.read(found), Curve(self._case.problem, varied, number))
         if found.size <= self._room:
             self._room -= found.size
             self._kept[number] = result
@@ -261,10 +258,15 @@ def _parsed(line: bytes) -> tuple[str, Record] | None:
 
 def key_of(curve: Curve, wanted: Wanted, numerics: Numerics) -> str:
     """What the record of a result is found by: a digest of all that its numbers and sentences follow from."""
+    return f"{RESULT_VERSION}-{_asked(wanted, numerics)}-{curve.digest}"
+
+
+@lru_cache(16)
+def _asked(wanted: Wanted, numerics: Numerics) -> str:
+    """A digest of what is asked of curves, and of how they are solved."""
     mesh, budget = numerics.mesh, numerics.budget
     return _digest(
         CurveResult,
-        **_of_curve(curve),
         p=wanted.p.tolist(),
         wanted=[wanted.indices, wanted.shown, wanted.density, wanted.differentiated, wanted.is_stated, wanted.start],
         response=[wanted.response, wanted.grid],
@@ -276,18 +278,19 @@ def key_of(curve: Curve, wanted: Wanted, numerics: Numerics) -> str:
 def growing_key(curve: Curve, numerics: Numerics) -> str:
     """What the numbers of a curve are found by that is not finished; they do not depend on the budget."""
     mesh = numerics.mesh and codec(CylinderMesh).plain(numerics.mesh)
-    return _digest(CurveResult, **_of_curve(curve), numerics=[numerics.rtol, mesh])
+    return f"{RESULT_VERSION}-{_digest(CurveResult, numerics=[numerics.rtol, mesh])}-{curve.digest}"
 
 
 def simulation_key(curve: Curve, orders: Sequence[float], setting: MonteCarloSection) -> str:
     settings = setting.model_dump(mode="json")
-    return _digest(SimulatedCurve, **_of_curve(curve), orders=list(orders), setting=settings)
+    return f"{RESULT_VERSION}-{_digest(SimulatedCurve, orders=list(orders), setting=settings)}-{curve.digest}"
 
 
 def line_key(case: Case, line: Boundary) -> str:
     """What the record of a line of a chart is found by."""
     frame = [repr(each) for each in (line.zero, line.x, line.y, line.step, line.budget)]
-    return _digest(Line, **_of_curve(case.curve({})), frame=frame, nodes=charted(case).nodes)
+    digest = _digest(Line, frame=frame, nodes=charted(case).nodes)
+    return f"{RESULT_VERSION}-{digest}-{case.curve({}).digest}"
 
 
 def line_of(record: Record, line: Boundary) -> Boundary:
@@ -301,15 +304,6 @@ def line_of(record: Record, line: Boundary) -> Boundary:
     if not is_whole:
         raise ValueError("this is no record of a line")
     return replace(line, traces=found.traces, scan=found.scan, seconds=found.seconds, complete=True)
-
-
-def _of_curve(curve: Curve) -> dict[str, Any]:
-    """The parameters, and the system and the noise as they are written, with versions and files of others' kinds."""
-    kinds = []
-    for half in curve.problem.sections.values():
-        kind: Any = type(half)
-        kinds.append([repr(half), version_of(kind), *filter(None, [source_of(kind)])])
-    return {"parameters": dict(curve.parameters), "kinds": kinds}
 
 
 def record_of(result: CurveResult | SimulatedCurve | Line) -> Record:
@@ -421,10 +415,10 @@ def simulation_fits(simulated: SimulatedCurve, orders: Sequence[float]) -> bool:
 
 
 def _digest(kind: type, **content: Any) -> str:
-    """A key from what results of a kind follow from and from their form; it begins with their version."""
+    """A digest of what results of a kind follow from beside their curve, and of their form."""
     form = {name: each.form for name, each in _recorded(kind).items()}
     text = json.dumps({"form": form, **content}, sort_keys=True)
-    return f"{RESULT_VERSION}-{hashlib.sha256(text.encode()).hexdigest()}"
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 class Codec(NamedTuple):

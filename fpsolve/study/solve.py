@@ -25,7 +25,6 @@ from fpsolve.analysis.sensitivity import DIFFERENTIATED, Sensitivities, solve_se
 from fpsolve.arrays import FloatArray
 from fpsolve.budget import counted
 from fpsolve.case.case import MOST_DRAWN, Case, Curve
-from fpsolve.case.kinds import varying
 from fpsolve.case.sections import EXCURSIONS, RESPONSE, SENSITIVITIES, Varied
 from fpsolve.errors import FpsolveError, NoSuchExponent, NotConverged
 from fpsolve.exponent.adapt import Budget
@@ -572,9 +571,9 @@ def solve_batch(
         progress: called after each moment; only where the task stays in this process.
         grow: takes what is known of a set that is not finished.
     """
-    kept, of_values = list[Kept](), varying(problem)
+    kept = list[Kept]()
     for order in batch:
-        curve = Curve(of_values(order.varied), order.varied, order.number)
+        curve = Curve(problem, order.varied, order.number)
         kept.append(keep(order, curve, solved(curve, order, numerics, progress, grow)))
     return kept
 

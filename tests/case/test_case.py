@@ -60,6 +60,51 @@ def test_shipped_case_loads(path: Path) -> None:
     assert case.planned == len(list(case.curves()))
 
 
+@pytest.mark.parametrize("path", sorted(CASES.rglob("*.toml")), ids=lambda path: path.stem)
+def test_a_curve_knows_its_parameters_without_its_problem(path: Path) -> None:
+    """No two curves have one digest, and one that a case states by itself has that of the sweep."""
+    case = load_case(path)
+    curves = list(case.curves())
+    assert len({curve.digest for curve in curves}) == case.planned
+    for curve in curves:
+        assert "problem" not in curve.__dict__
+        assert curve.parameters == curve.problem.values
+        assert curve.digest == Curve(curve.problem, {}).digest
+
+
+def test_a_digest_follows_from_all_that_a_problem_is(write: Write) -> None:
+    """Units and words do not count; a changed rate does, and the sign of 0 does not."""
+    stated = (
+        SMALL
+        + """[output]
+figure = false
+"""
+    )
+    known = load_case(write(stated)).curve({}).digest
+    changes = ["oscillator.omega=2.5", 'oscillator.impact="restitution"', 'noise.treatment="exact"', "noise.D0=2.0"]
+    assert len({known, *(load_case(write(stated), [each]).curve({}).digest for each in changes)}) == 5
+    assert load_case(write(stated), ["oscillator.c2=-0.0", "output.figure=true"]).curve({}).digest == known
+    rates = """
+title = "own"
+moments.p = [2]
+noise = { kind = "telegraph", a = 0.5, k = 1.0 }
+[system]
+variables = ["x", "v"]
+drift = ["v", "-(c + xi) * x - 0.1 * v"]
+parameters.c = { value = 1.0, unit = "1/time" }
+"""
+    own = load_case(write(rates)).curve({})
+    assert load_case(write(rates.replace("1/time", "1"))).curve({}).digest == own.digest
+    assert load_case(write(rates.replace("0.1", "0.2"))).curve({}).digest != own.digest
+    for base in (1.0, 3.0):
+        varied = load_case(write(rates + f"[vary]\nsystem.c = [{base}, 2.0]\n"))
+        assert (next(varied.curves()).digest == own.digest) == (base == 1.0)
+    for treatment in ("exact", "ou-reduction"):
+        varied = load_case(write(f'{stated}[vary]\nnoise.treatment = ["exact", "ou-reduction"]'))
+        alone = load_case(write(stated), [f'noise.treatment="{treatment}"']).curve({})
+        assert [curve.digest == alone.digest for curve in varied.curves()].count(True) == 1
+
+
 CAPTIONS: dict[str, dict[str, float]] = {
     "fig1": {"epsilon": 0.1, "omega": 1, "restitution": 0.8, "c1": 0.1, "r0": 0.95, "tau0": 0.5},
     "fig2a": {"epsilon": 0.1, "restitution": 0.8, "omega": math.pi, "c1": 0.1, "r0": 0.95, "tau0": 0.5},

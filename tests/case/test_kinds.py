@@ -188,7 +188,7 @@ def test_records_depend_on_the_kind_and_its_version(
 ) -> None:
     keys = set()
     for version in ("windy 1.5", "windy 1.6"):
-        monkeypatch.setattr("fpsolve.output.records.version_of", lambda _, version=version: version)
+        monkeypatch.setattr("fpsolve.model.problem.version_of", lambda _, version=version: version)
         case = load_case(write(tmp_path, OSCILLATOR, WIND, MOMENTS))
         keys.add(key_of(case.curve({}), everything(case), Numerics.of(case)))
     assert len(keys) == 2
@@ -211,9 +211,10 @@ def test_records_depend_on_the_file_of_a_kind(tmp_path: Path, monkeypatch: pytes
 
 
 def test_records_of_a_changed_kind_are_others(windy: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    case, keys = load_case(write(tmp_path, OSCILLATOR, WIND, MOMENTS)), set()
+    keys = set()
     for source in ("a", "b"):
-        monkeypatch.setattr("fpsolve.output.records.source_of", lambda _, source=source: source)
+        monkeypatch.setattr("fpsolve.model.problem.source_of", lambda _, source=source: source)
+        case = load_case(write(tmp_path, OSCILLATOR, WIND, MOMENTS))
         keys.add(key_of(case.curve({}), everything(case), Numerics.of(case)))
     assert len(keys) == 2
     assert facts_of(case, datetime.now(UTC), 0.0)["versions"]["windy"] == "1.5"
