@@ -370,9 +370,7 @@ class Case(Section):
     def is_exact(self) -> bool:
         """Whether perturbation theory has another noise than some curve."""
         texts = [key for key in self.vary.keys if self.vary.is_text(key)]
-        sets = self.vary.sets() if texts else [{}]
-        told = {tuple(varied[key] for key in texts): varied for varied in sets}  # one for each of their combinations
-        return any(self.curve(varied).is_exact for varied in told.values())
+        return any(self.curve(varied).is_exact for varied in self.vary.among(texts))
 
     def heading(self, curve: Curve) -> str:
         """The headline, with which of the curves."""

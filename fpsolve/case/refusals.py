@@ -65,21 +65,39 @@ def _of_vary(vary: Vary, valid: Known, context: Known) -> Iterator[Refusal]:
     if len(vary) > MAX_CURVES:
         yield (), None, f"makes {len(vary)} curves; must be at most {MAX_CURVES}; list fewer values"
     elif vary.file:
-        reasons = ((vary.lines[place], text) for place, text in (_unsolvable(valid, vary) if vary.lines else ()))
-        for line, text in sorted([*vary.faults, *reasons], key=itemgetter(0)):
+        reasons = _unsolvable(valid, vary) if vary.lines.size else ()
+        of_rows = [(int(vary.lines[place]), text) for place, text in reasons]
+        for line, text in sorted([*vary.faults, *of_rows], key=itemgetter(0)):
             yield ("file",), None, f"{vary.file}:{line}: {text}"
     else:
         yield from (((), None, text) for _, text in islice(_unsolvable(valid, vary), 1))
 
 
 def _unsolvable(valid: Known, vary: Vary, *, with_moments: bool = False) -> Iterator[tuple[int, str]]:
-    """The places of sets that contradict themselves or overflow, or of which some Λ(p) is not computed, and why."""
+    """The places of sets that contradict themselves or overflow, or of which some Λ(p) is not computed, and why.
+
+    Of many sets some alone are made problems, see `Vary.checked`; of the others the system and the noises are made.
+    """
     problem = problem_of(valid)
     if problem is None or "moments" not in valid:
         return
-    p, at = valid["moments"].values, problem.at
+    p, is_wholly = valid["moments"].values, np.full(len(vary), False)
+    is_wholly[vary.checked] = True
+    names = {
+        section: {key: key.rpartition(".")[2] for key in vary.keys if key.rpartition(".")[0] == section}
+        for section in problem.sections
+    }
+    halves = [(half, names[section]) for section, half in problem.sections.items() if names[section]]
     for place, varied in enumerate(vary.sets()):
-        reason = _obstacle(at, varied, p, with_moments=with_moments)
+        reason = ""
+        if is_wholly[place]:
+            reason = obstacle(problem, varied, p, with_moments=with_moments)
+        else:
+            try:
+                for half, own in halves:
+                    half.at({name: varied[key] for key, name in own.items()})
+            except ValueError as error:
+                reason = said(error)
         if reason:
             yield place, _with(varied) + reason
 
@@ -88,11 +106,11 @@ def _with(varied: Varied) -> str:
     return f"with {assignments(varied)}: " if varied else ""
 
 
-def _obstacle(at: Callable[[Varied], Problem], varied: Varied, p: FloatArray, *, with_moments: bool = True) -> str:
+def obstacle(base: Problem, varied: Varied, p: FloatArray, *, with_moments: bool = True) -> str:
     """Why there is no such curve, or why some Λ(p) of it is not computed, or nothing."""
-    extremes = [float(p.max()), float(p.min())]
+    extremes = [float(p.max()), float(p.min())] if p.size else []
     try:
-        problem = at(varied)
+        problem = base.at(varied)
         with np.errstate(all="ignore"):
             factors = [math.exp(each * jump.log_factor) for jump in problem.system.jumps for each in extremes]
             theory = second_order_or_none(problem)
@@ -164,9 +182,9 @@ def _of_monte_carlo(section: MonteCarloSection, valid: Known, context: Known) ->
     p = np.array(section.p or (0.0,))
     vary: Vary = valid["vary"]
     is_known = section.p is None and "moments" in valid  # then there are such curves, and λ is finite
-    for place, varied in enumerate(vary.sets()):
-        row = f"{vary.file}:{vary.lines[place]}: " if vary.file else ""
-        reason, faults = "" if is_known else _obstacle(base.at, varied, p), {}
+    for place, varied in zip(vary.checked.tolist(), vary.sets_at(vary.checked), strict=True):
+        row = vary.line_of(place + 1)
+        reason, faults = "" if is_known else obstacle(base, varied, p), {}
         with suppress(ValueError):  # that is the reason
             try:
                 faults = obstacles(*simulated_parts(base.at(varied)), time=section.time, step=section.step)
@@ -241,7 +259,7 @@ def _of_expect(expect: tuple[Expectation, ...], valid: Known, context: Known) ->
             guess, known = nearest(key, vary.keys), ", ".join(vary.keys) or "none"
             text = f"is not varied;{guess} varied keys: {known}; add it to [vary], {_without('expect')}"
             yield (i, "where", key), value, text
-        elif not any(same(value, other) for other in vary.columns[key]):
+        elif not any(same(value, other) for other in vary.values(key)):
             is_possible = (type(value) is str) == vary.is_text(key)
             remedy = f"add it to [vary], {_without('expect')}" if is_possible else "write one of these"
             text = f"got {shown(value)}; must be one of {shown(vary.values(key))}; {remedy}"
@@ -257,7 +275,8 @@ def _of_excursions(section: ExcursionSection, valid: Known, context: Known) -> I
     problem = problem_of(valid)
     if problem is None or section.xi == STATIONARY:
         return
-    for varied in valid.get("vary", Vary()).sets():
+    vary: Vary = valid.get("vary", Vary())
+    for varied in vary.sets_at(vary.checked):
         with suppress(ValueError):  # another fault tells why
             curve = problem.at(varied)
             try:
@@ -306,7 +325,7 @@ def _of_chart(chart: ChartSection | None, valid: Known, context: Known) -> Itera
                 return
     p = np.array([zero.p for zero in chart.zero])
     for corner in corners:
-        if reason := _obstacle(problem.at, corner, p):
+        if reason := obstacle(problem, corner, p):
             yield (), None, f"{_with(corner)}{reason}; choose another frame"
             return
 

@@ -50,7 +50,7 @@ MOST_LEVELS = 100
 MOST_PLACES = 4_000_000
 """At which a density is written."""
 _DIGITS = 12
-_SAME = 10.0**-_DIGITS
+SAME = 10.0**-_DIGITS
 """p that differ by no more are one p; values of a varied key, relative to their size."""
 SENSITIVITIES, EIGENFUNCTIONS, EXCURSIONS = "sensitivities", "eigenfunctions", "excursions"
 RESPONSE = "response"
@@ -129,7 +129,7 @@ def same(value: Value, other: Value) -> bool:
     """Whether two values of a varied key are one."""
     if str in (type(value), type(other)):
         return value == other
-    return math.isclose(value, other, rel_tol=_SAME)  # type: ignore[arg-type]
+    return math.isclose(value, other, rel_tol=SAME)  # type: ignore[arg-type]
 
 
 def flat(table: Mapping[str, Any], whole: Container[str] = (), section: str = "") -> dict[str, Any]:
@@ -228,15 +228,15 @@ class Moments(Section):
     def has(self, p: float) -> bool:
         """Whether p is one of them."""
         at = bisect_left(self.increasing, p)
-        return any(abs(each - p) <= _SAME for each in self.increasing[max(at - 1, 0) : at + 1])
+        return any(abs(each - p) <= SAME for each in self.increasing[max(at - 1, 0) : at + 1])
 
     @model_validator(mode="after")
     def _distinct(self) -> Self:
         values = np.array(self.increasing)
         with np.errstate(over="ignore"):
-            close = values[1:][np.diff(values) <= _SAME]
+            close = values[1:][np.diff(values) <= SAME]
         if close.size:
-            text = f"{close[0]} stands twice; p must differ by more than {_SAME:g}; remove one of them"
+            text = f"{close[0]} stands twice; p must differ by more than {SAME:g}; remove one of them"
             refuse([(("p",), self.p, text)])
         return self
 

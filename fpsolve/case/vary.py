@@ -8,13 +8,16 @@ import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import islice, product
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, NamedTuple, TypeGuard
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field, TypeAdapter, ValidationError, ValidationInfo
 from pydantic.fields import FieldInfo
 
+from fpsolve.arrays import FloatArray
 from fpsolve.case.kinds import parameters_of
 from fpsolve.case.messages import (
     DEPENDENT,
@@ -30,7 +33,7 @@ from fpsolve.case.messages import (
     shown_with_kind,
     too_long,
 )
-from fpsolve.case.sections import MAX_MOMENTS, MOST_NAMED, FigureSection, Sweep, Value, Values, flat, same
+from fpsolve.case.sections import MAX_MOMENTS, MOST_NAMED, SAME, FigureSection, Sweep, Value, Values, flat
 from fpsolve.data import written
 from fpsolve.model.faults import accepted, choices, table_of
 from fpsolve.model.parameters import STRICT, meaning_of
@@ -41,7 +44,15 @@ EXAMPLE = '[vary] with "noise.D0" = [0.1, 0.5, 1.0]'
 _START = "its first row must name keys, as in noise.D0,noise.tau0"
 _WORDS = Words("the sets", "a file of sets", "sets.csv", "comma-separated", _START, may_have_mark=True)
 _DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+(e[+-]?\d+)?", re.IGNORECASE)
-Columns = dict[str, tuple[Value, ...]]
+WHOLLY_CHECKED = 1000
+"""Sets of a case whose problems are all made and checked when it is loaded."""
+SPREAD = 250
+"""Sets of a case with more whose problems are, evenly spread, beside those at the ends of the keys."""
+BLOCK = 4096
+"""Sets that are read or made at a time."""
+Column = FloatArray | tuple[str, ...]
+"""The values of a varied key: numbers, or texts."""
+Columns = dict[str, Column]
 Known = Mapping[str, FieldInfo]
 """The parameters of a case by their keys, each with its range."""
 
@@ -52,23 +63,28 @@ def values_of(known: FieldInfo, most: int | None = None) -> TypeAdapter[Values]:
     return TypeAdapter(Annotated[tuple[number, ...], Field(strict=False, min_length=1, max_length=most)], config=STRICT)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Vary:
     """The parameter sets of a case: all combinations of some values, or values side by side.
 
     Attributes:
-        columns: the values of each varied key; of a product its distinct values, else one for each set.
+        columns: the values of each varied key; of a product its distinct values, else one for each set. Numbers become
+            an array, 8 bytes each.
         mode: "product" for all combinations, the last key varying fastest, or "zip" for values side by side.
         file: where they were read, for messages; empty for those of the case itself.
-        lines: where each set stands in this file.
+        lines: where each set stands in this file, integers of shape (sets,).
         faults: what is wrong in other rows, with their lines.
     """
 
-    columns: Mapping[str, tuple[Value, ...]] = field(default_factory=dict)
+    columns: Mapping[str, Column] = field(default_factory=dict)
     mode: Literal["product", "zip"] = "product"
     file: str = ""
-    lines: tuple[int, ...] = ()
+    lines: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=int))
     faults: tuple[tuple[int, str], ...] = ()
+
+    def __post_init__(self) -> None:
+        columns = {key: values if _is_text(values) else np.asarray(values) for key, values in self.columns.items()}
+        object.__setattr__(self, "columns", columns)
 
     @property
     def keys(self) -> tuple[str, ...]:
@@ -86,24 +102,63 @@ class Vary:
 
     def values(self, key: str) -> tuple[Value, ...]:
         """The distinct values of a key in the order in which they appear."""
-        return tuple(dict.fromkeys(self.columns[key]))
+        return tuple(dict.fromkeys(_plain(self.columns[key])))
 
     def is_text(self, key: str) -> bool:
         """Whether the values of a varied key are texts."""
-        return type(next(iter(self.columns[key]), 0.0)) is str
+        return _is_text(self.columns[key])
 
     def sets(self, start: int = 0, stop: int | None = None) -> Iterator[dict[str, Value]]:
         """The varied values of each set from one place to another, any place reached at once."""
-        columns, sizes = self.columns, [len(values) for values in self.columns.values()]
-        for place in range(len(self))[start:stop]:
-            at: Sequence[Any] = [place] * len(sizes) if self.mode == "zip" else np.unravel_index(place, sizes)
-            yield {key: values[i] for (key, values), i in zip(columns.items(), at, strict=True)}
+        places = range(len(self))[start:stop]
+        for begin in range(places.start, places.stop, BLOCK):
+            yield from self.sets_at(np.arange(begin, min(begin + BLOCK, places.stop)))
+
+    def sets_at(self, places: NDArray[np.int64]) -> Iterator[dict[str, Value]]:
+        """The varied values of the sets at some places."""
+        if not self.columns:
+            yield from ({} for _ in places)
+            return
+        sizes = [len(values) for values in self.columns.values()]
+        at = [places] * len(sizes) if self.mode == "zip" else np.unravel_index(places, sizes)
+        columns = [_plain(_picked(values, picked)) for values, picked in zip(self.columns.values(), at, strict=True)]
+        for row in zip(*columns, strict=True):
+            yield dict(zip(self.columns, row, strict=True))
+
+    @property
+    def checked(self) -> NDArray[np.int64]:
+        """The places of the sets whose problems are made and checked: all of them, or of many some.
+
+        These are the sets in which a key has its smallest or its largest value, of a product their combinations, with
+        each combination of texts, and others that are evenly spread.
+        """
+        count = len(self)
+        if count <= WHOLLY_CHECKED:
+            return np.arange(count)
+        numbers = [values for values in self.columns.values() if not _is_text(values)]
+        if self.mode == "product":
+            sizes = [len(values) for values in self.columns.values()]
+            ends = [
+                range(len(values)) if _is_text(values) else {int(np.argmin(values)), int(np.argmax(values))}
+                for values in self.columns.values()
+            ]
+            extreme = [int(np.ravel_multi_index(each, sizes)) for each in islice(product(*ends), WHOLLY_CHECKED)]
+        else:
+            first = first_places([values for values in self.columns.values() if _is_text(values)], count)
+            alike = [np.flatnonzero(first == place) for place in np.unique(first)]
+            extreme = [at[end(values[at])] for at in alike for values in numbers for end in (np.argmin, np.argmax)]
+        spread = np.linspace(0, count - 1, SPREAD).astype(int)
+        return np.union1d(np.array(extreme, dtype=int), spread)
 
     def among(self, keys: Iterable[str]) -> Iterator[dict[str, Value]]:
         """The distinct sets of some of the keys."""
-        wanted = set(keys)
-        chosen = {key: values for key, values in self.columns.items() if key in wanted}
-        return map(dict, dict.fromkeys(tuple(each.items()) for each in Vary(chosen, self.mode).sets()))
+        chosen = {key: _plain(values) for key, values in self.columns.items() if key in set(keys)}
+        rows = zip(*chosen.values(), strict=True) if chosen and self.mode == "zip" else product(*chosen.values())
+        return (dict(zip(chosen, row, strict=True)) for row in dict.fromkeys(rows))
+
+    def line_of(self, number: int) -> str:
+        """The line of its file on which the set of a curve stands, as "sets.csv:12: "; empty where there is no file."""
+        return f"{self.file}:{self.lines[number - 1]}: " if self.file else ""
 
     def crossing(self, key: str) -> str | None:
         """The second key of a map over a key: of a product over two keys of numbers the other one."""
@@ -136,24 +191,48 @@ def legend(varied: Mapping[str, Value], about: Callable[[str], Quantity]) -> str
     return ", ".join(about(key).stated(value) for key, value in varied.items())
 
 
-def groups(values: Sequence[Value]) -> list[int]:
+def groups(values: Column) -> NDArray[np.int64]:
     """For each value the place of the first one that is the same."""
-    runs: list[list[int]] = []
-    for place in sorted(range(len(values)), key=values.__getitem__):
-        if runs and same(values[runs[-1][-1]], values[place]):
-            runs[-1].append(place)
-        else:
-            runs.append([place])
-    first = {place: start for run, start in zip(runs, map(min, runs), strict=True) for place in run}
-    return [first[i] for i in range(len(values))]
+    if _is_text(values):
+        seen = dict[Any, int]()
+        return np.array([seen.setdefault(each, place) for place, each in enumerate(values)], dtype=int)
+    numbers = np.asarray(values)
+    order = np.argsort(numbers, kind="stable")
+    ranked = numbers[order]
+    with np.errstate(over="ignore"):
+        is_other = np.diff(ranked) > SAME * np.maximum(abs(ranked[1:]), abs(ranked[:-1]))
+    starts = np.flatnonzero(np.concatenate([[True], is_other])[: numbers.size])
+    first = np.empty(numbers.size, dtype=int)
+    first[order] = np.repeat(np.minimum.reduceat(order, starts), np.diff([*starts, numbers.size]))
+    return first
 
 
-def repeats(columns: Mapping[str, tuple[Value, ...]]) -> Iterator[tuple[int, int]]:
+def first_places(columns: Iterable[Column], count: int) -> NDArray[np.int64]:
+    """For each of so many sets side by side the place of the first one that is the same."""
+    rows = np.array([np.zeros(count, dtype=int), *map(groups, columns)])
+    order = np.lexsort(rows)
+    is_other = np.any(np.diff(rows[:, order]) != 0, axis=0)
+    starts = np.flatnonzero(np.concatenate([[True], is_other])[:count])
+    first = np.empty(count, dtype=int)
+    first[order] = np.repeat(order[starts], np.diff([*starts, count]))
+    return first
+
+
+def repeats(columns: Columns, count: int) -> list[tuple[int, int]]:
     """The places of sets side by side that stand there already, each with the first place."""
-    seen: dict[tuple[int, ...], int] = {}
-    for i, row in enumerate(zip(*map(groups, columns.values()), strict=True)):
-        if (first := seen.setdefault(row, i)) != i:
-            yield i, first
+    first = first_places(columns.values(), count)
+    again = np.flatnonzero(first != np.arange(count))
+    return list(zip(again.tolist(), first[again].tolist(), strict=True))
+
+
+def _is_text(values: Column) -> TypeGuard[tuple[str, ...]]:
+    """Whether the values of a key are texts."""
+    return isinstance(values, tuple) and type(next(iter(values), 0.0)) is str
+
+
+def _plain(values: Column) -> Sequence[Value]:
+    """The values of a key as Python has them."""
+    return values if isinstance(values, tuple) else values.tolist()
 
 
 def vary_of(value: Any, info: ValidationInfo) -> Vary:
@@ -223,12 +302,12 @@ def _column(key: str, values: Any, field: FieldInfo, columns: Columns) -> Iterat
             if value not in texts:
                 text = f"got {shown_with_kind(value)}; must be one of {quoted(texts)};{nearest(value, texts)}"
                 yield (key, i), value, f"{text} write one of them"
-        columns[key] = tuple(values)
+        columns[key] = tuple(map(str, values))
     elif table_of(values):
         yield from _range(key, values, field, columns)
     else:
         try:
-            columns[key] = values_of(field, MAX_MOMENTS).validate_python(values)
+            columns[key] = np.array(values_of(field, MAX_MOMENTS).validate_python(values))
         except ValidationError as error:
             yield from (((key, *detail["loc"]), detail["input"], too_long(detail)) for detail in faults_in(error))
 
@@ -244,8 +323,8 @@ def _range(key: str, table: Mapping[str, Any], field: FieldInfo, columns: Column
     ends = ("start", sweep.start), ("stop", sweep.stop)
     wrong = [ends[i] for i in _out_of_range(field, [end for _, end in ends])]
     yield from (((key, name), end, "") for name, end in wrong)
-    values = tuple(sweep.values.tolist())
-    if len(set(groups(values))) < len(values):
+    values = sweep.values
+    if np.unique(groups(values)).size < values.size:
         text = f"got num = {sweep.num}, which makes values equal to 12 digits; use a smaller num, or ends further apart"
         yield (key, "num"), sweep.num, text
     elif not wrong:
@@ -263,9 +342,8 @@ def _out_of_range(field: FieldInfo, values: Sequence[float]) -> list[int]:
 def _repeated(columns: Columns) -> Iterator[Refusal]:
     """The values of a product that a key has already."""
     for key, values in columns.items():
-        for i, first in enumerate(groups(values)):
-            if first != i:
-                yield (key, i), values[i], f"got {values[i]} twice; values must be distinct; remove one of them"
+        for i in np.flatnonzero(groups(values) != np.arange(len(values))).tolist():
+            yield (key, i), values[i], f"got {values[i]} twice; values must be distinct; remove one of them"
 
 
 def _uneven(columns: Columns) -> Iterator[Refusal]:
@@ -276,7 +354,7 @@ def _uneven(columns: Columns) -> Iterator[Refusal]:
         text = f'{told}; with mode = "zip" all must have one length; complete the shorter ones, or use mode = "product"'
         yield (), None, text
         return
-    for place, first in repeats(columns):
+    for place, first in repeats(columns, next(iter(lengths.values()), 0)):
         varied = {key: values[place] for key, values in columns.items()}
         text = f"sets {first + 1} and {place + 1} are both {assignments(varied)}; must be distinct; remove one of them"
         yield (next(iter(columns)), place), varied, text
@@ -289,9 +367,8 @@ def read_sets(file: str, folder: Path, parameters: Known) -> Vary:
         Unreadable: there are no rows in it, no commas, or wrong quotes.
     """
     reader = csv.reader(io.StringIO(read_text(folder / file, _WORDS), newline=""), strict=True)
-    line, header = 1, list[str]()
-    unknown, faults = list[tuple[int, str]](), list[tuple[int, str]]()
-    rows = dict[int, list[str]]()  # by their lines
+    line, header, unknown = 1, list[str](), list[tuple[int, str]]()
+    faults, rows, blocks = list[tuple[int, str]](), dict[int, list[str]](), list[_Block]()
     try:
         for row in reader:
             cells = [cell.strip() for cell in row]
@@ -305,23 +382,56 @@ def read_sets(file: str, folder: Path, parameters: Known) -> Vary:
                 faults.append((line, _wrong_length(cells, header)))
             elif any(cells):
                 rows[line] = cells
+            if len(rows) == BLOCK:
+                blocks.append(_block_of(rows, header, parameters))
+                rows = {}
             line = reader.line_num + 1
     except csv.Error as error:
         raise Unreadable(f"cannot be read as comma-separated values ({error}); correct its quotes", line) from None
-    if not (rows or faults):
+    blocks.append(_block_of(rows, header, parameters))
+    faults += (fault for block in blocks for fault in block.faults)
+    lines = np.concatenate([block.lines for block in blocks])
+    if not (lines.size or faults):
         raise Unreadable("has a header but no sets; write a row of values for each set")
-    columns, lines, wrong = Columns(), list(rows), set[int]()
-    for key, column in zip(header, zip(*rows.values(), strict=True), strict=False):
+    if unknown:
+        return Vary({}, "zip", file, lines[:0], (*unknown, *faults))
+    columns = {key: _joined([block.columns[key] for block in blocks]) for key in blocks[0].columns}
+    for place, first in repeats(columns, lines.size):
+        text = f"is the same set as line {lines[first]}; must be distinct; remove one of them"
+        faults.append((int(lines[place]), text))
+    return Vary(columns, "zip", file, lines, tuple(faults))
+
+
+class _Block(NamedTuple):
+    """Some rows of a file: the lines and the columns of those that are right, and the faults of the others."""
+
+    lines: NDArray[np.int64]
+    columns: Columns
+    faults: list[tuple[int, str]]
+
+
+def _block_of(rows: Mapping[int, Sequence[str]], header: Sequence[str], parameters: Known) -> _Block:
+    lines, columns = np.array([*rows], dtype=int), Columns()
+    faults, is_right = list[tuple[int, str]](), np.full(len(rows), True)
+    for key, cells in zip(header, zip(*rows.values(), strict=True) if rows else [()] * len(header), strict=True):
         if key in parameters:
-            columns[key], reasons = _cells(column, parameters[key])
-            faults += [(lines[i], f"{key}: {reason}") for i, reason in reasons.items()]
-            wrong |= reasons.keys()
-    good = [] if unknown else [i for i in range(len(lines)) if i not in wrong]
-    kept = {key: tuple(values[i] for i in good) for key, values in columns.items()}
-    lines = [lines[i] for i in good]
-    for place, first in repeats(kept) if good else ():
-        faults.append((lines[place], f"is the same set as line {lines[first]}; must be distinct; remove one of them"))
-    return Vary(kept, "zip", file, tuple(lines), (*unknown, *faults))
+            columns[key], reasons = _cells(cells, parameters[key])
+            faults += [(int(lines[i]), f"{key}: {reason}") for i, reason in reasons.items()]
+            is_right[[*reasons]] = False
+    right = np.flatnonzero(is_right)
+    return _Block(lines[right], {key: _picked(values, right) for key, values in columns.items()}, faults)
+
+
+def _picked(values: Column, places: NDArray[np.int64]) -> Column:
+    """The values of a key at some places."""
+    return tuple(values[i] for i in places.tolist()) if isinstance(values, tuple) else values[places]
+
+
+def _joined(parts: Sequence[Column]) -> Column:
+    """The values of a key in several blocks."""
+    if any(map(_is_text, parts)):
+        return tuple(each for part in parts for each in part)
+    return np.concatenate(parts)
 
 
 def _header_faults(header: Sequence[str], parameters: Known) -> Iterator[str]:
@@ -345,14 +455,15 @@ def _wrong_length(cells: Sequence[str], header: Sequence[str]) -> str:
     return f"has {len(cells)} cell{'s' * (len(cells) > 1)}; must have {len(header)}, one for each key; {remedy}"
 
 
-def _cells(cells: Sequence[str], field: FieldInfo) -> tuple[tuple[Value, ...], dict[int, str]]:
+def _cells(cells: Sequence[str], field: FieldInfo) -> tuple[Column, dict[int, str]]:
     """The values in cells, 0 without a sign, and what is wrong with some, by their places."""
     wrong = dict[int, str]()
     if texts := choices(field.annotation):
         for i, cell in enumerate(cells):
             if cell not in texts:
                 wrong[i] = f"must be one of {', '.join(texts)};{nearest(cell, texts)} write one of them"
-        values: tuple[Value, ...] = tuple(cells)
+        known = {text: text for text in texts}
+        values: Column = tuple(known.get(cell, "") for cell in cells)  # one text for all that are alike
     else:
         must, numbers = f"must be {accepted(field)} ({meaning_of(field)})", list[float]()
         for i, cell in enumerate(cells):
@@ -365,8 +476,8 @@ def _cells(cells: Sequence[str], field: FieldInfo) -> tuple[tuple[Value, ...], d
                 if _DECIMAL_COMMA.fullmatch(cell):
                     remedy = f"write the decimal point as {cell.replace(',', '.')}"
                 wrong[i] = f"{must}; {remedy}"
-        for i in _out_of_range(field, numbers):
+        for i in _out_of_range(field, numbers) if numbers else ():
             wrong.setdefault(i, f"{must}; change it, or remove the row")
-        values = tuple(numbers)
+        values = np.array(numbers)
     got = (f"got {shortened(cell)}" if cell else "is empty" for cell in cells)
     return values, {i: f"{each}; {wrong[i]}" for i, each in enumerate(got) if i in wrong}

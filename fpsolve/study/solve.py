@@ -25,6 +25,7 @@ from fpsolve.analysis.sensitivity import DIFFERENTIATED, Sensitivities, solve_se
 from fpsolve.arrays import FloatArray
 from fpsolve.budget import counted
 from fpsolve.case.case import MOST_DRAWN, Case, Curve
+from fpsolve.case.refusals import obstacle
 from fpsolve.case.sections import EXCURSIONS, RESPONSE, SENSITIVITIES, Varied
 from fpsolve.errors import FpsolveError, NoSuchExponent, NotConverged
 from fpsolve.exponent.adapt import Budget
@@ -541,6 +542,7 @@ class Order:
 
     Attributes:
         number, varied: of the curve.
+        line: where it stands in a file of sets, for the message of one that cannot be solved.
         wanted: what of it.
         is_known: whether there is a record, so that only its eigenfunctions are to be drawn.
         earlier: what an interrupted run knew of it.
@@ -549,6 +551,7 @@ class Order:
     number: int
     varied: Varied
     wanted: Wanted
+    line: str = ""
     is_known: bool = False
     earlier: CurveResult | None = None
 
@@ -606,8 +609,13 @@ def solved(
     progress: Callable[[], None] = lambda: None,
     grow: Callable[[CurveResult], None] = lambda _: None,
 ) -> Solved:
-    """What is wanted of a set; where that cannot be found, a result that says why, unless its numbers are known."""
+    """What is wanted of a set; where that cannot be found, a result that says why, unless its numbers are known.
+
+    That of a set which contradicts itself, or overflows, as those of a small case are refused for, is not kept.
+    """
     wanted = order.wanted
+    if reason := obstacle(curve.base, curve.varied, wanted.p, with_moments=False):
+        return Solved(failed(curve, f"{order.line}{reason}"), (), None, True)
     if order.is_known:
         try:
             solver = numerics.solver(curve)

@@ -132,7 +132,7 @@ def _drawn(case: Case) -> Vary:
     """The samples as parameter sets."""
     laws = case.uncertain.laws(case.problem)
     drawn = latin_hypercube(laws, case.uncertain.sample, case.uncertain.seed)
-    return Vary({key: tuple(values.tolist()) for key, values in drawn.items()}, "zip")
+    return Vary(drawn, "zip")
 
 
 def refuse_wrong_samples(case: Case) -> None:

@@ -326,7 +326,8 @@ def check_case(case: Case, *, by_hierarchy: bool = False, pool: Pool | None = No
     found: list[CurveResult] = []
 
     def order(number: int, varied: Varied) -> Order:
-        return Order(number, varied, Wanted(even_moments(case), ()) if by_hierarchy else expected(case, varied))
+        wanted = Wanted(even_moments(case), ()) if by_hierarchy else expected(case, varied)
+        return Order(number, varied, wanted, case.vary.line_of(number))
 
     with (
         saying_if_interrupted(lambda: kept(len(found), of_curves(case)), ANEW),

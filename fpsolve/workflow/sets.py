@@ -193,7 +193,7 @@ class Sweep(_Kept):
     def _order(self, number: int, varied: Varied) -> Order | None:
         wanted = self._wanted(number)
         if not self.results.has(number):
-            order = Order(number, varied, wanted)
+            order = Order(number, varied, wanted, self.case.vary.line_of(number))
             return replace(order, earlier=self._known_of(self._curve(order))) if self.growing.are_there else order
         if not wanted.draws:
             return None
