@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from hashlib import sha256
@@ -351,6 +351,16 @@ class Case(Section):
             Curve(self.problem, varied, place + 1)
             for place, varied in zip(places, self.vary.sets(start, stop), strict=True)
         )
+
+    def membership(self) -> Callable[[Varied], bool]:
+        """Tells whether parameters by their keys are those of a curve."""
+        held, is_set = self.held, self.vary.membership()
+        names = {*held, *self.vary.keys}
+
+        def is_curve(values: Varied) -> bool:
+            return values.keys() == names and is_set(values) and all(values[key] == each for key, each in held.items())
+
+        return is_curve
 
     def curve(self, varied: Varied) -> Curve:
         """The case's parameter set with some parameters replaced, by their dotted keys."""

@@ -156,6 +156,14 @@ class Vary:
         rows = zip(*chosen.values(), strict=True) if chosen and self.mode == "zip" else product(*chosen.values())
         return (dict(zip(chosen, row, strict=True)) for row in dict.fromkeys(rows))
 
+    def membership(self) -> Callable[[Mapping[str, Value]], bool]:
+        """Tells whether values of all keys are those of a set."""
+        if self.mode == "product":
+            known = {key: set(_plain(values)) for key, values in self.columns.items()}
+            return lambda varied: all(varied[key] in values for key, values in known.items())
+        sets = set(zip(*map(_plain, self.columns.values()), strict=True)) if self.columns else {()}
+        return lambda varied: tuple(varied[key] for key in self.columns) in sets
+
     def line_of(self, number: int) -> str:
         """The line of its file on which the set of a curve stands, as "sets.csv:12: "; empty where there is no file."""
         return f"{self.file}:{self.lines[number - 1]}: " if self.file else ""

@@ -95,20 +95,19 @@ def _stale(case: Case, there: Mapping[str, Path]) -> list[str]:
     states = {
         kind: [path for name, path in there.items() if re.fullmatch(table, name)] for kind, table in _TABLES.items()
     }
-    curves = [curve.parameters for curve in case.curves()] if any(states.values()) else []
-    known = {frozenset(each.items()) for each in curves}
+    is_of_case = case.membership() if any(states.values()) else bool
 
     def agrees(path: Path) -> bool:
         try:
             content = parsed_json(plain_text(path))
             if path.name == "chart.json":
                 stated, axes = content["parameters"], {content["x"]["key"], content["y"]["key"]}
-                is_whole = {*stated, *axes} == set(curves[0]) and axes.isdisjoint(stated)
-                return is_whole and any(stated.items() <= each.items() for each in curves)
+                is_whole = {*stated, *axes} == case.problem.values.keys() and axes.isdisjoint(stated)
+                return is_whole and any(stated.items() <= curve.parameters.items() for curve in case.curves())
             held = content.get("parameters", {})  # by many curves, which then state the others alone
             stated = [each.get("parameters") or {**held, **each["varied"]} for each in content.get("curves", [content])]
             is_empty = path.name == "proof.json" and not stated
-            return not is_empty and all(frozenset(each.items()) in known for each in stated)
+            return not is_empty and all(map(is_of_case, stated))
         except (OSError, ValueError, LookupError, TypeError, AttributeError):  # it is not a table of fpsolve
             return False
 
