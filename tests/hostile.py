@@ -1,8 +1,7 @@
-"""Folders of results, netCDF files and records with random faults, and what fpsolve makes of them.
+"""NetCDF files and records with random faults, and what fpsolve makes of them.
 
-`python -m tests.hostile [folders|netcdf|records ...] [--seed S] [--count N]` prints how each ended. Nothing may
-end in a traceback or without an end, nothing outside of the folder of results may change, and nothing that was found
-may be lost.
+`python -m tests.hostile [netcdf|records ...] [--seed S] [--count N]` prints how each ended. Nothing may end in a
+traceback or without an end, and nothing that was found may be lost; `tests/test_folders.py` has folders with faults.
 """
 
 from __future__ import annotations
@@ -12,7 +11,6 @@ import contextlib
 import copy
 import io
 import json
-import os
 import random
 import shutil
 import signal
@@ -34,31 +32,21 @@ from fpsolve.cli import main as command
 from fpsolve.errors import FpsolveError
 from tests.kit import case_text
 
-COUNTS = {"folders": 500, "netcdf": 300, "records": 500}
+COUNTS = {"netcdf": 300, "records": 500}
 PATIENCE = 120
 """Seconds after which a command hangs."""
 TEXT = case_text(
     '[moments]\np = [2.0, 0.0, -1.0]\n[monte_carlo]\npaths = 64\ntime = 40.0\n[vary]\n"noise.D0" = [0.1, 0.5]\n'
 )
-PLAIN, DRAWN = "[output]\nfigure = false\neigenfunctions = [2.0]\n", "[output]\neigenfunctions = [2.0]\n"
+PLAIN = "[output]\nfigure = false\neigenfunctions = [2.0]\n"
 LEAN = '[output]\nquantities = ["moment", "lyapunov_exponent"]\nfigure = false\n'
 DATA = [
     *(None, True, False, 0, 1, -1, 7.0, 1e308, -1e-320, 10**400, 2**63, "", "x", "nan", "inf", "\ud800", "\x1b[31m"),
-    *(
-        [],
-        {},
-        [[]],
-        [0.0],
-        ["x"],
-        {"": 0},
-        {"code": "TEXT"},
-        {"shape": [2**40], "data": ""},
-        {"shape": [-1], "data": ""},
-    ),
+    *([], {}, [[]], [0.0], ["x"], {"": 0}, {"code": "TEXT"}),
+    *({"shape": [2**40], "data": ""}, {"shape": [-1], "data": ""}),
     *("2.0", [1, 2, 3, 4], {"number": "x"}, {"remedy": "NONE"}, "[" * 10000),
 ]
 """What may stand where something else should."""
-DEVICES = ("/dev/null", "/dev/zero", "/dev/full", "/dev/urandom")
 
 
 class Wrong(Exception):
@@ -132,11 +120,8 @@ def changed_bytes(content: bytes, rng: random.Random) -> bytes:
     return bytes(data[:at] + data[at + rng.choice([0, 0, 0, 1, 8, 100]) :])
 
 
-# ── folders of results ───────────────────────────────────────────────────────────────────────────────────────────────
-
-
 def results_in(place: Path) -> Path:
-    """A folder with all that fpsolve writes for one case, beside the case file."""
+    """A folder that a run and a simulation have written, beside its case file."""
     (place / "case.toml").write_text(TEXT + PLAIN, encoding="utf-8")
     called("run", str(place / "case.toml"), "--out", str(place / "out"), "--quiet", "--jobs", "1")
     called("simulate", str(place / "case.toml"), "--out", str(place / "out"), "--quiet", "--jobs", "1")
@@ -144,122 +129,7 @@ def results_in(place: Path) -> Path:
     for kind in ("solved", "simulated"):  # of a process that has ended
         [path] = (folder / "records" / kind).glob("*.jsonl")
         path.rename(path.with_name("earlier.jsonl"))
-    summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
-    parameters = summary["curves"][0]["parameters"]
-    (folder / "proof.json").write_text(json.dumps({"curves": [{"parameters": parameters}]}), encoding="utf-8")
-    axes = {"x": {"key": "noise.D0"}, "y": {"key": "oscillator.c1"}}
-    held = {key: value for key, value in parameters.items() if key not in ("noise.D0", "oscillator.c1")}
-    lines = [{"line": "lyapunov_exponent", "branches": [{"points": 2, "closed": False, "obstacles": []}]}]
-    chart = {"complete": True, "parameters": held, **axes, "lines": lines}
-    (folder / "chart.json").write_text(json.dumps(chart), encoding="utf-8")
-    table = "line,branch,x,y,width,label\nlyapunov_exponent,1,0.1,0.05,0,\nlyapunov_exponent,1,0.5,0.2,0,\n"
-    (folder / "chart.csv").write_text(table, encoding="utf-8")
-    (folder / "notes.txt").write_text("mine", encoding="utf-8")
     return folder
-
-
-def spoil(path: Path, elsewhere: Path, rng: random.Random) -> str:
-    """Put something else in the place of a file or a folder, and say what."""
-    content = path.read_bytes() if path.is_file() else b""
-    kinds = ["bytes", "json", "cut", "nested", "huge", "none", "folder", "full folder", "pipe", "device"]
-    kind = rng.choice([*kinds, "link", "link to folder", "dangling link", "link to itself", "link to its name"])
-    if path.is_dir():
-        shutil.rmtree(path)
-    else:
-        path.unlink()
-    match kind:
-        case "bytes" | "json" | "cut":
-            with contextlib.suppress(ValueError):
-                if kind == "json":
-                    content = json.dumps(changed_data(json.loads(content), rng)).encode()
-            path.write_bytes(content[: len(content) // 2] if kind == "cut" else changed_bytes(content, rng))
-        case "nested":
-            path.write_text("[" * 100_000, encoding="utf-8")
-        case "huge":
-            with path.open("wb") as file:
-                file.truncate(2**40)
-        case "folder" | "full folder":
-            path.mkdir()
-            if kind == "full folder":
-                (path / "mine.txt").write_text("mine", encoding="utf-8")
-        case "pipe":
-            os.mkfifo(path)
-        case "device":
-            path.symlink_to(rng.choice(DEVICES))
-        case "link" | "link to folder":
-            path.symlink_to(elsewhere / ("file.json" if kind == "link" else "folder"))
-        case "dangling link":
-            path.symlink_to(elsewhere / "none")
-        case "link to itself":
-            path.symlink_to(path)
-        case "link to its name":
-            target = elsewhere / "names" / path.name
-            target.parent.mkdir(exist_ok=True)
-            target.write_bytes(content)
-            path.symlink_to(target)
-    return kind
-
-
-def tree(folder: Path) -> dict[str, bytes]:
-    """All files of a folder, with what is in them."""
-    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
-
-
-def folders(rng: random.Random, count: int) -> Iterator[tuple[str, Callable[[], str]]]:
-    """Runs and simulations into folders of which one or two entries are spoilt."""
-    with tempfile.TemporaryDirectory() as name:
-        place = Path(name)
-        good = results_in(place)
-        shutil.move(good, place / "good")
-        good, bad = place / "good", place / "out/case"
-        moments = (good / "moments.csv").read_bytes()
-        entries = sorted(path.relative_to(good) for path in good.rglob("*") if path.name != "notes.txt")
-
-        def run() -> str:
-            for path in (place / "out", place / "elsewhere"):
-                shutil.rmtree(path, ignore_errors=True)
-            shutil.copytree(good, bad)
-            eigenfunctions = place / "elsewhere/folder"
-            eigenfunctions.mkdir(parents=True)
-            for name in ("p+2.0.vtu", "summary.json", "x.jsonl"):
-                (eigenfunctions / name).write_text("mine", encoding="utf-8")
-            (place / "elsewhere/file.json").write_text("{}", encoding="utf-8")
-            chosen = rng.sample(entries, rng.choice([1, 1, 2]))
-            kinds = []
-            for entry in chosen:
-                if os.path.lexists(bad / entry):
-                    kinds.append(spoil(bad / entry, place / "elsewhere", rng))
-            outside, mine = (
-                tree(place / "elsewhere"),
-                (bad / "notes.txt").read_bytes(),
-            )
-            verb = rng.choice(["run", "run", "run", "simulate"])
-            text = TEXT + (DRAWN if rng.random() < 0.1 else PLAIN)
-            (place / "case.toml").write_text(text, encoding="utf-8")
-            words = [verb, str(place / "case.toml"), "--out", str(place / "out"), "--jobs", "1"]
-            label = f"{verb} with {', '.join(f'{entry}: {kind}' for entry, kind in zip(chosen, kinds, strict=False))}"
-            try:
-                code, said = called(*words)
-                if code == 2 and not any(entry.name in said or "lock" in said for entry in chosen):
-                    raise Wrong(f"the refusal does not name it: {said}")
-                if code == 0 and verb == "run" and (bad / "moments.csv").read_bytes() != moments:
-                    raise Wrong("other numbers")
-                if tree(place / "elsewhere") != outside:
-                    raise Wrong("something outside of the folder has changed")
-                if (bad / "notes.txt").read_bytes() != mine:
-                    raise Wrong("a file of the user has changed")
-                spared = {str(entry) for entry in chosen} | ({"chart.csv"} if Path("chart.json") in chosen else set())
-                for entry in entries:
-                    is_found = entry.parts[0] == "records" or entry.name in ("proof.json", "chart.json", "chart.csv")
-                    is_spared = {str(entry), *map(str, entry.parents)} & spared
-                    if is_found and not is_spared and (good / entry).is_file() and not (bad / entry).is_file():
-                        raise Wrong(f"{entry} is lost")
-            except Wrong as wrong:
-                raise Wrong(f"{label}: {wrong}") from None
-            return f"{verb}: {code}"
-
-        for number in range(count):
-            yield f"folder {number}", run
 
 
 # ── records ──────────────────────────────────────────────────────────────────────────────────────────────────────────
@@ -310,47 +180,24 @@ def records(rng: random.Random, count: int) -> Iterator[tuple[str, Callable[[], 
 # ── netCDF ───────────────────────────────────────────────────────────────────────────────────────────────────────────
 
 ATTRIBUTES = [
-    np.arange(3),
-    "abc",
-    np.float64("nan"),
-    np.array(["a", "b"], dtype="S1"),
-    1e308,
-    b"\xff\xfe",
-    np.int64(-1),
-    "",
-]
-NAMES = (
-    "scale_factor",
-    "add_offset",
-    "_FillValue",
-    "missing_value",
-    "units",
-    "calendar",
-    "coordinates",
-    "_Unsigned",
+    np.arange(3), "abc", np.float64("nan"), np.array(["a", "b"], dtype="S1"), 1e308, b"\xff\xfe", np.int64(-1), "",
+]  # fmt: skip
+"""Values of attributes, right or wrong."""
+NAMES = [
+    "scale_factor", "add_offset", "_FillValue", "missing_value", "units", "calendar", "coordinates", "_Unsigned",
     "dtype",
-)
+]  # fmt: skip
+"""Attributes that a reader of netCDF heeds."""
+SPOILT = [
+    "bytes", "bytes", "cut", "head", "variable", "gone", "size", "attribute", "own attribute", "twice", "p",
+    "type", "link",
+]  # fmt: skip
+"""Faults of a file; bytes are changed twice as often."""
 
 
 def spoil_netcdf(path: Path, rng: random.Random) -> str:
     """Change a file that a run wrote, and say how."""
-    kind = rng.choice(
-        [
-            "bytes",
-            "bytes",
-            "cut",
-            "head",
-            "variable",
-            "gone",
-            "size",
-            "attribute",
-            "own attribute",
-            "twice",
-            "p",
-            "type",
-            "link",
-        ]
-    )
+    kind = rng.choice(SPOILT)
     if kind in ("bytes", "cut", "head"):
         content = path.read_bytes()
         if kind == "head":
@@ -443,7 +290,7 @@ def netcdf(rng: random.Random, count: int) -> Iterator[tuple[str, Callable[[], s
             yield f"file {number}", run
 
 
-KINDS = {"folders": folders, "netcdf": netcdf, "records": records}
+KINDS = {"netcdf": netcdf, "records": records}
 
 
 def tried(
