@@ -95,11 +95,11 @@ def test_without_an_imposed_tail_the_density_falls_as_that_of_the_linear_system(
     system = VibroImpactOscillator(omega=1.0, epsilon=0.5, restitution=0.97, c1=0.1, c2=0.5, c3=0.2)
     problem = Problem(system, noise_of(0.3, 0.5))
     plane = Plane(
-        Flow(problem), Elements(Flow(problem).phases(3), 14, is_closed=True), PolynomialAxis(problem.coloured, 16)
+        Flow(problem), Elements(Flow(problem).phases(3), 12, is_closed=True), PolynomialAxis(problem.coloured, 12)
     )
     any_inflow = Tail(1.0, plane.constant[None])
     with one_thread():
-        found = solved(plane, Elements(np.linspace(-10, 1.8, 48), 8), any_inflow)
+        found = solved(plane, Elements(np.linspace(-10, 1.8, 40), 7), any_inflow)
     u = np.linspace(-5.5, -3, 101)
     logs = np.log(found.at(u) @ plane.unit @ plane.constant)
     shapes = np.stack([np.ones_like(u), u, np.exp(2 * u), np.exp(4 * u)], axis=1)

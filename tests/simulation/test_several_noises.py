@@ -60,7 +60,7 @@ def test_beside_a_harmonic_load_a_transient_is_whole_periods():
 def test_impacts_at_a_wall_are_counted():
     wall = [{"at": "x = 0", "restitution": 0.9}]
     system = PlaneSystem.of_equations(("x", "v"), RATES, {"omega": 1.0, "zeta": 0.0}, noises=NAMES, walls=wall)
-    noises = Problem(system, {"axial": OrnsteinUhlenbeck(1.0, 1e-9), "lateral": Telegraph(a=1e-9, k=1.5)}).noise
+    noises = Problem(system, {"axial": OrnsteinUhlenbeck(1.0, 1e-9), "lateral": White(s=1e-9)}).noise  # compiled above
     rng, h = np.random.default_rng(1), default_step(system, noises)
     known = coefficients(system, noises)
     x, u, state = starting_state(noises, 8, rng)
