@@ -335,9 +335,9 @@ def _over_parameter(case: Case, pairs: Sequence[Pair]) -> list[Series]:
     shown, found = _some(len(groups)), []
     for i, (others, group) in enumerate(groups.items()):
         x = np.array([float(result.curve.varied[key]) for result, _ in group])
-        line = np.linspace(x.min(), x.max(), 200) if i in shown else _NOTHING
+        line = np.linspace(x.min(), x.max(), 100) if i in shown else _NOTHING
         if line.size and x.min() > 0:
-            line = np.unique(np.concatenate([line, np.geomspace(x.min(), x.max(), 200)]))
+            line = np.unique(np.concatenate([line, np.geomspace(x.min(), x.max(), 100)]))
         dots = [(at, _simulated(case, sample)) for at, (_, sample) in zip(x, group, strict=True) if sample]
         found.append(
             Series(
