@@ -489,8 +489,8 @@ def test_exact_noise_is_compared_with_the_theory_of_its_reduction(tmp_path):
     case = case_in(tmp_path, TEXT, ["noise.treatment='exact'"])
     result, reduced = solve_case(case)[0], solve_case(case_in(tmp_path, TEXT))[0]
     np.testing.assert_array_equal(result.moments.perturbation, reduced.moments.perturbation)
-    assert result.curve.is_exact
-    assert not reduced.curve.is_exact
+    assert result.curve.theory_reduces_noise
+    assert not reduced.curve.theory_reduces_noise
 
 
 def test_a_text_is_varied_in_every_file(tmp_path):

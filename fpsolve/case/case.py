@@ -76,7 +76,7 @@ COMPUTED = ("oscillator", "system", "noise", "vary", "mesh")
 CHEAP = (MOMENT.name, LYAPUNOV_EXPONENT.name, STABILITY_INDEX.name)
 """What is computed where nothing is named, beside one eigenfunction."""
 CHEAP_OF_WALLS = (IMPACT_RATE.name, CRITICAL_IMPACT_FACTOR.name)
-"""The same of a system with walls."""
+"""What is computed in addition of a system with walls."""
 MOST_DRAWN = 10
 """Of so many curves at most the response is computed unasked, and densities of it are written."""
 MOST_DENSITIES = 3
@@ -133,7 +133,7 @@ class Curve:
 
     @property
     def label(self) -> str:
-        """The same for the eye: "noise.D0 = 0.1, noise.r0 = 0.9"."""
+        """What varies, for the eye: "noise.D0 = 0.1, noise.r0 = 0.9"."""
         return assignments(self.varied, "g")
 
     @property
@@ -142,8 +142,8 @@ class Curve:
         return "" if self.number == 1 else f"-{self.number}"
 
     @property
-    def is_exact(self) -> bool:
-        """Whether perturbation theory has another noise than this, as for Eq. (7) as it stands."""
+    def theory_reduces_noise(self) -> bool:
+        """Whether perturbation theory takes the reduction in place of its noise, as for Eq. (7) as it stands."""
         return self.noise.approximates_spectrum
 
 
@@ -339,7 +339,7 @@ class Case(Section):
         return len(self.vary)
 
     @property
-    def held(self) -> Varied:
+    def constants(self) -> Varied:
         """The values of the parameters that are not varied, by their keys."""
         [first] = self.curves(0, 1)
         return {key: value for key, value in first.parameters.items() if key not in self.vary.keys}
@@ -354,11 +354,15 @@ class Case(Section):
 
     def membership(self) -> Callable[[Varied], bool]:
         """Tells whether parameters by their keys are those of a curve."""
-        held, is_set = self.held, self.vary.membership()
-        names = {*held, *self.vary.keys}
+        constants, is_set = self.constants, self.vary.membership()
+        names = {*constants, *self.vary.keys}
 
         def is_curve(values: Varied) -> bool:
-            return values.keys() == names and is_set(values) and all(values[key] == each for key, each in held.items())
+            return (
+                values.keys() == names
+                and is_set(values)
+                and all(values[key] == each for key, each in constants.items())
+            )
 
         return is_curve
 
@@ -373,14 +377,14 @@ class Case(Section):
 
     @property
     def caption(self) -> str:
-        """The same above its figure, which may have a title of its own."""
+        """The headline of its figure, which may have a title of its own."""
         return self._with_changes(self.figure.title or self.title)
 
     @property
-    def is_exact(self) -> bool:
-        """Whether perturbation theory has another noise than some curve."""
+    def theory_reduces_noise(self) -> bool:
+        """Whether perturbation theory takes the reduction in place of the noise of some curve."""
         texts = [key for key in self.vary.keys if self.vary.is_text(key)]
-        return any(self.curve(varied).is_exact for varied in self.vary.among(texts))
+        return any(self.curve(varied).theory_reduces_noise for varied in self.vary.among(texts))
 
     def heading(self, curve: Curve) -> str:
         """The headline, with which of the curves."""

@@ -92,7 +92,7 @@ def shown(value: Any) -> str:
 
 
 def shown_with_kind(value: Any, *, but: type | None = None) -> str:
-    """The same with what it is, but for one kind: "3 (a number)"."""
+    """A value as TOML writes it with what it is, but for one kind: "3 (a number)"."""
     return shown(value) if type(value) is but else f"{shown(value)} ({_KINDS.get(type(value), 'a date or time')})"
 
 

@@ -117,7 +117,7 @@ def schema() -> dict[str, Any]:
 
 
 def schema_text() -> str:
-    """The same as the content of a file."""
+    """The schema as the content of a file."""
     return json.dumps(schema(), indent=1) + "\n"
 
 

@@ -577,7 +577,7 @@ class ChartAxis(Section):
 
     @property
     def axis(self) -> Axis:
-        """The same for the solver."""
+        """What the solver takes."""
         return Axis(self.key, self.start, self.stop, self.scale, self.at)
 
 

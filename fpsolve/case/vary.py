@@ -195,7 +195,7 @@ def assignments(varied: Mapping[str, Value], style: str = "") -> str:
 
 
 def legend(varied: Mapping[str, Value], about: Callable[[str], Quantity]) -> str:
-    r"""The same for a figure, by what the keys are: "$D_0$ = 0.1/time, treatment = exact"."""
+    r"""Keys with their values for a figure, by what the keys are: "$D_0$ = 0.1/time, treatment = exact"."""
     return ", ".join(about(key).stated(value) for key, value in varied.items())
 
 

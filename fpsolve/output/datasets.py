@@ -132,7 +132,14 @@ def _coordinates(case: Case) -> dict[str, Variable]:
 def _origin(case: Case, facts: Mapping[str, Any]) -> dict[str, str | float | int]:
     """The case, the parameters that are not varied, and where the numbers come from."""
     origin = {name: each if isinstance(each, str | float | int) else json.dumps(each) for name, each in facts.items()}
-    return {"title": case.title, "case": case.name, "Conventions": "CF-1.11", "rtol": case.rtol, **case.held, **origin}
+    return {
+        "title": case.title,
+        "case": case.name,
+        "Conventions": "CF-1.11",
+        "rtol": case.rtol,
+        **case.constants,
+        **origin,
+    }
 
 
 def open_results(*places: str | Path, errors: Literal["raise", "warn"] = "raise") -> xr.Dataset:

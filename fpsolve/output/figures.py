@@ -169,8 +169,7 @@ def draw(
             series = [_moment_series(case, *pair, with_theory=i in shown) for i, pair in enumerate(pairs)]
         else:
             series = _over_parameter(case, pairs)
-        is_exact = any(result.curve.is_exact for result in results)
-        draw_series(axes, case, series, setting.quantity.closed_form + ", reduced noise" * is_exact)
+        draw_series(axes, case, series, setting.quantity.closed_form + ", reduced noise" * case.theory_reduces_noise)
 
 
 def draw_rates(case: Case, results: Sequence[CurveResult], folder: Path, *, into: Path | None = None) -> None:
@@ -185,8 +184,9 @@ def draw_rates(case: Case, results: Sequence[CurveResult], folder: Path, *, into
         axes = figure.add_subplot()
         label_axes(axes, *(each.timed(case.units.time).attributes for each in (GROWTH, RATE_FUNCTION)))
         mark_zero(axes)
-        is_exact = any(result.curve.is_exact for result in results)
-        (_draw_few if is_few else _draw_many)(axes, case, series, MOMENT.closed_form + ", reduced noise" * is_exact)
+        (_draw_few if is_few else _draw_many)(
+            axes, case, series, MOMENT.closed_form + ", reduced noise" * case.theory_reduces_noise
+        )
         axes.margins(x=0.03)
         axes.ticklabel_format(style="sci", scilimits=(-2, 3), useMathText=True)
 

@@ -128,7 +128,7 @@ def _state(case: Case, done: int) -> dict[str, Any]:
 
 def _beginning(case: Case, done: int, facts: Mapping[str, Any], *, held: bool = False) -> str:
     """What summary.json has before its curves; with the parameters that these have in common, if they are held."""
-    common = {"parameters": dict(case.held)} if held else {}
+    common = {"parameters": dict(case.constants)} if held else {}
     start = json.dumps({**_state(case, done), **facts, **common}, indent=1, ensure_ascii=False)
     return start.removesuffix("\n}") + ',\n "curves": ['
 

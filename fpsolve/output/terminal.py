@@ -180,7 +180,7 @@ def _interval(case: Case, index: Index) -> list[_Shown]:
 
 def _theory(case: Case, index: Index) -> _Shown:
     """Its closed form; with a star where some solution is for another noise."""
-    heading = f"Eq. {index.closed_form}{'*' if case.is_exact else ''}"
+    heading = f"Eq. {index.closed_form}{'*' if case.theory_reduces_noise else ''}"
 
     def text(result: CurveResult) -> str:
         value = index.theory(result.curve.problem)
@@ -485,14 +485,14 @@ def _deviation(value: float, error: float, exact: float) -> str:
 
 
 def moment_grid(case: Case, result: CurveResult) -> Grid:
-    is_exact = result.curve.is_exact
-    theory = Column(f"perturbation, Eq. {MOMENT.closed_form}{'*' if is_exact else ''}", 1)
+    is_reduced = result.curve.theory_reduces_noise
+    theory = Column(f"perturbation, Eq. {MOMENT.closed_form}{'*' if is_reduced else ''}", 1)
     spreads = spreads_of(case, result).moments
     intervals = [Column(INTERVAL), Column("P(Λ < 0)")] * bool(spreads)
     columns = [Column("p"), Column(MOMENT.symbol), Column("± error"), theory, Column("difference", 2)]
     moments = result.moments
     has_theory = any(map(math.isfinite, moments.perturbation))
-    remark = "; ".join(filter(None, [STAR * (is_exact and has_theory), units_in_words(case, [MOMENT, *_told(case)])]))
+    remark = "; ".join(filter(None, [STAR * (is_reduced and has_theory), units_in_words(case, [MOMENT, *_told(case)])]))
     shown_columns = [*columns[:3], *intervals, *(columns[3:] if has_theory else [])]
     grid = Grid(case.heading(result.curve), shown_columns, remark=remark)
     for p, value, error, closed in zip(

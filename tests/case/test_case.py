@@ -303,7 +303,7 @@ def test_override_of_a_text_needs_no_quotes(write: Write) -> None:
     assert curve.parameters["oscillator.impact"] == "restitution"
     assert curve.oscillator.impact is ImpactLaw.RESTITUTION
     assert curve.noise == NonGaussianNoise(D0=1.0, tau0=1.0, r0=1.0)
-    assert curve.is_exact
+    assert curve.theory_reduces_noise
     assert case.title == "Two words"
 
 

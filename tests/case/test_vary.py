@@ -162,7 +162,7 @@ def test_the_treatment_of_the_noise_and_the_impact_law_vary(write: Write) -> Non
     case = load_case(write('noise.treatment = ["ou-reduction", "exact"]\noscillator.impact = ["delta", "restitution"]'))
     curves = list(case.curves())
     assert [type(curve.noise) for curve in curves] == [ReducedNoise] * 2 + [NonGaussianNoise] * 2
-    assert [curve.is_exact for curve in curves] == [False, False, True, True]
+    assert [curve.theory_reduces_noise for curve in curves] == [False, False, True, True]
     assert [curve.oscillator.impact for curve in curves] == ["delta", "restitution"] * 2
     assert curves[3].label == "noise.treatment = exact, oscillator.impact = restitution"
     assert second_order(curves[0].problem).moment_exponent(2.0) == second_order(curves[2].problem).moment_exponent(2.0)
