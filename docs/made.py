@@ -41,6 +41,7 @@ ROOMS = {
     "fem": "meshes and the matrices of the generator",
     "case": "case files",
     "results": "the numbers of many curves as one table",
+    "parts": "what a case may ask for of each curve",
     "study": "cases become results",
     "output": "results become files and pictures",
     "workflow": "run, simulate, chart and check a case",

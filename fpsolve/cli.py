@@ -311,7 +311,7 @@ def run(
     """
     from fpsolve.output.tables import whole_summary
     from fpsolve.output.terminal import done_of, known_of, note_missing, print_written
-    from fpsolve.study.uncertain import refuse_wrong_samples
+    from fpsolve.parts.intervals import refuse_wrong_samples
     from fpsolve.workflow.cases import run_case
 
     code, reporter = 0, reporter_of(report, interactive)

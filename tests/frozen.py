@@ -25,7 +25,7 @@ from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.function import solve_moments
 from fpsolve.exponent.quantities import INDICES
 from fpsolve.exponent.solver import ExponentSolver
-from fpsolve.study.response import solve_response
+from fpsolve.parts.response import solve_response
 from tests import random_modes, random_planar, random_problems, random_systems, random_units
 
 ROOT = Path(__file__).parents[1]

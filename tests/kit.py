@@ -8,8 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from fpsolve.case.case import Case, load_case
+from fpsolve.output.records import entries_of, record_of_set
+from fpsolve.parts.part import Numerics
 from fpsolve.study.results import CurveResult, Solved
-from fpsolve.study.solve import Numerics, everything, solve_curve
+from fpsolve.study.solve import everything, result_of, solve_curve
 
 ALL = 'output.quantities="all"'
 """Sets what a case asks for to everything."""
@@ -45,6 +47,13 @@ LEAN = "output={ quantities = ['lyapunov_exponent'] }"
 """Sets what is solved in the least time."""
 HOPELESS = "mesh={ phi_cells = 1, phi_degree = 2, xi_cells = 2, xi_degree = 3 }"
 """Sets a mesh that resolves nothing."""
+COSTLY = (
+    "fpsolve.parts.sensitivities.solve_sensitivities",
+    "fpsolve.parts.excursions.solve_excursion",
+    "fpsolve.parts.response.solve_response",
+    "fpsolve.parts.directions.settled_directions",
+)
+"""What takes more than the tolerance of Λ(p) needs."""
 TABLES = {"summary.json", "moments.csv", "curves.csv", "results.nc"}
 """The files of what is solved."""
 
@@ -68,14 +77,21 @@ def case_in(folder: Path, text: str, overrides: Sequence[str] = (), name: str = 
 
 
 def solve_sets(case: Case) -> list[Solved]:
-    """All that a case wants of its curves, with the eigenpairs."""
+    """All that a case wants of its curves, with the pictures."""
     wanted, numerics = everything(case), Numerics.of(case)
     return [solve_curve(curve, wanted, numerics) for curve in case.curves()]
 
 
 def solve_case(case: Case) -> list[CurveResult]:
     """The numbers alone."""
-    return [solved.result for solved in solve_sets(case) if solved.result is not None]
+    return [solved.result for solved in solve_sets(case)]
+
+
+def from_record(case: Case, solved: Solved) -> CurveResult:
+    """A solved set as it comes back from its record."""
+    curve, asked, numerics = solved.result.curve, everything(case), Numerics.of(case)
+    record = json.loads(json.dumps(record_of_set(curve, asked, numerics, solved.entries)))
+    return result_of(curve, asked, numerics, *entries_of(record, curve, asked, numerics))
 
 
 def files(folder: Path) -> set[str]:

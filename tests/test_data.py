@@ -28,7 +28,7 @@ from fpsolve.model.systems import ParametricOscillator
 from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
 from fpsolve.nonlinear import stationary_response
 from fpsolve.simulation import MomentEstimate, MonteCarlo, Response
-from fpsolve.study.solve import Numerics, Wanted, solve_curve
+from fpsolve.study.solve import Numerics, solve_curve
 from tests.conftest import FIG1, FIG1_NOISE, UNIT_NOISE
 from tests.kit import case_text
 
@@ -98,7 +98,9 @@ def response():
 
 def curve(p, *indices):
     curve = Curve(Problem(FIG1, REDUCED).at({"noise.D0": 0.5}), {"noise.D0": 0.5})
-    return solve_curve(curve, Wanted(np.array(p), indices), Numerics(1e-8, Budget(), None)).result
+    return solve_curve(
+        curve, {"moments": {"p": p, "slopes": True}} | {name: {} for name in indices}, Numerics(1e-8, Budget(), None)
+    ).result
 
 
 @pytest.fixture(scope="module")

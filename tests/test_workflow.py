@@ -21,15 +21,17 @@ import fpsolve
 from fpsolve.analysis import stationary_density, tilted_density
 from fpsolve.case.remedies import CASE_WORDS
 from fpsolve.errors import CaseError, FpsolveError, NotConverged, OutputError
+from fpsolve.exponent import INDICES as KNOWN
 from fpsolve.exponent.fields import UNRESOLVED
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.files import alone
 from fpsolve.output.tables import write_results
+from fpsolve.parts import PARTS
 from fpsolve.study import solve
 from fpsolve.study.solve import compare, solve_curve
 from fpsolve.workflow import Watch, check_case, run_case, sets, simulate_case
 from tests.conftest import painted
-from tests.kit import DRAWN, HOPELESS, INDICES, LEAN, TABLES, TEXT, case_in, files, solve_case, solve_sets
+from tests.kit import COSTLY, DRAWN, HOPELESS, INDICES, LEAN, TABLES, TEXT, case_in, files, solve_case, solve_sets
 
 
 @pytest.fixture
@@ -280,12 +282,12 @@ def raising_at(count, exception):
 
 
 def interrupt_curve(monkeypatch, number, exception=KeyboardInterrupt):
-    """The solving of a curve is interrupted."""
+    """The solving of a curve is interrupted, but not that only pictures of it are drawn."""
 
-    def interrupted(curve, *others):
-        if curve.number == number:
+    def interrupted(curve, asked, numerics, progress, entries, *others):
+        if curve.number == number and not entries:
             raise exception
-        return solve_curve(curve, *others)
+        return solve_curve(curve, asked, numerics, progress, entries, *others)
 
     monkeypatch.setattr(solve, "solve_curve", interrupted)
 
@@ -584,7 +586,7 @@ def test_tilted_densities_that_python_refuses_are_warned_of(tmp_path):
     overrides += ["moments={p=[1.0, 3.0, 4.0], rtol=1e-5}", "output.eigenfunctions=[1.0, 3.0, 4.0]", "vary={}"]
     [solved] = solve_sets(case_in(tmp_path, TEXT.replace("c1 = 0.1", "c1 = 0.0"), overrides))
     refused = []
-    for pair in solved.eigenpairs:
+    for pair in solved.pictures["eigenfunctions"].pairs:
         try:
             tilted_density(pair)
         except NotConverged:
@@ -608,7 +610,7 @@ def test_unresolved_eigenfunctions_are_warned_of(tmp_path):
         [*sets, "moments.p=[4.0]", "output.eigenfunctions=[4.0]", "moments.rtol=1e-5", 'vary={"noise.D0"=[0.5]}'],
     )
     (solved,) = solve_sets(case)
-    pair = solved.eigenpairs[0]
+    pair = solved.pictures["eigenfunctions"].pairs[0]
     told = [
         text for text in solved.result.warnings if text.startswith("T") and "do not rely on a picture of it" in text
     ]
@@ -715,16 +717,18 @@ def test_an_interrupted_curve_keeps_its_moments_and_goes_on(tmp_path, monkeypatc
 def test_an_interrupted_curve_keeps_its_indices(tmp_path, monkeypatch, name):
     """λ comes before δ_p, and what was found is not sought again."""
     case, order = case_in(tmp_path, TEXT, [*GROWING, "moments.p=[2.0]"]), list[str]()
-    index = solve.INDICES[name]
 
     def interrupting(*_):
         raise KeyboardInterrupt
 
-    def noting(each):
-        return replace(each, solve=lambda *arguments: order.append(each.name) or each.solve(*arguments))
+    def noting(part):
+        if part.name not in KNOWN:
+            return part
+        return replace(part, solve=lambda *arguments: order.append(part.name) or part.solve(*arguments))
 
-    indices = {each.name: noting(each) for each in solve.INDICES.values()}
-    monkeypatch.setattr(solve, "INDICES", {**indices, name: replace(index, solve=interrupting)})
+    parts = tuple(map(noting, PARTS))
+    changed = (replace(each, solve=interrupting) if each.name == name else each for each in parts)
+    monkeypatch.setattr(solve, "PARTS", tuple(changed))
     with pytest.raises(KeyboardInterrupt):
         fpsolve.run(case, tmp_path / "out")
     before = order.copy()
@@ -734,7 +738,7 @@ def test_an_interrupted_curve_keeps_its_indices(tmp_path, monkeypatch, name):
     assert all(row[each] for each in before)
     assert not row[name]
     order.clear()
-    monkeypatch.setattr(solve, "INDICES", indices)
+    monkeypatch.setattr(solve, "PARTS", parts)
     [result] = fpsolve.run(case, tmp_path / "out")
     assert order[0] == name
     assert not set(order) & set(before)
@@ -747,8 +751,8 @@ def test_a_quantity_that_fails_takes_no_other_with_it(tmp_path, monkeypatch, fai
         raise failure
 
     case = case_in(tmp_path, TEXT, [*GROWING, "moments.p=[2.0]", 'output.quantities="all"'])
-    for name in ("solve_sensitivities", "solve_excursion", "solve_response", "settled_directions"):
-        monkeypatch.setattr(solve, name, fails)
+    for place in COSTLY:
+        monkeypatch.setattr(place, fails)
     monkeypatch.setattr(ExponentSolver, "variance_rate", fails)
     monkeypatch.setattr(ExponentSolver, "by_class", fails)
     with pytest.raises(NotConverged) as caught:
@@ -762,7 +766,7 @@ def test_a_quantity_that_fails_takes_no_other_with_it(tmp_path, monkeypatch, fai
 
 def test_each_moment_is_in_the_table_as_soon_as_it_is_solved(tmp_path, monkeypatch):
     """With nothing waiting for a second."""
-    monkeypatch.setattr(solve, "SOON", 0.0)
+    monkeypatch.setattr("fpsolve.parts.part.SOON", 0.0)
     monkeypatch.setattr("fpsolve.workflow.sets.REST", 0)
     case, seen = case_in(tmp_path, TEXT, GROWING), list[int]()
 

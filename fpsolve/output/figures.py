@@ -47,7 +47,7 @@ from fpsolve.model.quantity import (
     ResponseQuantities,
 )
 from fpsolve.output.charts import held_in_words, read_line
-from fpsolve.study.response import CurveResponse, ResponseDensity
+from fpsolve.parts.response import CurveResponse, ResponseDensity
 from fpsolve.study.results import CurveResult, SimulatedCurve
 from fpsolve.theory import perturbation
 from fpsolve.theory.perturbation import perturbed_moments

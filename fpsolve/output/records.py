@@ -1,9 +1,12 @@
 """Records of what is finished, kept in files that only grow: what a run that ended early had done is not lost.
 
 A record is a line of JSON. Each process that writes has a file of its own, and a record is with the system before the
-next one is begun; a line that is torn, or damaged, is none. How a value becomes plain data, and comes back to the last
-bit, follows from the annotation of its attribute: a dataclass is a list of its attributes, an array a compressed text;
-nan and inf, which JSON has not, are texts.
+next one is begun; a line that is torn, or damaged, is none. The record of a parameter set has an entry for each part
+that was solved, by a key that follows from all that its numbers follow from: a run that asks for more solves what is
+missing and adds a line, a run that asks for less solves nothing.
+
+How a value becomes plain data, and comes back to the last bit, follows from the annotation of its attribute: a
+dataclass is a list of its attributes, an array a compressed text; nan and inf, which JSON has not, are texts.
 """
 
 from __future__ import annotations
@@ -15,8 +18,9 @@ import os
 import socket
 import zlib
 from base64 import b64decode, b64encode
-from bisect import insort
-from collections.abc import Callable, Mapping, Sequence
+from bisect import bisect_left, insort
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, fields, is_dataclass, replace
 from errno import ENOSPC
 from functools import cache, lru_cache
@@ -37,17 +41,18 @@ from fpsolve.case.remedies import CASE_WORDS
 from fpsolve.case.sections import MonteCarloSection
 from fpsolve.data import Quantity
 from fpsolve.errors import OutputError, Remedy
-from fpsolve.exponent.quantities import BY_JUMP, INDICES
-from fpsolve.exponent.solver import InvariantClass
+from fpsolve.exponent.error import Moment
 from fpsolve.fem.mesh import CylinderMesh
-from fpsolve.messages import Message, message_of
-from fpsolve.model.quantity import ResponseQuantities
+from fpsolve.messages import Code, Message, Severity, message_of
+from fpsolve.parts.every import BY_NAME
+from fpsolve.parts.moments import PART as MOMENTS
+from fpsolve.parts.moments import Moments, begun_of, unfinished
+from fpsolve.parts.part import Entry, Job, Numerics, Part, Reason, Settings
 from fpsolve.study.chart import charted
-from fpsolve.study.response import CurveResponse
 from fpsolve.study.results import CurveResult, SimulatedCurve
-from fpsolve.study.solve import Numerics, Wanted, everything
+from fpsolve.study.solve import Asked, everything, result_of
 
-RESULT_VERSION = 4
+RESULT_VERSION = 5
 """Of what is computed from the same parameters; records of another one are computed anew."""
 SHARED_SECONDS = 60.0
 """After which a file that another machine has written is there, if it ever is."""
@@ -82,11 +87,11 @@ class Line:
 
 
 class Records:
-    """The records in a folder by their keys, of which the last one counts."""
+    """The records in a folder by their keys, of which the last one counts, or each adds to those before."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        self._addresses: dict[str, Address] = {}
+        self._addresses: dict[str, tuple[Address, ...]] = {}
         self._seen: dict[str, int] = {}
 
     def look(self) -> Records:
@@ -97,7 +102,8 @@ class Records:
                 file.seek(start)
                 while len(line := file.readline(LONGEST)) not in (0, LONGEST):  # what is longer is no record
                     if found := _parsed(line):
-                        self._addresses[found[0]] = Address(path.name, start, len(line))
+                        place = Address(path.name, start, len(line))
+                        self._addresses[found[0]] = (*self._addresses.get(found[0], ()), place)
                         self._seen[path.name] = start + len(line)
                     start += len(line)
         return self
@@ -112,7 +118,12 @@ class Records:
         return sum(not key.startswith(f"{RESULT_VERSION}-") for key in self._addresses)
 
     def address(self, key: str) -> Address | None:
-        return self._addresses.get(key)
+        """The last record of a key."""
+        return self._addresses[key][-1] if key in self._addresses else None
+
+    def addresses(self, key: str) -> tuple[Address, ...]:
+        """All records of a key."""
+        return self._addresses.get(key, ())
 
     def expect(self, address: Address) -> None:
         """Wait for the file of a record, which a network may show late. Raises `OutputError` where it does not come."""
@@ -152,41 +163,67 @@ class Records:
 
 
 class Results(Sequence[CurveResult]):
-    """What is known of the curves of a case, in their order; each is read from its record when it is first looked at.
+    """What is known of the curves of a case, in their order; each is read from its records when it is first looked at.
 
     Args:
         case: whose curves these are.
         records: those of its folder.
+        numerics: how the curves are solved.
     """
 
-    def __init__(self, case: Case, records: Records) -> None:
-        self._case, self._records, self._asked = case, records, everything(case).p.tolist()
-        self._found: dict[int, Address | CurveResult] = {}
+    def __init__(self, case: Case, records: Records, numerics: Numerics) -> None:
+        self._case, self._records, self._numerics = case, records, numerics
+        self._first, self._further = everything(case, 1), everything(case, 2)
+        self._places: dict[int, tuple[Address, ...]] = {}
+        self._given: dict[int, CurveResult] = {}
         self._order: list[int] = []
         self._kept: dict[int, CurveResult] = {}
         self._room = KEPT
 
-    def add(self, number: int, found: Address | CurveResult) -> None:
-        if number not in self._found:
+    def asked(self, number: int) -> Asked:
+        """What is asked of the curve with a number."""
+        return self._first if number == 1 else self._further
+
+    def add(self, number: int, found: Address | CurveResult | None = None) -> None:
+        """Count a curve among those that are known, with a further record of it, or a result without one."""
+        if not self.has(number):
             insort(self._order, number)
-        self._found[number] = found
+        if isinstance(found, Address):
+            self._places[number] = (*self._places.get(number, ()), found)
+            self._given.pop(number, None)
+        elif found is not None:
+            self._given[number] = found
         self._kept.pop(number, None)
 
-    def find(self, curve: Curve, key: str) -> bool:
-        """Take the result of a curve from the record of a key; whether there is one that can be read."""
-        if (address := self._records.address(key)) is None:
+    def find(self, curve: Curve) -> bool:
+        """Look for the records of a curve; whether they have all that is asked of it, which can be read."""
+        places = self._records.addresses(set_key(curve))
+        if not places:
             return False
-        try:
-            is_whole = fits(result_of(self._records.read(address), curve), self._asked)
-        except (OSError, ValueError):
-            return False
+        self._places[curve.number] = places
+        asked, (entries, _) = self.asked(curve.number), self.entries(curve)
+        is_whole = asked.keys() <= entries.keys() or (MOMENTS.name in entries and entries[MOMENTS.name].reason)
         if is_whole:
-            self.add(curve.number, address)
-        return is_whole
+            self.add(curve.number)
+        return bool(is_whole)
+
+    def entries(self, curve: Curve) -> tuple[dict[str, Entry], dict[float, Moment]]:
+        """Of a curve the entries that are known and asked for, and Λ(p), by p, where others are still to be solved."""
+        record: Record = {}
+        for place in self._places.get(curve.number, ()):
+            with suppress(OSError, ValueError):  # which counts as none
+                found = self._records.read(place)
+                record |= found if isinstance(found, dict) else {}
+        return entries_of(record, curve, self.asked(curve.number), self._numerics)
 
     def has(self, number: int) -> bool:
-        """Whether that of the curve with a number is known."""
-        return number in self._found
+        """Whether the curve with a number is known."""
+        place = bisect_left(self._order, number)
+        return place < len(self._order) and self._order[place] == number
+
+    def is_begun(self, number: int) -> bool:
+        """Whether there are records of the curve with a number."""
+        return number in self._places
 
     def __len__(self) -> int:
         return len(self._order)
@@ -198,16 +235,16 @@ class Results(Sequence[CurveResult]):
         return self.of(numbers)
 
     def of(self, number: int) -> CurveResult:
-        """That of the curve with a number, if it is known. Raises `KeyError`."""
-        if (known := self._kept.get(number)) is not None:
+        """That of the curve with a number."""
+        if (known := self._given.get(number) or self._kept.get(number)) is not None:
             return known
-        found = self._found[number]
-        if not isinstance(found, Address):
-            return found
         [varied] = self._case.vary.sets(number - 1, number)
-        result = result_of(self._records.read(found), Curve(self._case.problem, varied, number))
-        if found.size <= self._room:
-            self._room -= found.size
+        curve = Curve(self._case.problem, varied, number)
+        entries, begun = self.entries(curve)
+        result = result_of(curve, self.asked(number), self._numerics, entries, begun)
+        size = sum(place.size for place in self._places.get(number, ()))
+        if size <= self._room:
+            self._room -= size
             self._kept[number] = result
         return result
 
@@ -256,29 +293,106 @@ def _parsed(line: bytes) -> tuple[str, Record] | None:
         return None
 
 
-def key_of(curve: Curve, wanted: Wanted, numerics: Numerics) -> str:
-    """What the record of a result is found by: a digest of all that its numbers and sentences follow from."""
-    return f"{RESULT_VERSION}-{_asked(wanted, numerics)}-{curve.digest}"
+def set_key(curve: Curve) -> str:
+    """What the records of a parameter set are found by."""
+    return f"{RESULT_VERSION}-{curve.digest}"
 
 
-@lru_cache(16)
-def _asked(wanted: Wanted, numerics: Numerics) -> str:
-    """A digest of what is asked of curves, and of how they are solved."""
-    mesh, budget = numerics.mesh, numerics.budget
-    return _digest(
-        CurveResult,
-        p=wanted.p.tolist(),
-        wanted=[wanted.indices, wanted.shown, wanted.density, wanted.differentiated, wanted.is_stated, wanted.start],
-        response=[wanted.response, wanted.grid],
-        numerics=[numerics.rtol, mesh and codec(CylinderMesh).plain(mesh)],
-        budget=[budget.unknowns, budget.seconds, budget.memory],
-    )
+def part_key(part: Part, settings: Settings, numerics: Numerics, *, is_limited: bool = False) -> str:
+    """What the entry of a part is found by in the records of a set: a digest of all that its numbers follow from.
+
+    Args:
+        part: which.
+        settings: what is asked of it.
+        numerics: how it is solved.
+        is_limited: whether it is an entry that a larger budget may change.
+    """
+    content: dict[str, Any] = {"form": codec(part.kind).form, "settings": settings}
+    if part.uses_solver:
+        mesh = numerics.mesh
+        content["numerics"] = [numerics.rtol, mesh and codec(CylinderMesh).plain(mesh)]
+    if is_limited:
+        content["budget"] = [numerics.budget.unknowns, numerics.budget.seconds, numerics.budget.memory]
+    return f"{part.name}-{_hash(content)[:16]}"
 
 
-def growing_key(curve: Curve, numerics: Numerics) -> str:
-    """What the numbers of a curve are found by that is not finished; they do not depend on the budget."""
-    mesh = numerics.mesh and codec(CylinderMesh).plain(numerics.mesh)
-    return f"{RESULT_VERSION}-{_digest(CurveResult, numerics=[numerics.rtol, mesh])}-{curve.digest}"
+@lru_cache(maxsize=64)
+def _part_keys(asked: str, numerics: Numerics) -> dict[str, tuple[str, str]]:
+    """The keys of what is asked for, as JSON: of entries that no budget limits, and of others."""
+    return {
+        name: (
+            part_key(BY_NAME[name], settings, numerics),
+            part_key(BY_NAME[name], settings, numerics, is_limited=True),
+        )
+        for name, settings in json.loads(asked).items()
+    }
+
+
+@lru_cache(maxsize=16)
+def begun_key(numerics: Numerics) -> str:
+    """What Λ(p) is found by while other p are being solved."""
+    return part_key(MOMENTS, {}, numerics)
+
+
+def record_of_set(curve: Curve, asked: Asked, numerics: Numerics, entries: Mapping[str, Entry]) -> Record:
+    """The record of what was solved of a set, without what failed for a reason that may be gone the next time."""
+    keys, record = _part_keys(json.dumps(asked), numerics), Record()
+    for name, entry in entries.items():
+        part = BY_NAME[name]
+        said = list(messages_of(part, entry, curve, numerics))
+        if not any(each.tells_of(code) for each in said for code in (Code.NO_MEMORY, Code.FAULT)):
+            is_limited = entry.reason is not None or any(each.severity is not Severity.NOTE for each in said)
+            found = None if entry.found is None else codec(part.kind).plain(entry.found)
+            record[keys[name][is_limited]] = [found, _REASON.plain(entry.reason), entry.seconds]
+    return record
+
+
+def begun_record(job: Job) -> Record:
+    """The record of Λ(p) while other p are being solved."""
+    found = unfinished(job.curve.problem, job.begun)
+    return {begun_key(job.numerics): [codec(Moments).plain(found), None, 0.0]}
+
+
+def messages_of(part: Part, entry: Entry, curve: Curve, numerics: Numerics) -> Iterator[Message]:
+    """All that is said of an entry."""
+    if entry.reason is not None:
+        yield entry.reason.message
+    elif entry.found is not None:
+        yield from part.said(entry.found, curve, numerics)
+        yield from (failure.reason for failure in getattr(entry.found, "failures", ()))
+
+
+def entries_of(
+    record: Record, curve: Curve, asked: Asked, numerics: Numerics
+) -> tuple[dict[str, Entry], dict[float, Moment]]:
+    """The entries of a record that answer what is asked for, and Λ(p) of an unfinished run, by p.
+
+    An entry that cannot be read, or does not fit, is none.
+    """
+    entries = dict[str, Entry]()
+    for name, keys in _part_keys(json.dumps(asked), numerics).items():
+        for data in (record[key] for key in keys if key in record):
+            with suppress(ValueError):
+                entries[name] = _entry_of(data, BY_NAME[name], curve, asked[name])
+    begun = dict[float, Moment]()
+    if (data := record.get(begun_key(numerics))) is not None:
+        with suppress(ValueError):
+            found = _entry_of(data, replace(MOMENTS, is_whole=lambda *_: True), curve, {}).found
+            if MOMENTS.is_whole(found, curve, {"p": found.columns.p.tolist()}):
+                begun = begun_of(found)
+    return entries, begun
+
+
+def _entry_of(data: Any, part: Part, curve: Curve, settings: Settings) -> Entry:
+    """An entry from what a record has of it. Raises `ValueError` where that has another form, or does not fit."""
+    with _read_as(part.name):
+        plain, reason, seconds = data
+        found = None if plain is None else codec(part.kind).made(plain)
+        entry = Entry(found, _REASON.made(reason), _number(seconds))
+        is_known = part.is_whole(found, curve, settings) if found is not None else entry.reason is not None
+        if is_known and 0 <= entry.seconds < math.inf:
+            return entry
+    raise ValueError(f"this is no entry of {part.name}")
 
 
 def simulation_key(curve: Curve, orders: Sequence[float], setting: MonteCarloSection) -> str:
@@ -306,14 +420,9 @@ def line_of(record: Record, line: Boundary) -> Boundary:
     return replace(line, traces=found.traces, scan=found.scan, seconds=found.seconds, complete=True)
 
 
-def record_of(result: CurveResult | SimulatedCurve | Line) -> Record:
-    kind: Any = type(result)
-    return {name: each.plain(getattr(result, name)) for name, each in _recorded(kind).items()}
-
-
-def result_of(record: Mapping[str, Any], curve: Curve) -> CurveResult:
-    """The result of a curve from its record. Raises `ValueError` where that has another form."""
-    return CurveResult(curve, **_made(CurveResult, record))
+def record_of(found: SimulatedCurve | Line) -> Record:
+    kind: Any = type(found)
+    return {name: each.plain(getattr(found, name)) for name, each in _recorded(kind).items()}
 
 
 def simulated_of(record: Mapping[str, Any], curve: Curve) -> SimulatedCurve:
@@ -322,76 +431,17 @@ def simulated_of(record: Mapping[str, Any], curve: Curve) -> SimulatedCurve:
 
 
 def _made(kind: type, record: Mapping[str, Any]) -> dict[str, Any]:
-    try:
+    with _read_as(f"a {kind.__name__}"):
         return {name: each.made(record[name]) for name, each in _recorded(kind).items()}
+
+
+@contextmanager
+def _read_as(what: str) -> Iterator[None]:
+    """Raises `ValueError` where data have another form."""
+    try:
+        yield
     except (LookupError, TypeError, AttributeError, ValueError, ArithmeticError, RecursionError, zlib.error) as failure:
-        raise ValueError(f"this is no record of a {kind.__name__}: {failure!r}") from failure
-
-
-def fits(result: CurveResult, asked: Sequence[float]) -> bool:
-    """Whether the numbers of a result are of the p that were asked for, each found or failed, and can be written."""
-    found, slopes, failed = result.moments, result.sensitivities, [each.p for each in result.failures]
-    columns = [getattr(found, each.name) for each in fields(found)]
-    p, solved = found.p.tolist(), {*found.p.tolist(), *failed}
-    indices = [each for some in (result.estimates, *result.jumps) for each in some.values() if each]
-    if (rare := result.excursion) is not None:
-        numbers = rare.lyapunov_exponent, rare.stability_index, rare.lower, rare.upper, rare.upcrossings
-        indices += filter(None, numbers)
-    if (response := result.response) is not None:
-        indices += [*response.numbers.values(), response.balance]
-    is_whole = (
-        all(each.shape == found.p.shape for each in columns[:-1])
-        and found.p.ndim == 1
-        and not any(np.isinf(each).any() for each in columns)
-        and bool(np.isfinite(found.value).all())
-        and len(set(p)) == len(p)
-        and {*p} <= set(asked) <= (solved if None not in solved else {*asked})
-        and result.estimates.keys() == INDICES.keys()
-        and len(result.jumps) in (0, len(result.curve.problem.system.jumps))
-        and all(each.keys() <= BY_JUMP.keys() for each in result.jumps)
-        and all(np.array_equal(each.p, found.p) and _is_finite(each, found.p.shape) for each in result.classes)
-        and (response is None or _can_be_drawn(response, result.curve.problem.system.response))
-        and 0 <= result.seconds < math.inf
-    )
-    if is_whole and slopes is not None:
-        keys, rows = slopes.theta.keys(), [*slopes.moments, *slopes.indices.values()]
-        indices += [each for row in rows for each in row.values()]
-        is_whole = (
-            slopes.p.shape == (len(slopes.moments),)
-            and set(slopes.p.tolist()) <= set(p)
-            and keys == slopes.quantities.keys()
-            and keys <= result.curve.parameters.keys()
-            and all(row.keys() <= keys for row in rows)
-            and slopes.indices.keys() <= INDICES.keys()
-            and all(map(math.isfinite, slopes.theta.values()))
-        )
-    return is_whole and not any(math.isinf(each.value) or each.error_estimate < 0 for each in indices)
-
-
-def _is_finite(each: InvariantClass, shape: tuple[int, ...]) -> bool:
-    """Whether the numbers of a class are, and of a shape."""
-    exponent = each.lyapunov_exponent
-    is_whole = all(
-        column.shape == shape and bool(np.isfinite(column).all()) for column in (each.value, each.error_estimate)
-    )
-    return is_whole and all(map(math.isfinite, (each.phase or 0.0, exponent.value, exponent.error_estimate)))
-
-
-def _can_be_drawn(response: CurveResponse, about: ResponseQuantities) -> bool:
-    """Whether the numbers of a response are all there, and its density is one over a grid."""
-    density = response.density
-    numbers = response.stability_index, response.least
-    is_whole = response.numbers.keys() <= about.numbers.keys() and all(map(math.isfinite, numbers))
-    if density is None or not is_whole:
-        return is_whole
-    places = density.amplitude, density.phi, density.xi
-    shape = tuple(each.size for each in places)
-    tables = {1: density.of_amplitude, 2: density.of_plane, 3: density.whole}
-    return (
-        all(each.ndim == 1 and each.size > 1 and bool(np.all(np.diff(each) > 0)) for each in places)
-        and all(each.shape == shape[:size] for size, each in tables.items())
-        and all(bool(np.isfinite(each).all()) for each in (*places, *tables.values()))
-    )
+        raise ValueError(f"this is no record of {what}: {failure!r}") from failure
 
 
 def simulation_fits(simulated: SimulatedCurve, orders: Sequence[float]) -> bool:
@@ -417,8 +467,11 @@ def simulation_fits(simulated: SimulatedCurve, orders: Sequence[float]) -> bool:
 def _digest(kind: type, **content: Any) -> str:
     """A digest of what results of a kind follow from beside their curve, and of their form."""
     form = {name: each.form for name, each in _recorded(kind).items()}
-    text = json.dumps({"form": form, **content}, sort_keys=True)
-    return hashlib.sha256(text.encode()).hexdigest()
+    return _hash({"form": form, **content})
+
+
+def _hash(content: Any) -> str:
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 
 class Codec(NamedTuple):
@@ -567,3 +620,4 @@ _SIMPLE: Mapping[Any, Codec] = {
     Message: Codec("message", lambda value: message_of(value).to_data(), _message),
 }
 """For what has no parts."""
+_REASON = codec(Reason | None)

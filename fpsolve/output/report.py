@@ -47,6 +47,7 @@ from fpsolve.output.terminal import (
     simulation_grid,
     verdicts,
 )
+from fpsolve.parts.intervals import Samples, spreads_of
 from fpsolve.proofs.balls import MissingFlint
 from fpsolve.proofs.certificate import MalformedProof
 from fpsolve.proofs.claims import CurveClaims, claims_from
@@ -54,7 +55,6 @@ from fpsolve.proofs.statement import statement_of
 from fpsolve.study.chart import Chart, charted
 from fpsolve.study.prove import CurveProof
 from fpsolve.study.results import CurveResult, SimulatedCurve
-from fpsolve.study.uncertain import Samples, spreads_of
 
 REPORT = "report.html"
 MOST_CHECKED = 3e7

@@ -8,7 +8,7 @@ from fpsolve.analysis.excursions import SYMBOL, Excursion
 from fpsolve.case.case import Case
 from fpsolve.exponent.error import digits
 from fpsolve.model.quantity import ResponseQuantities
-from fpsolve.study.response import CurveResponse
+from fpsolve.parts.response import CurveResponse
 from fpsolve.study.results import CurveResult
 
 DIGITS = 4

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import csv
 import json
-import math
 import platform
 import shlex
 import socket
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import asdict
 from datetime import datetime
@@ -18,25 +17,19 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from fpsolve import __version__
-from fpsolve.analysis.excursions import Excursion
-from fpsolve.analysis.sensitivity import DIFFERENTIATED, Sensitivities, Slopes
-from fpsolve.analysis.spreads import LEVEL, UNCERTAIN, Spread
+from fpsolve.analysis.spreads import LEVEL
 from fpsolve.case.case import Case, Curve
 from fpsolve.case.remedies import CASE_WORDS
-from fpsolve.case.sections import EXCURSIONS, RESPONSE, SENSITIVITIES
-from fpsolve.exponent.error import MEANINGLESS, Estimate
 from fpsolve.files import draft, write_csv, write_json
 from fpsolve.messages import message_of
 from fpsolve.model.kinds import version_of
 from fpsolve.model.quantity import MOMENT, Quantity
+from fpsolve.parts.every import PARTS
+from fpsolve.parts.intervals import SAMPLE, Samples, plain_spread
 from fpsolve.results.table import Row, plain, rows_over_p
-from fpsolve.study.columns import ENDS, columns_of, pair, row_of
-from fpsolve.study.response import CurveResponse
+from fpsolve.study.columns import columns_of, row_of
 from fpsolve.study.results import CurveResult, SimulatedCurve, Status
-from fpsolve.study.uncertain import SAMPLE, Samples, spreads_of
 
 MOST_INDENTED = 100
 """Curves of a summary that is made for eyes, too."""
@@ -140,33 +133,12 @@ def _entry(case: Case, number: int, content: Mapping[str, Any]) -> str:
     return (",\n  " if number else "\n  ") + text
 
 
-def _spread(spread: Spread) -> dict[str, float]:
-    """To first order."""
-    return {name: getattr(spread, name) for name in ("mean", "deviation", *ENDS)} | {
-        "probability_below_0": spread.below
-    }
-
-
-def _spreads(case: Case, result: CurveResult) -> dict[str, Any]:
-    """What is uncertain of a curve, and how that of the parameters is."""
-    found, laws = spreads_of(case, result), case.uncertain.laws(result.curve.problem)
-    return {
-        "level": LEVEL,
-        "laws": {
-            key: {"value": each.value, "sd": each.sd, "mean": each.mean, "deviation": each.deviation}
-            for key, each in laws.items()
-        },
-        **{name: _spread(found.indices[name]) if name in found.indices else None for name in UNCERTAIN},
-        "moments": [{"p": p, **_spread(each)} for p, each in found.moments.items()],
-    }
-
-
 def write_samples(case: Case, samples: Samples, folder: Path) -> None:
     """sample.json: the quantiles of the samples of a case, beside the first order."""
     rows = [
         {"quantity": each.quantity.name, "p": each.p}
         | {name: getattr(each, name) for name in ("count", "mean", "deviation", "low", "median", "high")}
-        | {"share_below_0": each.below, "first_order": _spread(each.spread), "apart": each.apart}
+        | {"share_below_0": each.below, "first_order": plain_spread(each.spread), "apart": each.apart}
         for each in samples.rows
     ]
     content = {
@@ -260,86 +232,7 @@ def _told(result: CurveResult) -> dict[str, list[str]]:
 
 def _beyond_tables(case: Case, result: CurveResult) -> dict[str, Any]:
     """What neither results.nc nor a CSV file has."""
-    found: dict[str, Any] = {}
-    if result.jumps:
-        found["jumps"] = [
-            {"phase": ray.phase, "log_factor": ray.log_factor, **_pairs(of_ray)}
-            for ray, of_ray in zip(result.curve.problem.system.jumps, result.jumps, strict=True)
-        ]
-    if result.classes:
-        found["classes"] = [
-            {
-                "name": each.name,
-                **pair("lyapunov_exponent", each.lyapunov_exponent),
-                "moments": [
-                    {"p": p, "moment": value, "moment_error": error}
-                    for p, value, error in zip(
-                        each.p.tolist(), each.value.tolist(), each.error_estimate.tolist(), strict=True
-                    )
-                ],
-            }
-            for each in result.classes
-        ]
-    if SENSITIVITIES in case.asked:
-        found["sensitivities"] = None if result.sensitivities is None else _sensitivities(result.sensitivities)
-    if EXCURSIONS in case.asked:
-        found["excursions"] = None if result.excursion is None else _excursion(case, result.excursion)
-    if case.has_response:
-        found[RESPONSE] = None if result.response is None else _response(result.response)
-    if case.uncertain:
-        found["uncertainty"] = _spreads(case, result)
-    return found
-
-
-def _pairs(numbers: Mapping[str, Estimate | None]) -> dict[str, float | None]:
-    """Numbers and their errors by their names."""
-    return {key: each for name, number in numbers.items() for key, each in pair(name, number).items()}
-
-
-def _response(found: CurveResponse) -> dict[str, Any]:
-    """The means and impacts with their errors, what the density does near rest, and how far these are to be trusted."""
-    return {
-        "means": _pairs(found.means),
-        **({} if found.impact_rate is None else pair("impact_rate", found.impact_rate)),
-        "has_hump": found.has_hump,
-        "has_crater": found.has_crater,
-        **pair("balance", found.balance),
-        "least_over_largest_density": found.least,
-        "unknowns": found.unknowns,
-    }
-
-
-def _excursion(case: Case, found: Excursion) -> dict[str, Any]:
-    """The start, the bounds and the asymptotic number of upcrossings at all levels, and what these follow from."""
-    levels = np.array(case.excursions.levels)
-    rows = zip(levels.tolist(), *(each.tolist() for each in found.bounds(levels)), strict=True)
-    many = [None if math.isnan(each) else each for each in found.expected_upcrossings(levels).tolist()]
-    return {
-        "start": {"phi": found.phi, "xi": found.xi},
-        "is_certain": found.is_certain,
-        **pair("stability_index", found.stability_index),
-        **pair("lower", found.lower),
-        **pair("upper", found.upper),
-        **pair("upcrossings", found.upcrossings),
-        "levels": [
-            {"level": level, "least_probable": low, "most_probable": high, "upcrossings": count}
-            for (level, low, high), count in zip(rows, many, strict=True)
-        ],
-    }
-
-
-def _sensitivities(found: Sensitivities) -> dict[str, Any]:
-    """∂/∂θ by the key of θ, null where its error leaves it no meaning, and the estimates of these errors alike."""
-
-    def numbers(of: Callable[[Estimate], float]) -> dict[str, Any]:
-        def row(slopes: Slopes) -> dict[str, float | None]:
-            return {key: of(each) if each.relative_error <= MEANINGLESS else None for key, each in slopes.items()}
-
-        moments = zip(found.p.tolist(), found.moments, strict=True)
-        indices = {name: row(found.indices[name]) if name in found.indices else None for name in DIFFERENTIATED}
-        return {"moments": [{"p": p, **row(slopes)} for p, slopes in moments], **indices}
-
-    return {**numbers(lambda each: each.value), "errors": numbers(lambda each: each.error_estimate)}
+    return {name: each for part in PARTS for name, each in part.content(case, result).items()}
 
 
 def _with_errors(numbers: Mapping[str, tuple[float, float]]) -> dict[str, dict[str, float]]:

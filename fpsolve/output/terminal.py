@@ -37,10 +37,10 @@ from fpsolve.model.quantity import OSCILLATOR_RESPONSE, moment_at
 from fpsolve.output.screen import Cell, Column, Grid, Screen
 from fpsolve.output.sentences import bounds_text, excursions, sentence, shape_of_response
 from fpsolve.output.tables import in_case_words
+from fpsolve.parts.intervals import Sampled, Samples, Spreads, spreads_of
 from fpsolve.study.chart import Chart, charted
 from fpsolve.study.columns import asked
 from fpsolve.study.results import Comparison, CurveResult, SimulatedCurve, Status
-from fpsolve.study.uncertain import Sampled, Samples, Spreads, spreads_of
 
 SUMMARY, MONTE_CARLO = "summary.json", "monte_carlo*.json"
 STYLES = {

@@ -29,6 +29,8 @@ from fpsolve.model.problem import Problem, parameter_lines, parameter_words
 from fpsolve.model.quantity import Quantity
 from fpsolve.output.directions import on_one_grid, write_densities
 from fpsolve.output.nodes import FIELDS, Nodes
+from fpsolve.parts import directions
+from fpsolve.parts.eigenfunctions import NAME, Eigenfunctions
 from fpsolve.signals import signals_held
 from fpsolve.study.results import CurveResult, SimulatedCurve, Solved
 
@@ -110,18 +112,19 @@ def write_density(
     return path
 
 
-def write_functions(solved: Solved, curve: Curve, folder: Path, *, has_density: bool = True) -> None:
+def write_functions(solved: Solved, curve: Curve, folder: Path) -> None:
     """Write the eigenfunctions of a curve; with the first curve the stationary density too, if that is wanted."""
-    if solved.directions:
-        write_directions(solved.directions, curve, folder)
-    if solved.stationary is None:
+    if of_directions := solved.pictures.get(directions.NAME):
+        write_directions(of_directions, curve, folder)
+    found: Eigenfunctions | None = solved.pictures.get(NAME)
+    if found is None or found.stationary is None:
         return
     about = ({**curve.parameters, "curve": float(curve.number)}, curve.varied)
-    if curve.number == 1 and has_density:
-        write_density(folder / "density.vtu", solved.stationary, *about)
-    if solved.eigenpairs:
+    if curve.number == 1 and found.has_density:
+        write_density(folder / "density.vtu", found.stationary, *about)
+    if found.pairs:
         copy_show_script(folder)
-        write_eigenfunctions(folder, solved.eigenpairs, solved.stationary, f"eigenfunctions{curve.suffix}", *about)
+        write_eigenfunctions(folder, found.pairs, found.stationary, f"eigenfunctions{curve.suffix}", *about)
 
 
 def write_directions(found: Sequence[SettledDirections], curve: Curve, folder: Path) -> None:

@@ -72,3 +72,8 @@ def rows_over_p(row: Row, names: Sequence[str]) -> list[list[float | None]]:
 def plain(number: Any) -> Any:
     """A number as JSON and CSV have it: None where there is none."""
     return None if isinstance(number, float) and not math.isfinite(number) else number
+
+
+def pair(name: str, estimate: Any) -> dict[str, float | None]:
+    """A number and its error by their names; None where there is none."""
+    return {name: estimate and estimate.value, f"{name}_error": estimate and estimate.error_estimate}

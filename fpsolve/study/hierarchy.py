@@ -10,7 +10,9 @@ from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case
 from fpsolve.case.sections import Expectation
 from fpsolve.errors import FpsolveError, NoHierarchy
+from fpsolve.parts.moments import PART as MOMENTS
 from fpsolve.study.results import Comparison, CurveResult
+from fpsolve.study.solve import Asked
 from fpsolve.theory.moments import hierarchy_exponent, refuse_open_hierarchy
 
 SOURCE = "moment hierarchy; ± the stated error"
@@ -19,6 +21,11 @@ SOURCE = "moment hierarchy; ± the stated error"
 def even_moments(case: Case) -> FloatArray:
     """The even p > 0 of a case, shape (n,)."""
     return case.p[(case.p > 0) & (case.p % 2 == 0)]
+
+
+def even_moments_asked(case: Case) -> Asked:
+    """What is asked of a curve for these p."""
+    return {MOMENTS.name: {"p": even_moments(case).tolist(), "slopes": True}}
 
 
 def refuse_no_hierarchy(case: Case) -> None:

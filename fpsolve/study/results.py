@@ -3,56 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from fpsolve.analysis.directions import SettledDirections
 from fpsolve.analysis.excursions import Excursion
 from fpsolve.analysis.sensitivity import Sensitivities
-from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Curve
 from fpsolve.case.sections import Expectation, Varied
 from fpsolve.data import Quantity, Result, dataset
-from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.error import Estimate, Failure
 from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, STABILITY_INDEX, VARIANCE_RATE
 from fpsolve.exponent.solver import InvariantClass
 from fpsolve.messages import Code, Message, Severity, message_of
 from fpsolve.model.quantity import MOMENT, OVER_P, P
-from fpsolve.study.response import CurveResponse
+from fpsolve.parts import excursions, response, sensitivities
+from fpsolve.parts.moments import MomentColumns
+from fpsolve.parts.part import Entry
+from fpsolve.parts.response import CurveResponse
 
 if TYPE_CHECKING:  # which take half a second to import
     import xarray
 
     from fpsolve.simulation.estimators import MonteCarlo
     from fpsolve.simulation.response import Response
-
-
-@dataclass(frozen=True, eq=False)
-class MomentColumns:
-    """Λ(p) at those p of a curve that did not fail, in the order of the case; all of shape (n,).
-
-    Attributes:
-        p: the moments.
-        value, derivative, error_estimate, derivative_error, residual: as in `MomentLyapunov`.
-        perturbation: Eq. (37) at the same p.
-    """
-
-    p: FloatArray
-    value: FloatArray
-    derivative: FloatArray
-    error_estimate: FloatArray
-    derivative_error: FloatArray
-    residual: FloatArray
-    perturbation: FloatArray
-
-    @property
-    def rate_function(self) -> FloatArray:
-        """I(s) = ps − Λ(p) at s = Λ′(p), shape (n,); its error is, to first order, that of Λ(p)."""
-        return np.asarray(self.p * self.derivative - self.value) + 0.0
 
 
 class Status(IntEnum):
@@ -89,9 +63,7 @@ class CurveResult(Result):
         failures: why some p are missing, or with all p some indices.
         jumps: where a system has several, the `BY_JUMP` of each by their names, as `estimates`.
         classes: λ and Λ(p) of blocks of variables, or on a ray that the phase never leaves and across it.
-        sensitivities: the derivatives of these numbers by the parameters; None where they are not wanted.
-        excursion: the probability that ‖x‖ ever exceeds a level; None where it is not wanted, or did not converge.
-        response: that of a system with terms of degree 3; None where it is not wanted, or there is none.
+        parts: what else was found, by the names of `Part`s; without what is not wanted, or did not converge.
         seconds: how long the processor took.
     """
 
@@ -104,10 +76,23 @@ class CurveResult(Result):
     failures: tuple[Failure, ...] = ()
     jumps: tuple[Mapping[str, Estimate | None], ...] = ()
     classes: tuple[InvariantClass, ...] = ()
-    sensitivities: Sensitivities | None = None
-    excursion: Excursion | None = None
-    response: CurveResponse | None = None
+    parts: Mapping[str, Any] = field(default_factory=dict)
     seconds: float = 0.0
+
+    @property
+    def excursion(self) -> Excursion | None:
+        """The probability that ‖x‖ ever exceeds a level."""
+        return self.parts.get(excursions.NAME)
+
+    @property
+    def response(self) -> CurveResponse | None:
+        """The stationary response of a system with terms of degree 3."""
+        return self.parts.get(response.NAME)
+
+    @property
+    def sensitivities(self) -> Sensitivities | None:
+        """The derivatives of these numbers by the parameters."""
+        return self.parts.get(sensitivities.NAME)
 
     @property
     def lyapunov_exponent(self) -> Estimate | None:
@@ -159,21 +144,17 @@ class CurveResult(Result):
 
 @dataclass(frozen=True, eq=False)
 class Solved:
-    """A parameter set once it is solved, with the eigenfunctions that are to be drawn.
+    """A parameter set once it is solved.
 
     Attributes:
-        result: the numbers; None where they were known before.
-        eigenpairs: those whose eigenfunctions are wanted.
-        stationary: the eigenpair at p = 0; None where no density is wanted, or it is not to be trusted.
-        is_passing: whether it failed for a reason that may be gone when it is tried again.
-        directions: of more than two variables, in their place, all that is wanted; p = 0 with the density.
+        result: the numbers and messages.
+        entries: what became of the parts that were solved now, by their names.
+        pictures: what is drawn of it, by the names of parts.
     """
 
-    result: CurveResult | None
-    eigenpairs: tuple[PrincipalPair, ...]
-    stationary: PrincipalPair | None
-    is_passing: bool = False
-    directions: tuple[SettledDirections, ...] = ()
+    result: CurveResult
+    entries: Mapping[str, Entry]
+    pictures: Mapping[str, Any]
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
@@ -22,15 +22,16 @@ from fpsolve.output.directions import draw_densities
 from fpsolve.output.figures import draw, draw_rates, draw_response, draw_sensitivities, draw_stationary_responses
 from fpsolve.output.tables import write_samples, write_simulation
 from fpsolve.output.vtk import write_simulated_response
+from fpsolve.parts.intervals import Samples, sampled_case, samples_of
+from fpsolve.parts.part import Numerics
 from fpsolve.pool import Pool, cluster, parallel, serial
 from fpsolve.signals import signals_held
 from fpsolve.study.chart import Chart, chart_work, refuse_no_chart, solve_chart
 from fpsolve.study.design import DesignOutcome, refuse_no_design, solve_design
-from fpsolve.study.hierarchy import compare_with_hierarchy, even_moments
+from fpsolve.study.hierarchy import compare_with_hierarchy, even_moments_asked
 from fpsolve.study.results import Comparison, CurveResult, SimulatedCurve
 from fpsolve.study.simulate import refuse_obstacles, simulation_work
-from fpsolve.study.solve import Numerics, Order, Wanted, batches, compare, expected, result_alone, solve_batch
-from fpsolve.study.uncertain import Samples, sampled_case, samples_of
+from fpsolve.study.solve import Order, batches, compare, expected, result_alone, solve_batch
 from fpsolve.testing import check_noise
 from fpsolve.workflow.folders import (
     AGAIN,
@@ -324,19 +325,20 @@ def check_case(case: Case, *, by_hierarchy: bool = False, pool: Pool | None = No
     With `by_hierarchy` that is Λ of its even p, by the moment hierarchy.
     """
     found: list[CurveResult] = []
+    numerics = replace(Numerics.of(case), is_stated=True)
 
     def order(number: int, varied: Varied) -> Order:
-        wanted = Wanted(even_moments(case), ()) if by_hierarchy else expected(case, varied)
-        return Order(number, varied, wanted, case.vary.line_of(number))
+        asked = even_moments_asked(case) if by_hierarchy else expected(case, varied)
+        return Order(number, varied, asked, case.vary.line_of(number))
 
     with (
         saying_if_interrupted(lambda: kept(len(found), of_curves(case)), ANEW),
         watch.bar(Phase(case.name, "solving", case.planned, SETS)) as progress,
         pool or serial() as workers,
     ):
-        task = partial(solve_batch, problem=case.problem, numerics=Numerics.of(case), keep=result_alone)
+        task = partial(solve_batch, problem=case.problem, numerics=numerics, keep=result_alone)
         for _, results in workers.run(task, batches(case, order)):
-            for result in filter(None, results):
+            for result in results:
                 found.append(result)
                 progress(failed=result.status.fails)
     found.sort(key=lambda result: result.curve.number)

@@ -17,8 +17,8 @@ from rich.text import Text
 from fpsolve.budget import Countdown, watched
 from fpsolve.case.case import Case
 from fpsolve.messages import Message
+from fpsolve.parts.intervals import Samples
 from fpsolve.study.results import CurveResult, SimulatedCurve
-from fpsolve.study.uncertain import Samples
 
 SETS, MOMENTS, NODES, POINTS, BOUNDS, PERCENT, SOLVES = "sets", "p", "nodes", "points", "bounds", "%", "solves"
 """What a phase counts."""

@@ -17,7 +17,8 @@ from typing import Any, ClassVar
 from fpsolve.analysis.stability import Boundary
 from fpsolve.analysis.zero import Zero
 from fpsolve.case.case import Case, Curve
-from fpsolve.case.sections import Varied
+from fpsolve.case.sections import RESPONSE, Varied
+from fpsolve.model.quantity import MOMENT
 from fpsolve.output.datasets import write_dataset
 from fpsolve.output.records import (
     Address,
@@ -25,29 +26,31 @@ from fpsolve.output.records import (
     Records,
     Results,
     append,
-    fits,
-    growing_key,
-    key_of,
+    begun_record,
     line_key,
     line_of,
     record_of,
-    result_of,
+    record_of_set,
+    set_key,
     simulated_of,
     simulation_fits,
     simulation_key,
 )
 from fpsolve.output.tables import facts_of, write_response, write_results
 from fpsolve.output.vtk import write_curves, write_functions, write_stationary_response
+from fpsolve.parts.every import BY_NAME
+from fpsolve.parts.moments import PART as OF_P
+from fpsolve.parts.part import Job, Numerics
 from fpsolve.pool import Pool, serial
 from fpsolve.study.results import CurveResult, SimulatedCurve, Solved
 from fpsolve.study.simulate import simulate_curve, simulate_curves, simulation_steps, simulation_work
-from fpsolve.study.solve import Numerics, Order, Wanted, batches, everything, solve_batch, without_failed
+from fpsolve.study.solve import Order, batches, result_of, solve_batch
 from fpsolve.workflow.progress import MOMENTS, SETS, Advance, Phase
 
 Found = tuple[int, Address | CurveResult | None, bool]
 """The number of a curve, its numbers where they are new, and whether some of these are missing."""
 Orders = tuple[Order, ...]
-SOLVED_RECORDS, SIMULATED_RECORDS, GROWING_RECORDS = "records/solved", "records/simulated", "records/unfinished"
+SOLVED_RECORDS, SIMULATED_RECORDS = "records/solved", "records/simulated"
 LINE_RECORDS = "records/charted"
 REST = 50
 """Tables are rewritten when so many times as long has gone by as the last time took, so that all of it costs little."""
@@ -55,18 +58,24 @@ REST = 50
 
 def keep(folder: Path, numerics: Numerics, order: Order, curve: Curve, solved: Solved) -> Found:
     """Write what was found of a set into the folder of its case, and say where the numbers are."""
-    result = solved.result
-    write_functions(solved, curve, folder, has_density=order.wanted.density)
-    is_failed = result is not None and result.status.fails
-    if result is None or solved.is_passing:
-        return curve.number, result, is_failed
-    key = key_of(curve, order.wanted, numerics)
-    return curve.number, append(folder / SOLVED_RECORDS, key, record_of(result)), is_failed
+    write_functions(solved, curve, folder)
+    if not solved.entries and order.entries:  # its numbers were known
+        return curve.number, None, False
+    is_failed = solved.result.status.fails
+    record = record_of_set(curve, order.asked, numerics, solved.entries)
+    place = append(folder / SOLVED_RECORDS, set_key(curve), record) if record else None
+    is_whole = place is not None and len(record) == len(solved.entries)
+    return curve.number, place if is_whole else solved.result, is_failed
 
 
-def grow(folder: Path, numerics: Numerics, result: CurveResult) -> None:
-    """Write what is known of a set that is not finished, of which the last record counts."""
-    append(folder / GROWING_RECORDS, growing_key(result.curve, numerics), record_of(result))
+def grow(folder: Path, numerics: Numerics, order: Order, job: Job) -> None:
+    """Write what is known of a set that is not finished."""
+    new = {name: entry for name, entry in job.entries.items() if name not in order.entries}
+    record = record_of_set(job.curve, order.asked, numerics, new)
+    if OF_P.name not in job.entries and job.begun:
+        record |= begun_record(job)
+    if record:
+        append(folder / SOLVED_RECORDS, set_key(job.curve), record)
 
 
 class _Kept:
@@ -98,13 +107,10 @@ class Sweep(_Kept):
     def __init__(self, case: Case, folder: Path, *, is_fresh: bool = False) -> None:
         super().__init__(case, folder.resolve(), is_fresh=is_fresh)
         self.started, self._clock = datetime.now(UTC), monotonic()
-        self.numerics, self.first, self.further = Numerics.of(case), everything(case, 1), everything(case, 2)
-        self.results, self.facts = Results(case, self.records), dict[str, Any]()
-        self.growing = Records(self.folder / GROWING_RECORDS)
-        if is_fresh:
-            self.growing.remove()
+        self.numerics = Numerics.of(case)
+        self.results, self.facts = Results(case, self.records, self.numerics), dict[str, Any]()
         self._settled, self._due, self._unfinished = 0, 0.0, set[int]()
-        self._steps_each = max(self.first.p.size, 1) if case.planned == 1 else 1
+        self._steps_each = max(case.p.size if MOMENT.name in case.asked else 0, 1) if case.planned == 1 else 1
         self.find()
         self.known = len(self.results)
 
@@ -123,29 +129,22 @@ class Sweep(_Kept):
     def find(self) -> None:
         """Look for the records of all sets, also those that a worker has finished without reporting them."""
         for curve in self.looked_through():
-            wanted = self._wanted(curve.number)
-            if self.results.find(curve, key_of(curve, wanted, self.numerics)):
+            if self.results.find(curve):
                 self._unfinished.discard(curve.number)
-                self._settled += not wanted.draws
-        self.growing.look()
+                self._settled += not self._is_drawn(curve.number)
 
     def find_unfinished(self) -> None:
-        """Look for what is known of the sets that were being solved."""
-        for curve in self.case.curves() if self.growing.look().are_there else ():
-            if not self.results.has(curve.number) and (found := self._known_of(curve)):
-                self._unfinished.add(curve.number)
-                self.results.add(curve.number, found)
+        """Count what is known of the sets that were being solved."""
+        for number in range(1, self.case.planned + 1):
+            if self.results.is_begun(number) and not self.results.has(number):
+                self._unfinished.add(number)
+                self.results.add(number)
 
-    def _known_of(self, curve: Curve) -> CurveResult | None:
-        """What an interrupted run knew of a set; None where there is nothing that can be read."""
-        found = self.growing.made(growing_key(curve, self.numerics), lambda record: result_of(record, curve))
-        return found if found and fits(found, found.moments.p.tolist()) else None
-
-    def _grow(self, result: CurveResult) -> None:
+    def _grow(self, order: Order, job: Job) -> None:
         """Keep what is known of the only set, and show it in the tables."""
-        grow(self.folder, self.numerics, result)
+        grow(self.folder, self.numerics, order, job)
         self._unfinished.add(1)
-        self.results.add(1, result)
+        self.results.add(1, result_of(job.curve, order.asked, self.numerics, job.entries, job.begun))
         if monotonic() >= self._due:
             self.write_tables()
 
@@ -182,26 +181,24 @@ class Sweep(_Kept):
         """Write the tables, results.nc, the series over the curves, and the stationary densities."""
         self.write_tables()
         write_curves(self.case, self.folder)
-        for result in self.results if self.first.grid else ():
+        for result in self.results if RESPONSE in self.results.asked(1) else ():
             write_response(result, self.folder)
             write_stationary_response(result, self.folder)
         write_dataset(self.case, self.results, self.folder, self.facts)
 
-    def _wanted(self, number: int) -> Wanted:
-        return self.first if number == 1 else self.further
+    def _is_drawn(self, number: int) -> bool:
+        """Whether pictures of a set are wanted, which are drawn in each run."""
+        return any(BY_NAME[name].is_drawn for name in self.results.asked(number))
 
     def _order(self, number: int, varied: Varied) -> Order | None:
-        wanted = self._wanted(number)
-        if not self.results.has(number):
-            order = Order(number, varied, wanted, self.case.vary.line_of(number))
-            return replace(order, earlier=self._known_of(self._curve(order))) if self.growing.are_there else order
-        if not wanted.draws:
+        if self.results.has(number) and not self._is_drawn(number):
             return None
-        return Order(number, varied, without_failed(wanted, self.results.of(number).failures), is_known=True)
-
-    def _curve(self, order: Order) -> Curve:
-        [curve] = self.case.curves(order.number - 1, order.number)
-        return curve
+        order = Order(number, varied, self.results.asked(number), self.case.vary.line_of(number))
+        if not self.results.is_begun(number):
+            return order
+        [curve] = self.case.curves(number - 1, number)
+        entries, begun = self.results.entries(curve)
+        return replace(order, entries=entries, begun=begun)
 
 
 class Lines:

@@ -14,8 +14,7 @@ from fpsolve.cli import BAD_INPUT, main
 from fpsolve.exponent.function import moment_lyapunov
 from fpsolve.model.problem import RTOL_BEYOND_PLANE
 from fpsolve.model.systems import EquationSystem, VibroImpactOscillator
-from fpsolve.output.records import key_of
-from fpsolve.study.solve import Numerics, everything
+from fpsolve.output.records import set_key
 from tests import snapshots
 from tests.oracles import kronecker
 
@@ -98,7 +97,7 @@ def test_a_noise_has_its_name_or_none(tmp_path: Path) -> None:
     other = load_case(write(tmp_path, plain, MOMENTS))
     assert [*other.parameters] == ["system.omega", "system.zeta", "noise.alpha", "noise.sigma"]
     assert other.system.terms == named.system.terms
-    keys = {key_of(case.curve({}), everything(case), Numerics.of(case)) for case in (named, other)}
+    keys = {set_key(case.curve({})) for case in (named, other)}
     assert len(keys) == 2
 
 
@@ -109,7 +108,7 @@ def test_symbols_and_words(tmp_path: Path) -> None:
     assert legend({"system.zeta": 0.1, "system.omega": 2.0}, case.about) == r"$\zeta$ = 0.1, omega = 2"
     assert load_case(write(tmp_path, SYSTEM, MOMENTS), ["system.zeta=0.2"]).about("system.zeta").latex == r"$\zeta$"
     other = load_case(write(tmp_path, SYSTEM.replace("damping ratio", "damping"), MOMENTS))
-    keys = {key_of(each.curve({}), everything(each), Numerics.of(each)) for each in (case, other)}
+    keys = {set_key(each.curve({})) for each in (case, other)}
     assert len(keys) == 1
 
 

@@ -20,11 +20,10 @@ from fpsolve.model.noises.non_gaussian import NonGaussianNoise, ReducedNoise
 from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
 from fpsolve.model.problem import Problem
 from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
-from fpsolve.output.records import key_of
+from fpsolve.output.records import set_key
 from fpsolve.output.tables import facts_of
 from fpsolve.simulation.setup import simulated_parts
 from fpsolve.study.prove import refuse_unprovable_case
-from fpsolve.study.solve import Numerics, everything
 
 OSCILLATOR = """\
 title = "kinds"
@@ -190,7 +189,7 @@ def test_records_depend_on_the_kind_and_its_version(
     for version in ("windy 1.5", "windy 1.6"):
         monkeypatch.setattr("fpsolve.model.problem.version_of", lambda _, version=version: version)
         case = load_case(write(tmp_path, OSCILLATOR, WIND, MOMENTS))
-        keys.add(key_of(case.curve({}), everything(case), Numerics.of(case)))
+        keys.add(set_key(case.curve({})))
     assert len(keys) == 2
 
 
@@ -215,7 +214,7 @@ def test_records_of_a_changed_kind_are_others(windy: None, tmp_path: Path, monke
     for source in ("a", "b"):
         monkeypatch.setattr("fpsolve.model.problem.source_of", lambda _, source=source: source)
         case = load_case(write(tmp_path, OSCILLATOR, WIND, MOMENTS))
-        keys.add(key_of(case.curve({}), everything(case), Numerics.of(case)))
+        keys.add(set_key(case.curve({})))
     assert len(keys) == 2
     assert facts_of(case, datetime.now(UTC), 0.0)["versions"]["windy"] == "1.5"
 

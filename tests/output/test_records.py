@@ -1,6 +1,7 @@
 """Records: exact, in files that only grow; what is torn or damaged is none."""
 
 import base64
+import contextlib
 import copy
 import json
 import math
@@ -8,31 +9,39 @@ import multiprocessing
 import os
 import zlib
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+import fpsolve
+from fpsolve.case.case import load_case
 from fpsolve.case.sections import MonteCarloSection
 from fpsolve.cli import main
-from fpsolve.errors import OutputError
+from fpsolve.errors import NotConverged, OutputError
 from fpsolve.exponent.adapt import Budget
 from fpsolve.fem.mesh import make_mesh
+from fpsolve.messages import Code
 from fpsolve.output import records as plain
 from fpsolve.output.records import (
     Records,
     Results,
     _packed,
     append,
-    growing_key,
-    key_of,
-    record_of,
-    result_of,
+    part_key,
+    record_of_set,
+    set_key,
     simulation_key,
 )
-from fpsolve.study.solve import Numerics, Wanted, everything, solve_curve
-from tests.kit import ALL, case_in, solve_case
+from fpsolve.parts import PARTS
+from fpsolve.parts.every import BY_NAME
+from fpsolve.parts.part import Numerics
+from fpsolve.study import solve
+from fpsolve.study.solve import everything, solve_curve
+from tests.kit import ALL, case_in, from_record, solve_sets
 from tests.output.test_datasets import HOPELESS, PRODUCT, TEXT
 
+CASES = Path(__file__).parents[2] / "cases"
 VALUES = {"numbers": [0.1, 1 / 3, 1e-300, math.inf, -0.0], "text": 'Λ(2) "quoted" , "record": {}\n', "nothing": None}
 
 
@@ -131,10 +140,9 @@ def test_what_cannot_be_written_leaves_nothing(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("text", [TEXT + PRODUCT, TEXT + HOPELESS])
 def test_results_are_the_same_from_their_records(tmp_path, text):
-    for result in solve_case(case_in(tmp_path, text, [ALL])):
-        record = record_of(result)
-        again = result_of(json.loads(json.dumps(record)), result.curve)
-        assert same(record_of(again), record)
+    case = case_in(tmp_path, text, [ALL])
+    for solved in solve_sets(case):
+        result, again = solved.result, from_record(case, solved)
         for name in ("p", "value", "derivative", "error_estimate", "residual", "perturbation"):
             np.testing.assert_array_equal(getattr(again.moments, name), getattr(result.moments, name))
         assert again.estimates == result.estimates
@@ -143,43 +151,179 @@ def test_results_are_the_same_from_their_records(tmp_path, text):
             assert (one.code, one.data) == (other.code, other.data)
         assert [each.reason.code for each in again.failures] == [each.reason.code for each in result.failures]
         assert again.status == result.status
+        assert again.seconds == result.seconds
+        assert again.parts.keys() == result.parts.keys()
         assert again.sensitivities.moments == result.sensitivities.moments
         assert again.sensitivities.indices == result.sensitivities.indices
 
 
-def test_a_key_follows_from_all_that_changes_a_result(tmp_path, monkeypatch):
-    curve, other, *_ = case_in(tmp_path, TEXT + PRODUCT).curves()
-    wanted, numerics = Wanted(np.array([1.0, 2.0]), ("lyapunov_exponent",)), Numerics(1e-8, Budget(), None)
-    asked = [{"p": np.array([1.0, 3.0])}, {"indices": ()}, {"shown": (1.0,)}, {"density": True}]
-    asked += [{"is_stated": not wanted.is_stated}, {"start": (0.3, 0.4)}]
-    meshes = [make_mesh(phi_cells=2, xi_cells=4), make_mesh(phi_cells=2, xi_cells=4, xi_max=8.5)]
-    solved = [{"rtol": 1e-9}, {"budget": Budget(unknowns=500)}, {"budget": Budget(seconds=5.0)}]
-    solved.append({"budget": Budget(memory=1.0)})
-    keys = [
-        key_of(curve, wanted, numerics),
-        key_of(other, wanted, numerics),
-        *(key_of(curve, replace(wanted, **each), numerics) for each in (*asked, {"differentiated": (1.0,)})),
-        *(key_of(curve, wanted, replace(numerics, **each)) for each in (*solved, *({"mesh": mesh} for mesh in meshes))),
-    ]
-    assert len(set(keys)) == len(keys)
-    assert keys[0] == key_of(curve, wanted, numerics)
-    monkeypatch.setattr(plain, "RESULT_VERSION", 0)
-    assert key_of(curve, wanted, numerics) not in keys
+ASKED = {
+    "moments": {"p": [1.0, 2.0], "slopes": True},
+    "lyapunov_exponent": {},
+    "excursions": {"phi": 0.0, "xi": "stationary"},
+    "response": {"rtol": 1e-6, "grid": None},
+    "sensitivities": {"p": [1.0], "indices": ["lyapunov_exponent"]},
+    "eigenfunctions": {"p": [1.0], "density": True},
+}
+ALL_PARTS = {*ASKED}
+OF_SOLVER = ALL_PARTS - {"response"}
+"""Parts whose numbers follow from rtol and the mesh of Λ(p)."""
 
 
-def test_other_keys_follow_from_what_they_are_of(tmp_path):
-    """The moments of a curve that is not finished do not depend on the budget; a simulation has no tolerance."""
+@pytest.mark.parametrize(
+    ("part", "change"),
+    [
+        ("moments", {"p": [1.0, 3.0]}),
+        ("moments", {"slopes": False}),
+        ("excursions", {"phi": 0.3}),
+        ("excursions", {"xi": 0.4}),
+        ("response", {"rtol": 1e-5}),
+        ("response", {"grid": [80, 49, 25]}),
+        ("sensitivities", {"p": [2.0]}),
+        ("sensitivities", {"indices": []}),
+        ("eigenfunctions", {"p": [2.0]}),
+        ("eigenfunctions", {"density": False}),
+    ],
+)
+def test_a_setting_of_a_part_changes_its_key_and_no_other(part, change):
+    numerics = Numerics(1e-8, Budget(), None)
+    assert changed(ASKED, {**ASKED, part: ASKED[part] | change}, numerics, numerics) == {part}
+
+
+@pytest.mark.parametrize(
+    ("change", "parts", "limited"),
+    [
+        ({"rtol": 1e-9}, OF_SOLVER, OF_SOLVER),
+        ({"mesh": make_mesh(phi_cells=2, xi_cells=4)}, OF_SOLVER, OF_SOLVER),
+        ({"budget": Budget(unknowns=500)}, set(), ALL_PARTS),
+        ({"budget": Budget(seconds=5.0)}, set(), ALL_PARTS),
+        ({"budget": Budget(memory=1.0)}, set(), ALL_PARTS),
+        ({"is_stated": False}, set(), set()),
+    ],
+    ids=lambda each: "".join(each) if isinstance(each, dict) else "",
+)
+def test_numerics_change_the_keys_of_the_parts_that_they_decide(change, parts, limited):
+    """A budget decides what it has limited alone; what a case states decides what is told of the numbers."""
+    numerics = Numerics(1e-8, Budget(), None)
+    other = replace(numerics, **change)
+    assert changed(ASKED, ASKED, numerics, other) == parts
+    assert changed(ASKED, ASKED, numerics, other, is_limited=True) == limited
+
+
+def changed(asked, others, numerics, other, **more):
+    """The parts whose keys differ."""
+    keys, again = (
+        {name: part_key(BY_NAME[name], settings, how, **more) for name, settings in what.items()}
+        for what, how in ((asked, numerics), (others, other))
+    )
+    assert len(set(keys.values())) == len(keys)
+    return {name for name in keys if keys[name] != again[name]}
+
+
+def test_meshes_have_keys_of_their_own():
+    meshes = [None, make_mesh(phi_cells=2, xi_cells=4), make_mesh(phi_cells=2, xi_cells=4, xi_max=8.5)]
+    keys = {part_key(BY_NAME["moments"], {}, Numerics(1e-8, Budget(), mesh)) for mesh in meshes}
+    assert len(keys) == len(meshes)
+
+
+def test_every_setting_of_a_case_is_in_what_is_asked_of_a_part(tmp_path):
+    """Each key of a file that changes numbers changes the settings of the parts that it is about, and of no other."""
+    base = everything(case_in(tmp_path, TEXT, [ALL]))
+    for sets, parts in {
+        "moments.p=[2.0, 1.0]": {"moments", "classes", "sensitivities"},
+        "excursions.phi=0.3": {"excursions"},
+        "excursions.levels=[5.0]": set(),
+        "output.eigenfunctions=[-1.0]": {"eigenfunctions"},
+        "moments.rtol=1e-6": set(),
+        "budget.memory=1.0": set(),
+        "title='other'": set(),
+    }.items():
+        other = everything(case_in(tmp_path, TEXT, [ALL, sets]))
+        assert {name for name in base | other if base.get(name) != other.get(name)} == parts, sets
+
+
+def test_keys_of_sets_and_simulations_follow_from_what_they_are_of(tmp_path, monkeypatch):
     curve, other, *_ = case_in(tmp_path, TEXT + PRODUCT).curves()
-    numerics, mesh = Numerics(1e-8, Budget(), None), make_mesh(phi_cells=2, xi_cells=4)
-    known = growing_key(curve, numerics)
-    changed = [growing_key(curve, replace(numerics, **each)) for each in ({"rtol": 1e-9}, {"mesh": mesh})]
-    assert len({known, growing_key(other, numerics), *changed}) == 4
-    assert growing_key(curve, replace(numerics, budget=Budget(seconds=5.0, memory=1.0))) == known
+    assert set_key(curve) == set_key(curve) != set_key(other)
     setting = MonteCarloSection()
     settings = [setting, *(setting.model_copy(update=each) for each in ({"seed": 7}, {"paths": 5000}))]
     simulated = [simulation_key(curve, (1.0, 2.0), each) for each in settings]
     simulated += [simulation_key(curve, (1.0,), setting), simulation_key(other, (1.0, 2.0), setting)]
     assert len(set(simulated)) == len(simulated)
+    known = set_key(curve)
+    monkeypatch.setattr(plain, "RESULT_VERSION", 0)
+    assert set_key(curve) != known
+
+
+def solved_in(monkeypatch):
+    """Takes the names of the parts that are solved."""
+    found = list[str]()
+
+    def noting(part):
+        return replace(part, solve=lambda *arguments: found.append(part.name) or part.solve(*arguments))
+
+    monkeypatch.setattr(solve, "PARTS", tuple(noting(part) if part.solve else part for part in PARTS))
+    return found
+
+
+def asking(*names, more=()):
+    return [f"output.quantities={json.dumps(names)}", "output.eigenfunctions=[]", "vary={}", *more]
+
+
+def test_more_quantities_are_solved_alone_and_fewer_not_at_all(tmp_path, monkeypatch):
+    found = solved_in(monkeypatch)
+
+    def run(*names, more=()):
+        found.clear()
+        [result] = fpsolve.run(case_in(tmp_path, TEXT, asking(*names, more=more)), tmp_path / "out")
+        return result, set(found)
+
+    first, parts = run("moment", "lyapunov_exponent")
+    assert parts == {"moments", "lyapunov_exponent", "classes", "discretisation"}
+    both, parts = run("moment", "lyapunov_exponent", "excursions", "variance_rate")
+    assert parts == {"excursions", "variance_rate"}
+    np.testing.assert_array_equal(both.moments.value, first.moments.value)
+    assert both.estimates["lyapunov_exponent"] == first.estimates["lyapunov_exponent"]
+    assert both.excursion is not None
+    fewer, parts = run("moment", "variance_rate")
+    assert parts == set()
+    assert fewer.excursion is None
+    assert fewer.estimates["lyapunov_exponent"] is None
+    assert fewer.estimates["variance_rate"] == both.estimates["variance_rate"]
+    again, parts = run("moment", "lyapunov_exponent", "excursions", more=["excursions.phi=0.5"])
+    assert parts == {"excursions"}
+    assert again.excursion.phi == 0.5
+    _, parts = run("moment", "lyapunov_exponent", more=["budget.memory=1.0"])
+    assert parts == set()
+    _, parts = run("moment", "lyapunov_exponent", more=["moments.rtol=1e-7"])
+    assert parts == {"moments", "lyapunov_exponent", "classes", "discretisation"}
+
+
+def test_what_a_budget_has_limited_is_solved_again_with_another(tmp_path, monkeypatch):
+    found, names = solved_in(monkeypatch), ("moment", "lyapunov_exponent")
+
+    def run(*more):
+        found.clear()
+        with contextlib.suppress(NotConverged):
+            fpsolve.run(case_in(tmp_path, TEXT, asking(*names, more=[*more, "oscillator.epsilon=2.0"])), tmp_path)
+        return set(found)
+
+    small = "budget.unknowns=100"
+    assert {"moments", "lyapunov_exponent"} <= run(small)
+    assert run(small) == set()
+    assert {"moments", "lyapunov_exponent"} <= run("budget.unknowns=120")
+
+
+def test_what_there_is_not_is_told_where_a_case_lists_it_without_solving_it_again(tmp_path, monkeypatch):
+    found, told = solved_in(monkeypatch), []
+    path, sets = CASES / "systems/stochastic_mathieu.toml", ["expect=[]", "figure={}", "vary={}", "moments.p=[2.0]"]
+    for quantities in ('"all"', '["moment", "impact_rate"]'):
+        found.clear()
+        case = load_case(path, [*sets, f"output.quantities={quantities}"])
+        [result] = fpsolve.run(case, tmp_path / "out")
+        told.append(any(note.tells_of(Code.NOT_ONE_RAY) for note in result.notes))
+    assert told == [False, True]
+    assert found == []
 
 
 def rewritten(folder, change):
@@ -197,7 +341,9 @@ def test_a_record_of_another_form_is_solved_anew(tmp_path, capsys):
     command = ["run", str(tmp_path / "test.toml"), "--out", str(tmp_path)]
     assert main([*command, "--quiet"]) == 0
     moments = (tmp_path / "test/moments.csv").read_bytes()
-    rewritten(tmp_path / "test", lambda key, record: (key, record | {"seconds": "soon"}))
+    rewritten(
+        tmp_path / "test", lambda key, record: (key, {name: [*entry[:2], "soon"] for name, entry in record.items()})
+    )
     capsys.readouterr()
     assert main([*command, "--quiet"]) == 0
     assert "known" not in capsys.readouterr().out
@@ -208,78 +354,91 @@ def test_a_record_of_another_form_is_solved_anew(tmp_path, capsys):
 
 @pytest.fixture(scope="module")
 def solved(tmp_path_factory):
-    """A case, its first curve, and the record of that."""
+    """A case, its first curve, and the entries of the record of that by the names of their parts."""
     case = case_in(tmp_path_factory.mktemp("solved"), TEXT + PRODUCT, [ALL])
     [curve] = case.curves(0, 1)
-    return case, curve, record_of(solve_curve(curve, everything(case), Numerics.of(case)).result)
+    asked, numerics = everything(case), Numerics.of(case)
+    record = record_of_set(curve, asked, numerics, solve_curve(curve, asked, numerics).entries)
+    return case, curve, {key.rpartition("-")[0]: entry for key, entry in record.items()}, record
 
 
 def is_taken(folder, solved, change):
     """Whether a record is taken as it is, or changed, with a right checksum."""
-    case, curve, record = solved
-    content = json.dumps(change(copy.deepcopy(record))).encode()
-    (folder / "x.jsonl").write_bytes(b'{"key": "key", "crc32": %d, "record": %s}\n' % (zlib.crc32(content), content))
-    return Results(case, Records(folder).look()).find(curve, "key")
+    case, curve, entries, record = solved
+    changed = change(copy.deepcopy(entries))
+    names = {key.rpartition("-")[0]: key for key in record}
+    content = json.dumps({names.get(name, name): each for name, each in changed.items()}).encode()
+    line = b'{"key": "%s", "crc32": %d, "record": %s}\n' % (set_key(curve).encode(), zlib.crc32(content), content)
+    (folder / "x.jsonl").write_bytes(line)
+    return Results(case, Records(folder).look(), Numerics.of(case)).find(curve)
 
 
 def column(i, values):
     """Another column of the moments."""
-    return lambda record: record["moments"].__setitem__(i, _packed(np.array(values))) or record
+    return lambda record: record["moments"][0][0].__setitem__(i, _packed(np.array(values))) or record
 
 
 def compressed(**change):
     """The p in the form of long arrays, with something changed."""
     data = base64.b64encode(zlib.compress(np.array([2.0, 0.0, -1.0]).tobytes())).decode()
-    return lambda record: record["moments"].__setitem__(0, {"shape": [3], "data": data} | change) or record
+    return lambda record: record["moments"][0][0].__setitem__(0, {"shape": [3], "data": data} | change) or record
 
 
 def estimate(value, i):
-    return lambda record: record["estimates"]["lyapunov_exponent"].__setitem__(i, value) or record
+    return lambda record: record["lyapunov_exponent"][0].__setitem__(i, value) or record
 
 
 def slope(key, i=3):
     """Another attribute of the sensitivities."""
-    return lambda record: record["sensitivities"].__setitem__(i, key) or record
+    return lambda record: record["sensitivities"][0].__setitem__(i, key) or record
+
+
+def of_moments(i, value):
+    """Another attribute of Λ(p): its columns, root, failures, warnings or notes."""
+    return lambda record: record["moments"][0].__setitem__(i, value) or record
+
+
+def seconds(value):
+    return lambda record: record["stability_index"].__setitem__(2, value) or record
 
 
 WRONG = {
     "nothing": lambda record: {},
-    "a column too few": lambda record: record | {"moments": record["moments"][:-1]},
-    "one estimate alone": lambda record: record | {"estimates": {"lyapunov_exponent": [0.0, 0.0]}},
-    "seconds are a word": lambda record: record | {"seconds": "soon"},
-    "warnings are a text": lambda record: record | {"warnings": "none"},
-    "one p of another": lambda record: record | {"moments": [_packed(np.array([7.0])), *record["moments"][1:]]},
+    "a column too few": lambda record: record["moments"][0][0].pop() and record,
+    "no entry": lambda record: record | {"moments": []},
+    "neither found nor missing": lambda record: record | {"lyapunov_exponent": [None, None, 0.0]},
+    "one estimate alone": lambda record: {"lyapunov_exponent": record["lyapunov_exponent"]},
+    "seconds are a word": seconds("soon"),
+    "warnings are a text": of_moments(3, "none"),
+    "one p of another": column(0, [7.0]),
     "p of others": column(0, [7.0, 0.0, -1.0]),
     "p twice": column(0, [2.0, 2.0, -1.0]),
     "p is nan": column(0, [2.0, 0.0, math.nan]),
-    "p missing": lambda record: record | {"moments": [_packed(np.zeros(0))] * 7},
+    "p missing": of_moments(0, [_packed(np.zeros(0))] * 7),
     "one value too many": column(1, [1.0, 2.0, 3.0, 4.0]),
     "values in a table": column(1, [[1.0, 2.0, 3.0]]),
     "no value": column(1, [math.nan, 0.0, 0.0]),
     "infinite error": column(3, [math.inf, 0.0, 0.0]),
-    "a value in words": lambda record: record["moments"][1].__setitem__(0, "1.0") or record,
-    "a value that is true": lambda record: record["moments"][1].__setitem__(0, True) or record,
+    "a value in words": lambda record: record["moments"][0][0][1].__setitem__(0, "1.0") or record,
+    "a value that is true": lambda record: record["moments"][0][0][1].__setitem__(0, True) or record,
     "no shape": compressed(shape=[-1]),
     "a large shape": compressed(shape=[3 * 10**9]),
     "much in little": compressed(data=base64.b64encode(zlib.compress(bytes(10**8))).decode()),
-    "seconds are infinite": lambda record: record | {"seconds": "inf"},
-    "seconds are true": lambda record: record | {"seconds": True},
-    "seconds are a text": lambda record: record | {"seconds": "1.0"},
-    "seconds are too large": lambda record: record | {"seconds": 10**400},
+    "seconds are infinite": seconds("inf"),
+    "seconds are true": seconds(True),
+    "seconds are a text": seconds("1.0"),
+    "seconds are too large": seconds(10**400),
     "λ is infinite": estimate("inf", 0),
     "error is negative": estimate(-1.0, 1),
-    "no λ": lambda record: record["estimates"].pop("lyapunov_exponent") and record,
-    "another index": lambda record: record["estimates"].update(x=None) or record,
-    "discretisation": lambda record: record | {"discretisation": {"xi": math.nan}},
-    "half a letter": lambda record: record | {"discretisation": {"xi": "\ud800"}},
-    "a message with half a letter": lambda record: record | {
-        "warnings": [{"code": "TEXT", "data": {"text": "\ud800"}}]
-    },
-    "a message that cannot be said": lambda record: record | {"notes": [{"code": "INFINITE", "data": {"p": "x"}}]},
-    "a message of no size": lambda record: record | {"notes": [{"code": "TEXT", "data": {"text": "x", "size": "x"}}]},
+    "no λ": lambda record: record.pop("lyapunov_exponent") and record,
+    "discretisation": lambda record: record | {"discretisation": [{"xi": math.nan}, None, 0.0]},
+    "half a letter": lambda record: record | {"discretisation": [{"xi": "\ud800"}, None, 0.0]},
+    "a message with half a letter": of_moments(3, [{"code": "TEXT", "data": {"text": "\ud800"}}]),
+    "a message that cannot be said": of_moments(4, [{"code": "INFINITE", "data": {"p": "x"}}]),
+    "a message of no size": of_moments(4, [{"code": "TEXT", "data": {"text": "x", "size": "x"}}]),
     "fewer derivatives": slope([]),
     "derivatives by another key": slope({"oscillator.x": 1.0}, 0),
-    "nested": lambda record: record | {"notes": json.loads("[" * 900 + "]" * 900)},
+    "nested": of_moments(4, json.loads("[" * 900 + "]" * 900)),
 }  # fmt: skip
 
 

@@ -7,10 +7,10 @@ import pytest
 
 from fpsolve.case.case import load_case
 from fpsolve.messages import Code
-from fpsolve.output.records import record_of, result_of
 from fpsolve.output.tables import write_results
 from fpsolve.output.terminal import print_remarks
 from fpsolve.study.solve import Numerics, everything, solve_curve
+from tests.kit import from_record
 
 CASE = """
 title = "Triangular"
@@ -35,12 +35,13 @@ def test_both_classes_are_told_by_name_from_records_too(tmp_path):
     path.write_text(CASE, encoding="utf-8")
     case = load_case(path)
     [curve] = case.curves()
-    result = solve_curve(curve, everything(case), Numerics.of(case)).result
+    solved = solve_curve(curve, everything(case), Numerics.of(case))
+    result = solved.result
     assert [
         str(note) for note in result.notes if "the ray at phi = 1.5708: λ is -1 on the ray and -0.3 across it" in note
     ]
     summaries = []
-    for each in (result, result_of(json.loads(json.dumps(record_of(result))), curve)):
+    for each in (result, from_record(case, solved)):
         write_results(case, [each], tmp_path, {})
         summaries += json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))["curves"]
     assert summaries[0] == summaries[1]
@@ -79,7 +80,8 @@ def test_blocks_are_told_by_their_variables(tmp_path, capsys):
     path.write_text(BLOCKS, encoding="utf-8")
     case = load_case(path)
     [curve] = case.curves()
-    result = solve_curve(curve, everything(case), Numerics.of(case)).result
+    solved = solve_curve(curve, everything(case), Numerics.of(case))
+    result = solved.result
     assert [note for note in result.notes if "the blocks of variables (y), (x, v) are solved one by one" in note]
     assert [(each.p, each.reason.code) for each in result.failures] == [
         (p, Code.NEGATIVE_OF_SEVERAL) for p in (-2.0, -0.5)
@@ -88,7 +90,7 @@ def test_blocks_are_told_by_their_variables(tmp_path, capsys):
     said = capsys.readouterr().err
     assert said.count("Λ(p) for p < 0 is not computed") == 1
     assert "(y), (x, v) do not all drive each other" in " ".join(said.split())
-    assert result_of(json.loads(json.dumps(record_of(result))), curve).classes[1].variables == ("x", "v")
+    assert from_record(case, solved).classes[1].variables == ("x", "v")
     write_results(case, [result], tmp_path, {})
     [summary] = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))["curves"]
     slow, own = summary["classes"]

@@ -1,7 +1,6 @@
 """The cases of the paper's figures: their own expectations, and every trend that the paper's text states."""
 
 import math
-from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -20,10 +19,14 @@ NAMES = sorted((path.stem for path in CASES.glob("*.toml")), key=lambda name: na
 SAMPLE = sampled(*NAMES, keep=len(NAMES) - len(LONG))
 
 
+def without_pictures(asked):
+    return {name: each for name, each in asked.items() if name not in ("sensitivities", "eigenfunctions", "directions")}
+
+
 @cache
 def solved(name):
     case = load_case(CASES / f"{name}.toml")
-    numerics, wanted = Numerics.of(case), replace(everything(case), differentiated=None, shown=(), density=False)
+    numerics, wanted = Numerics.of(case), without_pictures(everything(case))
     return case, [solve_curve(curve, wanted, numerics).result for curve in case.curves()]
 
 

@@ -16,13 +16,12 @@ from fpsolve.errors import CaseError, NotConverged
 from fpsolve.messages import Code, Message
 from fpsolve.model.quantity import OSCILLATOR_RESPONSE
 from fpsolve.output.figures import draw_stationary_responses
-from fpsolve.output.records import fits, record_of, result_of
 from fpsolve.output.sentences import sentence, shape_of_response
 from fpsolve.output.terminal import simulated_mean
-from fpsolve.study import solve
+from fpsolve.parts import response
+from fpsolve.parts.intervals import sampled_case
 from fpsolve.study.results import Status
 from fpsolve.study.solve import Numerics, compare, everything, expected, solve_curve
-from fpsolve.study.uncertain import sampled_case
 from tests.kit import case_in, case_text
 
 SECTIONS = """[moments]
@@ -57,7 +56,7 @@ def folder(case, tmp_path_factory):
 def result(case, folder):
     """As it is read from its record."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(solve, "solve_response", never)
+        patch.setattr("fpsolve.parts.response.solve_response", never)
         [found] = fpsolve.run(case, folder.parent)
     return found
 
@@ -113,11 +112,10 @@ def test_a_response_is_read_from_its_record(result, case, folder):
     assert {name: each.value for name, each in again.response.numbers.items()} == {
         name: each.value for name, each in result.response.numbers.items()
     }
-    record = json.loads(json.dumps(record_of(result)))
-    np.testing.assert_array_equal(result_of(record, result.curve).response.density.whole, result.response.density.whole)
-    assert fits(result, case.p.tolist())
+    settings, is_whole = everything(case)["response"], response.PART.is_whole
+    assert is_whole(result.response, result.curve, settings)
     result.response.density.of_plane[0, 0] = math.nan
-    assert not fits(result, case.p.tolist())
+    assert not is_whole(result.response, result.curve, settings)
     result.response.density.of_plane[0, 0] = 0.0
 
 
@@ -125,7 +123,7 @@ def test_expectations_of_a_response(result, tmp_path):
     text = '[[expect]]\nquantity = "response.{}"\nvalue = {}\natol = 0.01\nsource = "another code"\n'
     expectations = text.format("amplitude_squared", 1.54568) + text.format("impact_rate", 1.0)
     case = case_in(tmp_path, CASE + expectations)
-    assert expected(case, result.curve).response == 0.01
+    assert expected(case, result.curve)["response"] == {"rtol": 0.01, "grid": None}
     assert [each.met for each in compare(case, [result])] == [True, False]
 
 
@@ -162,7 +160,7 @@ def test_where_it_fails_nothing_else_is_lost(case, monkeypatch, raised, code):
     def failing(*arguments):
         raise raised
 
-    monkeypatch.setattr(solve, "solve_response", failing)
+    monkeypatch.setattr("fpsolve.parts.response.solve_response", failing)
     found = solved(case)
     assert found.status is Status.PARTLY
     [failure] = found.failures
@@ -176,29 +174,35 @@ def wanted(tmp_path, more, **changes):
     return case_in(tmp_path, case_text(f"[moments]\np = [1.0]\n{more}", noise=NOISE, **{**NONLINEAR, **changes}))
 
 
+def asked_of(case):
+    return everything(case).get("response")
+
+
 def test_when_it_is_computed(tmp_path):
     """Of up to ten curves unasked, of more without densities if it is named; of linear ones if it is named."""
     many = '[vary]\n"noise.D0" = { start = 0.1, stop = 0.2, num = 11 }\n'
     named = '[output]\nquantities = ["response"]\n'
     few = wanted(tmp_path, many.replace("11", "10"))
-    assert (everything(few).response, everything(few).grid, few.leaves_out_response) == (1e-6, (80, 49, 25), False)
+    alone = {"rtol": 1e-6, "grid": None}
+    written = {"rtol": 1e-6, "grid": [80, 49, 25]}
+    assert (asked_of(few), few.leaves_out_response) == (written, False)
     case = wanted(tmp_path, many)
-    assert (everything(case).response, case.leaves_out_response) == (None, True)
+    assert (asked_of(case), case.leaves_out_response) == (None, True)
     case = wanted(tmp_path, many + named)
-    assert (everything(case).response, everything(case).grid, case.leaves_out_response) == (1e-6, None, False)
-    assert everything(wanted(tmp_path, named, c2=0.0, c3=0.0)).response == 1e-6
+    assert (asked_of(case), case.leaves_out_response) == (alone, False)
+    assert asked_of(wanted(tmp_path, named, c2=0.0, c3=0.0)) == written
     for more, changes in (
         ("", {"c2": 0.0, "c3": 0.0}),
         ("[response]\noff = true\n", {}),
         (many, {"c2": 0.0, "c3": 0.0}),
     ):
         case = wanted(tmp_path, more, **changes)
-        assert (everything(case).response, case.leaves_out_response) == (None, False)
+        assert (asked_of(case), case.leaves_out_response) == (None, False)
     case = wanted(tmp_path, '[vary]\n"oscillator.c3" = [0.0, 0.2]\n', c2=0.0, c3=0.0)
-    assert everything(case).response == 1e-6
+    assert asked_of(case) == written
     case = wanted(tmp_path, '[uncertain]\nsample = 20\n"noise.D0" = 0.05\n')
-    assert everything(case).response == 1e-6
-    assert everything(sampled_case(case)).response is None
+    assert asked_of(case) == written
+    assert asked_of(sampled_case(case)) is None
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,5 @@
 """Results of cases are plain values: they travel to other processes."""
 
-import json
 import pickle
 from dataclasses import FrozenInstanceError
 
@@ -8,10 +7,9 @@ import numpy as np
 import pytest
 
 from fpsolve.cli import main
-from fpsolve.output.records import record_of, result_of
 from fpsolve.study.simulate import simulate_curves
 from fpsolve.study.solve import compare
-from tests.kit import ALL, INDICES, case_in, case_text, solve_sets
+from tests.kit import ALL, INDICES, case_in, case_text, from_record, solve_sets
 
 SECTIONS = """[moments]
 p = [1.0]
@@ -57,9 +55,10 @@ def test_results_pickle(case, solved, result):
         assert each.curve == result.curve
         assert compare(case, [each]) == [comparison] == [other]
     assert comparison.met
-    [pair], [original] = whole.eigenpairs, solved.eigenpairs
+    drawn, first = (each.pictures["eigenfunctions"] for each in (whole, solved))
+    [pair], [original] = drawn.pairs, first.pairs
     assert pair.p == original.p == 1.0
-    for one, two in ((pair, original), (whole.stationary, solved.stationary)):
+    for one, two in ((pair, original), (drawn.stationary, first.stationary)):
         np.testing.assert_array_equal(one.right, two.right)
         np.testing.assert_array_equal(one.left, two.left)
     assert (sample.result, sample.estimates) == (simulated.result, simulated.estimates)
@@ -96,8 +95,7 @@ def test_a_density_that_is_none_is_not_written(tmp_path, capsys):
 
 def test_results_from_records_are_data_as_those_that_are_solved(case, solved):
     """Also what comparisons leave out: the names and units of numbers, which pictures and arrays tell."""
-    record = json.loads(json.dumps(record_of(solved.result)))
-    found = result_of(record, solved.result.curve)
+    found = from_record(case, solved)
     for name, estimate in solved.result.estimates.items():
         again = found.estimates[name]
         assert repr(again) == repr(estimate)

@@ -11,8 +11,8 @@ from scipy.stats import norm
 from fpsolve.case.case import load_case
 from fpsolve.cli import main
 from fpsolve.messages import Code
+from fpsolve.parts.intervals import sampled_case, samples_of, spreads_of
 from fpsolve.study.solve import Numerics, everything, solve_curve
-from fpsolve.study.uncertain import sampled_case, samples_of, spreads_of
 from tests.conftest import sampled
 
 UNIFORM = """

@@ -1,24 +1,34 @@
-"""The stationary response of a curve with cubic terms: what is kept of it, and how it is found."""
+"""The stationary response of a curve with terms of degree 3: its numbers, its density, and their files."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from fpsolve.arrays import FloatArray
+from fpsolve.data import Quantity
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.error import Estimate
 from fpsolve.model.noise import Noise
 from fpsolve.model.problem import Problem
+from fpsolve.model.quantity import ResponseQuantities
 from fpsolve.nonlinear.rest import NearRest
+from fpsolve.parts.indices import is_estimate
+from fpsolve.parts.part import Job, Part, Settings
+from fpsolve.results.table import Row, pair
 
 if TYPE_CHECKING:
+    from fpsolve.case.case import Case, Curve
     from fpsolve.nonlinear.response import StationaryResponse
+    from fpsolve.study.results import CurveResult
 
+NAME = "response"
+MOST_GRIDS = 10
+"""Largest number of curves of which densities are written."""
 Grid = tuple[int, int, int]
 """How many amplitudes, phases and values of the noise."""
 SPREAD = 4.0
@@ -116,3 +126,89 @@ def _values_of(noise: Noise, count: int) -> FloatArray:
 
 def _short(values: FloatArray) -> FloatArray:
     return np.asarray(values.astype(np.float32), dtype=float)
+
+
+def _settings(case: Case, number: int) -> Settings | None:
+    """The tolerance of the response, which is its own, and the grid of its density if there are few curves."""
+    if not case.has_response:
+        return None
+    grid = case.response.grid
+    places = [grid.amplitude, grid.phi, grid.xi] if case.planned <= MOST_GRIDS else None
+    return {"rtol": case.response.rtol, "grid": places}
+
+
+def _solve(job: Job, settings: Settings) -> CurveResponse:
+    grid = settings["grid"] and tuple(settings["grid"])
+    return solve_response(job.curve.problem, settings["rtol"], grid, job.numerics.budget)
+
+
+def numbers_of(case: Case) -> Mapping[str, Quantity]:
+    """The numbers of the stationary response by their names, if a case asks for them."""
+    return case.system.response.numbers if case.has_response else {}
+
+
+def _columns(case: Case) -> Sequence[Quantity]:
+    return tuple(each for number in numbers_of(case).values() for each in (number, number.error()))
+
+
+def _row(case: Case, result: CurveResult) -> Row:
+    found, numbers = result.response, numbers_of(case)
+    row: dict[str, Any] = {}
+    for name, number in found.numbers.items() if found and numbers else ():
+        row |= pair(numbers[name].name, number)
+    return row
+
+
+def _content(case: Case, result: CurveResult) -> Mapping[str, Any]:
+    """The means and impacts with their errors, what the density does near rest, and how far these are to be trusted."""
+    if not case.has_response or (found := result.response) is None:
+        return {NAME: None} if case.has_response else {}
+    means: dict[str, Any] = {}
+    for name, number in found.means.items():
+        means |= pair(name, number)
+    content = {
+        "means": means,
+        **({} if found.impact_rate is None else pair("impact_rate", found.impact_rate)),
+        "has_hump": found.has_hump,
+        "has_crater": found.has_crater,
+        **pair("balance", found.balance),
+        "least_over_largest_density": found.least,
+        "unknowns": found.unknowns,
+    }
+    return {NAME: content}
+
+
+def _is_whole(found: CurveResponse, curve: Curve, settings: Settings) -> bool:
+    """Whether the numbers are all there, and the density is one over a grid."""
+    about: ResponseQuantities = curve.problem.system.response
+    density, numbers = found.density, (found.stability_index, found.least)
+    is_whole = (
+        found.numbers.keys() <= about.numbers.keys()
+        and all(map(math.isfinite, numbers))
+        and all(map(is_estimate, (*found.numbers.values(), found.balance)))
+        and (density is None) == (settings["grid"] is None)
+    )
+    if density is None or not is_whole:
+        return is_whole
+    places = density.amplitude, density.phi, density.xi
+    shape = tuple(each.size for each in places)
+    tables = {1: density.of_amplitude, 2: density.of_plane, 3: density.whole}
+    return (
+        all(each.ndim == 1 and each.size > 1 and bool(np.all(np.diff(each) > 0)) for each in places)
+        and all(each.shape == shape[:size] for size, each in tables.items())
+        and all(bool(np.isfinite(each).all()) for each in (*places, *tables.values()))
+    )
+
+
+PART: Part = Part(
+    NAME,
+    _settings,
+    _solve,
+    CurveResponse,
+    NAME,
+    columns=_columns,
+    row=_row,
+    content=_content,
+    is_whole=_is_whole,
+    uses_solver=False,
+)

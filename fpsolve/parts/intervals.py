@@ -5,26 +5,33 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from fpsolve.analysis.spreads import LEVEL, UNCERTAIN, Spread, latin_hypercube, spread_of
 from fpsolve.arrays import FloatArray
-from fpsolve.case.case import Case
-from fpsolve.case.uncertain import Uncertain
-from fpsolve.case.vary import Vary
 from fpsolve.errors import FpsolveError
 from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.quantities import INDICES, MOMENT
 from fpsolve.messages import Code, Message
 from fpsolve.model.quantity import Quantity, moment_at
-from fpsolve.study.results import CurveResult
+from fpsolve.parts.part import Part, Settings
+from fpsolve.results.table import Row
+
+if TYPE_CHECKING:
+    from fpsolve.case.case import Case
+    from fpsolve.case.vary import Vary
+    from fpsolve.study.results import CurveResult
 
 SAMPLE = "sample"
 """The name of the folder of the samples of a case, and of the file of their quantiles."""
 APART = 0.1
 """Of the width of an interval, by which two of them differ so that it is told."""
 SHARES = (0.5 - 0.5 * LEVEL, 0.5, 0.5 + 0.5 * LEVEL)
+"""Quantiles of an interval, and the median."""
+ENDS = ("low", "high")
+"""Names of the ends of an interval."""
 
 
 @dataclass(frozen=True)
@@ -132,7 +139,7 @@ def _drawn(case: Case) -> Vary:
     """The samples as parameter sets."""
     laws = case.uncertain.laws(case.problem)
     drawn = latin_hypercube(laws, case.uncertain.sample, case.uncertain.seed)
-    return Vary(drawn, "zip")
+    return type(case.vary)(drawn, "zip")
 
 
 def refuse_wrong_samples(case: Case) -> None:
@@ -150,7 +157,14 @@ def sampled_case(case: Case) -> Case:
     vary = _drawn(case)
     wanted = [name for name in (MOMENT.name, *UNCERTAIN) if name in case.asked]
     output = case.output.model_copy(update={"quantities": tuple(wanted), "eigenfunctions": None, "figure": False})
-    updated = {"vary": vary, "output": output, "uncertain": Uncertain(), "expect": (), "chart": None, "design": None}
+    updated = {
+        "vary": vary,
+        "output": output,
+        "uncertain": type(case.uncertain)(),
+        "expect": (),
+        "chart": None,
+        "design": None,
+    }
     made = case.model_copy(update={**updated, "figure": type(case.figure)()})
     made._path = case.path.with_name(f"{SAMPLE}.toml")
     return made
@@ -180,11 +194,11 @@ def _rows(case: Case, result: CurveResult, sampled: Sequence[CurveResult]) -> It
     for name, spread in spreads.indices.items():
         estimates = [each.estimates[name] for each in sampled]
         values = np.array([np.nan if each is None else each.value for each in estimates])
-        yield _row(INDICES[name], None, values, spread, _linear(spread, slopes.indices[name], result, sets))
+        yield _sampled(INDICES[name], None, values, spread, _linear(spread, slopes.indices[name], result, sets))
     rows = dict(zip(slopes.p.tolist(), slopes.moments, strict=True))
     for p, spread in spreads.moments.items():
         values = np.array([_moment(each, p) for each in sampled])
-        yield _row(moment_at(p), p, values, spread, _linear(spread, rows[p], result, sets))
+        yield _sampled(moment_at(p), p, values, spread, _linear(spread, rows[p], result, sets))
 
 
 def _moment(result: CurveResult, p: float) -> float:
@@ -202,7 +216,7 @@ def _linear(
     )
 
 
-def _row(quantity: Quantity, p: float | None, values: FloatArray, spread: Spread, linear: FloatArray) -> Sampled:
+def _sampled(quantity: Quantity, p: float | None, values: FloatArray, spread: Spread, linear: FloatArray) -> Sampled:
     is_there = np.isfinite(values)
     found, first = values[is_there], linear[is_there]
     if not found.size:
@@ -224,3 +238,55 @@ def _row(quantity: Quantity, p: float | None, values: FloatArray, spread: Spread
         spread=spread,
         apart=max(map(abs, moved)) / (most - least) if most > least else 0.0,
     )
+
+
+def _settings(case: Case, number: int) -> Settings | None:
+    return {} if case.uncertain else None
+
+
+def _indices(case: Case) -> list[str]:
+    """The names of the indices whose intervals are asked for."""
+    return [name for name in INDICES if name in UNCERTAIN and name in case.asked] if case.uncertain else []
+
+
+def _columns(case: Case) -> Sequence[Quantity]:
+    about = [MOMENT] if case.uncertain and MOMENT.name in case.asked else []
+    return [each.end(end, LEVEL) for each in (*about, *(INDICES[name] for name in _indices(case))) for end in ENDS]
+
+
+def _row(case: Case, result: CurveResult) -> Row:
+    if not case.uncertain:
+        return {}
+    spreads, row = spreads_of(case, result), dict[str, Any]()
+    of_p = [spreads.moments.get(p) for p in result.moments.p.tolist()]
+    for end in ENDS:
+        row[f"{MOMENT.name}_{end}"] = np.array([getattr(each, end, math.nan) for each in of_p], dtype=float)
+        row |= {f"{name}_{end}": getattr(spreads.indices.get(name), end, None) for name in _indices(case)}
+    return row
+
+
+def _content(case: Case, result: CurveResult) -> Mapping[str, Any]:
+    """What is uncertain of a curve, and how that of the parameters is."""
+    if not case.uncertain:
+        return {}
+    found, laws = spreads_of(case, result), case.uncertain.laws(result.curve.problem)
+    content = {
+        "level": LEVEL,
+        "laws": {
+            key: {"value": each.value, "sd": each.sd, "mean": each.mean, "deviation": each.deviation}
+            for key, each in laws.items()
+        },
+        **{name: plain_spread(found.indices[name]) if name in found.indices else None for name in UNCERTAIN},
+        "moments": [{"p": p, **plain_spread(each)} for p, each in found.moments.items()],
+    }
+    return {"uncertainty": content}
+
+
+def plain_spread(spread: Spread) -> dict[str, float]:
+    """A spread to first order as files have it."""
+    return {name: getattr(spread, name) for name in ("mean", "deviation", *ENDS)} | {
+        "probability_below_0": spread.below
+    }
+
+
+PART: Part = Part("intervals", _settings, columns=_columns, row=_row, content=_content)

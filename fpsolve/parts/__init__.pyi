@@ -1,0 +1,4 @@
+from .every import PARTS as PARTS
+from .part import Entry as Entry
+from .part import Job as Job
+from .part import Part as Part

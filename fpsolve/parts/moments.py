@@ -1,0 +1,224 @@
+"""Λ(p) of a curve at the p of its case, and of each of its blocks or rays."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fpsolve.arrays import FloatArray
+from fpsolve.data import Quantity
+from fpsolve.errors import NoSuchExponent
+from fpsolve.exponent.error import Failure, Moment
+from fpsolve.exponent.function import solve_moments
+from fpsolve.exponent.solver import InvariantClass
+from fpsolve.messages import Code, Message
+from fpsolve.model.problem import Problem, refuse_infinite
+from fpsolve.model.quantity import LYAPUNOV_EXPONENT, MOMENT, OVER_P
+from fpsolve.parts.part import Job, Numerics, Part, Settings
+from fpsolve.results.table import Row, pair
+from fpsolve.theory.perturbation import perturbed_moments, weak_noise_note
+
+if TYPE_CHECKING:
+    from fpsolve.case.case import Case, Curve
+    from fpsolve.study.results import CurveResult
+
+
+@dataclass(frozen=True, eq=False)
+class MomentColumns:
+    """Λ(p) at those p of a curve that did not fail, in the order of the case; all of shape (n,).
+
+    Attributes:
+        p: the moments.
+        value, derivative, error_estimate, derivative_error, residual: as in `MomentLyapunov`.
+        perturbation: Eq. (37) at the same p.
+    """
+
+    p: FloatArray
+    value: FloatArray
+    derivative: FloatArray
+    error_estimate: FloatArray
+    derivative_error: FloatArray
+    residual: FloatArray
+    perturbation: FloatArray
+
+    @property
+    def rate_function(self) -> FloatArray:
+        """I(s) = ps − Λ(p) at s = Λ′(p), shape (n,); its error is, to first order, that of Λ(p)."""
+        return np.asarray(self.p * self.derivative - self.value) + 0.0
+
+
+NO_MOMENTS = MomentColumns(*[np.zeros(0)] * 7)
+"""Λ(p) at no p."""
+
+
+@dataclass(frozen=True, eq=False)
+class Moments:
+    """What is found of Λ(p).
+
+    Attributes:
+        columns: where it did not fail.
+        root: near δ_p, see `MomentLyapunov`.
+        failures: why some p are missing.
+        warnings: what limits the numbers.
+        notes: on them, and where the theories compared with are not valid.
+    """
+
+    columns: MomentColumns
+    root: float | None = None
+    failures: tuple[Failure, ...] = ()
+    warnings: tuple[Message, ...] = ()
+    notes: tuple[Message, ...] = ()
+
+
+def _settings(case: Case, number: int) -> Settings:
+    return {"p": case.p.tolist() if MOMENT.name in case.asked else [], "slopes": True}
+
+
+def _solve(job: Job, settings: Settings) -> Moments:
+    """Λ(p), with an error of Λ′(p) where `slopes` says so, which may cost more than Λ(p)."""
+    problem, has_slopes = job.curve.problem, settings["slopes"]
+    refused = _refused(problem, settings["p"])
+    for _ in refused:
+        job.advance()
+    computed = [p for p in settings["p"] if p not in refused]
+    found = solve_moments(job.solver, computed, progress=job.advance, known=job.begun if has_slopes else None)
+    columns = MomentColumns(
+        p=found.p,
+        value=found.value,
+        derivative=found.derivative,
+        error_estimate=found.error_estimate,
+        derivative_error=found.derivative_error if has_slopes else np.full(found.p.shape, np.nan),
+        residual=found.residual,
+        perturbation=perturbed_moments(problem, found.p),  # Eq. (37)
+    )
+    notes = *found.notes, *problem.remarks, weak_noise_note(problem, found.p, found.value)
+    return Moments(
+        columns,
+        found.root,
+        (*(Failure(p, reason) for p, reason in refused.items()), *found.failures),
+        tuple(found.warnings),
+        tuple(note for note in notes if note is not None),
+    )
+
+
+def _refused(problem: Problem, p: Sequence[float]) -> dict[float, Message]:
+    """The p of a set of a sweep of which there is no Λ(p), as for other sets, and why."""
+    found = dict[float, Message]()
+    for each in p:
+        try:
+            refuse_infinite(problem, each)
+        except NoSuchExponent as failure:
+            found[each] = failure.message
+    return found
+
+
+def unfinished(problem: Problem, begun: Mapping[float, Moment]) -> Moments:
+    """What is known while other p are being solved."""
+    p = np.array(sorted(begun))
+    rows = np.array([begun[each] for each in p.tolist()]).reshape(-1, len(Moment._fields))
+    value, slope, slope_error, error, residual = np.where(np.isinf(rows), np.nan, rows).T
+    return Moments(MomentColumns(p, value, slope, error, slope_error, residual, perturbed_moments(problem, p)))
+
+
+def begun_of(found: Moments) -> dict[float, Moment]:
+    """The inverse of `unfinished`."""
+    columns = found.columns
+    names = "value", "derivative", "derivative_error", "error_estimate", "residual"
+    rows = zip(*(getattr(columns, name).tolist() for name in names), strict=True)
+    return {p: Moment(*row) for p, row in zip(columns.p.tolist(), rows, strict=True)}
+
+
+def _is_whole(found: Moments, curve: Curve, settings: Settings) -> bool:
+    """Whether the numbers are of the p that were asked for, each found or failed, and can be written."""
+    columns, asked = vars(found.columns), set(settings["p"])
+    p, failed = found.columns.p.tolist(), {failure.p for failure in found.failures}
+    return (
+        found.columns.p.ndim == 1
+        and all(each.shape == found.columns.p.shape for each in columns.values())
+        and not any(np.isinf(each).any() for each in columns.values())
+        and bool(np.isfinite(found.columns.value).all())
+        and len(set(p)) == len(p)
+        and {*p} <= asked <= (asked if None in failed else {*p, *failed})
+    )
+
+
+def _said(found: Moments, curve: Curve, numerics: Numerics) -> Iterator[Message]:
+    yield from found.warnings
+    yield from found.notes
+
+
+def _columns(case: Case) -> Sequence[Quantity]:
+    return tuple(OVER_P.values()) if MOMENT.name in case.asked else ()
+
+
+def _row(case: Case, result: CurveResult) -> Row:
+    return {"p": result.moments.p} | {each.name: getattr(result.moments, name) for name, each in OVER_P.items()}
+
+
+PART: Part = Part("moments", _settings, _solve, Moments, said=_said, is_whole=_is_whole, columns=_columns, row=_row)
+
+
+def _solve_classes(job: Job, settings: Settings) -> tuple[InvariantClass, ...]:
+    return job.solver.by_class(job.found(PART.name).columns.p) if PART.name in job.entries else ()
+
+
+def _said_of_classes(classes: Sequence[InvariantClass], curve: Curve, numerics: Numerics) -> Iterator[Message]:
+    """That there are such classes, and their λ."""
+    if len(classes) < 2:
+        return
+    problem, rates = curve.problem, [each.lyapunov_exponent.value for each in classes]
+    if classes[0].phase is None:
+        is_hidden = not set(classes[0].variables) <= set(problem.system.states)
+        yield Message(Code.BLOCKS, blocks=problem.block_names, is_hidden=is_hidden, rates=rates)
+    else:
+        along, across = rates
+        yield Message(Code.INVARIANT_CLASSES, phase=classes[0].phase, along=along, across=across)
+
+
+def _classes_are_whole(classes: Sequence[InvariantClass], curve: Curve, settings: Settings) -> bool:
+    """Whether all numbers are finite, each class with all p."""
+    return all(
+        each.p.shape == each.value.shape == each.error_estimate.shape
+        and set(each.p.tolist()) <= set(settings["p"])
+        and all(bool(np.isfinite(column).all()) for column in (each.value, each.error_estimate))
+        and all(
+            map(math.isfinite, (each.phase or 0.0, each.lyapunov_exponent.value, each.lyapunov_exponent.error_estimate))
+        )
+        for each in classes
+    )
+
+
+def _content_of_classes(case: Case, result: CurveResult) -> Mapping[str, Any]:
+    if not result.classes:
+        return {}
+    found = [
+        {
+            "name": each.name,
+            **pair(LYAPUNOV_EXPONENT.name, each.lyapunov_exponent),
+            "moments": [
+                {"p": p, "moment": value, "moment_error": error}
+                for p, value, error in zip(
+                    each.p.tolist(), each.value.tolist(), each.error_estimate.tolist(), strict=True
+                )
+            ],
+        }
+        for each in result.classes
+    ]
+    return {"classes": found}
+
+
+CLASSES: Part = Part(
+    "classes",
+    _settings,
+    _solve_classes,
+    tuple[InvariantClass, ...],
+    said=_said_of_classes,
+    content=_content_of_classes,
+    is_whole=_classes_are_whole,
+    is_silent=True,
+)
+"""λ and Λ(p) of blocks of variables, or on a ray that the phase never leaves and across it."""

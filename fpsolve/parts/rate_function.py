@@ -1,0 +1,32 @@
+"""I(s) = ps − Λ(p) at s = Λ′(p), which follows from Λ(p)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from fpsolve.data import Quantity
+from fpsolve.model.quantity import MOMENT, RATE_FUNCTION
+from fpsolve.parts.part import Part, Settings
+from fpsolve.results.table import Row
+
+if TYPE_CHECKING:
+    from fpsolve.case.case import Case
+    from fpsolve.study.results import CurveResult
+
+
+def _settings(case: Case, number: int) -> Settings | None:
+    return {} if {MOMENT.name, RATE_FUNCTION.name} <= {*case.asked} else None
+
+
+def _columns(case: Case) -> Sequence[Quantity]:
+    about = replace(RATE_FUNCTION, dims=MOMENT.dims, comment="at s = Λ′(p); its error is moment_error")
+    return () if _settings(case, 1) is None else (about,)
+
+
+def _row(case: Case, result: CurveResult) -> Row:
+    return {RATE_FUNCTION.name: result.moments.rate_function}
+
+
+PART: Part = Part(RATE_FUNCTION.name, _settings, columns=_columns, row=_row)

@@ -1,0 +1,79 @@
+"""How the numbers of a curve change with every parameter."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fpsolve.analysis.sensitivity import DIFFERENTIATED, Sensitivities, Slopes, solve_sensitivities
+from fpsolve.exponent.error import MEANINGLESS, Estimate
+from fpsolve.messages import Message
+from fpsolve.model.quantity import MOMENT
+from fpsolve.parts.indices import is_estimate
+from fpsolve.parts.part import Job, Numerics, Part, Settings
+
+if TYPE_CHECKING:
+    from fpsolve.case.case import Case, Curve
+    from fpsolve.study.results import CurveResult
+
+NAME = "sensitivities"
+
+
+def _settings(case: Case, number: int) -> Settings | None:
+    """At which p, and of which indices; intervals follow from them, too."""
+    if NAME not in case.asked and not case.uncertain:
+        return None
+    p = case.differentiated.tolist() if MOMENT.name in case.asked else []
+    return {"p": p, "indices": [name for name in DIFFERENTIATED if name in case.asked]}
+
+
+def _solve(job: Job, settings: Settings) -> Sensitivities:
+    solved = job.found("moments").columns.p
+    p = np.array([p for p in settings["p"] if np.any(solved == p)])
+    names = [name for name in settings["indices"] if job.found(name) is not None]
+    return solve_sensitivities(job.solver, p, job.curve.problem.derivatives(), indices=names, root=job.root)
+
+
+def _said(found: Sensitivities, curve: Curve, numerics: Numerics) -> Iterable[Message]:
+    return found.notes
+
+
+def _content(case: Case, result: CurveResult) -> Mapping[str, Any]:
+    """∂/∂θ by the key of θ, null where its error leaves it no meaning, and the estimates of these errors alike."""
+    if NAME not in case.asked:
+        return {}
+    if (found := result.sensitivities) is None:
+        return {NAME: None}
+    known = found
+
+    def numbers(of: Callable[[Estimate], float]) -> dict[str, Any]:
+        def row(slopes: Slopes) -> dict[str, float | None]:
+            return {key: of(each) if each.relative_error <= MEANINGLESS else None for key, each in slopes.items()}
+
+        moments = zip(known.p.tolist(), known.moments, strict=True)
+        indices = {name: row(known.indices[name]) if name in known.indices else None for name in DIFFERENTIATED}
+        return {"moments": [{"p": p, **row(slopes)} for p, slopes in moments], **indices}
+
+    errors = numbers(lambda each: each.error_estimate)
+    return {NAME: {**numbers(lambda each: each.value), "errors": errors}}
+
+
+def _is_whole(found: Sensitivities, curve: Curve, settings: Settings) -> bool:
+    """Whether the derivatives are of p that were asked for, by parameters of the curve."""
+    keys, rows = found.theta.keys(), [*found.moments, *found.indices.values()]
+    return (
+        found.p.shape == (len(found.moments),)
+        and set(found.p.tolist()) <= set(settings["p"])
+        and keys == found.quantities.keys()
+        and keys <= curve.parameters.keys()
+        and all(row.keys() <= keys for row in rows)
+        and found.indices.keys() <= {*settings["indices"]}
+        and all(map(math.isfinite, found.theta.values()))
+        and all(is_estimate(each) for row in rows for each in row.values())
+    )
+
+
+PART: Part = Part(NAME, _settings, _solve, Sensitivities, NAME, said=_said, content=_content, is_whole=_is_whole)
