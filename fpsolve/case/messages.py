@@ -13,13 +13,20 @@ from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails, InitErrorDetails, PydanticCustomError
 
 from fpsolve.messages import is_control
-from fpsolve.model.faults import accepted, choices, fields_of, written_path
+from fpsolve.model.faults import accepted, choices, entry_of, fields_of, written_path
 from fpsolve.model.parameters import example_of, meaning_of, parameter
 
 _OWN, _RANGE = "own sentence", "range"
 LIST = "<list>"
+"""Tag of a list, in a union that is told apart by what TOML has there."""
 TABLE = "<table>"
-"""Tags of a discriminated union: parts of pydantic's error locations that are no keys."""
+"""Tag of a table."""
+WORD = "<word>"
+"""Tag of a text."""
+NUMBER = "<number>"
+"""Tag of a number."""
+TAGS = (LIST, TABLE, WORD, NUMBER)
+"""Parts of pydantic's error locations that are no keys."""
 DEPENDENT = "cannot be judged, as the kinds of the system and the noise are not known; correct these"
 """Of a section; which kinds are wrong is another fault."""
 _UNKNOWN = ("extra_forbidden", "unexpected_keyword_argument")
@@ -142,7 +149,7 @@ def explain(
         fields: of that model.
         varied: the ranges of the values of [vary].
     """
-    faults = [(tuple(part for part in each["loc"] if part not in (LIST, TABLE)), each) for each in faults_in(error)]
+    faults = [(tuple(part for part in each["loc"] if part not in TAGS), each) for each in faults_in(error)]
     misspelt = set[Path]()
     for path, detail in faults:
         if detail["type"] in _UNKNOWN and (guess := _guess(str(path[-1]), _known_keys(path, fields))):
@@ -174,6 +181,8 @@ def _sentence(
         return f"unknown key;{nearest(str(path[-1]), known)} known keys: {beside}; rename or remove it"
     is_varied = path[0] == "vary" and len(path) > 1
     field = varied.get(str(path[1]), UNBOUNDED) if is_varied else _beside(path, fields)[1]
+    if type(path[-1]) is int and not is_varied:
+        field = entry_of(field)
     must, example = f"must be {accepted(field)} ({meaning_of(field)})", example_of(field)
     if is_varied:
         example = example_of(fields["vary"])
@@ -181,9 +190,15 @@ def _sentence(
     if kind == "missing":
         return f"missing; {must}; add it, for example {example}"
     is_number = kind == _RANGE and type(value) in (int, float)  # of the right type, and out of range
-    has_kind = kind.endswith((_RANGE, "_type", "_not_found", "_instance_of")) and not is_number
+    has_kind = kind.endswith((_RANGE, "_type", "_not_found", "_tag_invalid", "_instance_of")) and not is_number
+    has_kind |= kind == "literal_error" and type(value) is not str
     got = shown_with_kind(value) if has_kind else shown(value)
-    return f"got {got}; {must};{nearest(value, choices(field.annotation))} write, for example, {example}"
+    return f"got {got}; {must};{nearest(value, _texts(field.annotation))} write, for example, {example}"
+
+
+def _texts(annotation: Any) -> list[str]:
+    """The texts in an annotation such as `DrawnName | MomentAt`."""
+    return choices(annotation) or [text for each in get_args(annotation) for text in _texts(each)]
 
 
 def _beside(path: Path, fields: Mapping[str, FieldInfo]) -> tuple[Mapping[str, FieldInfo], FieldInfo]:

@@ -9,10 +9,10 @@ import math
 import re
 import sys
 from bisect import bisect_left
-from collections.abc import Container, Mapping, Sequence
+from collections.abc import Container, Mapping
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self, get_args
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import (
@@ -28,12 +28,22 @@ from pydantic import (
     model_validator,
 )
 
-from fpsolve.analysis.excursions import STATIONARY, UNIFORM
+from fpsolve.analysis.excursions import STATIONARY
 from fpsolve.analysis.inverse import MOST_PARAMETERS
 from fpsolve.analysis.target import start_and_stop, target_of
 from fpsolve.analysis.zero import Axis, Zero, zero_of
 from fpsolve.arrays import FloatArray
-from fpsolve.case.messages import LIST, TABLE, Refusal, is_list, nearest, quoted, refuse, shown, shown_with_kind
+from fpsolve.case.messages import (
+    LIST,
+    NUMBER,
+    TABLE,
+    WORD,
+    Refusal,
+    is_list,
+    refuse,
+    shown,
+    shown_with_kind,
+)
 from fpsolve.errors import MeshError
 from fpsolve.exponent.quantities import MOMENT, QUANTITIES, DrawnName, QuantityName
 from fpsolve.fem.mesh import MAX_CELLS, MAX_DEGREE, CylinderMesh, make_mesh, read_mesh, vertices_at
@@ -192,7 +202,14 @@ class Sweep(Section):
 
 RANGE = frozenset(Sweep.__pydantic_fields__)
 """The keys that tell a range from a section."""
-_TAGS: Mapping[type, str] = {list: LIST, tuple: LIST, dict: TABLE, Sweep: TABLE}
+_TAGS: Mapping[type, str] = {list: LIST, tuple: LIST, dict: TABLE, str: WORD, int: NUMBER, float: NUMBER}
+BY_KIND = Discriminator(lambda value: _TAGS.get(type(value), TABLE if isinstance(value, Section) else None))
+"""How a union is told apart: by what TOML has there."""
+Names: Any = Annotated[
+    tuple[Literal[*QUANTITY_NAMES], ...],  # type: ignore[valid-type]
+    Field(strict=False, min_length=1),
+    AfterValidator(lambda names: _distinct(names)),
+]
 
 
 class Moments(Section):
@@ -200,7 +217,7 @@ class Moments(Section):
 
     p: Annotated[
         Annotated[NonEmpty, Tag(LIST)] | Annotated[Sweep, Tag(TABLE)],
-        Discriminator(lambda value: _TAGS.get(type(value))),
+        BY_KIND,
         parameter(
             "orders of the moments",
             "p = [1.0, 2.0] or p = { start = -2.0, stop = 6.0, num = 33 }",
@@ -294,46 +311,18 @@ class MonteCarloSection(Section):
     p: Annotated[NonEmpty | None, parameter("orders of the moments that are simulated", "p = [1.0, 2.0]")] = None
 
 
-def _names(
-    known: Sequence[str], must: str, unknown: str, *, may_be_empty: bool = False, word: str = ""
-) -> BeforeValidator:
-    """Takes a list of some names, each at most once, or a word for all of them; both texts follow what was got."""
-
-    def checked(names: Any) -> Any:
-        if word and names in (word, None):
-            return names
-        if not is_list(names) or not (names or may_be_empty):
-            raise ValueError(f"got {shown_with_kind(names)}; {must}")
-        wrong = list[Refusal]()
-        for i, name in enumerate(names):
-            if name not in known:
-                text = f"got {shown_with_kind(name)};{unknown.format(guess=nearest(name, known))} rename or remove it"
-                wrong.append(((i,), name, text))
-            elif name in names[:i]:
-                wrong.append(((i,), name, f"got {shown(name)} twice; names must be distinct; remove one"))
-        refuse(wrong)
-        return tuple(names)
-
-    stated: Any = Annotated[tuple[Literal[*known], ...], Field(min_length=0 if may_be_empty else 1)]  # type: ignore[valid-type]
-    return BeforeValidator(checked, json_schema_input_type=stated | Literal[word] if word else stated)
+def _distinct(values: tuple[Any, ...]) -> tuple[Any, ...]:
+    """A list without entries that stand twice."""
+    first = dict[Any, int]()
+    twice = [(i, each) for i, each in enumerate(values) if first.setdefault(each, i) != i]
+    refuse(((i,), each, f"got {shown(each)} twice; values must be distinct; remove one") for i, each in twice)
+    return values
 
 
 class MomentAt(Section):
     """{ moment = p }: Λ at one p."""
 
     moment: Annotated[float, parameter("order of the moment", "moment = 2.0")]
-
-
-def _ordinate(value: Any) -> Any:
-    names = get_args(DrawnName)
-    if isinstance(value, MomentAt) or value in names:
-        return value
-    if table_of(value).keys() == {"moment"} and is_number(value["moment"]):
-        return MomentAt(moment=float(value["moment"]))
-    raise ValueError(
-        f"got {shown_with_kind(value, but=str)}; must be one of {quoted(names)}, or {{ moment = p }} with a finite "
-        f"p;{nearest(value, names)} write, for example, y = {{ moment = 2.0 }}"
-    )
 
 
 def _limits(value: Any) -> tuple[float, float]:
@@ -356,14 +345,17 @@ def _time_unit(value: Any) -> Any:
 
 Limits = Annotated[tuple[float, float], BeforeValidator(_limits)]
 UnitName = Annotated[str, Field(min_length=1, max_length=12)]
-_MARKS = quoted(get_args(MarkedName))
 
 
 class FigureSection(Section):
     """[figure]: the axes, what is marked, and how it is set; x is "p" or a varied key."""
 
     x: Annotated[Text, parameter("the abscissa", 'x = "p"')] = "p"
-    y: Annotated[DrawnName | MomentAt, BeforeValidator(_ordinate), parameter("the ordinate", 'y = "moment"')] = "moment"
+    y: Annotated[
+        Annotated[DrawnName, Tag(WORD)] | Annotated[MomentAt, Tag(TABLE)],
+        BY_KIND,
+        parameter("the ordinate", "y = { moment = 2.0 }"),
+    ] = "moment"
     map: Annotated[bool | None, parameter("whether the figure is a map in colours over two keys", "map = true")] = None
     title: Annotated[Text | None, parameter("the title instead of that of the case", 'title = "Stability"')] = None
     width: Annotated[
@@ -373,13 +365,8 @@ class FigureSection(Section):
     ylim: Annotated[Limits | None, parameter("ends of the ordinate", "ylim = [-0.1, 0.1]")] = None
     mark: Annotated[
         tuple[MarkedName, ...],
-        _names(
-            get_args(MarkedName),
-            f"must be a list of some of {_MARKS}; write, for example, [{_MARKS}]",
-            f" must be one of {_MARKS};{{guess}}",
-            may_be_empty=True,
-        ),
-        parameter("what is marked", 'mark = ["stability_index"]'),
+        parameter("what is marked", 'mark = ["stability_index"]', strict=False),
+        AfterValidator(_distinct),
     ] = ("stability_index",)
 
     @property
@@ -430,13 +417,7 @@ class OutputSection(Section):
     """[output]: what is computed, the p whose eigenfunctions are written, and what is drawn."""
 
     quantities: Annotated[
-        tuple[str, ...] | Literal["all"] | None,
-        _names(
-            QUANTITY_NAMES,
-            f'must be "{EVERYTHING}", or a non-empty list of some of {quoted(QUANTITY_NAMES)}; name one',
-            f"{{guess}} known names: {quoted(QUANTITY_NAMES)};",
-            word=EVERYTHING,
-        ),
+        Annotated[Annotated[Names, Tag(LIST)] | Annotated[Literal["all"], Tag(WORD)], BY_KIND] | None,
         parameter("what is computed", 'quantities = ["lyapunov_exponent", "stability_index"]'),
     ] = None
     eigenfunctions: Annotated[
@@ -447,6 +428,7 @@ class OutputSection(Section):
             strict=False,
             max_length=MAX_MOMENTS,
         ),
+        AfterValidator(lambda values: values and _distinct(values)),
     ] = None
     figure: Annotated[bool, parameter("whether the figure is drawn", "figure = false")] = True
     sensitivities: Annotated[bool, parameter("whether sensitivities are drawn", "sensitivities = true")] = False
@@ -472,12 +454,7 @@ class OutputSection(Section):
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
-        wanted, wrong = self.eigenfunctions or (), list[Refusal]()
-        first = {p: i for i, p in reversed(list(enumerate(wanted)))}
-        for i, p in enumerate(wanted):
-            if first[p] != i:
-                text = f"got {p} twice; values must be distinct; remove one"
-                wrong.append((("eigenfunctions", i), p, text))
+        wrong = list[Refusal]()
         for name, value, instead in (
             ("sensitivities", self.sensitivities, "false"),
             ("eigenfunctions", self.eigenfunctions, "eigenfunctions = []"),
@@ -493,42 +470,27 @@ class OutputSection(Section):
         return self
 
 
-def _start(word: str, remedy: str) -> BeforeValidator:
-    """Takes a number or a word."""
-
-    def checked(value: Any) -> Any:
-        if value == word or is_number(value):
-            return value if value == word else float(value)
-        raise ValueError(f"got {shown_with_kind(value)}; must be a finite number or {shown(word)}; write {remedy}")
-
-    return BeforeValidator(checked)
-
-
-def _levels(value: Any) -> Any:
-    if is_list(value) and 0 < len(value) <= MOST_LEVELS and all(map(is_number, value)) and min(value) > 1:
-        return value
-    raise ValueError(
-        f"got {shown_with_kind(value)}; must be a list of 1 to {MOST_LEVELS} numbers above 1, as the start has the "
-        "length 1; write, for example, levels = [2.0, 10.0]"
-    )
-
-
 class ExcursionSection(Section):
     """[excursions]: how far ‖x‖ may rise above its start, and what that start is."""
 
     levels: Annotated[
-        Values,
-        BeforeValidator(_levels),
-        parameter("A of P(sup ‖x‖ ≥ A)", "levels = [2.0, 10.0, 100.0]", strict=False),
+        tuple[Annotated[float, Field(gt=1)], ...],
+        parameter(
+            "A of P(sup ‖x‖ ≥ A), where the start has the length 1",
+            "levels = [2.0, 10.0, 100.0]",
+            strict=False,
+            min_length=1,
+            max_length=MOST_LEVELS,
+        ),
     ] = (2.0, 10.0, 100.0)
     phi: Annotated[
-        float | Literal["uniform"],
-        _start(UNIFORM, 'phi = 0.0, which displaces the first variable, or phi = "uniform"'),
+        Annotated[float, Tag(NUMBER)] | Annotated[Literal["uniform"], Tag(WORD)],
+        BY_KIND,
         parameter("phase of the start x = (cos φ, −sin φ), in radians", "phi = 0.0"),
     ] = 0.0
     xi: Annotated[
-        float | Literal["stationary"],
-        _start(STATIONARY, 'xi = "stationary", or the value of the noise at the start'),
+        Annotated[float, Tag(NUMBER)] | Annotated[Literal["stationary"], Tag(WORD)],
+        BY_KIND,
         parameter("the noise at the start", 'xi = "stationary"'),
     ] = STATIONARY
 

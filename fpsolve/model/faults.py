@@ -107,7 +107,7 @@ def accepted(field: FieldInfo) -> str:
         for name, sign in _BOUNDS.items()
         if hasattr(constraint, name)
     )
-    return f"a {_not_empty(field.metadata)}{_noun(field.annotation)} {' and '.join(bounds)}".rstrip()
+    return f"{_with_article(_not_empty(field.metadata) + _noun(field.annotation))} {' and '.join(bounds)}".rstrip()
 
 
 def _not_empty(metadata: Iterable[Any]) -> str:
@@ -119,6 +119,18 @@ def _number(bound: float) -> str:
     fraction = Fraction(bound).limit_denominator(99)
     is_simple = fraction.denominator > 1 and math.isclose(fraction, bound, rel_tol=1e-15)
     return str(fraction) if is_simple or isinstance(bound, int) else re.sub(r"e\+?(-?)0*", r"e\1", f"{bound:g}")
+
+
+def entry_of(field: FieldInfo) -> FieldInfo:
+    """The field of an entry of a list, with the words of the list; of what is none the field itself."""
+    inner: list[Any] = [field.annotation]
+    for kind in inner:
+        if get_origin(kind) is tuple:
+            entry = FieldInfo.from_annotation(get_args(kind)[0])
+            entry.description, entry.examples = field.description, field.examples
+            return entry
+        inner += get_args(kind)
+    return field
 
 
 def choices(annotation: Any) -> list[str]:
@@ -147,6 +159,10 @@ def written_path(path: Iterable[str | int]) -> str:
     return text
 
 
+def _with_article(noun: str) -> str:
+    return noun if noun.startswith(('"', "one of")) else f"a {noun}"
+
+
 def _noun(annotation: Any, plural: str = "") -> str:
     """An annotation in words: tuple[float, ...] as "list of finite numbers"."""
     if fields := fields_of(annotation):
@@ -156,7 +172,11 @@ def _noun(annotation: Any, plural: str = "") -> str:
         inner = chain.from_iterable(getattr(extra, "metadata", ()) for extra in arguments[1:])
         return _not_empty(inner) + _noun(arguments[0], plural)
     if origin in (Union, UnionType):
-        return " or a ".join(_noun(argument, plural) for argument in arguments if argument is not NoneType)
+        first, *others = (_noun(argument, plural) for argument in arguments if argument is not NoneType)
+        return " or ".join([first, *map(_with_article, others)])
+    if texts := choices(annotation):
+        names = ", ".join(f'"{text}"' for text in texts)
+        return f"{'some' if plural else 'one'} of {names}" if len(texts) > 1 else names
     if origin is tuple:
         return f"list{plural} of {_noun(arguments[0], 's')}"
     if origin is dict:

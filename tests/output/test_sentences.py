@@ -126,7 +126,7 @@ def test_bounds_are_rounded_outwards():
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        (["excursions.levels=[1.0]"], "numbers above 1"),
+        (["excursions.levels=[1.0]"], "must be a finite number > 1 "),
         (["excursions.phi='first'"], 'must be a finite number or "uniform"'),
         (["excursions.xi=0.7"], "must be one of the states, -0.8, 0.8"),
         (["excursions.xi=0.8", "vary={'noise.a'=[0.8, 0.7]}"], "with noise.a = 0.7: got xi = 0.8; must be one of"),
