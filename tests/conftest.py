@@ -95,27 +95,41 @@ LONGEST = (
     "simulation/test_spaces.py",
     "test_sweeps.py",
     "analysis/test_growth.py",
-    "test_budget.py",
-    "nonlinear/test_response.py",
     "test_docs.py",
-    "study/test_systems.py",
-    "output/test_many_curves.py",
-    "exponent/test_heavy_tails.py",
+    "nonlinear/test_response.py",
     "exponent/test_slopes.py",
-    "analysis/test_stability.py",
-    "exponent/test_blocks.py",
-    "study/test_figures.py",
-    "study/test_uncertain.py",
-    "test_cli.py",
+    "test_budget.py",
     "nonlinear/test_cubic.py",
-    "proofs/test_excursions.py",
     "exponent/test_solver.py",
+    "output/test_many_curves.py",
+    "study/test_uncertain.py",
+    "proofs/test_excursions.py",
     "study/test_chart.py",
-    "analysis/test_continuation.py",
-    "simulation/test_random_simulations.py",
-    "simulation/test_estimators.py",
+    "exponent/test_blocks.py",
+    "test_kills.py",
     "test_data.py",
+    "test_cli.py",
+    "study/test_figures.py",
     "test_workflow.py",
+    "analysis/test_stability.py",
+    "simulation/test_random_simulations.py",
+    "test_notebook.py",
+    "study/test_simulate.py",
+    "analysis/test_continuation.py",
+    "simulation/test_several_noises.py",
+    "proofs/test_claims.py",
+    "proofs/test_certificate_checker.py",
+    "output/test_show.py",
+    "output/test_report.py",
+    "model/test_filter.py",
+    "output/test_terminal.py",
+    "proofs/test_command.py",
+    "study/test_systems.py",
+    "exponent/test_no_noise.py",
+    "simulation/test_cubic_motion.py",
+    "case/test_refusals.py",
+    "simulation/test_estimators.py",
+    "exponent/test_heavy_tails.py",
 )
 """Files that begin first, so that no processor is left with a long one while the others have nothing to do."""
 
@@ -130,6 +144,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 def pytest_collection_finish() -> None:
     gc.freeze()
+    gc.set_threshold(20_000)  # objects more than before, not 700: looking for cycles takes a third of the time
     gc.enable()
 
 

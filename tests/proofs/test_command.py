@@ -4,6 +4,7 @@ import json
 import math
 import os
 import re
+import shutil
 import signal
 import sys
 import time
@@ -26,6 +27,7 @@ from fpsolve.study import prove as study
 from fpsolve.study.prove import CurveProof, Plan
 from fpsolve.workflow.proofs import check_proof, prove_case
 from tests.conftest import sampled, started
+from tests.kit import case_in
 from tests.oracles import fourier_hermite
 from tests.proofs.case import CASE
 
@@ -286,23 +288,38 @@ def forged(record):
     record["enclosure"]["upper"] -= 1e-3
 
 
-@pytest.mark.parametrize("change", [None, forged, lambda record: record.clear()])
-def test_an_interrupted_run_goes_on_with_the_bounds_that_follow(case, tmp_path, monkeypatch, change):
-    """What is proven is not proven again, but verified; δ_p and what was forged are."""
-    sets = ["moments.p=[0.0, 1.0, 2.0]", "output={ quantities = ['moment', 'lyapunov_exponent'] }", "figure.mark=[]"]
-    loaded, asked = load_case(case, sets), []
+def noting(asked, most=None):
+    """`prove_bounds` that notes each p it is asked for, up to so many: then comes an interrupt."""
     prove_one = study.prove_bounds
 
-    def interrupted(problem, stated, p, width, *, budget):
-        if len(asked) == 2:
+    def prove_bounds(problem, stated, p, width, *, budget):
+        if len(asked) == most:
             raise KeyboardInterrupt
         asked.append(p)
         return prove_one(problem, stated, p, width, budget=budget)
 
-    interrupted.__name__ = "prove_bounds"
-    monkeypatch.setattr(study, "prove_bounds", interrupted)
-    with pytest.raises(KeyboardInterrupt, match="run it again to go on"):
-        prove_case(loaded, tmp_path, width=1e-2)
+    return prove_bounds
+
+
+@pytest.fixture(scope="module")
+def interrupted(tmp_path_factory):
+    """A folder with a case whose run was interrupted after two bounds, and the case."""
+    folder, asked = tmp_path_factory.mktemp("interrupted"), []
+    sets = ["moments.p=[0.0, 1.0, 2.0]", "output={ quantities = ['moment', 'lyapunov_exponent'] }", "figure.mark=[]"]
+    case = case_in(folder, MOMENTS, sets, "proven")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(study, "prove_bounds", noting(asked, 2))
+        with pytest.raises(KeyboardInterrupt, match="run it again to go on"):
+            prove_case(case, folder, width=1e-2)
+    assert asked == ["0.0", "1.0"]
+    return folder, case
+
+
+@pytest.mark.parametrize("change", [None, forged, lambda record: record.clear()])
+def test_an_interrupted_run_goes_on_with_the_bounds_that_follow(interrupted, tmp_path, monkeypatch, change):
+    """What is proven is not proven again, but verified; δ_p and what was forged are."""
+    (folder, case), asked = interrupted, []
+    shutil.copytree(folder / "proven", tmp_path / "proven")
     if change is not None:
         [path] = (tmp_path / "proven/records/proven").glob("*.jsonl")
         records = Records(path.parent).look()
@@ -310,11 +327,8 @@ def test_an_interrupted_run_goes_on_with_the_bounds_that_follow(case, tmp_path, 
         for key, record in places:
             change(record)
             append(path.parent, key, record)
-    first, asked[:] = asked.copy(), []
-    monkeypatch.setattr(study, "prove_bounds", lambda *args, **more: asked.append(args[2]) or prove_one(*args, **more))
-    study.prove_bounds.__name__ = "prove_bounds"
-    [proof] = prove_case(loaded, tmp_path, width=1e-2)
-    assert first == ["0.0", "1.0"]
+    monkeypatch.setattr(study, "prove_bounds", noting(asked))
+    [proof] = prove_case(case, tmp_path, width=1e-2)
     assert asked == (["2.0", None] if change is None else ["0.0", "1.0", "2.0", None])
     assert all(found.is_proven for _, found in proof.moments)
     assert proof.exponent.is_proven
