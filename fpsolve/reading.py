@@ -49,8 +49,12 @@ def read_bytes(path: Path, words: Words) -> bytes:
         raise Unreadable(f"cannot be read ({reason}); check its name and permissions") from None
 
 
-def read_text(path: Path, words: Words) -> str:
-    """The text of a file in UTF-8, without a byte order mark where it may have one. Raises Unreadable."""
+def read_text(path: Path, words: Words, *, may_be_latin: bool = False) -> str:
+    """The text of a file in UTF-8, or Latin-1 if it may be, without a byte order mark where it may have one.
+
+    Raises:
+        Unreadable: it is none.
+    """
     content = read_bytes(path, words)
     if content.startswith(BOM_UTF8) and not words.may_have_mark:
         raise Unreadable('starts with a byte order mark; save it as "UTF-8", not "UTF-8 with BOM"', 1)
@@ -60,6 +64,8 @@ def read_text(path: Path, words: Words) -> str:
     try:
         text = content.decode()
     except UnicodeDecodeError as error:
+        if may_be_latin:
+            return content.decode("latin-1")
         line = content.count(b"\n", 0, error.start) + 1
         raise Unreadable(f"is not UTF-8 text: byte 0x{content[error.start]:02x}; save it as UTF-8", line) from None
     if not text.strip():

@@ -46,6 +46,14 @@ FADING = 0.1
 """The share of a whole record that fades, by halves at its ends."""
 LAGS = 3
 """How many steps apart segments count as correlated."""
+PERIODS = 8
+"""Of the lowest frequency that matters in each segment of a record, so that a segment resolves it to an eighth."""
+MOST_SEGMENT = 0.4
+"""Share of a record that a segment has at most, so that there are four that overlap by half."""
+LEAST_SAMPLES = 16
+"""In a segment."""
+MOST_STEPS, MORE_STEPS = 100, 2000
+"""Evaluations of a search, and of one that goes on where this did not suffice."""
 MISFIT, UNSURE_MISFIT = 3.0, 2.0
 """Standard errors by which a fit may be off where it matters before that is said; fewer where they count it."""
 
@@ -193,6 +201,7 @@ def fit_noise(
     noise_in: Where = "stiffness",
     terms: int = 1,
     method: Literal["spectrum", "whittle"] = "spectrum",
+    segment: float | None = None,
 ) -> NoiseFit:
     """The noise of a kind whose spectral density is nearest to a measured one, most of all where it matters.
 
@@ -204,7 +213,10 @@ def fit_noise(
         noise_in: "stiffness", for which S(2ω) counts, or "damping", for which S(0) counts as well; of two modes
             S(2ω₁), S(2ω₂), S(ω₁ ± ω₂).
         terms: 1 to 3, how many independent noises of the kind ξ is the sum of. A `Problem` takes two of them at most.
-        method: of a record "spectrum", Welch's estimate, or "whittle", the periodogram of the whole record.
+        method: of a record "spectrum", Welch's estimate, or "whittle", the periodogram of the whole record. One too
+            short for four segments that resolve the frequencies is fitted by its periodogram, which a note says.
+        segment: of a record the time of a segment; None for the shortest that resolves the frequencies, or a
+            thirty-second of the record if that is longer.
 
     Raises:
         ValueError: an argument is none of these, or nothing was measured near a frequency that matters.
@@ -216,22 +228,53 @@ def fit_noise(
         raise ValueError(f"got terms = {shown(terms)}; must be a whole number from 1 to {MOST_TERMS}")
     if method not in ("spectrum", "whittle"):
         raise ValueError(f"got method = {shown(method)}; must be spectrum or whittle")
+    notes: tuple[Message, ...] = ()
     if isinstance(data, Spectrum):
         spectrum, used, method = data, _of_spectrum(data), "spectrum"
     elif isinstance(data, Record):
-        spectrum = data.spectrum()
-        used = _of_record(data, whole=method == "whittle")
+        length, notes = _segment(data, segment, matter)
+        method = method if length else "whittle"
+        spectrum = data.spectrum(length or data.values.size // 2)
+        used = _of_record(data, length if method == "spectrum" else data.values.size)
     else:
         raise TypeError(f"got {shown(data)}; must be a Spectrum or a Record")
     _refuse_far(spectrum, matter)
     weights = _weights(used.omega, [*matter.values()], 2 * frequency)
     fits = [_fitted(used, [family] * terms, weights) for family in KINDS[kind]]
     # more parameters must lower the deviance by ln n each, as in Bayes' criterion
-    families, theta, _ = min(
+    families, theta, _, is_stopped = min(
         zip([[family] * terms for family in KINDS[kind]], *zip(*fits, strict=True), strict=True),
         key=lambda each: each[2] + len(each[1]) * math.log(len(used.values)),
     )
-    return _told(used, families, theta, weights, matter, spectrum, method)
+    found = _told(used, families, theta, weights, matter, spectrum, method)
+    stopped = (Message(Code.FIT_STOPPED, steps=MORE_STEPS),) if is_stopped else ()
+    return replace(found, messages=(*notes, *stopped, *found.messages))
+
+
+def _segment(record: Record, stated: float | None, matter: Mapping[str, float]) -> tuple[int, tuple[Message, ...]]:
+    """Samples of a segment; 0 where four of them do not resolve the lowest frequency that matters, with a note.
+
+    Raises:
+        ValueError: the record has too few periods of it, or the stated time is none of a segment.
+    """
+    n, lowest = record.values.size, min(each for each in matter.values() if each > 0)
+    periods = lowest * record.duration / (2 * math.pi)
+    if stated is not None:
+        if not LEAST_SAMPLES * record.step <= stated <= MOST_SEGMENT * record.duration:
+            low, high = LEAST_SAMPLES * record.step, MOST_SEGMENT * record.duration
+            raise ValueError(
+                f"got segment = {stated:g}; must be from {low:.4g} to {high:.4g}, in the unit of its times"
+            )
+        return int(stated / record.step), ()
+    if periods < PERIODS:
+        raise ValueError(
+            f"the record has {periods:.3g} periods of the frequency {lowest:.4g} rad/time, and must have {PERIODS}; "
+            "record for longer, or correct the natural frequency, its unit, or --rate"
+        )
+    needed = math.ceil(PERIODS / periods * n)
+    if needed > MOST_SEGMENT * n:
+        return 0, (Message(Code.WHOLE_RECORD, periods=periods, needed=PERIODS),)
+    return max(record.segment_length(), needed), ()
 
 
 def _refuse_far(spectrum: Spectrum, matter: Mapping[str, float]) -> None:
@@ -270,14 +313,14 @@ def _of_spectrum(data: Spectrum) -> _Data:
     )
 
 
-def _of_record(record: Record, whole: bool) -> _Data:
+def _of_record(record: Record, length: int) -> _Data:
     """Periodograms of segments with Hann's window that overlap by half, or of the whole record, whose ends fade.
 
     Without that its ends would leak into all high frequencies alike, whose values were then not independent.
     """
     from scipy.signal.windows import tukey
 
-    length = record.values.size if whole else record.segment_length()
+    whole = length == record.values.size
     window = np.asarray(tukey(length, FADING) if whole else np.hanning(length + 1)[:-1], dtype=float)
     window /= math.sqrt(float(window @ window))
     cut = _Cut(window, record.step)
@@ -338,8 +381,8 @@ def _start(data: _Data, families: Sequence[Kind], weights: FloatArray) -> FloatA
     return np.concatenate(found)
 
 
-def _fitted(data: _Data, families: Sequence[Kind], weights: FloatArray) -> tuple[FloatArray, float]:
-    """ln θ where the deviance is least, and the deviance."""
+def _fitted(data: _Data, families: Sequence[Kind], weights: FloatArray) -> tuple[FloatArray, float, bool]:
+    """ln θ where the deviance is least, the deviance, and whether the search was stopped before its end."""
     size = np.sqrt(2 * weights * data.number)
 
     def residuals(theta: FloatArray) -> FloatArray:
@@ -349,7 +392,7 @@ def _fitted(data: _Data, families: Sequence[Kind], weights: FloatArray) -> tuple
 
     starts = [_start(data, families, weights)]
     if len(families) > 1:  # one part more beside the best sum of fewer, which halves a part of it in two places
-        fewer, _ = _fitted(data, families[1:], weights)
+        fewer, _, _ = _fitted(data, families[1:], weights)
         first = fewer[: len(families[0].names)]
         shift = np.zeros_like(first)
         shift[0 if families[0].amplitude else 1] = 1.0
@@ -360,9 +403,12 @@ def _fitted(data: _Data, families: Sequence[Kind], weights: FloatArray) -> tuple
     found = []
     for start in (np.minimum(each, highest) for each in starts):
         bounds = (start - 15, np.minimum(start + 15, highest))
-        found.append(least_squares(residuals, start, bounds=bounds, ftol=1e-10, xtol=1e-8, max_nfev=100))
+        each = least_squares(residuals, start, bounds=bounds, ftol=1e-10, xtol=1e-8, max_nfev=MOST_STEPS)
+        if not each.status:  # it was stopped
+            each = least_squares(residuals, each.x, bounds=bounds, ftol=1e-10, xtol=1e-8, max_nfev=MORE_STEPS)
+        found.append(each)
     best = min(found, key=lambda each: each.cost)
-    return best.x, 2 * best.cost
+    return best.x, 2 * best.cost, not best.status
 
 
 def _slopes(data: _Data, families: Sequence[Kind], theta: FloatArray) -> FloatArray:

@@ -19,7 +19,7 @@ MOST_AVERAGES = 1e12
 """Of periodograms: their errors are far below any other then."""
 MOST_VARIANCE = 1.5
 """Of a density over that of its record, which has the other frequencies as well."""
-SHORTEST = 256
+SHORTEST = 64
 """Samples of a record at least."""
 SEGMENTS = 64
 """A record is cut into about so many parts, each twice covered, if nothing else is stated."""
@@ -52,6 +52,7 @@ class Spectrum:
         density: S(ω) > 0, in ξ² time, shape (n,).
         relative_error: the standard error of each value over the value, shape (n,); None where it is not known.
         variance: of the record that it was made of; None where that is not known.
+        notes: what was assumed where it was read.
 
     Raises:
         ValueError: there are fewer than 5 values, one is no number, not positive, or the frequencies do not increase;
@@ -62,6 +63,7 @@ class Spectrum:
     density: FloatArray
     relative_error: FloatArray | None = None
     variance: float | None = None
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         omega, density = _column("frequencies", self.frequencies), _column("density", self.density)
@@ -172,8 +174,9 @@ class Record:
     """Values ξ(0), ξ(step), ξ(2 step), …; their mean does not count.
 
     Attributes:
-        values: shape (n,), n ≥ 256.
+        values: shape (n,), n ≥ 64.
         step: time between two of them.
+        notes: what was assumed where it was read.
 
     Raises:
         ValueError: there are fewer values, one is no number, all are the same, or the step is not > 0.
@@ -181,6 +184,7 @@ class Record:
 
     values: FloatArray
     step: float
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         values = _column("values", self.values)

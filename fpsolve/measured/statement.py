@@ -87,6 +87,22 @@ class Statement:
     rate: Annotated[float | None, Parameter(help="Values of the record per second, if the file states no times.")] = (
         None
     )
+    over: Annotated[str | None, Parameter(help="The column of frequencies or times, if its name does not tell.")] = None
+    unit: Annotated[
+        str | None, Parameter(help="The unit of the signal, such as g, or of its density, if the file states none.")
+    ] = None
+    scale: Annotated[float, Parameter(help="What the signal is multiplied by; a density by its square.")] = 1.0
+    skip: Annotated[Count, Parameter(help="Rows of the file that are left out at its beginning; of a text lines.")] = 0
+    row: Annotated[
+        Count | None, Parameter(help="Which of several spectra in the rows of a file; their mean if omitted.")
+    ] = None
+    segment: Annotated[
+        float | None,
+        Parameter(help="Seconds of a segment of a record; as the natural frequency needs if omitted."),
+    ] = None
+    rtol: Annotated[
+        float | None, Parameter(help="Tolerance of the exponents of the system, relative; 1e-4 if omitted.")
+    ] = None
     averages: Annotated[
         float | None, Parameter(help="How many independent periodograms the spectrum is the mean of: tells its errors.")
     ] = None

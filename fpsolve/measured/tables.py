@@ -5,77 +5,57 @@ A column of an array of NumPy or MATLAB with several columns is called by its nu
 
 from __future__ import annotations
 
-import csv
 import io
 import math
 import re
 import warnings
 import zipfile
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import replace
+from itertools import islice
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import FpsolveError
+from fpsolve.measured.columns import WORDS, Column, Table
 from fpsolve.measured.matlab import MatError, read_mat
-from fpsolve.reading import Unreadable, Words, read_bytes, read_text
+from fpsolve.measured.text import NO_TABLE, read_peer_table, read_text_table
+from fpsolve.reading import Unreadable, read_bytes
 
 MOST_NUMBERS = 2**26
 """Of an array that is read."""
 MOST_COLUMNS = 64
-WORDS = Words("the measurement", "a file of numbers", "spectrum.csv", "comma-separated", "export the data again", True)
-NO_TEXT_TABLE = "has no table of numbers"
 
 
-@dataclass(frozen=True, eq=False)
-class Column:
-    """Numbers with a unit; an empty text where it is not stated."""
-
-    values: FloatArray
-    unit: str = ""
-
-
-@dataclass(frozen=True, eq=False)
-class Table:
-    """What a file holds.
-
-    Attributes:
-        path: where it is from.
-        columns: by their names, in the order of the file.
-        rate: values per second, where the file states it.
-        abscissa: the name of the column that the others are over, where the file states it.
-        kind: "record" or "spectrum", where the file states it.
-    """
-
-    path: Path
-    columns: Mapping[str, Column]
-    rate: float | None = None
-    abscissa: str = ""
-    kind: str = ""
-
-
-def read_table(path: str | Path) -> Table:
+def read_table(path: str | Path, skip: int = 0) -> Table:
     """The columns of a file by its ending.
 
     Args:
-        path: .csv, .txt, .dat, .tsv: text; .npy, .npz: NumPy; .mat: MATLAB; .wav: sound; .uff, .unv, .uf: universal
-            files, which need pyuff; .nc: netCDF, as xarray writes it.
+        path: .csv, .txt, .dat, .tsv and others: text; .at2, .vt2: PEER; .npy, .npz: NumPy; .mat: MATLAB; .wav: sound;
+            .uff, .unv, .uf: universal files, which need pyuff; .nc: netCDF, as xarray writes it.
+        skip: rows at its beginning that are left out, of a text its lines.
 
     Raises:
         FpsolveError: the file is none of these, or broken: one sentence.
     """
     path = Path(path)
-    reader = READERS.get(path.suffix.lower())
+    reader, of_text = READERS.get(path.suffix.lower()), TEXTS.get(path.suffix.lower())
     try:
-        if reader is None:
-            known = ", ".join(READERS)
+        if of_text is not None:
+            table = of_text(path, skip)
+        elif reader is None:
+            known = ", ".join([*TEXTS, *READERS])
             raise Unreadable(f'has the unknown ending "{path.suffix}"; must be one of {known}; export it as .csv')
-        table = reader(path)
-        if not table.columns:
-            raise Unreadable(f"{NO_TEXT_TABLE}; export columns of numbers")
+        else:
+            table = reader(path)
+            cut = {name: replace(each, values=each.values[skip:]) for name, each in table.columns.items()}
+            table = replace(table, columns=cut) if skip else table
+        if not table.columns or not all(each.values.size for each in islice(table.columns.values(), 1)):
+            raise Unreadable(f"{NO_TABLE}; export columns of numbers{', or skip fewer rows' if skip else ''}")
         return table
     except Unreadable as error:
         place = path if error.line is None else f"{path}:{error.line}"
@@ -105,11 +85,12 @@ def _split(name: str, array: Any, unit: str = "") -> Iterator[tuple[str, Column]
     if found.dtype.kind not in "iufb":
         raise Unreadable(_of_name(name, "has no numbers; export numbers"))
     with np.errstate(invalid="ignore"):  # what is no number is said of its row later
+        resolution = float(np.finfo(found.dtype).eps) if found.dtype.kind == "f" else 0.0
         found = np.squeeze(found).astype(float)
     if found.ndim == 0:
         return
     if found.ndim == 1:
-        yield name or "1", Column(found, unit)
+        yield name or "1", Column(found, unit, resolution * float(np.max(abs(found), initial=0.0)))
         return
     if found.ndim > 2:
         raise Unreadable(_of_name(name, f"has {found.ndim} dimensions; export one or two, a column for each quantity"))
@@ -119,71 +100,6 @@ def _split(name: str, array: Any, unit: str = "") -> Iterator[tuple[str, Column]
         raise Unreadable(_of_name(name, f"has {found.shape[1]} columns; export at most {MOST_COLUMNS}"))
     for i, values in enumerate(found.T):
         yield f"{name} {i + 1}".strip(), Column(values, unit)
-
-
-_HEADING = re.compile(r"(?P<name>.*?)\s*(?:\[(?P<square>[^\]]*)\]|\((?P<round>.*)\))\s*")
-_DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+(e[+-]?\d+)?", re.IGNORECASE)
-
-
-def _heading(text: str) -> tuple[str, str]:
-    """The name and the unit of a column: "a (m/s²)" or "a [m/s²]"."""
-    found = _HEADING.fullmatch(text.strip())
-    if found is None or not found["name"]:
-        return text.strip(), ""
-    return found["name"], (found["square"] or found["round"] or "").strip()
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
-
-
-def _of_text(path: Path) -> Table:
-    """A header, then a row for each line; cells separated by commas, semicolons, tabs or spaces; # begins a remark."""
-    lines = read_text(path, WORDS).splitlines()
-    rows = [(i, line) for i, line in enumerate(lines, 1) if line.strip() and not line.lstrip().startswith("#")]
-    if len(rows) < 2:
-        raise Unreadable(f"{NO_TEXT_TABLE}; it needs a header and a row for each frequency or time")
-    _, second = rows[1]
-    separator = next((each for each in ("\t", ";", ",") if each in second), None)
-
-    def cells(line: str) -> list[str]:
-        if separator is None:
-            return line.split()
-        return [cell.strip() for cell in next(csv.reader([line], delimiter=separator))]
-
-    try:
-        split = [(i, cells(line)) for i, line in rows]
-    except csv.Error as error:
-        raise Unreadable(f"is no table ({error}); export it again") from None
-    first = split[0][1]
-    has_header = not all(map(_is_number, first))
-    headings = [_heading(each) for each in first] if has_header else [(str(i + 1), "") for i in range(len(first))]
-    names = [name for name, _ in headings]
-    twice = next((name for name in names if names.count(name) > 1), None)
-    if twice is not None:
-        raise Unreadable(f'has two columns called "{twice}"; rename one', split[0][0])
-    if len(names) > MOST_COLUMNS:
-        raise Unreadable(f"has {len(names)} columns; export at most {MOST_COLUMNS}", split[0][0])
-    body = split[has_header:]
-    values = np.empty((len(body), len(names)))
-    for row, (line, entries) in enumerate(body):
-        if len(entries) != len(names):
-            text = f"has {len(entries)} cells, and the header has {len(names)}; complete the row, or remove it"
-            raise Unreadable(text, line)
-        for column, cell in enumerate(entries):
-            try:
-                values[row, column] = float(cell)
-            except ValueError:
-                remedy = (
-                    "write decimal points" if _DECIMAL_COMMA.fullmatch(cell) else "write a number or remove the row"
-                )
-                told = f'"{cell}"' if cell else "nothing"
-                raise Unreadable(f"has {told} in the column {names[column]}; {remedy}", line) from None
-    return Table(path, {name: Column(values[:, i], unit) for i, (name, unit) in enumerate(headings)})
 
 
 def _of_npy(path: Path) -> Table:
@@ -244,7 +160,7 @@ def _of_mat(path: Path) -> Table:
         raise Unreadable('is a MATLAB 7.3 file, which is HDF5; save it by save(..., "-v7")')
     columns = dict[str, Column]()
     try:
-        for name, array in read_mat(content, MOST_NUMBERS):
+        for name, array in read_mat(path).items():
             columns |= _split(name, array)
     except MatError as error:
         raise Unreadable(f'is no MATLAB file ({_reason(error)}); save it by save(..., "-v7")') from None
@@ -255,8 +171,6 @@ def _of_mat(path: Path) -> Table:
 
 def _of_wav(path: Path) -> Table:
     """Channels as shares of full scale."""
-    import warnings
-
     from scipy.io import wavfile
 
     content = read_bytes(path, WORDS)
@@ -264,8 +178,7 @@ def _of_wav(path: Path) -> Table:
     if content[:4] in (b"RIFF", b"RIFX") and stated > len(content):
         raise Unreadable(f"states {stated} bytes and has {len(content)}; copy or export it again")
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("error", wavfile.WavFileWarning)
+        with warnings.catch_warnings(action="ignore", category=wavfile.WavFileWarning):  # of chunks that are no sound
             rate, data = wavfile.read(io.BytesIO(content))
     except Exception as error:  # scipy raises many kinds for what is no such file
         raise Unreadable(f"is no WAV file ({_reason(error)}); export it again as PCM") from None
@@ -278,19 +191,31 @@ def _of_wav(path: Path) -> Table:
     return Table(path, dict(_split("" if data.ndim == 1 else "channel", data)), rate=float(rate), kind="record")
 
 
+def _is_utf8(content: bytes) -> bool:
+    """Whether a universal file is in UTF-8, or has binary numbers, whose bytes are no text."""
+    try:
+        content.decode()
+    except UnicodeDecodeError:
+        return b"58b" in content
+    return True
+
+
 UFF_KINDS = {1: "record", 9: "spectrum"}
 """What the functions of dataset 58 are: time response, power spectral density."""
 
 
 def _of_uff(path: Path) -> Table:
-    read_bytes(path, WORDS)
+    content = read_bytes(path, WORDS)
     try:
         import pyuff
     except ImportError:
         raise Unreadable("is a universal file, which needs pyuff: pip install 'fpsolve[measured]'") from None
     try:
-        found = pyuff.UFF(str(path))
-        sets = [found.read_sets(i) for i, number in enumerate(found.get_set_types()) if int(number) == 58]
+        with TemporaryDirectory() as folder:
+            utf8 = Path(folder) / "a.uff"  # of what is in Latin-1, which pyuff does not read
+            utf8.write_bytes(content if _is_utf8(content) else content.decode("latin-1").encode())
+            found = pyuff.UFF(str(utf8))
+            sets = [found.read_sets(i) for i, number in enumerate(found.get_set_types()) if int(number) == 58]
         used = [each for each in sets if each["func_type"] in UFF_KINDS]
         columns, kinds, axes = dict[str, Column](), list[str](), list[FloatArray]()
         for i, each in enumerate(used):
@@ -343,26 +268,54 @@ def _of_netcdf(path: Path) -> Table:
         options: dict[str, Any] = {"decode_times": False, "decode_timedelta": False}
         source = io.BytesIO(content)
         with warnings.catch_warnings(action="ignore"), xr.open_dataset(source, engine=engine, **options) as found:
-            found = found.squeeze(drop=True)
-            wide = [str(name) for name, each in found.data_vars.items() if each.ndim > 1]
-            vectors = {str(name): each for name, each in found.variables.items() if each.ndim == 1}
-            numbers = {name: each for name, each in vectors.items() if each.dtype.kind in "iuf"}
-            sizes = {each.dims[0] for each in numbers.values()}
-            if not numbers:
-                raise Unreadable(f"has no variable of one dimension{_such_as(wide)}; select one, such as one time")
-            if len(sizes) > 1:
-                names = ", ".join(sorted(map(str, sizes)))
-                raise Unreadable(f"has variables over several dimensions ({names}); keep those over one of them")
-            columns = {
-                name: Column(np.asarray(each.values, dtype=float), str(each.attrs.get("units", "")))
-                for name, each in numbers.items()
-            }
-            [dimension] = sizes
-            return Table(path, columns, abscissa=str(dimension) if dimension in columns else "")
+            return _of_dataset(path, found.squeeze(drop=True))
     except Unreadable:
         raise
     except Exception as error:  # each engine raises its own kinds for what is no such file
         raise Unreadable(f"is no netCDF file ({_reason(error)}); write it by xarray's to_netcdf") from None
+
+
+def _of_dataset(path: Path, found: Any) -> Table:
+    """The variables over one dimension; of waves, over frequencies and directions, too. Raises Unreadable."""
+    waves = next(
+        (each for each in found.data_vars.values() if set(each.dims) & {"freq", "frequency"} and each.ndim > 1), None
+    )
+    if waves is not None:
+        return _of_waves(path, waves)
+    wide = [str(name) for name, each in found.data_vars.items() if each.ndim > 1]
+    vectors = {str(name): each for name, each in found.variables.items() if each.ndim == 1}
+    numbers = {name: each for name, each in vectors.items() if each.dtype.kind in "iuf"}
+    sizes = {each.dims[0] for each in numbers.values()}
+    if not numbers:
+        raise Unreadable(f"has no variable of one dimension{_such_as(wide)}; select one, such as one time")
+    if len(sizes) > 1:
+        names = ", ".join(sorted(map(str, sizes)))
+        raise Unreadable(f"has variables over several dimensions ({names}); keep those over one of them")
+    columns = dict[str, Column]()
+    for name, each in numbers.items():
+        unit = str(each.attrs.get("units", "")).partition(" since ")[0]  # of times in the conventions of CF
+        columns |= _split(name, each.values, unit)
+    [dimension] = sizes
+    return Table(path, columns, abscissa=str(dimension) if dimension in columns else "")
+
+
+def _of_waves(path: Path, waves: Any) -> Table:
+    """Spectra over frequencies, integrated over directions, one for each time or place. Raises Unreadable."""
+    [f] = {"freq", "frequency"} & set(waves.dims)
+    unit = str(waves.attrs.get("units", ""))
+    for name in {"dir", "direction", "directions"} & set(waves.dims):
+        angles = np.asarray(waves[name].values, dtype=float)
+        turn = 360.0 if "rad" not in str(waves[name].attrs.get("units", "")) else 2 * math.pi
+        steps = np.diff(np.sort(angles))
+        if angles.size < 2 or not np.allclose(steps, turn / angles.size, rtol=1e-3):
+            raise Unreadable(f"has directions in {name} that do not divide the circle evenly; integrate over them")
+        waves = waves.sum(name) * (turn / angles.size)
+        unit = re.sub(r"[ ./*]*(deg\w*|rad\w*)[\^{]*-?\d*\}?", "", unit)
+    values = np.asarray(waves.transpose(..., f).values, dtype=float)
+    values = values.reshape(-1, values.shape[-1])
+    over = Column(np.asarray(waves[f].values, dtype=float), str(waves[f].attrs.get("units", "")))
+    _looked_at(values.shape, str(waves.name))
+    return Table(path, {"f": over, "S": Column(values[0], unit)}, abscissa="f", kind="spectrum", rows=values)
 
 
 def _look_into_hdf(content: bytes) -> None:
@@ -392,18 +345,16 @@ def _reason(error: BaseException) -> str:
     return text if len(text) <= 100 else f"{text[:97]}..."
 
 
+TEXTS: Mapping[str, Callable[[Path, int], Table]] = {
+    **dict.fromkeys((".csv", ".txt", ".dat", ".tsv", ".out", ".lvm", ".asc", ".prn", ".spec"), read_text_table),
+    **dict.fromkeys((".at2", ".vt2"), read_peer_table),
+}
 READERS: Mapping[str, Callable[[Path], Table]] = {
-    ".csv": _of_text,
-    ".txt": _of_text,
-    ".dat": _of_text,
-    ".tsv": _of_text,
     ".npy": _of_npy,
     ".npz": _of_npz,
     ".mat": _of_mat,
     ".wav": _of_wav,
-    ".uff": _of_uff,
-    ".unv": _of_uff,
-    ".uf": _of_uff,
+    **dict.fromkeys((".uff", ".unv", ".uf"), _of_uff),
     ".nc": _of_netcdf,
 }
 """By the endings of files."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -31,7 +31,7 @@ from fpsolve.measured.fit import NAMES
 from fpsolve.measured.signals import SIGNALS
 from fpsolve.measured.stability import STEPS
 from fpsolve.measured.weak import Where
-from fpsolve.messages import Message
+from fpsolve.messages import Code, Message
 from fpsolve.model import ParametricOscillator, PlaneSystem, Problem, VibroImpactOscillator
 from fpsolve.model.plane import System
 from fpsolve.model.systems.vibro_impact import ImpactLaw
@@ -57,6 +57,8 @@ class Wanted:
         modes: natural frequencies, and damping ratios that may be NaN.
         height: GM where its variation was measured.
         case: whose system the noise is for; None for an oscillator with the first mode's damping.
+        segment: of a record, in s; None for what the frequencies need.
+        rtol: of λ and Λ(2).
     """
 
     of: str
@@ -66,6 +68,8 @@ class Wanted:
     modes: Modes
     height: float | None = None
     case: Case | None = None
+    segment: float | None = None
+    rtol: float = RTOL
 
     @property
     def noise_in(self) -> Where:
@@ -171,9 +175,11 @@ def measure(data: Spectrum | Record, wanted: Wanted, progress: Callable[[], None
                 noise_in=wanted.noise_in,
                 terms=wanted.terms,
                 method=wanted.method,
+                segment=wanted.segment,
             )
     except ValueError as error:
         raise FpsolveError(str(error)) from None
+    fit = replace(fit, messages=(*(Message(Code.AS_READ, text=each) for each in data.notes), *fit.messages))
     progress()
     scaled = fit.scaled(_factor(wanted))
     found = {"exponent": None, "moment": None, "verdict": None, "failure": None} | _critical(fit, wanted)
@@ -181,7 +187,7 @@ def measure(data: Spectrum | Record, wanted: Wanted, progress: Callable[[], None
     if system is not None and wanted.terms < len(NAMES):
         try:
             problem = Problem(system, scaled.noise)
-            found["verdict"] = verdict(problem, scaled, rtol=max(problem.usual_rtol, RTOL), progress=progress)
+            found["verdict"] = verdict(problem, scaled, rtol=max(problem.usual_rtol, wanted.rtol), progress=progress)
         except NotConverged as failure:
             found["failure"] = failure.message
         except ValueError as error:

@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -22,6 +23,7 @@ from fpsolve.measured.units import GRAVITY
 from fpsolve.output.noises import Convention, write_noise
 from fpsolve.study.noise import (
     CLOSE,
+    RTOL,
     STEPS_OF_A_FIT,
     NoiseOutcome,
     Wanted,
@@ -85,15 +87,27 @@ def measurement_of(
         raise FpsolveError(f"--gm belongs to --of height; {remedy}")
     if stated.gm is not None and not 0 < stated.gm < math.inf:
         raise FpsolveError(f"got --gm {stated.gm}; must be > 0, in m")
-    wanted = Wanted(of, stated.kind, stated.terms, stated.method, modes, stated.gm, case)
-    record = read_record(stated.record, rate=stated.rate, of=of, column=stated.column) if stated.record else None
+    wanted = Wanted(
+        of, stated.kind, stated.terms, stated.method, modes, stated.gm, case, stated.segment, stated.rtol or RTOL
+    )
+    how: dict[str, Any] = {
+        "of": of,
+        "unit": stated.unit,
+        "scale": stated.scale,
+        "skip": stated.skip,
+        "over": stated.over,
+    }
+    of_record = how if spectrum is None else {"of": of}
+    record = read_record(stated.record, rate=stated.rate, column=stated.column, **of_record) if stated.record else None
     if spectrum is not None:
         if stated.method == "whittle":
             raise FpsolveError("--method whittle is for a record, and a spectrum was named; leave it out")
+        if stated.segment is not None:
+            raise FpsolveError("--segment is for a record, and a spectrum was named; leave it out")
         if stated.rate is not None and record is None:
             raise FpsolveError("--rate is for a record, and a spectrum was named; leave it out, or name it by --record")
     if spectrum is None and record is not None:
-        for name in ("sided", "averages"):
+        for name in ("sided", "averages", "row"):
             if getattr(stated, name) is not None:
                 raise FpsolveError(f"--{name} is for a spectrum, and a record was named; leave it out")
         return record, wanted, source
@@ -101,10 +115,11 @@ def measurement_of(
         spectrum or source,
         per=stated.per,
         sided=stated.sided,
-        of=of,
         column=stated.column if record is None else None,
+        row=stated.row,
         averages=stated.averages,
         variance=None if record is None else float(np.var(record.values)),
+        **how,
     )
     return data, wanted, source
 

@@ -243,5 +243,5 @@ def test_what_is_no_argument_is_refused():
             fit_noise(spectrum, **{"frequency": 2.0, **options})
     with pytest.raises(TypeError, match="Spectrum or a Record"):
         fit_noise([1, 2], frequency=2.0)
-    with pytest.raises(ValueError, match="at least 256"):
+    with pytest.raises(ValueError, match="at least 64"):
         Record(np.arange(10.0), 0.1)

@@ -192,7 +192,7 @@ REFUSED = {
         [*FILE, "--of", "acceleration", "--length", "2", "--frequency", "2"],
         "--length 0.3524 Hz",
     ),
-    "unit": ([*AT_2, "--of", "acceleration"], 'has the unit "1"'),
+    "unit": ([*AT_2, "--of", "acceleration"], 'has the unit "1/Hz"'),
     "percent": ([*AT_2, "--damping-ratio", "1"], "0.01 is 1 %"),
     "half": ([*AT_2, "--restitution", "0.9"], "state --damping-ratio"),
     "terms": ([*AT_2, "--terms", "4"], "from 1 to 3"),

@@ -138,7 +138,7 @@ def test_units_per_radian(tmp_path):
     found = read_spectrum(path, sided="one", of="acceleration")
     assert found.frequencies == pytest.approx(F)
     assert found.density == pytest.approx(math.pi * G)
-    assert density_unit("m**2 / (rad/s)") == ("m", "rad/s")
+    assert density_unit("m**2 / (rad/s)") == ({"m": 1}, "rad/s")
 
 
 def test_modes_of_a_table(tmp_path):
@@ -238,7 +238,7 @@ def test_a_missing_file_and_a_folder(tmp_path):
         ("f (Hz),G (1/Hz)", {}, "one-sided"),
         ("f,G", {"sided": "one"}, "states no unit of its frequencies"),
         ("f (Hz),G (1/Hz)", {"sided": "one", "per": "rad/s"}, "state --per Hz"),
-        ("f (Hz),G (V^2/Hz)", {"sided": "one", "of": "acceleration"}, 'the unit "V\\^?2?"|the unit "v"'),
+        ("f (Hz),G (V^2/Hz)", {"sided": "one", "of": "acceleration"}, r'the unit "V\^2/Hz"'),
         ("f (Hz),G (m/s^2)", {"sided": "one"}, "in the column G has the unit"),
         ("f (kHz),G (1/Hz)", {"sided": "one", "per": "Hz"}, 'has the unit "kHz" of the column f; must be Hz, rad/s'),
         ("t (s),G (1/Hz)", {"sided": "one", "per": "Hz"}, "over times, in the column t, so that it is a record"),

@@ -1,0 +1,325 @@
+"""Tables of numbers in text, as loggers, programs and buoys write them.
+
+A table begins where rows of one shape begin. What stands above is a preamble; its last line with a name for each cell
+is the header, also behind #, % or //, and the line below that may hold the units. A table whose header ends in numbers
+lies on its side: these are frequencies, and each row is a spectrum.
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+import warnings
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from fpsolve.arrays import FloatArray
+from fpsolve.measured.columns import WORDS, Column, Table, heading
+from fpsolve.measured.signals import FREQUENCIES, SIGNALS, TIMES, among, density_unit
+from fpsolve.reading import Unreadable, read_text
+
+NO_TABLE = "has no table of numbers"
+MOST_COLUMNS = 1000
+LEAST_FREQUENCIES = 5
+"""Numbers at the end of a header that are taken for frequencies."""
+SAMPLE = 2000
+"""Lines at the beginning and at the end by which the separator is found."""
+_MARK = re.compile(r"^\s*(?:#+|%+|//+)\s?")
+_NUMBER = re.compile(r"[+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[ed][+-]?\d+)?|[+-]?(?:nan|inf)|", re.IGNORECASE)
+_DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+(e[+-]?\d+)?", re.IGNORECASE)
+_DAY, _CLOCK = r"\d{4}[-/]\d\d?[-/]\d\d?", r"\d\d?:\d\d(?::\d\d(?:\.\d*)?)?(?: ?[AP]M)?"
+_STAMP = re.compile(rf"(?:{_DAY}|\d\d?/\d\d?/\d\d(?:\d\d)?)(?:[T ]+{_CLOCK})?(?:Z| ?[+-]\d\d:?\d\d)?|{_CLOCK}")
+_SPACED = re.compile(r"\S+(?:[ \t]+(?:[\[(]\S*[\])]|[\[(][^\])]*[\])])(?=\s|$))?")
+"""Names between spaces, each with its unit in brackets."""
+SEPARATORS = ("\t", ";", ",", None)
+
+
+@dataclass(frozen=True)
+class _Lines:
+    """The rows of a table, by their lines, and how they are cut."""
+
+    numbers: Sequence[int]
+    lines: Sequence[str]
+    separator: str | None
+
+    def cells(self, column: int) -> list[str]:
+        return [_cells(line, self.separator)[column] for line in self.lines]
+
+
+@dataclass(frozen=True)
+class _Columns(Mapping[str, Column]):
+    """The columns of a text, each read when it is wanted; a word in one of them is no fault of another."""
+
+    rows: _Lines
+    places: Mapping[str, int]
+    units: Mapping[str, str]
+    _read: dict[str, Column] = field(default_factory=dict)
+
+    def __getitem__(self, name: str) -> Column:
+        if name not in self._read:
+            self._read[name] = self._column(name, self.rows.cells(self.places[name]))
+        return self._read[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.places)
+
+    def __len__(self) -> int:
+        return len(self.places)
+
+    def _column(self, name: str, cells: list[str]) -> Column:
+        if _STAMP.fullmatch(cells[0]):
+            return _times(name, cells, self.rows.numbers)
+        try:
+            values = np.array([float(cell) for cell in cells])
+        except ValueError:
+            values = np.array([_number(name, *each) for each in zip(cells, self.rows.numbers, strict=True)])
+        return Column(values, self.units[name], _last_digit(cells[:: max(len(cells) // SAMPLE, 1)]))
+
+
+def _number(name: str, cell: str, line: int) -> float:
+    """The number in a cell, also with the exponent of Fortran. Raises Unreadable."""
+    try:
+        return float(cell.lower().replace("d", "e"))
+    except ValueError:
+        remedy = "write decimal points" if _DECIMAL_COMMA.fullmatch(cell) else "write a number or remove the row"
+        told = f'"{cell}"' if cell else "nothing"
+        raise Unreadable(f"has {told} in the column {name}; {remedy}", line) from None
+
+
+def _last_digit(cells: Sequence[str]) -> float:
+    """One unit of the last digit of some numbers, of which up to three quarters may lack zeros at their ends."""
+    found = list[float]()
+    for cell in cells:
+        mantissa, _, exponent = cell.lower().partition("e")
+        found.append(10.0 ** (int(exponent or 0) - len(mantissa.partition(".")[2])))
+    return sorted(found)[len(found) // 4]
+
+
+def _times(name: str, cells: Sequence[str], numbers: Sequence[int]) -> Column:
+    """Seconds since the first of some times of the calendar, or of a day, which may end at midnight."""
+    import pandas as pd
+
+    clock = re.fullmatch(_CLOCK, cells[0]) is not None and not cells[0].endswith("M")
+    try:
+        with warnings.catch_warnings(action="ignore"):  # a form that pandas does not know takes it longer
+            found = pd.to_timedelta([*cells]) if clock else pd.to_datetime([*cells])
+        seconds = np.asarray((found - found[0]) / pd.Timedelta(seconds=1), dtype=float)
+        if np.isnan(seconds).any():
+            raise ValueError
+    except (ValueError, TypeError, OverflowError):
+        wrong = next((i for i, cell in enumerate(cells) if not _STAMP.fullmatch(cell)), 0)
+        text = f'has "{cells[wrong]}" in the column {name}; write all times alike, such as 2026-01-31 12:00:00.5'
+        raise Unreadable(text, numbers[wrong]) from None
+    if clock:
+        seconds += 86400.0 * np.cumsum(np.diff(seconds, prepend=0.0) < -43200)
+    digits = max(len(re.match(r"\d*", each.partition(".")[2])[0]) for each in cells)  # type: ignore[index]
+    return Column(seconds, "s", 10.0**-digits)
+
+
+def read_text_table(path: Path, skip: int = 0) -> Table:
+    """The table of a text file.
+
+    Args:
+        path: of a file in UTF-8, or Latin-1.
+        skip: lines at its beginning that are left out.
+
+    Raises:
+        Unreadable: there is none, or its header has a name twice.
+    """
+    lines = read_text(path, WORDS, may_be_latin=True).splitlines()
+    separators: Sequence[str | None] = SEPARATORS
+    if lines and (stated := re.fullmatch(r'"?sep=(.)"?', lines[0].strip(), re.IGNORECASE)):  # of Excel
+        separators, lines[0] = (stated[1],), ""
+    every = [(i, line) for i, line in enumerate(lines, 1) if line.strip() and i > skip]
+    plain = [(i, line) for i, line in every if not _MARK.match(line)]
+    separator, count = _shape([line for _, line in [*plain[:SAMPLE], *plain[SAMPLE:][-SAMPLE:]]], separators)
+    start = _start(plain, separator, count)
+    body = plain[start:]
+    first = _cells(body[0][1], separator)
+    table = _Lines([i for i, _ in body], [line for _, line in body], separator)
+    above = [each for each in every if each[0] < body[0][0]]
+    names, units, header = _header(above, first, separator)
+    if names and all(map(_is_number, names[-LEAST_FREQUENCIES:])):
+        return _on_its_side(path, table, names)
+    for line, text in body:
+        if (found := len(_cells(text, separator))) != count:
+            told = f"has {found} cells, and {'the header' if names else 'the first row'} has {count}"
+            raise Unreadable(f"{told}; complete the row, or remove it", line)
+    ends = [k for k in range(count) if not first[k] and not any(table.cells(k))]
+    if names:
+        twice = next((name for name in names if name and names.count(name) > 1), None)
+        if twice is not None:
+            raise Unreadable(f'has two columns called "{twice}"; rename one', header)
+        names = [name or f"column {k + 1}" for k, name in enumerate(names)]
+    else:
+        names, units = [str(k + 1) for k in range(count)], [""] * count
+    places = {name: k for k, name in enumerate(names) if k not in ends}
+    columns = _Columns(table, places, dict(zip(names, units, strict=True)))
+    notes = () if not above or header else (f"left out the lines 1 to {above[-1][0]}, which have no names of columns",)
+    return Table(path, _without_index(columns), abscissa=_stamps(columns, first), lines=table.numbers, notes=notes)
+
+
+def _is_number(cell: str) -> bool:
+    return bool(cell) and _NUMBER.fullmatch(cell) is not None
+
+
+def _cells(line: str, separator: str | None) -> list[str]:
+    """The cells of a row. Raises Unreadable where its quotes are wrong."""
+    if separator is None:
+        return line.split()
+    if '"' not in line:
+        return [cell.strip() for cell in line.split(separator)]
+    try:
+        return [cell.strip() for cell in next(csv.reader([line], delimiter=separator))]
+    except csv.Error as error:
+        raise Unreadable(f"is no table ({error}); export it again") from None
+
+
+def _like_row(cells: Sequence[str]) -> bool:
+    """Whether at least half of some cells are numbers or times."""
+    if len(cells) == 1 and "," in cells[0]:
+        return False
+    fitting = sum(_NUMBER.fullmatch(each) is not None or _STAMP.fullmatch(each) is not None for each in cells)
+    return any(cells) and 2 * fitting >= len(cells) and any(map(str.isdigit, "".join(cells)))
+
+
+def _shape(lines: Sequence[str], separators: Sequence[str | None]) -> tuple[str | None, int]:
+    """The separator by which most lines are rows of one shape, and how many cells these have. Raises Unreadable."""
+    best: tuple[int, int] = (0, 0)
+    chosen: str | None = None
+    for separator in separators:
+        counts = Counter(len(cells) for cells in (_cells(each, separator) for each in lines) if _like_row(cells))
+        found = max(((rows, count) for count, rows in counts.items()), default=(0, 0))
+        if found[0] > best[0] or (found[0] == best[0] and found[1] > best[1] and separator is not None):
+            best, chosen = found, separator
+    if not best[0]:
+        raise Unreadable(f"{NO_TABLE}; it needs a header and a row for each frequency or time")
+    if best[1] > MOST_COLUMNS:
+        raise Unreadable(f"has {best[1]} columns; export at most {MOST_COLUMNS}")
+    return chosen, best[1]
+
+
+def _start(lines: Sequence[tuple[int, str]], separator: str | None, count: int) -> int:
+    """Where the table begins: the first row of its shape that another one follows."""
+    rows = (
+        i for i, (_, line) in enumerate(lines) if len(cells := _cells(line, separator)) == count and _like_row(cells)
+    )
+    candidates = [*rows]
+    numeric = Counter(k for i in candidates for k, cell in enumerate(_cells(lines[i][1], separator)) if _fits(cell))
+    columns = [k for k, times in numeric.items() if 2 * times > len(candidates)]
+    good = [i for i in candidates if all(_fits(_cells(lines[i][1], separator)[k]) for k in columns)] or candidates
+    return next((i for i, j in pairwise(good) if j == i + 1), good[0])
+
+
+def _fits(cell: str) -> bool:
+    return _NUMBER.fullmatch(cell) is not None or _STAMP.fullmatch(cell) is not None
+
+
+def _header(
+    above: Sequence[tuple[int, str]], first: Sequence[str], separator: str | None
+) -> tuple[list[str], list[str], int]:
+    """The names and the units of columns, and the line of these; empty where there is none.
+
+    Args:
+        above: the lines above the table, with remarks.
+        first: the cells of its first row.
+        separator: of these.
+    """
+    units, count = [""] * len(first), len(first)
+    for line, text in reversed(above):
+        found = next(
+            filter(None, (_names(_MARK.sub("", text, 1), each, count) for each in (separator, *SEPARATORS))), None
+        )
+        if found is None:
+            continue
+        split = [heading(each) for each in found]
+        if all(not name or _is_unit(name) for name in found):
+            units = [each.strip("()[] ") for each in found]
+            continue
+        return [name for name, _ in split], [unit or below for (_, unit), below in zip(split, units, strict=True)], line
+    return [], [], 0
+
+
+def _is_unit(text: str) -> bool:
+    """Whether a heading is a unit alone, in brackets or as m/s^2; one letter alone is a name."""
+    if re.fullmatch(r"\(.*\)|\[.*\]|-|1", text):
+        return True
+    known = [*TIMES, *FREQUENCIES, *(unit for each in SIGNALS.values() for unit in each.units if len(unit) > 1)]
+    if among(text, known) and (len(text) > 1 or text == "s"):
+        return True
+    try:
+        return bool(density_unit(text).per)
+    except ValueError:
+        return False
+
+
+def _names(text: str, separator: str | None, count: int) -> list[str] | None:
+    """The names in a line, if it has one for each cell of the rows, or one more for a last column without values."""
+    if separator is None:
+        found = list(_SPACED.findall(text))
+        found = text.split() if len(found) != count else found
+    else:
+        found = _cells(text, separator)
+    if len(found) == count + 1 and separator is not None:
+        found = found[:-1]
+    if len(found) != count or not any(found) or any("=" in each for each in found):
+        return None
+    numbers = [k for k, each in enumerate(found) if _is_number(each)]
+    tail = range(numbers[0], count) if numbers else range(0)
+    is_wide = len(tail) >= LEAST_FREQUENCIES and [*tail] == numbers and numbers[0] > 0
+    return found if not numbers or (is_wide and all(np.diff([float(found[k]) for k in tail]) > 0)) else None
+
+
+def _on_its_side(path: Path, rows: _Lines, names: Sequence[str]) -> Table:
+    """A spectrum in each row, over the frequencies in the header."""
+    begin = next(k for k, name in enumerate(names) if _is_number(name))
+    f = np.array([float(name) for name in names[begin:]])
+    every = _Columns(rows, {name: k for k, name in enumerate(names)}, dict.fromkeys(names, ""))
+    values: FloatArray = np.array([every[name].values for name in names[begin:]]).T
+    columns = {"f": Column(f), "S": Column(values[0])}
+    return Table(path, columns, abscissa="f", kind="spectrum", rows=values)
+
+
+def _stamps(columns: _Columns, first: Sequence[str]) -> str:
+    """The column of times of the calendar or of a day, if there is one."""
+    return next((name for name, k in columns.places.items() if _STAMP.fullmatch(first[k])), "")
+
+
+def _without_index(columns: _Columns) -> _Columns:
+    """The columns but for the first one if that counts the rows, and has no name or is called #."""
+    name = next(iter(columns))
+    if len(columns) > 2 and name in ("column 1", "#") and not _STAMP.fullmatch(columns.rows.cells(0)[0]):
+        values = columns[name].values
+        if np.array_equal(values, values[0] + np.arange(values.size)) and values[0] in (0, 1):
+            places = {each: k for each, k in columns.places.items() if each != name}
+            return _Columns(columns.rows, places, columns.units)
+    return columns
+
+
+def read_peer_table(path: Path, skip: int = 0) -> Table:
+    """A record as the PEER ground motion database has it, .AT2 or .VT2: values row by row behind NPTS and DT.
+
+    Raises:
+        Unreadable: it has no DT, or not as many values as it states.
+    """
+    lines = read_text(path, WORDS, may_be_latin=True).splitlines()
+    new = re.compile(r"NPTS\s*=\s*(?P<count>\d+).*DT\s*=\s*(?P<step>[\d.]+(?:E[+-]?\d+)?)", re.IGNORECASE)
+    old = re.compile(r"\s*(?P<count>\d+)\s+(?P<step>[\d.]+(?:E[+-]?\d+)?)\s+NPTS,\s*DT", re.IGNORECASE)
+    stated = next(((i, m) for i, line in enumerate(lines[:20], 1) if (m := new.search(line) or old.match(line))), None)
+    if stated is None or not float(stated[1]["step"]) > 0:
+        raise Unreadable("states no NPTS and DT above its values; export it again, or as .csv")
+    values = [
+        _number("values", cell, i) for i, line in enumerate(lines[stated[0] :], stated[0] + 1) for cell in line.split()
+    ]
+    if len(values) != int(stated[1]["count"]):
+        raise Unreadable(
+            f"states {stated[1]['count']} values and has {len(values)}; copy or export it again", stated[0]
+        )
+    unit = re.search(r"UNITS OF\s+(\S+)", " ".join(lines[: stated[0]]), re.IGNORECASE)
+    column = Column(np.array(values[skip:]), unit[1] if unit else "")
+    return Table(path, {"values": column}, rate=1 / float(stated[1]["step"]), kind="record")
