@@ -1,6 +1,8 @@
 from .fit import NoiseFit as NoiseFit
 from .fit import fit_noise as fit_noise
 from .moments import non_gaussian_from_record as non_gaussian_from_record
+from .named import named_density as named_density
+from .named import named_spectrum as named_spectrum
 from .reading import read_modes as read_modes
 from .reading import read_record as read_record
 from .reading import read_spectrum as read_spectrum

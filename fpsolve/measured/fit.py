@@ -465,7 +465,7 @@ def _told(
         if abs(each.relative) > max(most * each.error, 0.02)
     ]
     messages += [Message(Code.SPECTRUM_GAP, low=low, high=high) for low, high in gaps(spectrum)]
-    if unknown:
+    if unknown and not spectrum.is_formula:
         messages.append(Message(Code.NO_SPECTRUM_ERROR))
     size = np.sqrt(np.maximum(np.diag(information), 1e-300))
     if np.linalg.eigvalsh(information / np.outer(size, size))[0] < UNTOLD:

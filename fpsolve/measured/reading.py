@@ -33,6 +33,8 @@ from fpsolve.reading import Unreadable
 
 Per = Literal["Hz", "rad/s"]
 Sided = Literal["one", "two"]
+BETWEEN = 400
+"""Frequencies between the first and the last break point of a spectrum."""
 UNEVEN = 1e-3
 """By which share of it steps of a record may differ."""
 FREQUENCY_NAMES = ("f", "fn", "freq", "frequency", "frequencies", "omega", "ω", "w", "frequency_hz", "f_hz")
@@ -59,6 +61,7 @@ def read_spectrum(
     scale: float = 1.0,
     skip: int = 0,
     row: int | None = None,
+    log_log: bool = False,
     averages: float | None = None,
     variance: float | None = None,
 ) -> Spectrum:
@@ -76,6 +79,7 @@ def read_spectrum(
         scale: what the signal is multiplied by, the density by its square.
         skip: rows of the file at its beginning that are left out, of a text its lines.
         row: of a file with several spectra which of them, from 1 on; None for their mean.
+        log_log: whether the file has break points, with straight lines in the logarithms between them.
         averages, variance: see `Spectrum.from_columns`.
 
     Raises:
@@ -109,8 +113,19 @@ def read_spectrum(
         values = density.values[keep] * (factor * _scale(scale)) ** 2
         _refuse_wrong_rows(table, f.values, density.values[keep], f_name, name)
         order = np.argsort(f.values[keep], kind="stable") if np.all(np.diff(f.values) < 0) else slice(None)
-        made = Spectrum.from_columns(f.values[keep][order], values[order], per, sided, averages, variance)
-        return replace(made, notes=(*notes, *more))
+        places, values = f.values[keep][order], values[order]
+        if log_log:
+            places, values = _between(places, values)
+        made = Spectrum.from_columns(places, values, per, sided, averages, variance)
+        return replace(made, notes=(*notes, *more), is_formula=log_log)
+
+
+def _between(f: FloatArray, density: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Values on straight lines in the logarithms between break points."""
+    if f.size < 2 or not np.all(f > 0):
+        raise ValueError("has break points at frequencies that are not > 0, or one only; leave out log_log (--log-log)")
+    places = np.unique(np.concatenate([f, np.geomspace(f[0], f[-1], BETWEEN)[1:-1]]))
+    return places, np.exp(np.interp(np.log(places), np.log(f), np.log(density)))
 
 
 def _is_density(unit: str) -> bool:

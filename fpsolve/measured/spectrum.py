@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.integrate import trapezoid
+from scipy.ndimage import median_filter
 
 from fpsolve.arrays import FloatArray, is_whole, shown
 
@@ -23,6 +24,8 @@ SHORTEST = 64
 """Samples of a record at least."""
 SEGMENTS = 64
 """A record is cut into about so many parts, each twice covered, if nothing else is stated."""
+AROUND = 11
+"""Steps of frequencies around one, itself among them, whose median is taken."""
 SIDES = {"one": 0.5, "two": 1.0}
 UNITS = {"Hz": 2 * math.pi, "rad/s": 1.0}
 
@@ -53,6 +56,7 @@ class Spectrum:
         relative_error: the standard error of each value over the value, shape (n,); None where it is not known.
         variance: of the record that it was made of; None where that is not known.
         notes: what was assumed where it was read.
+        is_formula: whether the values are those of a formula, and have no errors.
 
     Raises:
         ValueError: there are fewer than 5 values, one is no number, not positive, or the frequencies do not increase;
@@ -64,6 +68,7 @@ class Spectrum:
     relative_error: FloatArray | None = None
     variance: float | None = None
     notes: tuple[str, ...] = ()
+    is_formula: bool = False
 
     def __post_init__(self) -> None:
         omega, density = _column("frequencies", self.frequencies), _column("density", self.density)
@@ -253,7 +258,7 @@ def bracketed(frequencies: FloatArray, omega: float) -> bool:
 
 
 def gaps(spectrum: Spectrum) -> Sequence[tuple[float, float]]:
-    """Where two neighbouring frequencies are farther apart than ten times the median, in rad/time."""
+    """Where two neighbouring frequencies are farther apart than ten times the median of those around, in rad/time."""
     steps = np.diff(spectrum.frequencies)
-    wide = np.flatnonzero(steps > 10 * np.median(steps))
+    wide = np.flatnonzero(steps > 10 * median_filter(steps, AROUND, mode="nearest"))
     return [(float(spectrum.frequencies[i]), float(spectrum.frequencies[i + 1])) for i in wide]

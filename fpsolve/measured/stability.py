@@ -8,13 +8,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fpsolve.analysis.sensitivity import solve_sensitivities
+from fpsolve.analysis.sensitivity import Sensitivities, solve_sensitivities
 from fpsolve.analysis.spreads import Spread
 from fpsolve.errors import NotConverged
+from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.solver import solver_of
 from fpsolve.measured.fit import NoiseFit
-from fpsolve.messages import Code
+from fpsolve.messages import Code, Message
 from fpsolve.model.problem import Problem
 from fpsolve.model.quantity import LYAPUNOV_EXPONENT
 
@@ -27,14 +28,22 @@ class Verdict:
     """λ and Λ(2), in 1/time, each a `Spread` with a standard error; `below` of it is the probability that it is < 0.
 
     The law is normal. Its variance is that of the fit, and what the fit is off where it matters beyond standard errors.
+    In a narrow band Λ(2) is known at once, by moment equations, and λ may not converge: it is None then, and `failure`
+    says why.
     """
 
-    exponent: Spread
-    moment: Spread
+    exponent: Spread | None
+    moment: Spread | None
+    failure: Message | None = None
 
 
 def verdict(
-    problem: Problem, fit: NoiseFit, *, rtol: float | None = None, progress: Callable[[], None] = lambda: None
+    problem: Problem,
+    fit: NoiseFit,
+    *,
+    rtol: float | None = None,
+    budget: Budget | None = None,
+    progress: Callable[[], None] = lambda: None,
 ) -> Verdict:
     """λ and Λ(2) with the standard errors √(gᵀCg + (m ∂/∂ ln S)²).
 
@@ -45,36 +54,62 @@ def verdict(
     Args:
         problem: a system with `fit.noise`, in the unit in which the system takes it, see `NoiseFit.scaled`.
         fit: of the noise.
-        rtol: as for `moment_lyapunov`.
+        rtol, budget: as for `moment_lyapunov`.
         progress: called for λ and Λ(2), and again for the derivatives of each: `STEPS` times.
 
     Raises:
         ValueError: the problem has another noise.
-        NotConverged: λ, Λ(2) or a derivative was not solved.
+        NotConverged: neither λ nor Λ(2) was solved.
     """
-    solver = solver_of(problem, rtol=rtol)
+    solver = solver_of(problem, rtol=rtol, budget=budget)
     if problem.noise != fit.noise:
         raise ValueError("the noise of the problem is not that of the fit; make it of fit.noise, or of fit.scaled(...)")
-    exponent = solver.lyapunov_exponent()
-    progress()
-    moment = solver.solution(2.0)
-    progress()
     section = problem.system.noise_sections[0] if len(fit.parts) == 1 else "noise"
     keys = [f"{section}.{key}" for key in fit.parameters]
     along = {key: by for key, by in problem.derivatives().items() if key in keys}
     name = LYAPUNOV_EXPONENT.name
-    found = solve_sensitivities(solver, np.array([2.0]), along, indices=[name], progress=progress)
+
+    def moment() -> Spread:
+        if even := solver.even(2.0):
+            progress()
+            return _spread(even.value, even.error, {key: even.slope(key) for key in keys}, fit, keys)
+        found = solver.solution(2.0)
+        progress()
+        slopes = _slopes(solve_sensitivities(solver, np.array([2.0]), along, indices=[], progress=progress))
+        return _spread(found.pair.value, found.error, _values(slopes.moments[0]), fit, keys)
+
+    def exponent() -> Spread:
+        found = solver.lyapunov_exponent()
+        progress()
+        slopes = _slopes(solve_sensitivities(solver, np.zeros(0), along, indices=[name], progress=progress))
+        return _spread(found.value, found.error_estimate, _values(slopes.indices[name]), fit, keys)
+
+    solved, failures = list[Spread | None](), list[NotConverged]()
+    for solve in (moment, exponent):
+        try:
+            solved.append(solve())
+        except NotConverged as failure:
+            solved.append(None)
+            failures.append(failure)
+    if len(failures) == len(solved):
+        raise failures[-1]
+    return Verdict(solved[1], solved[0], failures[0].message if failures else None)
+
+
+def _values(slopes: Mapping[str, Estimate]) -> dict[str, float]:
+    return {key: each.value for key, each in slopes.items()}
+
+
+def _slopes(found: Sensitivities) -> Sensitivities:
+    """Derivatives. Raises `NotConverged` where there are none."""
     for note in found.notes:
         if note.code is Code.NO_SENSITIVITIES:
             raise NotConverged(note.data["reason"])
-    return Verdict(
-        _spread(exponent.value, exponent.error_estimate, found.indices[name], fit, keys),
-        _spread(moment.pair.value, moment.error, found.moments[0], fit, keys),
-    )
+    return found
 
 
-def _spread(value: float, error: float, slopes: Mapping[str, Estimate], fit: NoiseFit, keys: Sequence[str]) -> Spread:
-    g = np.array([slopes[key].value for key in keys])
+def _spread(value: float, error: float, slopes: Mapping[str, float], fit: NoiseFit, keys: Sequence[str]) -> Spread:
+    g = np.array([slopes[key] for key in keys])
     by_size = 0.5 * float(g @ (fit.powers * np.array([*fit.parameters.values()])))
     return Spread(
         value, value, math.hypot(math.sqrt(max(float(g @ fit.covariance @ g), 0.0)), error, fit.off * by_size)

@@ -96,12 +96,26 @@ class Statement:
     row: Annotated[
         Count | None, Parameter(help="Which of several spectra in the rows of a file; their mean if omitted.")
     ] = None
+    log_log: Annotated[
+        bool, Parameter(help="The file has break points, with straight lines in the logarithms between.", negative="")
+    ] = False
+    named: Annotated[
+        str | None,
+        Parameter(
+            help="A spectral density by its name instead of a file: jonswap, pierson-moskowitz, von-karman, kaimal, "
+            "kanai-tajimi."
+        ),
+    ] = None
+    parameters: Annotated[str, Parameter(help="Those of the named density, such as Hs=2,Tp=9.")] = ""
     segment: Annotated[
         float | None,
         Parameter(help="Seconds of a segment of a record; as the natural frequency needs if omitted."),
     ] = None
     rtol: Annotated[
         float | None, Parameter(help="Tolerance of the exponents of the system, relative; 1e-4 if omitted.")
+    ] = None
+    seconds: Annotated[
+        float | None, Parameter(help="Processor time for each exponent of the system; 20 if omitted.")
     ] = None
     averages: Annotated[
         float | None, Parameter(help="How many independent periodograms the spectrum is the mean of: tells its errors.")

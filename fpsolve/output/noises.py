@@ -113,6 +113,8 @@ def write_noise(outcome: NoiseOutcome, source: Path, shown: Convention, folder: 
     write_json(folder / "noise.json", summary(outcome, source))
     if text:
         write_text(folder / "noise.toml", text)
+    else:  # of other options
+        (folder / "noise.toml").unlink(missing_ok=True)
     draw_noise(outcome, source, shown, folder)
     return [name for name in FILES if text or name != "noise.toml"]
 
@@ -142,11 +144,15 @@ def summary(outcome: NoiseOutcome, source: Path) -> dict[str, Any]:
             "covariance": each.covariance.tolist(),
         }
 
-    def spread(each: Spread) -> dict[str, float]:
+    def spread(each: Spread | None) -> dict[str, float] | None:
+        if each is None:
+            return None
         return {"value": each.value, "standard_error": each.deviation, "probability_below_0": each.below}
 
     def critical(each: Critical | None) -> dict[str, float] | None:
-        return each and {"value": each.value, "standard_error": each.error}
+        if each is None:
+            return None
+        return {"value": each.value, "standard_error": each.error}
 
     omega = [each.omega for each in fit.misfit]
     densities, errors = density_of(fit, omega) if omega else (np.zeros(0), np.zeros(0))
@@ -226,6 +232,8 @@ def sentences(outcome: NoiseOutcome) -> Iterator[str]:
         ("λ", outcome.verdict.exponent, "almost every path decays", "almost every path grows"),
         ("Λ(2)", outcome.verdict.moment, "the mean square decays", "the mean square grows"),
     ):
+        if each is None:
+            continue
         number = f"{symbol} = {sampled(each.value, each.deviation)} ± {each.deviation:.1g} 1/s"
         is_below = each.below >= 0.5
         sure = percent(each.below if is_below else 1 - each.below)

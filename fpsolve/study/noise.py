@@ -13,6 +13,7 @@ from fpsolve.arrays import FloatArray, one
 from fpsolve.case.case import Case
 from fpsolve.case.new import Modes
 from fpsolve.errors import FpsolveError, NotConverged
+from fpsolve.exponent.adapt import Budget
 from fpsolve.measured import (
     NoiseFit,
     Record,
@@ -43,6 +44,8 @@ STEPS_OF_A_FIT = 1 + STEPS
 """How often `measure` calls `progress` at most."""
 RTOL = 1e-4
 """Of λ and Λ(2), whose errors by the fit are some percent."""
+SECONDS = 20.0
+"""Of a processor for λ and for Λ(2) each."""
 STILL = 1e-6
 """Of a modulus: imaginary parts below are none."""
 
@@ -58,7 +61,7 @@ class Wanted:
         height: GM where its variation was measured.
         case: whose system the noise is for; None for an oscillator with the first mode's damping.
         segment: of a record, in s; None for what the frequencies need.
-        rtol: of λ and Λ(2).
+        rtol, seconds: tolerance and time for λ and for Λ(2).
     """
 
     of: str
@@ -70,6 +73,7 @@ class Wanted:
     case: Case | None = None
     segment: float | None = None
     rtol: float = RTOL
+    seconds: float = SECONDS
 
     @property
     def noise_in(self) -> Where:
@@ -91,8 +95,8 @@ class NoiseOutcome:
         fit: of the relative stiffness, or of the damping in 1/s.
         scaled: the same in the unit in which the system takes it.
         exponent, moment: the critical damping ratios for λ and for Λ(2), of one mode.
-        verdict: of the system; None where there is no system, or it was not solved.
-        failure: why it was not solved.
+        verdict: of the system; None where there is no system, or nothing of it was solved.
+        failure: why it, or a part of it, was not solved.
     """
 
     wanted: Wanted
@@ -187,7 +191,9 @@ def measure(data: Spectrum | Record, wanted: Wanted, progress: Callable[[], None
     if system is not None and wanted.terms < len(NAMES):
         try:
             problem = Problem(system, scaled.noise)
-            found["verdict"] = verdict(problem, scaled, rtol=max(problem.usual_rtol, wanted.rtol), progress=progress)
+            rtol, budget = max(problem.usual_rtol, wanted.rtol), Budget(seconds=wanted.seconds)
+            known = verdict(problem, scaled, rtol=rtol, budget=budget, progress=progress)
+            found |= {"verdict": known, "failure": known.failure}
         except NotConverged as failure:
             found["failure"] = failure.message
         except ValueError as error:

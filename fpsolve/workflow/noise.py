@@ -16,14 +16,14 @@ from fpsolve.errors import FpsolveError
 from fpsolve.fem.factors import one_thread
 from fpsolve.files import alone, writable
 from fpsolve.measured import Record, Spectrum, read_modes, read_record, read_spectrum
-from fpsolve.measured.signals import SIGNALS
+from fpsolve.measured.named import NAMED, named_spectrum, parameters_of
+from fpsolve.measured.signals import SIGNALS, factor_of, powers
 from fpsolve.measured.spectrum import UNITS
 from fpsolve.measured.statement import Statement
 from fpsolve.measured.units import GRAVITY
 from fpsolve.output.noises import Convention, write_noise
 from fpsolve.study.noise import (
     CLOSE,
-    RTOL,
     STEPS_OF_A_FIT,
     NoiseOutcome,
     Wanted,
@@ -53,7 +53,7 @@ def noise_case(
         FpsolveError: there is no fit; nothing is written.
         OutputError: the folder cannot be made or written to, or another run writes into it.
     """
-    folder = out / source.stem
+    folder = out / source.name  # with its ending, so that it is none of a case
     try:
         with one_thread(), watch.bar(Phase(source.stem, "solving", STEPS_OF_A_FIT, SOLVES)) as progress:
             outcome = measure(data, wanted, progress)  # the arrays are small
@@ -76,9 +76,13 @@ def measurement_of(
     place = SIGNALS[of].noise_in
     if stated.noise_in not in (None, place):
         raise FpsolveError(f"got --of {of} and --noise-in {stated.noise_in}; {of} is in the {place}; leave one out")
-    source = spectrum or stated.record
+    source = spectrum or stated.record or (Path(stated.named) if stated.named else None)
     if source is None:
-        raise FpsolveError("name a file: that of a spectrum, or of a record by --record")
+        raise FpsolveError("name a file, that of a spectrum or of a record by --record, or a density by --named")
+    if stated.named and (spectrum or stated.record):
+        raise FpsolveError("--named is in place of a file; leave one of them out")
+    if stated.parameters and not stated.named:
+        raise FpsolveError("--parameters are those of --named; name a density, or leave them out")
     modes = _modes(stated, of, case)
     if case:
         refuse_wrong_case(case, of, stated.terms)
@@ -87,9 +91,14 @@ def measurement_of(
         raise FpsolveError(f"--gm belongs to --of height; {remedy}")
     if stated.gm is not None and not 0 < stated.gm < math.inf:
         raise FpsolveError(f"got --gm {stated.gm}; must be > 0, in m")
-    wanted = Wanted(
-        of, stated.kind, stated.terms, stated.method, modes, stated.gm, case, stated.segment, stated.rtol or RTOL
-    )
+    wanted = Wanted(of, stated.kind, stated.terms, stated.method, modes, stated.gm, case, stated.segment)
+    limits = {name: each for name in ("rtol", "seconds") if (each := getattr(stated, name)) is not None}
+    for name, each in limits.items():
+        if not 0 < each < math.inf or (name == "rtol" and each >= 1):
+            raise FpsolveError(f"got --{name} {each:g}; must be > 0{' and < 1' if name == 'rtol' else ', in seconds'}")
+    wanted = replace(wanted, **limits)
+    if stated.named:
+        return _named(stated, of, 2 * modes.omega[0]), wanted, source
     how: dict[str, Any] = {
         "of": of,
         "unit": stated.unit,
@@ -107,9 +116,11 @@ def measurement_of(
         if stated.rate is not None and record is None:
             raise FpsolveError("--rate is for a record, and a spectrum was named; leave it out, or name it by --record")
     if spectrum is None and record is not None:
-        for name in ("sided", "averages", "row"):
-            if getattr(stated, name) is not None:
-                raise FpsolveError(f"--{name} is for a spectrum, and a record was named; leave it out")
+        for name in ("sided", "averages", "row", "log_log"):
+            if getattr(stated, name) not in (None, False):
+                raise FpsolveError(
+                    f"--{name.replace('_', '-')} is for a spectrum, and a record was named; leave it out"
+                )
         return record, wanted, source
     data = read_spectrum(
         spectrum or source,
@@ -117,11 +128,30 @@ def measurement_of(
         sided=stated.sided,
         column=stated.column if record is None else None,
         row=stated.row,
+        log_log=stated.log_log,
         averages=stated.averages,
         variance=None if record is None else float(np.var(record.values)),
         **how,
     )
     return data, wanted, source
+
+
+def _named(stated: Statement, of: str, near: float) -> Spectrum:
+    """The density that is named, in the unit of its signal."""
+    assert stated.named is not None
+    try:
+        found = named_spectrum(stated.named, near, **parameters_of(stated.parameters))
+        unit = stated.unit or NAMED[stated.named].unit
+        if stated.scale == 1.0 and powers(unit) not in [powers(each) for each in SIGNALS[of].units]:
+            signal = SIGNALS[of]
+            text = (
+                f"is in {unit}, and {signal.words} in {signal.unit}; state by --scale how much of this is in one {unit}"
+            )
+            raise ValueError(f"{stated.named} {text}")
+        factor = factor_of(of, powers(unit), unit) if stated.scale == 1.0 else stated.scale
+    except ValueError as error:
+        raise FpsolveError(f"--named: {error}") from None
+    return found.scaled(factor)
 
 
 def _modes(stated: Statement, of: str, case: Case | None) -> Modes:

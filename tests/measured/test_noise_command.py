@@ -58,7 +58,7 @@ def test_a_spectrum_becomes_a_case_and_a_verdict(capsys):
     critical = found["critical_damping_ratio"]
     assert critical["moment"]["value"] == pytest.approx(OMEGA * at_double / 4, rel=1e-3)
     assert critical["lyapunov_exponent"]["value"] == pytest.approx(OMEGA * at_double / 8, rel=1e-3)
-    case, printed = load_case("results/spectrum/noise.toml"), capsys.readouterr().out
+    case, printed = load_case("results/spectrum.csv/noise.toml"), capsys.readouterr().out
     assert case.problem.values == pytest.approx(
         {
             "system.stiffness": OMEGA**2,
@@ -71,7 +71,7 @@ def test_a_spectrum_becomes_a_case_and_a_verdict(capsys):
     )
     assert 'kind = "ornstein-uhlenbeck"' in printed
     assert "Λ(2) < 0 with > 99.9 %, the mean square decays" in printed
-    assert {path.name for path in Path("results/spectrum").iterdir()} == {
+    assert {path.name for path in Path("results/spectrum.csv").iterdir()} == {
         f"noise.{ending}" for ending in ("json", "png", "pdf", "toml")
     }
 
@@ -85,7 +85,7 @@ def test_noise_in_the_damping_of_a_case_needs_0_too(capsys):
     at_double, at_zero = (0.4 * NOISE.spectral_density(each) for each in (2 * OMEGA, 0.0))
     expected = weak_moment(2, OMEGA, 0.02, at_double, at_zero, "damping")
     assert found["second_moment"]["value"] == pytest.approx(expected, rel=1e-3)
-    assert load_case("results/spectrum/noise.toml").problem.values["oscillator.omega"] == pytest.approx(OMEGA)
+    assert load_case("results/spectrum.csv/noise.toml").problem.values["oscillator.omega"] == pytest.approx(OMEGA)
 
 
 @pytest.mark.slow
@@ -103,7 +103,7 @@ def test_acceleration_of_a_support_and_two_terms():
     assert found["frequencies"][0]["density"] == pytest.approx(at_double, rel=1e-3)
     expected = weak_moment(2, OMEGA, 0.01, at_double, 0, "stiffness")
     assert found["second_moment"]["value"] == pytest.approx(expected, rel=5e-3)
-    assert load_case("results/spectrum/noise.toml").system.noise_sections == ("noise.first", "noise.second")
+    assert load_case("results/spectrum.csv/noise.toml").system.noise_sections == ("noise.first", "noise.second")
 
 
 def test_the_sea_at_a_buoy():
@@ -125,7 +125,7 @@ def test_the_sea_at_a_buoy():
     )
     assert found["second_moment"]["probability_below_0"] > 0.99
     case = load_case(ROOT / "cases/systems/hoisted.toml")
-    assert case.problem.values == pytest.approx(load_case("results/buoy/noise.toml").problem.values, rel=1e-5)
+    assert case.problem.values == pytest.approx(load_case("results/buoy.csv/noise.toml").problem.values, rel=1e-5)
 
 
 def test_a_fit_that_is_off_counts_its_distance(capsys):
