@@ -29,8 +29,8 @@ class Words(NamedTuple):
     may_have_mark: bool = False
 
 
-def read_bytes(path: Path, words: Words) -> bytes:
-    """What a plain file of a reasonable size holds. Raises Unreadable."""
+def read_bytes(path: Path, words: Words, most: int = LARGEST) -> bytes:
+    """What a plain file of so many bytes at most holds. Raises Unreadable."""
     try:
         about = path.stat()
         mode = about.st_mode
@@ -38,8 +38,8 @@ def read_bytes(path: Path, words: Words) -> bytes:
             raise Unreadable(f"is a directory; name {words.kind} in it, such as {words.example}")
         if not stat.S_ISREG(mode):
             raise Unreadable(f"is a pipe or a device, not a file; write {words.content} into a file and name that")
-        if about.st_size > LARGEST:
-            said = f"has {about.st_size} bytes, and {words.kind} has at most {LARGEST}"
+        if about.st_size > most:
+            said = f"has {about.st_size} bytes, and {words.kind} has at most {most}"
             raise Unreadable(f"{said}; name another, such as {words.example}")
         return path.read_bytes()
     except FileNotFoundError:
@@ -49,13 +49,13 @@ def read_bytes(path: Path, words: Words) -> bytes:
         raise Unreadable(f"cannot be read ({reason}); check its name and permissions") from None
 
 
-def read_text(path: Path, words: Words, *, may_be_latin: bool = False) -> str:
+def read_text(path: Path, words: Words, *, may_be_latin: bool = False, most: int = LARGEST) -> str:
     """The text of a file in UTF-8, or Latin-1 if it may be, without a byte order mark where it may have one.
 
     Raises:
         Unreadable: it is none.
     """
-    content = read_bytes(path, words)
+    content = read_bytes(path, words, most)
     if content.startswith(BOM_UTF8) and not words.may_have_mark:
         raise Unreadable('starts with a byte order mark; save it as "UTF-8", not "UTF-8 with BOM"', 1)
     content = content.removeprefix(BOM_UTF8)

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from fpsolve.arrays import FloatArray
+from fpsolve.arrays import FloatArray, IntArray
 from fpsolve.reading import Words
 
 WORDS = Words("the measurement", "a file of numbers", "spectrum.csv", "comma-separated", "export the data again", True)
@@ -49,7 +49,7 @@ class Table:
     rate: float | None = None
     abscissa: str = ""
     kind: str = ""
-    lines: Sequence[int] = ()
+    lines: Sequence[int] | IntArray = ()
     rows: FloatArray | None = None
     notes: tuple[str, ...] = ()
 
@@ -60,7 +60,7 @@ class Table:
 
     def place(self, row: int) -> str:
         """Where a row stands in the file, counted from 0: "line 7", or "row 5" where there are no lines."""
-        return f"line {self.lines[row]}" if self.lines else f"row {row + 1}"
+        return f"line {self.lines[row]}" if len(self.lines) else f"row {row + 1}"
 
 
 def heading(text: str) -> tuple[str, str]:

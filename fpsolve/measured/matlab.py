@@ -5,6 +5,7 @@ Some files that are broken end the process that reads them, or let it take all m
 
 from __future__ import annotations
 
+import math
 import subprocess
 import sys
 from pathlib import Path
@@ -22,8 +23,12 @@ class MatError(ValueError):
     """What is wrong with a file."""
 
 
-def read_mat(path: Path) -> dict[str, Any]:
+def read_mat(path: Path, most: int) -> dict[str, Any]:
     """The arrays of real numbers at the top level of a file, by their names; others are left out.
+
+    Args:
+        path: of the file.
+        most: numbers that it has at most in all.
 
     Raises:
         MatError: the file is none of these levels, or is broken.
@@ -32,7 +37,7 @@ def read_mat(path: Path) -> dict[str, Any]:
 
     with TemporaryDirectory() as folder:
         target = Path(folder) / "arrays.npz"
-        command = [sys.executable, "-P", "-m", "fpsolve.measured.matlab", str(path.resolve()), str(target)]
+        command = [sys.executable, "-P", "-m", "fpsolve.measured.matlab", str(path.resolve()), str(target), str(most)]
         try:
             ended = subprocess.run(command, capture_output=True, text=True, timeout=MOST_SECONDS, check=False)
         except subprocess.TimeoutExpired:
@@ -44,7 +49,7 @@ def read_mat(path: Path) -> dict[str, Any]:
             return dict(arrays)
 
 
-def _read(source: str, target: str) -> None:
+def _read(source: str, target: str, most: str) -> None:
     """In the process: write the arrays of a file into another one."""
     import numpy as np
     from scipy.io import loadmat, whosmat
@@ -53,7 +58,10 @@ def _read(source: str, target: str) -> None:
         import resource
 
         resource.setrlimit(resource.RLIMIT_AS, (MOST_BYTES, MOST_BYTES))
-    names = [name for name, _, kind in whosmat(source) if kind in KINDS]
+    about = [(name, math.prod(shape)) for name, shape, kind in whosmat(source) if kind in KINDS]
+    names = [name for name, _ in about]
+    if (total := sum(count for _, count in about)) > int(most):
+        raise ValueError(f"it has {total} numbers, and at most {most} are read")
     arrays = loadmat(source, variable_names=names) if names else {}
     np.savez(target, **{name: arrays[name] for name in names if np.isrealobj(arrays[name])})
 

@@ -23,11 +23,13 @@ from fpsolve.arrays import FloatArray
 from fpsolve.errors import FpsolveError
 from fpsolve.measured.columns import WORDS, Column, Table
 from fpsolve.measured.matlab import MatError, read_mat
-from fpsolve.measured.text import NO_TABLE, read_peer_table, read_text_table
+from fpsolve.measured.text import MOST_TEXT, NO_TABLE, read_peer_table, read_text_table
 from fpsolve.reading import Unreadable, read_bytes
 
-MOST_NUMBERS = 2**26
-"""Of an array that is read."""
+MOST_NUMBERS = 2**25
+"""Of all arrays of a file."""
+MOST_BYTES = 2**27
+"""Of a file that is no text."""
 MOST_COLUMNS = 64
 
 
@@ -103,7 +105,7 @@ def _split(name: str, array: Any, unit: str = "") -> Iterator[tuple[str, Column]
 
 
 def _of_npy(path: Path) -> Table:
-    content = read_bytes(path, WORDS)
+    content = read_bytes(path, WORDS, MOST_BYTES)
     return Table(path, dict(_of_array("", _npy(content, ""))))
 
 
@@ -139,13 +141,13 @@ def _npy(content: bytes, name: str) -> Any:
 
 
 def _of_npz(path: Path) -> Table:
-    content = read_bytes(path, WORDS)
+    content = read_bytes(path, WORDS, MOST_BYTES)
     columns = dict[str, Column]()
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
+            _looked_at((sum(entry.file_size for entry in archive.infolist()) // 8,), "")
             for entry in archive.infolist():
                 name = entry.filename.removesuffix(".npy")
-                _looked_at((entry.file_size // 8,), name)
                 columns |= _of_array(name, _npy(archive.read(entry), name))
     except Unreadable:
         raise
@@ -155,12 +157,12 @@ def _of_npz(path: Path) -> Table:
 
 
 def _of_mat(path: Path) -> Table:
-    content = read_bytes(path, WORDS)
+    content = read_bytes(path, WORDS, MOST_BYTES)
     if content[:8] == b"\x89HDF\r\n\x1a\n" or b"MATLAB 7.3" in content[:128]:
         raise Unreadable('is a MATLAB 7.3 file, which is HDF5; save it by save(..., "-v7")')
     columns = dict[str, Column]()
     try:
-        for name, array in read_mat(path).items():
+        for name, array in read_mat(path, MOST_NUMBERS).items():
             columns |= _split(name, array)
     except MatError as error:
         raise Unreadable(f'is no MATLAB file ({_reason(error)}); save it by save(..., "-v7")') from None
@@ -173,7 +175,7 @@ def _of_wav(path: Path) -> Table:
     """Channels as shares of full scale."""
     from scipy.io import wavfile
 
-    content = read_bytes(path, WORDS)
+    content = read_bytes(path, WORDS, MOST_BYTES)
     stated = int.from_bytes(content[4:8], "big" if content.startswith(b"RIFX") else "little") + 8
     if content[:4] in (b"RIFF", b"RIFX") and stated > len(content):
         raise Unreadable(f"states {stated} bytes and has {len(content)}; copy or export it again")
@@ -182,6 +184,7 @@ def _of_wav(path: Path) -> Table:
             rate, data = wavfile.read(io.BytesIO(content))
     except Exception as error:  # scipy raises many kinds for what is no such file
         raise Unreadable(f"is no WAV file ({_reason(error)}); export it again as PCM") from None
+    _looked_at(data.shape, "")
     if not rate > 0:
         raise Unreadable("states a rate of 0; export it again")
     if data.dtype.kind in "iu":
@@ -205,7 +208,7 @@ UFF_KINDS = {1: "record", 9: "spectrum"}
 
 
 def _of_uff(path: Path) -> Table:
-    content = read_bytes(path, WORDS)
+    content = read_bytes(path, WORDS, MOST_TEXT)
     try:
         import pyuff
     except ImportError:
@@ -258,7 +261,7 @@ def _of_uff(path: Path) -> Table:
 def _of_netcdf(path: Path) -> Table:
     import xarray as xr
 
-    content = read_bytes(path, WORDS)
+    content = read_bytes(path, WORDS, MOST_BYTES)
     try:
         if content[:8] == b"\x89HDF\r\n\x1a\n":
             _look_into_hdf(content)
@@ -322,6 +325,7 @@ def _look_into_hdf(content: bytes) -> None:
     """Refuse variables elsewhere, and those that are too large. Raises Unreadable."""
     import h5py
 
+    total = 0
     with h5py.File(io.BytesIO(content), "r") as file:
         for name in file:
             link = file.get(name, getlink=True)
@@ -331,7 +335,8 @@ def _look_into_hdf(content: bytes) -> None:
             if each is None or (isinstance(each, h5py.Dataset) and (each.is_virtual or each.external)):
                 raise Unreadable(f"{name} leads to another file; write one file by xarray's to_netcdf")
             if isinstance(each, h5py.Dataset):
-                _looked_at(each.shape or (), name)
+                total += math.prod(each.shape or ())
+                _looked_at((total,), "")
 
 
 def _such_as(names: list[str]) -> str:

@@ -18,13 +18,15 @@ from pathlib import Path
 
 import numpy as np
 
-from fpsolve.arrays import FloatArray
+from fpsolve.arrays import FloatArray, IntArray
 from fpsolve.measured.columns import WORDS, Column, Table, heading
 from fpsolve.measured.signals import FREQUENCIES, SIGNALS, TIMES, among, density_unit
 from fpsolve.reading import Unreadable, read_text
 
 NO_TABLE = "has no table of numbers"
 MOST_COLUMNS = 1000
+MOST_TEXT, MOST_LINES = 2**26, 4_000_000
+"""Bytes and lines of a text; to read it takes some twelve times as many bytes, or 200 a line."""
 LEAST_FREQUENCIES = 5
 """Numbers at the end of a header that are taken for frequencies."""
 SAMPLE = 2000
@@ -41,14 +43,14 @@ SEPARATORS = ("\t", ";", ",", None)
 
 @dataclass(frozen=True)
 class _Lines:
-    """The rows of a table, by their lines, and how they are cut."""
+    """The rows of a table: the lines of a file, the numbers of those that are rows, and how they are cut."""
 
-    numbers: Sequence[int]
     lines: Sequence[str]
+    numbers: IntArray
     separator: str | None
 
     def cells(self, column: int) -> list[str]:
-        return [_cells(line, self.separator)[column] for line in self.lines]
+        return [_cells(self.lines[i - 1], self.separator)[column] for i in self.numbers.tolist()]
 
 
 @dataclass(frozen=True)
@@ -77,7 +79,7 @@ class _Columns(Mapping[str, Column]):
         try:
             values = np.array([float(cell) for cell in cells])
         except ValueError:
-            values = np.array([_number(name, *each) for each in zip(cells, self.rows.numbers, strict=True)])
+            values = np.array([_number(name, *each) for each in zip(cells, self.rows.numbers.tolist(), strict=True)])
         return Column(values, self.units[name], _last_digit(cells[:: max(len(cells) // SAMPLE, 1)]))
 
 
@@ -100,7 +102,7 @@ def _last_digit(cells: Sequence[str]) -> float:
     return sorted(found)[len(found) // 4]
 
 
-def _times(name: str, cells: Sequence[str], numbers: Sequence[int]) -> Column:
+def _times(name: str, cells: Sequence[str], numbers: IntArray) -> Column:
     """Seconds since the first of some times of the calendar, or of a day, which may end at midnight."""
     import pandas as pd
 
@@ -114,7 +116,7 @@ def _times(name: str, cells: Sequence[str], numbers: Sequence[int]) -> Column:
     except (ValueError, TypeError, OverflowError):
         wrong = next((i for i, cell in enumerate(cells) if not _STAMP.fullmatch(cell)), 0)
         text = f'has "{cells[wrong]}" in the column {name}; write all times alike, such as 2026-01-31 12:00:00.5'
-        raise Unreadable(text, numbers[wrong]) from None
+        raise Unreadable(text, int(numbers[wrong])) from None
     if clock:
         seconds += 86400.0 * np.cumsum(np.diff(seconds, prepend=0.0) < -43200)
     digits = max(len(re.match(r"\d*", each.partition(".")[2])[0]) for each in cells)  # type: ignore[index]
@@ -131,25 +133,28 @@ def read_text_table(path: Path, skip: int = 0) -> Table:
     Raises:
         Unreadable: there is none, or its header has a name twice.
     """
-    lines = read_text(path, WORDS, may_be_latin=True).splitlines()
+    text = read_text(path, WORDS, may_be_latin=True, most=MOST_TEXT)
+    if text.count("\n") > MOST_LINES:
+        raise Unreadable(f"has more than {MOST_LINES} lines; cut the measurement, or save it as .npy")
+    lines = text.splitlines()
     separators: Sequence[str | None] = SEPARATORS
     if lines and (stated := re.fullmatch(r'"?sep=(.)"?', lines[0].strip(), re.IGNORECASE)):  # of Excel
         separators, lines[0] = (stated[1],), ""
-    every = [(i, line) for i, line in enumerate(lines, 1) if line.strip() and i > skip]
-    plain = [(i, line) for i, line in every if not _MARK.match(line)]
-    separator, count = _shape([line for _, line in [*plain[:SAMPLE], *plain[SAMPLE:][-SAMPLE:]]], separators)
-    start = _start(plain, separator, count)
-    body = plain[start:]
-    first = _cells(body[0][1], separator)
-    table = _Lines([i for i, _ in body], [line for _, line in body], separator)
-    above = [each for each in every if each[0] < body[0][0]]
-    names, units, header = _header(above, first, separator)
+    stated_lines = [i for i in range(skip + 1, len(lines) + 1) if lines[i - 1].strip()]
+    numbers = np.array([i for i in stated_lines if not _MARK.match(lines[i - 1])], dtype=np.int32)
+    sample = np.concatenate([numbers[:SAMPLE], numbers[SAMPLE:][-SAMPLE:]]).tolist()
+    separator, count = _shape([lines[i - 1] for i in sample], separators)
+    table = _Lines(lines, numbers[_start([lines[i - 1] for i in sample], separator, count) :], separator)
+    begin = int(table.numbers[0])
+    first = _cells(lines[begin - 1], separator)
+    above = [i for i in stated_lines[: begin + 1] if i < begin]
+    names, units, header = _header([(i, lines[i - 1]) for i in above], first, separator)
+    for i in table.numbers.tolist():
+        if (found := len(_cells(lines[i - 1], separator))) != count:
+            told = f"has {found} cells, and {'the header' if names else 'the first row'} has {count}"
+            raise Unreadable(f"{told}; complete the row, or remove it", i)
     if names and all(map(_is_number, names[-LEAST_FREQUENCIES:])):
         return _on_its_side(path, table, names)
-    for line, text in body:
-        if (found := len(_cells(text, separator))) != count:
-            told = f"has {found} cells, and {'the header' if names else 'the first row'} has {count}"
-            raise Unreadable(f"{told}; complete the row, or remove it", line)
     ends = [k for k in range(count) if not first[k] and not any(table.cells(k))]
     if names:
         twice = next((name for name in names if name and names.count(name) > 1), None)
@@ -160,7 +165,7 @@ def read_text_table(path: Path, skip: int = 0) -> Table:
         names, units = [str(k + 1) for k in range(count)], [""] * count
     places = {name: k for k, name in enumerate(names) if k not in ends}
     columns = _Columns(table, places, dict(zip(names, units, strict=True)))
-    notes = () if not above or header else (f"left out the lines 1 to {above[-1][0]}, which have no names of columns",)
+    notes = () if not above or header else (f"left out the lines 1 to {above[-1]}, which have no names of columns",)
     return Table(path, _without_index(columns), abscissa=_stamps(columns, first), lines=table.numbers, notes=notes)
 
 
@@ -204,15 +209,13 @@ def _shape(lines: Sequence[str], separators: Sequence[str | None]) -> tuple[str 
     return chosen, best[1]
 
 
-def _start(lines: Sequence[tuple[int, str]], separator: str | None, count: int) -> int:
+def _start(lines: Sequence[str], separator: str | None, count: int) -> int:
     """Where the table begins: the first row of its shape that another one follows."""
-    rows = (
-        i for i, (_, line) in enumerate(lines) if len(cells := _cells(line, separator)) == count and _like_row(cells)
-    )
-    candidates = [*rows]
-    numeric = Counter(k for i in candidates for k, cell in enumerate(_cells(lines[i][1], separator)) if _fits(cell))
-    columns = [k for k, times in numeric.items() if 2 * times > len(candidates)]
-    good = [i for i in candidates if all(_fits(_cells(lines[i][1], separator)[k]) for k in columns)] or candidates
+    split = [_cells(line, separator) for line in lines]
+    rows = [i for i, cells in enumerate(split) if len(cells) == count and _like_row(cells)]
+    numeric = Counter(k for i in rows for k, cell in enumerate(split[i]) if _fits(cell))
+    columns = [k for k, times in numeric.items() if 2 * times > len(rows)]
+    good = [i for i in rows if all(_fits(split[i][k]) for k in columns)] or rows
     return next((i for i, j in pairwise(good) if j == i + 1), good[0])
 
 
@@ -307,7 +310,7 @@ def read_peer_table(path: Path, skip: int = 0) -> Table:
     Raises:
         Unreadable: it has no DT, or not as many values as it states.
     """
-    lines = read_text(path, WORDS, may_be_latin=True).splitlines()
+    lines = read_text(path, WORDS, may_be_latin=True, most=MOST_TEXT).splitlines()
     new = re.compile(r"NPTS\s*=\s*(?P<count>\d+).*DT\s*=\s*(?P<step>[\d.]+(?:E[+-]?\d+)?)", re.IGNORECASE)
     old = re.compile(r"\s*(?P<count>\d+)\s+(?P<step>[\d.]+(?:E[+-]?\d+)?)\s+NPTS,\s*DT", re.IGNORECASE)
     stated = next(((i, m) for i, line in enumerate(lines[:20], 1) if (m := new.search(line) or old.match(line))), None)

@@ -14,7 +14,8 @@ from scipy.io import savemat, wavfile
 from scipy.signal import lfilter, welch
 
 from fpsolve.errors import FpsolveError
-from fpsolve.measured import read_record, read_spectrum
+from fpsolve.measured import read_record, read_spectrum, tables
+from fpsolve.measured import text as text_tables
 from tests.measured.test_reading import uff
 
 RATE, F0 = 50.0, 2.0
@@ -315,3 +316,41 @@ def test_rows_are_left_out_at_the_beginning(tmp_path):
     for path, skip in (("a.csv", 101), ("b.npy", 100)):
         found = read_record(tmp_path / path, rate=RATE, skip=skip, column="2" if path == "a.csv" else None)
         assert found.values == pytest.approx(X[100:] - X[100:].mean())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(2))
+def test_rotten_files_are_read_or_refused_in_one_sentence(seed, tmp_path):
+    """Bits that have turned, bytes that are gone, added, or all ones."""
+    rng = np.random.default_rng(seed)
+    good = {name: text.encode() for name, (text, _, _) in TEXT_RECORDS.items()}
+    good |= {name: make() for name, (make, _, _) in BINARY_RECORDS.items() if not name.endswith(".mat")}
+    good |= {name: content for name, (content, _, _) in LYING.items()}
+    said = 0
+    for name, content in good.items():
+        path = tmp_path / f"rotten{name[name.rindex('.') :]}"
+        for _ in range(10):
+            rotten = bytearray(content)
+            place, count = int(rng.integers(len(rotten))), int(rng.integers(1, 40))
+            more = bytes(rng.integers(0, 256, count).astype("u1"))
+            rotten[place] ^= 1 << int(rng.integers(8))
+            kept = rng.integers(4)
+            rotten[place : place + (count if kept != 1 else 0)] = (b"", more, b"\xff" * count, more)[kept]
+            path.write_bytes(rotten)
+            try:
+                read_spectrum(path, per="Hz", sided="one") if name in LYING else read_record(path, rate=RATE)
+            except FpsolveError as error:
+                said += 1
+                assert "\n" not in str(error)
+    assert said > 50
+
+
+def test_what_is_too_large_is_refused_before_it_is_read(tmp_path, monkeypatch):
+    np.savez_compressed(tmp_path / "a.npz", **{f"a{k}": np.zeros(2**18) for k in range(4)})
+    (tmp_path / "b.csv").write_text("t,x\n" + "1,2\n" * 5000, encoding="utf-8")
+    savemat(tmp_path / "c.mat", {f"a{k}": np.zeros(2**18) for k in range(4)}, do_compression=True)
+    monkeypatch.setattr(tables, "MOST_NUMBERS", 2**19)
+    monkeypatch.setattr(text_tables, "MOST_LINES", 4000)
+    for name, most in (("a.npz", 2**19), ("b.csv", 4000), ("c.mat", 2**19)):
+        with pytest.raises(FpsolveError, match=f"{most}"):
+            read_record(tmp_path / name, rate=1.0)
