@@ -70,4 +70,4 @@ if __name__ == "__main__":
     try:
         _read(*sys.argv[1:])
     except Exception as error:  # scipy raises many kinds for what is no such file
-        raise SystemExit(" ".join(str(error).split()) or type(error).__name__) from None
+        raise SystemExit(f"{type(error).__name__}: {error}") from None

@@ -319,17 +319,16 @@ def test_rows_are_left_out_at_the_beginning(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(2))
-def test_rotten_files_are_read_or_refused_in_one_sentence(seed, tmp_path):
+def test_rotten_files_are_read_or_refused_in_one_sentence(tmp_path):
     """Bits that have turned, bytes that are gone, added, or all ones."""
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     good = {name: text.encode() for name, (text, _, _) in TEXT_RECORDS.items()}
     good |= {name: make() for name, (make, _, _) in BINARY_RECORDS.items() if not name.endswith(".mat")}
     good |= {name: content for name, (content, _, _) in LYING.items()}
-    said = 0
+    said = list[str]()
     for name, content in good.items():
         path = tmp_path / f"rotten{name[name.rindex('.') :]}"
-        for _ in range(10):
+        for _ in range(6):
             rotten = bytearray(content)
             place, count = int(rng.integers(len(rotten))), int(rng.integers(1, 40))
             more = bytes(rng.integers(0, 256, count).astype("u1"))
@@ -340,9 +339,9 @@ def test_rotten_files_are_read_or_refused_in_one_sentence(seed, tmp_path):
             try:
                 read_spectrum(path, per="Hz", sided="one") if name in LYING else read_record(path, rate=RATE)
             except FpsolveError as error:
-                said += 1
-                assert "\n" not in str(error)
-    assert said > 50
+                said.append(str(error))
+    assert len(said) > 50
+    assert not [each for each in said if "\n" in each]
 
 
 def test_what_is_too_large_is_refused_before_it_is_read(tmp_path, monkeypatch):

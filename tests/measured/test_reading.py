@@ -314,7 +314,7 @@ def test_damaged_files_are_read_or_refused_in_one_sentence(seed, tmp_path):
     wavfile.write(tmp_path / "a.wav", 50, X.astype("<f4"))
     said = []
     for path, rate in [*good, (tmp_path / "a.wav", None)]:
-        for _ in range(40):
+        for _ in range(40 if path.suffix != ".mat" else 4):  # which a process of its own reads
             damaged = bytearray(path.read_bytes())
             place = rng.integers(len(damaged))
             new = bytes(rng.integers(0, 256, rng.integers(0, 40)).astype("u1"))
