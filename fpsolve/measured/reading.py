@@ -110,7 +110,7 @@ def read_spectrum(
         )
         factor, more = _factor(of, (known or signal).signal, unit or density.unit, name)
         keep = slice(None) if table.rows is None else density.values > 0  # buoys write 0 where there are no waves
-        values = density.values[keep] * (factor * _scale(scale)) ** 2
+        values = density.values[keep] * (factor * checked_scale(scale)) ** 2
         _refuse_wrong_rows(table, f.values, density.values[keep], f_name, name)
         order = np.argsort(f.values[keep], kind="stable") if np.all(np.diff(f.values) < 0) else slice(None)
         places, values = f.values[keep][order], values[order]
@@ -161,7 +161,8 @@ def _factor(of: str | None, stated: Powers | None, text: str, name: str) -> tupl
     return factor_of(of, stated, text), ()
 
 
-def _scale(scale: float) -> float:
+def checked_scale(scale: float) -> float:
+    """A factor. Raises `ValueError`."""
     if not (math.isfinite(scale) and scale != 0):
         raise ValueError(f"cannot be multiplied by {scale}; state another --scale")
     return scale
@@ -248,7 +249,7 @@ def read_record(
         values = _numbers(table, name)
         stated = powers(unit or values.unit) if (unit or values.unit).strip() else None
         factor, more = _factor(of, stated, unit or values.unit, name)
-        made = Record(values.values * (factor * _scale(scale)), step if rate is None else 1 / rate)
+        made = Record(values.values * (factor * checked_scale(scale)), step if rate is None else 1 / rate)
         return replace(made, notes=(*notes, *more))
 
 

@@ -17,6 +17,7 @@ from fpsolve.fem.factors import one_thread
 from fpsolve.files import alone, writable
 from fpsolve.measured import Record, Spectrum, read_modes, read_record, read_spectrum
 from fpsolve.measured.named import NAMED, named_spectrum, parameters_of
+from fpsolve.measured.reading import checked_scale
 from fpsolve.measured.signals import SIGNALS, factor_of, powers
 from fpsolve.measured.spectrum import UNITS
 from fpsolve.measured.statement import Statement
@@ -148,7 +149,7 @@ def _named(stated: Statement, of: str, near: float) -> Spectrum:
                 f"is in {unit}, and {signal.words} in {signal.unit}; state by --scale how much of this is in one {unit}"
             )
             raise ValueError(f"{stated.named} {text}")
-        factor = factor_of(of, powers(unit), unit) if stated.scale == 1.0 else stated.scale
+        factor = factor_of(of, powers(unit), unit) if stated.scale == 1.0 else checked_scale(stated.scale)
     except ValueError as error:
         raise FpsolveError(f"--named: {error}") from None
     return found.scaled(factor)

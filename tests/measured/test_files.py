@@ -133,7 +133,31 @@ TEXT_RECORDS = {
     "mark.csv": ("\ufefft (s),a (g)\n" + rows(T, X), G, {}),
     "motion.AT2": (peer("A", X), G, {}),
 }
+
+
+def binary_uff(end):
+    """Dataset 58b as its format says: lines of text, then numbers of four bytes."""
+    axis = f"{17:10d}{0:5d}{0:5d}{0:5d} {'NONE':20s} {'NONE':20s}"
+    data = X.astype("<f4").tobytes()
+    lines = [
+        "    -1",
+        f"{58:6d}b{1:6d}{2:6d}{11:12d}{len(data):12d}{0:6d}{0:6d}{0:12d}{0:12d}",
+        "a",
+        *["NONE"] * 4,
+        f"{1:5d}{0:10d}{1:5d}{0:10d} {'NONE':10s}{1:10d}{1:4d} {'NONE':10s}{1:10d}{1:4d}",
+        f"{2:10d}{X.size:10d}{1:10d}{0.0:13.5e}{1 / RATE:13.5e}{0.0:13.5e}",
+        axis,
+        f"{12:10d}{0:5d}{0:5d}{0:5d} {'NONE':20s} {'g':20s}",
+        axis,
+        axis,
+        "",
+    ]
+    return end.join(lines).encode() + data + f"{end}    -1{end}".encode()
+
+
 BINARY_RECORDS = {
+    "58b.uff": (lambda: binary_uff("\n"), G, {}),
+    "58b_crlf.uff": (lambda: binary_uff("\r\n"), G, {}),
     "latin.csv": (lambda: ("Mesure à 5 °C\nt (s),a (m/s²)\n" + rows(T, X)).encode("latin-1"), 1.0, {}),
     "bext.wav": (
         lambda: wav((b"bext", b"station" * 40), (b"cue ", b"\0" * 28), (b"id3 ", b"ID3" + b"x" * 30)),
@@ -183,7 +207,9 @@ def test_a_record_as_people_have_it(name, tmp_path):
         path.write_bytes(make())
     found = read_record(path, of="acceleration", **options)
     assert found.step == pytest.approx(1 / RATE, rel=1e-9 if name != "single.mat" else 1e-5)
-    length, x = found.segment_length(), factor * (X if name != "bext.wav" else 4 * (X / 4).astype("f4").astype(float))
+    single = {"bext.wav": 4.0, "58b.uff": 1.0, "58b_crlf.uff": 1.0}.get(name)  # numbers of four bytes
+    x = factor * (X if single is None else single * (X / single).astype("f4").astype(float))
+    length = found.segment_length()
     spectrum = found.spectrum(length)
     here = float(np.interp(2 * F0 * 2 * math.pi, spectrum.frequencies, 2 * spectrum.density))
     assert here == pytest.approx(welch_at(2 * F0, x, found.step, length), rel=1e-9)

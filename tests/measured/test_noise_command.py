@@ -254,3 +254,35 @@ def test_the_page_of_the_docs(tmp_path, monkeypatch, capsys):
         elif language == "text":
             for line in block.splitlines():
                 assert " ".join(line.split()) in printed, line
+
+
+def test_results_stay_where_they_belong():
+    """A file called ...csv does not lead out of --out, nor a file into the folder of a case; no old case is left."""
+    options = ["--sided", "one", "--averages", "64", "--frequency", "2"]
+    for name in ("...csv", "m.csv"):
+        noise(spectrum(name), *options, "--damping-ratio", "0.01")
+        assert (Path("results") / name / "noise.toml").is_file()
+    noise("m.csv", *options)
+    assert not Path("results/m.csv/noise.toml").exists()
+    assert {path.name for path in Path().iterdir()} == {"...csv", "m.csv", "results"}
+
+
+def test_what_was_assumed_is_said(capsys):
+    np.savetxt("a.csv", np.column_stack([F, 0.02 / (1 + F)]), delimiter=",", header="f (Hz),G")
+    found = noise("a.csv", "--sided", "one", "--of", "acceleration", "--frequency", "2", "--averages", "9")
+    assert any("taken as m/s²" in each for each in found["warnings"])
+    assert "state --unit" in capsys.readouterr().err
+
+
+def test_a_named_density_becomes_a_case(capsys):
+    options = ["--named", "kanai-tajimi", "--parameters", "S0=0.01", "--of", "acceleration", "--frequency", "2.5"]
+    found = noise(*options, "--damping-ratio", "0.05", "--kind", "filter")
+    assert load_case("results/kanai-tajimi/noise.toml").problem.values["noise.zeta"] > 0.3
+    assert abs(found["frequencies"][0]["measured_over_fitted"] - 1) < 0.3
+    assert "how many averages" not in capsys.readouterr().err
+    for more, said in (
+        (["--record", "a.csv"], "in place of a file"),
+        (["--scale", "0"], "state another --scale"),
+    ):
+        assert main(["noise", *options, *more]) == BAD_INPUT
+        assert said in capsys.readouterr().err
