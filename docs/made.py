@@ -44,6 +44,8 @@ ROOMS = {
     "parts": "what a case may ask for of each curve",
     "study": "cases become results",
     "output": "results become files and pictures",
+    "show": "what is said of results",
+    "page": "blocks on a terminal and in HTML",
     "workflow": "run, simulate, chart and check a case",
 }
 

@@ -27,14 +27,14 @@ from fpsolve.case.remedies import CASE_WORDS
 from fpsolve.errors import CaseError, FpsolveError, NotConverged, WorkersDied
 from fpsolve.measured.statement import Count, ModeRows, ModesFile, Statement
 from fpsolve.messages import Severity, escaped, message_of
-from fpsolve.output.letters import HANDLER
+from fpsolve.page.letters import HANDLER
 from fpsolve.signals import INTERRUPTED, ended_by_signals
 
 if TYPE_CHECKING:
     from fpsolve.case.case import Case
-    from fpsolve.output.report import Reporter
     from fpsolve.pool import Pool
     from fpsolve.workflow.progress import Watch
+    from fpsolve.workflow.reports import Reporter
 
 CHECK_FAILED, BAD_INPUT, NOT_CONVERGED, CLOSED_PIPE = 1, 2, 3, 141
 TRACEBACK = "--traceback"
@@ -310,8 +310,10 @@ def run(
     Example: fpsolve run cases/fig1.toml --out results --set oscillator.omega=2.0
     """
     from fpsolve.output.tables import whole_summary
-    from fpsolve.output.terminal import done_of, known_of, note_missing, print_written
+    from fpsolve.page.terminal import print_blocks
     from fpsolve.parts.intervals import refuse_wrong_samples
+    from fpsolve.show.notes import left_out
+    from fpsolve.show.results import done_of, known_of, last_line
     from fpsolve.workflow.cases import run_case
 
     code, reporter = 0, reporter_of(report, interactive)
@@ -328,12 +330,13 @@ def run(
         if outcome.interruption:
             print_error(outcome.interruption)
         if not (quiet or outcome.interruption):
-            note_missing(case, monte_carlo=monte_carlo)
+            print_blocks(left_out(case, monte_carlo=monte_carlo))
         if json:
             print(whole_summary(case, outcome.results, outcome.facts))
         else:
             what = done_of(case, len(outcome.results), sum(each.status.fails for each in outcome.results))
-            print_written(out / case.name, what, monotonic() - start, known_of(case, outcome.known, outcome.outdated))
+            known = known_of(case, outcome.known, outcome.outdated)
+            print_blocks([last_line(out / case.name, what, monotonic() - start, known)])
         if outcome.interruption:
             return INTERRUPTED
         if outcome.failures or (outcome.samples and outcome.samples.failed):
@@ -375,7 +378,8 @@ def simulate(
 
     Example: fpsolve simulate cases/fig1.toml --paths 100000 --seed 1 --estimator population
     """
-    from fpsolve.output.terminal import done_of, known_of, print_written
+    from fpsolve.page.terminal import print_blocks
+    from fpsolve.show.results import done_of, known_of, last_line
     from fpsolve.workflow.cases import simulate_case
 
     reporter = reporter_of(report, interactive)
@@ -394,7 +398,8 @@ def simulate(
         if outcome.interruption:
             print_error(outcome.interruption)
         what = done_of(case, sum(not each.interrupted for each in outcome.simulated))
-        print_written(out / case.name, what, monotonic() - start, known_of(case, outcome.known, outcome.outdated))
+        known = known_of(case, outcome.known, outcome.outdated)
+        print_blocks([last_line(out / case.name, what, monotonic() - start, known)])
         if outcome.interruption:
             return INTERRUPTED
     return 0
@@ -423,7 +428,10 @@ def check(
 
     Example: fpsolve check cases/fig1.toml cases/minimal.toml
     """
-    from fpsolve.output.terminal import agreement, print_comparisons, print_message, print_remarks
+    from fpsolve.page.terminal import print_blocks
+    from fpsolve.show.comparison import agreement
+    from fpsolve.show.comparison import show as show_comparisons
+    from fpsolve.show.notes import note_on, notes
     from fpsolve.study.hierarchy import refuse_no_hierarchy
     from fpsolve.workflow.cases import check_case
 
@@ -435,12 +443,10 @@ def check(
         outcome = check_case(case, by_hierarchy=hierarchy, pool=pool, watch=_watch(is_quiet=quiet))
         if quiet:
             print(f"{case.name}: {agreement(outcome.comparisons)}")
-            print_remarks(case, outcome.results, "", [Severity.FAILURE])
         else:
-            print_comparisons(case, outcome.comparisons)
-            print_remarks(case, outcome.results, "")
-        for fault in outcome.faults:
-            print_message(case, fault)
+            print_blocks(show_comparisons(case, outcome.comparisons))
+        print_blocks(notes(case, outcome.results, ""), [Severity.FAILURE] if quiet else list(Severity))
+        print_blocks(note_on(case.name, fault) for fault in outcome.faults)
         if outcome.failures:
             code = NOT_CONVERGED
         elif outcome.faults or not all(comparison.met for comparison in outcome.comparisons):
@@ -468,7 +474,11 @@ def chart(
 
     Example: fpsolve chart cases/chart.toml --set chart.x.stop=3.0
     """
-    from fpsolve.output.terminal import print_chart, print_remark, print_written, traced
+    from fpsolve.page.terminal import print_blocks
+    from fpsolve.show.chart import show as show_chart
+    from fpsolve.show.chart import traced
+    from fpsolve.show.notes import note_on
+    from fpsolve.show.results import last_line
     from fpsolve.study.chart import refuse_no_chart
     from fpsolve.workflow.cases import chart_case
 
@@ -481,11 +491,10 @@ def chart(
         start = monotonic()
         found = chart_case(case, out, pool=pool, reporter=reporter, watch=_watch(is_quiet=quiet))
         if quiet:
-            for each in dict.fromkeys(found.failures):
-                print_remark(f"{case.name}: {each.words(CASE_WORDS)}", Severity.FAILURE)
+            print_blocks(note_on(case.name, each) for each in dict.fromkeys(found.failures))
         else:
-            print_chart(case, found)
-        print_written(out / case.name, traced(found), monotonic() - start)
+            print_blocks(show_chart(case, found, out / case.name))
+        print_blocks([last_line(out / case.name, traced(found), monotonic() - start)])
         if found.failures:
             code = NOT_CONVERGED
     return code
@@ -534,8 +543,10 @@ def design(
 
     Example: fpsolve design cases/theorem.toml --for "stability_index = 1" --by oscillator.c1 --from -1 --to 1
     """
-    from fpsolve.output.designs import found_of, print_design, print_reason
-    from fpsolve.output.terminal import print_written
+    from fpsolve.page.terminal import print_blocks, print_notes
+    from fpsolve.show.design import found_of
+    from fpsolve.show.design import show as show_design
+    from fpsolve.show.results import last_line
     from fpsolve.study.design import refuse_no_design
     from fpsolve.workflow.cases import design_case
 
@@ -549,12 +560,9 @@ def design(
         if json:
             lines = (out / case.name / "design.json").read_text(encoding="utf-8").splitlines()
             print(" ".join(line.strip() for line in lines))
-        if quiet or json:
-            print_reason(case, outcome)
-        else:
-            print_design(case, outcome)
+        (print_notes if quiet or json else print_blocks)(show_design(case, outcome))
         if not json:
-            print_written(out / case.name, found_of(outcome), monotonic() - begun)
+            print_blocks([last_line(out / case.name, found_of(outcome), monotonic() - begun)])
         if outcome.is_out_of_reach:
             code = max(code, CHECK_FAILED)
         elif outcome.found is None:
@@ -617,8 +625,9 @@ def prove(
 
     Example: fpsolve prove cases/fig1.toml --width 1e-9
     """
-    from fpsolve.output.proofs import print_proofs
-    from fpsolve.output.terminal import done_of, print_written
+    from fpsolve.page.terminal import print_blocks
+    from fpsolve.show.proof import show as show_proofs
+    from fpsolve.show.results import done_of, last_line
     from fpsolve.study.prove import refuse_unprovable_case
     from fpsolve.workflow.proofs import check_proof, prove_case
 
@@ -651,9 +660,10 @@ def prove(
         watch = _watch(is_quiet=quiet)
         proofs = prove_case(case, out, width=width, pool=pool, reporter=reporter, watch=watch)
         if not quiet:
-            print_proofs(case, proofs)
+            print_blocks(show_proofs(case, proofs))
         unmet = sum(not each.is_met for each in proofs)
-        print_written(out / case.name, done_of(case, len(proofs), unmet, "not as close as wanted"), monotonic() - start)
+        what = done_of(case, len(proofs), unmet, "not as close as wanted")
+        print_blocks([last_line(out / case.name, what, monotonic() - start)])
         if unmet:
             code = NOT_CONVERGED
     return code
@@ -682,8 +692,10 @@ def noise(
 
     Example: fpsolve noise --record shaking.csv --of acceleration --length 0.5 --damping-ratio 0.02 --kind filter
     """
-    from fpsolve.output.noises import Convention, print_noise
-    from fpsolve.output.terminal import print_written
+    from fpsolve.output.noises import Convention, noise_sections
+    from fpsolve.page.terminal import print_blocks
+    from fpsolve.show.noise import show as show_noise
+    from fpsolve.show.results import last_line
     from fpsolve.workflow.noise import measurement_of, noise_case
 
     start = monotonic()
@@ -694,8 +706,9 @@ def noise(
     if json:
         print(" ".join(line.strip() for line in (folder / names[0]).read_text(encoding="utf-8").splitlines()))
     else:
-        print_noise(outcome, source, shown)
-        print_written(folder, ", ".join(names), monotonic() - start)
+        print(escaped(noise_sections(outcome).strip()), end="\n\n")
+        print_blocks(show_noise(outcome, source, shown))
+        print_blocks([last_line(folder, ", ".join(names), monotonic() - start)])
     return NOT_CONVERGED if outcome.failure is not None else 0
 
 
@@ -796,31 +809,19 @@ def reporter_of(report: bool, interactive: bool = False) -> Reporter | None:
     """Who writes reports, if one is wanted. Raises `FpsolveError` where what it needs is not installed."""
     if not (report or interactive):
         return None
-    from fpsolve.output.report import Reporter
+    from fpsolve.workflow.reports import Reporter
 
     return Reporter(is_interactive=interactive)
 
 
 def _watch(*, is_json: bool = False, is_quiet: bool = False) -> Watch:
     """What is printed on the way: progress and results, with JSON no tables, or only what failed."""
-    from fpsolve.output.terminal import (
-        print_message,
-        print_remarks,
-        print_results,
-        print_sample_remarks,
-        print_samples,
-        print_simulation,
-    )
+    from fpsolve.page.terminal import print_blocks, print_notes
     from fpsolve.workflow.progress import Bars, Watch
 
     if is_quiet:
-        failed = [Severity.FAILURE]
-        solved, sampled = partial(print_remarks, severities=failed), partial(print_sample_remarks, severities=failed)
-        return Watch(solved=solved, said=print_message, sampled=sampled)
-    bar, said = Bars().bar, print_message
-    if is_json:
-        return Watch(bar, print_remarks, said=said, sampled=print_sample_remarks)
-    return Watch(bar, print_results, print_simulation, said, print_samples)
+        return Watch(shown=partial(print_notes, severities=[Severity.FAILURE]), said=print_blocks)
+    return Watch(Bars().bar, print_notes if is_json else print_blocks, print_blocks)
 
 
 if __name__ == "__main__":

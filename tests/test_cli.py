@@ -18,11 +18,11 @@ from fpsolve import cli, run
 from fpsolve.case.case import load_case
 from fpsolve.case.sections import QUANTITY_NAMES
 from fpsolve.cli import BAD_INPUT, CHECK_FAILED, CLOSED_PIPE, INTERRUPTED, NOT_CONVERGED, main
+from fpsolve.exponent.error import digits
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.files import alone
 from fpsolve.model.problem import Problem
 from fpsolve.output import figures, tables
-from fpsolve.output.terminal import digits
 from fpsolve.study import solve
 from tests.conftest import FIG1, FIG1_NOISE, heed_signals, sampled, started
 from tests.kit import COSTLY, DRAWN, HOPELESS, LEAN, TABLES, TEXT, files
@@ -78,7 +78,7 @@ def test_what_is_computed_unasked_is_cheap_and_the_rest_is_told_in_one_line(case
     Path(case).write_text(TEXT.replace("eigenfunctions = [2.0]", ""), encoding="utf-8")
     assert main(["run", case, "--set", f"oscillator.restitution={wall}", "--set", "moments.p=[-1.0, 1.5]"]) == 0
     out, err = capsys.readouterr()
-    assert all(f"{each} = " in out for each in ("λ", "δ_p", "N", "R_c"))
+    assert all(f"│ {each} │" in out for each in ("     λ", "   δ_p", "     N", "   R_c"))
     told = [line for line in " ".join(err.split()).split("note: ") if "there are also" in line]
     names = "variance_rate, critical_restitution, sensitivities, eigenfunctions, rate_function, excursions"
     assert told == [f"test: there are also {names}: name them in [output] quantities, or --all"]
@@ -133,13 +133,12 @@ def test_what_is_set_is_told_above_the_results(case, capsys, monkeypatch):
     assert drawn[1:] == ["A test"]
 
 
-def test_indices_stand_whole_in_short_lines(shown):
-    lines = [line for line in shown.out.splitlines() if " = " in line and " ± " in line]
-    assert max(map(len, lines)) <= 80
-    for symbols in (("λ", "δ_p", "Λ″(0)"), ("N", "R_c", "r_c")):  # as many in a line as it holds whole
-        number = r"-?\d+\.\d+(?:e-\d+)? ± \de-\d+"
-        pattern = r"\s+".join(rf"{re.escape(symbol)} = {number}" for symbol in symbols)
-        assert len(re.findall(rf"(?m)^{pattern}$", shown.out)) == 2
+def test_each_index_has_a_row_with_its_error_and_perturbation_theory(shown):
+    for symbol in ("λ", "δ_p", "Λ″(0)", "N", "R_c", "r_c"):
+        row = (
+            rf"(?m)^│ \w[\w ]+ │ +{re.escape(symbol)} │ +-?\d+\.\d+(e-\d+)? │ +\de-\d+ │ .* │ +-?\d\S*, Eq\. \(3\d\) │$"
+        )
+        assert len(re.findall(row, shown.out)) == 2
 
 
 @pytest.mark.parametrize(("c1", "words"), [("-0.8", "almost surely stable for every r in (0, 1]"), ("0.7", "unstable")])
@@ -147,7 +146,7 @@ def test_why_there_is_no_critical_restitution_is_a_note(case, tmp_path, capsys, 
     sets = [f"oscillator.c1={c1}", "noise.D0=0.1", "vary={}", "output.eigenfunctions=[]"]
     assert main(["run", case, "--all", *(f"--set={text}" for text in sets)]) == 0
     out, err = capsys.readouterr()
-    assert "r_c = none" in out
+    assert re.search("r_c │ +none │", out)
     assert f"note: test: no r_c: {words}" in err
     assert "warning" not in err
     (curve,) = json.loads((tmp_path / "results/test/summary.json").read_text(encoding="utf-8"))["curves"]
@@ -792,7 +791,7 @@ def test_an_output_in_ascii_has_words_for_greek(case, command, monkeypatch):
     assert b"?" not in out
     assert b"Traceback" not in err
     if command == "run":
-        assert b"lambda = 0.0010875697504 +- " in out
+        assert b"| lambda | 0.0010875697504 | " in b" ".join(out.split())
         assert b"Lambda(p)" in out
 
 
@@ -805,7 +804,7 @@ def test_an_output_in_ascii_has_words_for_greek(case, command, monkeypatch):
             "write_dataset",
             "interrupted after 2 of 2 curves; what was done is kept in results/test",
         ),
-        ("fpsolve.output.terminal", "print_results", "interrupted; what was solved is kept in results/test"),
+        ("fpsolve.page.terminal", "print_blocks", "interrupted; what was solved is kept in results/test"),
         ("fpsolve.workflow.cases", "draw", "interrupted; what was solved is kept in results/test"),
     ],
 )

@@ -137,6 +137,11 @@ class Curve:
         return assignments(self.varied, "g")
 
     @property
+    def of(self) -> str:
+        """Which of the curves, after a title: ", noise.D0 = 0.1"."""
+        return f", {self.label}" if self.varied else ""
+
+    @property
     def suffix(self) -> str:
         """What the names of its files end in: nothing for the first curve, "-2" for the second."""
         return "" if self.number == 1 else f"-{self.number}"
@@ -396,10 +401,6 @@ class Case(Section):
             shortened(f"{key} = {value}".expandtabs(1)) for key, value in split if key.partition(".")[0] in COMPUTED
         ]
         return f"{title}\nwith {', '.join(told)}" if told else title
-
-    def place(self, curve: Curve) -> str:
-        """The name of the case, and which of the curves."""
-        return f"{self.name}, {curve.label}" if curve.varied else self.name
 
     def cylinder_mesh(self) -> CylinderMesh | None:
         """The mesh that the case states; None leaves it to the solver."""

@@ -25,6 +25,9 @@ from fpsolve.output.vtk import write_simulated_response
 from fpsolve.parts.intervals import Samples, sampled_case, samples_of
 from fpsolve.parts.part import Numerics
 from fpsolve.pool import Pool, cluster, parallel, serial
+from fpsolve.show import intervals, results, simulation
+from fpsolve.show.chart import show as show_chart
+from fpsolve.show.proof import show_claims
 from fpsolve.signals import signals_held
 from fpsolve.study.chart import Chart, chart_work, refuse_no_chart, solve_chart
 from fpsolve.study.design import DesignOutcome, refuse_no_design, solve_design
@@ -46,11 +49,16 @@ from fpsolve.workflow.folders import (
     saying_if_interrupted,
 )
 from fpsolve.workflow.progress import NODES, PERCENT, POINTS, SETS, SILENT, SOLVES, Phase, Watch, ignore
-from fpsolve.workflow.reports import facts_since, shown_at_the_end, write_report
+from fpsolve.workflow.reports import facts_since, shown_at_the_end
 from fpsolve.workflow.sets import Lines, Simulations, Sweep
 
 if TYPE_CHECKING:
-    from fpsolve.output.report import Reporter
+    from fpsolve.workflow.reports import Reporter
+
+TABLES = "summary.json", "curves.csv", "moments.csv", "results.nc"
+SAMPLING = ("sample.json",)
+SIMULATION = ("monte_carlo.json",)
+CHARTED = "chart.csv", "chart.json"
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,27 +178,22 @@ def run_case(
                 draw_densities(case, sweep.results, folder)
             if reporter is not None:
                 is_whole = not interruption and len(simulated) == case.planned * monte_carlo
-                write_report(
-                    reporter,
-                    case,
-                    folder,
-                    watch,
-                    facts=sweep.facts,
-                    results=sweep.results,
-                    simulated=simulated,
-                    samples=samples,
-                    complete=is_whole and sweep.done == case.planned,
-                )
+                blocks = [*results.show(case, sweep.results, folder, simulated), *show_claims(sweep.results, folder)]
+                blocks += intervals.show_samples(case, samples) if samples else ()
+                blocks += simulation.show(case, simulated, sweep.results, folder) if simulated else ()
+                files = TABLES + SIMULATION * bool(simulated) + SAMPLING * bool(samples)
+                is_whole &= sweep.done == case.planned
+                reporter.write(case, folder, watch, blocks, facts=sweep.facts, files=files, complete=is_whole)
 
         told = saying_if_interrupted(lambda: f"; what was {'done' if simulated else 'solved'} is kept in {folder}")
         with told, shown_at_the_end(show):
-            watch.solved(case, sweep.results)
+            watch.shown(results.show(case, sweep.results, folder))
             if case.uncertain.sample:
                 samples = _sample(case, sweep, folder, pool or serial(), watch, is_fresh=is_fresh)
             if monte_carlo:
                 simulations = Simulations(case, folder, is_fresh=is_fresh)
                 interruption = _simulate(simulations, watch, simulated, simulators)
-                watch.simulated(case, simulated, sweep.results)
+                watch.shown(simulation.show(case, simulated, sweep.results, folder))
     return Outcome(
         sweep.results,
         tuple(simulated),
@@ -236,10 +239,10 @@ def simulate_case(
     ):
         simulations = Simulations(case, folder, is_fresh=is_fresh)
         interruption = _simulate(simulations, watch, simulated, pool)
-        watch.simulated(case, simulated, ())
+        watch.shown(simulation.show(case, simulated, (), folder))
         if reporter is not None:
-            facts = facts_since(case, started)
-            write_report(reporter, case, folder, watch, facts=facts, simulated=simulated, complete=not interruption)
+            facts, blocks = facts_since(case, started), simulation.show(case, simulated, (), folder)
+            reporter.write(case, folder, watch, blocks, facts=facts, files=SIMULATION, complete=not interruption)
     return Outcome((), tuple(simulated), interruption, known=simulations.known, outdated=simulations.records.outdated)
 
 
@@ -277,8 +280,8 @@ def chart_case(
             with writable(folder):
                 draw_chart(case, chart, folder)
             if reporter is not None:
-                facts = facts_since(case, started)
-                write_report(reporter, case, folder, watch, facts=facts, chart=chart, complete=chart.complete)
+                facts, blocks = facts_since(case, started), show_chart(case, chart, folder)
+                reporter.write(case, folder, watch, blocks, facts=facts, files=CHARTED, complete=chart.complete)
 
     with (
         own_folder(case, out, (CHART,)) as folder,
@@ -378,7 +381,7 @@ def _sample(case: Case, sweep: Sweep, folder: Path, pool: Pool, watch: Watch, *,
     samples = samples_of(case, sweep.results[0], solved.results)
     with writable(folder):
         write_samples(case, samples, folder)
-    watch.sampled(case, samples)
+    watch.shown(intervals.show_samples(case, samples))
     return samples
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
 from typing import Any, Protocol
@@ -15,10 +15,7 @@ from rich.table import Column
 from rich.text import Text
 
 from fpsolve.budget import Countdown, watched
-from fpsolve.case.case import Case
-from fpsolve.messages import Message
-from fpsolve.parts.intervals import Samples
-from fpsolve.study.results import CurveResult, SimulatedCurve
+from fpsolve.page.page import Block
 
 SETS, MOMENTS, NODES, POINTS, BOUNDS, PERCENT, SOLVES = "sets", "p", "nodes", "points", "bounds", "%", "solves"
 """What a phase counts."""
@@ -64,17 +61,13 @@ class Watch:
 
     Attributes:
         bar: gives a phase what it shall call for its progress; a chart has two phases at a time.
-        solved: takes a case and its curves once they are solved.
-        simulated: takes a case, its simulated curves, and those that are solved too.
-        said: takes a case and a message about its files.
-        sampled: takes a case and what its samples say.
+        shown: takes what was found once it is there, which it may leave.
+        said: takes notes about files.
     """
 
     bar: Callable[[Phase], AbstractContextManager[Advance]] = lambda _: nullcontext(ignore)
-    solved: Callable[[Case, Sequence[CurveResult]], None] = lambda *_: None
-    simulated: Callable[[Case, Sequence[SimulatedCurve], Sequence[CurveResult]], None] = lambda *_: None
-    said: Callable[[Case, Message], None] = lambda *_: None
-    sampled: Callable[[Case, Samples], None] = lambda *_: None
+    shown: Callable[[Iterable[Block]], None] = lambda _: None
+    said: Callable[[Iterable[Block]], None] = lambda _: None
 
 
 SILENT = Watch()

@@ -15,20 +15,21 @@ from pydantic import TypeAdapter
 from fpsolve import __version__
 from fpsolve.case.case import Case
 from fpsolve.files import writable
-from fpsolve.output.proofs import write_proof
+from fpsolve.output.proofs import PROOF, write_proof
 from fpsolve.output.records import Records, append
 from fpsolve.pool import Pool, serial
 from fpsolve.proofs.certificate import NOTHING, Enclosure, MalformedProof, enclosure_of
 from fpsolve.proofs.claims import Claims, claims_from
 from fpsolve.proofs.verify import objection
 from fpsolve.reading import Unreadable, Words, read_text
+from fpsolve.show.proof import show as show_proofs
 from fpsolve.study.prove import Answer, CurveProof, Plan, Question, answer, refuse_unprovable_case
 from fpsolve.workflow.folders import PROVEN, kept, own_folder, saying_if_interrupted
 from fpsolve.workflow.progress import BOUNDS, SILENT, Phase, Watch
-from fpsolve.workflow.reports import facts_since, shown_at_the_end, write_report
+from fpsolve.workflow.reports import facts_since, shown_at_the_end
 
 if TYPE_CHECKING:
-    from fpsolve.output.report import Reporter
+    from fpsolve.workflow.reports import Reporter
 
 PROVEN_RECORDS = "records/proven"
 ENCLOSURES = TypeAdapter(Enclosure)
@@ -121,7 +122,8 @@ def prove_case(
     def show() -> None:
         if reporter is not None and proofs:
             facts, is_whole = facts_since(case, started), len(answers) == plan.total
-            write_report(reporter, case, folder, watch, facts=facts, proofs=proofs, complete=is_whole)
+            blocks = show_proofs(case, proofs)
+            reporter.write(case, folder, watch, blocks, facts=facts, files=[PROOF], complete=is_whole)
 
     def write() -> list[CurveProof]:
         proofs = plan.gathered(answers)

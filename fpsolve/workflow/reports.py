@@ -2,34 +2,93 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from datetime import UTC, datetime
+from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from fpsolve.case.case import Case
 from fpsolve.errors import FpsolveError
-from fpsolve.files import writable
+from fpsolve.files import writable, write_text
+from fpsolve.messages import Code, Message
 from fpsolve.output.tables import facts_of
+from fpsolve.page.html import page_of
+from fpsolve.page.page import Block
+from fpsolve.show import problem
+from fpsolve.show.notes import note_on
 from fpsolve.workflow.progress import Phase, Watch
 
-if TYPE_CHECKING:
-    from fpsolve.output.report import Reporter
+REPORT = "report.html"
+COMPLETE = "Complete."
+INCOMPLETE = "Not complete: the run ended early, and this is what was done."
+_OTHERS = "summary.json", "monte_carlo.json", "chart.json", "design.json", "proof.json"
+"""What a command says that it has done."""
 
 
-def write_report(reporter: Reporter, case: Case, folder: Path, watch: Watch, **found: Any) -> None:
-    """Write the report of what was found, as for `Found`; a fault in that is said and nothing more.
+@dataclass(frozen=True)
+class Reporter:
+    """Writes reports.
+
+    Args:
+        is_interactive: whether Λ(p) and charts tell their numbers where the pointer is.
 
     Raises:
-        OutputError: it cannot be written.
+        FpsolveError: that needs plotly, which is not installed.
     """
-    from fpsolve.output.report import Found
 
-    with watch.bar(Phase(case.name, "report")), writable(folder):
-        message = reporter.write(case, Found(**found), folder)
-    if message is not None:
-        watch.said(case, message)
+    is_interactive: bool = False
+
+    def __post_init__(self) -> None:
+        if self.is_interactive and find_spec("plotly") is None:
+            raise FpsolveError("--interactive needs plotly; install it by pip install 'fpsolve[interactive]'")
+
+    def write(
+        self,
+        case: Case,
+        folder: Path,
+        watch: Watch,
+        blocks: Iterable[Block],
+        *,
+        facts: Mapping[str, Any],
+        files: Sequence[str],
+        complete: bool = True,
+    ) -> None:
+        """Write the report of what a command found into a folder; a fault in that is said and nothing more.
+
+        Args:
+            blocks: what was found.
+            facts: on the run, see `facts_of`.
+            files: the names of those that hold all numbers.
+            complete: whether all was done that was planned.
+
+        Raises:
+            OutputError: it cannot be written.
+        """
+        others = [name for name in _OTHERS if name not in files and (folder / name).is_file()]
+        also = f" Other commands wrote {', '.join(others)} there; their own --report shows it." if others else ""
+        with watch.bar(Phase(case.name, "report")), writable(folder):
+            try:
+                text = page_of(
+                    blocks,
+                    is_interactive=self.is_interactive,
+                    title=case.headline,
+                    state=COMPLETE if complete else INCOMPLETE,
+                    equations=problem.equations_of(next(case.curves(0, 1)).problem),
+                    about=list(problem.show(case)),
+                    facts=facts,
+                    file=case.path.name,
+                    more=f"All numbers are in {', '.join(files)}, in the folder of the results, {folder.name}.{also}",
+                )
+            except OSError:
+                raise
+            except Exception as failure:  # what is finished is there already, and shall not be lost for its picture
+                message = Message(Code.NO_REPORT, kind=type(failure).__name__, text=str(failure))
+                watch.said([note_on(case.name, message)])
+            else:
+                write_text(folder / REPORT, text)
 
 
 @contextmanager

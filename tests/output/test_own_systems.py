@@ -30,8 +30,10 @@ from fpsolve.output.eigenfunctions import draw_eigenfunction, surface_of
 from fpsolve.output.figures import draw
 from fpsolve.output.surfaces import flat_figure
 from fpsolve.output.tables import write_results
-from fpsolve.output.terminal import note_missing, print_results, shows_perturbed_moments, varied_columns
 from fpsolve.output.vtk import write_eigenfunctions, write_functions
+from fpsolve.page.terminal import print_blocks
+from fpsolve.show.notes import left_out, shows_perturbed_moments
+from fpsolve.show.results import show
 from fpsolve.simulation import MonteCarlo
 from fpsolve.simulation.estimators import MomentEstimate
 from fpsolve.workflow import run
@@ -131,7 +133,7 @@ def test_one_symbol_for_two_parameters_is_refused(tmp_path):
 
 def test_columns_are_told_apart(tmp_path):
     case = case_in(tmp_path, own("telegraph") + MOMENTS + '[vary]\n"system.k" = [1.0]\n"noise.axial.k" = [1.0]\n')
-    assert [column.heading for column in varied_columns(case)] == ["system.k", "noise.axial.k"]
+    assert short_names(case.vary.keys) == ["system.k", "noise.axial.k"]
     assert short_names(["system.k", "noise.a"]) == ["k", "a"]
 
 
@@ -192,12 +194,12 @@ def test_a_short_list_of_moments_is_on_an_even_axis(drawn, tmp_path):
 def test_nothing_is_said_of_impacts_where_there_are_none(tmp_path, capsys):
     [silent] = solve_case(case := case_in(tmp_path, own("telegraph") + MOMENTS))
     assert not [note for note in silent.notes if note.tells_of(Code.NOT_ONE_RAY)]
-    print_results(case, [silent])
+    print_blocks(show(case, [silent], tmp_path))
     assert "R_c" not in "".join(capsys.readouterr())
     asked = case_in(tmp_path, own("telegraph") + MOMENTS + '[output]\nquantities = ["impact_rate"]\n')
     [told] = solve_case(asked)
     assert [note for note in told.notes if note.tells_of(Code.NOT_ONE_RAY)]
-    print_results(asked, [told])
+    print_blocks(show(asked, [told], tmp_path))
     assert "no N" in "".join(capsys.readouterr())
 
 
@@ -241,8 +243,8 @@ def test_every_ray_has_its_rate_in_the_summary(tmp_path, capsys):
         assert ray["impact_rate"] == pytest.approx(impact_rate(solver, number).value, rel=1e-9)
         assert ray["critical_impact_factor"] == pytest.approx(critical_impact_factor(solver, number).value, rel=1e-7)
         assert ray["critical_restitution"] is None
-    print_results(case, results)
-    assert "φ = 0:" in "".join(capsys.readouterr())
+    print_blocks(show(case, results, tmp_path))
+    assert "impact rate at φ = 0 " in "".join(capsys.readouterr())
 
 
 @pytest.mark.parametrize("noise", [Telegraph(a=0.5, k=1.0), White(s=0.5), CHAIN], ids=lambda noise: noise.kind)
@@ -294,14 +296,12 @@ quantities = ["moment", "eigenfunctions"]
 """
 
 
-def test_eigenfunctions_of_several_noises_with_values_are_refused_in_words(tmp_path, capsys):
+def test_eigenfunctions_of_several_noises_with_values_are_refused_in_words(tmp_path):
     case = case_in(tmp_path, SEVERAL)
     [solved] = solve_sets(case)
     assert not solved.pictures
-    note_missing(case, monte_carlo=False)
-    assert "no eigenfunctions are written: an eigenfunction of the phase and of several noises" in " ".join(
-        capsys.readouterr().err.split()
-    )
+    [note, *_] = left_out(case, monte_carlo=False)
+    assert "no eigenfunctions are written: an eigenfunction of the phase and of several noises" in note.text
     pair = ExponentSolver(case.problem).pair(2.0)
     for draw_it in (draw_eigenfunction, tilted_density):
         with pytest.raises(OutputError, match="make all of these noises white but one"):

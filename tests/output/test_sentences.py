@@ -1,5 +1,6 @@
 """What the terminal, summary.json and the report say of excursions, and in one sentence of a curve."""
 
+import html
 import json
 import re
 from types import SimpleNamespace
@@ -7,7 +8,8 @@ from types import SimpleNamespace
 import pytest
 
 from fpsolve.cli import main
-from fpsolve.output.sentences import bounds_text, sentence
+from fpsolve.show.excursions import bounds_text
+from fpsolve.show.moments import show_meaning
 from tests.kit import case_in, solve_case
 
 TEXT = """
@@ -49,11 +51,13 @@ def test_a_run_states_bounds_and_their_meaning(written, capsys, monkeypatch):
         "Start with φ₀ = 0, stationary noise: P(sup ‖x‖ ≥ 2) between 0.288 and 0.436, P(sup ‖x‖ ≥ 4) between 0.117 and "
         "0.177, P(sup ‖x‖ ≥ 8) between 0.0474 and 0.0717; ‖x‖ is the length of (x, v), and ‖x₀‖ = 1." in shown
     )
-    assert (
-        "Almost every path decays (λ = -0.02962), but the second moment grows (Λ(2) = 0.02801): rare large excursions, "
-        "P(sup ‖x‖ ≥ 8) between 0.0474 and 0.0717." in shown
-    )
-    assert "P(sup ‖x‖ ≥ 8) between 0.0474 and 0.0717" in (folder / "report.html").read_text(encoding="utf-8")
+    for text in (
+        "< 0: almost every path decays, halving in a time of 23.4.",
+        "> 0: the mean square grows, doubling in a time of 24.7, carried by bursts of rare paths.",
+        "P(sup ‖x‖ ≥ 8) between 0.0474 and 0.0717",
+    ):
+        assert text in shown
+        assert text in html.unescape((folder / "report.html").read_text(encoding="utf-8"))
 
 
 def test_the_summary_holds_them(written):
@@ -71,34 +75,29 @@ def test_the_summary_holds_them(written):
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        (["noise.a=0.3"], "and so does the second moment"),
-        (["system.zeta=0.01"], "it passes every level in the end."),
-        (["moments.p=[1.0]"], "but moments of orders p > 1.302 grow: rare large excursions, P(sup ‖x‖ ≥ 8) between"),
-        (
-            [
-                "moments.p=[1.0]",
-                "output.quantities=['moment', 'lyapunov_exponent', 'stability_index']",
-                "excursions={}",
-            ],
-            "rare large excursions, P(sup ‖x‖ ≥ A) falls as A^-1.302.",
-        ),
-        (["output.quantities=['lyapunov_exponent']", "excursions={}"], "Almost every path decays (λ = -0.02962)."),
-        (["output.quantities=['moment']", "excursions={}"], ""),
+        (["noise.a=0.3"], "< 0: the mean square decays, halving"),
+        (["system.zeta=0.01"], "passes every level in the end."),
+        (["moments.p=[1.0]"], "those of p > δ_p grow"),
+        (["moments.p=[1.0]"], "P(sup ‖x‖ ≥ A), falls as A^-1.302."),
+        (["output.quantities=['lyapunov_exponent']", "excursions={}"], "< 0: almost every path decays"),
+        (["output.quantities=['stability_index']", "excursions={}"], "δ_p = 1.302367 > 0"),
+        (["output.quantities=['moment']", "moments.p=[1.0]", "excursions={}"], ""),
     ],
 )
 def test_a_sentence_says_what_there_is(tmp_path, changes, words):
     case = case_in(tmp_path, TEXT, changes)
     [result] = solve_case(case)
-    found = sentence(case, result)
-    assert words in found
-    assert bool(words) == bool(found)
+    told = " ".join(each.text for each in show_meaning(case, result))
+    assert words in told
+    assert bool(words) == bool(told)
 
 
 def test_no_path_passes_every_level_where_a_stationary_response_is_not_known(tmp_path):
     """Here none is computed, as the noise is a chain."""
     case = case_in(tmp_path, TEXT, ["system.zeta=0.01", "system.drift=['v', '-x - 2*zeta*v - v**3 - xi*x']"])
     [result] = solve_case(case)
-    assert re.fullmatch(r"Almost every path grows from rest \(λ = 0\.\d+\)\.", sentence(case, result))
+    told = next(show_meaning(case, result)).text
+    assert re.fullmatch(r"λ = 0\.\d+ > 0: almost every path grows, doubling in a time of \S+ near rest\.", told)
 
 
 def test_a_table_over_a_parameter_has_a_column(tmp_path, capsys):

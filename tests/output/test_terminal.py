@@ -11,19 +11,17 @@ import pytest
 from fpsolve.case.sections import Expectation
 from fpsolve.exponent.error import Estimate, Failure
 from fpsolve.exponent.quantities import INDICES
-from fpsolve.messages import Code, Message
+from fpsolve.messages import Code, Message, Severity
 from fpsolve.model.quantity import OSCILLATOR_RESPONSE
-from fpsolve.output.letters import spelt
-from fpsolve.output.screen import Column, Grid, Screen
-from fpsolve.output.terminal import (
-    curve_grid,
-    duration,
-    print_comparisons,
-    print_remark,
-    print_remarks,
-    print_results,
-    print_simulation,
-)
+from fpsolve.page.letters import encodable
+from fpsolve.page.page import Column, Grid, Note
+from fpsolve.page.terminal import print_blocks
+from fpsolve.show import simulation
+from fpsolve.show.comparison import show as show_comparisons
+from fpsolve.show.curves import curve_grid
+from fpsolve.show.notes import notes
+from fpsolve.show.results import show as show_results
+from fpsolve.show.text import duration
 from fpsolve.study.results import Comparison, CurveResult, MomentColumns
 from fpsolve.study.simulate import simulate_curves
 from fpsolve.study.solve import failed
@@ -32,7 +30,7 @@ from tests.kit import ALL, TEXT, case_in, solve_case
 NONLINEAR = ["vary={}", "oscillator.c1=0.8", "oscillator.c2=0.5", "response.rtol=0.01"]
 NONLINEAR += ["monte_carlo={ paths = 64, time = 100.0 }", "output.quantities='all'"]
 MEANS = {each.symbol for each in OSCILLATOR_RESPONSE.means.values()}
-QUANTITY = re.compile(r"(\S+) = \S+ ± \S+")
+NUMBER = re.compile(r"-?\d\S*")
 
 
 @pytest.fixture(scope="module")
@@ -58,29 +56,43 @@ def terminal(monkeypatch):
     return begin
 
 
+def print_results(case, results):
+    print_blocks(show_results(case, results, case.path.parent))
+
+
+def print_notes(case, results, **more):
+    print_blocks(notes(case, results, **more))
+
+
+def cells(text):
+    """The rows of the tables of a text."""
+    return [[cell.strip() for cell in line.split("│")[1:-1]] for line in text.splitlines() if line.startswith("│")]
+
+
 def test_quantities_are_whole(case, solved, capsys, terminal):
-    simulated = tuple(simulate_curves(case))
-    for width, (show, names) in product(
+    simulated, place = tuple(simulate_curves(case)), case.path.parent
+    for width, (blocks, names) in product(
         (60, 80, 200),
         (
-            (lambda: print_results(case, solved), {"λ", "δ_p", "Λ″(0)", "N", "R_c", *MEANS} - {"⟨x⟩"}),
-            (lambda: print_simulation(case, simulated), {"λ", "Λ″(0)", *MEANS} - {"⟨A²⟩", "⟨A⁴⟩"}),
-            (lambda: print_simulation(case, simulated, solved), {"λ", "Λ″(0)", *MEANS} - {"⟨A²⟩", "⟨A⁴⟩"}),
+            ([*show_results(case, solved, place)], {"λ", "δ_p", "Λ″(0)", "N", "R_c", *MEANS} - {"⟨x⟩"}),
+            ([*simulation.show(case, simulated, (), place)], {"λ", "Λ″(0)", *MEANS} - {"⟨A²⟩", "⟨A⁴⟩"}),
+            ([*simulation.show(case, simulated, solved, place)], {"λ", "Λ″(0)", *MEANS} - {"⟨A²⟩", "⟨A⁴⟩"}),
         ),
     ):
         terminal(width)
-        show()
-        lines = capsys.readouterr().out.splitlines()
-        assert {name for line in lines for name in QUANTITY.findall(line)} == names
-        assert max(map(len, lines)) <= width
-        assert not [line for line in lines if line.rstrip().endswith("±") or line.startswith("±")]
+        print_blocks(blocks)
+        out = capsys.readouterr().out
+        rows = [row for row in cells(out) if names & set(row)]
+        assert names <= {cell for row in rows for cell in row}
+        assert all(sum(bool(NUMBER.fullmatch(cell)) for cell in row) >= 2 for row in rows)
+        assert max(map(len, out.splitlines())) <= width
 
 
 @pytest.mark.parametrize("width", [50, 80, 120])
 def test_remarks_are_wrapped_on_a_terminal(width, capsys, terminal):
     terminal(width)
     text = "case: " + "Λ(2) may be 1e-10 or [less] than " * 10 + "a_word_as_long_as_a_path/" * 6
-    print_remark(text)
+    print_blocks([Note(Severity.NOTE, text)])
     first, *others = capsys.readouterr().err.splitlines()
     assert all(line.startswith("  ") for line in others)
     assert " ".join([first, *(line.strip() for line in others)]) == f"note: {text}"
@@ -89,7 +101,7 @@ def test_remarks_are_wrapped_on_a_terminal(width, capsys, terminal):
 
 def test_remarks_are_whole_in_a_file(capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "60")
-    print_remark("case: " + "a word " * 50)
+    print_blocks([Note(Severity.NOTE, "case: " + "a word " * 50)])
     assert capsys.readouterr().err.splitlines() == [("note: case: " + "a word " * 50).rstrip()]
 
 
@@ -112,12 +124,12 @@ def test_a_star_tells_of_exact_noise_on_any_curve(treatments, star, tmp_path, ca
         assert f"{result.lyapunov_exponent.value:#.7g}"[:8] in out
 
 
-def test_tables_without_indices_stand_apart(tmp_path, capsys):
+def test_curves_stand_apart(tmp_path, capsys):
     case = case_in(tmp_path, TEXT, ['noise.treatment="exact"', "output={ quantities = ['moment'] }"])
     print_results(case, solve_case(case))
     lines = [line.strip() for line in capsys.readouterr().out.splitlines()]
-    ends = [i for i, line in enumerate(lines) if line.startswith("* for the noise reduced by")]
-    assert [lines[i + 1] for i in ends] == ["", ""]
+    first, second = (i for i, line in enumerate(lines) if line.startswith(case.title))
+    assert (first, lines[second - 1], lines[-1]) == (0, "", "")
 
 
 def test_what_is_missing_is_told_before_what_is_only_remarkable(case, solved, capsys, monkeypatch):
@@ -128,7 +140,7 @@ def test_what_is_missing_is_told_before_what_is_only_remarkable(case, solved, ca
         noted, notes=(Message(Code.NO_MOMENT, p=7),), warnings=("a warning",), failures=(Failure(2.0, "a reason"),)
     )
     capsys.readouterr()
-    print_remarks(case, [noted, failed])
+    print_notes(case, [noted, failed])
     first, second, third = capsys.readouterr().err.splitlines()
     assert re.fullmatch("not converged: .*: a reason", first)
     assert re.fullmatch("warning: .*: a warning", second)
@@ -252,9 +264,8 @@ def test_a_file_has_all_columns_whatever_the_terminal_is(tmp_path, capsys, monke
 )
 def test_headings_are_folded_and_columns_left_out_in_their_order(capsys, terminal, width, headings):
     terminal(width)
-    Screen.of().show(
-        Grid("", [Column("a"), Column("rank one", 1), Column("rank two", 2)], [["1234567890", "12345", "1"]])
-    )
+    columns = [Column("a"), Column("rank one", 1), Column("rank two", 2)]
+    print_blocks([Grid("", columns, [["1234567890", "12345", "1"]])])
     out = capsys.readouterr().out
     *_, last = [line for line in out.splitlines() if line.startswith("┃")]
     assert " ┃ ".join(part.strip() for part in last.strip("┃").split("┃")) == headings
@@ -264,13 +275,13 @@ def test_headings_are_folded_and_columns_left_out_in_their_order(capsys, termina
 
 def test_where_no_table_fits_rows_are_lists(capsys, terminal):
     terminal(13)
-    Screen.of().show(Grid("", [Column("a"), Column("b", 1)], [["1234567890", "12345"]]))
+    print_blocks([Grid("", [Column("a"), Column("b", 1)], [["1234567890", "12345"]])])
     assert capsys.readouterr().out.split() == ["a", "=", "1234567890", "b", "=", "12345"]
 
 
 def test_sentences_that_differ_in_numbers_are_one(tmp_path, capsys):
     case, results = many(tmp_path, 200, ["output.figure=true"], **KINDS)
-    print_remarks(case, results)
+    print_notes(case, results)
     warning, note = capsys.readouterr().err.splitlines()
     worst = results[89].curve.label
     assert note.startswith(
@@ -287,7 +298,7 @@ def test_sentences_that_differ_in_numbers_are_one(tmp_path, capsys):
 
 def test_curves_that_share_a_sentence_are_named_if_they_are_few(tmp_path, capsys):
     case, results = many(tmp_path, 5, notes=lambda i: ("the same",) if i < 3 else (f"other {'x' * i} {i}",))
-    print_remarks(case, results)
+    print_notes(case, results)
     labels = [each.curve.label for each in results]
     assert capsys.readouterr().err.splitlines() == [
         f"note: many, {labels[0]}, {labels[1]} and {labels[2]}: the same",
@@ -300,7 +311,7 @@ def test_several_sentences_of_one_curve_are_counted(tmp_path, capsys):
     case, results = many(
         tmp_path, 1, ["vary={}"], failures=lambda _: tuple(Failure(p, Message(Code.NO_MOMENT, p=p)) for p in (2, 3, 4))
     )
-    print_remarks(case, results, file="")
+    print_notes(case, results, file="")
     assert capsys.readouterr().err == "not converged: many: there is no Λ(2); and 2 more like this one\n"
 
 
@@ -338,15 +349,15 @@ def test_the_line_of_states_agrees_with_the_warnings(tmp_path, capsys, count, co
 def test_weak_noise_is_spoken_of_where_its_equation_is_shown(tmp_path, capsys, count, overrides, is_shown):
     told = Message(Code.STRONG_NOISE, first=2.0, most=0.05, p=6.0, rest=1.0, size=0.5)
     case, results = many(tmp_path, count, overrides, notes=lambda _: (told,))
-    print_remarks(case, results)
+    print_notes(case, results)
     assert ("perturbation theory, Eq. (37), is for weak noise" in capsys.readouterr().err) == is_shown
-    print_remarks(case, results, file="")
+    print_notes(case, results, file="")
     assert capsys.readouterr().err == ""
 
 
 def test_equations_and_names_with_numbers_keep_sentences_apart(tmp_path, capsys):
     case, results = many(tmp_path, 4, notes=lambda i: (f"Eq. (3{i}) fails for tau{i}",))
-    print_remarks(case, results)
+    print_notes(case, results)
     assert capsys.readouterr().err.count("note:") == 4
 
 
@@ -354,12 +365,12 @@ def test_of_many_values_that_are_expected_those_that_differ_are_shown(tmp_path, 
     case, _ = many(tmp_path, 60)
     expectation = Expectation(quantity="moment", p=2.0, value=1.0, rtol=1e-3, source="here")
     made = [Comparison(expectation, curve.varied, 1.0 + i / 59, 1e-3, i == 0) for i, curve in enumerate(case.curves())]
-    print_comparisons(case, made)
+    print_blocks(show_comparisons(case, made))
     out = capsys.readouterr().out
     assert out.count("differs") == 50
     assert "9 more differ" in out
     assert "1 of 60 ok" in out
-    print_comparisons(case, made[:1] * 60)
+    print_blocks(show_comparisons(case, made[:1] * 60))
     assert capsys.readouterr().out == "many: 60 of 60 ok\n"
 
 
@@ -370,10 +381,10 @@ def test_a_narrow_terminal_breaks_no_comparison(tmp_path, capsys, terminal, coun
     source = "an independent Fourier-Hermite computation [of the same]"
     expectation = Expectation(quantity="critical_impact_factor", value=-0.123456789012, rtol=1e-9, source=source)
     made = [Comparison(expectation, each.varied, -0.12345678901, 1e-10, met=True) for each in case.curves()]
-    print_comparisons(case, made)
+    print_blocks(show_comparisons(case, made))
     whole = capsys.readouterr().out
     terminal(width)
-    print_comparisons(case, made)
+    print_blocks(show_comparisons(case, made))
     narrow = capsys.readouterr().out
     assert tokens(narrow) - tokens(whole) <= {"no", "room", "for:", "=", "±,"}
     assert max(map(len, narrow.splitlines())) <= width
@@ -387,10 +398,11 @@ def test_durations(seconds, text):
     assert duration(seconds) == text
 
 
-def test_greek_is_spelt_where_there_is_none():
-    assert spelt("λ = 1 ± 2, Λ″(0), δ_p ≤ ε²", "ascii") == "lambda = 1 +- 2, Lambda''(0), delta_p <= epsilon^2"
-    assert spelt("λ ± é", "latin-1") == "lambda ± é"
-    assert spelt("Λ ± …", "utf-8") == "Λ ± …"
+def test_letters_that_an_encoding_does_not_have_are_replaced_by_the_nearest():
+    assert encodable("λ = 1 ± 2, Λ″(0), δ_p ≤ ε²", "ascii") == "lambda = 1 +- 2, Lambda''(0), delta_p <= eps^2"
+    assert encodable("λ ± é", "latin-1") == "lambda ± é"
+    assert encodable("Λ ± …", "utf-8") == "Λ ± …"
+    assert encodable("ж", "ascii") == "?"
 
 
 def test_columns_of_theories_that_there_are_not_are_left_out(tmp_path):

@@ -20,9 +20,10 @@ from fpsolve.case.case import load_case
 from fpsolve.cli import BAD_INPUT, NOT_CONVERGED, main
 from fpsolve.model.noises.non_gaussian import NonGaussianNoise
 from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
-from fpsolve.output.proofs import print_proofs
 from fpsolve.output.records import Records, append
+from fpsolve.page.terminal import print_blocks
 from fpsolve.proofs.certificate import Certificate, Enclosure
+from fpsolve.show.proof import show
 from fpsolve.study import prove as study
 from fpsolve.study.prove import CurveProof, Plan
 from fpsolve.workflow.proofs import check_proof, prove_case
@@ -57,7 +58,7 @@ def test_bounds_and_verdicts_are_told_and_written(case, tmp_path, capsys):
     assert main(["prove", case, *LOOSE]) == 0
     out, err = capsys.readouterr()
     assert not err
-    assert re.search(r"│ 0 │ +0 │ +0 │ +0 │ is constant │", out)
+    assert re.search(r"│ +Λ\(0\) │ +0 │ +0 │ +0 │ +is constant │", out)
     assert "Proven: the moment of order 2 grows." in out
     assert "λ" not in out
     assert re.search(r"written: results/proven \(1 curve, [\d.]+ s\)", out)
@@ -240,16 +241,16 @@ def proofs(case, count, orders):
 
 def test_the_sentence_tells_few_moments_and_counts_many(case, capsys):
     few, many = ["-1.0", "2.0000001"], [f"{n}.0" for n in range(-1, 30)]
-    print_proofs(*proofs(case, 1, few))
+    print_blocks(show(*proofs(case, 1, few)))
     out = capsys.readouterr().out
     assert "Proven: the moment of order -1 decays; the moment of order 2.0000001 grows.\n" in out
-    assert "│ 2.0000001 │" in out
-    print_proofs(*proofs(case, 1, many))
+    assert "│ Λ(2.0000001) │" in out
+    print_blocks(show(*proofs(case, 1, many)))
     assert "Proven: of 31 moments 29 grow, 1 decays.\n" in capsys.readouterr().out
 
 
 def test_many_curves_have_a_row_each(case, capsys):
-    print_proofs(*proofs(case, 11, ["-1.0", "2.5"]))
+    print_blocks(show(*proofs(case, 11, ["-1.0", "2.5"])))
     out = capsys.readouterr().out
     heading = next(line for line in out.splitlines() if "proven" in line)
     assert re.sub(r"[┃ ]+", " ", heading).split() == ["D0", "proven", "λ", "paths", "p", "=", "-1", "p", "=", "2.5"]
@@ -323,7 +324,7 @@ def test_an_interrupted_run_goes_on_with_the_bounds_that_follow(interrupted, tmp
     if change is not None:
         [path] = (tmp_path / "proven/records/proven").glob("*.jsonl")
         records = Records(path.parent).look()
-        places = [(key, records.read(place)) for key, place in records._addresses.items()]
+        places = [(key, records.read(place)) for key, (*_, place) in records._addresses.items()]
         for key, record in places:
             change(record)
             append(path.parent, key, record)

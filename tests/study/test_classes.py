@@ -8,7 +8,8 @@ import pytest
 from fpsolve.case.case import load_case
 from fpsolve.messages import Code
 from fpsolve.output.tables import write_results
-from fpsolve.output.terminal import print_remarks
+from fpsolve.page.terminal import print_blocks
+from fpsolve.show.notes import notes
 from fpsolve.study.solve import Numerics, everything, solve_curve
 from tests.kit import from_record
 
@@ -86,7 +87,7 @@ def test_blocks_are_told_by_their_variables(tmp_path, capsys):
     assert [(each.p, each.reason.code) for each in result.failures] == [
         (p, Code.NEGATIVE_OF_SEVERAL) for p in (-2.0, -0.5)
     ]
-    print_remarks(case, [result])
+    print_blocks(notes(case, [result]))
     said = capsys.readouterr().err
     assert said.count("Λ(p) for p < 0 is not computed") == 1
     assert "(y), (x, v) do not all drive each other" in " ".join(said.split())

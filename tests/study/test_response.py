@@ -16,10 +16,11 @@ from fpsolve.errors import CaseError, NotConverged
 from fpsolve.messages import Code, Message
 from fpsolve.model.quantity import OSCILLATOR_RESPONSE
 from fpsolve.output.figures import draw_stationary_responses
-from fpsolve.output.sentences import sentence, shape_of_response
-from fpsolve.output.terminal import simulated_mean
 from fpsolve.parts import response
 from fpsolve.parts.intervals import sampled_case
+from fpsolve.show.moments import show_meaning
+from fpsolve.show.response import shape
+from fpsolve.show.simulation import number_grid
 from fpsolve.study.results import Status
 from fpsolve.study.solve import Numerics, compare, everything, expected, solve_curve
 from tests.kit import case_in, case_text
@@ -235,7 +236,7 @@ def test_p_bifurcations_are_told(result, case, index, words, titles, tmp_path, m
     monkeypatch.setattr(matplotlib.figure.Figure, "savefig", lambda figure, *_, **__: figures.append(figure))
     monkeypatch.setattr(case.output, "__dict__", {**vars(case.output), "figure": True})
     other = SimpleNamespace(**{**vars(result), "response": with_index(result.response, index)})
-    assert words in shape_of_response(other.response, OSCILLATOR_RESPONSE)
+    assert words in shape(other.response, OSCILLATOR_RESPONSE)
     edges = np.linspace(0, 3, 31)
     sample = SimpleNamespace(amplitude_edges=edges, amplitude_density=edges[1:], amplitude_error=0.1 * edges[1:])
     simulated = SimpleNamespace(curve=result.curve, response=sample)
@@ -252,12 +253,16 @@ def with_index(response, index):
     return replace(response, stability_index=index)
 
 
-def test_a_simulated_mean_stands_beside_that_of_finite_elements(result):
-    about, mean = OSCILLATOR_RESPONSE.means, replace(result.response.means["energy"], value=0.7)
-    told = simulated_mean(about["energy"], 0.75, 0.02, mean)
-    assert told == "⟨E⟩ = 0.750 ± 2.0e-02 (finite elements 0.7, +2.5 s.e. away)"
-    assert simulated_mean(about["x"], 0.75, 0.02, None) == "⟨x⟩ = 0.750 ± 2.0e-02"
+def test_a_simulated_mean_stands_beside_that_of_finite_elements(case, result):
+    mean = replace(result.response.means["energy"], value=0.7)
+    solved = SimpleNamespace(estimates={}, response=SimpleNamespace(means={"energy": mean}))
+    sample = SimpleNamespace(means={"energy": (0.75, 0.02), "x": (0.75, 0.02)}, about=OSCILLATOR_RESPONSE)
+    simulated = SimpleNamespace(estimates={}, response=sample)
+    energy, x = number_grid(case, simulated, solved).rows
+    assert energy[1:] == ["⟨E⟩", "0.750", "2.0e-02", "0.7", "+2.5"]
+    assert x[1:] == ["⟨x⟩", "0.750", "2.0e-02", "", ""]
+    assert [row[1:] for row in number_grid(case, simulated, None).rows] == [energy[1:4], x[1:4]]
 
 
 def test_the_sentence_tells_where_paths_end(result, case):
-    assert sentence(case, result).endswith("and settles into the stationary response.")
+    assert next(show_meaning(case, result)).text.endswith("and settles into the stationary response.")

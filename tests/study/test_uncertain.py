@@ -140,7 +140,7 @@ def test_files_and_the_terminal_say_it(tmp_path, capsys):
     assert told["rows"][0]["median"] == pytest.approx(np.median(values), abs=1e-9)  # λ = a
     assert main([*arguments, "--report", "--set", "output.figure=false"]) == 0
     page = (tmp_path / "case/report.html").read_text(encoding="utf-8")
-    assert "Λ(2) &gt; 0 with 96.5 %, as parameters are uncertain." in page
+    assert "As parameters are uncertain, λ &lt; 0 with &gt; 99.9 %, and Λ(2) &gt; 0 with 96.5 %." in page
     assert "20 samples of a Latin hypercube, seed 0" in page
     assert "1 of 1 known" in capsys.readouterr().out
     assert main([*arguments[:4], "--jobs", "1", "--set", "output.figure=false"]) == 0  # a run without samples

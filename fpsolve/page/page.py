@@ -1,0 +1,101 @@
+"""The four blocks of which all that people see is made: a table, a sentence, a drawing, a note."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+from fpsolve.messages import Severity
+
+WORDS = {Severity.FAILURE: "not converged", Severity.WARNING: "warning", Severity.NOTE: "note"}
+"""How a note begins, in the order in which notes are told."""
+TONES = {"ok": "good", "differs": "bad", "not proven": "bad"}
+"""The cells that stand out, and how."""
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of a table.
+
+    Attributes:
+        heading: above it.
+        rank: where there is no room, columns are left out, that of the largest rank first, of equal ones that on the
+            right; with 0 never.
+        is_text: whether its entries are words, and not numbers; with rank 0 they may take several lines.
+    """
+
+    heading: str
+    rank: int = 0
+    is_text: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """A table.
+
+    Attributes:
+        title: above it, or nothing.
+        columns: their headings.
+        rows: the cells; those of words may have several lines.
+        ends: the rows below which there is a line.
+        remark: below it, or nothing.
+    """
+
+    title: str
+    columns: Sequence[Column]
+    rows: list[Sequence[str]] = field(default_factory=list)
+    ends: set[int] = field(default_factory=set)
+    remark: str = ""
+
+
+def filled(title: str, columns: Sequence[Column], rows: Sequence[Sequence[str]], remark: str = "") -> Grid:
+    """A table of those columns that have any entry."""
+    kept = [i for i in range(len(columns)) if any(row[i] for row in rows)]
+    return Grid(title, [columns[i] for i in kept], [[row[i] for i in kept] for row in rows], remark=remark)
+
+
+@dataclass(frozen=True)
+class Sentence:
+    """What numbers mean, in one sentence or a few.
+
+    Attributes:
+        text: the sentence, or nothing.
+        title: what the blocks from here on are about, if something else than before.
+    """
+
+    text: str
+    title: str = ""
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """A picture, which a page has and a terminal has not.
+
+    Attributes:
+        title: below it.
+        draw: draws it `into` a file, or does not where there is nothing to draw.
+        kind: of that file.
+        plot: gives what plotly takes for a page in which the pointer shows numbers, or None; None where there is none.
+    """
+
+    title: str
+    draw: Callable[..., None]
+    kind: Literal["svg", "png"] = "svg"
+    plot: Callable[[], Mapping[str, Any] | None] | None = None
+
+
+@dataclass(frozen=True)
+class Note:
+    """What limits the numbers, or is remarkable.
+
+    Attributes:
+        severity: how much it means.
+        text: with what it is about.
+    """
+
+    severity: Severity
+    text: str
+
+
+Block = Grid | Sentence | Drawing | Note

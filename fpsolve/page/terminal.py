@@ -1,0 +1,151 @@
+"""Blocks on a terminal, whose width nothing exceeds, or in a file, which takes any line.
+
+Nothing is cut, and no word and no number is broken.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Iterable, Sequence
+from dataclasses import dataclass, replace
+from textwrap import TextWrapper
+
+from rich.cells import cell_len
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from fpsolve.messages import Severity, escaped
+from fpsolve.page.letters import encodable
+from fpsolve.page.page import TONES, WORDS, Block, Column, Grid, Note, Sentence
+
+ENDLESS = 1_000_000
+"""The width of what is not a terminal."""
+STYLES = {"good": "green", "bad": "bold red"}
+COLOURS = {Severity.FAILURE: "bold red", Severity.WARNING: "yellow", Severity.NOTE: "cyan"}
+_TIE = re.compile(r"(?<=\S) (=|±|<=|<|>) (?=\S)")
+"""What holds a name and a number together in one line: "D0 = 0.1", "0.1 ± 1e-3"."""
+_TIED = "\0"
+"""The letter in place of a space at which no line ends."""
+
+
+def print_blocks(blocks: Iterable[Block], severities: Collection[Severity] = tuple(Severity)) -> None:
+    """Print tables and sentences on the standard output, and notes of some severities on the standard error."""
+    output, errors = Screen.of(), Screen.of(errors=True)
+    has_begun = has_grid = False
+    for block in blocks:
+        if isinstance(block, Note):
+            if block.severity in severities:
+                errors.say(f"{WORDS[block.severity]}: {block.text}", COLOURS[block.severity])
+        elif isinstance(block, Grid | Sentence):
+            if block.title:
+                output.say("\n" * has_begun + block.title, "italic")
+            if isinstance(block, Grid):
+                output.show(block)
+                has_grid = True
+            elif block.text:
+                output.say(block.text)
+            has_begun = True
+    if has_grid:
+        output.say("")
+
+
+def print_notes(blocks: Iterable[Block], severities: Collection[Severity] = tuple(Severity)) -> None:
+    """Print the notes alone."""
+    print_blocks((each for each in blocks if isinstance(each, Note)), severities)
+
+
+@dataclass(frozen=True)
+class Screen:
+    """The standard output, or errors.
+
+    Attributes:
+        console: which prints.
+        width: of the terminal, or `ENDLESS`.
+    """
+
+    console: Console
+    width: int
+
+    @classmethod
+    def of(cls, *, errors: bool = False) -> Screen:
+        console = Console(stderr=errors)
+        if not console.file.isatty():
+            console = Console(stderr=errors, width=ENDLESS)
+        elif console.is_dumb_terminal:
+            from shutil import get_terminal_size  # with its compression it takes longer than the rest
+
+            size = get_terminal_size()  # rich takes 80 columns
+            console = Console(stderr=errors, width=size.columns, height=size.lines)
+        return cls(console, console.width)
+
+    def say(self, text: str, style: str = "") -> None:
+        """Print a text in lines that fit, indented from the second one on; its own line ends remain."""
+        for line in text.split("\n"):
+            for each in wrapped(self._plain(line), self.width - 1):
+                self.console.print(Text(each), style=style, soft_wrap=True)
+
+    def show(self, grid: Grid) -> None:
+        """Print a table of as many columns as there is room for; where there is too little, "heading = number" lines.
+
+        Where it has too little room, rich would break numbers; so columns and the breaks of headings are chosen here.
+        """
+        columns = [replace(each, heading=self._plain(each.heading)) for each in grid.columns]
+        rows = [[Text(self._plain(each), STYLES.get(TONES.get(each, ""), "")) for each in row] for row in grid.rows]
+        chosen = self._layout(columns, rows)
+        if chosen is None:
+            for row in rows:
+                told = [
+                    (column.heading, cell.plain.replace("\n", " ")) for column, cell in zip(columns, row, strict=True)
+                ]
+                lines = [f"{heading} = {text}" if heading else text for heading, text in told if text]
+                self.say("\n  ".join(lines))
+        else:
+            kept, is_folded = chosen
+            table = Table()
+            for i in kept:
+                if columns[i].is_text:
+                    table.add_column(Text(columns[i].heading), overflow="fold")
+                else:
+                    heading = columns[i].heading.replace(" ", "\n") if is_folded else columns[i].heading
+                    table.add_column(Text(heading), justify="right", no_wrap=True)
+            for number, row in enumerate(rows):
+                table.add_row(*(row[i] for i in kept), end_section=number in grid.ends)
+            self.console.print(table)
+            if left_out := [column.heading for i, column in enumerate(columns) if i not in kept]:
+                self.say(f"no room for: {', '.join(left_out)}", "dim")
+        if grid.remark:
+            self.say(grid.remark, "dim italic")
+
+    def _layout(self, columns: Sequence[Column], rows: Sequence[Sequence[Text]]) -> tuple[list[int], bool] | None:
+        """The columns that are shown, and whether their headings are in several lines; None where no table fits."""
+
+        def needed(i: int) -> int:
+            is_broken = columns[i].is_text and not columns[i].rank
+            heading = columns[i].heading.split() if is_folded or is_broken else [columns[i].heading]
+            parts = [part for row in rows for part in row[i].plain.split(None if is_broken else "\n")]
+            return max(map(cell_len, [*heading, *parts]), default=0)
+
+        kept = list(range(len(columns)))
+        leaving = sorted((i for i in kept if columns[i].rank), key=lambda i: columns[i].rank)
+        while True:
+            for is_folded in (False, True):
+                if sum(needed(i) + 3 for i in kept) + 1 <= self.width:
+                    return kept, is_folded
+            if not leaving:
+                return None
+            kept.remove(leaving.pop())
+
+    def _plain(self, text: str) -> str:
+        return encodable(escaped(text), self.console.encoding)
+
+
+def wrapped(text: str, width: int) -> list[str]:
+    """A text in lines of at most this width, but for longer words; those from the second on are indented."""
+    start = text[: len(text) - len(text.lstrip())]
+    wrapper = TextWrapper(max(width, 20), start, start + "  ", break_long_words=False, break_on_hyphens=False)
+    tied = _TIE.sub(lambda match: match[0].replace(" ", _TIED), text.strip())
+    lines = wrapper.wrap(tied) or [""]
+    if max(map(len, lines)) > width:
+        lines = wrapper.wrap(text.strip()) or [""]
+    return [line.replace(_TIED, " ") for line in lines]

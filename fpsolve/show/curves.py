@@ -1,0 +1,160 @@
+"""Several curves in one table, a row each: what varies, λ, δ_p, what else is asked for; of many the extreme ones."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import Any, NamedTuple
+
+from fpsolve.analysis.spreads import LEVEL, UNCERTAIN
+from fpsolve.case.case import Case
+from fpsolve.case.sections import EXCURSIONS
+from fpsolve.case.vary import short_names
+from fpsolve.data import written
+from fpsolve.exponent.error import digits
+from fpsolve.exponent.quantities import LYAPUNOV_EXPONENT, MOMENT, STABILITY_INDEX, Index
+from fpsolve.model.quantity import OSCILLATOR_RESPONSE, moment_at
+from fpsolve.page.page import Block, Column, Grid, Sentence
+from fpsolve.parts.intervals import spreads_of
+from fpsolve.show.excursions import bounds_text
+from fpsolve.show.limits import EACH, EXTREMES, FAILURES, MOMENTS, ROWS
+from fpsolve.show.moments import STAR, index_text, told_indices, units_in_words
+from fpsolve.show.text import DIGITS, interval, short
+from fpsolve.study.results import CurveResult
+
+MAIN = LYAPUNOV_EXPONENT, STABILITY_INDEX
+THEORY = "Eqs. (38)-(39): perturbation theory"
+
+
+class Shown(NamedTuple):
+    """What a column shows of each curve.
+
+    Attributes:
+        column: its place.
+        text: what stands there, also where there is no number.
+        number: of which the extreme curves are sought, None where it is not there; None for the other columns.
+    """
+
+    column: Column
+    text: Callable[[Any], str]
+    number: Callable[[Any], float | None] | None = None
+
+
+def show(case: Case, results: Sequence[CurveResult]) -> Iterator[Block]:
+    """The table, and of many curves how many converged."""
+    yield curve_grid(case, results)
+    if len(results) <= EACH:
+        return
+    counts = Counter(result.status for result in results)
+    states = ", ".join(f"{counts[each]} {each.word}" for each in sorted(counts, key=lambda each: (each.fails, each)))
+    is_short = len(results) > ROWS and sum(count for each, count in counts.items() if each.fails) > FAILURES
+    shown = f"; of those that are not converged the first {FAILURES} are shown" if is_short else ""
+    yield Sentence(f"{len(results)} curves: {states}{shown}; all numbers are in curves.csv and results.nc")
+
+
+def curve_grid(case: Case, results: Sequence[CurveResult]) -> Grid:
+    """What was solved of each curve, beside perturbation theory."""
+    shown = list(_quantities(case))
+    if len(results) > EACH or any(result.status for result in results):
+        is_whole = not any(result.status for result in results)
+        shown.append(Shown(Column("status", 1 if is_whole else 0), lambda result: result.status.word))
+    units = units_in_words(case, told_indices(case) + [MOMENT] * (case.figure.x == "p" and MOMENT.name in case.asked))
+    grid = table_of(case, results, shown, lambda result: result.status.fails)
+    theories = [each.heading for each in grid.columns if each.heading.startswith("Eq.")]
+    told = [THEORY] * bool(theories) + [STAR] * any("*" in each for each in theories) + [units] * bool(units)
+    return replace(grid, remark="; ".join(told))
+
+
+def table_of(
+    case: Case, found: Sequence[Any], shown: Iterable[Shown], has_failed: Callable[[Any], bool] = lambda _: False
+) -> Grid:
+    """A row for what was found of each curve, or of more than `ROWS` for the extreme and the first failed ones."""
+    shown = [each for each in shown if each.number or any(map(each.text, found))]
+    is_digest = len(found) > ROWS
+    chosen = _chosen(found, shown, has_failed) if is_digest else [(each, "") for each in found]
+    columns = [Column(name) for name in short_names(case.vary.keys)] + [each.column for each in shown]
+    grid = Grid(case.headline, columns + [Column("which", is_text=True)] * is_digest)
+    for each, which in chosen:
+        texts = [column.text(each) for column in shown]
+        grid.rows.append([*map(written, each.curve.varied.values()), *texts, *[which] * is_digest])
+    return grid
+
+
+def _chosen(found: Sequence[Any], shown: Sequence[Shown], has_failed: Callable[[Any], bool]) -> list[tuple[Any, str]]:
+    """What has the extreme values of the first quantities, and some that failed, each with the reason."""
+    sought = [(column.heading, number) for column, _, number in shown if number][:EXTREMES]
+    extremes: dict[str, tuple[float, Any]] = {}
+    reasons: dict[int, tuple[Any, list[str]]] = {}
+    for each in found:
+        if len(reasons) < FAILURES and has_failed(each):
+            reasons[each.curve.number] = each, []
+        for heading, number in sought:
+            if (value := number(each)) is not None:
+                for word, size in (("least", value), ("largest", -value)):
+                    if size < extremes.get(f"{word} {heading}", (math.inf,))[0]:
+                        extremes[f"{word} {heading}"] = size, each
+    for reason, (_, each) in extremes.items():
+        reasons.setdefault(each.curve.number, (each, []))[1].append(reason)
+    return [(each, ", ".join(told)) for _, (each, told) in sorted(reasons.items())]
+
+
+def _quantities(case: Case) -> Iterator[Shown]:
+    """What has a column, the most important first: λ, δ_p, the other indices, then Λ at the p of a case if few."""
+    over_p, told = case.figure.x == "p", sorted(told_indices(case), key=lambda index: index not in MAIN)
+    for rank, index in enumerate(told if over_p else [each for each in told if each in MAIN]):
+        yield _index(index, rank + 1 if rank > 1 else 0)
+        if case.uncertain and index.name in UNCERTAIN:
+            yield Shown(Column(f"{LEVEL:.0%} of {index.symbol}", 1), partial(_interval, case, index.name))
+        if not over_p:
+            heading = f"Eq. {index.closed_form}{'*' if case.theory_reduces_noise else ''}"
+            yield Shown(Column(heading, 1), partial(_theory, index))
+    if EXCURSIONS in case.asked:
+        level = case.excursions.sentence_level
+        yield Shown(
+            Column(f"P(sup ‖x‖ ≥ {level:g})", 1),
+            lambda result: bounds_text(result.excursion, level) if result.excursion else "",
+        )
+    if case.has_response:
+        square = "amplitude_squared"
+        yield Shown(
+            Column(OSCILLATOR_RESPONSE.means[square].symbol, 1),
+            lambda result: short(result.response.means[square]) if result.response else "",
+        )
+    p = [float(each) for each in case.p if each] if over_p and MOMENT.name in case.asked else []
+    if len(p) > MOMENTS:
+        p = [] if told else [p[0], p[-1]]
+    yield from (_moment(each, 2 if told else 0) for each in p)
+
+
+def _index(index: Index, rank: int) -> Shown:
+    def text(result: CurveResult) -> str:
+        is_lost = result.estimates[index.name] is None and result.status.fails
+        return "" if is_lost else index_text(index, result, DIGITS)
+
+    return Shown(Column(index.symbol, rank), text, lambda result: getattr(result.estimates[index.name], "value", None))
+
+
+def _moment(p: float, rank: int) -> Shown:
+    def found(result: CurveResult) -> list[tuple[float, float]]:
+        moments = result.moments
+        rows = zip(moments.p.tolist(), moments.value.tolist(), moments.error_estimate.tolist(), strict=True)
+        return [(value, error) for each, value, error in rows if each == p]
+
+    return Shown(
+        Column(moment_at(p).symbol, rank),
+        lambda result: "".join(digits(*each, most=DIGITS) for each in found(result)),
+        lambda result: next((value for value, _ in found(result)), None),
+    )
+
+
+def _interval(case: Case, name: str, result: CurveResult) -> str:
+    spread = spreads_of(case, result).indices.get(name)
+    return "" if spread is None else interval(spread.low, spread.high)
+
+
+def _theory(index: Index, result: CurveResult) -> str:
+    value = index.theory(result.curve.problem)
+    return "" if math.isnan(value) else f"{value:.6g}"
