@@ -8,7 +8,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from decimal import Decimal
 from functools import cached_property, partial
-from typing import Any, cast
+from typing import Any, TypeAlias, cast
 
 from fpsolve.case.case import Case, Curve
 from fpsolve.case.sections import EXCURSIONS
@@ -32,7 +32,7 @@ from fpsolve.proofs.statement import DECIMAL, Statement, linear_values, statemen
 ORDERS = "moments.p"
 Literals = Mapping[float, str]
 """Decimals by their floats."""
-Answer = Enclosure | IndexEnclosure | ExcursionEnclosure
+Answer: TypeAlias = Enclosure | IndexEnclosure | ExcursionEnclosure
 Question = partial[Any]
 
 
