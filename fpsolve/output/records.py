@@ -205,6 +205,7 @@ class Results(Sequence[CurveResult]):
         is_whole = asked.keys() <= entries.keys() or (MOMENTS.name in entries and entries[MOMENTS.name].reason)
         if is_whole:
             self.add(curve.number)
+            self._keep(curve, entries, {})
         return bool(is_whole)
 
     def entries(self, curve: Curve) -> tuple[dict[str, Entry], dict[float, Moment]]:
@@ -240,12 +241,15 @@ class Results(Sequence[CurveResult]):
             return known
         [varied] = self._case.vary.sets(number - 1, number)
         curve = Curve(self._case.problem, varied, number)
-        entries, begun = self.entries(curve)
-        result = result_of(curve, self.asked(number), self._numerics, entries, begun)
-        size = sum(place.size for place in self._places.get(number, ()))
+        return self._keep(curve, *self.entries(curve))
+
+    def _keep(self, curve: Curve, entries: Mapping[str, Entry], begun: Mapping[float, Moment]) -> CurveResult:
+        """The result of a curve, which stays in memory as long as there is room."""
+        result = result_of(curve, self.asked(curve.number), self._numerics, entries, begun)
+        size = sum(place.size for place in self._places.get(curve.number, ()))
         if size <= self._room:
             self._room -= size
-            self._kept[number] = result
+            self._kept[curve.number] = result
         return result
 
 

@@ -75,7 +75,7 @@ def write_results(
     """
     columns, is_short = columns_of(case), case.planned > MOST_SUMMARISED
     over_p, of_curve = _names(columns)
-    of_curve = [name for name in of_curve if not name.endswith("_perturbation")]  # which take the problem of each curve
+    of_curve = [name for name in of_curve if not name.endswith("_perturbation")]  # which others have
     with ExitStack() as stack:
         summary, moments, curves = (
             stack.enter_context(draft(folder / name)) for name in ("summary.json", "moments.csv", "curves.csv")
@@ -85,7 +85,7 @@ def write_results(
         by_curve.writerow([*case.vary.keys, *of_curve])
         summary.write(_beginning(case, len(results) if finished is None else finished, facts, held=is_short))
         for number, result in enumerate(results):
-            row, varied = row_of(case, result, has_theory=not is_short), result.curve.varied.values()
+            row, varied = row_of(case, result), result.curve.varied.values()
             content = _short_summary(case, result) if is_short else _summary(case, result, row, columns)
             summary.write(_entry(case, number, content))
             by_moment.writerows([*varied, *each] for each in rows_over_p(row, over_p))

@@ -21,6 +21,7 @@ PARTS: tuple[Part, ...] = (
     rate_function.PART,
     *indices.PARTS,
     indices.JUMPS,
+    indices.THEORY,
     moments.CLASSES,
     excursions.PART,
     response.PART,

@@ -144,3 +144,23 @@ JUMPS: Part = Part(
     is_whole=_jumps_are_whole,
 )
 """The indices of impacts, of each place of several."""
+
+
+def _theory_settings(case: Case, number: int) -> Settings | None:
+    return {} if any(name in case.asked for name in INDICES) else None
+
+
+def _solve_theory(job: Job, settings: Settings) -> dict[str, float]:
+    return {name: index.theory(job.curve.problem) for name, index in INDICES.items()}
+
+
+def _row_of_theory(case: Case, result: CurveResult) -> Row:
+    numbers: Mapping[str, float] = result.parts.get("theory", {})
+    is_there = {name for name in case.asked if result.estimates.get(name)}
+    return {INDICES[name].perturbation.name: each for name, each in numbers.items() if name in is_there}
+
+
+THEORY: Part = Part(
+    "theory", _theory_settings, _solve_theory, dict[str, float], row=_row_of_theory, uses_solver=False, is_silent=True
+)
+"""The indices by perturbation theory, which a record has so that tables need not make the problem of each curve."""

@@ -27,18 +27,14 @@ def columns_of(case: Case) -> tuple[Quantity, ...]:
     return *sorted(found, key=lambda each: not each.dims), *COUNTS, STATUS, SECONDS
 
 
-def row_of(case: Case, result: CurveResult, *, has_theory: bool = True) -> Row:
+def row_of(case: Case, result: CurveResult) -> Row:
     """The numbers of a curve by the names of the columns, and its p.
 
     Args:
         case: which tells what is asked for.
         result: of the curve.
-        has_theory: whether the indices of perturbation theory are there, for which the problem is made.
     """
     row = {name: each for part in PARTS for name, each in part.row(case, result).items()}
-    for index in asked(case) if has_theory else ():
-        if result.estimates[index.name]:
-            row[index.perturbation.name] = index.theory(result.curve.problem)
     count, solved = case.p.size if MOMENT.name in case.asked else 0, result.moments.p.size
     counts = {"p_solved": solved, "p_failed": count - solved}
     return {**row, **counts, STATUS.name: result.status, SECONDS.name: round(result.seconds, 6)}

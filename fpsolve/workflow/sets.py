@@ -149,8 +149,9 @@ class Sweep(_Kept):
             self.write_tables()
 
     def solve(self, pool: Pool, progress: Advance) -> None:
-        """Solve what is not known yet; tables are written at the beginning, and as they grow."""
-        self.write_tables()
+        """Solve what is not known yet; tables are written first, where anything is missing, and as they grow."""
+        if self.done < self.case.planned:
+            self.write_tables()
         is_alone = self.case.planned == 1 and not pool.is_elsewhere
         if self._settled:
             progress(self._settled * self._steps_each, known=True)

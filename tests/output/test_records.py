@@ -279,7 +279,7 @@ def test_more_quantities_are_solved_alone_and_fewer_not_at_all(tmp_path, monkeyp
         return result, set(found)
 
     first, parts = run("moment", "lyapunov_exponent")
-    assert parts == {"moments", "lyapunov_exponent", "classes", "discretisation"}
+    assert parts == {"moments", "lyapunov_exponent", "theory", "classes", "discretisation"}
     both, parts = run("moment", "lyapunov_exponent", "excursions", "variance_rate")
     assert parts == {"excursions", "variance_rate"}
     np.testing.assert_array_equal(both.moments.value, first.moments.value)
