@@ -543,7 +543,8 @@ def design(
 
     Example: fpsolve design cases/theorem.toml --for "stability_index = 1" --by oscillator.c1 --from -1 --to 1
     """
-    from fpsolve.page.terminal import print_blocks, print_notes
+    from fpsolve.page.page import Note
+    from fpsolve.page.terminal import print_blocks
     from fpsolve.show.design import found_of
     from fpsolve.show.design import show as show_design
     from fpsolve.show.results import last_line
@@ -560,7 +561,8 @@ def design(
         if json:
             lines = (out / case.name / "design.json").read_text(encoding="utf-8").splitlines()
             print(" ".join(line.strip() for line in lines))
-        (print_notes if quiet or json else print_blocks)(show_design(case, outcome))
+        is_short = quiet or json
+        print_blocks(each for each in show_design(case, outcome) if isinstance(each, Note) or not is_short)
         if not json:
             print_blocks([last_line(out / case.name, found_of(outcome), monotonic() - begun)])
         if outcome.is_out_of_reach:
@@ -816,12 +818,13 @@ def reporter_of(report: bool, interactive: bool = False) -> Reporter | None:
 
 def _watch(*, is_json: bool = False, is_quiet: bool = False) -> Watch:
     """What is printed on the way: progress and results, with JSON no tables, or only what failed."""
-    from fpsolve.page.terminal import print_blocks, print_notes
+    from fpsolve.page.terminal import print_blocks
     from fpsolve.workflow.progress import Bars, Watch
 
     if is_quiet:
-        return Watch(shown=partial(print_notes, severities=[Severity.FAILURE]), said=print_blocks)
-    return Watch(Bars().bar, print_notes if is_json else print_blocks, print_blocks)
+        return Watch(noted=partial(print_blocks, severities=[Severity.FAILURE]), said=print_blocks)
+    tables: dict[str, Any] = {} if is_json else {"shown": print_blocks}
+    return Watch(Bars().bar, noted=print_blocks, said=print_blocks, **tables)
 
 
 if __name__ == "__main__":

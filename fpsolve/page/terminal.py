@@ -50,11 +50,6 @@ def print_blocks(blocks: Iterable[Block], severities: Collection[Severity] = tup
         output.say("")
 
 
-def print_notes(blocks: Iterable[Block], severities: Collection[Severity] = tuple(Severity)) -> None:
-    """Print the notes alone."""
-    print_blocks((each for each in blocks if isinstance(each, Note)), severities)
-
-
 @dataclass(frozen=True)
 class Screen:
     """The standard output, or errors.

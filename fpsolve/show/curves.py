@@ -59,7 +59,7 @@ def curve_grid(case: Case, results: Sequence[CurveResult]) -> Grid:
     """What was solved of each curve, beside perturbation theory."""
     shown = list(_quantities(case))
     if len(results) > EACH or any(result.status for result in results):
-        is_whole = not any(result.status for result in results)
+        is_whole = len(results) <= ROWS and not any(result.status for result in results)
         shown.append(Shown(Column("status", 1 if is_whole else 0), lambda result: result.status.word))
     units = units_in_words(case, told_indices(case) + [MOMENT] * (case.figure.x == "p" and MOMENT.name in case.asked))
     grid = table_of(case, results, shown, lambda result: result.status.fails)

@@ -10,7 +10,6 @@ from fpsolve.exponent.quantities import LYAPUNOV_EXPONENT
 from fpsolve.model.quantity import moment_at
 from fpsolve.page.page import Block, Column, Grid, Sentence
 from fpsolve.parts.intervals import Samples, spreads_of
-from fpsolve.show.notes import note_on
 from fpsolve.show.text import interval, percent
 from fpsolve.study.results import CurveResult
 
@@ -32,7 +31,7 @@ def show(case: Case, result: CurveResult) -> Iterator[Sentence]:
 
 
 def show_samples(case: Case, samples: Samples) -> Iterator[Block]:
-    """The intervals of the samples, their medians, the intervals to first order, and where these do not serve."""
+    """The intervals of the samples, their medians, and the intervals to first order."""
     columns = [Column("quantity"), Column(f"samples, {LEVEL:.0%}"), Column("median", 1), Column("P(< 0)")]
     remark = f"{samples.planned} samples of a Latin hypercube, seed {samples.seed}"
     grid = Grid(case.headline, [*columns, Column(f"first order, {LEVEL:.0%}"), Column("apart", 2)], remark=remark)
@@ -43,4 +42,3 @@ def show_samples(case: Case, samples: Samples) -> Iterator[Block]:
         apart = f"{each.apart:.0%}" if is_there else ""
         grid.rows.append([each.quantity.symbol, *(numbers if is_there else ["none", "", ""]), first, apart])
     yield grid
-    yield from (note_on(case.name, each) for each in samples.remarks)

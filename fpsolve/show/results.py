@@ -1,4 +1,4 @@
-"""What was solved of a case: figures, tables, what the numbers mean, pictures, and what limits all of it."""
+"""What was solved of a case: figures, tables, what the numbers mean, pictures."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ from fpsolve.page.page import Block, Drawing, Sentence
 from fpsolve.show import curves, excursions, intervals, moments, plots, response
 from fpsolve.show.eigenfunctions import directions_of, eigenfunctions_of
 from fpsolve.show.limits import EACH, PICTURES
-from fpsolve.show.notes import notes
 from fpsolve.show.text import duration, plural
 from fpsolve.study.results import CurveResult, SimulatedCurve
 
@@ -50,7 +49,6 @@ def show(
         if any(not isinstance(each, Drawing) for each in told):
             yield Sentence("", case.heading(result.curve) if has_tables else result.curve.label)
         yield from told
-    yield from notes(case, results)
 
 
 def last_line(folder: Path, what: str, seconds: float, known: str = "") -> Sentence:

@@ -15,7 +15,7 @@ from fpsolve.page.page import Block, Column, Drawing, Grid, Sentence, filled
 from fpsolve.show.curves import Shown, table_of
 from fpsolve.show.limits import EACH, PICTURES
 from fpsolve.show.moments import units_in_words
-from fpsolve.show.notes import MONTE_CARLO, notes
+from fpsolve.show.notes import MONTE_CARLO
 from fpsolve.show.text import fate, sampled, sign_of
 from fpsolve.study.results import CurveResult, SimulatedCurve
 
@@ -49,7 +49,6 @@ def show(
         if each.response and each.curve.number <= PICTURES:
             job = partial(draw_response, case, each, folder)
             yield Drawing(f"Simulated stationary response{each.curve.of}", job)
-    yield from notes(case, simulated, MONTE_CARLO)
 
 
 def moment_grid(case: Case, simulated: SimulatedCurve, result: CurveResult | None) -> Grid:

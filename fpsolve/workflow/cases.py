@@ -27,6 +27,7 @@ from fpsolve.parts.part import Numerics
 from fpsolve.pool import Pool, cluster, parallel, serial
 from fpsolve.show import intervals, results, simulation
 from fpsolve.show.chart import show as show_chart
+from fpsolve.show.notes import MONTE_CARLO, note_on, notes
 from fpsolve.show.proof import show_claims
 from fpsolve.signals import signals_held
 from fpsolve.study.chart import Chart, chart_work, refuse_no_chart, solve_chart
@@ -181,6 +182,8 @@ def run_case(
                 blocks = [*results.show(case, sweep.results, folder, simulated), *show_claims(sweep.results, folder)]
                 blocks += intervals.show_samples(case, samples) if samples else ()
                 blocks += simulation.show(case, simulated, sweep.results, folder) if simulated else ()
+                blocks += [*notes(case, sweep.results), *notes(case, simulated, MONTE_CARLO)]
+                blocks += (note_on(case.name, each) for each in (samples.remarks if samples else ()))
                 files = TABLES + SIMULATION * bool(simulated) + SAMPLING * bool(samples)
                 is_whole &= sweep.done == case.planned
                 reporter.write(case, folder, watch, blocks, facts=sweep.facts, files=files, complete=is_whole)
@@ -188,12 +191,14 @@ def run_case(
         told = saying_if_interrupted(lambda: f"; what was {'done' if simulated else 'solved'} is kept in {folder}")
         with told, shown_at_the_end(show):
             watch.shown(results.show(case, sweep.results, folder))
+            watch.noted(notes(case, sweep.results))
             if case.uncertain.sample:
                 samples = _sample(case, sweep, folder, pool or serial(), watch, is_fresh=is_fresh)
             if monte_carlo:
                 simulations = Simulations(case, folder, is_fresh=is_fresh)
                 interruption = _simulate(simulations, watch, simulated, simulators)
                 watch.shown(simulation.show(case, simulated, sweep.results, folder))
+                watch.noted(notes(case, simulated, MONTE_CARLO))
     return Outcome(
         sweep.results,
         tuple(simulated),
@@ -240,8 +245,10 @@ def simulate_case(
         simulations = Simulations(case, folder, is_fresh=is_fresh)
         interruption = _simulate(simulations, watch, simulated, pool)
         watch.shown(simulation.show(case, simulated, (), folder))
+        watch.noted(notes(case, simulated, MONTE_CARLO))
         if reporter is not None:
-            facts, blocks = facts_since(case, started), simulation.show(case, simulated, (), folder)
+            facts, blocks = facts_since(case, started), list(simulation.show(case, simulated, (), folder))
+            blocks += notes(case, simulated, MONTE_CARLO)
             reporter.write(case, folder, watch, blocks, facts=facts, files=SIMULATION, complete=not interruption)
     return Outcome((), tuple(simulated), interruption, known=simulations.known, outdated=simulations.records.outdated)
 
@@ -382,6 +389,7 @@ def _sample(case: Case, sweep: Sweep, folder: Path, pool: Pool, watch: Watch, *,
     with writable(folder):
         write_samples(case, samples, folder)
     watch.shown(intervals.show_samples(case, samples))
+    watch.noted(note_on(case.name, each) for each in samples.remarks)
     return samples
 
 

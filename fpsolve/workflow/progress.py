@@ -61,12 +61,14 @@ class Watch:
 
     Attributes:
         bar: gives a phase what it shall call for its progress; a chart has two phases at a time.
-        shown: takes what was found once it is there, which it may leave.
+        shown: takes what was found once it is there; it is made when it is asked for.
+        noted: takes what limits this.
         said: takes notes about files.
     """
 
     bar: Callable[[Phase], AbstractContextManager[Advance]] = lambda _: nullcontext(ignore)
     shown: Callable[[Iterable[Block]], None] = lambda _: None
+    noted: Callable[[Iterable[Block]], None] = lambda _: None
     said: Callable[[Iterable[Block]], None] = lambda _: None
 
 

@@ -32,7 +32,7 @@ from fpsolve.output.surfaces import flat_figure
 from fpsolve.output.tables import write_results
 from fpsolve.output.vtk import write_eigenfunctions, write_functions
 from fpsolve.page.terminal import print_blocks
-from fpsolve.show.notes import left_out, shows_perturbed_moments
+from fpsolve.show.notes import left_out, notes, shows_perturbed_moments
 from fpsolve.show.results import show
 from fpsolve.simulation import MonteCarlo
 from fpsolve.simulation.estimators import MomentEstimate
@@ -194,12 +194,12 @@ def test_a_short_list_of_moments_is_on_an_even_axis(drawn, tmp_path):
 def test_nothing_is_said_of_impacts_where_there_are_none(tmp_path, capsys):
     [silent] = solve_case(case := case_in(tmp_path, own("telegraph") + MOMENTS))
     assert not [note for note in silent.notes if note.tells_of(Code.NOT_ONE_RAY)]
-    print_blocks(show(case, [silent], tmp_path))
+    print_blocks([*show(case, [silent], tmp_path), *notes(case, [silent])])
     assert "R_c" not in "".join(capsys.readouterr())
     asked = case_in(tmp_path, own("telegraph") + MOMENTS + '[output]\nquantities = ["impact_rate"]\n')
     [told] = solve_case(asked)
     assert [note for note in told.notes if note.tells_of(Code.NOT_ONE_RAY)]
-    print_blocks(show(asked, [told], tmp_path))
+    print_blocks([*show(asked, [told], tmp_path), *notes(asked, [told])])
     assert "no N" in "".join(capsys.readouterr())
 
 

@@ -57,7 +57,7 @@ def terminal(monkeypatch):
 
 
 def print_results(case, results):
-    print_blocks(show_results(case, results, case.path.parent))
+    print_blocks([*show_results(case, results, case.path.parent), *notes(case, results)])
 
 
 def print_notes(case, results, **more):
