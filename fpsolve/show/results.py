@@ -31,7 +31,7 @@ def show(
         yield from curves.show(case, results)
     drawn = results[:PICTURES]
     eigenfunctions = eigenfunctions_of(case, [result.curve for result in drawn], folder)
-    for result in results if len(results) <= EACH else drawn:
+    for place, result in enumerate(results if len(results) <= EACH else drawn):
         told: list[Block] = []
         if has_tables:
             told += moments.show_tables(case, result)
@@ -40,7 +40,7 @@ def show(
             told += excursions.show(case, result)
             told += intervals.show(case, result)
             told += response.show(case, result)
-        if result in drawn:
+        if place < PICTURES:
             job = partial(draw_sensitivities, case, [result], folder)
             told.append(Drawing(f"Effect of the parameters{result.curve.of}", job))
             told += directions_of(case, result, folder)

@@ -7,6 +7,7 @@ from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from functools import partial
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -179,11 +180,15 @@ def run_case(
                 draw_densities(case, sweep.results, folder)
             if reporter is not None:
                 is_whole = not interruption and len(simulated) == case.planned * monte_carlo
-                blocks = [*results.show(case, sweep.results, folder, simulated), *show_claims(sweep.results, folder)]
-                blocks += intervals.show_samples(case, samples) if samples else ()
-                blocks += simulation.show(case, simulated, sweep.results, folder) if simulated else ()
-                blocks += [*notes(case, sweep.results), *notes(case, simulated, MONTE_CARLO)]
-                blocks += (note_on(case.name, each) for each in (samples.remarks if samples else ()))
+                blocks = chain(
+                    results.show(case, sweep.results, folder, simulated),
+                    show_claims(sweep.results, folder),
+                    intervals.show_samples(case, samples) if samples else (),
+                    simulation.show(case, simulated, sweep.results, folder) if simulated else (),
+                    notes(case, sweep.results),
+                    notes(case, simulated, MONTE_CARLO),
+                    (note_on(case.name, each) for each in (samples.remarks if samples else ())),
+                )
                 files = TABLES + SIMULATION * bool(simulated) + SAMPLING * bool(samples)
                 is_whole &= sweep.done == case.planned
                 reporter.write(case, folder, watch, blocks, facts=sweep.facts, files=files, complete=is_whole)
@@ -247,8 +252,8 @@ def simulate_case(
         watch.shown(simulation.show(case, simulated, (), folder))
         watch.noted(notes(case, simulated, MONTE_CARLO))
         if reporter is not None:
-            facts, blocks = facts_since(case, started), list(simulation.show(case, simulated, (), folder))
-            blocks += notes(case, simulated, MONTE_CARLO)
+            facts = facts_since(case, started)
+            blocks = chain(simulation.show(case, simulated, (), folder), notes(case, simulated, MONTE_CARLO))
             reporter.write(case, folder, watch, blocks, facts=facts, files=SIMULATION, complete=not interruption)
     return Outcome((), tuple(simulated), interruption, known=simulations.known, outdated=simulations.records.outdated)
 

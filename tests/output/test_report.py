@@ -201,11 +201,12 @@ def test_a_simulation_has_a_page(tmp_path):
     assert "effective windows" in Page(tmp_path / "test/report.html").text
 
 
-def test_a_fault_in_the_report_costs_nothing_else(tmp_path, monkeypatch, capsys):
+@pytest.mark.parametrize(("module", "name"), [(problem, "equations_of"), (results, "eigenfunctions_of")])
+def test_a_fault_in_the_report_costs_nothing_else(tmp_path, monkeypatch, capsys, module, name):
     def fault(*_):
         raise RuntimeError("a fault")
 
-    monkeypatch.setattr(problem, "equations_of", fault)
+    monkeypatch.setattr(module, name, fault)
     lean = ["--set", "output={ quantities = ['lyapunov_exponent'] }"]
     assert run(tmp_path, ONE, "--report", *lean) == 0
     assert "warning: test: no report.html: RuntimeError: a fault" in capsys.readouterr().err
