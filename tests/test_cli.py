@@ -80,7 +80,7 @@ def test_what_is_computed_unasked_is_cheap_and_the_rest_is_told_in_one_line(case
     out, err = capsys.readouterr()
     assert all(f"│ {each} │" in out for each in ("     λ", "   δ_p", "     N", "   R_c"))
     told = [line for line in " ".join(err.split()).split("note: ") if "there are also" in line]
-    names = "variance_rate, critical_restitution, sensitivities, eigenfunctions, rate_function, excursions"
+    names = "rate_function, variance_rate, critical_restitution, excursions, sensitivities, eigenfunctions"
     assert told == [f"test: there are also {names}: name them in [output] quantities, or --all"]
     written = files(tmp_path / "results/test")
     assert {name for name in written if name.endswith((".vtu", ".pvd"))} == {

@@ -99,7 +99,7 @@ def response():
 def curve(p, *indices):
     curve = Curve(Problem(FIG1, REDUCED).at({"noise.D0": 0.5}), {"noise.D0": 0.5})
     return solve_curve(
-        curve, {"moments": {"p": p, "slopes": True}} | {name: {} for name in indices}, Numerics(1e-8, Budget(), None)
+        curve, {"moment": {"p": p, "slopes": True}} | {name: {} for name in indices}, Numerics(1e-8, Budget(), None)
     ).result
 
 

@@ -23,7 +23,6 @@ from fpsolve.errors import WorkersDied
 from fpsolve.output import records
 from fpsolve.output.records import Records
 from fpsolve.pool import cluster
-from fpsolve.study import solve
 from fpsolve.workflow import run_case
 from fpsolve.workflow.progress import Watch
 from fpsolve.workflow.sets import SOLVED_RECORDS
@@ -405,7 +404,7 @@ def test_a_drawing_that_fails_costs_no_numbers(place, monkeypatch):
     def fail(*_):
         raise MemoryError
 
-    monkeypatch.setattr(solve, "_functions", fail)
+    monkeypatch.setattr("fpsolve.parts.eigenfunctions.stationary_density", fail)
     outcome = run_case(case, place / "drawn")
     assert not outcome.failures
     np.testing.assert_array_equal(outcome.results[0].moments.value, before.moments.value)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from functools import cached_property, partial
 from hashlib import sha256
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 from pydantic import (
@@ -19,31 +19,24 @@ from pydantic import (
     PrivateAttr,
     ValidationError,
     ValidationInfo,
+    create_model,
     field_validator,
     model_validator,
 )
 
 from fpsolve.arrays import FloatArray, shown
 from fpsolve.case.kinds import half_of, kinds_of, parameters_of, sections_of
-from fpsolve.case.messages import explain, refuse, shortened
 from fpsolve.case.refusals import REFUSALS
 from fpsolve.case.sections import (
-    EIGENFUNCTIONS,
-    EXCURSIONS,
     QUANTITY_NAMES,
-    RESPONSE,
-    SENSITIVITIES,
     ChartSection,
     DesignSection,
-    ExcursionSection,
     Expectation,
     FigureSection,
     MeshSection,
     Moments,
     MonteCarloSection,
     OutputSection,
-    ResponseSection,
-    Section,
     Text,
     UnitsSection,
     Value,
@@ -54,6 +47,7 @@ from fpsolve.case.uncertain import EXAMPLE as UNCERTAIN
 from fpsolve.case.uncertain import Uncertain, uncertain_of
 from fpsolve.case.vary import EXAMPLE, Vary, assignments, vary_of
 from fpsolve.errors import CaseError, Fault
+from fpsolve.explain import explain, refuse, shortened
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.quantities import (
     BY_JUMP,
@@ -66,10 +60,15 @@ from fpsolve.exponent.quantities import (
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import is_control
 from fpsolve.model.noise import Noise
-from fpsolve.model.parameters import Parameter, parameter
+from fpsolve.model.parameters import Parameter, Section, parameter
 from fpsolve.model.plane import System
 from fpsolve.model.problem import Problem
 from fpsolve.model.quantity import Quantity
+from fpsolve.parts.eigenfunctions import NAME as EIGENFUNCTIONS
+from fpsolve.parts.every import PARTS
+from fpsolve.parts.excursions import ExcursionSection
+from fpsolve.parts.response import NAME as RESPONSE
+from fpsolve.parts.response import ResponseSection
 
 COMPUTED = ("oscillator", "system", "noise", "vary", "mesh")
 """The sections that say of what the numbers are."""
@@ -152,7 +151,7 @@ class Curve:
         return self.noise.approximates_spectrum
 
 
-class Case(Section):
+class CaseWithoutParts(Section):
     """What one case file says; made by `load_case`.
 
     Raises:
@@ -190,18 +189,15 @@ class Case(Section):
     units: Annotated[UnitsSection, parameter("what units are called", "[units]")] = UnitsSection()
     figure: Annotated[FigureSection, parameter("what is drawn", "[figure]")] = FigureSection()
     output: Annotated[OutputSection, parameter("what is written", "[output]")] = OutputSection()
-    excursions: Annotated[ExcursionSection, parameter("how far ‖x‖ may rise, and its start", "[excursions]")] = (
-        ExcursionSection()
-    )
-    response: Annotated[
-        ResponseSection, parameter("the stationary response of a system with terms of degree 3", "[response]")
-    ] = ResponseSection()
     chart: Annotated[ChartSection | None, parameter("the lines of a chart, on which stability ends", "[chart]")] = None
     design: Annotated[DesignSection | None, parameter("what parameters shall be changed for", "[design]")] = None
     uncertain: Annotated[
         InstanceOf[Uncertain], BeforeValidator(uncertain_of), parameter("how uncertain parameters are", UNCERTAIN)
     ] = Uncertain()
     expect: Annotated[tuple[Expectation, ...], parameter("values to check", "[[expect]]", strict=False)] = ()
+    if TYPE_CHECKING:  # what parts add at the end
+        excursions: ExcursionSection
+        response: ResponseSection
     _path: Path = PrivateAttr(default=Path("case.toml"))
     _overrides: tuple[str, ...] = PrivateAttr(default=())
     _text: str = PrivateAttr(default="")
@@ -268,14 +264,7 @@ class Case(Section):
             return self.output.names
         named = {*CHEAP, *(CHEAP_OF_WALLS if self.problem.system.jumps else ())}
         named |= {RESPONSE if each.of_response else each.quantity for each in self.expect}
-        is_drawn = self.output.eigenfunctions is None and self.problem.dimension == 2
-        about = {
-            EIGENFUNCTIONS: is_drawn or self.output.asks_for_eigenfunctions,
-            SENSITIVITIES: self.output.sensitivities,
-            EXCURSIONS: EXCURSIONS in self.model_fields_set,
-            RESPONSE: RESPONSE in self.model_fields_set or self.is_nonlinear,
-        }
-        return tuple(name for name in QUANTITY_NAMES if name in named or about.get(name))
+        return tuple(part.name for part in PARTS if part.is_quantity and (part.name in named or part.is_usual(self)))
 
     @property
     def unasked(self) -> tuple[str, ...]:
@@ -414,11 +403,28 @@ class Case(Section):
             refuse([(("oscillator",), data["oscillator"], text)])
         return data
 
-    @field_validator(*REFUSALS)
+    @field_validator(*REFUSALS, check_fields=False)
     @classmethod
     def _agrees_with_those_before(cls, section: Any, info: ValidationInfo) -> Any:
         refuse(REFUSALS[str(info.field_name)](section, info.data, info.context or {}))
         return section
+
+
+if TYPE_CHECKING:
+    Case = CaseWithoutParts
+else:
+    _SECTIONS = {
+        part.name: (
+            Annotated[part.section, parameter(part.section.__doc__.partition(": ")[2].rstrip("."), f"[{part.name}]")],
+            part.section(),
+        )
+        for part in PARTS
+        if part.section
+    }
+    Case = create_model(
+        "Case", __base__=CaseWithoutParts, __doc__=CaseWithoutParts.__doc__, __module__=__name__, **_SECTIONS
+    )
+"""A case with the sections of all parts."""
 
 
 def load_case(path: str | Path, overrides: Sequence[str] = (), options: Mapping[str, str] | None = None) -> Case:

@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from fpsolve.case.messages import nearest, shown
 from fpsolve.errors import FpsolveError
+from fpsolve.explain import nearest, shown
 
 USUAL_ZETA = 0.01
 """The damping ratio where none is stated."""

@@ -18,34 +18,32 @@ import numpy as np
 from pydantic import ValidationError
 from pydantic.fields import FieldInfo
 
-from fpsolve.analysis.excursions import STATIONARY, check_start
 from fpsolve.analysis.zero import axis_faults, said
 from fpsolve.arrays import FloatArray, is_log_spaced
 from fpsolve.case.kinds import parameters_of, problem_of
-from fpsolve.case.messages import Refusal, faults_in, nearest, quoted, shown
 from fpsolve.case.remedies import CASE_WORDS
 from fpsolve.case.sections import (
-    EXCURSIONS,
-    RESPONSE,
     ChartAxis,
     ChartSection,
     DesignSection,
-    ExcursionSection,
     Expectation,
     FigureSection,
     MeshSection,
     Moments,
     MonteCarloSection,
     OutputSection,
-    ResponseSection,
     Varied,
     same,
 )
 from fpsolve.case.vary import Vary, assignments, map_key, values_of
 from fpsolve.errors import FpsolveError, MeshError, NoSuchExponent
+from fpsolve.explain import Refusal, faults_in, nearest, quoted, shown
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.fem.space import Space
 from fpsolve.model.problem import Problem, refuse_infinite
+from fpsolve.parts.every import PARTS
+from fpsolve.parts.part import Part
+from fpsolve.parts.response import NAME as RESPONSE
 from fpsolve.simulation.setup import obstacles, simulated_parts
 from fpsolve.theory.perturbation import second_order_or_none
 
@@ -266,35 +264,31 @@ def _of_expect(expect: tuple[Expectation, ...], valid: Known, context: Known) ->
             yield (i, "where", key), value, text
 
 
-def _of_excursions(section: ExcursionSection, valid: Known, context: Known) -> Iterator[Refusal]:
-    """A section of what is not computed, and a start that the noise of some curve does not have."""
-    output: OutputSection = valid.get("output", OutputSection())
-    if section.model_fields_set and output.lacks(EXCURSIONS):
-        text = f'stands here, but output.quantities has no "{EXCURSIONS}"; add it there, or remove this section'
-        yield (), None, text
-    problem = problem_of(valid)
-    if problem is None or section.xi == STATIONARY:
+def _of_part(part: Part) -> Callable[[Any, Known, Known], Iterator[Refusal]]:
+    """The check of the section of a part."""
+
+    def refusals(section: Any, valid: Known, context: Known) -> Iterator[Refusal]:
+        """A section of what is not computed, and what its part finds wrong with it."""
+        output: OutputSection = valid.get("output", OutputSection())
+        if section.model_fields_set and not getattr(section, "off", False) and output.lacks(part.name):
+            text = f'stands here, but output.quantities has no "{part.name}"; add it there, or remove this section'
+            yield (), None, text
+        yield from part.check(section, output, _problems(valid))
+
+    return refusals
+
+
+def _problems(valid: Known) -> Iterator[tuple[str, Problem]]:
+    """The problems of the sets that are checked, and how messages name them."""
+    problem, vary = problem_of(valid), valid.get("vary", Vary())
+    if problem is None:
         return
-    vary: Vary = valid.get("vary", Vary())
     for varied in vary.sets_at(vary.checked):
-        with suppress(ValueError):  # another fault tells why
-            curve = problem.at(varied)
-            try:
-                check_start(curve, section.phi, section.xi)
-            except ValueError as error:
-                yield ("xi",), section.xi, f"{_with(varied)}{error}"
-                return
-
-
-def _of_response(section: ResponseSection, valid: Known, context: Known) -> Iterator[Refusal]:
-    """A section of what is not computed, or that leaves out what is asked for."""
-    output: OutputSection = valid.get("output", OutputSection())
-    if section.off and output.lists_quantities and not output.lacks(RESPONSE):
-        text = f'got true, but output.quantities names "{RESPONSE}"; remove one of the two'
-        yield ("off",), True, text
-    elif section.model_fields_set and not section.off and output.lacks(RESPONSE):
-        text = f'stands here, but output.quantities has no "{RESPONSE}"; add it there, or remove this section'
-        yield (), None, text
+        try:
+            made = problem.at(varied)
+        except ValueError:  # another fault tells why
+            continue
+        yield _with(varied), made
 
 
 def _of_chart(chart: ChartSection | None, valid: Known, context: Known) -> Iterator[Refusal]:
@@ -391,11 +385,10 @@ REFUSALS: Mapping[str, Callable[[Any, Known, Known], Iterator[Refusal]]] = {
     "mesh": _of_mesh,
     "monte_carlo": _of_monte_carlo,
     "figure": _of_figure,
-    "excursions": _of_excursions,
     "output": _of_output,
-    "response": _of_response,
     "chart": _of_chart,
     "design": _of_design,
     "expect": _of_expect,
+    **{part.name: _of_part(part) for part in PARTS if part.section},
 }
 """What is wrong with each section."""

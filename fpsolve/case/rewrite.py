@@ -12,8 +12,8 @@ import tomlkit
 from tomlkit.items import Comment, Table
 
 from fpsolve.case.case import Case
-from fpsolve.case.sections import is_number
 from fpsolve.case.toml import document_of, loads
+from fpsolve.explain import is_number
 from fpsolve.model.faults import table_of
 
 

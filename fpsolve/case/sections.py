@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 import re
-import sys
 from bisect import bisect_left
 from collections.abc import Container, Mapping
 from functools import cached_property
@@ -17,10 +16,7 @@ from typing import Annotated, Any, Literal, Self
 import numpy as np
 from pydantic import (
     AfterValidator,
-    BaseModel,
     BeforeValidator,
-    ConfigDict,
-    Discriminator,
     Field,
     Tag,
     ValidatorFunctionWrapHandler,
@@ -28,43 +24,41 @@ from pydantic import (
     model_validator,
 )
 
-from fpsolve.analysis.excursions import STATIONARY
 from fpsolve.analysis.inverse import MOST_PARAMETERS
 from fpsolve.analysis.target import start_and_stop, target_of
 from fpsolve.analysis.zero import Axis, Zero, zero_of
 from fpsolve.arrays import FloatArray
-from fpsolve.case.messages import (
+from fpsolve.errors import MeshError
+from fpsolve.explain import (
+    BY_KIND,
     LIST,
-    NUMBER,
     TABLE,
     WORD,
     Refusal,
     is_list,
+    is_number,
     refuse,
     shown,
     shown_with_kind,
 )
-from fpsolve.errors import MeshError
 from fpsolve.exponent.quantities import MOMENT, QUANTITIES, DrawnName, QuantityName
 from fpsolve.fem.mesh import MAX_CELLS, MAX_DEGREE, CylinderMesh, make_mesh, read_mesh, vertices_at
 from fpsolve.messages import is_control
 from fpsolve.model.faults import table_of
-from fpsolve.model.parameters import STRICT, parameter
+from fpsolve.model.parameters import Section, parameter
 from fpsolve.model.problem import RTOL, RTOL_BEYOND_PLANE, RTOL_OF_SEVERAL, Problem
 from fpsolve.model.quantity import RATE_FUNCTION, Quantity, moment_at
+from fpsolve.parts.eigenfunctions import NAME as EIGENFUNCTIONS
+from fpsolve.parts.every import PARTS
+from fpsolve.parts.response import NAME as RESPONSE
 from fpsolve.simulation.setup import BATCHES, MAX_PATHS, PATHS, Estimator
 
 MAX_MOMENTS = 100_000
 MAX_NODES = 1000
-MOST_LEVELS = 100
-MOST_PLACES = 4_000_000
-"""At which a density is written."""
 _DIGITS = 12
 SAME = 10.0**-_DIGITS
 """p that differ by no more are one p; values of a varied key, relative to their size."""
-SENSITIVITIES, EIGENFUNCTIONS, EXCURSIONS = "sensitivities", "eigenfunctions", "excursions"
-RESPONSE = "response"
-QUANTITY_NAMES = (*QUANTITIES, SENSITIVITIES, EIGENFUNCTIONS, RESPONSE, RATE_FUNCTION.name, EXCURSIONS)
+QUANTITY_NAMES = tuple(part.name for part in PARTS if part.is_quantity)
 """What may be asked for."""
 EVERYTHING = "all"
 """What stands for all of these."""
@@ -130,11 +124,6 @@ def _printed(text: str) -> str:
 Text = Annotated[str, Field(min_length=1), AfterValidator(_printed)]
 
 
-def is_number(value: Any) -> bool:
-    """Whether a value of TOML is a finite number."""
-    return type(value) in (int, float) and abs(value) <= sys.float_info.max
-
-
 def same(value: Value, other: Value) -> bool:
     """Whether two values of a varied key are one."""
     if str in (type(value), type(other)):
@@ -160,12 +149,6 @@ def flat(table: Mapping[str, Any], whole: Container[str] = (), section: str = ""
                 raise ValueError(f"{each} stands twice, once with quotes and once without; remove one of them")
             result[each] = value
     return result
-
-
-class Section(BaseModel):
-    """A table of a case file: immutable, no unknown keys, no conversions, finite numbers only."""
-
-    model_config = STRICT | ConfigDict(frozen=True)
 
 
 class Sweep(Section):
@@ -202,9 +185,6 @@ class Sweep(Section):
 
 RANGE = frozenset(Sweep.__pydantic_fields__)
 """The keys that tell a range from a section."""
-_TAGS: Mapping[type, str] = {list: LIST, tuple: LIST, dict: TABLE, str: WORD, int: NUMBER, float: NUMBER}
-BY_KIND = Discriminator(lambda value: _TAGS.get(type(value), TABLE if isinstance(value, Section) else None))
-"""How a union is told apart: by what TOML has there."""
 Names: Any = Annotated[
     tuple[Literal[*QUANTITY_NAMES], ...],  # type: ignore[valid-type]
     Field(strict=False, min_length=1),
@@ -468,61 +448,6 @@ class OutputSection(Section):
             wrong.append((at, RATE_FUNCTION.name, text))
         refuse(wrong)
         return self
-
-
-class ExcursionSection(Section):
-    """[excursions]: how far ‖x‖ may rise above its start, and what that start is."""
-
-    levels: Annotated[
-        tuple[Annotated[float, Field(gt=1)], ...],
-        parameter(
-            "A of P(sup ‖x‖ ≥ A), where the start has the length 1",
-            "levels = [2.0, 10.0, 100.0]",
-            strict=False,
-            min_length=1,
-            max_length=MOST_LEVELS,
-        ),
-    ] = (2.0, 10.0, 100.0)
-    phi: Annotated[
-        Annotated[float, Tag(NUMBER)] | Annotated[Literal["uniform"], Tag(WORD)],
-        BY_KIND,
-        parameter("phase of the start x = (cos φ, −sin φ), in radians", "phi = 0.0"),
-    ] = 0.0
-    xi: Annotated[
-        Annotated[float, Tag(NUMBER)] | Annotated[Literal["stationary"], Tag(WORD)],
-        BY_KIND,
-        parameter("the noise at the start", 'xi = "stationary"'),
-    ] = STATIONARY
-
-    @property
-    def sentence_level(self) -> float:
-        """The level that is nearest to 10."""
-        return min(self.levels, key=lambda level: abs(math.log(level / 10)))
-
-
-class ResponseGrid(Section):
-    """{ amplitude, phi, xi }: at how many places along each axis a density is written."""
-
-    amplitude: Annotated[int, parameter("amplitudes", "amplitude = 80", ge=2, le=MAX_NODES)] = 80
-    phi: Annotated[int, parameter("phases from impact to impact", "phi = 49", ge=3, le=MAX_NODES)] = 49
-    xi: Annotated[int, parameter("values of the noise", "xi = 25", ge=2, le=MAX_NODES)] = 25
-
-    @model_validator(mode="after")
-    def _of_moderate_size(self) -> Self:
-        if (size := self.amplitude * self.phi * self.xi) > MOST_PLACES:
-            text = f"makes {size} places; must be at most {MOST_PLACES}; use fewer along some axis"
-            refuse([((), None, text)])
-        return self
-
-
-class ResponseSection(Section):
-    """[response]: the stationary response of a system with terms of degree 3, and where its density is written."""
-
-    rtol: Annotated[float, parameter("wanted relative error of its means", "rtol = 1e-6", ge=1e-10, le=0.1)] = 1e-6
-    off: Annotated[bool, parameter("whether it is left out", "off = true")] = False
-    grid: Annotated[
-        ResponseGrid, parameter("places of the written density", "grid = { amplitude = 80, phi = 49, xi = 25 }")
-    ] = ResponseGrid()
 
 
 class ChartAxis(Section):

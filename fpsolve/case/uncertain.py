@@ -11,9 +11,9 @@ from pydantic.fields import FieldInfo
 
 from fpsolve.analysis.spreads import MOST_SAMPLES, Deviation, Law, deviation_of, laws_of
 from fpsolve.case.kinds import parameters_of, problem_of
-from fpsolve.case.messages import DEPENDENT, Refusal, nearest, refuse, shown, shown_with_kind
 from fpsolve.case.sections import flat
 from fpsolve.case.vary import Vary
+from fpsolve.explain import DEPENDENT, Refusal, nearest, refuse, shown, shown_with_kind
 from fpsolve.model.parameters import STRICT, parameter
 from fpsolve.model.problem import Problem
 

@@ -19,7 +19,9 @@ from pydantic.fields import FieldInfo
 
 from fpsolve.arrays import FloatArray
 from fpsolve.case.kinds import parameters_of
-from fpsolve.case.messages import (
+from fpsolve.case.sections import MAX_MOMENTS, MOST_NAMED, SAME, FigureSection, Sweep, Value, Values, flat
+from fpsolve.data import written
+from fpsolve.explain import (
     DEPENDENT,
     Refusal,
     explain,
@@ -33,8 +35,6 @@ from fpsolve.case.messages import (
     shown_with_kind,
     too_long,
 )
-from fpsolve.case.sections import MAX_MOMENTS, MOST_NAMED, SAME, FigureSection, Sweep, Value, Values, flat
-from fpsolve.data import written
 from fpsolve.model.faults import accepted, choices, table_of
 from fpsolve.model.parameters import STRICT, meaning_of
 from fpsolve.model.quantity import Quantity

@@ -8,7 +8,7 @@ from enum import Enum
 from functools import cache, lru_cache, wraps
 from typing import Annotated, Any, ClassVar, NamedTuple, ParamSpec, Self, TypeVar, cast
 
-from pydantic import ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
@@ -25,6 +25,13 @@ ANY_SIGN = {"ge": -SIZE["le"], "le": SIZE["le"]}
 DERIVED = {"ge": 1e-32, "le": 1e32}
 """The range of a positive parameter that is made of such parameters."""
 STRICT: ConfigDict = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
+"""The rules of all tables: no unknown keys, no conversions, finite numbers only."""
+
+
+class Section(BaseModel):
+    """A table of a case file: immutable, no unknown keys, no conversions, finite numbers only."""
+
+    model_config = STRICT | ConfigDict(frozen=True)
 
 
 def parameter(

@@ -16,7 +16,7 @@ _MODES = "the highest modes of the cells, the ends of a noise interval, rounding
 _FINER = "the difference from a finer or wider discretisation, rounding"
 _RATIO = "the errors of λ and N"
 _ROOT = "the error of Λ(p)/p at p = δ_p over its slope"
-MOMENT = Quantity(
+MOMENT: Quantity = Quantity(
     "moment", "Λ(p)", "moment Lyapunov exponent", r"$\Lambda(p)$", "1/time", ("p",), "(1), (19)", "(37)", _MODES
 )
 DERIVATIVE = Quantity(

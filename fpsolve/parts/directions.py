@@ -61,4 +61,13 @@ def _unclear(found: SettledDirections) -> Iterator[Message]:
         yield Message(Code.ROUGH_DENSITY, p=p, size=None if math.isnan(found.error) else found.error)
 
 
-PART: Part = Part(NAME, _settings, _solve, tuple[Message, ...], said=said_of_pictures, is_drawn=True, is_silent=True)
+PART: Part = Part(
+    NAME,
+    _settings,
+    _solve,
+    tuple[Message, ...],
+    "density of directions",
+    said=said_of_pictures,
+    is_quantity=False,
+    is_drawn=True,
+)

@@ -24,4 +24,4 @@ def _solve(job: Job, settings: Settings) -> dict[str, Any]:
     return {**space.phi.facts, **space.xi.facts, "unknowns": space.size}
 
 
-PART: Part = Part("discretisation", _settings, _solve, dict[str, Any], is_silent=True)
+PART: Part = Part("discretisation", _settings, _solve, dict[str, Any], is_quantity=False)

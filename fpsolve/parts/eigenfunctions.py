@@ -12,6 +12,7 @@ from fpsolve.errors import NotConverged
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.fields import MOST_NEGATIVE, UNRESOLVED
 from fpsolve.messages import Code, Message
+from fpsolve.model.quantity import MOMENT
 from fpsolve.parts.part import Job, Numerics, Part, Reason, Settings, attempt
 
 if TYPE_CHECKING:
@@ -45,7 +46,7 @@ def shown_of(case: Case, number: int) -> Settings | None:
 
 def without_failed(job: Job, p: Sequence[float]) -> list[float]:
     """Those of some p at which Λ(p) did not fail."""
-    moments = job.found("moments")
+    moments = job.found(MOMENT.name)
     failed = {failure.p for failure in moments.failures} if moments else ()
     return [each for each in p if each not in failed]
 
@@ -83,4 +84,19 @@ def said_of_pictures(found: Any, curve: Curve, numerics: Numerics) -> Sequence[M
     return tuple(found)
 
 
-PART: Part = Part(NAME, _settings, _solve, tuple[Message, ...], said=said_of_pictures, is_drawn=True, is_silent=True)
+def _is_usual(case: Case) -> bool:
+    """One is drawn unasked, of two variables."""
+    is_drawn = case.output.eigenfunctions is None and case.problem.dimension == 2
+    return is_drawn or case.output.asks_for_eigenfunctions
+
+
+PART: Part = Part(
+    NAME,
+    _settings,
+    _solve,
+    tuple[Message, ...],
+    NAME,
+    is_usual=_is_usual,
+    said=said_of_pictures,
+    is_drawn=True,
+)

@@ -1,15 +1,19 @@
-"""How far ‖x‖ may rise above its start."""
+"""How far ‖x‖ may rise above its start: [excursions], its numbers, and what files have of them."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable, Iterator, Mapping
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
+from pydantic import Field, Tag
 
-from fpsolve.analysis.excursions import SYMBOL, Excursion, solve_excursion
+from fpsolve.analysis.excursions import STATIONARY, SYMBOL, Excursion, check_start, solve_excursion
+from fpsolve.explain import BY_KIND, NUMBER, WORD, Refusal
 from fpsolve.messages import Message
+from fpsolve.model.parameters import Section, parameter
+from fpsolve.model.problem import Problem
 from fpsolve.parts.indices import is_estimate
 from fpsolve.parts.part import Job, Numerics, Part, Settings
 from fpsolve.results.table import pair
@@ -19,6 +23,48 @@ if TYPE_CHECKING:
     from fpsolve.study.results import CurveResult
 
 NAME = "excursions"
+MOST_LEVELS = 100
+"""Largest number of levels."""
+
+
+class ExcursionSection(Section):
+    """[excursions]: how far ‖x‖ may rise above its start, and what that start is."""
+
+    levels: Annotated[
+        tuple[Annotated[float, Field(gt=1)], ...],
+        parameter(
+            "A of P(sup ‖x‖ ≥ A), where the start has the length 1",
+            "levels = [2.0, 10.0, 100.0]",
+            strict=False,
+            min_length=1,
+            max_length=MOST_LEVELS,
+        ),
+    ] = (2.0, 10.0, 100.0)
+    phi: Annotated[
+        Annotated[float, Tag(NUMBER)] | Annotated[Literal["uniform"], Tag(WORD)],
+        BY_KIND,
+        parameter("phase of the start x = (cos φ, −sin φ), in radians", "phi = 0.0"),
+    ] = 0.0
+    xi: Annotated[
+        Annotated[float, Tag(NUMBER)] | Annotated[Literal["stationary"], Tag(WORD)],
+        BY_KIND,
+        parameter("the noise at the start", 'xi = "stationary"'),
+    ] = STATIONARY
+
+    @property
+    def sentence_level(self) -> float:
+        """The level that is nearest to 10."""
+        return min(self.levels, key=lambda level: abs(math.log(level / 10)))
+
+
+def _check(section: ExcursionSection, output: Any, problems: Iterable[tuple[str, Problem]]) -> Iterator[Refusal]:
+    """A start that the noise of some curve does not have."""
+    for named, problem in () if section.xi == STATIONARY else problems:
+        try:
+            check_start(problem, section.phi, section.xi)
+        except ValueError as error:
+            yield ("xi",), section.xi, f"{named}{error}"
+            return
 
 
 def _settings(case: Case, number: int) -> Settings | None:
@@ -62,4 +108,16 @@ def _is_whole(found: Excursion, curve: Curve, settings: Settings) -> bool:
     return all(is_estimate(each) for each in numbers if each)
 
 
-PART: Part = Part(NAME, _settings, _solve, Excursion, SYMBOL, said=_said, content=_content, is_whole=_is_whole)
+PART: Part = Part(
+    NAME,
+    _settings,
+    _solve,
+    Excursion,
+    SYMBOL,
+    section=ExcursionSection,
+    check=_check,
+    is_usual=lambda case: NAME in case.model_fields_set,
+    said=_said,
+    content=_content,
+    is_whole=_is_whole,
+)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from fpsolve.data import Quantity
 from fpsolve.errors import NoSuchExponent
 from fpsolve.exponent.error import Absent, Estimate
-from fpsolve.exponent.quantities import BY_JUMP, INDICES, STABILITY_INDEX, Index
+from fpsolve.exponent.quantities import BY_JUMP, INDICES, MOMENT, STABILITY_INDEX, Index
 from fpsolve.messages import Code, Message, Remedy
 from fpsolve.parts.part import Job, Numerics, Part, Reason, Settings, attempt
 from fpsolve.results.table import Row, pair
@@ -42,7 +42,7 @@ def part_of(index: Index) -> Part:
         return {} if index.name in case.asked else None
 
     def solve(job: Job, settings: Settings) -> Estimate | Reason:
-        moments = job.found("moments")
+        moments = job.found(MOMENT.name)
         try:
             found = index.solve(job.solver, moments.root if moments else None)
         except NoSuchExponent as failure:
@@ -142,6 +142,7 @@ JUMPS: Part = Part(
     OfJumps,
     content=_content_of_jumps,
     is_whole=_jumps_are_whole,
+    is_quantity=False,
 )
 """The indices of impacts, of each place of several."""
 
@@ -161,6 +162,12 @@ def _row_of_theory(case: Case, result: CurveResult) -> Row:
 
 
 THEORY: Part = Part(
-    "theory", _theory_settings, _solve_theory, dict[str, float], row=_row_of_theory, uses_solver=False, is_silent=True
+    "theory",
+    _theory_settings,
+    _solve_theory,
+    dict[str, float],
+    row=_row_of_theory,
+    is_quantity=False,
+    uses_solver=False,
 )
 """The indices by perturbation theory, which a record has so that tables need not make the problem of each curve."""

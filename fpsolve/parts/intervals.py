@@ -289,4 +289,4 @@ def plain_spread(spread: Spread) -> dict[str, float]:
     }
 
 
-PART: Part = Part("intervals", _settings, columns=_columns, row=_row, content=_content)
+PART: Part = Part("intervals", _settings, columns=_columns, row=_row, content=_content, is_quantity=False)

@@ -159,7 +159,7 @@ def _row(case: Case, result: CurveResult) -> Row:
     return {"p": result.moments.p} | {each.name: getattr(result.moments, name) for name, each in OVER_P.items()}
 
 
-PART: Part = Part("moments", _settings, _solve, Moments, said=_said, is_whole=_is_whole, columns=_columns, row=_row)
+PART: Part = Part(MOMENT.name, _settings, _solve, Moments, said=_said, is_whole=_is_whole, columns=_columns, row=_row)
 
 
 def _solve_classes(job: Job, settings: Settings) -> tuple[InvariantClass, ...]:
@@ -219,6 +219,6 @@ CLASSES: Part = Part(
     said=_said_of_classes,
     content=_content_of_classes,
     is_whole=_classes_are_whole,
-    is_silent=True,
+    is_quantity=False,
 )
 """λ and Λ(p) of blocks of variables, or on a ray that the phase never leaves and across it."""

@@ -12,11 +12,14 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from fpsolve.data import Quantity
 from fpsolve.errors import FpsolveError
+from fpsolve.explain import Refusal
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.error import Moment
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import Code, Message, Remedy
+from fpsolve.model.parameters import Section
+from fpsolve.model.problem import Problem
 from fpsolve.model.quantity import STABILITY_INDEX
 from fpsolve.results.table import Row
 from fpsolve.signals import is_interrupt
@@ -189,7 +192,12 @@ class Part:
         solve: finds it, or gives the `Reason` why there is none; None where it follows from other parts. Raises
             `FpsolveError`.
         kind: the type of what is found, which a record holds.
-        symbol: what messages call it.
+        symbol: what messages call it; empty where nobody is told why there is none.
+        section: its table in a case file.
+        check: what is wrong with that, beside what its keys say; with [output], and with some problems of the case and
+            how messages name these.
+        is_quantity: whether [output] quantities may name it.
+        is_usual: whether a case that names no quantities asks for it.
         said: the messages about what was found.
         columns: the columns of tables that a case asks for.
         row: the numbers of a curve in these columns.
@@ -198,7 +206,6 @@ class Part:
         is_whole: whether what a record holds is what can be written and drawn.
         uses_solver: whether rtol and the mesh of Λ(p) decide its numbers.
         is_drawn: whether there is more than a record holds, so that a further run solves it again.
-        is_silent: whether nobody asks for it by name, so that it is not told why there is none.
     """
 
     name: str
@@ -206,6 +213,10 @@ class Part:
     solve: Callable[[Job, Settings], Any] | None = None
     kind: Any = None
     symbol: str = ""
+    section: type[Section] | None = None
+    check: Callable[[Any, Any, Iterable[tuple[str, Problem]]], Iterable[Refusal]] = _nothing
+    is_quantity: bool = True
+    is_usual: Callable[[Case], bool] = lambda case: False
     said: Callable[[Any, Curve, Numerics], Iterable[Message]] = _nothing
     columns: Callable[[Case], Sequence[Quantity]] = _nothing
     row: Callable[[Case, CurveResult], Row] = _no_row
@@ -214,4 +225,3 @@ class Part:
     is_whole: Callable[[Any, Curve, Settings], bool] = lambda *_: True
     uses_solver: bool = True
     is_drawn: bool = False
-    is_silent: bool = False

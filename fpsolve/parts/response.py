@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, Self
 
 import numpy as np
+from pydantic import model_validator
 
 from fpsolve.arrays import FloatArray
 from fpsolve.data import Quantity
+from fpsolve.explain import Refusal
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.error import Estimate
 from fpsolve.model.noise import Noise
+from fpsolve.model.parameters import Section, parameter
 from fpsolve.model.problem import Problem
 from fpsolve.model.quantity import ResponseQuantities
 from fpsolve.nonlinear.rest import NearRest
@@ -33,6 +36,44 @@ Grid = tuple[int, int, int]
 """How many amplitudes, phases and values of the noise."""
 SPREAD = 4.0
 """Standard deviations of the noise on each side of its mean in which its values lie."""
+
+
+MOST_NODES = 1000
+"""Largest number of places along an axis."""
+MOST_PLACES = 4_000_000
+"""Largest number of places at which a density is written."""
+
+
+class ResponseGrid(Section):
+    """{ amplitude, phi, xi }: at how many places along each axis a density is written."""
+
+    amplitude: Annotated[int, parameter("amplitudes", "amplitude = 80", ge=2, le=MOST_NODES)] = 80
+    phi: Annotated[int, parameter("phases from impact to impact", "phi = 49", ge=3, le=MOST_NODES)] = 49
+    xi: Annotated[int, parameter("values of the noise", "xi = 25", ge=2, le=MOST_NODES)] = 25
+
+    @model_validator(mode="after")
+    def _of_moderate_size(self) -> Self:
+        if (size := self.amplitude * self.phi * self.xi) > MOST_PLACES:
+            text = f"makes {size} places; must be at most {MOST_PLACES}; use fewer along some axis"
+            raise ValueError(text)
+        return self
+
+
+class ResponseSection(Section):
+    """[response]: the stationary response of a system with terms of degree 3, and where its density is written."""
+
+    rtol: Annotated[float, parameter("wanted relative error of its means", "rtol = 1e-6", ge=1e-10, le=0.1)] = 1e-6
+    off: Annotated[bool, parameter("whether it is left out", "off = true")] = False
+    grid: Annotated[
+        ResponseGrid, parameter("places of the written density", "grid = { amplitude = 80, phi = 49, xi = 25 }")
+    ] = ResponseGrid()
+
+
+def _check(section: ResponseSection, output: Any, problems: Iterable[tuple[str, Problem]]) -> Iterator[Refusal]:
+    """A section that leaves out what is asked for."""
+    if section.off and output.lists_quantities and not output.lacks(NAME):
+        text = f'got true, but output.quantities names "{NAME}"; remove one of the two'
+        yield ("off",), True, text
 
 
 @dataclass(frozen=True, eq=False)
@@ -210,5 +251,8 @@ PART: Part = Part(
     row=_row,
     content=_content,
     is_whole=_is_whole,
+    section=ResponseSection,
+    check=_check,
+    is_usual=lambda case: NAME in case.model_fields_set or case.is_nonlinear,
     uses_solver=False,
 )

@@ -31,7 +31,7 @@ def _settings(case: Case, number: int) -> Settings | None:
 
 
 def _solve(job: Job, settings: Settings) -> Sensitivities:
-    solved = job.found("moments").columns.p
+    solved = job.found(MOMENT.name).columns.p
     p = np.array([p for p in settings["p"] if np.any(solved == p)])
     names = [name for name in settings["indices"] if job.found(name) is not None]
     return solve_sensitivities(job.solver, p, job.curve.problem.derivatives(), indices=names, root=job.root)
@@ -76,4 +76,14 @@ def _is_whole(found: Sensitivities, curve: Curve, settings: Settings) -> bool:
     )
 
 
-PART: Part = Part(NAME, _settings, _solve, Sensitivities, NAME, said=_said, content=_content, is_whole=_is_whole)
+PART: Part = Part(
+    NAME,
+    _settings,
+    _solve,
+    Sensitivities,
+    NAME,
+    is_usual=lambda case: case.output.sensitivities,
+    said=_said,
+    content=_content,
+    is_whole=_is_whole,
+)

@@ -11,13 +11,13 @@ from typing import Any, NamedTuple
 
 from fpsolve.analysis.spreads import LEVEL, UNCERTAIN
 from fpsolve.case.case import Case
-from fpsolve.case.sections import EXCURSIONS
 from fpsolve.case.vary import short_names
 from fpsolve.data import written
 from fpsolve.exponent.error import digits
 from fpsolve.exponent.quantities import LYAPUNOV_EXPONENT, MOMENT, STABILITY_INDEX, Index
 from fpsolve.model.quantity import OSCILLATOR_RESPONSE, moment_at
 from fpsolve.page.page import Block, Column, Grid, Sentence
+from fpsolve.parts.excursions import NAME as EXCURSIONS
 from fpsolve.parts.intervals import spreads_of
 from fpsolve.show.excursions import bounds_text
 from fpsolve.show.limits import EACH, EXTREMES, FAILURES, MOMENTS, ROWS

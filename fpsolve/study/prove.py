@@ -11,10 +11,10 @@ from functools import cached_property, partial
 from typing import Any, TypeAlias, cast
 
 from fpsolve.case.case import Case, Curve
-from fpsolve.case.sections import EXCURSIONS
 from fpsolve.errors import FpsolveError, NoSuchExponent
 from fpsolve.exponent.quantities import LYAPUNOV_EXPONENT, STABILITY_INDEX
 from fpsolve.messages import Code, Message
+from fpsolve.parts.excursions import NAME as EXCURSIONS
 from fpsolve.proofs.certificate import Enclosure
 from fpsolve.proofs.claims import verdicts
 from fpsolve.proofs.questions import (

@@ -17,7 +17,7 @@ import numpy as np
 
 from fpsolve.case.case import Case, Curve
 from fpsolve.case.refusals import obstacle
-from fpsolve.case.sections import RESPONSE, Varied
+from fpsolve.case.sections import Varied
 from fpsolve.errors import FpsolveError
 from fpsolve.exponent.error import Failure, Moment
 from fpsolve.exponent.quantities import INDICES
@@ -28,6 +28,7 @@ from fpsolve.parts.indices import JUMPS
 from fpsolve.parts.moments import CLASSES, NO_MOMENTS, Moments, unfinished
 from fpsolve.parts.moments import PART as MOMENTS
 from fpsolve.parts.part import Entry, Job, Numerics, Part, Reason, Settings, attempt, fault
+from fpsolve.parts.response import NAME as RESPONSE
 from fpsolve.study.results import Comparison, CurveResult, Solved
 
 Kept = TypeVar("Kept")
@@ -144,7 +145,7 @@ def result_of(
         if part.name in known:
             for message in part.said(known[part.name], curve, numerics):
                 said[message.severity].append(message)
-        elif (entry := entries.get(part.name)) and entry.reason and part.name in asked and not part.is_silent:
+        elif (entry := entries.get(part.name)) and entry.reason and part.name in asked and part.symbol:
             reasons.append((part, entry.reason))
     jumps = known.get(JUMPS.name, ())
     reasons += [(JUMPS, each.reason) for of_jump in jumps for each in of_jump.values() if each.reason]

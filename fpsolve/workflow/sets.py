@@ -17,7 +17,7 @@ from typing import Any, ClassVar
 from fpsolve.analysis.stability import Boundary
 from fpsolve.analysis.zero import Zero
 from fpsolve.case.case import Case, Curve
-from fpsolve.case.sections import RESPONSE, Varied
+from fpsolve.case.sections import Varied
 from fpsolve.model.quantity import MOMENT
 from fpsolve.output.datasets import write_dataset
 from fpsolve.output.records import (
@@ -41,6 +41,7 @@ from fpsolve.output.vtk import write_curves, write_functions, write_stationary_r
 from fpsolve.parts.every import BY_NAME
 from fpsolve.parts.moments import PART as OF_P
 from fpsolve.parts.part import Job, Numerics
+from fpsolve.parts.response import NAME as RESPONSE
 from fpsolve.pool import Pool, serial
 from fpsolve.study.results import CurveResult, SimulatedCurve, Solved
 from fpsolve.study.simulate import simulate_curve, simulate_curves, simulation_steps, simulation_work

@@ -9,10 +9,10 @@ from functools import cache
 from importlib.resources import files
 from pathlib import Path
 
-from fpsolve.case.messages import nearest, shown
 from fpsolve.case.new import Modes, case_text
 from fpsolve.case.schema import SCHEMA, schema_text
 from fpsolve.errors import FpsolveError
+from fpsolve.explain import nearest, shown
 from fpsolve.files import write_text
 
 _NAMED = re.compile(r"\A#:schema .*\n")

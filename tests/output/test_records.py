@@ -158,7 +158,7 @@ def test_results_are_the_same_from_their_records(tmp_path, text):
 
 
 ASKED = {
-    "moments": {"p": [1.0, 2.0], "slopes": True},
+    "moment": {"p": [1.0, 2.0], "slopes": True},
     "lyapunov_exponent": {},
     "excursions": {"phi": 0.0, "xi": "stationary"},
     "response": {"rtol": 1e-6, "grid": None},
@@ -173,8 +173,8 @@ OF_SOLVER = ALL_PARTS - {"response"}
 @pytest.mark.parametrize(
     ("part", "change"),
     [
-        ("moments", {"p": [1.0, 3.0]}),
-        ("moments", {"slopes": False}),
+        ("moment", {"p": [1.0, 3.0]}),
+        ("moment", {"slopes": False}),
         ("excursions", {"phi": 0.3}),
         ("excursions", {"xi": 0.4}),
         ("response", {"rtol": 1e-5}),
@@ -222,7 +222,7 @@ def changed(asked, others, numerics, other, **more):
 
 def test_meshes_have_keys_of_their_own():
     meshes = [None, make_mesh(phi_cells=2, xi_cells=4), make_mesh(phi_cells=2, xi_cells=4, xi_max=8.5)]
-    keys = {part_key(BY_NAME["moments"], {}, Numerics(1e-8, Budget(), mesh)) for mesh in meshes}
+    keys = {part_key(BY_NAME["moment"], {}, Numerics(1e-8, Budget(), mesh)) for mesh in meshes}
     assert len(keys) == len(meshes)
 
 
@@ -230,7 +230,7 @@ def test_every_setting_of_a_case_is_in_what_is_asked_of_a_part(tmp_path):
     """Each key of a file that changes numbers changes the settings of the parts that it is about, and of no other."""
     base = everything(case_in(tmp_path, TEXT, [ALL]))
     for sets, parts in {
-        "moments.p=[2.0, 1.0]": {"moments", "classes", "sensitivities"},
+        "moments.p=[2.0, 1.0]": {"moment", "classes", "sensitivities"},
         "excursions.phi=0.3": {"excursions"},
         "excursions.levels=[5.0]": set(),
         "output.eigenfunctions=[-1.0]": {"eigenfunctions"},
@@ -279,7 +279,7 @@ def test_more_quantities_are_solved_alone_and_fewer_not_at_all(tmp_path, monkeyp
         return result, set(found)
 
     first, parts = run("moment", "lyapunov_exponent")
-    assert parts == {"moments", "lyapunov_exponent", "theory", "classes", "discretisation"}
+    assert parts == {"moment", "lyapunov_exponent", "theory", "classes", "discretisation"}
     both, parts = run("moment", "lyapunov_exponent", "excursions", "variance_rate")
     assert parts == {"excursions", "variance_rate"}
     np.testing.assert_array_equal(both.moments.value, first.moments.value)
@@ -296,7 +296,7 @@ def test_more_quantities_are_solved_alone_and_fewer_not_at_all(tmp_path, monkeyp
     _, parts = run("moment", "lyapunov_exponent", more=["budget.memory=1.0"])
     assert parts == set()
     _, parts = run("moment", "lyapunov_exponent", more=["moments.rtol=1e-7"])
-    assert parts == {"moments", "lyapunov_exponent", "classes", "discretisation"}
+    assert parts == {"moment", "lyapunov_exponent", "classes", "discretisation"}
 
 
 def test_what_a_budget_has_limited_is_solved_again_with_another(tmp_path, monkeypatch):
@@ -309,9 +309,9 @@ def test_what_a_budget_has_limited_is_solved_again_with_another(tmp_path, monkey
         return set(found)
 
     small = "budget.unknowns=100"
-    assert {"moments", "lyapunov_exponent"} <= run(small)
+    assert {"moment", "lyapunov_exponent"} <= run(small)
     assert run(small) == set()
-    assert {"moments", "lyapunov_exponent"} <= run("budget.unknowns=120")
+    assert {"moment", "lyapunov_exponent"} <= run("budget.unknowns=120")
 
 
 def test_what_there_is_not_is_told_where_a_case_lists_it_without_solving_it_again(tmp_path, monkeypatch):
@@ -375,13 +375,13 @@ def is_taken(folder, solved, change):
 
 def column(i, values):
     """Another column of the moments."""
-    return lambda record: record["moments"][0][0].__setitem__(i, _packed(np.array(values))) or record
+    return lambda record: record["moment"][0][0].__setitem__(i, _packed(np.array(values))) or record
 
 
 def compressed(**change):
     """The p in the form of long arrays, with something changed."""
     data = base64.b64encode(zlib.compress(np.array([2.0, 0.0, -1.0]).tobytes())).decode()
-    return lambda record: record["moments"][0][0].__setitem__(0, {"shape": [3], "data": data} | change) or record
+    return lambda record: record["moment"][0][0].__setitem__(0, {"shape": [3], "data": data} | change) or record
 
 
 def estimate(value, i):
@@ -395,7 +395,7 @@ def slope(key, i=3):
 
 def of_moments(i, value):
     """Another attribute of Λ(p): its columns, root, failures, warnings or notes."""
-    return lambda record: record["moments"][0].__setitem__(i, value) or record
+    return lambda record: record["moment"][0].__setitem__(i, value) or record
 
 
 def seconds(value):
@@ -404,8 +404,8 @@ def seconds(value):
 
 WRONG = {
     "nothing": lambda record: {},
-    "a column too few": lambda record: record["moments"][0][0].pop() and record,
-    "no entry": lambda record: record | {"moments": []},
+    "a column too few": lambda record: record["moment"][0][0].pop() and record,
+    "no entry": lambda record: record | {"moment": []},
     "neither found nor missing": lambda record: record | {"lyapunov_exponent": [None, None, 0.0]},
     "one estimate alone": lambda record: {"lyapunov_exponent": record["lyapunov_exponent"]},
     "seconds are a word": seconds("soon"),
@@ -419,8 +419,8 @@ WRONG = {
     "values in a table": column(1, [[1.0, 2.0, 3.0]]),
     "no value": column(1, [math.nan, 0.0, 0.0]),
     "infinite error": column(3, [math.inf, 0.0, 0.0]),
-    "a value in words": lambda record: record["moments"][0][0][1].__setitem__(0, "1.0") or record,
-    "a value that is true": lambda record: record["moments"][0][0][1].__setitem__(0, True) or record,
+    "a value in words": lambda record: record["moment"][0][0][1].__setitem__(0, "1.0") or record,
+    "a value that is true": lambda record: record["moment"][0][0][1].__setitem__(0, True) or record,
     "no shape": compressed(shape=[-1]),
     "a large shape": compressed(shape=[3 * 10**9]),
     "much in little": compressed(data=base64.b64encode(zlib.compress(bytes(10**8))).decode()),

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import json
+import sys
 from collections.abc import Iterable, Iterator, Mapping
 from difflib import get_close_matches
 from types import MappingProxyType
 from typing import Any, get_args
 
-from pydantic import ValidationError
+from pydantic import Discriminator, ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails, InitErrorDetails, PydanticCustomError
 
 from fpsolve.messages import is_control
 from fpsolve.model.faults import accepted, choices, entry_of, fields_of, written_path
-from fpsolve.model.parameters import example_of, meaning_of, parameter
+from fpsolve.model.parameters import Section, example_of, meaning_of, parameter
 
 _OWN, _RANGE = "own sentence", "range"
 LIST = "<list>"
@@ -27,6 +28,9 @@ NUMBER = "<number>"
 """Tag of a number."""
 TAGS = (LIST, TABLE, WORD, NUMBER)
 """Parts of pydantic's error locations that are no keys."""
+_TAGS: Mapping[type, str] = {list: LIST, tuple: LIST, dict: TABLE, str: WORD, int: NUMBER, float: NUMBER}
+BY_KIND = Discriminator(lambda value: _TAGS.get(type(value), TABLE if isinstance(value, Section) else None))
+"""How a union is told apart: by what TOML has there."""
 DEPENDENT = "cannot be judged, as the kinds of the system and the noise are not known; correct these"
 """Of a section; which kinds are wrong is another fault."""
 _UNKNOWN = ("extra_forbidden", "unexpected_keyword_argument")
@@ -64,6 +68,11 @@ def details_of(error: ValidationError, *place: str) -> list[InitErrorDetails]:
         )
         for each in error.errors(include_url=False)
     ]
+
+
+def is_number(value: Any) -> bool:
+    """Whether a value of TOML is a finite number."""
+    return type(value) in (int, float) and abs(value) <= sys.float_info.max
 
 
 def is_list(value: Any) -> bool:
@@ -147,7 +156,7 @@ def explain(
     Args:
         error: with paths from a model.
         fields: of that model.
-        varied: the ranges of the values of [vary].
+        varied: the ranges of the values of keys that are varied.
     """
     faults = [(tuple(part for part in each["loc"] if part not in TAGS), each) for each in faults_in(error)]
     misspelt = set[Path]()
