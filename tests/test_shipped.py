@@ -12,7 +12,7 @@ from fpsolve.arrays import one
 from fpsolve.case.case import load_case
 from fpsolve.case.schema import SCHEMA
 from fpsolve.cli import BAD_INPUT, main
-from fpsolve.workflow.shipped import described_cases, shipped_cases
+from fpsolve.commands.new import described_cases, shipped_cases
 from tests.kit import files
 
 ROOT = Path(__file__).parents[1]

@@ -8,10 +8,10 @@ import pytest
 
 from fpsolve.case.case import load_case
 from fpsolve.cli import BAD_INPUT, CHECK_FAILED, main
+from fpsolve.commands.prove import prove_case
 from fpsolve.proofs import claims
 from fpsolve.proofs.certificate import MalformedProof
 from fpsolve.proofs.claims import claims_from, plain, verdicts
-from fpsolve.workflow.proofs import prove_case
 from tests.proofs.case import CASE
 
 

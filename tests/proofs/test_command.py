@@ -18,6 +18,7 @@ import pytest
 import fpsolve
 from fpsolve.case.case import load_case
 from fpsolve.cli import BAD_INPUT, NOT_CONVERGED, main
+from fpsolve.commands.prove import check_proof, prove_case
 from fpsolve.model.noises.non_gaussian import NonGaussianNoise
 from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
 from fpsolve.output.records import Records, append
@@ -26,7 +27,6 @@ from fpsolve.proofs.certificate import Certificate, Enclosure
 from fpsolve.show.proof import show
 from fpsolve.study import prove as study
 from fpsolve.study.prove import CurveProof, Plan
-from fpsolve.workflow.proofs import check_proof, prove_case
 from tests.conftest import sampled, started
 from tests.kit import case_in
 from tests.oracles import fourier_hermite
@@ -372,8 +372,8 @@ def test_curves_that_are_done_are_written_before_the_end(case, monkeypatch):
     def write(case, proofs, folder, *, is_whole):
         kept.append((len(proofs), is_whole))
 
-    monkeypatch.setattr("fpsolve.workflow.proofs.EVERY", 0.0)
-    monkeypatch.setattr("fpsolve.workflow.proofs.write_proof", write)
+    monkeypatch.setattr("fpsolve.commands.prove.EVERY", 0.0)
+    monkeypatch.setattr("fpsolve.commands.prove.write_proof", write)
     overrides = [
         "--set=vary.noise.r0=[0.9,0.95]",
         "--set=moments.p=[1.0]",

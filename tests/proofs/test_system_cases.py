@@ -6,8 +6,8 @@ import pytest
 
 from fpsolve.case.case import load_case
 from fpsolve.cli import BAD_INPUT, main
+from fpsolve.commands.prove import check_proof, prove_case
 from fpsolve.proofs.claims import claims_from
-from fpsolve.workflow.proofs import check_proof, prove_case
 from tests.oracles import certificate_checker as checker
 
 EQUATIONS = """

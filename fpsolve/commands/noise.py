@@ -1,17 +1,20 @@
-"""Reading a measurement, fitting a noise to it, and writing what became of it."""
+"""`fpsolve noise`: from a measurement to a noise, and to what it means."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from time import monotonic
+from typing import Annotated, Any, Literal
 
 import numpy as np
+from cyclopts import Parameter
 
 from fpsolve.case.case import Case
 from fpsolve.case.new import Modes, modes_of
+from fpsolve.commands.options import NOT_CONVERGED, Count, ModeRows, ModesFile, Out, load, watch_of
 from fpsolve.errors import FpsolveError
 from fpsolve.fem.factors import one_thread
 from fpsolve.files import alone, writable
@@ -20,8 +23,8 @@ from fpsolve.measured.named import NAMED, named_spectrum, parameters_of
 from fpsolve.measured.reading import checked_scale
 from fpsolve.measured.signals import SIGNALS, factor_of, powers
 from fpsolve.measured.spectrum import UNITS
-from fpsolve.measured.statement import Statement
 from fpsolve.measured.units import GRAVITY
+from fpsolve.messages import escaped
 from fpsolve.output.noises import Convention, write_noise
 from fpsolve.study.noise import (
     CLOSE,
@@ -33,6 +36,103 @@ from fpsolve.study.noise import (
     refuse_wrong_case,
 )
 from fpsolve.workflow.progress import SILENT, SOLVES, Phase, Watch
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Statement:
+    """The options of `fpsolve noise`."""
+
+    record: Annotated[
+        Path | None,
+        Parameter(
+            help="A record of values over time instead, also .wav; beside a spectrum its variance is compared with it."
+        ),
+    ] = None
+    per: Annotated[
+        Literal["Hz", "rad/s"] | None,
+        Parameter(help="The unit of the frequencies; if omitted that of the file, which must state it."),
+    ] = None
+    sided: Annotated[
+        Literal["one", "two"] | None,
+        Parameter(help="Whether the integral over f > 0 is the variance, one, or half of it, two."),
+    ] = None
+    frequency: Annotated[
+        list[float] | None,
+        Parameter(
+            help="Natural frequency in the unit of --per, Hz if that is omitted; of two modes twice.", negative=""
+        ),
+    ] = None
+    damping_ratio: Annotated[
+        float | None,
+        Parameter(help="Damping as a share of critical damping: states an oscillator, whose verdict is told."),
+    ] = None
+    restitution: Annotated[
+        float | None, Parameter(help="Speed after a bounce off its wall over that before; no wall if omitted.")
+    ] = None
+    case: Annotated[Path | None, Parameter(help="A case instead, whose noise is replaced.")] = None
+    modes: ModesFile = None
+    mode: ModeRows = None
+    noise_in: Annotated[
+        Literal["stiffness", "damping"] | None,
+        Parameter(help="Where the noise is; stiffness if neither this nor --of is stated."),
+    ] = None
+    of: Annotated[
+        Literal["stiffness", "damping", "acceleration", "height"] | None,
+        Parameter(
+            help="What was measured: the relative stiffness, the damping in 1/s, the vertical acceleration of the "
+            "support of a pendulum in m/s^2, or the metacentric height of a ship in m; that of --noise-in if omitted."
+        ),
+    ] = None
+    length: Annotated[
+        float | None, Parameter(help="Length of the pendulum in m, from which its natural frequency follows.")
+    ] = None
+    gm: Annotated[float | None, Parameter(help="Mean metacentric height in m, for --of height.")] = None
+    kind: Annotated[
+        Literal["ornstein-uhlenbeck", "filter", "bounded", "non-gaussian"], Parameter(help="The kind of noise.")
+    ] = "ornstein-uhlenbeck"
+    terms: Annotated[Count, Parameter(help="How many noises of the kind are added, 1 to 3.")] = 1
+    method: Annotated[
+        Literal["spectrum", "whittle"],
+        Parameter(help="Of a record: its spectrum by Welch's method, or Whittle's likelihood."),
+    ] = "spectrum"
+    column: Annotated[str | None, Parameter(help="The column of values, if the file has several.")] = None
+    rate: Annotated[float | None, Parameter(help="Values of the record per second, if the file states no times.")] = (
+        None
+    )
+    over: Annotated[str | None, Parameter(help="The column of frequencies or times, if its name does not tell.")] = None
+    unit: Annotated[
+        str | None, Parameter(help="The unit of the signal, such as g, or of its density, if the file states none.")
+    ] = None
+    scale: Annotated[float, Parameter(help="What the signal is multiplied by; a density by its square.")] = 1.0
+    skip: Annotated[Count, Parameter(help="Rows of the file that are left out at its beginning; of a text lines.")] = 0
+    row: Annotated[
+        Count | None, Parameter(help="Which of several spectra in the rows of a file; their mean if omitted.")
+    ] = None
+    log_log: Annotated[
+        bool, Parameter(help="The file has break points, with straight lines in the logarithms between.", negative="")
+    ] = False
+    named: Annotated[
+        str | None,
+        Parameter(
+            help="A spectral density by its name instead of a file: jonswap, pierson-moskowitz, von-karman, kaimal, "
+            "kanai-tajimi."
+        ),
+    ] = None
+    parameters: Annotated[str, Parameter(help="Those of the named density, such as Hs=2,Tp=9.")] = ""
+    segment: Annotated[
+        float | None,
+        Parameter(help="Seconds of a segment of a record; as the natural frequency needs if omitted."),
+    ] = None
+    rtol: Annotated[
+        float | None, Parameter(help="Tolerance of the exponents of the system, relative; 1e-4 if omitted.")
+    ] = None
+    seconds: Annotated[
+        float | None, Parameter(help="Processor time for each exponent of the system; 20 if omitted.")
+    ] = None
+    averages: Annotated[
+        float | None, Parameter(help="How many independent periodograms the spectrum is the mean of: tells its errors.")
+    ] = None
 
 
 def noise_case(
@@ -208,3 +308,47 @@ def modes_from(path: Path, numbers: Sequence[int], restitution: float | None) ->
         raise FpsolveError(f"{path}: has {len(chosen)} modes; choose one or two by --mode, such as --mode 1 --mode 2")
     omega = tuple(2 * math.pi * each.frequency for each in chosen)
     return Modes(omega, tuple(each.damping_ratio for each in chosen), restitution)
+
+
+NOTHING_STATED = Statement()
+
+
+def noise(
+    spectrum: Annotated[
+        Path | None,
+        Parameter(
+            help="A spectral density: .csv, .txt, .npy, .npz, .mat, .uff or .nc, with a column of frequencies.",
+        ),
+    ] = None,
+    *,
+    stated: Statement = NOTHING_STATED,
+    out: Out = Path("results"),
+    json: Annotated[bool, Parameter(help="Print noise.json in one line.", negative="")] = False,
+) -> int:
+    """Fit a noise to what was measured, most of all at twice the natural frequency; say what it means for stability.
+
+    Prints the section [noise] of a case, and writes noise.toml, a case with it, noise.json and a figure into
+    OUT/<file>/. Frequencies of the fit are 2f, of two modes 2f1, 2f2, f1 + f2 and |f1 - f2|, and 0 for noise in the
+    damping.
+
+    Example: fpsolve noise spectrum.csv --per Hz --sided one --frequency 2.0 --damping-ratio 0.01 --averages 64
+
+    Example: fpsolve noise --record shaking.csv --of acceleration --length 0.5 --damping-ratio 0.02 --kind filter
+    """
+    from fpsolve.output.noises import Convention, noise_sections
+    from fpsolve.page.terminal import print_blocks
+    from fpsolve.show.noise import show as show_noise
+    from fpsolve.show.results import last_line
+
+    start = monotonic()
+    case = load([stated.case], None)[0] if stated.case else None
+    data, wanted, source = measurement_of(spectrum, stated, case)
+    shown = Convention(stated.per or "Hz", stated.sided or "one")
+    outcome, folder, names = noise_case(data, wanted, source, shown, out, watch_of(is_json=json))
+    if json:
+        print(" ".join(line.strip() for line in (folder / names[0]).read_text(encoding="utf-8").splitlines()))
+    else:
+        print(escaped(noise_sections(outcome).strip()), end="\n\n")
+        print_blocks(show_noise(outcome, source, shown))
+        print_blocks([last_line(folder, ", ".join(names), monotonic() - start)])
+    return NOT_CONVERGED if outcome.failure is not None else 0

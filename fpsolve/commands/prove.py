@@ -1,4 +1,4 @@
-"""Proving the bounds of a case, and checking those of a file."""
+"""`fpsolve prove`: bounds that hold with certainty, and the check of those of a file."""
 
 from __future__ import annotations
 
@@ -8,13 +8,31 @@ from datetime import UTC, datetime
 from hashlib import sha256
 from pathlib import Path
 from time import monotonic
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
+from cyclopts import Parameter
 from pydantic import TypeAdapter
 
 from fpsolve import __version__
 from fpsolve.case.case import Case
+from fpsolve.commands.errors import print_error
+from fpsolve.commands.options import (
+    CHECK_FAILED,
+    NOT_CONVERGED,
+    Jobs,
+    Out,
+    Overrides,
+    Quiet,
+    Report,
+    Scheduler,
+    load_to_write,
+    pool_of,
+    reporter_of,
+    watch_of,
+)
+from fpsolve.errors import FpsolveError
 from fpsolve.files import writable
+from fpsolve.messages import escaped
 from fpsolve.output.proofs import PROOF, write_proof
 from fpsolve.output.records import Records, append
 from fpsolve.pool import Pool, serial
@@ -30,6 +48,7 @@ from fpsolve.workflow.reports import facts_since, shown_at_the_end
 
 if TYPE_CHECKING:
     from fpsolve.workflow.reports import Reporter
+
 
 PROVEN_RECORDS = "records/proven"
 ENCLOSURES = TypeAdapter(Enclosure)
@@ -172,3 +191,76 @@ def check_proof(path: Path) -> Checked:
     except MalformedProof as failure:
         raise MalformedProof(f"{path}: {failure}; make one with `fpsolve prove`") from None
     return Checked(claims, tuple(claims.objections()))
+
+
+ProvenCases = Annotated[list[Path] | None, Parameter(help="Case files.", consume_multiple=True, negative="")]
+
+
+def prove(
+    cases: ProvenCases = None,
+    *,
+    width: Annotated[
+        float | None,
+        Parameter(help="Wanted distance of the bounds, in 1/time; if omitted, 1e-7 of the scale of each number."),
+    ] = None,
+    check: Annotated[
+        Path | None, Parameter(help="Prove nothing, but verify a proof.json from its certificates alone.")
+    ] = None,
+    out: Out = Path("results"),
+    jobs: Jobs = None,
+    scheduler: Scheduler = "",
+    report: Report = False,
+    quiet: Quiet = False,
+    overrides: Overrides = None,
+) -> int:
+    """Prove bounds on the exponents that hold with certainty; write them with certificates into OUT/<case>/proof.json.
+
+    A bound takes at most [budget] seconds of processor time and a third more.
+    The bounds on δ_p together take at most twice as much.
+    Needs python-flint: pip install 'fpsolve[proof]'.
+
+    Exit codes: 0 proven, 3 bounds are farther apart than wanted; with --check 0 accepted, 1 rejected, 2 malformed.
+
+    Example: fpsolve prove cases/fig1.toml --width 1e-9
+    """
+    from fpsolve.page.terminal import print_blocks
+    from fpsolve.show.proof import show as show_proofs
+    from fpsolve.show.results import done_of, last_line
+    from fpsolve.study.prove import refuse_unprovable_case
+
+    if (check is None) == (not cases):
+        raise FpsolveError("name either cases to prove, or with --check a proof.json to verify")
+    if check is not None:
+        if width is not None or overrides or jobs is not None or scheduler or report:
+            raise FpsolveError("--check takes a proof.json and nothing else, as that says all that is verified")
+        checked = check_proof(check)
+        for text in checked.objections:
+            print_error(f"{check}: {text}")
+        bounds = f"bounds on {checked.claims.count} number{'s' * (checked.claims.count != 1)}"
+        if checked.objections:
+            objections = f"{len(checked.objections)} objection{'s' * (len(checked.objections) > 1)}"
+            print(f"rejected: {escaped(str(check))} ({objections}, {bounds})")
+            return CHECK_FAILED
+        unfinished = "" if checked.claims.complete else "; what proved them was interrupted"
+        print(f"accepted: {escaped(str(check))} ({bounds} follow from their certificates{unfinished})")
+        if checked.claims.labels:
+            told = "they are labels, as the certificates state matrices or rates, of which the bounds are"
+            print(f"note: {', '.join(checked.claims.labels)} were not verified: {told}")
+        return 0
+    code, reporter = 0, reporter_of(report)
+    loaded = load_to_write(cases or [], overrides)
+    for case in loaded:
+        refuse_unprovable_case(case, width)
+    pool = pool_of(jobs, scheduler)
+    for case in loaded:
+        start = monotonic()
+        watch = watch_of(is_quiet=quiet)
+        proofs = prove_case(case, out, width=width, pool=pool, reporter=reporter, watch=watch)
+        if not quiet:
+            print_blocks(show_proofs(case, proofs))
+        unmet = sum(not each.is_met for each in proofs)
+        what = done_of(case, len(proofs), unmet, "not as close as wanted")
+        print_blocks([last_line(out / case.name, what, monotonic() - start)])
+        if unmet:
+            code = NOT_CONVERGED
+    return code

@@ -1,19 +1,25 @@
-"""Cases to start from: those that come with fpsolve, which a wheel or a copy of the repository holds, and made ones."""
+"""`fpsolve new`: cases to start from, those that come with fpsolve and made ones."""
 
 from __future__ import annotations
 
+import math
 import re
 import tomllib
 from collections.abc import Mapping
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
 
 from fpsolve.case.new import Modes, case_text
 from fpsolve.case.schema import SCHEMA, schema_text
+from fpsolve.commands.options import ModeRows, ModesFile
 from fpsolve.errors import FpsolveError
 from fpsolve.explain import nearest, shown
 from fpsolve.files import write_text
+from fpsolve.messages import escaped
 
 _NAMED = re.compile(r"\A#:schema .*\n")
 """The line by which a case names its schema."""
@@ -94,3 +100,67 @@ def _write_new(contents: dict[Path, str], case: Path, remedy: str) -> None:
         contents = {**contents, schema: schema_text()}
     for each, content in contents.items():
         write_text(each, content)
+
+
+def new(
+    name: Annotated[
+        str,
+        Parameter(
+            help="A case that comes with fpsolve; if omitted, all are listed. With options the new file; if omitted, "
+            "KIND.toml here."
+        ),
+    ] = "",
+    file: Annotated[Path | None, Parameter(help="The new file, or its folder; if omitted, NAME.toml here.")] = None,
+    *,
+    kind: Annotated[
+        str | None,
+        Parameter(
+            help="Write a case of this kind with comments: oscillator, which is meant if only other options are given, "
+            "system for an equation of your own, parametric for noise in the stiffness, modes or plane."
+        ),
+    ] = None,
+    frequency: Annotated[
+        list[float] | None, Parameter(help="Its natural frequency in Hz; of two modes twice.", negative="")
+    ] = None,
+    damping_ratio: Annotated[
+        list[float] | None,
+        Parameter(help="Its damping as a share of critical damping; 0.01 if omitted.", negative=""),
+    ] = None,
+    modes: ModesFile = None,
+    mode: ModeRows = None,
+    restitution: Annotated[
+        float | None, Parameter(help="Speed after a bounce off its wall over that before; no wall if omitted.")
+    ] = None,
+) -> int:
+    """Copy a case that comes with fpsolve, list these cases with their titles, or write a commented one of a kind.
+
+    Beside the new case is fpsolve.schema.json, with which editors complete and check it.
+
+    Example: fpsolve new fig1 my_case.toml
+
+    Example: fpsolve new my.toml --frequency 2 --damping-ratio 0.01 --restitution 0.9
+    """
+    from fpsolve.case.new import modes_of
+    from fpsolve.commands.noise import modes_from
+
+    if any(each is not None for each in (kind, frequency, damping_ratio, restitution, modes, mode)):
+        if file is not None:
+            raise FpsolveError(f"got {name} and {file}; with --kind and other options name the new file only")
+        if modes is not None and (frequency or damping_ratio):
+            raise FpsolveError("--modes states frequencies and damping; leave out --frequency and --damping-ratio")
+        if modes is None and mode is not None:
+            raise FpsolveError("--mode is for the table that --modes names; name one, or leave it out")
+        if modes is not None:
+            table = modes_from(modes, mode or (), restitution)
+            frequency = [each / (2 * math.pi) for each in table.omega]
+            damping_ratio = [each for each in table.zeta if not math.isnan(each)]
+        made = modes_of(frequency or [], damping_ratio or [], restitution)
+        print(f"written: {escaped(str(write_case(kind or 'oscillator', made, Path(name) if name else None)))}")
+        return 0
+    if name:
+        print(f"written: {escaped(str(copy_case(name, file)))}")
+        return 0
+    described = described_cases()
+    for each, title in described.items():
+        print(f"{each:{max(map(len, described))}}  {title}")
+    return 0

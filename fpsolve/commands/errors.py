@@ -1,0 +1,32 @@
+"""What is wrong, on the standard error."""
+
+from __future__ import annotations
+
+import os
+import sys
+
+from fpsolve.case.remedies import CASE_WORDS
+from fpsolve.messages import escaped, message_of
+
+
+def print_error(text: str) -> None:
+    """Print what is wrong on the standard error, in the words of case files."""
+    from rich.console import Console
+    from rich.text import Text
+
+    try:
+        Console(stderr=True).print(Text(escaped(message_of(text).words(CASE_WORDS))), style="bold red", soft_wrap=True)
+    except (OSError, SystemExit):  # there is no place left to say it
+        drop_blocked_output()
+
+
+def drop_blocked_output() -> None:
+    """Drop what waits in the standard output or errors and cannot be written, so that Python need not at its end."""
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            if stream is not None:
+                stream.flush()
+        except OSError:
+            nowhere = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(nowhere, stream.fileno())
+            os.close(nowhere)

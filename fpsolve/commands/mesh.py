@@ -1,0 +1,50 @@
+"""`fpsolve mesh`: a mesh for a case."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from fpsolve.commands.options import Count
+from fpsolve.messages import escaped
+
+
+def mesh(
+    output: Annotated[Path, Parameter(help="The file to write: .vtu for ParaView, .msh for Gmsh.")],
+    *,
+    phi_cells: Annotated[Count, Parameter(help="Cells in the phase, from one impact to the next.")] = 2,
+    phi_degree: Annotated[Count, Parameter(help="Degree of the elements in the phase.")] = 10,
+    xi_cells: Annotated[Count, Parameter(help="Cells in the noise.")] = 4,
+    xi_degree: Annotated[Count, Parameter(help="Degree of the elements in the noise.")] = 9,
+    xi_min: Annotated[float, Parameter(help="Lower end of the noise, in standard deviations.")] = -8.0,
+    xi_max: Annotated[float, Parameter(help="Upper end of the noise, in standard deviations.")] = 8.0,
+    grading: Annotated[
+        float, Parameter(help="Size of the outermost noise cells divided by that of the innermost; 1 is uniform.")
+    ] = 1.0,
+    full_circle: Annotated[
+        bool, Parameter(help="Mesh the whole circle of phases instead of one half.", negative="")
+    ] = False,
+) -> int:
+    """Write a mesh that a case can name as [mesh] file.
+
+    Example: fpsolve mesh meshes/graded.vtu --phi-cells 3 --xi-cells 8 --grading 2
+    """
+    from fpsolve.fem.mesh import make_mesh, write_mesh
+
+    made = make_mesh(
+        phi_cells=phi_cells,
+        phi_degree=phi_degree,
+        xi_cells=xi_cells,
+        xi_degree=xi_degree,
+        xi_min=xi_min,
+        xi_max=xi_max,
+        grading=grading,
+        full_circle=full_circle,
+    )
+    write_mesh(made, output)
+    cells = (made.phi_lines.size - 1) * (made.z_lines.size - 1)
+    unknowns = (made.phi_lines.size - 1) * (phi_degree + 1) * ((made.z_lines.size - 1) * xi_degree + 1)
+    print(f"written: {escaped(str(output))} ({cells} cells, {unknowns} unknowns)")
+    return 0

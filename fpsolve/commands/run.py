@@ -1,0 +1,100 @@
+"""`fpsolve run`: solve cases."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from time import monotonic
+from typing import Annotated, Any
+
+from cyclopts import Parameter
+
+from fpsolve.commands.errors import print_error
+from fpsolve.commands.options import (
+    NOT_CONVERGED,
+    Cases,
+    Count,
+    Fresh,
+    Interactive,
+    Jobs,
+    Out,
+    Overrides,
+    Quiet,
+    Report,
+    Scheduler,
+    load_to_write,
+    pool_of,
+    reporter_of,
+    watch_of,
+)
+from fpsolve.signals import INTERRUPTED
+
+
+def run(
+    cases: Cases,
+    *,
+    out: Out = Path("results"),
+    monte_carlo: Annotated[
+        bool, Parameter(help="Also simulate, as [monte_carlo] of the case says, and draw both.", negative="")
+    ] = False,
+    jobs: Jobs = None,
+    scheduler: Scheduler = "",
+    fresh: Fresh = False,
+    json: Annotated[
+        bool, Parameter(help="Print the summaries, one line of JSON for each case, instead of tables.", negative="")
+    ] = False,
+    everything: Annotated[
+        bool, Parameter(name="--all", help='Compute everything, as quantities = "all" in [output].', negative="")
+    ] = False,
+    sample: Annotated[
+        Count | None,
+        Parameter(help="Also solve so many samples of the parameters that [uncertain] of the case names."),
+    ] = None,
+    report: Report = False,
+    interactive: Interactive = False,
+    quiet: Quiet = False,
+    overrides: Overrides = None,
+) -> int:
+    """Solve case files; write tables, figures and ParaView files into OUT/<case>/.
+
+    Curves that an earlier run has finished are not solved again, even if that run was killed.
+
+    Without [output] quantities a case computes moment, lyapunov_exponent, stability_index, of walls impact_rate and
+    critical_impact_factor, of terms of degree 3 the response, one of the eigenfunctions, and what other sections name.
+    Only where they are named, or with --all, it computes variance_rate, critical_restitution, sensitivities, all
+    eigenfunctions with densities, rate_function and excursions, too.
+
+    Example: fpsolve run cases/fig1.toml --out results --set oscillator.omega=2.0
+    """
+    from fpsolve.output.tables import whole_summary
+    from fpsolve.page.terminal import print_blocks
+    from fpsolve.parts.intervals import refuse_wrong_samples
+    from fpsolve.show.notes import left_out
+    from fpsolve.show.results import done_of, known_of, last_line
+    from fpsolve.workflow.cases import run_case
+
+    code, reporter = 0, reporter_of(report, interactive)
+    options = {} if sample is None else {f"--sample {sample}": f"uncertain.sample={sample}"}
+    options |= {"--all": 'output.quantities="all"'} if everything else {}
+    loaded = load_to_write(cases, overrides, options, monte_carlo=monte_carlo)
+    for case in loaded:
+        refuse_wrong_samples(case)
+    pool = pool_of(jobs, scheduler) if sample else pool_of(jobs, scheduler, loaded)
+    for case in loaded:
+        start, watch = monotonic(), watch_of(is_json=json, is_quiet=quiet)
+        how: dict[str, Any] = {"monte_carlo": monte_carlo, "is_fresh": fresh, "reporter": reporter}
+        outcome = run_case(case, out, pool=pool, watch=watch, **how)
+        if outcome.interruption:
+            print_error(outcome.interruption)
+        if not (quiet or outcome.interruption):
+            print_blocks(left_out(case, monte_carlo=monte_carlo))
+        if json:
+            print(whole_summary(case, outcome.results, outcome.facts))
+        else:
+            what = done_of(case, len(outcome.results), sum(each.status.fails for each in outcome.results))
+            known = known_of(case, outcome.known, outcome.outdated)
+            print_blocks([last_line(out / case.name, what, monotonic() - start, known)])
+        if outcome.interruption:
+            return INTERRUPTED
+        if outcome.failures or (outcome.samples and outcome.samples.failed):
+            code = NOT_CONVERGED
+    return code

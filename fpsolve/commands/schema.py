@@ -1,0 +1,16 @@
+"""`fpsolve schema`: what editors know of case files."""
+
+from __future__ import annotations
+
+
+def schema() -> int:
+    """Print the JSON Schema of case files, with which editors complete and check them.
+
+    A case file names it in its first line, "#:schema fpsolve.schema.json", for the editors Taplo and Even Better TOML.
+
+    Example: fpsolve schema > fpsolve.schema.json
+    """
+    from fpsolve.case.schema import schema_text
+
+    print(schema_text(), end="")
+    return 0
