@@ -17,7 +17,8 @@ from collections import Counter
 from contextlib import chdir, redirect_stderr, redirect_stdout
 from pathlib import Path
 
-from fpsolve.cli import BAD_INPUT, NOT_CONVERGED, main
+from fpsolve.cli import main
+from fpsolve.commands.options import BAD_INPUT, NOT_CONVERGED
 from tests.case.test_mutations import mutated
 from tests.odd_calls import Hang, hang
 

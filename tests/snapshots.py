@@ -29,8 +29,8 @@ from itertools import groupby
 from pathlib import Path
 from typing import NamedTuple
 
-from fpsolve.cli import BAD_INPUT
 from fpsolve.cli import main as fpsolve
+from fpsolve.commands.options import BAD_INPUT
 
 FOLDER = Path(__file__).parent / "case/refusals"
 END = "====\n"

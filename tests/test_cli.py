@@ -17,7 +17,8 @@ import pytest
 from fpsolve import cli, run
 from fpsolve.case.case import load_case
 from fpsolve.case.sections import QUANTITY_NAMES
-from fpsolve.cli import BAD_INPUT, CHECK_FAILED, CLOSED_PIPE, INTERRUPTED, NOT_CONVERGED, main
+from fpsolve.cli import CLOSED_PIPE, INTERRUPTED, main
+from fpsolve.commands.options import BAD_INPUT, CHECK_FAILED, NOT_CONVERGED
 from fpsolve.exponent.error import digits
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.files import alone

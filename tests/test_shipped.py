@@ -11,8 +11,9 @@ import pytest
 from fpsolve.arrays import one
 from fpsolve.case.case import load_case
 from fpsolve.case.schema import SCHEMA
-from fpsolve.cli import BAD_INPUT, main
+from fpsolve.cli import main
 from fpsolve.commands.new import described_cases, shipped_cases
+from fpsolve.commands.options import BAD_INPUT
 from tests.kit import files
 
 ROOT = Path(__file__).parents[1]

@@ -18,7 +18,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from fpsolve.case.case import load_case
-from fpsolve.cli import BAD_INPUT, main
+from fpsolve.cli import main
+from fpsolve.commands.options import BAD_INPUT
 from fpsolve.errors import CaseError
 from fpsolve.fem.mesh import make_mesh, write_mesh
 from fpsolve.simulation.setup import default_step, obstacles, transient

@@ -10,7 +10,8 @@ import pytest
 
 from fpsolve.case.case import load_case
 from fpsolve.case.vary import legend
-from fpsolve.cli import BAD_INPUT, main
+from fpsolve.cli import main
+from fpsolve.commands.options import BAD_INPUT
 from fpsolve.exponent.function import moment_lyapunov
 from fpsolve.model.problem import RTOL_BEYOND_PLANE
 from fpsolve.model.systems import EquationSystem, VibroImpactOscillator

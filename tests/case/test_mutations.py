@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from fpsolve.case.case import load_case
-from fpsolve.cli import BAD_INPUT
+from fpsolve.commands.options import BAD_INPUT
 from fpsolve.errors import CaseError, MeshError
 from fpsolve.fem.mesh import make_mesh, read_mesh, write_mesh
 from tests.snapshots import good

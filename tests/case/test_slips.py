@@ -9,7 +9,8 @@ import pytest
 import xarray as xr
 
 from fpsolve.case.case import load_case
-from fpsolve.cli import BAD_INPUT, main
+from fpsolve.cli import main
+from fpsolve.commands.options import BAD_INPUT
 from fpsolve.exponent.function import moment_lyapunov
 from fpsolve.measured.tables import read_table
 from fpsolve.model.faults import TableError

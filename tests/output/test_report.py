@@ -14,7 +14,8 @@ import pyvista
 from fpsolve.analysis.regions import Region
 from fpsolve.analysis.zero import Zero
 from fpsolve.case.case import load_case
-from fpsolve.cli import BAD_INPUT, main
+from fpsolve.cli import main
+from fpsolve.commands.options import BAD_INPUT
 from fpsolve.errors import OutputError, Remedy
 from fpsolve.model import OrnsteinUhlenbeck, PlaneSystem, Problem, White
 from fpsolve.output import pictures

@@ -7,7 +7,8 @@ import re
 import pytest
 
 from fpsolve.case.case import load_case
-from fpsolve.cli import BAD_INPUT, CHECK_FAILED, main
+from fpsolve.cli import main
+from fpsolve.commands.options import BAD_INPUT, CHECK_FAILED
 from fpsolve.commands.prove import prove_case
 from fpsolve.proofs import claims
 from fpsolve.proofs.certificate import MalformedProof

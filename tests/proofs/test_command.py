@@ -17,7 +17,8 @@ import pytest
 
 import fpsolve
 from fpsolve.case.case import load_case
-from fpsolve.cli import BAD_INPUT, NOT_CONVERGED, main
+from fpsolve.cli import main
+from fpsolve.commands.options import BAD_INPUT, NOT_CONVERGED
 from fpsolve.commands.prove import check_proof, prove_case
 from fpsolve.model.noises.non_gaussian import NonGaussianNoise
 from fpsolve.model.systems.vibro_impact import VibroImpactOscillator

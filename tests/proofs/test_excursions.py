@@ -13,7 +13,8 @@ import fpsolve
 from fpsolve import PlaneSystem, Problem
 from fpsolve.analysis import excursion
 from fpsolve.analysis.excursions import Crossing
-from fpsolve.cli import BAD_INPUT, CHECK_FAILED, main
+from fpsolve.cli import main
+from fpsolve.commands.options import BAD_INPUT, CHECK_FAILED
 from fpsolve.model import MarkovChain, OrnsteinUhlenbeck, ParametricOscillator, SineWiener, Telegraph, White
 from fpsolve.proofs import prove_excursion, prove_lyapunov_exponent
 from fpsolve.proofs.claims import ExcursionClaim

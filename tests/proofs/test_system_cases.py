@@ -5,7 +5,8 @@ import json
 import pytest
 
 from fpsolve.case.case import load_case
-from fpsolve.cli import BAD_INPUT, main
+from fpsolve.cli import main
+from fpsolve.commands.options import BAD_INPUT
 from fpsolve.commands.prove import check_proof, prove_case
 from fpsolve.proofs.claims import claims_from
 from tests.oracles import certificate_checker as checker

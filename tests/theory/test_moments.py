@@ -8,7 +8,8 @@ import pytest
 
 from fpsolve import ExponentSolver, OrnsteinUhlenbeck, PlaneSystem, Problem
 from fpsolve.arrays import identity
-from fpsolve.cli import BAD_INPUT, CHECK_FAILED, main
+from fpsolve.cli import main
+from fpsolve.commands.options import BAD_INPUT, CHECK_FAILED
 from fpsolve.errors import NoHierarchy
 from fpsolve.model import (
     Bounded,
