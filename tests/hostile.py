@@ -28,6 +28,7 @@ import h5py
 import numpy as np
 
 import fpsolve
+from fpsolve.cli import main as command
 from fpsolve.errors import FpsolveError
 from tests.kit import case_text
 
