@@ -15,11 +15,15 @@ from fpsolve.messages import Code, Message
 from fpsolve.page.page import TONES, WORDS, Block, Drawing
 
 TEMPLATE = "report.html"
+"""The file of this folder that is filled."""
 _FURTHER = re.compile(r"<(metadata|style)\b.*?</\1>", re.DOTALL)
 """Elements of SVG that would be of the whole page, or that no page needs."""
 _COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
+"""A comment of XML."""
 _ID = re.compile(r'\bid="')
+"""The beginning of an id."""
 _REFERENCE = re.compile(r'(href="#|url\(#)')
+"""The beginning of a reference to an id."""
 
 
 def page_of(blocks: Iterable[Block], *, is_interactive: bool = False, **head: Any) -> str:

@@ -22,7 +22,9 @@ from fpsolve.page.page import TONES, WORDS, Block, Column, Grid, Note, Sentence
 ENDLESS = 1_000_000
 """The width of what is not a terminal."""
 STYLES = {"good": "green", "bad": "bold red"}
+"""The styles of cells that stand out."""
 COLOURS = {Severity.FAILURE: "bold red", Severity.WARNING: "yellow", Severity.NOTE: "cyan"}
+"""The styles of notes."""
 _TIE = re.compile(r"(?<=\S) (=|±|<=|<|>) (?=\S)")
 """What holds a name and a number together in one line: "D0 = 0.1", "0.1 ± 1e-3"."""
 _TIED = "\0"

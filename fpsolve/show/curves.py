@@ -26,7 +26,9 @@ from fpsolve.show.text import DIGITS, interval, short
 from fpsolve.study.results import CurveResult
 
 MAIN = LYAPUNOV_EXPONENT, STABILITY_INDEX
+"""The indices that come first, and that have a column over a parameter."""
 THEORY = "Eqs. (38)-(39): perturbation theory"
+"""The remark on the columns of closed forms."""
 
 
 class Shown(NamedTuple):

@@ -29,7 +29,9 @@ from fpsolve.study.columns import asked
 from fpsolve.study.results import CurveResult
 
 STAR = "* for the noise reduced by Eqs. (12)-(14)"
+"""The remark on perturbation theory of another noise than that which is solved."""
 INTERVAL = f"{LEVEL:.0%} interval"
+"""The heading of intervals."""
 
 
 def show_tables(case: Case, result: CurveResult) -> Iterator[Block]:

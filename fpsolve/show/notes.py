@@ -17,7 +17,9 @@ from fpsolve.show.limits import EACH, NAMED, NOTES
 from fpsolve.study.results import CurveResult, SimulatedCurve
 
 SUMMARY = "summary.json"
+"""The file of all messages of a run."""
 MONTE_CARLO = "monte_carlo*.json"
+"""The files of all messages of a simulation."""
 
 
 def notes(case: Case, found: Sequence[CurveResult | SimulatedCurve], file: str = SUMMARY) -> Iterator[Note]:

@@ -28,11 +28,13 @@ from fpsolve.study.prove import CurveProof
 from fpsolve.study.results import CurveResult
 
 NOT_PROVEN = "not proven"
+"""The word where no bound is proven."""
 LONGEST = 12
 """Digits of a p at most in a table."""
 MOST_CHECKED = 3e7
 """Operations for the certificates of a curve that a report checks: some seconds."""
 WORDS = {1: "grows", -1: "decays", 0: "open"}
+"""The fate of a path or a moment by the sign of its exponent."""
 
 
 def show(case: Case, proofs: Sequence[CurveProof]) -> Iterator[Block]:

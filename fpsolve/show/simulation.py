@@ -22,6 +22,7 @@ from fpsolve.study.results import CurveResult, SimulatedCurve
 SURE = 3
 """Standard errors from 0 at which a simulated sign is told."""
 COMPARED = Column("finite elements", 2), Column("s.e. away", 1)
+"""The columns of what finite elements have found."""
 
 
 def show(

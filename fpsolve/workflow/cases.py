@@ -58,9 +58,13 @@ if TYPE_CHECKING:
     from fpsolve.workflow.reports import Reporter
 
 TABLES = "summary.json", "curves.csv", "moments.csv", "results.nc"
+"""The files with all numbers of a run."""
 SAMPLING = ("sample.json",)
+"""The file with all numbers of samples."""
 SIMULATION = ("monte_carlo.json",)
+"""The file with all numbers of a simulation."""
 CHARTED = "chart.csv", "chart.json"
+"""The files with all numbers of a chart."""
 
 
 @dataclass(frozen=True, eq=False)

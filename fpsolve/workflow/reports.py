@@ -22,8 +22,11 @@ from fpsolve.show.notes import note_on
 from fpsolve.workflow.progress import Phase, Watch
 
 REPORT = "report.html"
+"""The file of a report."""
 COMPLETE = "Complete."
+"""The state of a run that did all."""
 INCOMPLETE = "Not complete: the run ended early, and this is what was done."
+"""The state of a run that ended early."""
 _OTHERS = "summary.json", "monte_carlo.json", "chart.json", "design.json", "proof.json"
 """What a command says that it has done."""
 
