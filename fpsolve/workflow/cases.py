@@ -29,7 +29,6 @@ from fpsolve.pool import Pool, cluster, parallel, serial
 from fpsolve.show import intervals, results, simulation
 from fpsolve.show.chart import show as show_chart
 from fpsolve.show.notes import MONTE_CARLO, note_on, notes
-from fpsolve.show.proof import show_claims
 from fpsolve.signals import signals_held
 from fpsolve.study.chart import Chart, chart_work, refuse_no_chart, solve_chart
 from fpsolve.study.design import DesignOutcome, refuse_no_design, solve_design
@@ -183,6 +182,8 @@ def run_case(
                 draw_stationary_responses(case, sweep.results, simulated, folder)
                 draw_densities(case, sweep.results, folder)
             if reporter is not None:
+                from fpsolve.show.proof import show_claims  # which takes a tenth of a second
+
                 is_whole = not interruption and len(simulated) == case.planned * monte_carlo
                 blocks = chain(
                     results.show(case, sweep.results, folder, simulated),
