@@ -1,6 +1,8 @@
 """What the pages of the site tell to type into Python runs, page by page, and their case files are read."""
 
 import ast
+import json
+import math
 import re
 from contextlib import chdir, redirect_stdout
 from datetime import UTC, datetime
@@ -15,11 +17,12 @@ import pytest
 import fpsolve
 from fpsolve import ExponentSolver
 from fpsolve.exponent import INDICES
+from fpsolve.output.records import entries_of, record_of_set
 from fpsolve.output.tables import facts_of, write_results
 from fpsolve.parts import PARTS, indices
 from fpsolve.parts.part import Numerics
 from fpsolve.study import columns, solve
-from fpsolve.study.solve import everything, solve_curve
+from fpsolve.study.solve import everything, result_of, solve_curve
 
 ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")), *sorted((ROOT / "docs").glob("[!g]*/*.md"))]
@@ -112,3 +115,20 @@ def test_a_quantity_of_the_walk_through_is_solved_and_tabulated(monkeypatch, tmp
     write_results(asked_for, [result], tmp_path, facts_of(asked_for, datetime.now(UTC), 0.0))
     heads = (tmp_path / "curves.csv").read_text(encoding="utf-8").splitlines()[0].split(",")
     assert {index.name, f"{index.name}_error"} <= set(heads)
+
+
+def test_the_part_of_the_walk_through_is_solved_recorded_and_tabulated(monkeypatch):
+    """The chance that Gaussian noise is above a level, as the complementary error function has it."""
+    names, _ = typed(ROOT / "docs/contributing.md")
+    part, case = names["part"], fpsolve.load_case(ROOT / "cases/minimal.toml")
+    monkeypatch.setattr(solve, "PARTS", (*PARTS, part))
+    monkeypatch.setitem(solve.BY_NAME, part.name, part)
+    [curve], asked = case.curves(), {"moment": {"p": [], "slopes": True}, part.name: {"level": 1.0}}
+    solved = solve_curve(curve, asked, Numerics.of(case))
+    record = json.loads(json.dumps(record_of_set(curve, asked, Numerics.of(case), solved.entries)))
+    entries, _ = entries_of(record, curve, asked, Numerics.of(case))
+    expected = 0.5 * math.erfc(1.0 / (math.sqrt(2) * curve.noise.standard_deviation))
+    for found in (solved.result, result_of(curve, asked, Numerics.of(case), entries)):
+        assert found.parts[part.name].value == pytest.approx(expected, rel=1e-8)
+        row = part.row(case, found)
+        assert row.keys() == {each.name for each in (names["chance"], names["chance"].error())}

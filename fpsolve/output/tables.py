@@ -152,14 +152,6 @@ def write_samples(case: Case, samples: Samples, folder: Path) -> None:
     write_json(folder / f"{SAMPLE}.json", content)
 
 
-def write_response(result: CurveResult, folder: Path) -> None:
-    """response.csv of a curve, where it has a stationary density: that of the amplitude."""
-    if result.response is None or (density := result.response.density) is None:
-        return
-    rows = zip(density.amplitude.tolist(), density.of_amplitude.tolist(), strict=True)
-    write_csv(folder / f"response{result.curve.suffix}.csv", ["amplitude", "density"], rows)
-
-
 def write_simulation(case: Case, simulated: SimulatedCurve, folder: Path) -> None:
     """monte_carlo.json of a curve, and monte_carlo_response.csv where there is a response."""
     suffix, result, response = simulated.curve.suffix, simulated.result, simulated.response

@@ -12,7 +12,6 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from importlib.resources import files
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
@@ -25,20 +24,19 @@ from fpsolve.exponent.directions import DirectionGrid
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.fields import xi_marginal
 from fpsolve.files import write_text
-from fpsolve.model.problem import Problem, parameter_lines, parameter_words
+from fpsolve.model.problem import Problem
 from fpsolve.model.quantity import Quantity
 from fpsolve.output.directions import on_one_grid, write_densities
 from fpsolve.output.nodes import FIELDS, Nodes
 from fpsolve.parts import directions
 from fpsolve.parts.eigenfunctions import NAME, Eigenfunctions
-from fpsolve.signals import signals_held
-from fpsolve.study.results import CurveResult, SimulatedCurve, Solved
+from fpsolve.study.results import SimulatedCurve, Solved
+from fpsolve.vtk import Facts, field_data, pyvista_module, write_between, write_vtk
 
 CURVES = "curves.pvd"
 MOST_STATES = 8
 """States of the noise that a picture names."""
 _DIGITS = str.maketrans("₁₂₃₄²", "12342")
-Facts = Mapping[str, Any]
 
 
 def write_eigenfunctions(
@@ -70,7 +68,7 @@ def write_eigenfunctions(
     """
     names = {pair.p: _name(stem, pair.p) for pair in sorted(pairs, key=lambda pair: pair.p)}
     problem = stationary.generator.problem
-    facts = {**_frame(problem), **_facts(parameters, varied, problem)}
+    facts = {**_frame(problem), **field_data(parameters, varied, problem)}
     for pair in pairs:
         grid = Nodes.of(pair)
         found = grid.fields(pair)
@@ -108,7 +106,7 @@ def write_density(
     }
     problem = stationary.generator.problem
     known = {"p": 0.0, "Lambda": 0.0, "lyapunov_exponent": stationary.derivative, **_frame(problem)}
-    _write_grid(path, grid, data, {**known, **_facts(parameters, varied, problem)})
+    _write_grid(path, grid, data, {**known, **field_data(parameters, varied, problem)})
     return path
 
 
@@ -137,7 +135,7 @@ def write_directions(found: Sequence[SettledDirections], curve: Curve, folder: P
     write_densities(found, curve, folder)
     grid, problem = found[0].fields.grid, curve.problem
     stationary = next((each for each in found if not each.pair.p), None)
-    facts = {"curve": float(curve.number), **_facts(curve.parameters, curve.varied, problem)}
+    facts = {"curve": float(curve.number), **field_data(curve.parameters, curve.varied, problem)}
     facts |= {f"along_{side}": _plain(axis) for side, axis in zip("xy", grid.quantities, strict=True)}
     always: dict[str, FloatArray] = {}
     if stationary is not None:
@@ -168,30 +166,7 @@ def _write_plane(path: Path, grid: DirectionGrid, data: Mapping[str, FloatArray]
     if grid.dimension == 3:
         flat = np.cos(second)
         places = [flat * np.cos(first), flat * np.sin(first), np.sin(second)]
-    _write_between(path, places, data, facts)
-
-
-def _write_between(path: Path, places: Sequence[FloatArray], data: Mapping[str, Any], facts: Facts) -> None:
-    """Write a .vtu file of the quadrilaterals, or the hexahedra, between the nodes of a grid.
-
-    Args:
-        path: of the file.
-        places: x, y and z of the nodes, all of the shape of the grid.
-        data: point data of this shape; the first is shown first.
-        facts: field data.
-    """
-    pyvista, numbers = _pyvista(), np.arange(places[0].size).reshape(places[0].shape)
-    square = [(0, 0), (1, 0), (1, 1), (0, 1)]
-    steps = square if numbers.ndim == 2 else [(*step, top) for top in (0, 1) for step in square]
-    corners = [numbers[tuple(slice(k, k - 1 or None) for k in step)].ravel() for step in steps]
-    kind = pyvista.CellType.QUAD if numbers.ndim == 2 else pyvista.CellType.HEXAHEDRON
-    cells = np.stack([np.full_like(corners[0], len(corners)), *corners], axis=1)
-    kinds = np.full(len(cells), kind, dtype=np.uint8)
-    output = pyvista.UnstructuredGrid(cells.ravel(), kinds, np.stack([each.ravel() for each in places], axis=1))
-    for name, values in data.items():
-        output.point_data[name] = values.ravel()
-    output.GetPointData().SetActiveScalars(next(iter(data)))
-    _write(path, output, facts)
+    write_between(path, places, data, facts)
 
 
 def write_curves(case: Case, folder: Path) -> Path | None:
@@ -225,40 +200,11 @@ def write_simulated_response(simulated: SimulatedCurve, folder: Path) -> None:
         return
     path, x, v = folder / f"monte_carlo_response{curve.suffix}.vti", response.x_edges, response.v_edges
     size, spacing = (x.size, v.size, 1), (x[1] - x[0], v[1] - v[0], 1.0)
-    grid = _pyvista().ImageData(dimensions=size, spacing=spacing, origin=(x[0], v[0], 0.0))
+    grid = pyvista_module().ImageData(dimensions=size, spacing=spacing, origin=(x[0], v[0], 0.0))
     grid.cell_data["density"] = response.density.ravel(order="F")
     known = {name: getattr(found, name) for name in ("lyapunov_exponent", "lyapunov_exponent_error")}
     parameters = {**curve.parameters, "curve": float(curve.number)}
-    _write(path, grid, {**known, **_facts(parameters, curve.varied, curve.problem)})
-
-
-def write_stationary_response(result: CurveResult, folder: Path) -> None:
-    """Write the stationary density of a curve, if it has one, as response.vtu and response_3d.vtu.
-
-    The first shows both variables as x and y, with the `density` of these, and `amplitude` and `phi`; the second shows
-    (a, φ, ξ) as x, y and z, with the `density` of these. Field data: the numbers of the response, `stability_index`,
-    and the parameters as in `write_eigenfunctions`.
-    """
-    found, curve = result.response, result.curve
-    if found is None or found.density is None:
-        return
-    density, system = found.density, curve.problem.system
-    about = system.response.numbers
-    known = {about[name].name: each.value for name, each in found.numbers.items()}
-    facts = {
-        **known,
-        "stability_index": found.stability_index,
-        "curve": float(curve.number),
-        **_facts(curve.parameters, curve.varied, curve.problem),
-    }
-    phases, of_plane = density.plane(system.response.has_wall)
-    a, phi = np.meshgrid(density.amplitude, phases, indexing="ij")
-    plane = {"density": of_plane, "amplitude": a, "phi": phi}
-    places = [a * np.cos(phi), -a * system.aspect * np.sin(phi), 0 * a]
-    _write_between(folder / f"response{curve.suffix}.vtu", places, plane, facts)
-    places = [*np.meshgrid(density.amplitude, density.phi, density.xi, indexing="ij")]
-    whole = {"density": density.whole.astype(np.float32)}
-    _write_between(folder / f"response_3d{curve.suffix}.vtu", places, whole, facts)
+    write_vtk(path, grid, {**known, **field_data(parameters, curve.varied, curve.problem)})
 
 
 def copy_show_script(directory: Path) -> Path:
@@ -270,7 +216,7 @@ def copy_show_script(directory: Path) -> Path:
 
 def _write_grid(path: Path, grid: Nodes, data: Mapping[str, FloatArray], facts: Facts) -> None:
     """Write a .vtu file; arrays of point data broadcast to (φ-nodes, ξ-nodes), and the first is shown first."""
-    pyvista, connectivity = _pyvista(), grid.cells()
+    pyvista, connectivity = pyvista_module(), grid.cells()
     count, size = connectivity.shape
     cells = np.column_stack([np.full(count, size), connectivity]).ravel()
     kinds = np.full(count, pyvista.CellType.LAGRANGE_QUADRILATERAL, dtype=np.uint8)
@@ -278,38 +224,7 @@ def _write_grid(path: Path, grid: Nodes, data: Mapping[str, FloatArray], facts: 
     for name, values in data.items():
         output.point_data[name] = np.broadcast_to(values, (grid.phi.size, grid.z.size)).ravel()
     output.GetPointData().SetActiveScalars(next(iter(data)))
-    _write(path, output, facts)
-
-
-def _write(path: Path, grid: Any, facts: Facts) -> None:
-    """Write a grid with field data; as a text, for VTK itself is silent about a full disk."""
-    from vtkmodules.vtkIOXML import vtkXMLImageDataWriter, vtkXMLUnstructuredGridWriter
-
-    for name, value in facts.items():
-        is_text = isinstance(value, str)
-        grid.field_data[name] = np.frombuffer(value.encode(), np.uint8) if is_text else np.atleast_1d(value)
-    writer = vtkXMLImageDataWriter() if path.suffix == ".vti" else vtkXMLUnstructuredGridWriter()
-    writer.SetInputData(grid)
-    writer.WriteToOutputStringOn()
-    writer.Write()
-    write_text(path, writer.GetOutputString())
-
-
-def _pyvista() -> Any:
-    """pyvista, which takes half a second. No signal interrupts the import of it and of VTK's writers."""
-    with signals_held():
-        import pyvista
-        import vtkmodules.vtkIOXML  # noqa: F401
-    return pyvista
-
-
-def _facts(parameters: Facts, varied: Collection[str], problem: Problem) -> Facts:
-    """The parameters, words in the name, and the words about those that a picture shows, if there are any, in ASCII."""
-    known = {key: each._replace(value=parameters[key]) for key, each in problem.parameters.items() if key in parameters}
-    words = {"varied": parameter_words(known, varied), "held": "\n".join(parameter_lines(known, varied))}
-    named = {f"{key} = {each.value}": 1.0 for key, each in known.items() if isinstance(each.value, str)}
-    numbers = {key: each for key, each in parameters.items() if f"{key} = {each}" not in named}
-    return {**numbers, **named, **{name: text.replace("²", "^2") for name, text in words.items() if text}}
+    write_vtk(path, output, facts)
 
 
 def _frame(problem: Problem) -> Facts:

@@ -202,7 +202,7 @@ class Part:
         columns: the columns of tables that a case asks for.
         row: the numbers of a curve in these columns.
         content: what summary.json has of it beyond the tables; None where it is not asked for.
-        files: writes the files of a curve that no other part writes.
+        files: writes into a folder the files that a curve has beyond the tables.
         is_whole: whether what a record holds is what can be written and drawn.
         uses_solver: whether rtol and the mesh of Λ(p) decide its numbers.
         is_drawn: whether there is more than a record holds, so that a further run solves it again.
@@ -221,7 +221,7 @@ class Part:
     columns: Callable[[Case], Sequence[Quantity]] = _nothing
     row: Callable[[Case, CurveResult], Row] = _no_row
     content: Callable[[Case, CurveResult], Mapping[str, Any]] = _no_row
-    files: Callable[[CurveResult, Path], None] = lambda *_: None
+    files: Callable[[CurveResult, Path], None] | None = None
     is_whole: Callable[[Any, Curve, Settings], bool] = lambda *_: True
     uses_solver: bool = True
     is_drawn: bool = False

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Self
 
 import numpy as np
@@ -15,6 +16,7 @@ from fpsolve.data import Quantity
 from fpsolve.explain import Refusal
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.error import Estimate
+from fpsolve.files import write_csv
 from fpsolve.model.noise import Noise
 from fpsolve.model.parameters import Section, parameter
 from fpsolve.model.problem import Problem
@@ -23,6 +25,7 @@ from fpsolve.nonlinear.rest import NearRest
 from fpsolve.parts.indices import is_estimate
 from fpsolve.parts.part import Job, Part, Settings
 from fpsolve.results.table import Row, pair
+from fpsolve.vtk import field_data, write_between
 
 if TYPE_CHECKING:
     from fpsolve.case.case import Case, Curve
@@ -241,6 +244,37 @@ def _is_whole(found: CurveResponse, curve: Curve, settings: Settings) -> bool:
     )
 
 
+def _files(result: CurveResult, folder: Path) -> None:
+    """Write the stationary density of a curve, if it has one, as response.csv, response.vtu and response_3d.vtu.
+
+    The table has that of the amplitude. response.vtu shows both variables as x and y, with the `density` of these, and
+    `amplitude` and `phi`; response_3d.vtu shows (a, φ, ξ) as x, y and z, with the `density` of these. Field data: the
+    numbers of the response, `stability_index`, and the parameters as in `write_eigenfunctions`.
+    """
+    found, curve = result.response, result.curve
+    if found is None or found.density is None:
+        return
+    density, system = found.density, curve.problem.system
+    rows = zip(density.amplitude.tolist(), density.of_amplitude.tolist(), strict=True)
+    write_csv(folder / f"response{curve.suffix}.csv", ["amplitude", "density"], rows)
+    about = system.response.numbers
+    known = {about[name].name: each.value for name, each in found.numbers.items()}
+    facts = {
+        **known,
+        "stability_index": found.stability_index,
+        "curve": float(curve.number),
+        **field_data(curve.parameters, curve.varied, curve.problem),
+    }
+    phases, of_plane = density.plane(system.response.has_wall)
+    a, phi = np.meshgrid(density.amplitude, phases, indexing="ij")
+    plane = {"density": of_plane, "amplitude": a, "phi": phi}
+    places = [a * np.cos(phi), -a * system.aspect * np.sin(phi), 0 * a]
+    write_between(folder / f"response{curve.suffix}.vtu", places, plane, facts)
+    places = [*np.meshgrid(density.amplitude, density.phi, density.xi, indexing="ij")]
+    whole = {"density": density.whole.astype(np.float32)}
+    write_between(folder / f"response_3d{curve.suffix}.vtu", places, whole, facts)
+
+
 PART: Part = Part(
     NAME,
     _settings,
@@ -250,6 +284,7 @@ PART: Part = Part(
     columns=_columns,
     row=_row,
     content=_content,
+    files=_files,
     is_whole=_is_whole,
     section=ResponseSection,
     check=_check,

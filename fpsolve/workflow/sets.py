@@ -36,12 +36,11 @@ from fpsolve.output.records import (
     simulation_fits,
     simulation_key,
 )
-from fpsolve.output.tables import facts_of, write_response, write_results
-from fpsolve.output.vtk import write_curves, write_functions, write_stationary_response
-from fpsolve.parts.every import BY_NAME
+from fpsolve.output.tables import facts_of, write_results
+from fpsolve.output.vtk import write_curves, write_functions
+from fpsolve.parts.every import BY_NAME, PARTS
 from fpsolve.parts.moments import PART as OF_P
 from fpsolve.parts.part import Job, Numerics
-from fpsolve.parts.response import NAME as RESPONSE
 from fpsolve.pool import Pool, serial
 from fpsolve.study.results import CurveResult, SimulatedCurve, Solved
 from fpsolve.study.simulate import simulate_curve, simulate_curves, simulation_steps, simulation_work
@@ -180,12 +179,13 @@ class Sweep(_Kept):
         self._due = monotonic() + REST * (monotonic() - started)
 
     def write_all(self) -> None:
-        """Write the tables, results.nc, the series over the curves, and the stationary densities."""
+        """Write the tables, results.nc, the series over the curves, and the files of parts."""
         self.write_tables()
         write_curves(self.case, self.folder)
-        for result in self.results if RESPONSE in self.results.asked(1) else ():
-            write_response(result, self.folder)
-            write_stationary_response(result, self.folder)
+        writers = [part.files for part in PARTS if part.files and part.name in self.results.asked(1)]
+        for result in self.results if writers else ():
+            for write in writers:
+                write(result, self.folder)
         write_dataset(self.case, self.results, self.folder, self.facts)
 
     def _is_drawn(self, number: int) -> bool:

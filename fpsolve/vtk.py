@@ -1,0 +1,71 @@
+"""Files for ParaView: grids with field data, which are numbers, as meshio refuses texts, and the codes of letters."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fpsolve.arrays import FloatArray
+from fpsolve.files import write_text
+from fpsolve.model.problem import Problem, parameter_lines, parameter_words
+from fpsolve.signals import signals_held
+
+Facts = Mapping[str, Any]
+"""Field data by their names."""
+
+
+def field_data(parameters: Facts, varied: Collection[str], problem: Problem) -> Facts:
+    """The parameters, words in the name, and the words about those that a picture shows, if there are any, in ASCII."""
+    known = {key: each._replace(value=parameters[key]) for key, each in problem.parameters.items() if key in parameters}
+    words = {"varied": parameter_words(known, varied), "held": "\n".join(parameter_lines(known, varied))}
+    named = {f"{key} = {each.value}": 1.0 for key, each in known.items() if isinstance(each.value, str)}
+    numbers = {key: each for key, each in parameters.items() if f"{key} = {each}" not in named}
+    return {**numbers, **named, **{name: text.replace("²", "^2") for name, text in words.items() if text}}
+
+
+def write_between(path: Path, places: Sequence[FloatArray], data: Mapping[str, Any], facts: Facts) -> None:
+    """Write a .vtu file of the quadrilaterals, or the hexahedra, between the nodes of a grid.
+
+    Args:
+        path: of the file.
+        places: x, y and z of the nodes, all of the shape of the grid.
+        data: point data of this shape; the first is shown first.
+        facts: field data.
+    """
+    pyvista, numbers = pyvista_module(), np.arange(places[0].size).reshape(places[0].shape)
+    square = [(0, 0), (1, 0), (1, 1), (0, 1)]
+    steps = square if numbers.ndim == 2 else [(*step, top) for top in (0, 1) for step in square]
+    corners = [numbers[tuple(slice(k, k - 1 or None) for k in step)].ravel() for step in steps]
+    kind = pyvista.CellType.QUAD if numbers.ndim == 2 else pyvista.CellType.HEXAHEDRON
+    cells = np.stack([np.full_like(corners[0], len(corners)), *corners], axis=1)
+    kinds = np.full(len(cells), kind, dtype=np.uint8)
+    output = pyvista.UnstructuredGrid(cells.ravel(), kinds, np.stack([each.ravel() for each in places], axis=1))
+    for name, values in data.items():
+        output.point_data[name] = values.ravel()
+    output.GetPointData().SetActiveScalars(next(iter(data)))
+    write_vtk(path, output, facts)
+
+
+def write_vtk(path: Path, grid: Any, facts: Facts) -> None:
+    """Write a grid with field data; as a text, for VTK itself is silent about a full disk."""
+    from vtkmodules.vtkIOXML import vtkXMLImageDataWriter, vtkXMLUnstructuredGridWriter
+
+    for name, value in facts.items():
+        is_text = isinstance(value, str)
+        grid.field_data[name] = np.frombuffer(value.encode(), np.uint8) if is_text else np.atleast_1d(value)
+    writer = vtkXMLImageDataWriter() if path.suffix == ".vti" else vtkXMLUnstructuredGridWriter()
+    writer.SetInputData(grid)
+    writer.WriteToOutputStringOn()
+    writer.Write()
+    write_text(path, writer.GetOutputString())
+
+
+def pyvista_module() -> Any:
+    """pyvista, which takes half a second. No signal interrupts the import of it and of VTK's writers."""
+    with signals_held():
+        import pyvista
+        import vtkmodules.vtkIOXML  # noqa: F401
+    return pyvista
