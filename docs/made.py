@@ -47,6 +47,7 @@ ROOMS = {
     "show": "what is said of results",
     "page": "blocks on a terminal and in HTML",
     "workflow": "run, simulate, chart and check a case",
+    "commands": "what each command does",
 }
 
 

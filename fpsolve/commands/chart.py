@@ -2,36 +2,15 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from time import monotonic
 
-from fpsolve.commands.options import (
-    NOT_CONVERGED,
-    Cases,
-    Interactive,
-    Jobs,
-    Out,
-    Overrides,
-    Quiet,
-    Report,
-    Scheduler,
-    load_to_write,
-    pool_of,
-    reporter_of,
-    watch_of,
-)
+from fpsolve.commands.options import ALL_OPTIONS, NOT_CONVERGED, Cases, Pointing
 
 
 def chart(
     cases: Cases,
     *,
-    out: Out = Path("results"),
-    jobs: Jobs = None,
-    scheduler: Scheduler = "",
-    report: Report = False,
-    interactive: Interactive = False,
-    quiet: Quiet = False,
-    overrides: Overrides = None,
+    options: Pointing = ALL_OPTIONS,
 ) -> int:
     """Trace where stability ends in a plane of two parameters; write chart.csv, .json, .png and .pdf into OUT/<case>/.
 
@@ -45,23 +24,22 @@ def chart(
     from fpsolve.show.chart import show as show_chart
     from fpsolve.show.chart import traced
     from fpsolve.show.notes import note_on
-    from fpsolve.show.results import last_line
     from fpsolve.study.chart import refuse_no_chart
     from fpsolve.workflow.cases import chart_case
 
-    code, reporter = 0, reporter_of(report, interactive)
-    loaded = load_to_write(cases, overrides)
+    code, reporter = 0, options.reporter()
+    loaded = options.load(cases)
     for case in loaded:
         refuse_no_chart(case)
-    pool = pool_of(jobs, scheduler)
+    pool = options.pool()
     for case in loaded:
         start = monotonic()
-        found = chart_case(case, out, pool=pool, reporter=reporter, watch=watch_of(is_quiet=quiet))
-        if quiet:
+        found = chart_case(case, options.out, pool=pool, reporter=reporter, watch=options.watch())
+        if options.quiet:
             print_blocks(note_on(case.name, each) for each in dict.fromkeys(found.failures))
         else:
-            print_blocks(show_chart(case, found, out / case.name))
-        print_blocks([last_line(out / case.name, traced(found), monotonic() - start)])
+            print_blocks(show_chart(case, found, options.out / case.name))
+        options.print_written(case, traced(found), start)
         if found.failures:
             code = NOT_CONVERGED
     return code

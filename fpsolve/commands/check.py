@@ -6,18 +6,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from fpsolve.commands.options import (
-    CHECK_FAILED,
-    NOT_CONVERGED,
-    Cases,
-    Jobs,
-    Overrides,
-    Quiet,
-    Scheduler,
-    load,
-    pool_of,
-    watch_of,
-)
+from fpsolve.commands.options import CHECK_FAILED, NOT_CONVERGED, OPTIONS_OF_WORK, Cases, Working
 from fpsolve.messages import Severity
 
 
@@ -32,10 +21,7 @@ def check(
             negative="",
         ),
     ] = False,
-    jobs: Jobs = None,
-    scheduler: Scheduler = "",
-    quiet: Quiet = False,
-    overrides: Overrides = None,
+    options: Working = OPTIONS_OF_WORK,
 ) -> int:
     """Solve case files and compare the results with the values that they expect; write nothing.
 
@@ -50,17 +36,17 @@ def check(
     from fpsolve.study.hierarchy import refuse_no_hierarchy
     from fpsolve.workflow.cases import check_case
 
-    code, loaded = 0, load(cases, overrides)
+    code, loaded = 0, options.load(cases)
     for case in loaded if hierarchy else ():
         refuse_no_hierarchy(case)
-    pool = pool_of(jobs, scheduler, loaded)
+    pool = options.pool(loaded)
     for case in loaded:
-        outcome = check_case(case, by_hierarchy=hierarchy, pool=pool, watch=watch_of(is_quiet=quiet))
-        if quiet:
+        outcome = check_case(case, by_hierarchy=hierarchy, pool=pool, watch=options.watch())
+        if options.quiet:
             print(f"{case.name}: {agreement(outcome.comparisons)}")
         else:
             print_blocks(show_comparisons(case, outcome.comparisons))
-        print_blocks(notes(case, outcome.results, ""), [Severity.FAILURE] if quiet else list(Severity))
+        print_blocks(notes(case, outcome.results, ""), [Severity.FAILURE] if options.quiet else list(Severity))
         print_blocks(note_on(case.name, fault) for fault in outcome.faults)
         if outcome.failures:
             code = NOT_CONVERGED

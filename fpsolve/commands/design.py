@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 from time import monotonic
 from typing import Annotated
 
 from cyclopts import Parameter
 
-from fpsolve.commands.options import CHECK_FAILED, NOT_CONVERGED, Cases, Out, Overrides, Quiet, load_to_write, watch_of
+from fpsolve.commands.options import CHECK_FAILED, NOT_CONVERGED, OPTIONS_OF_FILES, Cases, Writing
 from fpsolve.errors import FpsolveError
 
 
@@ -42,10 +41,8 @@ def design(
         list[float] | None,
         Parameter(name="--to", help="Its largest value, one for each --by; twice its value if omitted.", negative=""),
     ] = None,
-    out: Out = Path("results"),
     json: Annotated[bool, Parameter(help="Print design.json, one line for each case.", negative="")] = False,
-    quiet: Quiet = False,
-    overrides: Overrides = None,
+    options: Writing = OPTIONS_OF_FILES,
 ) -> int:
     """Find the values of parameters with which λ, Λ(p) or δ_p has a wanted value.
 
@@ -59,24 +56,22 @@ def design(
     from fpsolve.page.terminal import print_blocks
     from fpsolve.show.design import found_of
     from fpsolve.show.design import show as show_design
-    from fpsolve.show.results import last_line
     from fpsolve.study.design import refuse_no_design
     from fpsolve.workflow.cases import design_case
 
-    code, options = 0, design_options(target, by, start, stop)
-    loaded = load_to_write(cases, overrides, options)
+    code, loaded = 0, options.load(cases, design_options(target, by, start, stop))
     for case in loaded:
         refuse_no_design(case)
     for case in loaded:
         begun = monotonic()
-        outcome = design_case(case, out, watch=watch_of(is_json=json, is_quiet=quiet))
+        outcome = design_case(case, options.out, watch=options.watch(is_json=json))
         if json:
-            lines = (out / case.name / "design.json").read_text(encoding="utf-8").splitlines()
+            lines = (options.out / case.name / "design.json").read_text(encoding="utf-8").splitlines()
             print(" ".join(line.strip() for line in lines))
-        is_short = quiet or json
+        is_short = options.quiet or json
         print_blocks(each for each in show_design(case, outcome) if isinstance(each, Note) or not is_short)
         if not json:
-            print_blocks([last_line(out / case.name, found_of(outcome), monotonic() - begun)])
+            options.print_written(case, found_of(outcome), begun)
         if outcome.is_out_of_reach:
             code = max(code, CHECK_FAILED)
         elif outcome.found is None:

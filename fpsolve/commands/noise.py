@@ -14,7 +14,7 @@ from cyclopts import Parameter
 
 from fpsolve.case.case import Case
 from fpsolve.case.new import Modes, modes_of
-from fpsolve.commands.options import NOT_CONVERGED, Count, ModeRows, ModesFile, Out, load, watch_of
+from fpsolve.commands.options import NOT_CONVERGED, Count, ModeRows, ModesFile, Options
 from fpsolve.errors import FpsolveError
 from fpsolve.fem.factors import one_thread
 from fpsolve.files import alone, writable
@@ -322,7 +322,7 @@ def noise(
     ] = None,
     *,
     stated: Statement = NOTHING_STATED,
-    out: Out = Path("results"),
+    out: Annotated[Path, Parameter(help="Folder for the results.")] = Path("results"),
     json: Annotated[bool, Parameter(help="Print noise.json in one line.", negative="")] = False,
 ) -> int:
     """Fit a noise to what was measured, most of all at twice the natural frequency; say what it means for stability.
@@ -341,10 +341,10 @@ def noise(
     from fpsolve.show.results import last_line
 
     start = monotonic()
-    case = load([stated.case], None)[0] if stated.case else None
+    case = Options().load([stated.case])[0] if stated.case else None
     data, wanted, source = measurement_of(spectrum, stated, case)
     shown = Convention(stated.per or "Hz", stated.sided or "one")
-    outcome, folder, names = noise_case(data, wanted, source, shown, out, watch_of(is_json=json))
+    outcome, folder, names = noise_case(data, wanted, source, shown, out, Options().watch(is_json=json))
     if json:
         print(" ".join(line.strip() for line in (folder / names[0]).read_text(encoding="utf-8").splitlines()))
     else:

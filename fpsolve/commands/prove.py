@@ -16,20 +16,7 @@ from pydantic import TypeAdapter
 from fpsolve import __version__
 from fpsolve.case.case import Case
 from fpsolve.commands.errors import print_error
-from fpsolve.commands.options import (
-    CHECK_FAILED,
-    NOT_CONVERGED,
-    Jobs,
-    Out,
-    Overrides,
-    Quiet,
-    Report,
-    Scheduler,
-    load_to_write,
-    pool_of,
-    reporter_of,
-    watch_of,
-)
+from fpsolve.commands.options import CHECK_FAILED, NOT_CONVERGED, OPTIONS_OF_REPORTS, Reporting
 from fpsolve.errors import FpsolveError
 from fpsolve.files import writable
 from fpsolve.messages import escaped
@@ -206,12 +193,7 @@ def prove(
     check: Annotated[
         Path | None, Parameter(help="Prove nothing, but verify a proof.json from its certificates alone.")
     ] = None,
-    out: Out = Path("results"),
-    jobs: Jobs = None,
-    scheduler: Scheduler = "",
-    report: Report = False,
-    quiet: Quiet = False,
-    overrides: Overrides = None,
+    options: Reporting = OPTIONS_OF_REPORTS,
 ) -> int:
     """Prove bounds on the exponents that hold with certainty; write them with certificates into OUT/<case>/proof.json.
 
@@ -225,13 +207,13 @@ def prove(
     """
     from fpsolve.page.terminal import print_blocks
     from fpsolve.show.proof import show as show_proofs
-    from fpsolve.show.results import done_of, last_line
+    from fpsolve.show.results import done_of
     from fpsolve.study.prove import refuse_unprovable_case
 
     if (check is None) == (not cases):
         raise FpsolveError("name either cases to prove, or with --check a proof.json to verify")
     if check is not None:
-        if width is not None or overrides or jobs is not None or scheduler or report:
+        if width is not None or options not in (OPTIONS_OF_REPORTS, Reporting(out=options.out, quiet=options.quiet)):
             raise FpsolveError("--check takes a proof.json and nothing else, as that says all that is verified")
         checked = check_proof(check)
         for text in checked.objections:
@@ -247,20 +229,19 @@ def prove(
             told = "they are labels, as the certificates state matrices or rates, of which the bounds are"
             print(f"note: {', '.join(checked.claims.labels)} were not verified: {told}")
         return 0
-    code, reporter = 0, reporter_of(report)
-    loaded = load_to_write(cases or [], overrides)
+    code, reporter = 0, options.reporter()
+    loaded = options.load(cases or [])
     for case in loaded:
         refuse_unprovable_case(case, width)
-    pool = pool_of(jobs, scheduler)
+    pool = options.pool()
     for case in loaded:
         start = monotonic()
-        watch = watch_of(is_quiet=quiet)
-        proofs = prove_case(case, out, width=width, pool=pool, reporter=reporter, watch=watch)
-        if not quiet:
+        proofs = prove_case(case, options.out, width=width, pool=pool, reporter=reporter, watch=options.watch())
+        if not options.quiet:
             print_blocks(show_proofs(case, proofs))
         unmet = sum(not each.is_met for each in proofs)
         what = done_of(case, len(proofs), unmet, "not as close as wanted")
-        print_blocks([last_line(out / case.name, what, monotonic() - start)])
+        options.print_written(case, what, start)
         if unmet:
             code = NOT_CONVERGED
     return code

@@ -2,42 +2,22 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from time import monotonic
 from typing import Annotated, Any
 
 from cyclopts import Parameter
 
 from fpsolve.commands.errors import print_error
-from fpsolve.commands.options import (
-    NOT_CONVERGED,
-    Cases,
-    Count,
-    Fresh,
-    Interactive,
-    Jobs,
-    Out,
-    Overrides,
-    Quiet,
-    Report,
-    Scheduler,
-    load_to_write,
-    pool_of,
-    reporter_of,
-    watch_of,
-)
+from fpsolve.commands.options import ALL_OPTIONS, NOT_CONVERGED, Cases, Count, Fresh, Pointing
 from fpsolve.signals import INTERRUPTED
 
 
 def run(
     cases: Cases,
     *,
-    out: Out = Path("results"),
     monte_carlo: Annotated[
         bool, Parameter(help="Also simulate, as [monte_carlo] of the case says, and draw both.", negative="")
     ] = False,
-    jobs: Jobs = None,
-    scheduler: Scheduler = "",
     fresh: Fresh = False,
     json: Annotated[
         bool, Parameter(help="Print the summaries, one line of JSON for each case, instead of tables.", negative="")
@@ -49,10 +29,7 @@ def run(
         Count | None,
         Parameter(help="Also solve so many samples of the parameters that [uncertain] of the case names."),
     ] = None,
-    report: Report = False,
-    interactive: Interactive = False,
-    quiet: Quiet = False,
-    overrides: Overrides = None,
+    options: Pointing = ALL_OPTIONS,
 ) -> int:
     """Solve case files; write tables, figures and ParaView files into OUT/<case>/.
 
@@ -69,30 +46,32 @@ def run(
     from fpsolve.page.terminal import print_blocks
     from fpsolve.parts.intervals import refuse_wrong_samples
     from fpsolve.show.notes import left_out
-    from fpsolve.show.results import done_of, known_of, last_line
+    from fpsolve.show.results import done_of, known_of
+    from fpsolve.study.simulate import refuse_obstacles
     from fpsolve.workflow.cases import run_case
 
-    code, reporter = 0, reporter_of(report, interactive)
-    options = {} if sample is None else {f"--sample {sample}": f"uncertain.sample={sample}"}
-    options |= {"--all": 'output.quantities="all"'} if everything else {}
-    loaded = load_to_write(cases, overrides, options, monte_carlo=monte_carlo)
+    code, reporter, out = 0, options.reporter(), options.out
+    typed = {} if sample is None else {f"--sample {sample}": f"uncertain.sample={sample}"}
+    typed |= {"--all": 'output.quantities="all"'} if everything else {}
+    loaded = options.load(cases, typed)
     for case in loaded:
         refuse_wrong_samples(case)
-    pool = pool_of(jobs, scheduler) if sample else pool_of(jobs, scheduler, loaded)
+        if monte_carlo:
+            refuse_obstacles(case)
+    pool = options.pool(() if sample else loaded)
     for case in loaded:
-        start, watch = monotonic(), watch_of(is_json=json, is_quiet=quiet)
+        start, watch = monotonic(), options.watch(is_json=json)
         how: dict[str, Any] = {"monte_carlo": monte_carlo, "is_fresh": fresh, "reporter": reporter}
         outcome = run_case(case, out, pool=pool, watch=watch, **how)
         if outcome.interruption:
             print_error(outcome.interruption)
-        if not (quiet or outcome.interruption):
+        if not (options.quiet or outcome.interruption):
             print_blocks(left_out(case, monte_carlo=monte_carlo))
         if json:
             print(whole_summary(case, outcome.results, outcome.facts))
         else:
             what = done_of(case, len(outcome.results), sum(each.status.fails for each in outcome.results))
-            known = known_of(case, outcome.known, outcome.outdated)
-            print_blocks([last_line(out / case.name, what, monotonic() - start, known)])
+            options.print_written(case, what, start, known_of(case, outcome.known, outcome.outdated))
         if outcome.interruption:
             return INTERRUPTED
         if outcome.failures or (outcome.samples and outcome.samples.failed):

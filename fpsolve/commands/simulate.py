@@ -2,35 +2,19 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from time import monotonic
 from typing import Annotated, Any
 
 from cyclopts import Parameter
 
 from fpsolve.commands.errors import print_error
-from fpsolve.commands.options import (
-    Cases,
-    Count,
-    Fresh,
-    Interactive,
-    Out,
-    Overrides,
-    Quiet,
-    Report,
-    Scheduler,
-    load_to_write,
-    pool_of,
-    reporter_of,
-    watch_of,
-)
+from fpsolve.commands.options import ALL_OPTIONS, Cases, Count, Fresh, Pointing
 from fpsolve.signals import INTERRUPTED
 
 
 def simulate(
     cases: Cases,
     *,
-    out: Out = Path("results"),
     paths: Annotated[Count | None, Parameter(help="Number of paths; 32768 if the case does not state it.")] = None,
     time: Annotated[
         float | None,
@@ -45,13 +29,8 @@ def simulate(
         str | None,
         Parameter(help="direct, or population for strong noise or large |p|; direct if the case does not state it."),
     ] = None,
-    jobs: Annotated[Count | None, Parameter(help="Number of processors; all if omitted.")] = None,
-    scheduler: Scheduler = "",
     fresh: Fresh = False,
-    report: Report = False,
-    interactive: Interactive = False,
-    quiet: Quiet = False,
-    overrides: Overrides = None,
+    options: Pointing = ALL_OPTIONS,
 ) -> int:
     """Simulate the system with its impacts and estimate the exponents; write monte_carlo.json into OUT/<case>/.
 
@@ -60,28 +39,29 @@ def simulate(
 
     Example: fpsolve simulate cases/fig1.toml --paths 100000 --seed 1 --estimator population
     """
-    from fpsolve.page.terminal import print_blocks
-    from fpsolve.show.results import done_of, known_of, last_line
+    from fpsolve.show.results import done_of, known_of
+    from fpsolve.study.simulate import refuse_obstacles
     from fpsolve.workflow.cases import simulate_case
 
-    reporter = reporter_of(report, interactive)
+    reporter = options.reporter()
     stated = {"paths": paths, "time": time, "seed": seed, "estimator": estimator}
-    options = {
+    typed = {
         f"--{name} {value:{'g' if name == 'time' else ''}}": f"monte_carlo.{name}={value}"
         for name, value in stated.items()
         if value is not None
     }
-    loaded = load_to_write(cases, overrides, options, monte_carlo=True)
-    pool = pool_of(jobs, scheduler)
+    loaded = options.load(cases, typed)
     for case in loaded:
-        start, watch = monotonic(), watch_of(is_quiet=quiet)
+        refuse_obstacles(case)
+    pool = options.pool()
+    for case in loaded:
+        start, watch = monotonic(), options.watch()
         how: dict[str, Any] = {"is_fresh": fresh, "reporter": reporter, "watch": watch}
-        outcome = simulate_case(case, out, pool=pool if scheduler else None, **how)
+        outcome = simulate_case(case, options.out, pool=pool if options.scheduler else None, **how)
         if outcome.interruption:
             print_error(outcome.interruption)
         what = done_of(case, sum(not each.interrupted for each in outcome.simulated))
-        known = known_of(case, outcome.known, outcome.outdated)
-        print_blocks([last_line(out / case.name, what, monotonic() - start, known)])
+        options.print_written(case, what, start, known_of(case, outcome.known, outcome.outdated))
         if outcome.interruption:
             return INTERRUPTED
     return 0
