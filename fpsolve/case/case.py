@@ -26,6 +26,7 @@ from pydantic import (
 
 from fpsolve.arrays import FloatArray, shown
 from fpsolve.case.kinds import half_of, kinds_of, parameters_of, sections_of
+from fpsolve.case.read_vary import EXAMPLE, vary_of
 from fpsolve.case.refusals import REFUSALS
 from fpsolve.case.sections import (
     QUANTITY_NAMES,
@@ -45,7 +46,7 @@ from fpsolve.case.sections import (
 from fpsolve.case.toml import Place, read_document
 from fpsolve.case.uncertain import EXAMPLE as UNCERTAIN
 from fpsolve.case.uncertain import Uncertain, uncertain_of
-from fpsolve.case.vary import EXAMPLE, Vary, assignments, vary_of
+from fpsolve.case.vary import Vary, assignments
 from fpsolve.errors import CaseError, Fault
 from fpsolve.explain import explain, refuse, shortened
 from fpsolve.exponent.adapt import Budget

@@ -21,6 +21,7 @@ from pydantic.fields import FieldInfo
 from fpsolve.analysis.zero import axis_faults, said
 from fpsolve.arrays import FloatArray, is_log_spaced
 from fpsolve.case.kinds import parameters_of, problem_of
+from fpsolve.case.read_vary import values_of
 from fpsolve.case.remedies import CASE_WORDS
 from fpsolve.case.sections import (
     ChartAxis,
@@ -35,7 +36,7 @@ from fpsolve.case.sections import (
     Varied,
     same,
 )
-from fpsolve.case.vary import Vary, assignments, map_key, values_of
+from fpsolve.case.vary import Vary, assignments, map_key
 from fpsolve.errors import FpsolveError, MeshError, NoSuchExponent
 from fpsolve.explain import Refusal, faults_in, nearest, quoted, shown
 from fpsolve.fem.mesh import CylinderMesh

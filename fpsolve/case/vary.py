@@ -1,49 +1,21 @@
-"""[vary] of a case file: the parameter sets of lists, of ranges, or of a file of comma-separated values."""
+"""The parameter sets of a case, and how they are named."""
 
 from __future__ import annotations
 
-import csv
-import io
 import math
-import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import islice, product
-from pathlib import Path
-from typing import Annotated, Any, Literal, NamedTuple, TypeGuard
+from typing import Any, Literal, TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, TypeAdapter, ValidationError, ValidationInfo
-from pydantic.fields import FieldInfo
 
 from fpsolve.arrays import FloatArray
-from fpsolve.case.kinds import parameters_of
-from fpsolve.case.sections import MAX_MOMENTS, MOST_NAMED, SAME, FigureSection, Sweep, Value, Values, flat
+from fpsolve.case.sections import MOST_NAMED, SAME, FigureSection, Value
 from fpsolve.data import written
-from fpsolve.explain import (
-    DEPENDENT,
-    Refusal,
-    explain,
-    faults_in,
-    is_list,
-    nearest,
-    quoted,
-    refuse,
-    shortened,
-    shown,
-    shown_with_kind,
-    too_long,
-)
-from fpsolve.model.faults import accepted, choices, table_of
-from fpsolve.model.parameters import STRICT, meaning_of
 from fpsolve.model.quantity import Quantity
-from fpsolve.reading import Unreadable, Words, read_text
 
-EXAMPLE = '[vary] with "noise.D0" = [0.1, 0.5, 1.0]'
-_START = "its first row must name keys, as in noise.D0,noise.tau0"
-_WORDS = Words("the sets", "a file of sets", "sets.csv", "comma-separated", _START, may_have_mark=True)
-_DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+(e[+-]?\d+)?", re.IGNORECASE)
 WHOLLY_CHECKED = 1000
 """Sets of a case whose problems are all made and checked when it is loaded."""
 SPREAD = 250
@@ -53,14 +25,6 @@ BLOCK = 4096
 Column = FloatArray | tuple[str, ...]
 """The values of a varied key: numbers, or texts."""
 Columns = dict[str, Column]
-Known = Mapping[str, FieldInfo]
-"""The parameters of a case by their keys, each with its range."""
-
-
-def values_of(known: FieldInfo, most: int | None = None) -> TypeAdapter[Values]:
-    """What a list of values of a parameter must be, with at most so many entries."""
-    number = Annotated[float, Field(), *known.metadata]
-    return TypeAdapter(Annotated[tuple[number, ...], Field(strict=False, min_length=1, max_length=most)], config=STRICT)
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +47,7 @@ class Vary:
     faults: tuple[tuple[int, str], ...] = ()
 
     def __post_init__(self) -> None:
-        columns = {key: values if _is_text(values) else np.asarray(values) for key, values in self.columns.items()}
+        columns = {key: values if holds_texts(values) else np.asarray(values) for key, values in self.columns.items()}
         object.__setattr__(self, "columns", columns)
 
     @property
@@ -106,7 +70,7 @@ class Vary:
 
     def is_text(self, key: str) -> bool:
         """Whether the values of a varied key are texts."""
-        return _is_text(self.columns[key])
+        return holds_texts(self.columns[key])
 
     def sets(self, start: int = 0, stop: int | None = None) -> Iterator[dict[str, Value]]:
         """The varied values of each set from one place to another, any place reached at once."""
@@ -121,7 +85,7 @@ class Vary:
             return
         sizes = [len(values) for values in self.columns.values()]
         at = [places] * len(sizes) if self.mode == "zip" else np.unravel_index(places, sizes)
-        columns = [_plain(_picked(values, picked)) for values, picked in zip(self.columns.values(), at, strict=True)]
+        columns = [_plain(picked(values, each)) for values, each in zip(self.columns.values(), at, strict=True)]
         for row in zip(*columns, strict=True):
             yield dict(zip(self.columns, row, strict=True))
 
@@ -135,16 +99,16 @@ class Vary:
         count = len(self)
         if count <= WHOLLY_CHECKED:
             return np.arange(count)
-        numbers = [values for values in self.columns.values() if not _is_text(values)]
+        numbers = [values for values in self.columns.values() if not holds_texts(values)]
         if self.mode == "product":
             sizes = [len(values) for values in self.columns.values()]
             ends = [
-                range(len(values)) if _is_text(values) else {int(np.argmin(values)), int(np.argmax(values))}
+                range(len(values)) if holds_texts(values) else {int(np.argmin(values)), int(np.argmax(values))}
                 for values in self.columns.values()
             ]
             extreme = [int(np.ravel_multi_index(each, sizes)) for each in islice(product(*ends), WHOLLY_CHECKED)]
         else:
-            first = first_places([values for values in self.columns.values() if _is_text(values)], count)
+            first = first_places([values for values in self.columns.values() if holds_texts(values)], count)
             alike = [np.flatnonzero(first == place) for place in np.unique(first)]
             extreme = [at[end(values[at])] for at in alike for values in numbers for end in (np.argmin, np.argmax)]
         spread = np.linspace(0, count - 1, SPREAD).astype(int)
@@ -201,7 +165,7 @@ def legend(varied: Mapping[str, Value], about: Callable[[str], Quantity]) -> str
 
 def groups(values: Column) -> NDArray[np.int64]:
     """For each value the place of the first one that is the same."""
-    if _is_text(values):
+    if holds_texts(values):
         seen = dict[Any, int]()
         return np.array([seen.setdefault(each, place) for place, each in enumerate(values)], dtype=int)
     numbers = np.asarray(values)
@@ -233,7 +197,7 @@ def repeats(columns: Columns, count: int) -> list[tuple[int, int]]:
     return list(zip(again.tolist(), first[again].tolist(), strict=True))
 
 
-def _is_text(values: Column) -> TypeGuard[tuple[str, ...]]:
+def holds_texts(values: Column) -> TypeGuard[tuple[str, ...]]:
     """Whether the values of a key are texts."""
     return isinstance(values, tuple) and type(next(iter(values), 0.0)) is str
 
@@ -243,249 +207,6 @@ def _plain(values: Column) -> Sequence[Value]:
     return values if isinstance(values, tuple) else values.tolist()
 
 
-def vary_of(value: Any, info: ValidationInfo) -> Vary:
-    """What [vary] means; a `Vary` is left. Raises ValidationError with all that is wrong with it.
-
-    Of a file the rows that are wrong by themselves are not raised, but among its `faults`.
-    """
-    context = info.context or {}
-    parameters = parameters_of(info.data, context)
-    if isinstance(value, Vary):
-        return value
-    if not isinstance(value, dict):
-        text = f"got {shown_with_kind(value)}; must be a table of lists and ranges; write, for example, {EXAMPLE}"
-        raise ValueError(text)
-    if parameters is None:
-        refuse([((), value, DEPENDENT)])
-        return Vary()
-    table = flat(value, parameters)
-    if "file" in table:
-        return _of_file(table, parameters, context.get("folder", Path()))
-    mode = table.pop("mode", "product")
-    columns, refusals = Columns(), list[Refusal]()
-    if mode not in ("product", "zip"):
-        text = f'got {shown_with_kind(mode)}; must be one of "product", "zip";{nearest(mode, ("product", "zip"))}'
-        refusals.append((("mode",), mode, f'{text} write mode = "zip", or remove it'))
-    for key, item in table.items():
-        if key in parameters:
-            refusals += _column(key, item, parameters[key], columns)
-        else:
-            known = (*parameters, "mode", "file")
-            text = f"cannot be varied;{nearest(key, known)} known keys: {', '.join(known)}; rename or remove it"
-            refusals.append(((key,), item, text))
-    refuse(refusals)
-    refuse(_uneven(columns) if mode == "zip" else _repeated(columns))
-    return Vary(columns, mode)
-
-
-def _of_file(table: Mapping[str, Any], parameters: Known, folder: Path) -> Vary:
-    file, mode = table["file"], table.get("mode", "zip")
-    others = [key for key in table if key not in ("file", "mode")]
-    if type(file) is not str or not file:
-        text = f'got {shown_with_kind(file)}; must be the path of a file of sets; write, for example, file = "sets.csv"'
-        refuse([(("file",), file, text)])
-    if others:
-        text = f"gives all values, so that [vary] may have no other key; leave out {', '.join(others)}"
-        refuse([(("file",), file, f"{text}, as by --set 'vary={{ file = {shown(file)} }}'")])
-    if mode != "zip":
-        text = f"got {shown(mode)}; each row of a file is a set; remove it"
-        refuse([(("mode",), mode, text)])
-    try:
-        return read_sets(file, folder, parameters)
-    except Unreadable as error:
-        place = file if error.line is None else f"{file}:{error.line}"
-        refuse([(("file",), file, f"{place}: {error.sentence}")])
-        raise
-
-
-def _column(key: str, values: Any, field: FieldInfo, columns: Columns) -> Iterator[Refusal]:
-    """What is wrong with the values of a key; without faults these join the columns."""
-    texts = choices(field.annotation)
-    if texts and not (is_list(values) and values):
-        known = quoted(texts)
-        text = f"got {shown_with_kind(values)}; must be a non-empty list of {known}; write, for example, "
-        yield (key,), values, f"{text}{key} = [{known}]"
-    elif texts:
-        for i, value in enumerate(values):
-            if value not in texts:
-                text = f"got {shown_with_kind(value)}; must be one of {quoted(texts)};{nearest(value, texts)}"
-                yield (key, i), value, f"{text} write one of them"
-        columns[key] = tuple(map(str, values))
-    elif table_of(values):
-        yield from _range(key, values, field, columns)
-    else:
-        try:
-            columns[key] = np.array(values_of(field, MAX_MOMENTS).validate_python(values))
-        except ValidationError as error:
-            yield from (((key, *detail["loc"]), detail["input"], too_long(detail)) for detail in faults_in(error))
-
-
-def _range(key: str, table: Mapping[str, Any], field: FieldInfo, columns: Columns) -> Iterator[Refusal]:
-    """A range; where its ends are in the range of the key, so are the values between them."""
-    try:
-        sweep = Sweep(**table)
-    except ValidationError as error:
-        faults = explain(error, Sweep.__pydantic_fields__)
-        yield from (((key, *path), table, sentence) for path, _, sentence in faults)
-        return
-    ends = ("start", sweep.start), ("stop", sweep.stop)
-    wrong = [ends[i] for i in _out_of_range(field, [end for _, end in ends])]
-    yield from (((key, name), end, "") for name, end in wrong)
-    values = sweep.values
-    if np.unique(groups(values)).size < values.size:
-        text = f"got num = {sweep.num}, which makes values equal to 12 digits; use a smaller num, or ends further apart"
-        yield (key, "num"), sweep.num, text
-    elif not wrong:
-        columns[key] = values
-
-
-def _out_of_range(field: FieldInfo, values: Sequence[float]) -> list[int]:
-    try:
-        values_of(field).validate_python(values)
-    except ValidationError as error:
-        return [int(detail["loc"][0]) for detail in faults_in(error)]
-    return []
-
-
-def _repeated(columns: Columns) -> Iterator[Refusal]:
-    """The values of a product that a key has already."""
-    for key, values in columns.items():
-        for i in np.flatnonzero(groups(values) != np.arange(len(values))).tolist():
-            yield (key, i), values[i], f"got {values[i]} twice; values must be distinct; remove one of them"
-
-
-def _uneven(columns: Columns) -> Iterator[Refusal]:
-    """Lists side by side of several lengths, or a set that stands twice."""
-    lengths = {key: len(values) for key, values in columns.items()}
-    if len(set(lengths.values())) > 1:
-        told = ", ".join(f"{key} has {length}" for key, length in lengths.items())
-        text = f'{told}; with mode = "zip" all must have one length; complete the shorter ones, or use mode = "product"'
-        yield (), None, text
-        return
-    for place, first in repeats(columns, next(iter(lengths.values()), 0)):
-        varied = {key: values[place] for key, values in columns.items()}
-        text = f"sets {first + 1} and {place + 1} are both {assignments(varied)}; must be distinct; remove one of them"
-        yield (next(iter(columns)), place), varied, text
-
-
-def read_sets(file: str, folder: Path, parameters: Known) -> Vary:
-    """The sets of a file, with the faults of its rows.
-
-    Raises:
-        Unreadable: there are no rows in it, no commas, or wrong quotes.
-    """
-    reader = csv.reader(io.StringIO(read_text(folder / file, _WORDS), newline=""), strict=True)
-    line, header, unknown = 1, list[str](), list[tuple[int, str]]()
-    faults, rows, blocks = list[tuple[int, str]](), dict[int, list[str]](), list[_Block]()
-    try:
-        for row in reader:
-            cells = [cell.strip() for cell in row]
-            if any(cells) and not header:
-                if len(cells) == 1 and re.search(r"[;\t]", cells[0]):
-                    mark = "semicolons" if ";" in cells[0] else "tabs"
-                    raise Unreadable(f"is separated by {mark}; write commas, and decimal points in the numbers", line)
-                header = cells
-                unknown = [(line, reason) for reason in _header_faults(header, parameters)]
-            elif any(cells) and len(cells) != len(header):
-                faults.append((line, _wrong_length(cells, header)))
-            elif any(cells):
-                rows[line] = cells
-            if len(rows) == BLOCK:
-                blocks.append(_block_of(rows, header, parameters))
-                rows = {}
-            line = reader.line_num + 1
-    except csv.Error as error:
-        raise Unreadable(f"cannot be read as comma-separated values ({error}); correct its quotes", line) from None
-    blocks.append(_block_of(rows, header, parameters))
-    faults += (fault for block in blocks for fault in block.faults)
-    lines = np.concatenate([block.lines for block in blocks])
-    if not (lines.size or faults):
-        raise Unreadable("has a header but no sets; write a row of values for each set")
-    if unknown:
-        return Vary({}, "zip", file, lines[:0], (*unknown, *faults))
-    columns = {key: _joined([block.columns[key] for block in blocks]) for key in blocks[0].columns}
-    for place, first in repeats(columns, lines.size):
-        text = f"is the same set as line {lines[first]}; must be distinct; remove one of them"
-        faults.append((int(lines[place]), text))
-    return Vary(columns, "zip", file, lines, tuple(faults))
-
-
-class _Block(NamedTuple):
-    """Some rows of a file: the lines and the columns of those that are right, and the faults of the others."""
-
-    lines: NDArray[np.int64]
-    columns: Columns
-    faults: list[tuple[int, str]]
-
-
-def _block_of(rows: Mapping[int, Sequence[str]], header: Sequence[str], parameters: Known) -> _Block:
-    lines, columns = np.array([*rows], dtype=int), Columns()
-    faults, is_right = list[tuple[int, str]](), np.full(len(rows), True)
-    for key, cells in zip(header, zip(*rows.values(), strict=True) if rows else [()] * len(header), strict=True):
-        if key in parameters:
-            columns[key], reasons = _cells(cells, parameters[key])
-            faults += [(int(lines[i]), f"{key}: {reason}") for i, reason in reasons.items()]
-            is_right[[*reasons]] = False
-    right = np.flatnonzero(is_right)
-    return _Block(lines[right], {key: _picked(values, right) for key, values in columns.items()}, faults)
-
-
-def _picked(values: Column, places: NDArray[np.int64]) -> Column:
+def picked(values: Column, places: NDArray[np.int64]) -> Column:
     """The values of a key at some places."""
     return tuple(values[i] for i in places.tolist()) if isinstance(values, tuple) else values[places]
-
-
-def _joined(parts: Sequence[Column]) -> Column:
-    """The values of a key in several blocks."""
-    if any(map(_is_text, parts)):
-        return tuple(each for part in parts for each in part)
-    return np.concatenate(parts)
-
-
-def _header_faults(header: Sequence[str], parameters: Known) -> Iterator[str]:
-    """What of a header is no key, or there already."""
-    known = f"known keys: {', '.join(parameters)}; rename or remove it"
-    for i, key in enumerate(header):
-        if not key:
-            yield f"column {i + 1}: has no key in the header; {known}"
-        elif key not in parameters:
-            yield f"{shortened(key)}: cannot be varied;{nearest(key, parameters)} {known}"
-        elif key in header[:i]:
-            yield f"{key}: stands twice in the header; remove one of them"
-
-
-def _wrong_length(cells: Sequence[str], header: Sequence[str]) -> str:
-    remedy = "remove the others, and write decimal points, not commas, in the numbers"
-    if len(cells) < len(header):
-        remedy = "add those that are missing"
-    if len(cells) == 1 and ";" in cells[0]:
-        remedy = "write commas between them, and decimal points in the numbers"
-    return f"has {len(cells)} cell{'s' * (len(cells) > 1)}; must have {len(header)}, one for each key; {remedy}"
-
-
-def _cells(cells: Sequence[str], field: FieldInfo) -> tuple[Column, dict[int, str]]:
-    """The values in cells, 0 without a sign, and what is wrong with some, by their places."""
-    wrong = dict[int, str]()
-    if texts := choices(field.annotation):
-        for i, cell in enumerate(cells):
-            if cell not in texts:
-                wrong[i] = f"must be one of {', '.join(texts)};{nearest(cell, texts)} write one of them"
-        known = {text: text for text in texts}
-        values: Column = tuple(known.get(cell, "") for cell in cells)  # one text for all that are alike
-    else:
-        must, numbers = f"must be {accepted(field)} ({meaning_of(field)})", list[float]()
-        for i, cell in enumerate(cells):
-            try:
-                numbers.append(float(cell) + 0.0)
-            except ValueError:
-                numbers.append(math.nan)
-                is_split = ";" in cell
-                remedy = "write commas between cells, and decimal points in numbers" if is_split else "write a number"
-                if _DECIMAL_COMMA.fullmatch(cell):
-                    remedy = f"write the decimal point as {cell.replace(',', '.')}"
-                wrong[i] = f"{must}; {remedy}"
-        for i in _out_of_range(field, numbers) if numbers else ():
-            wrong.setdefault(i, f"{must}; change it, or remove the row")
-        values = np.array(numbers)
-    got = (f"got {shortened(cell)}" if cell else "is empty" for cell in cells)
-    return values, {i: f"{each}; {wrong[i]}" for i, each in enumerate(got) if i in wrong}

@@ -13,7 +13,7 @@ from pydantic.fields import FieldInfo
 
 from fpsolve.case.case import Case
 from fpsolve.case.kinds import kinds_of, parameters_of, sections_of
-from fpsolve.case.vary import values_of
+from fpsolve.case.read_vary import values_of
 from fpsolve.exponent.adapt import Budget
 from fpsolve.model import faults
 from fpsolve.model.parameters import STRICT, example_of, symbol_of
