@@ -132,3 +132,19 @@ def test_the_part_of_the_walk_through_is_solved_recorded_and_tabulated(monkeypat
         assert found.parts[part.name].value == pytest.approx(expected, rel=1e-8)
         row = part.row(case, found)
         assert row.keys() == {each.name for each in (names["chance"], names["chance"].error())}
+
+
+def test_the_format_and_the_command_of_the_walk_through(tmp_path, capsys):
+    """A line for each number of a curve, and a command that takes the options of others."""
+    names, _ = typed(ROOT / "docs/contributing.md")
+    case = fpsolve.load_case(ROOT / "cases/minimal.toml")
+    names["write_lines"](
+        case, [solve_curve(next(case.curves()), everything(case), Numerics.of(case)).result], tmp_path / "lines.txt"
+    )
+    assert "curve 1, lyapunov_exponent = " in (tmp_path / "lines.txt").read_text(encoding="utf-8")
+    minimal = str(ROOT / "cases/minimal.toml")
+    assert names["app"](["variance", minimal, "--set", "noise.D0=2.0"], result_action="return_value") == 0
+    said = capsys.readouterr().out
+    assert float(said.rpartition(": ")[2]) == pytest.approx(
+        case.problem.at({"noise.D0": 2.0}).noise.standard_deviation ** 2, rel=1e-5
+    )

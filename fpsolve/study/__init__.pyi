@@ -1,3 +1,5 @@
+from .columns import columns_of as columns_of
+from .columns import row_of as row_of
 from .results import Comparison as Comparison
 from .results import CurveResult as CurveResult
 from .results import SimulatedCurve as SimulatedCurve
