@@ -62,6 +62,8 @@ KEPT = 2**24
 """Bytes of the records whose results stay in memory once they are read, as each table and figure asks for all."""
 MOST_LISTED = 8
 """Numbers of an array that is a list in a record; longer ones take less room and time compressed."""
+_AS_IT_IS = getattr(os, "O_BINARY", 0)
+"""The flag of files whose line ends Windows leaves alone."""
 _NAMES: dict[int, str] = {}
 """The file of this process."""
 Record = dict[str, Any]
@@ -266,7 +268,7 @@ def append(folder: Path, key: str, record: Record) -> Address:
         _NAMES[number] = f"{socket.gethostname()}-{number}-{token_hex(4)}.jsonl"
     path = folder / _NAMES[number]
     path.parent.mkdir(parents=True, exist_ok=True)
-    handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o666)
+    handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND | _AS_IT_IS, 0o666)
     try:
         start = os.fstat(handle).st_size
         if start:
@@ -375,7 +377,7 @@ def entries_of(
     """
     entries = dict[str, Entry]()
     for name, keys in _part_keys(json.dumps(asked), numerics).items():
-        for data in (record[key] for key in keys if key in record):
+        for data in (record[key] for key in reversed(keys) if key in record):  # what no budget limits counts
             with suppress(ValueError):
                 entries[name] = _entry_of(data, BY_NAME[name], curve, asked[name])
     begun = dict[float, Moment]()

@@ -312,6 +312,10 @@ def test_what_a_budget_has_limited_is_solved_again_with_another(tmp_path, monkey
     assert {"moment", "lyapunov_exponent"} <= run(small)
     assert run(small) == set()
     assert {"moment", "lyapunov_exponent"} <= run("budget.unknowns=120")
+    assert {"moment", "lyapunov_exponent"} <= run()
+    assert run(small) == set()
+    [result] = fpsolve.run(case_in(tmp_path, TEXT, asking(*names, more=[small, "oscillator.epsilon=2.0"])), tmp_path)
+    assert result.lyapunov_exponent is not None  # which the larger budget has found
 
 
 def test_what_there_is_not_is_told_where_a_case_lists_it_without_solving_it_again(tmp_path, monkeypatch):
