@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -92,6 +93,17 @@ def from_record(case: Case, solved: Solved) -> CurveResult:
     curve, asked, numerics = solved.result.curve, everything(case), Numerics.of(case)
     record = json.loads(json.dumps(record_of_set(curve, asked, numerics, solved.entries)))
     return result_of(curve, asked, numerics, *entries_of(record, curve, asked, numerics))
+
+
+def read_json(path: Path) -> Any:
+    """The data of a file of JSON."""
+    return json.loads(path.read_text(encoding="utf-8"))
+
+
+def read_csv(path: Path) -> list[dict[str, str]]:
+    """The rows of a table, by the heads of its columns."""
+    with path.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
 
 
 def files(folder: Path) -> set[str]:

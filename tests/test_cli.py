@@ -26,7 +26,7 @@ from fpsolve.model.problem import Problem
 from fpsolve.output import figures, tables
 from fpsolve.study import solve
 from tests.conftest import FIG1, FIG1_NOISE, heed_signals, sampled, started
-from tests.kit import COSTLY, DRAWN, HOPELESS, LEAN, TABLES, TEXT, files
+from tests.kit import COSTLY, DRAWN, HOPELESS, LEAN, TABLES, TEXT, files, read_json
 
 CASES = Path(__file__).parents[1] / "cases"
 BARE = ["--set", "output.eigenfunctions=[]"]
@@ -150,7 +150,7 @@ def test_why_there_is_no_critical_restitution_is_a_note(case, tmp_path, capsys, 
     assert re.search("r_c │ +none │", out)
     assert f"note: test: no r_c: {words}" in err
     assert "warning" not in err
-    (curve,) = json.loads((tmp_path / "results/test/summary.json").read_text(encoding="utf-8"))["curves"]
+    (curve,) = read_json(tmp_path / "results/test/summary.json")["curves"]
     assert curve["critical_restitution"] is None
     assert curve["critical_impact_factor"] > 0
     assert any(text.startswith(f"no r_c: {words}") for text in curve["notes"])
@@ -665,7 +665,7 @@ def test_json_prints_the_summary_and_nothing_else(case, tmp_path, capsys):
     assert main(["run", case, "--json", "--set", LEAN]) == 0
     out, err = capsys.readouterr()
     assert out.count("\n") == 1
-    assert json.loads(out) == json.loads((tmp_path / "results/test/summary.json").read_text(encoding="utf-8"))
+    assert json.loads(out) == read_json(tmp_path / "results/test/summary.json")
     assert err == ""
 
 
@@ -684,7 +684,7 @@ def test_a_run_where_there_is_no_command_line(tmp_path, monkeypatch):
     """As where Python is embedded."""
     monkeypatch.setattr(sys, "argv", [])
     run(CASES / "minimal.toml", tmp_path)
-    assert json.loads((tmp_path / "minimal/summary.json").read_text(encoding="utf-8"))["complete"]
+    assert read_json(tmp_path / "minimal/summary.json")["complete"]
 
 
 def test_many_curves_leave_their_numbers_to_results_nc(case, tmp_path, monkeypatch, capsys):
@@ -699,7 +699,7 @@ def test_many_curves_leave_their_numbers_to_results_nc(case, tmp_path, monkeypat
     many = json.loads(capsys.readouterr().out)
     known = {"command", "started", "wall_seconds"}
     assert {**few, **dict.fromkeys(known)} == {**many, **dict.fromkeys(known)}
-    written = json.loads((tmp_path / "results/test/summary.json").read_text(encoding="utf-8"))
+    written = read_json(tmp_path / "results/test/summary.json")
     told = {"varied", "status", "sensitivities", "warnings", "notes"}
     assert written["curves"] == [{key: each[key] for key in told} for each in few["curves"]]
     assert any(each["notes"] for each in written["curves"])

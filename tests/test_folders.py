@@ -10,7 +10,7 @@ from fpsolve.analysis.zero import Zero
 from fpsolve.errors import OutputError
 from fpsolve.output.charts import read_line
 from fpsolve.workflow.folders import SOLVED, own_folder
-from tests.kit import case_in, case_text
+from tests.kit import case_in, case_text, read_json
 
 NESTED = "[" * 100_000
 TABLES = {
@@ -87,7 +87,7 @@ def test_a_chart_is_beside_its_table(case, folder, tmp_path):
 
 
 def test_parameters_and_axes_of_a_chart_are_complete(case, folder, tmp_path):
-    chart = json.loads((folder / "chart.json").read_text(encoding="utf-8"))
+    chart = read_json(folder / "chart.json")
     del chart["parameters"]["noise.r0"]
     (folder / "chart.json").write_text(json.dumps(chart), encoding="utf-8")
     assert left(case, tmp_path) == EVERYTHING - {"chart.json", "chart.csv", "chart.png"}
@@ -152,7 +152,7 @@ ROWS = f"{HEAD}lyapunov_exponent,1,0.1,0.05,0,\nlyapunov_exponent,1,0.5,0.2,0,\n
 
 @pytest.mark.parametrize("table", [ROWS, HEAD, "", ROWS.replace("0.2", "nan"), ROWS.replace("0.2", "x" * 200_000)])
 def test_a_line_of_a_chart_is_one_or_none(case, folder, table):
-    chart = json.loads((folder / "chart.json").read_text(encoding="utf-8"))
+    chart = read_json(folder / "chart.json")
     chart |= {"complete": True, "lines": [{"line": "lyapunov_exponent", "branches": [{"closed": False}]}]}
     (folder / "chart.json").write_text(json.dumps(chart), encoding="utf-8")
     (folder / "chart.csv").write_text(table, encoding="utf-8")

@@ -10,7 +10,7 @@ import pytest
 
 from fpsolve.pool import processors
 from tests.conftest import started
-from tests.kit import case_text
+from tests.kit import case_text, read_json
 
 VARIED = '[vary]\n"noise.D0" = { start = 0.5, stop = 1.6, num = 4 }\n'
 CASE = case_text(f"[moments]\np = [-1.0, 2.0]\n{VARIED}", "Killed", {"D0": 1.0}, epsilon=0.3)
@@ -40,7 +40,7 @@ def numbers(curves):
 
 def contents(folder):
     """The numbers of a summary, and the names of all files but records and hidden ones."""
-    curves = json.loads((folder / "summary.json").read_text(encoding="utf-8"))["curves"]
+    curves = read_json(folder / "summary.json")["curves"]
     names = {path.relative_to(folder).as_posix() for path in folder.rglob("[!.]*") if path.is_file()}
     return numbers(curves), {name for name in names if not name.startswith("records/")}
 
@@ -71,7 +71,7 @@ def test_killed_runs_leave_nothing_torn(case, tmp_path):
         assert "Traceback" not in said
         summary = out / "killed" / "summary.json"
         if summary.exists():
-            left = json.loads(summary.read_text(encoding="utf-8"))
+            left = read_json(summary)
             assert left["complete"] == (left["done"] == left["planned"])
             assert len(left["curves"]) == left["done"]
             found = numbers(left["curves"])

@@ -1,6 +1,5 @@
 """Sweeps: results do not depend on who works, nor on kills, full disks and dead workers on the way."""
 
-import json
 import os
 import re
 import shutil
@@ -27,7 +26,7 @@ from fpsolve.workflow import run_case
 from fpsolve.workflow.progress import Watch
 from fpsolve.workflow.sets import SOLVED_RECORDS
 from tests.conftest import heed_signals, sampled, started
-from tests.kit import case_text
+from tests.kit import case_text, read_json
 
 SIZE = 4
 """Sets each way."""
@@ -92,10 +91,7 @@ def assert_same_results(folder, out):
         kept = [{key: value for key, value in each.attrs.items() if key not in PASSING} for each in (one, two)]
         assert kept[0] == kept[1]
         assert one.attrs["complete"] == 1
-    curves = [
-        json.loads((each / "sweep/summary.json").read_text(encoding="utf-8"))["curves"]
-        for each in (folder / out, whole(folder))
-    ]
+    curves = [read_json(each / "sweep/summary.json")["curves"] for each in (folder / out, whole(folder))]
     assert [{**curve, "seconds": 0} for curve in curves[0]] == [{**curve, "seconds": 0} for curve in curves[1]]
 
 
@@ -184,7 +180,7 @@ def test_a_changed_parameter_solves_only_what_it_changes(place):
     run(place, "changed", "--jobs", "1", "--set", sets)
     assert len(lines(place, "changed")) == SIZE**2 + SIZE  # omega = 0.5 is known
     run(place, "changed", "--jobs", "1", "--set", 'title="Another"', "--set", "figure.x=p")
-    assert_same_numbers = json.loads((place / "changed/sweep/summary.json").read_text(encoding="utf-8"))
+    assert_same_numbers = read_json(place / "changed/sweep/summary.json")
     assert (assert_same_numbers["done"], assert_same_numbers["title"]) == (SIZE**2, "Another")
     assert len(lines(place, "changed")) == SIZE**2 + SIZE
     run(place, "changed", "--jobs", "1", "--fresh")
@@ -201,7 +197,7 @@ def test_an_interrupt_keeps_what_is_solved(place):
     assert process.returncode == 130
     assert "run it again to go on" in said
     assert "Traceback" not in said
-    summary = json.loads((place / "interrupted/sweep/summary.json").read_text(encoding="utf-8"))
+    summary = read_json(place / "interrupted/sweep/summary.json")
     assert not summary["complete"]
     assert summary["done"] == len(summary["curves"]) >= 3
     with xr.open_dataset(place / "interrupted/sweep/results.nc") as found:
@@ -255,7 +251,7 @@ def test_a_killed_worker_ends_a_run_and_the_same_command_goes_on(place):
         "a worker has died, perhaps for lack of memory; what was finished is kept, and the same command goes on\n"
     )
     done = len(lines(place, "orphan"))
-    summary = json.loads((place / "orphan/sweep/summary.json").read_text(encoding="utf-8"))
+    summary = read_json(place / "orphan/sweep/summary.json")
     assert 4 <= summary["done"] == done < SIZE**2
     run(place, "orphan", "--jobs", "2")
     assert_same_results(place, "orphan")  # as of one process, though others solved all

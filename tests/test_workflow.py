@@ -1,6 +1,5 @@
 """Running a case: what is written, that it agrees with what was computed, and that failures lose nothing."""
 
-import csv
 import json
 import re
 import shutil
@@ -31,7 +30,21 @@ from fpsolve.study import solve
 from fpsolve.study.solve import compare, solve_curve
 from fpsolve.workflow import Watch, check_case, run_case, sets, simulate_case
 from tests.conftest import painted
-from tests.kit import COSTLY, DRAWN, HOPELESS, INDICES, LEAN, TABLES, TEXT, case_in, files, solve_case, solve_sets
+from tests.kit import (
+    COSTLY,
+    DRAWN,
+    HOPELESS,
+    INDICES,
+    LEAN,
+    TABLES,
+    TEXT,
+    case_in,
+    files,
+    read_csv,
+    read_json,
+    solve_case,
+    solve_sets,
+)
 
 
 @pytest.fixture
@@ -55,7 +68,7 @@ def beside_records(folder):
 
 def test_summary_has_the_promised_form_and_the_computed_values(whole):
     results = whole.results
-    summary = json.loads((whole.folder / "summary.json").read_text(encoding="utf-8"))
+    summary = read_json(whole.folder / "summary.json")
     state = ["case", "title", "fpsolve_version", "units", "complete", "planned", "done"]
     facts = ["versions", "command", "host", "started", "wall_seconds", "overrides", "case_text"]
     assert list(summary) == [*state, *facts, "curves"]
@@ -96,13 +109,12 @@ def test_writing_tables_makes_no_curves(case, tmp_path, monkeypatch):
     """There may be many, and the tables are written again and again."""
     monkeypatch.setattr("fpsolve.case.case.Curve", None)
     write_results(case, [], tmp_path / "out", {})
-    summary = json.loads((tmp_path / "out/summary.json").read_text(encoding="utf-8"))
+    summary = read_json(tmp_path / "out/summary.json")
     assert (summary["complete"], summary["planned"], summary["done"]) == (False, 2, 0)
 
 
 def test_table_holds_every_curve_and_moment(whole):
-    with (whole.folder / "moments.csv").open(newline="", encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
+    rows = read_csv(whole.folder / "moments.csv")
     assert len(rows) == 6
     assert list(rows[0])[:3] == ["noise.D0", "p", "moment"]
     values = np.concatenate([result.moments.value for result in whole.results])
@@ -161,7 +173,7 @@ def test_of_many_curves_only_an_eigenfunction_of_the_first_is_written(tmp_path):
 def test_without_vary_there_is_one_curve(tmp_path):
     case = case_in(tmp_path, TEXT.replace('[vary]\n"noise.D0" = [0.1, 1.0]\n', ""), [LEAN])
     (result,) = fpsolve.run(case, tmp_path / "out")
-    summary = json.loads((tmp_path / "out/test/summary.json").read_text(encoding="utf-8"))
+    summary = read_json(tmp_path / "out/test/summary.json")
     assert summary["curves"][0]["varied"] == {}
     assert summary["curves"][0]["parameters"]["noise.D0"] == 0.5 == result.curve.parameters["noise.D0"]
 
@@ -171,7 +183,7 @@ def test_missing_stability_index_is_null_and_said(tmp_path):
     overrides += ["output={ quantities = ['stability_index'] }"]
     case = case_in(tmp_path, TEXT, overrides)
     result = fpsolve.run(case, tmp_path / "out")[0]
-    curve = json.loads((tmp_path / "out/test/summary.json").read_text(encoding="utf-8"))["curves"][0]
+    curve = read_json(tmp_path / "out/test/summary.json")["curves"][0]
     assert curve["stability_index"] is None
     assert curve["status"] == result.status.word == "no index"
     assert not result.status.fails
@@ -186,7 +198,7 @@ def test_a_failure_half_way_loses_nothing_that_was_finished(tmp_path):
     with pytest.raises(NotConverged, match="use more cells") as caught:
         fpsolve.run(case, tmp_path / "out")
     assert len(caught.value.partial) == 2
-    summary = json.loads((tmp_path / "out/test/summary.json").read_text(encoding="utf-8"))
+    summary = read_json(tmp_path / "out/test/summary.json")
     assert [row["p"] for row in summary["curves"][0]["moments"]] == [2.0, 0.0, -1.0]
     assert 0.0 in [row["p"] for row in summary["curves"][1]["moments"]]
     assert len(summary["curves"][1]["moments"]) < 3
@@ -207,7 +219,7 @@ def test_failures_are_values(tmp_path):
     assert all(reason.startswith("no ") for reason in indices)  # whose p are all there
     assert (len(outcome.failures) - len(indices), len(checked.failures)) == (2, 1)
     assert not outcome.interruption
-    curves = json.loads((tmp_path / "out/test/summary.json").read_text(encoding="utf-8"))["curves"]
+    curves = read_json(tmp_path / "out/test/summary.json")["curves"]
     told = [*outcome.results[1].warnings, *outcome.failures[len(indices) :]]
     assert curves[1]["warnings"] == [each.words(CASE_WORDS) for each in told]
     assert any("[mesh]" in text for text in curves[1]["warnings"])
@@ -221,7 +233,7 @@ def test_what_fails_for_small_p_is_said_once(tmp_path, small):
     sets = [f"moments.p=[9.0, {small}]", "oscillator.epsilon=2.0", "budget.unknowns=100", "output.eigenfunctions=[]"]
     sets += [f"output.quantities={INDICES}"]
     outcome = run_case(case_in(tmp_path, TEXT, [*sets, 'vary={"noise.D0"=[1.0]}']), tmp_path / "out")
-    (curve,) = json.loads((tmp_path / "out/test/summary.json").read_text(encoding="utf-8"))["curves"]
+    (curve,) = read_json(tmp_path / "out/test/summary.json")["curves"]
     assert [failure.p for failure in outcome.results[0].failures] == [9.0, small][: 2 if small else 1]
     assert sum("the next mesh has" in text for text in curve["warnings"]) == 2
     row = {"p": 0.0, "moment": 0.0, "moment_perturbation": 0.0, "moment_error": 0.0}
@@ -229,8 +241,7 @@ def test_what_fails_for_small_p_is_said_once(tmp_path, small):
     assert curve["moments"] == ([] if small else [row])
     assert curve["warnings"][0].startswith("no λ, δ_p, Λ″(0), N, R_c, r_c: ")
     assert curve["warnings"][0].endswith("there is no Λ(0.001)") == bool(small)
-    with (tmp_path / "out/test/moments.csv").open(newline="", encoding="utf-8") as file:
-        assert [row["moment_derivative"] for row in csv.DictReader(file)] == [""] * (not small)
+    assert [row["moment_derivative"] for row in read_csv(tmp_path / "out/test/moments.csv")] == [""] * (not small)
 
 
 @pytest.mark.parametrize(("p", "status"), [([], "failed"), ([0.0], "partly")])
@@ -249,7 +260,7 @@ def test_an_index_that_does_not_converge_is_a_failure(tmp_path, p, status):
     )
     with pytest.raises(NotConverged, match=r"no λ: .*use a larger rtol"):
         fpsolve.run(case, tmp_path / "out")
-    [curve] = json.loads((tmp_path / "out/test/summary.json").read_text(encoding="utf-8"))["curves"]
+    [curve] = read_json(tmp_path / "out/test/summary.json")["curves"]
     assert curve["status"] == status
     assert [text[:5] for text in curve["warnings"]] == ["no λ: "[:5]]
 
@@ -296,7 +307,7 @@ def test_an_interruption_keeps_the_finished_curves(case, tmp_path, monkeypatch):
     interrupt_curve(monkeypatch, 2)
     with pytest.raises(KeyboardInterrupt, match=r"^interrupted after 1 of 2 curves; .*; run it again to go on$"):
         fpsolve.run(case, tmp_path / "out")
-    summary = json.loads((tmp_path / "out/test/summary.json").read_text(encoding="utf-8"))
+    summary = read_json(tmp_path / "out/test/summary.json")
     assert [curve["varied"]["noise.D0"] for curve in summary["curves"]] == [0.1]
     assert (summary["complete"], summary["planned"], summary["done"]) == (False, 2, 1)
     assert {*TABLES, "eigenfunctions.pvd"} <= files(tmp_path / "out/test")
@@ -319,7 +330,7 @@ def test_tables_are_whole_where_an_interruption_comes_as_they_are_written(case, 
             fpsolve.run(case, tmp_path / "out")
     finally:
         signal.signal(signal.SIGINT, before)
-    summary = json.loads((tmp_path / "out/test/summary.json").read_text(encoding="utf-8"))
+    summary = read_json(tmp_path / "out/test/summary.json")
     assert (summary["complete"], summary["planned"], summary["done"]) == (True, 2, 2)
     assert {*TABLES, "eigenfunctions.pvd"} <= files(tmp_path / "out/test")
 
@@ -374,7 +385,7 @@ def test_a_run_that_ends_early_leaves_nothing_of_an_earlier_one(
     with pytest.raises(raised):
         fpsolve.run(case, tmp_path, fresh=True)
     assert files(folder) == left | others
-    summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    summary = read_json(folder / "summary.json")
     assert summary["curves"] == []
     assert (summary["complete"], summary["planned"], summary["done"]) == (False, 2, 0)
 
@@ -501,13 +512,12 @@ def test_a_text_is_varied_in_every_file(tmp_path):
     case = case_in(tmp_path, TEXT, sets)
     fpsolve.run(case, tmp_path / "out")
     folder = tmp_path / "out/test"
-    with (folder / "moments.csv").open(encoding="utf-8", newline="") as stream:
-        rows = list(csv.DictReader(stream))
+    rows = read_csv(folder / "moments.csv")
     assert [row["noise.treatment"] for row in rows] == ["ou-reduction"] * 3 + ["exact"] * 3
     reduced, exact = rows[:3], rows[3:]
     assert [row["moment_perturbation"] for row in reduced] == [row["moment_perturbation"] for row in exact]
     assert float(reduced[0]["moment"]) != pytest.approx(float(exact[0]["moment"]), rel=1e-3)
-    summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    summary = read_json(folder / "summary.json")
     assert [curve["varied"] for curve in summary["curves"]] == [
         {"noise.treatment": "ou-reduction"},
         {"noise.treatment": "exact"},
@@ -650,7 +660,7 @@ def test_sensitivities_are_written(tmp_path):
     ]
     case = case_in(tmp_path, TEXT, sets)
     fpsolve.run(case, tmp_path)
-    [curve] = json.loads((tmp_path / "test/summary.json").read_text(encoding="utf-8"))["curves"]
+    [curve] = read_json(tmp_path / "test/summary.json")["curves"]
     found, errors = curve["sensitivities"], curve["sensitivities"]["errors"]
     assert [row["p"] for row in found["moments"]] == [-2.0, -1.0, 0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0]
     [solved] = case.curves()
@@ -672,8 +682,7 @@ GROWING = ["vary={}", "output.eigenfunctions=[]", "moments.p=[-1.0, 0.5, 1.0, 1.
 
 
 def table(folder):
-    with (folder / "moments.csv").open(newline="", encoding="utf-8") as file:
-        return {float(row["p"]): row for row in csv.DictReader(file)}
+    return {float(row["p"]): row for row in read_csv(folder / "moments.csv")}
 
 
 @pytest.mark.parametrize("sets", [GROWING, [*GROWING, "moments.p={start=-2.0, stop=6.0, num=33}"]])
@@ -697,7 +706,7 @@ def test_an_interrupted_curve_keeps_its_moments_and_goes_on(tmp_path, monkeypatc
     folder = tmp_path / "out/test"
     kept = table(folder)
     assert kept.keys() == set(asked)
-    summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    summary = read_json(folder / "summary.json")
     assert (summary["complete"], summary["done"]) == (False, 0)
     assert summary["curves"][0]["status"] == "partly"
     assert "not everything is solved yet; the same command goes on" in summary["curves"][0]["warnings"]
@@ -710,7 +719,7 @@ def test_an_interrupted_curve_keeps_its_moments_and_goes_on(tmp_path, monkeypatc
     assert np.all(apart <= result.moments.error_estimate + whole.moments.error_estimate)
     assert np.all(np.isfinite(result.moments.derivative_error))
     assert (result.failures, result.status) == ((), whole.status)
-    assert json.loads((folder / "summary.json").read_text(encoding="utf-8"))["complete"]
+    assert read_json(folder / "summary.json")["complete"]
 
 
 @pytest.mark.parametrize("name", ["stability_index", "critical_impact_factor"])
@@ -733,8 +742,7 @@ def test_an_interrupted_curve_keeps_its_indices(tmp_path, monkeypatch, name):
         fpsolve.run(case, tmp_path / "out")
     before = order.copy()
     assert before[0] == "lyapunov_exponent"
-    with (tmp_path / "out/test/curves.csv").open(newline="", encoding="utf-8") as file:
-        [row] = csv.DictReader(file)
+    [row] = read_csv(tmp_path / "out/test/curves.csv")
     assert all(row[each] for each in before)
     assert not row[name]
     order.clear()

@@ -1,6 +1,5 @@
 """The rate function against its Legendre transform and published bounds, the law of growth against what is Gaussian."""
 
-import json
 import math
 
 import numpy as np
@@ -11,7 +10,6 @@ from scipy.stats import norm
 from fpsolve.analysis import growth_law, rate_function
 from fpsolve.analysis.growth import log_moment, prefactor
 from fpsolve.arrays import identity
-from fpsolve.case.case import load_case
 from fpsolve.errors import CaseError, NoSuchExponent, NotConverged
 from fpsolve.exponent import ExponentSolver, moment_lyapunov
 from fpsolve.messages import Code, Message
@@ -30,6 +28,7 @@ from fpsolve.workflow.cases import run
 from tests import random_growth
 from tests.conftest import FIG1, FIG1_NOISE, sampled
 from tests.growth_paths import RATES, SHEAR, compared, simulated
+from tests.kit import case_in, read_json
 
 TURN = ((0.0, 1.0), (-1.0, 0.0))
 UNIT = OrnsteinUhlenbeck(alpha=1.0, sigma=1.0)
@@ -259,7 +258,7 @@ def test_a_case_writes_the_rate_function(tmp_path):
     folder, done = tmp_path / "rates", result.moments
     exact = rate_function(result.curve.problem, done.derivative)
     np.testing.assert_allclose(done.rate_function, exact.value, atol=1e-12)
-    rows = json.loads((folder / "summary.json").read_text(encoding="utf-8"))["curves"][0]["moments"]
+    rows = read_json(folder / "summary.json")["curves"][0]["moments"]
     assert [row["rate_function"] for row in rows] == done.rate_function.tolist()
     head, first, *_ = (folder / "moments.csv").read_text(encoding="utf-8").splitlines()
     assert dict(zip(head.split(","), first.split(","), strict=True))["rate_function"] == str(done.rate_function[0])
@@ -268,7 +267,5 @@ def test_a_case_writes_the_rate_function(tmp_path):
 
 
 def test_a_case_needs_the_moments_for_it(tmp_path):
-    path = tmp_path / "rates.toml"
-    path.write_text(CASE.replace('"moment", ', ""), encoding="utf-8")
     with pytest.raises(CaseError, match=r'output.quantities\[0\]: got "rate_function", which follows'):
-        load_case(path)
+        case_in(tmp_path, CASE.replace('"moment", ', ""), name="rates")

@@ -1,6 +1,5 @@
 """`fpsolve noise`: from a file to a case, a figure and what it means; and what it refuses."""
 
-import json
 import math
 import re
 import shlex
@@ -15,6 +14,7 @@ from fpsolve.commands.options import BAD_INPUT
 from fpsolve.measured import read_spectrum, weak_exponent, weak_moment
 from fpsolve.model import OrnsteinUhlenbeck
 from fpsolve.study.noise import natural_frequencies
+from tests.kit import read_json
 
 ROOT = Path(__file__).parents[2]
 F = np.linspace(0.05, 20, 400)
@@ -36,7 +36,7 @@ def spectrum(name="spectrum.csv", header="f (Hz),G (1/Hz)", factor=1.0, noises=(
 
 def noise(*options):
     assert main(["noise", *options]) == 0
-    return json.loads(next(Path("results").glob("*/noise.json")).read_text(encoding="utf-8"))
+    return read_json(next(Path("results").glob("*/noise.json")))
 
 
 def test_a_spectrum_becomes_a_case_and_a_verdict(capsys):

@@ -12,7 +12,6 @@ from scipy.linalg import expm, solve_continuous_lyapunov
 from fpsolve import OrnsteinUhlenbeck, PlaneSystem, Problem, moment_lyapunov, sensitivities
 from fpsolve.analysis.sensitivity import Changed
 from fpsolve.arrays import identity
-from fpsolve.case.case import load_case
 from fpsolve.errors import CaseError, MeshError, NotConverged
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.eigen import PairDerivatives, principal_pair
@@ -22,6 +21,7 @@ from fpsolve.fem.pairs import PairAxis
 from fpsolve.model import CoefficientMatrix, Filter, ParametricOscillator, White, noise_kind
 from fpsolve.simulation.motions import draw
 from tests import random_filters
+from tests.kit import case_in
 from tests.oracles import filtered
 
 OUTPUTS = {"y": lambda z: (1.0, 0.0), "y'": lambda z: (0.0, 1.0), "Kanai-Tajimi": lambda z: (4.0, 4 * z)}
@@ -306,9 +306,7 @@ p = [2.0]
 
 
 def read(tmp_path, output):
-    path = tmp_path / "case.toml"
-    path.write_text(CASE.format(output=output), encoding="utf-8")
-    return load_case(path)
+    return case_in(tmp_path, CASE.format(output=output), name="case")
 
 
 def test_a_case_file_states_the_output_either_way(tmp_path):

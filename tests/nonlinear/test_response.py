@@ -59,7 +59,7 @@ def test_x_drifts_nowhere(rough):
 
 def test_moments_have_errors(rough):
     assert rough.moment(2, 0).value == rough.means["x_squared"].value
-    finer = response(BOUNCING, 0.05, 0.5, 1e-4)
+    finer = response(BOUNCING, 0.05, 0.5, 1e-3)
     for n, m in ((1, 0), (3, 1), (0, 6)):
         assert agrees(rough.moment(n, m), finer.moment(n, m).value, finer.moment(n, m).error_estimate)
 

@@ -17,7 +17,7 @@ from fpsolve.errors import FpsolveError, NotConverged
 from fpsolve.exponent.quantities import INDICES
 from fpsolve.model.quantity import MOMENT
 from fpsolve.output.datasets import write_dataset
-from tests.kit import ALL, case_in, case_text
+from tests.kit import ALL, case_in, case_text, read_json
 
 TEXT = case_text("[moments]\np = [2.0, 0.0, -1.0]\n[output]\neigenfunctions = []\nfigure = false\n")
 PRODUCT = '[vary]\n"noise.D0" = [1.0, 0.1]\n"noise.treatment" = ["exact", "ou-reduction"]\n'
@@ -110,7 +110,7 @@ def test_what_is_not_asked_for_is_not_there(tmp_path):
     assert "p" not in found.dims
     assert json.loads(found.attrs["overrides"]) == sets
     folder = tmp_path / "out/test"
-    [curve, *_] = json.loads((folder / "summary.json").read_text(encoding="utf-8"))["curves"]
+    [curve, *_] = read_json(folder / "summary.json")["curves"]
     assert names < set(curve)
     assert not {"moments", "variance_rate", "impact_rate", "sensitivities"} & set(curve)
     header = (folder / "curves.csv").read_text(encoding="utf-8").splitlines()[0].split(",")
@@ -273,7 +273,7 @@ def test_the_unit_of_time_labels_files_and_tables(tmp_path, capsys):
         data, told = fpsolve.open_results(tmp_path / unit), capsys.readouterr().out
         assert data.moment.units == f"1/{unit}"
         assert ("Λ(p) in 1/s" in told) is (unit == "s")
-        summary = json.loads((tmp_path / unit / "summary.json").read_text(encoding="utf-8"))
+        summary = read_json(tmp_path / unit / "summary.json")
         assert summary["units"] == {"time": unit}
         found[unit] = data.moment.values.tolist()
     assert found["s"] == found["time"]

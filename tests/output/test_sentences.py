@@ -1,7 +1,6 @@
 """What the terminal, summary.json and the report say of excursions, and in one sentence of a curve."""
 
 import html
-import json
 import re
 from types import SimpleNamespace
 
@@ -10,7 +9,7 @@ import pytest
 from fpsolve.cli import main
 from fpsolve.show.excursions import bounds_text
 from fpsolve.show.moments import show_meaning
-from tests.kit import case_in, solve_case
+from tests.kit import case_in, read_json, solve_case
 
 TEXT = """
 title = "Telegraph"
@@ -62,7 +61,7 @@ def test_a_run_states_bounds_and_their_meaning(written, capsys, monkeypatch):
 
 def test_the_summary_holds_them(written):
     folder, _ = written
-    [curve] = json.loads((folder / "summary.json").read_text(encoding="utf-8"))["curves"]
+    [curve] = read_json(folder / "summary.json")["curves"]
     found = curve["excursions"]
     assert found["start"] == {"phi": 0.0, "xi": "stationary"}
     assert found["stability_index"] == pytest.approx(1.302367339, abs=1e-8)

@@ -6,13 +6,13 @@ import re
 
 import pytest
 
-from fpsolve.case.case import load_case
 from fpsolve.cli import main
 from fpsolve.commands.options import BAD_INPUT, CHECK_FAILED
 from fpsolve.commands.prove import prove_case
 from fpsolve.proofs import claims
 from fpsolve.proofs.certificate import MalformedProof
 from fpsolve.proofs.claims import claims_from, plain, verdicts
+from tests.kit import case_in
 from tests.proofs.case import CASE
 
 
@@ -20,9 +20,7 @@ from tests.proofs.case import CASE
 def proof(tmp_path_factory):
     """The text of a proof.json."""
     folder = tmp_path_factory.mktemp("claims")
-    path = folder / "proven.toml"
-    path.write_text(CASE, encoding="utf-8")
-    prove_case(load_case(path), folder, width=1e-3)
+    prove_case(case_in(folder, CASE, name="proven"), folder, width=1e-3)
     return (folder / "proven/proof.json").read_text(encoding="utf-8")
 
 

@@ -29,7 +29,7 @@ from fpsolve.show.proof import show
 from fpsolve.study import prove as study
 from fpsolve.study.prove import CurveProof, Plan
 from tests.conftest import sampled, started
-from tests.kit import case_in
+from tests.kit import case_in, read_json
 from tests.oracles import fourier_hermite
 from tests.proofs.case import CASE
 
@@ -52,7 +52,7 @@ def no_proving(monkeypatch):
 
 
 def read(folder):
-    return json.loads((folder / "results/proven/proof.json").read_text(encoding="utf-8"))
+    return read_json(folder / "results/proven/proof.json")
 
 
 def test_bounds_and_verdicts_are_told_and_written(case, tmp_path, capsys):

@@ -18,6 +18,7 @@ from fpsolve.commands.options import BAD_INPUT, CHECK_FAILED
 from fpsolve.model import MarkovChain, OrnsteinUhlenbeck, ParametricOscillator, SineWiener, Telegraph, White
 from fpsolve.proofs import prove_excursion, prove_lyapunov_exponent
 from fpsolve.proofs.claims import ExcursionClaim
+from tests.kit import read_json
 from tests.oracles import certificate_checker as checker
 from tests.oracles import certificate_excursion
 from tests.proofs.test_systems import driven_velocity, spring, wall
@@ -160,7 +161,7 @@ quantities = ["moment", "lyapunov_exponent", "excursions"]
     assert max(each.upper.value for each in exact) < most
     proof = tmp_path / "mine/proof.json"
     assert main(["prove", "--check", str(proof)]) == 0
-    data = json.loads(proof.read_text(encoding="utf-8"))
+    data = read_json(proof)
     [curve] = data["curves"]
     lower = next(each for each in curve["excursions"] if each["sense"] == "lower")
     exponent = checker.read(json.dumps(curve["lyapunov_exponent"]))

@@ -4,11 +4,11 @@ import json
 
 import pytest
 
-from fpsolve.case.case import load_case
 from fpsolve.cli import main
 from fpsolve.commands.options import BAD_INPUT
 from fpsolve.commands.prove import check_proof, prove_case
 from fpsolve.proofs.claims import claims_from
+from tests.kit import case_in, read_json
 from tests.oracles import certificate_checker as checker
 
 EQUATIONS = """
@@ -32,10 +32,8 @@ GAUSSIAN = EQUATIONS.replace("NOISE", 'ornstein-uhlenbeck"\nalpha = 1.0\nstandar
 
 def proof_of(text, folder):
     """What proof.json holds, and where it is."""
-    path = folder / "beam.toml"
-    path.write_text(f'title = "beam"\n{text}', encoding="utf-8")
-    prove_case(load_case(path), folder, width=1e-3)
-    return json.loads((folder / "beam/proof.json").read_text(encoding="utf-8")), folder / "beam/proof.json"
+    prove_case(case_in(folder, f'title = "beam"\n{text}', name="beam"), folder, width=1e-3)
+    return read_json(folder / "beam/proof.json"), folder / "beam/proof.json"
 
 
 @pytest.mark.parametrize(

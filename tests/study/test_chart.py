@@ -1,7 +1,5 @@
 """Charts of stability from a case file: what is written, and what its regions say."""
 
-import csv
-import json
 from contextlib import nullcontext
 
 import numpy as np
@@ -15,7 +13,7 @@ from fpsolve.output.charts import read_line
 from fpsolve.study.chart import chart_work, solve_chart
 from fpsolve.workflow import Watch, chart_case, run
 from tests.conftest import painted
-from tests.kit import case_text
+from tests.kit import case_text, read_csv, read_json
 
 CHART = """[moments]
 p = [2.0]
@@ -54,13 +52,12 @@ def folder(path):
 
 @pytest.fixture(scope="module")
 def rows(folder):
-    with (folder / "chart.csv").open(encoding="utf-8", newline="") as file:
-        return list(csv.DictReader(file))
+    return read_csv(folder / "chart.csv")
 
 
 @pytest.fixture(scope="module")
 def summary(folder):
-    return json.loads((folder / "chart.json").read_text(encoding="utf-8"))
+    return read_json(folder / "chart.json")
 
 
 def solver_at(path, x, y):
@@ -134,7 +131,7 @@ def test_a_line_that_does_not_cross_the_frame_is_said_so(path, tmp_path, capsys)
     words = [word for text in overrides for word in ("--set", text)]
     assert main(["chart", str(path), "--out", str(tmp_path), *words]) == 0
     assert "Λ(2) < 0 everywhere in the frame" in capsys.readouterr().err
-    summary = json.loads((tmp_path / "plane" / "chart.json").read_text(encoding="utf-8"))
+    summary = read_json(tmp_path / "plane" / "chart.json")
     assert summary["complete"]
     assert summary["warnings"] == ["Λ(2) < 0 everywhere in the frame"]
     assert [region["name"] for region in summary["regions"]] == ["second moment stable"]
@@ -151,7 +148,7 @@ def test_interrupted_it_keeps_what_is_traced(path, tmp_path, capsys):
     watch = Watch(bar=lambda phase: nullcontext(progress if phase.total else lambda: None))
     with pytest.raises(KeyboardInterrupt, match="after 1 branch of 3 lines; what was done is kept in"):
         chart_case(load_case(path), tmp_path, watch=watch)
-    summary = json.loads((tmp_path / "plane" / "chart.json").read_text(encoding="utf-8"))
+    summary = read_json(tmp_path / "plane" / "chart.json")
     assert not summary["complete"]
     assert [line["line"] for line in summary["lines"]] == ["lyapunov_exponent"]
     assert (tmp_path / "plane" / "chart.png").exists()
@@ -251,7 +248,7 @@ def test_a_map_and_its_chart_share_a_folder(path, tmp_path):
     assert {"summary.json", "figure.png", "chart.csv", "chart.png"} <= {
         each.name for each in (tmp_path / "plane").iterdir()
     }
-    held = json.loads((tmp_path / "plane" / "chart.json").read_text(encoding="utf-8"))["parameters"]
+    held = read_json(tmp_path / "plane" / "chart.json")["parameters"]
     assert not {"oscillator.omega", "noise.D0"} & held.keys()
     keys, held = ("noise.D0", "oscillator.omega"), case.curve({}).parameters
     [branch], is_whole = read_line(tmp_path / "plane", keys, Zero("moment", 2.0), held)

@@ -1,17 +1,14 @@
 """A case of a triangular system: what there is on the ray that the phase never leaves, and across it."""
 
-import json
-
 import numpy as np
 import pytest
 
-from fpsolve.case.case import load_case
 from fpsolve.messages import Code
 from fpsolve.output.tables import write_results
 from fpsolve.page.terminal import print_blocks
 from fpsolve.show.notes import notes
 from fpsolve.study.solve import Numerics, everything, solve_curve
-from tests.kit import from_record
+from tests.kit import case_in, from_record, read_json
 
 CASE = """
 title = "Triangular"
@@ -32,9 +29,7 @@ quantities = ["moment", "lyapunov_exponent"]
 
 def test_both_classes_are_told_by_name_from_records_too(tmp_path):
     """S(0) = 2 · 0.25: p(−0.3) + ¼p²·0.16 across the ray x = 0, and −p + ¼p² on it."""
-    path = tmp_path / "triangular.toml"
-    path.write_text(CASE, encoding="utf-8")
-    case = load_case(path)
+    case = case_in(tmp_path, CASE, name="triangular")
     [curve] = case.curves()
     solved = solve_curve(curve, everything(case), Numerics.of(case))
     result = solved.result
@@ -44,7 +39,7 @@ def test_both_classes_are_told_by_name_from_records_too(tmp_path):
     summaries = []
     for each in (result, from_record(case, solved)):
         write_results(case, [each], tmp_path, {})
-        summaries += json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))["curves"]
+        summaries += read_json(tmp_path / "summary.json")["curves"]
     assert summaries[0] == summaries[1]
     along, across = summaries[0]["classes"]
     assert [each["name"] for each in (along, across)] == [
@@ -77,9 +72,7 @@ quantities = ["moment", "lyapunov_exponent", "stability_index", "sensitivities"]
 
 def test_blocks_are_told_by_their_variables(tmp_path, capsys):
     """Λ(1) and Λ(2) are those of x and v alone; p < 0 is told in one sentence."""
-    path = tmp_path / "blocks.toml"
-    path.write_text(BLOCKS, encoding="utf-8")
-    case = load_case(path)
+    case = case_in(tmp_path, BLOCKS, name="blocks")
     [curve] = case.curves()
     solved = solve_curve(curve, everything(case), Numerics.of(case))
     result = solved.result
@@ -93,7 +86,7 @@ def test_blocks_are_told_by_their_variables(tmp_path, capsys):
     assert "(y), (x, v) do not all drive each other" in " ".join(said.split())
     assert from_record(case, solved).classes[1].variables == ("x", "v")
     write_results(case, [result], tmp_path, {})
-    [summary] = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))["curves"]
+    [summary] = read_json(tmp_path / "summary.json")["curves"]
     slow, own = summary["classes"]
     assert [each["name"] for each in (slow, own)] == ["y", "x, v"]
     assert slow["lyapunov_exponent"] == pytest.approx(-0.4, abs=1e-9)

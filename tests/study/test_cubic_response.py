@@ -1,7 +1,5 @@
 """A case of equations with terms of degree 3: its numbers and files have the names of its variables."""
 
-import csv
-import json
 import math
 
 import numpy as np
@@ -14,7 +12,7 @@ from fpsolve.messages import Code
 from fpsolve.study.results import Status
 from fpsolve.study.solve import Numerics, everything, solve_curve
 from fpsolve.workflow import simulate_case
-from tests.kit import case_in
+from tests.kit import case_in, read_csv, read_json
 
 CASE = """title = "test"
 [system]
@@ -56,19 +54,18 @@ def folder(tmp_path_factory):
 
 @pytest.mark.slow
 def test_names_are_those_of_the_variables(folder):
-    [curve] = json.loads((folder / "summary.json").read_text(encoding="utf-8"))["curves"]
+    [curve] = read_json(folder / "summary.json")["curves"]
     found = curve["response"]
     assert [*found["means"]] == [f"{name}{end}" for name in NUMBERS for end in ("", "_error")]
     assert "impact_rate" not in found
     amplitude, q, w = (found["means"][name] for name in ("amplitude_squared", "q_squared", "w_squared"))
     assert amplitude == pytest.approx(q + w / 4, rel=1e-12)
-    with (folder / "curves.csv").open(encoding="utf-8") as file:
-        [row] = csv.DictReader(file)
+    [row] = read_csv(folder / "curves.csv")
     assert {name for name in row if name.startswith("response") and not name.endswith("error")} == {
         f"response_{name}" for name in NUMBERS
     }
     assert float(row["response_q_squared"]) == q
-    simulated = json.loads((folder / "monte_carlo.json").read_text(encoding="utf-8"))["response"]
+    simulated = read_json(folder / "monte_carlo.json")["response"]
     assert [*simulated["means"]] == ["q_squared", "w_squared", "amplitude"]
     mean = simulated["means"]["q_squared"]
     assert abs(mean["value"] - q) < 5 * mean["standard_error"]

@@ -5,6 +5,7 @@ import json
 import pytest
 
 from fpsolve.cli import main
+from tests.kit import read_json
 
 TEXT = """\
 title = "The old oscillator"
@@ -47,7 +48,7 @@ def test_the_answer_is_a_case_that_meets_what_it_expects(design, tmp_path, capsy
     assert "  # to be designed" in text
     assert main(["check", str(tmp_path / "old/design.toml")]) == 0
     assert "1 of 1 ok" in capsys.readouterr().out
-    told = json.loads((tmp_path / "old/design.json").read_text(encoding="utf-8"))
+    told = read_json(tmp_path / "old/design.json")
     assert told["complete"]
     assert told["solves"] <= 8
     assert told["by"][0]["before"] == 0.1
@@ -61,7 +62,7 @@ def test_what_cannot_be_reached_exits_1_and_leaves_no_case(design, tmp_path):
     assert "Λ(2) = 5 cannot be reached with oscillator.c1 from -2 to 0" in err
     assert "no design" in out
     assert not (tmp_path / "old/design.toml").exists()
-    assert not json.loads((tmp_path / "old/design.json").read_text(encoding="utf-8"))["complete"]
+    assert not read_json(tmp_path / "old/design.json")["complete"]
 
 
 def test_several_parameters_state_their_metric(design, tmp_path):
@@ -82,7 +83,7 @@ def test_a_section_states_the_same(design, tmp_path):
     by = '{ key = "oscillator.c1", start = -2.0, stop = 0.0 }'
     section = f'design={{ target = "stability_index = 1", by = [{by}] }}'
     assert design("--set", section)[0] == 0
-    told = json.loads((tmp_path / "old/design.json").read_text(encoding="utf-8"))
+    told = read_json(tmp_path / "old/design.json")
     assert told["by"][0]["after"] == pytest.approx(-0.65415415855, abs=5e-12)
     text = (tmp_path / "old/design.toml").read_text(encoding="utf-8")
     assert 'target = "stability_index = 1"' in text

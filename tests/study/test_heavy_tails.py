@@ -1,13 +1,12 @@
 """What is printed and written of noise with algebraic tails."""
 
-import json
 import re
 
 import pytest
 
-from fpsolve.case.case import CaseError, load_case
+from fpsolve.case.case import CaseError
 from fpsolve.cli import main
-from tests.kit import case_in, case_text, solve_case
+from tests.kit import case_in, case_text, read_json, solve_case
 
 SECTIONS = "[moments]\np = [-0.4, 0.0]\n[vary]\n'noise.r0' = [0.9, 1.1]\n"
 TAILS = {"tau0": 1.0, "r0": 1.0, "treatment": "exact"}
@@ -28,10 +27,8 @@ def test_of_a_sweep_only_these_sets_fail(tmp_path):
 
 
 def test_alone_such_a_set_is_refused_at_once(tmp_path):
-    path = tmp_path / "heavy.toml"
-    path.write_text(text("[moments]\np = [-0.4, 0.0]\n", r0=1.1), encoding="utf-8")
     with pytest.raises(CaseError, match=r"moments: Λ\(-0\.4\) is not computed: for r0 > 1"):
-        load_case(path)
+        case_in(tmp_path, text("[moments]\np = [-0.4, 0.0]\n", r0=1.1), name="heavy")
 
 
 def test_what_is_not_computed_is_said(tmp_path, capsys):
@@ -44,5 +41,5 @@ def test_what_is_not_computed_is_said(tmp_path, capsys):
     said = " ".join(printed.err.split())
     for name in ("δ_p", "Λ″(0)"):
         assert f"{name} is not computed: for r0 > 1 the noise has algebraic tails" in said
-    (curve,) = json.loads((tmp_path / "heavy" / "summary.json").read_text(encoding="utf-8"))["curves"]
+    (curve,) = read_json(tmp_path / "heavy" / "summary.json")["curves"]
     assert curve["stability_index"] is None

@@ -1,6 +1,5 @@
 """The stationary response of a case: when it is computed, what is written of it, and why there is none."""
 
-import json
 import math
 import pickle
 from dataclasses import replace
@@ -23,7 +22,7 @@ from fpsolve.show.response import shape
 from fpsolve.show.simulation import number_grid
 from fpsolve.study.results import Status
 from fpsolve.study.solve import Numerics, compare, everything, expected, solve_curve
-from tests.kit import case_in, case_text
+from tests.kit import case_in, case_text, read_json
 
 SECTIONS = """[moments]
 p = [1.0]
@@ -67,7 +66,7 @@ def never(*arguments):
 
 
 def response_of(folder):
-    [curve] = json.loads((folder / "summary.json").read_text(encoding="utf-8"))["curves"]
+    [curve] = read_json(folder / "summary.json")["curves"]
     return curve["response"]
 
 

@@ -1,7 +1,5 @@
 """`fpsolve simulate` and `fpsolve run --monte-carlo`: files, exit codes, interrupts, bad input."""
 
-import csv
-import json
 import signal
 import subprocess
 import sys
@@ -20,7 +18,7 @@ from fpsolve.output import figures
 from fpsolve.simulation import response
 from fpsolve.study import simulate as simulated
 from tests.conftest import heed_signals
-from tests.kit import case_text
+from tests.kit import case_text, read_csv, read_json
 from tests.oracles import closed_forms
 
 SECTIONS = "[moments]\np = [-1.0, 1.0]\n[monte_carlo]\npaths = 6400\ntime = 40.0\nseed = 7\n"
@@ -81,7 +79,7 @@ def records(out):
 
 
 def read(path):
-    return json.loads(Path(path).read_text(encoding="utf-8"))
+    return read_json(Path(path))
 
 
 def test_monte_carlo_json(case, out, capsys):
@@ -172,8 +170,7 @@ def test_the_nonlinear_response_is_written(case, out):
     assert names(folder) == written
     response = read(folder / "monte_carlo.json")["response"]
     assert response["means"].keys() == {"x", "x_squared", "v_squared", "amplitude", "energy"}
-    with (folder / "monte_carlo_response.csv").open(encoding="utf-8") as file:
-        rows = np.array([[float(cell) for cell in row.values()] for row in csv.DictReader(file)])
+    rows = np.array([[float(cell) for cell in row.values()] for row in read_csv(folder / "monte_carlo_response.csv")])
     width, density = rows[:, 1] - rows[:, 0], rows[:, 2]
     assert np.sum(width * density) == pytest.approx(1, abs=1e-3)
     middle = (rows[:, 0] + rows[:, 1]) / 2

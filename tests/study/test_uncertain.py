@@ -1,19 +1,17 @@
 """Intervals of cases by first order and by samples, on the command line and in files."""
 
-import csv
-import json
 import math
 
 import numpy as np
 import pytest
 from scipy.stats import norm
 
-from fpsolve.case.case import load_case
 from fpsolve.cli import main
 from fpsolve.messages import Code
 from fpsolve.parts.intervals import sampled_case, samples_of, spreads_of
 from fpsolve.study.solve import Numerics, everything, solve_curve
 from tests.conftest import sampled
+from tests.kit import case_in, read_csv, read_json
 
 UNIFORM = """
 title = "A uniform phase"
@@ -54,9 +52,7 @@ quantities = ["moment", "lyapunov_exponent", "stability_index"]
 
 
 def case_of(folder, text, *overrides):
-    path = folder / "case.toml"
-    path.write_text(text, encoding="utf-8")
-    return load_case(path, overrides)
+    return case_in(folder, text, overrides, name="case")
 
 
 def solved(case):
@@ -123,19 +119,16 @@ def test_files_and_the_terminal_say_it(tmp_path, capsys):
     assert "λ < 0 with > 99.9 %" in said
     assert "Λ(2) > 0 with 96.5 %" in said  # norm.cdf(1.8125)
     assert "20 samples of a Latin hypercube, seed 0" in said
-    [curve] = json.loads((tmp_path / "case/summary.json").read_text(encoding="utf-8"))["curves"]
+    [curve] = read_json(tmp_path / "case/summary.json")["curves"]
     size = norm.ppf(0.975) * 0.05
     assert curve["uncertainty"]["lyapunov_exponent"]["high"] == pytest.approx(-0.3 + size, abs=1e-9)
-    with (tmp_path / "case/curves.csv").open(encoding="utf-8") as file:
-        [row] = csv.DictReader(file)
+    [row] = read_csv(tmp_path / "case/curves.csv")
     assert float(row["lyapunov_exponent_low"]) == pytest.approx(-0.3 - size, abs=1e-9)
-    with (tmp_path / "case/moments.csv").open(encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
+    rows = read_csv(tmp_path / "case/moments.csv")
     assert float(rows[1]["moment_low"]) == pytest.approx(-0.6 + 0.5 / 0.64 - 2 * size, abs=1e-9)
-    told = json.loads((tmp_path / "case/sample.json").read_text(encoding="utf-8"))
+    told = read_json(tmp_path / "case/sample.json")
     assert (told["planned"], told["seed"], told["failed"]) == (20, 0, 0)
-    with (tmp_path / "case/sample/curves.csv").open(encoding="utf-8") as file:
-        values = [float(each["system.a"]) for each in csv.DictReader(file)]
+    values = [float(each["system.a"]) for each in read_csv(tmp_path / "case/sample/curves.csv")]
     assert len(values) == 20
     assert told["rows"][0]["median"] == pytest.approx(np.median(values), abs=1e-9)  # λ = a
     assert main([*arguments, "--report", "--set", "output.figure=false"]) == 0
