@@ -20,16 +20,18 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
+from fpsolve import (
+    ExponentSolver,
+    NonGaussianNoise,
+    OrnsteinUhlenbeck,
+    Problem,
+    VibroImpactOscillator,
+    moment_lyapunov,
+    simulate,
+)
 from fpsolve.arrays import FloatArray
-from fpsolve.exponent.function import moment_lyapunov
-from fpsolve.exponent.solver import ExponentSolver
-from fpsolve.model.noise import Noise
-from fpsolve.model.noises.non_gaussian import NonGaussianNoise
-from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
-from fpsolve.model.problem import Problem
-from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
-from fpsolve.simulation import estimators
-from fpsolve.simulation.estimators import MomentEstimate, simulate
+from fpsolve.model import Noise
+from fpsolve.simulation import MomentEstimate, estimators
 from fpsolve.simulation.setup import default_step, largest_step, transient
 from tests.simulation.problems import MODERATE, REDUCED, STRONG, exact
 

@@ -6,9 +6,8 @@ import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
-from fpsolve import Problem
+from fpsolve import ExponentSolver, Problem
 from fpsolve.errors import FpsolveError
-from fpsolve.exponent.solver import ExponentSolver
 
 
 @dataclass(frozen=True)

@@ -18,13 +18,9 @@ from pathlib import Path
 
 import numpy as np
 
-from fpsolve import Problem
-from fpsolve.case.case import load_case
+from fpsolve import ExponentSolver, Problem, load_case
 from fpsolve.errors import FpsolveError
-from fpsolve.exponent.adapt import Budget
-from fpsolve.exponent.function import solve_moments
-from fpsolve.exponent.quantities import INDICES
-from fpsolve.exponent.solver import ExponentSolver
+from fpsolve.exponent import INDICES, Budget, solve_moments
 from fpsolve.parts.response import solve_response
 from tests import random_modes, random_planar, random_problems, random_systems, random_units
 

@@ -10,9 +10,10 @@ import sys
 
 import numpy as np
 
+from fpsolve import PlaneSystem, Problem
 from fpsolve.analysis import growth_law
 from fpsolve.arrays import identity
-from fpsolve.model import CoefficientMatrix, PlaneSystem, Problem, White
+from fpsolve.model import CoefficientMatrix, White
 
 TIMES = (2.0, 4.0, 8.0)
 CHUNK = 8192

@@ -8,11 +8,13 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from fpsolve.case.case import Case, load_case
+from fpsolve import load_case
+from fpsolve.case import Case
 from fpsolve.output.records import entries_of, record_of_set
 from fpsolve.parts.part import Numerics
-from fpsolve.study.results import CurveResult, Solved
-from fpsolve.study.solve import everything, result_of, solve_curve
+from fpsolve.study import CurveResult, solve_curve
+from fpsolve.study.results import Solved
+from fpsolve.study.solve import everything, result_of
 
 ALL = 'output.quantities="all"'
 """Sets what a case asks for to everything."""

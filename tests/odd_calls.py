@@ -25,15 +25,13 @@ from typing import Any
 import numpy as np
 
 import fpsolve
+from fpsolve import Problem
 from fpsolve.analysis import Axis
 from fpsolve.errors import FpsolveError
-from fpsolve.exponent.adapt import Budget
-from fpsolve.fem.mesh import read_mesh, write_mesh
+from fpsolve.exponent import Budget
+from fpsolve.fem import read_mesh, write_mesh
+from fpsolve.model import CoefficientMatrix, Jump, MarkovChain, SineWiener
 from fpsolve.model.faults import ParameterError
-from fpsolve.model.noises.bounded import SineWiener
-from fpsolve.model.noises.markov_chain import MarkovChain
-from fpsolve.model.plane import CoefficientMatrix, Jump
-from fpsolve.model.problem import Problem
 from tests.kit import case_text
 
 LIMIT = 60

@@ -14,16 +14,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from fpsolve import Problem
-from fpsolve.analysis import boundary
+from fpsolve import ExponentSolver, NonGaussianNoise, Problem, VibroImpactOscillator, boundary
+from fpsolve.analysis import Axis, Boundary
 from fpsolve.analysis.scan import Sample
-from fpsolve.analysis.stability import Boundary
-from fpsolve.analysis.zero import Axis
 from fpsolve.errors import FpsolveError
-from fpsolve.exponent.adapt import Budget
-from fpsolve.exponent.solver import ExponentSolver
-from fpsolve.model.noises.non_gaussian import NonGaussianNoise
-from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
+from fpsolve.exponent import Budget
 from tests import random_problems
 
 ZEROS = "lyapunov_exponent", {"moment": 2.0}, {"stability_index": -1.0}

@@ -9,8 +9,9 @@ import sys
 
 import numpy as np
 
+from fpsolve import NonGaussianNoise, OrnsteinUhlenbeck
 from fpsolve.measured import Record, Spectrum, fit_noise, non_gaussian_from_record
-from fpsolve.model import Bounded, Filter, NonGaussianNoise, OrnsteinUhlenbeck
+from fpsolve.model import Bounded, Filter
 
 FREQUENCY = 2.0
 NOISES = (

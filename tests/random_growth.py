@@ -13,10 +13,11 @@ import sys
 import numpy as np
 import scipy.linalg
 
+from fpsolve import OrnsteinUhlenbeck, PlaneSystem, Problem
 from fpsolve.analysis import growth_law
 from fpsolve.arrays import identity
 from fpsolve.errors import NotConverged
-from fpsolve.model import CoefficientMatrix, OrnsteinUhlenbeck, PlaneSystem, Problem, SineWiener, White
+from fpsolve.model import CoefficientMatrix, SineWiener, White
 
 STEPS_PER_TURN = 120
 KINDS = ("white", "ornstein-uhlenbeck", "sine-wiener")

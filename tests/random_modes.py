@@ -13,15 +13,14 @@ import time
 
 import numpy as np
 
-from fpsolve import OrnsteinUhlenbeck, Problem, lyapunov_exponent, moment_lyapunov
+from fpsolve import OrnsteinUhlenbeck, Problem, lyapunov_exponent, moment_lyapunov, simulate
 from fpsolve.arrays import FloatArray, identity
 from fpsolve.errors import FpsolveError
-from fpsolve.exponent.adapt import Budget
+from fpsolve.exponent import Budget
 from fpsolve.messages import Code
-from fpsolve.model import CoefficientMatrix, Filter, LinearSystem, Telegraph, White
-from fpsolve.model.noise import Noise
+from fpsolve.model import CoefficientMatrix, Filter, LinearSystem, Noise, Telegraph, White
+from fpsolve.simulation import MonteCarlo
 from fpsolve.simulation.coefficients import coefficients
-from fpsolve.simulation.estimators import MonteCarlo, simulate
 from fpsolve.simulation.setup import default_step, transient
 from tests.random_simulations import Outcome
 

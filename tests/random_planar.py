@@ -25,13 +25,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fpsolve import NonGaussianNoise, OrnsteinUhlenbeck, PlaneSystem, Problem, lyapunov_exponent, moment_lyapunov
+from fpsolve import (
+    NonGaussianNoise,
+    OrnsteinUhlenbeck,
+    PlaneSystem,
+    Problem,
+    lyapunov_exponent,
+    moment_lyapunov,
+    simulate,
+)
 from fpsolve.arrays import FloatArray, identity
 from fpsolve.errors import FpsolveError, NotConverged
-from fpsolve.exponent.adapt import Budget
-from fpsolve.model import Bounded, CoefficientMatrix, Filter, MarkovChain, Poisson, SineWiener, Telegraph, White
-from fpsolve.model.noise import Noise
-from fpsolve.simulation.estimators import simulate
+from fpsolve.exponent import Budget
+from fpsolve.model import Bounded, CoefficientMatrix, Filter, MarkovChain, Noise, Poisson, SineWiener, Telegraph, White
 from fpsolve.simulation.setup import default_step, transient
 from tests.oracles import planar
 

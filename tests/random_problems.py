@@ -14,12 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 
 import fpsolve
+from fpsolve import ExponentSolver, NonGaussianNoise, VibroImpactOscillator
 from fpsolve.errors import NotConverged
-from fpsolve.exponent.eigen import PrincipalPair, principal_pair
-from fpsolve.exponent.solver import ExponentSolver
-from fpsolve.model.noise import Noise
-from fpsolve.model.noises.non_gaussian import NonGaussianNoise
-from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
+from fpsolve.exponent import PrincipalPair, principal_pair
+from fpsolve.model import Noise
 from tests.oracles import fourier_hermite
 
 RTOL = 1e-8

@@ -17,10 +17,11 @@ from decimal import Decimal
 import numpy as np
 
 import fpsolve
+from fpsolve import prove
 from fpsolve.arrays import identity
 from fpsolve.model import CoefficientMatrix, Jump, MarkovChain, Noise, SineWiener, Telegraph, White
-from fpsolve.proofs import Enclosure, prove
-from fpsolve.theory.perturbation import scale_of
+from fpsolve.proofs import Enclosure
+from fpsolve.theory import scale_of
 from tests.oracles import certificate_checker
 
 SHARES = (1e-8, 1e-6, 1e-3)

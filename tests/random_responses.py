@@ -11,8 +11,15 @@ import time
 
 import numpy as np
 
-from fpsolve import ExponentSolver, lyapunov_exponent, stability_index
-from fpsolve.model import NonGaussianNoise, PlaneSystem, Problem, VibroImpactOscillator
+from fpsolve import (
+    ExponentSolver,
+    NonGaussianNoise,
+    PlaneSystem,
+    Problem,
+    VibroImpactOscillator,
+    lyapunov_exponent,
+    stability_index,
+)
 from fpsolve.model.settling import comes_down
 from fpsolve.nonlinear import stationary_response
 from fpsolve.simulation import simulated_response

@@ -8,10 +8,8 @@ import sys
 
 import numpy as np
 
-from fpsolve import NonGaussianNoise, Problem, VibroImpactOscillator
-from fpsolve.analysis.sensitivity import sensitivities
+from fpsolve import ExponentSolver, NonGaussianNoise, Problem, VibroImpactOscillator, sensitivities
 from fpsolve.errors import NumericalFailure
-from fpsolve.exponent.solver import ExponentSolver
 
 RTOL = 1e-11
 STEPS = 1e-4, 5e-4, 2.5e-3, 1.25e-2

@@ -14,13 +14,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fpsolve import NonGaussianNoise, OrnsteinUhlenbeck, PlaneSystem, Problem
+from fpsolve import ExponentSolver, NonGaussianNoise, OrnsteinUhlenbeck, PlaneSystem, Problem, simulate
 from fpsolve.arrays import FloatArray, identity
 from fpsolve.errors import FpsolveError
-from fpsolve.exponent.solver import ExponentSolver
-from fpsolve.model import Bounded, CoefficientMatrix, Filter, Jump, MarkovChain, Poisson, SineWiener, White
-from fpsolve.model.noise import Noise
-from fpsolve.simulation.estimators import simulate
+from fpsolve.model import Bounded, CoefficientMatrix, Filter, Jump, MarkovChain, Noise, Poisson, SineWiener, White
 from fpsolve.simulation.setup import transient
 
 P, RTOL, SYSTEMS = 2.0, 1e-6, 300

@@ -13,11 +13,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fpsolve import NonGaussianNoise, OrnsteinUhlenbeck, PlaneSystem, Problem
+from fpsolve import ExponentSolver, NonGaussianNoise, OrnsteinUhlenbeck, PlaneSystem, Problem
 from fpsolve.arrays import identity
 from fpsolve.errors import FpsolveError
-from fpsolve.exponent.adapt import Budget
-from fpsolve.exponent.solver import ExponentSolver
+from fpsolve.exponent import Budget
 from fpsolve.model import Bounded, CoefficientMatrix, Jump, Poisson, SineWiener, Telegraph, White
 from tests.oracles import moment_hierarchy, phase_circle
 

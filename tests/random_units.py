@@ -22,7 +22,7 @@ import numpy as np
 from fpsolve import NonGaussianNoise, OrnsteinUhlenbeck, Problem, lyapunov_exponent, moment_lyapunov
 from fpsolve.arrays import FloatArray, identity
 from fpsolve.errors import FpsolveError
-from fpsolve.exponent.adapt import Budget
+from fpsolve.exponent import Budget
 from fpsolve.model import (
     Bounded,
     CoefficientMatrix,
@@ -30,13 +30,13 @@ from fpsolve.model import (
     Jump,
     LinearSystem,
     MarkovChain,
+    Noise,
     ParametricOscillator,
     Poisson,
     SineWiener,
     Telegraph,
     White,
 )
-from fpsolve.model.noise import Noise
 
 SYSTEMS, MOST = 300, 1.5
 ORDERS = (1.0, 2.0)

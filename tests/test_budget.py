@@ -11,16 +11,14 @@ from functools import partial
 import numpy as np
 import pytest
 
-from fpsolve import OrnsteinUhlenbeck, PlaneSystem, Problem
+from fpsolve import ExponentSolver, OrnsteinUhlenbeck, PlaneSystem, Problem
 from fpsolve.analysis.excursions import solve_excursion
 from fpsolve.analysis.growth import Slopes
 from fpsolve.analysis.sensitivity import Gradient
 from fpsolve.budget import SECONDS_PER_OPERATION, Countdown, charge, counted, under_way, watched
 from fpsolve.errors import NotConverged
-from fpsolve.exponent.adapt import Budget
+from fpsolve.exponent import Budget, critical_restitution, impact_rate
 from fpsolve.exponent.function import nonzero_root
-from fpsolve.exponent.quantities import critical_restitution, impact_rate
-from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.model import Bounded, Filter, MarkovChain, ModalSystem, White
 from tests.benchmarks.measure import peak_memory
 from tests.conftest import FIG1, FIG1_NOISE, sampled

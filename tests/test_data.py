@@ -13,22 +13,19 @@ from matplotlib import pyplot
 from matplotlib.colors import to_hex
 
 import fpsolve
+from fpsolve import ExponentSolver, OrnsteinUhlenbeck, Problem, VibroImpactOscillator
 from fpsolve.analysis import Axis, design, excursion, growth_law, rate_function, uncertainty
-from fpsolve.case.case import Curve
+from fpsolve.case import Curve
 from fpsolve.data import Result
 from fpsolve.errors import FpsolveError
-from fpsolve.exponent import INDICES, perturbation_series
-from fpsolve.exponent.adapt import Budget
-from fpsolve.exponent.error import Absent, Estimate, Failure
-from fpsolve.exponent.solver import ExponentSolver
-from fpsolve.model import CoefficientMatrix, LinearSystem, OrnsteinUhlenbeck, Telegraph, White
-from fpsolve.model.problem import Problem
+from fpsolve.exponent import INDICES, Budget, Estimate, Failure, perturbation_series
+from fpsolve.exponent.error import Absent
+from fpsolve.model import CoefficientMatrix, LinearSystem, ParametricOscillator, Telegraph, White
 from fpsolve.model.quantity import MOMENT
-from fpsolve.model.systems import ParametricOscillator
-from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
 from fpsolve.nonlinear import stationary_response
 from fpsolve.simulation import MomentEstimate, MonteCarlo, Response
-from fpsolve.study.solve import Numerics, solve_curve
+from fpsolve.study import solve_curve
+from fpsolve.study.solve import Numerics
 from tests.conftest import FIG1, FIG1_NOISE, UNIT_NOISE
 from tests.kit import case_text
 

@@ -7,14 +7,10 @@ import tracemalloc
 import numpy as np
 import pytest
 
+from fpsolve import ExponentSolver, MomentLyapunovFunction, Problem, VibroImpactOscillator, make_mesh, moment_lyapunov
 from fpsolve.errors import CaseError, Fault, NotConverged
-from fpsolve.exponent.eigen import principal_pair
-from fpsolve.exponent.function import MomentLyapunovFunction, moment_lyapunov
-from fpsolve.exponent.solver import ExponentSolver
-from fpsolve.fem.generator import Generator
-from fpsolve.fem.mesh import make_mesh
-from fpsolve.model.problem import Problem
-from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
+from fpsolve.exponent import principal_pair
+from fpsolve.fem import Generator
 from tests.conftest import FIG1, FIG1_NOISE, UNIT_NOISE
 
 STRONG = VibroImpactOscillator(omega=1.0, restitution=0.9, c1=0.0, epsilon=1.5)

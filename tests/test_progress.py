@@ -7,8 +7,9 @@ import pytest
 from rich.console import Console
 
 from fpsolve.budget import SECONDS_PER_OPERATION, charge
-from fpsolve.exponent.adapt import Budget
-from fpsolve.workflow.progress import MOMENTS, PERCENT, POINTS, SETS, SILENT, Bars, Phase, counted, seconds_left
+from fpsolve.exponent import Budget
+from fpsolve.workflow import Phase
+from fpsolve.workflow.progress import MOMENTS, PERCENT, POINTS, SETS, SILENT, Bars, counted, seconds_left
 
 SOLVING = Phase("case", "solving", 400, SETS)
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from fpsolve import load_case
 from fpsolve.arrays import one
-from fpsolve.case.case import load_case
 from fpsolve.case.schema import SCHEMA
 from fpsolve.cli import main
 from fpsolve.commands.new import described_cases, shipped_cases

@@ -3,14 +3,18 @@
 import numpy as np
 import pytest
 
-from fpsolve.analysis.density import adjoint_density, furstenberg_khasminskii, stationary_density, tilted_density
+from fpsolve import (
+    ExponentSolver,
+    NonGaussianNoise,
+    OrnsteinUhlenbeck,
+    Problem,
+    VibroImpactOscillator,
+    make_mesh,
+    stationary_density,
+    tilted_density,
+)
+from fpsolve.analysis import adjoint_density, furstenberg_khasminskii
 from fpsolve.exponent.fields import fields
-from fpsolve.exponent.solver import ExponentSolver
-from fpsolve.fem.mesh import make_mesh
-from fpsolve.model.noises.non_gaussian import NonGaussianNoise
-from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
-from fpsolve.model.problem import Problem
-from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
 from tests.conftest import FIG1, FIG1_NOISE
 
 PROBLEMS = {

@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 import scipy.linalg
 
-from fpsolve import ExponentSolver, OrnsteinUhlenbeck, Problem
-from fpsolve.analysis import furstenberg_khasminskii, stationary_density, tilted_density
+from fpsolve import ExponentSolver, OrnsteinUhlenbeck, Problem, stationary_density, tilted_density
+from fpsolve.analysis import furstenberg_khasminskii
 from fpsolve.analysis.directions import settled_directions
 from fpsolve.arrays import identity
 from fpsolve.exponent import principal_pair
 from fpsolve.exponent.directions import DirectionGrid, Directions, oscillators, pair_names
-from fpsolve.fem.generator import Generator
+from fpsolve.fem import Generator
 from fpsolve.fem.harmonics import HarmonicAxis
 from fpsolve.model import CoefficientMatrix, LinearSystem, ModalSystem, White
-from fpsolve.output.eigenfunctions import draw_eigenfunction
+from fpsolve.output import draw_eigenfunction
 from tests.exponent.test_modes import COUPLED, FREE, problem
 
 OMEGA = 1.6

@@ -7,24 +7,14 @@ import pytest
 from scipy.optimize import brentq
 from scipy.stats import norm
 
-from fpsolve import PlaneSystem, Problem, VibroImpactOscillator, lyapunov_exponent
+from fpsolve import NonGaussianNoise, OrnsteinUhlenbeck, PlaneSystem, Problem, VibroImpactOscillator, lyapunov_exponent
 from fpsolve.analysis import excursion
 from fpsolve.analysis.excursions import Crossing
 from fpsolve.arrays import identity
 from fpsolve.errors import NotConverged
 from fpsolve.exponent import Budget
 from fpsolve.messages import Code
-from fpsolve.model import (
-    Bounded,
-    CoefficientMatrix,
-    LinearSystem,
-    MarkovChain,
-    NonGaussianNoise,
-    OrnsteinUhlenbeck,
-    Poisson,
-    Telegraph,
-    White,
-)
+from fpsolve.model import Bounded, CoefficientMatrix, LinearSystem, MarkovChain, Poisson, Telegraph, White
 from fpsolve.model.plane import matrix_at
 from tests.excursion_paths import angle_paths, chain_paths
 from tests.oracles.two_state_function import root_and_function

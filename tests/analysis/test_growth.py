@@ -7,24 +7,23 @@ import pytest
 import scipy.linalg
 from scipy.stats import norm
 
-from fpsolve.analysis import growth_law, rate_function
-from fpsolve.analysis.growth import log_moment, prefactor
-from fpsolve.arrays import identity
-from fpsolve.errors import CaseError, NoSuchExponent, NotConverged
-from fpsolve.exponent import ExponentSolver, moment_lyapunov
-from fpsolve.messages import Code, Message
-from fpsolve.model import (
-    CoefficientMatrix,
-    Filter,
+from fpsolve import (
+    ExponentSolver,
     NonGaussianNoise,
     OrnsteinUhlenbeck,
     PlaneSystem,
     Problem,
     VibroImpactOscillator,
-    White,
+    moment_lyapunov,
+    open_results,
+    run,
 )
-from fpsolve.output.datasets import open_results
-from fpsolve.workflow.cases import run
+from fpsolve.analysis import growth_law, rate_function
+from fpsolve.analysis.growth import log_moment, prefactor
+from fpsolve.arrays import identity
+from fpsolve.errors import CaseError, NoSuchExponent, NotConverged
+from fpsolve.messages import Code, Message
+from fpsolve.model import CoefficientMatrix, Filter, White
 from tests import random_growth
 from tests.conftest import FIG1, FIG1_NOISE, sampled
 from tests.growth_paths import RATES, SHEAR, compared, simulated

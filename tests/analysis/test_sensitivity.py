@@ -3,24 +3,24 @@
 import numpy as np
 import pytest
 
-from fpsolve import NonGaussianNoise, OrnsteinUhlenbeck, PlaneSystem, Problem, VibroImpactOscillator
-from fpsolve.analysis.sensitivity import (
-    SMALL_P,
-    Changed,
-    Gradient,
-    changes_of_errors,
+from fpsolve import (
+    ExponentSolver,
+    NonGaussianNoise,
+    OrnsteinUhlenbeck,
+    PlaneSystem,
+    Problem,
+    VibroImpactOscillator,
+    lyapunov_exponent,
     sensitivities,
-    solve_sensitivities,
 )
+from fpsolve.analysis.sensitivity import SMALL_P, Changed, Gradient, changes_of_errors, solve_sensitivities
 from fpsolve.arrays import identity
-from fpsolve.exponent.adapt import Budget
-from fpsolve.exponent.eigen import PairDerivatives, principal_pair
+from fpsolve.exponent import Budget, principal_pair
+from fpsolve.exponent.eigen import PairDerivatives
 from fpsolve.exponent.error import Solution
 from fpsolve.exponent.function import nonzero_root
-from fpsolve.exponent.quantities import lyapunov_exponent
-from fpsolve.exponent.solver import ExponentSolver
-from fpsolve.fem.generator import Generator
-from fpsolve.model.plane import CoefficientMatrix
+from fpsolve.fem import Generator
+from fpsolve.model import CoefficientMatrix
 from fpsolve.model.systems.vibro_impact import DAMPING
 from tests.conftest import FIG1, FIG1_NOISE, sampled
 from tests.oracles import moment_hierarchy, phase_fraction

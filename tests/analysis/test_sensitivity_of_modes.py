@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from fpsolve import Problem, lyapunov_exponent, moment_lyapunov
+from fpsolve import ExponentSolver, Problem, lyapunov_exponent, moment_lyapunov
 from fpsolve.analysis.sensitivity import solve_sensitivities
-from fpsolve.exponent import ExponentSolver
 from fpsolve.model import LinearSystem, Telegraph, White
 from tests.oracles import kronecker
 

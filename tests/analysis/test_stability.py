@@ -10,19 +10,27 @@ import numpy as np
 import pytest
 from threadpoolctl import ThreadpoolController, threadpool_limits
 
-from fpsolve import NonGaussianNoise, OrnsteinUhlenbeck, Problem, VibroImpactOscillator, budget
+from fpsolve import (
+    ExponentSolver,
+    NonGaussianNoise,
+    OrnsteinUhlenbeck,
+    Problem,
+    VibroImpactOscillator,
+    boundary,
+    budget,
+    sensitivities,
+)
+from fpsolve.analysis import Axis, Boundary
 from fpsolve.analysis.continuation import FRAME
 from fpsolve.analysis.scan import Sample, Scan, scan_row
-from fpsolve.analysis.sensitivity import sensitivities
-from fpsolve.analysis.stability import Boundary, boundary, crossed
-from fpsolve.analysis.zero import Axis, ZeroField, zero_of
+from fpsolve.analysis.stability import crossed
+from fpsolve.analysis.zero import ZeroField, zero_of
 from fpsolve.budget import charge
 from fpsolve.errors import FpsolveError
-from fpsolve.exponent.adapt import Budget
-from fpsolve.exponent.solver import ExponentSolver
+from fpsolve.exponent import Budget
 from fpsolve.fem import generator
 from fpsolve.messages import Code, Message
-from fpsolve.model.noises.markov_chain import MarkovChain
+from fpsolve.model import MarkovChain
 from tests.conftest import sampled
 
 NOISE = NonGaussianNoise(D0=0.5, tau0=0.5, r0=0.95)

@@ -17,10 +17,8 @@ from rich.console import Console
 from rich.table import Table
 from threadpoolctl import threadpool_limits
 
-from fpsolve import NonGaussianNoise, VibroImpactOscillator
-from fpsolve.exponent.function import solve_moments
-from fpsolve.exponent.solver import ExponentSolver
-from fpsolve.model.problem import Problem
+from fpsolve import ExponentSolver, NonGaussianNoise, Problem, VibroImpactOscillator
+from fpsolve.exponent import solve_moments
 from tests.benchmarks.certified import CertifiedFourierHermite
 from tests.benchmarks.fourier_hermite import FourierHermite
 from tests.benchmarks.problem import CASES, Case, FloatArray

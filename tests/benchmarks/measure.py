@@ -19,9 +19,8 @@ from typing import Any
 
 import numpy as np
 
-from fpsolve.exponent.function import solve_moments
-from fpsolve.exponent.solver import ExponentSolver
-from fpsolve.model.problem import Problem
+from fpsolve import ExponentSolver, Problem
+from fpsolve.exponent import solve_moments
 from tests.benchmarks import ngsolve_code
 from tests.benchmarks.finite_volume import FiniteVolume
 from tests.benchmarks.fourier_hermite import FourierHermite

@@ -18,13 +18,11 @@ from pathlib import Path
 
 import numpy as np
 
-from fpsolve import ExponentSolver, OrnsteinUhlenbeck, PlaneSystem, Problem, load_case
-from fpsolve.analysis import boundary
-from fpsolve.analysis.zero import Axis
+from fpsolve import ExponentSolver, OrnsteinUhlenbeck, PlaneSystem, Problem, boundary, load_case, prove
+from fpsolve.analysis import Axis
 from fpsolve.pool import parallel
-from fpsolve.proofs import prove
-from fpsolve.theory.perturbation import scale_of
-from fpsolve.workflow.cases import run_case
+from fpsolve.theory import scale_of
+from fpsolve.workflow import run_case
 from tests.benchmarks.rows import Row, print_rows
 from tests.kit import case_text
 from tests.random_proofs import SHARES, drawn

@@ -7,10 +7,7 @@ import time
 import numpy as np
 import pytest
 
-from fpsolve.model.noises.non_gaussian import NonGaussianNoise
-from fpsolve.model.problem import Problem
-from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
-from fpsolve.simulation.estimators import simulate
+from fpsolve import NonGaussianNoise, Problem, VibroImpactOscillator, simulate
 
 OSCILLATOR = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=0.1)
 NOISE = NonGaussianNoise(D0=1.0, tau0=0.5, r0=0.95)

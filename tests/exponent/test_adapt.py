@@ -7,29 +7,29 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from fpsolve import budget
+from fpsolve import (
+    ExponentSolver,
+    NonGaussianNoise,
+    OrnsteinUhlenbeck,
+    Problem,
+    VibroImpactOscillator,
+    budget,
+    make_mesh,
+    moment_lyapunov,
+)
 from fpsolve.errors import NotConverged
-from fpsolve.exponent import adapt
-from fpsolve.exponent.adapt import Budget
-from fpsolve.exponent.eigen import principal_pair
+from fpsolve.exponent import Budget, adapt, principal_pair
 from fpsolve.exponent.error import truncation
-from fpsolve.exponent.function import moment_lyapunov
-from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.exponent.starts import Start, first, first_place, other_places
+from fpsolve.fem import Generator
 from fpsolve.fem.effects import ModeEffects
-from fpsolve.fem.generator import Generator, Pencil
-from fpsolve.fem.mesh import make_mesh
+from fpsolve.fem.generator import Pencil
 from fpsolve.fem.noise_axes import PolynomialAxis
 from fpsolve.fem.phase import PhaseAxis
 from fpsolve.fem.space import Space
 from fpsolve.messages import Code, Message
-from fpsolve.model.noises.bounded import SineWiener
-from fpsolve.model.noises.markov_chain import MarkovChain
-from fpsolve.model.noises.non_gaussian import NonGaussianNoise
-from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
-from fpsolve.model.problem import Problem
-from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
-from fpsolve.theory.frozen import frozen_noise
+from fpsolve.model import MarkovChain, SineWiener
+from fpsolve.theory import frozen_noise
 from tests.conftest import FIG1, FIG1_NOISE, UNIT_NOISE, oracle_arguments
 from tests.oracles import fourier_hermite, perturbation
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from fpsolve import (
+    ExponentSolver,
     OrnsteinUhlenbeck,
     PlaneSystem,
     Problem,
@@ -18,12 +19,13 @@ from fpsolve import (
 from fpsolve.analysis import Axis
 from fpsolve.arrays import identity
 from fpsolve.errors import NoSuchExponent, NotConverged
-from fpsolve.exponent.adapt import Budget, WholeProblem
+from fpsolve.exponent import Budget
+from fpsolve.exponent.adapt import WholeProblem
 from fpsolve.exponent.function import nonzero_root
-from fpsolve.exponent.solver import ExponentSolver, tolerated
+from fpsolve.exponent.solver import tolerated
 from fpsolve.messages import Code
 from fpsolve.model import CoefficientMatrix, LinearSystem, ModalSystem, Telegraph, White
-from fpsolve.theory.perturbation import scale_of
+from fpsolve.theory import scale_of
 from tests.oracles import kronecker
 from tests.random_modes import by_simulation
 

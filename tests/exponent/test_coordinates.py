@@ -5,11 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from fpsolve import OrnsteinUhlenbeck, PlaneSystem, moment_lyapunov, sensitivities
+from fpsolve import ExponentSolver, OrnsteinUhlenbeck, PlaneSystem, Problem, moment_lyapunov, sensitivities
 from fpsolve.arrays import identity
-from fpsolve.exponent.quantities import critical_impact_factor, impact_rate
-from fpsolve.exponent.solver import ExponentSolver
-from fpsolve.model import CoefficientMatrix, ModalSystem, ParametricOscillator, Problem, Telegraph, White
+from fpsolve.exponent import critical_impact_factor, impact_rate
+from fpsolve.model import CoefficientMatrix, ModalSystem, ParametricOscillator, Telegraph, White
 from fpsolve.theory.perturbation import perturbed_moments
 from tests.oracles import moment_hierarchy
 

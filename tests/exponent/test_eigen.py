@@ -3,13 +3,10 @@
 import numpy as np
 import pytest
 
+from fpsolve import CylinderMesh, OrnsteinUhlenbeck, Problem, VibroImpactOscillator, make_mesh
 from fpsolve.errors import MeshError, NotConverged
-from fpsolve.exponent.eigen import principal_pair, spectrum
-from fpsolve.fem.generator import Generator
-from fpsolve.fem.mesh import CylinderMesh, make_mesh
-from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
-from fpsolve.model.problem import Problem
-from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
+from fpsolve.exponent import principal_pair, spectrum
+from fpsolve.fem import Generator
 from tests.conftest import FIG1, FIG1_NOISE, UNIT_NOISE, oracle_arguments, sampled
 from tests.oracles import fourier_hermite
 

@@ -4,12 +4,8 @@ from dataclasses import replace
 
 import pytest
 
-from fpsolve.exponent.function import MomentLyapunovFunction, nonzero_root
-from fpsolve.exponent.solver import ExponentSolver
-from fpsolve.fem.mesh import make_mesh
-from fpsolve.model.noises.non_gaussian import NonGaussianNoise
-from fpsolve.model.problem import Problem
-from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
+from fpsolve import ExponentSolver, MomentLyapunovFunction, NonGaussianNoise, Problem, VibroImpactOscillator, make_mesh
+from fpsolve.exponent.function import nonzero_root
 from tests.conftest import UNIT_NOISE
 from tests.random_problems import Outcome, problems, solve
 

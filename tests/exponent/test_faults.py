@@ -9,6 +9,7 @@ import pytest
 from scipy.sparse import csc_matrix
 
 from fpsolve import (
+    ExponentSolver,
     MomentLyapunovFunction,
     NonGaussianNoise,
     Problem,
@@ -16,13 +17,13 @@ from fpsolve import (
     lyapunov_exponent,
     moment_lyapunov,
     stability_index,
+    stationary_density,
 )
-from fpsolve.analysis import adjoint_density, stationary_density
+from fpsolve.analysis import adjoint_density
 from fpsolve.arrays import finite
 from fpsolve.errors import MeshError, NotConverged, NumericalFailure, SingularMatrix
-from fpsolve.exponent import adapt, eigen, starts
-from fpsolve.exponent.adapt import Budget, Search, WholeProblem
-from fpsolve.exponent.solver import ExponentSolver
+from fpsolve.exponent import Budget, adapt, eigen, starts
+from fpsolve.exponent.adapt import Search, WholeProblem
 from fpsolve.fem.factors import sparse_lu
 
 FIG1 = Problem(

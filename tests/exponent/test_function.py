@@ -6,19 +6,23 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from fpsolve import (
+    ExponentSolver,
+    MomentLyapunovFunction,
+    NonGaussianNoise,
+    OrnsteinUhlenbeck,
+    PlaneSystem,
+    Problem,
+    VibroImpactOscillator,
+    make_mesh,
+    moment_lyapunov,
+)
 from fpsolve.errors import NoSuchExponent, NotConverged
-from fpsolve.exponent.eigen import second_derivative
-from fpsolve.exponent.error import Absent, Estimate
-from fpsolve.exponent.function import MomentLyapunovFunction, moment_lyapunov, nonzero_root
-from fpsolve.exponent.solver import ExponentSolver
-from fpsolve.fem.mesh import make_mesh
+from fpsolve.exponent import Estimate, second_derivative
+from fpsolve.exponent.error import Absent
+from fpsolve.exponent.function import nonzero_root
 from fpsolve.messages import Code, Message
-from fpsolve.model.noises.non_gaussian import NonGaussianNoise
-from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
-from fpsolve.model.problem import Problem
-from fpsolve.model.systems.parametric import ParametricOscillator
-from fpsolve.model.systems.plane_system import PlaneSystem
-from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
+from fpsolve.model import ParametricOscillator
 from tests.conftest import FIG1, FIG1_NOISE, UNIT_NOISE, oracle_arguments
 from tests.oracles import fourier_hermite, perturbation
 

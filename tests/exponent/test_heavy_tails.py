@@ -7,19 +7,19 @@ import numpy as np
 import pytest
 
 from fpsolve import (
+    ExponentSolver,
     MomentLyapunovFunction,
     NonGaussianNoise,
     Problem,
     VibroImpactOscillator,
     lyapunov_exponent,
     moment_lyapunov,
+    simulate,
     stability_index,
 )
 from fpsolve.analysis import excursion, growth_law, rate_function
 from fpsolve.errors import NoSuchExponent
-from fpsolve.exponent.quantities import impact_rate
-from fpsolve.exponent.solver import ExponentSolver
-from fpsolve.simulation import simulate
+from fpsolve.exponent import impact_rate
 from tests.conftest import sampled
 from tests.oracles import asinh_grid
 

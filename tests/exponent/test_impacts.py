@@ -8,19 +8,12 @@ import numpy as np
 import pytest
 from scipy.special import hankel1
 
+from fpsolve import ExponentSolver, NonGaussianNoise, OrnsteinUhlenbeck, PlaneSystem, Problem, VibroImpactOscillator
 from fpsolve.arrays import identity
 from fpsolve.errors import NotConverged
-from fpsolve.exponent.adapt import Budget
+from fpsolve.exponent import INDICES, Budget, critical_impact_factor, critical_restitution, impact_rate
 from fpsolve.exponent.error import Absent
-from fpsolve.exponent.quantities import INDICES, critical_impact_factor, critical_restitution, impact_rate
-from fpsolve.exponent.solver import ExponentSolver
-from fpsolve.model.noises.markov_chain import MarkovChain
-from fpsolve.model.noises.non_gaussian import NonGaussianNoise
-from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
-from fpsolve.model.plane import CoefficientMatrix, Jump
-from fpsolve.model.problem import Problem
-from fpsolve.model.systems.plane_system import PlaneSystem
-from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
+from fpsolve.model import CoefficientMatrix, Jump, MarkovChain
 
 STRONG = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=1.0)
 GAUSSIAN = NonGaussianNoise(D0=1.0, tau0=0.5, r0=1.0).ou_reduction()

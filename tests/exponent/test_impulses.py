@@ -5,15 +5,22 @@ import math
 import numpy as np
 import pytest
 
-from fpsolve import PlaneSystem, Problem, lyapunov_exponent, moment_lyapunov, prove, sensitivities, simulate
-from fpsolve.analysis.density import furstenberg_khasminskii
+from fpsolve import (
+    ExponentSolver,
+    PlaneSystem,
+    Problem,
+    lyapunov_exponent,
+    moment_lyapunov,
+    prove,
+    sensitivities,
+    simulate,
+)
+from fpsolve.analysis import furstenberg_khasminskii
 from fpsolve.arrays import identity
-from fpsolve.exponent.solver import ExponentSolver
-from fpsolve.model import CoefficientMatrix, Jump, Poisson, White, noise_kind
-from fpsolve.model.systems.parametric import ParametricOscillator
+from fpsolve.model import CoefficientMatrix, Jump, ParametricOscillator, Poisson, White, noise_kind
 from fpsolve.simulation.coefficients import coefficients
 from fpsolve.simulation.setup import transient
-from fpsolve.theory.moments import hierarchy_exponent
+from fpsolve.theory import hierarchy_exponent
 from tests.oracles import moment_hierarchy, phase_circle
 
 FREE, STIFFNESS = [[0.0, 1.0], [-1.0, -0.4]], [[0.0, 0.0], [-1.0, 0.0]]

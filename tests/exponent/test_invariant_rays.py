@@ -5,12 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from fpsolve import OrnsteinUhlenbeck, PlaneSystem, moment_lyapunov, sensitivities
+from fpsolve import ExponentSolver, OrnsteinUhlenbeck, PlaneSystem, Problem, moment_lyapunov, sensitivities
 from fpsolve.arrays import identity
 from fpsolve.errors import NoSuchExponent, NotConverged
 from fpsolve.exponent.function import nonzero_root
-from fpsolve.exponent.solver import ExponentSolver
-from fpsolve.model import CoefficientMatrix, Jump, MarkovChain, Problem, White
+from fpsolve.model import CoefficientMatrix, Jump, MarkovChain, White
 
 NOISES = {
     "OU": OrnsteinUhlenbeck(alpha=1.0, sigma=0.7),

@@ -12,6 +12,7 @@ import pytest
 from scipy.optimize import brentq
 
 from fpsolve import (
+    ExponentSolver,
     NonGaussianNoise,
     OrnsteinUhlenbeck,
     PlaneSystem,
@@ -26,13 +27,12 @@ from fpsolve import (
 from fpsolve.analysis import Axis
 from fpsolve.arrays import identity
 from fpsolve.errors import FpsolveError
-from fpsolve.exponent.eigen import principal_pair
+from fpsolve.exponent import principal_pair
 from fpsolve.exponent.modes import BEYOND, SphereStart, first_directions, left_of, modal_coordinates, second_moments
-from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem.space import Space, first_axis
 from fpsolve.fem.sphere import SphereAxis
 from fpsolve.model import CoefficientMatrix, Jump, LinearSystem, Poisson, Telegraph, White
-from fpsolve.simulation.response import simulated_response
+from fpsolve.simulation import simulated_response
 from tests import random_units
 from tests.oracles import kronecker
 

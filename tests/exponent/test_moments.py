@@ -6,14 +6,10 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
+from fpsolve import ExponentSolver, Problem, VibroImpactOscillator, make_mesh, moment_lyapunov
 from fpsolve.errors import NotConverged
-from fpsolve.exponent import function
-from fpsolve.exponent.adapt import Budget
-from fpsolve.exponent.function import FEW_MOMENTS, moment_lyapunov, solve_moments
-from fpsolve.exponent.solver import ExponentSolver
-from fpsolve.fem.mesh import make_mesh
-from fpsolve.model.problem import Problem
-from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
+from fpsolve.exponent import Budget, function, solve_moments
+from fpsolve.exponent.function import FEW_MOMENTS
 from tests.conftest import FIG1, FIG1_NOISE
 
 WEAK_NOISE = FIG1_NOISE.ou_reduction()

@@ -5,25 +5,33 @@ import math
 import numpy as np
 import pytest
 
-from fpsolve.analysis.sensitivity import sensitivities
+from fpsolve import (
+    ExponentSolver,
+    NonGaussianNoise,
+    OrnsteinUhlenbeck,
+    PlaneSystem,
+    Problem,
+    load_case,
+    moment_lyapunov,
+    sensitivities,
+)
 from fpsolve.arrays import identity
-from fpsolve.case.case import load_case
 from fpsolve.cli import main
-from fpsolve.exponent.function import moment_lyapunov, nonzero_root
-from fpsolve.exponent.quantities import critical_impact_factor, impact_rate
-from fpsolve.exponent.solver import ExponentSolver
+from fpsolve.exponent import critical_impact_factor, impact_rate
+from fpsolve.exponent.function import nonzero_root
 from fpsolve.messages import Code
-from fpsolve.model.noises.bounded import Bounded, SineWiener
-from fpsolve.model.noises.filter import Filter
-from fpsolve.model.noises.markov_chain import MarkovChain
-from fpsolve.model.noises.non_gaussian import NonGaussianNoise
-from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
-from fpsolve.model.noises.poisson import Poisson
-from fpsolve.model.noises.white import White
-from fpsolve.model.plane import CoefficientMatrix, Jump
-from fpsolve.model.problem import Problem
-from fpsolve.model.systems.modal import ModalSystem
-from fpsolve.model.systems.plane_system import LinearSystem, PlaneSystem
+from fpsolve.model import (
+    Bounded,
+    CoefficientMatrix,
+    Filter,
+    Jump,
+    LinearSystem,
+    MarkovChain,
+    ModalSystem,
+    Poisson,
+    SineWiener,
+    White,
+)
 
 NOISES = {
     "OU": OrnsteinUhlenbeck(alpha=1.0, sigma=1.0),

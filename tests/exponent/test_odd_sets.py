@@ -6,10 +6,9 @@ The noise is that of Eq. (7) for r₀ < 1, or its reduction for r₀ up to 1.6.
 import numpy as np
 import pytest
 
-from fpsolve import NonGaussianNoise, Problem, VibroImpactOscillator
+from fpsolve import ExponentSolver, NonGaussianNoise, Problem, VibroImpactOscillator
 from fpsolve.errors import NotConverged
-from fpsolve.exponent.adapt import Budget
-from fpsolve.exponent.solver import ExponentSolver
+from fpsolve.exponent import Budget
 from tests.conftest import sampled
 from tests.oracles import phase_fraction
 

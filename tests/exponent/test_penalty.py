@@ -3,16 +3,14 @@
 import numpy as np
 import pytest
 
-from fpsolve.exponent.eigen import principal_pair, spectrum
-from fpsolve.fem.generator import Generator
+from fpsolve import NonGaussianNoise, Problem, VibroImpactOscillator
+from fpsolve.exponent import principal_pair, spectrum
+from fpsolve.fem import Generator
 from fpsolve.fem.noise_axes import PolynomialAxis
 from fpsolve.fem.phase import PhaseAxis
 from fpsolve.fem.space import Space
 from fpsolve.fem.terms import Terms
-from fpsolve.model.noises.non_gaussian import NonGaussianNoise
-from fpsolve.model.problem import Problem
-from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
-from fpsolve.theory.frozen import frozen_noise
+from fpsolve.theory import frozen_noise
 from tests.conftest import FIG1, FIG1_NOISE
 
 STRONG = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=1.0)

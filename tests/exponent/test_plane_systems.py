@@ -6,24 +6,25 @@ import pickle
 import numpy as np
 import pytest
 
-from fpsolve.analysis.density import furstenberg_khasminskii, stationary_density
+from fpsolve import (
+    CylinderMesh,
+    ExponentSolver,
+    NonGaussianNoise,
+    OrnsteinUhlenbeck,
+    PlaneSystem,
+    Problem,
+    VibroImpactOscillator,
+    make_mesh,
+    moment_lyapunov,
+    stationary_density,
+)
+from fpsolve.analysis import furstenberg_khasminskii
 from fpsolve.arrays import identity
 from fpsolve.errors import MeshError, NotConverged
-from fpsolve.exponent.eigen import principal_pair, spectrum
-from fpsolve.exponent.function import moment_lyapunov
-from fpsolve.exponent.quantities import impact_rate
-from fpsolve.exponent.solver import ExponentSolver
-from fpsolve.fem.generator import Generator
-from fpsolve.fem.mesh import CylinderMesh, make_mesh
-from fpsolve.model.noises.markov_chain import MarkovChain
-from fpsolve.model.noises.non_gaussian import NonGaussianNoise
-from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
-from fpsolve.model.noises.poisson import Poisson
-from fpsolve.model.noises.white import White
-from fpsolve.model.plane import CoefficientMatrix, Jump, matrix_at
-from fpsolve.model.problem import Problem
-from fpsolve.model.systems.plane_system import PlaneSystem
-from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
+from fpsolve.exponent import impact_rate, principal_pair, spectrum
+from fpsolve.fem import Generator
+from fpsolve.model import CoefficientMatrix, Jump, MarkovChain, Poisson, White
+from fpsolve.model.plane import matrix_at
 from tests.conftest import UNIT_NOISE
 from tests.oracles import moment_hierarchy
 

@@ -5,10 +5,9 @@ from typing import get_args
 import pytest
 
 import fpsolve
-from fpsolve.exponent.quantities import INDICES, QUANTITIES, DrawnName, QuantityName
-from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
-from fpsolve.model.problem import Problem
-from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
+from fpsolve import OrnsteinUhlenbeck, Problem, VibroImpactOscillator
+from fpsolve.exponent import INDICES, QUANTITIES
+from fpsolve.exponent.quantities import DrawnName, QuantityName
 from tests.conftest import FIG1, FIG1_NOISE
 from tests.oracles import perturbation
 

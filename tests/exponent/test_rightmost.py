@@ -8,11 +8,10 @@ import math
 
 import pytest
 
-from fpsolve import OrnsteinUhlenbeck, PlaneSystem, Problem, moment_lyapunov
+from fpsolve import ExponentSolver, OrnsteinUhlenbeck, PlaneSystem, Problem, moment_lyapunov
 from fpsolve.arrays import identity
 from fpsolve.errors import NotConverged
-from fpsolve.exponent.adapt import Budget
-from fpsolve.exponent.solver import ExponentSolver
+from fpsolve.exponent import Budget
 from fpsolve.model import CoefficientMatrix, Filter
 from fpsolve.theory.frozen import swing
 from tests.oracles import filtered

@@ -6,13 +6,11 @@ import numpy as np
 import pytest
 from scipy.sparse.linalg import eigs
 
-from fpsolve import OrnsteinUhlenbeck, PlaneSystem
+from fpsolve import ExponentSolver, OrnsteinUhlenbeck, PlaneSystem, Problem
 from fpsolve.arrays import identity
-from fpsolve.exponent.eigen import principal_pair
-from fpsolve.exponent.solver import ExponentSolver
+from fpsolve.exponent import principal_pair
 from fpsolve.messages import Code
-from fpsolve.model import CoefficientMatrix, MarkovChain, Problem
-from fpsolve.model.noises import SineWiener
+from fpsolve.model import CoefficientMatrix, MarkovChain, SineWiener
 from tests.conftest import sampled
 from tests.oracles.moment_hierarchy import ornstein_uhlenbeck_exponent, sine_wiener_exponent
 

@@ -5,25 +5,11 @@ import math
 import numpy as np
 import pytest
 
+from fpsolve import NonGaussianNoise, OrnsteinUhlenbeck, PlaneSystem, Problem, VibroImpactOscillator, moment_lyapunov
 from fpsolve.arrays import identity
 from fpsolve.errors import NoPerturbationTheory
-from fpsolve.exponent import moment_lyapunov, perturbation_series
-from fpsolve.model import (
-    Bounded,
-    CoefficientMatrix,
-    Filter,
-    Jump,
-    MarkovChain,
-    NonGaussianNoise,
-    OrnsteinUhlenbeck,
-    PlaneSystem,
-    Poisson,
-    Problem,
-    SineWiener,
-    Telegraph,
-    VibroImpactOscillator,
-    White,
-)
+from fpsolve.exponent import perturbation_series
+from fpsolve.model import Bounded, CoefficientMatrix, Filter, Jump, MarkovChain, Poisson, SineWiener, Telegraph, White
 from fpsolve.theory import second_order
 from tests.conftest import keeping, sampled
 from tests.oracles.fourier_hermite import moment_lyapunov as oracle

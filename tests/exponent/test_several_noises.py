@@ -5,18 +5,15 @@ import math
 import numpy as np
 import pytest
 
-from fpsolve import NonGaussianNoise, OrnsteinUhlenbeck, PlaneSystem, Problem
-from fpsolve.analysis.density import furstenberg_khasminskii
+from fpsolve import ExponentSolver, NonGaussianNoise, OrnsteinUhlenbeck, PlaneSystem, Problem, make_mesh
+from fpsolve.analysis import furstenberg_khasminskii
 from fpsolve.analysis.sensitivity import solve_sensitivities
 from fpsolve.arrays import identity
 from fpsolve.errors import MeshError
-from fpsolve.exponent.adapt import Budget
-from fpsolve.exponent.solver import ExponentSolver
-from fpsolve.fem.mesh import make_mesh
+from fpsolve.exponent import Budget
 from fpsolve.model import CoefficientMatrix, Jump, Noises, Poisson, SineWiener, Telegraph, White
 from fpsolve.proofs.statement import statement_of
-from fpsolve.theory.moments import hierarchy_exponent
-from fpsolve.theory.perturbation import second_order
+from fpsolve.theory import hierarchy_exponent, second_order
 from tests.oracles.moment_hierarchy import chain, gaussian, rates_of_monomials, several_exponent, struck_rates
 from tests.random_several import compared, drawn
 

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from fpsolve import MomentLyapunovFunction, OrnsteinUhlenbeck, PlaneSystem, Problem, moment_lyapunov
+from fpsolve import ExponentSolver, MomentLyapunovFunction, OrnsteinUhlenbeck, PlaneSystem, Problem, moment_lyapunov
 from fpsolve.arrays import identity
-from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.model import CoefficientMatrix, Filter, LinearSystem, SineWiener, Telegraph, White
 from tests.exponent.test_rightmost import DRIVEN, LAW, SADDLE
 

@@ -3,14 +3,11 @@
 import numpy as np
 import pytest
 
-from fpsolve import OrnsteinUhlenbeck, PlaneSystem, Problem
+from fpsolve import ExponentSolver, OrnsteinUhlenbeck, PlaneSystem, Problem, moment_lyapunov, sensitivities, simulate
 from fpsolve.analysis import rate_function
-from fpsolve.analysis.sensitivity import sensitivities
 from fpsolve.arrays import identity
-from fpsolve.exponent import ExponentSolver, moment_lyapunov
 from fpsolve.exponent.solver import TINY_P
 from fpsolve.model import CoefficientMatrix, White
-from fpsolve.simulation import simulate
 from tests.analysis.test_growth import STRONG, uniform
 from tests.exponent.test_modes import problem, random_system
 from tests.growth_paths import SHEAR

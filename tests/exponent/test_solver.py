@@ -5,17 +5,20 @@ import math
 import numpy as np
 import pytest
 
+from fpsolve import (
+    ExponentSolver,
+    NonGaussianNoise,
+    OrnsteinUhlenbeck,
+    Problem,
+    VibroImpactOscillator,
+    make_mesh,
+    moment_lyapunov,
+)
 from fpsolve.errors import NoSuchExponent, NotConverged
-from fpsolve.exponent.eigen import principal_pair, second_derivative
-from fpsolve.exponent.function import moment_lyapunov
-from fpsolve.exponent.solver import ExponentSolver
-from fpsolve.fem.generator import Generator
-from fpsolve.fem.mesh import make_mesh
-from fpsolve.model.noises.non_gaussian import NonGaussianNoise
-from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
-from fpsolve.model.plane import CoefficientMatrix, Harmonics
-from fpsolve.model.problem import Problem
-from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
+from fpsolve.exponent import principal_pair, second_derivative
+from fpsolve.fem import Generator
+from fpsolve.model import CoefficientMatrix
+from fpsolve.model.plane import Harmonics
 from tests.conftest import FIG1, FIG1_NOISE, UNIT_NOISE, oracle_arguments, sampled
 from tests.oracles import fourier_hermite, perturbation
 

@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from fpsolve import OrnsteinUhlenbeck, PlaneSystem
+from fpsolve import ExponentSolver, NonGaussianNoise, OrnsteinUhlenbeck, PlaneSystem, Problem
 from fpsolve.arrays import identity
-from fpsolve.exponent.solver import ExponentSolver
-from fpsolve.model import CoefficientMatrix, MarkovChain, NonGaussianNoise, Problem, SineWiener, White
+from fpsolve.model import CoefficientMatrix, MarkovChain, SineWiener, White
 
 NOISES = {
     "OU": OrnsteinUhlenbeck(alpha=1.0, sigma=0.8),

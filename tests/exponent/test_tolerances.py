@@ -2,8 +2,8 @@
 
 import pytest
 
-from fpsolve.exponent.solver import ExponentSolver
-from fpsolve.model import OrnsteinUhlenbeck, ParametricOscillator, Poisson, Problem
+from fpsolve import ExponentSolver, OrnsteinUhlenbeck, Problem
+from fpsolve.model import ParametricOscillator, Poisson
 from tests.conftest import sampled
 from tests.random_tolerances import MOST, compared
 

@@ -3,13 +3,9 @@
 import numpy as np
 import pytest
 
-from fpsolve.exponent.eigen import principal_pair
-from fpsolve.fem.generator import Generator
-from fpsolve.fem.mesh import make_mesh
-from fpsolve.model.noises.non_gaussian import NonGaussianNoise
-from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
-from fpsolve.model.problem import Problem
-from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
+from fpsolve import NonGaussianNoise, OrnsteinUhlenbeck, Problem, VibroImpactOscillator, make_mesh
+from fpsolve.exponent import principal_pair
+from fpsolve.fem import Generator
 from tests.conftest import oracle_arguments
 from tests.oracles import fourier_hermite
 

@@ -9,12 +9,11 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_matrix, identity, kron, random
 
-from fpsolve import NonGaussianNoise, OrnsteinUhlenbeck, Problem, VibroImpactOscillator
+from fpsolve import ExponentSolver, NonGaussianNoise, OrnsteinUhlenbeck, Problem, VibroImpactOscillator
 from fpsolve.errors import SingularMatrix
-from fpsolve.exponent.solver import ExponentSolver
+from fpsolve.fem import Generator
 from fpsolve.fem.axis import KroneckerSum
 from fpsolve.fem.factors import FEW_UNKNOWNS, DenseFactors, SparseFactors, candidates, factorised
-from fpsolve.fem.generator import Generator
 from fpsolve.fem.levels import LevelFactors, neighbours, paired
 from fpsolve.fem.noise_axes import PolynomialAxis, StateAxis
 from fpsolve.fem.phase import PhaseAxis

@@ -6,11 +6,10 @@ from functools import cached_property
 
 import pytest
 
-from fpsolve import NonGaussianNoise, OrnsteinUhlenbeck, PlaneSystem, Problem
+from fpsolve import ExponentSolver, NonGaussianNoise, OrnsteinUhlenbeck, PlaneSystem, Problem
 from fpsolve.arrays import identity
 from fpsolve.exponent.eigen import rayleigh_iteration
-from fpsolve.exponent.solver import ExponentSolver
-from fpsolve.fem.generator import Generator
+from fpsolve.fem import Generator
 from fpsolve.model import CoefficientMatrix, Jump, MarkovChain, White
 from fpsolve.model.plane import Harmonics, LinearMotion
 from tests.conftest import FIG1, FIG1_NOISE

@@ -5,20 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from fpsolve import NonGaussianNoise, PlaneSystem, Problem, VibroImpactOscillator, make_mesh
 from fpsolve.arrays import identity
-from fpsolve.exponent.eigen import spectrum
-from fpsolve.fem.generator import Generator
-from fpsolve.fem.mesh import make_mesh
+from fpsolve.exponent import spectrum
+from fpsolve.fem import Generator
 from fpsolve.fem.noise_axes import PolynomialAxis
 from fpsolve.fem.phase import PhaseAxis
 from fpsolve.fem.space import Space
 from fpsolve.fem.terms import OfMoment
-from fpsolve.model.noises.markov_chain import MarkovChain
-from fpsolve.model.noises.non_gaussian import NonGaussianNoise
-from fpsolve.model.plane import CoefficientMatrix
-from fpsolve.model.problem import Problem
-from fpsolve.model.systems.plane_system import PlaneSystem
-from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
+from fpsolve.model import CoefficientMatrix, MarkovChain
 from tests.conftest import FIG1, UNIT_NOISE, sampled
 from tests.oracles.paper_generator import PaperGenerator
 

@@ -5,8 +5,8 @@ import pytest
 
 from fpsolve import Problem
 from fpsolve.arrays import identity
-from fpsolve.exponent.eigen import principal_pair
-from fpsolve.fem.generator import Generator
+from fpsolve.exponent import principal_pair
+from fpsolve.fem import Generator
 from fpsolve.fem.harmonics import HarmonicAxis, Harmonics
 from fpsolve.fem.noise_axes import StateAxis
 from fpsolve.fem.space import Space, first_axis

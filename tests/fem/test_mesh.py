@@ -6,16 +6,12 @@ import meshio
 import numpy as np
 import pytest
 
+from fpsolve import CylinderMesh, ExponentSolver, OrnsteinUhlenbeck, PlaneSystem, Problem, make_mesh, moment_lyapunov
 from fpsolve.errors import MeshError
-from fpsolve.exponent.function import moment_lyapunov
-from fpsolve.exponent.solver import ExponentSolver
-from fpsolve.fem.generator import Generator
-from fpsolve.fem.mesh import MARKERS, CylinderMesh, make_mesh, read_mesh, write_mesh
+from fpsolve.fem import Generator, read_mesh, write_mesh
+from fpsolve.fem.mesh import MARKERS
 from fpsolve.fem.space import Space
-from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
-from fpsolve.model.plane import CoefficientMatrix, Jump
-from fpsolve.model.problem import Problem
-from fpsolve.model.systems.plane_system import PlaneSystem
+from fpsolve.model import CoefficientMatrix, Jump
 from tests.conftest import FIG1, FIG1_NOISE, UNIT_NOISE, oracle_arguments
 from tests.oracles import fourier_hermite
 

@@ -5,12 +5,12 @@ import math
 import numpy as np
 import pytest
 
+from fpsolve import NonGaussianNoise, OrnsteinUhlenbeck
 from fpsolve.arrays import one
 from fpsolve.fem.line import LineSpace
 from fpsolve.fem.noise_axes import CellAxis, PolynomialAxis
-from fpsolve.model.noise import Noise, NoiseDerivative
-from fpsolve.model.noises.non_gaussian import NonGaussianNoise
-from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
+from fpsolve.model import Noise
+from fpsolve.model.noise import NoiseDerivative
 from fpsolve.polynomials import gegenbauer, hermite, stieltjes
 
 OU = OrnsteinUhlenbeck(alpha=1.3, sigma=0.8)

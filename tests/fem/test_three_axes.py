@@ -15,7 +15,7 @@ from fpsolve.fem.noise_axes import PolynomialAxis
 from fpsolve.fem.phase import PhaseAxis
 from fpsolve.fem.space import Space
 from fpsolve.fem.terms import Terms, TermSum
-from fpsolve.model.plane import CoefficientMatrix
+from fpsolve.model import CoefficientMatrix
 from tests.oracles import two_noises
 
 ROTATION, STIFFNESS, DAMPING = ((0.0, 1.0), (-1.0, -0.1)), ((0.0, 0.0), (-1.0, 0.0)), ((0.0, 0.0), (0.0, -1.0))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import trapezoid
 
-from fpsolve import ExponentSolver
+from fpsolve import ExponentSolver, NonGaussianNoise, OrnsteinUhlenbeck, Problem, VibroImpactOscillator
 from fpsolve.measured import (
     Record,
     Spectrum,
@@ -20,7 +20,7 @@ from fpsolve.measured import (
     weak_moment,
 )
 from fpsolve.measured.kinds import KINDS
-from fpsolve.model import NonGaussianNoise, OrnsteinUhlenbeck, ParametricOscillator, Problem, VibroImpactOscillator
+from fpsolve.model import ParametricOscillator
 from tests.random_fits import NOISES, coverage, fitted, record_of, spectrum_of
 
 OMEGA = np.linspace(0.05, 20, 200)

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from fpsolve.exponent.adapt import Budget
+from fpsolve import OrnsteinUhlenbeck, Problem
+from fpsolve.exponent import Budget
 from fpsolve.exponent.solver import solver_of
 from fpsolve.measured import (
     Record,
@@ -22,7 +23,7 @@ from fpsolve.measured import (
     weak_moment,
 )
 from fpsolve.measured.named import NAMED
-from fpsolve.model import Filter, OrnsteinUhlenbeck, ParametricOscillator, Problem
+from fpsolve.model import Filter, ParametricOscillator
 
 WAVES, WIND, GROUND = {"Hs": 2.0, "Tp": 9.0}, {"sigma": 1.5, "L": 120.0, "U": 11.0}, {"S0": 0.01}
 STATED = {"jonswap": WAVES, "pierson-moskowitz": WAVES, "von-karman": WIND, "kaimal": WIND, "kanai-tajimi": GROUND}

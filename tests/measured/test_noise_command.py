@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from fpsolve import OrnsteinUhlenbeck
 from fpsolve.case.case import load_case
 from fpsolve.cli import main
 from fpsolve.commands.options import BAD_INPUT
 from fpsolve.measured import read_spectrum, weak_exponent, weak_moment
-from fpsolve.model import OrnsteinUhlenbeck
 from fpsolve.study.noise import natural_frequencies
 from tests.kit import read_json
 

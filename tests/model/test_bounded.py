@@ -6,15 +6,14 @@ import numpy as np
 import pytest
 from scipy.integrate import simpson
 
-from fpsolve import PlaneSystem, moment_lyapunov, sensitivities
+from fpsolve import ExponentSolver, PlaneSystem, Problem, moment_lyapunov, sensitivities
 from fpsolve.arrays import identity
 from fpsolve.errors import NoPerturbationTheory
-from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem.circle import CircleAxis
-from fpsolve.model import Bounded, CoefficientMatrix, ParametricOscillator, Problem, SineWiener, White, noise_kind
+from fpsolve.model import Bounded, CoefficientMatrix, ParametricOscillator, SineWiener, White, noise_kind
 from fpsolve.model.noise import NoiseDerivative
 from fpsolve.simulation.motions import draw
-from fpsolve.theory.perturbation import second_order
+from fpsolve.theory import second_order
 from tests import random_bounded
 from tests.conftest import sampled
 from tests.oracles import moment_hierarchy, phase_circle

@@ -7,21 +7,10 @@ import numpy as np
 import pytest
 from pydantic.dataclasses import dataclass
 
-from fpsolve import PlaneSystem, Problem, sensitivities
+from fpsolve import NonGaussianNoise, OrnsteinUhlenbeck, PlaneSystem, Problem, sensitivities
 from fpsolve.errors import NoDerivative
-from fpsolve.model import (
-    Bounded,
-    Filter,
-    MarkovChain,
-    Noises,
-    NonGaussianNoise,
-    OrnsteinUhlenbeck,
-    ReducedNoise,
-    SineWiener,
-    Telegraph,
-    White,
-)
-from fpsolve.model.noise import Noise, NoiseDerivative
+from fpsolve.model import Bounded, Filter, MarkovChain, Noise, Noises, ReducedNoise, SineWiener, Telegraph, White
+from fpsolve.model.noise import NoiseDerivative
 from fpsolve.model.noises.ornstein_uhlenbeck import linear_step
 from fpsolve.model.parameters import STRICT, parameter
 from fpsolve.testing import check_noise

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from fpsolve import (
+    ExponentSolver,
     OrnsteinUhlenbeck,
     PlaneSystem,
     Problem,
@@ -19,13 +20,11 @@ from fpsolve import (
 )
 from fpsolve.analysis import Axis
 from fpsolve.arrays import identity
-from fpsolve.exponent import ExponentSolver, critical_impact_factor, critical_restitution, impact_rate
-from fpsolve.model import CoefficientMatrix, Jump, MarkovChain
+from fpsolve.exponent import critical_impact_factor, critical_restitution, impact_rate
+from fpsolve.model import CoefficientMatrix, CubicTerms, EquationSystem, ImpactLaw, Jump, MarkovChain
 from fpsolve.model.faults import TableError
 from fpsolve.model.frame import Frame
-from fpsolve.model.plane import CubicTerms
-from fpsolve.model.systems import EquationSystem, ImpactLaw
-from fpsolve.theory.perturbation import second_order
+from fpsolve.theory import second_order
 from tests.conftest import keeping
 
 NOISE = OrnsteinUhlenbeck(alpha=1.0, sigma=0.6)

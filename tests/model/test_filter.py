@@ -9,14 +9,12 @@ from numpy.polynomial import HermiteE
 from scipy.integrate import quad
 from scipy.linalg import expm, solve_continuous_lyapunov
 
-from fpsolve import OrnsteinUhlenbeck, PlaneSystem, Problem, moment_lyapunov, sensitivities
+from fpsolve import ExponentSolver, OrnsteinUhlenbeck, PlaneSystem, Problem, make_mesh, moment_lyapunov, sensitivities
 from fpsolve.analysis.sensitivity import Changed
 from fpsolve.arrays import identity
 from fpsolve.errors import CaseError, MeshError, NotConverged
-from fpsolve.exponent.adapt import Budget
-from fpsolve.exponent.eigen import PairDerivatives, principal_pair
-from fpsolve.exponent.solver import ExponentSolver
-from fpsolve.fem.mesh import make_mesh
+from fpsolve.exponent import Budget, principal_pair
+from fpsolve.exponent.eigen import PairDerivatives
 from fpsolve.fem.pairs import PairAxis
 from fpsolve.model import CoefficientMatrix, Filter, ParametricOscillator, White, noise_kind
 from fpsolve.simulation.motions import draw

@@ -5,14 +5,21 @@ import math
 import numpy as np
 import pytest
 
-from fpsolve import OrnsteinUhlenbeck, PlaneSystem, sensitivities
-from fpsolve.analysis.density import furstenberg_khasminskii, stationary_density, tilted_density
+from fpsolve import (
+    ExponentSolver,
+    OrnsteinUhlenbeck,
+    PlaneSystem,
+    Problem,
+    make_mesh,
+    sensitivities,
+    stationary_density,
+    tilted_density,
+)
+from fpsolve.analysis import furstenberg_khasminskii
 from fpsolve.arrays import identity
+from fpsolve.exponent import impact_rate
 from fpsolve.exponent.fields import fields
-from fpsolve.exponent.quantities import impact_rate
-from fpsolve.exponent.solver import ExponentSolver
-from fpsolve.fem.mesh import make_mesh
-from fpsolve.model import CoefficientMatrix, Jump, Problem, White
+from fpsolve.model import CoefficientMatrix, Jump, White
 
 OU = OrnsteinUhlenbeck(alpha=1.0, sigma=0.7)
 

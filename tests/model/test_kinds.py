@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from fpsolve import (
+    ExponentSolver,
     NonGaussianNoise,
     OrnsteinUhlenbeck,
     PlaneSystem,
@@ -17,11 +18,10 @@ from fpsolve import (
     sensitivities,
 )
 from fpsolve.arrays import Constant, Linear
-from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.model import CoefficientMatrix, Jump, ReducedNoise, noise_kind, system_kind
 from fpsolve.model.kinds import NOISES, SYSTEMS
 from fpsolve.model.plane import affine, coefficient, is_driven
-from fpsolve.theory.perturbation import second_order
+from fpsolve.theory import second_order
 
 ROTATION, STIFFNESS, DAMPING = ((0.0, 1.0), (-1.0, 0.0)), ((0.0, 0.0), (-1.0, 0.0)), ((0.0, 0.0), (0.0, -0.2))
 NOISE = OrnsteinUhlenbeck(alpha=1.0, sigma=1.0)

@@ -7,12 +7,9 @@ import pytest
 import scipy.integrate
 import scipy.linalg
 
+from fpsolve import OrnsteinUhlenbeck, PlaneSystem, Problem
 from fpsolve.arrays import identity
-from fpsolve.model.noises.markov_chain import MarkovChain
-from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
-from fpsolve.model.plane import CoefficientMatrix, Jump
-from fpsolve.model.problem import Problem
-from fpsolve.model.systems.plane_system import PlaneSystem
+from fpsolve.model import CoefficientMatrix, Jump, MarkovChain
 
 RING = MarkovChain((0.0, 1.0, 3.0), ((0, 2.0, 0), (0, 0, 1.0), (0.5, 0, 0)))
 """0 → 1 → 3 → 0, which no detailed balance holds for."""

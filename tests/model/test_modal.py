@@ -7,9 +7,8 @@ import pytest
 
 from fpsolve import OrnsteinUhlenbeck, PlaneSystem, Problem, moment_lyapunov, sensitivities
 from fpsolve.arrays import identity
-from fpsolve.model import CoefficientMatrix, LinearSystem, White
+from fpsolve.model import CoefficientMatrix, LinearSystem, ModalSystem, ParametricOscillator, White
 from fpsolve.model.faults import TableError
-from fpsolve.model.systems import ModalSystem, ParametricOscillator
 from tests.conftest import sampled
 
 MASS, DAMPING = [[1.3, 0.2], [0.1, "m2"]], [[0.1, 0.02], ["c", 0.16]]

@@ -10,12 +10,8 @@ import pytest
 from pydantic import ValidationError
 from scipy.integrate import quad
 
-from fpsolve.model.noises.non_gaussian import NonGaussianNoise
-from fpsolve.model.noises.ornstein_uhlenbeck import (
-    OrnsteinUhlenbeck,
-    OrnsteinUhlenbeckByDeviation,
-    OrnsteinUhlenbeckByIntensity,
-)
+from fpsolve import NonGaussianNoise, OrnsteinUhlenbeck
+from fpsolve.model import OrnsteinUhlenbeckByDeviation, OrnsteinUhlenbeckByIntensity
 
 DEPARTURES = [-5.0, -1.0, 0.0, 0.5, 0.9, 0.95, 1 - 1e-4, 1.0, 1 + 1e-4, 1.1, 1.3, 1.5]
 

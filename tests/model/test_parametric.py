@@ -6,13 +6,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fpsolve import OrnsteinUhlenbeck, Problem, boundary, lyapunov_exponent, moment_lyapunov, sensitivities
-from fpsolve.analysis.zero import Axis
-from fpsolve.case.case import load_case
+from fpsolve import (
+    ExponentSolver,
+    OrnsteinUhlenbeck,
+    Problem,
+    boundary,
+    load_case,
+    lyapunov_exponent,
+    moment_lyapunov,
+    sensitivities,
+)
+from fpsolve.analysis import Axis
 from fpsolve.cli import main
 from fpsolve.errors import CaseError
-from fpsolve.exponent.quantities import critical_restitution
-from fpsolve.exponent.solver import ExponentSolver
+from fpsolve.exponent import critical_restitution
 from fpsolve.model import ParametricOscillator, Telegraph, White, system_kind
 from tests.oracles import closed_forms, moment_hierarchy, phase_circle
 

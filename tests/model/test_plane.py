@@ -10,13 +10,10 @@ import fpsolve.exponent
 import fpsolve.measured
 import fpsolve.nonlinear
 import fpsolve.simulation
+from fpsolve import OrnsteinUhlenbeck, PlaneSystem, Problem, VibroImpactOscillator
 from fpsolve.arrays import identity
-from fpsolve.model.noises.markov_chain import MarkovChain
-from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
-from fpsolve.model.plane import CoefficientMatrix, Jump, angular_frequency, growth_rate, matrix_at, phase_speed
-from fpsolve.model.problem import Problem
-from fpsolve.model.systems.plane_system import PlaneSystem
-from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
+from fpsolve.model import CoefficientMatrix, Jump, MarkovChain
+from fpsolve.model.plane import angular_frequency, growth_rate, matrix_at, phase_speed
 
 PHI = np.linspace(0, 2 * np.pi, 33)
 ROTATION = ((0.0, 1.3), (-1.3, 0.0))

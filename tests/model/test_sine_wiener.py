@@ -8,11 +8,19 @@ import pytest
 from scipy.integrate import quad
 from scipy.stats import kstest
 
-from fpsolve import PlaneSystem, VibroImpactOscillator, boundary, moment_lyapunov, sensitivities, simulate
-from fpsolve.analysis.zero import Axis
-from fpsolve.exponent.solver import ExponentSolver
+from fpsolve import (
+    ExponentSolver,
+    PlaneSystem,
+    Problem,
+    VibroImpactOscillator,
+    boundary,
+    moment_lyapunov,
+    sensitivities,
+    simulate,
+)
+from fpsolve.analysis import Axis
 from fpsolve.fem.noise_axes import PolynomialAxis
-from fpsolve.model import CoefficientMatrix, Problem, SineWiener, noise_kind
+from fpsolve.model import CoefficientMatrix, SineWiener, noise_kind
 from fpsolve.simulation.motions import draw
 from tests.conftest import sampled
 from tests.oracles.harmonics import moment_exponent, white_noise_exponent

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from pydantic.dataclasses import dataclass
 
-from fpsolve import PlaneSystem, boundary, lyapunov_exponent, moment_lyapunov, sensitivities
-from fpsolve.analysis.zero import Axis
+from fpsolve import PlaneSystem, Problem, boundary, lyapunov_exponent, moment_lyapunov, sensitivities
+from fpsolve.analysis import Axis
 from fpsolve.arrays import identity
-from fpsolve.model import CoefficientMatrix, MarkovChain, Problem, Telegraph, White, noise_kind
+from fpsolve.model import CoefficientMatrix, MarkovChain, Telegraph, White, noise_kind
 from fpsolve.model.noise import NoiseDerivative
 from fpsolve.model.noises.markov_chain import Chain
 from fpsolve.model.parameters import parameter

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from fpsolve.model.systems.vibro_impact import ImpactLaw, VibroImpactOscillator
+from fpsolve import VibroImpactOscillator
+from fpsolve.model import ImpactLaw
 from tests.conftest import FIG1
 
 h1, q1 = FIG1.terms[1].h, FIG1.terms[1].q

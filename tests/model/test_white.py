@@ -8,13 +8,12 @@ import pytest
 from scipy.integrate import quad
 from scipy.special import iv
 
-from fpsolve import OrnsteinUhlenbeck, PlaneSystem, VibroImpactOscillator, sensitivities
-from fpsolve.analysis.density import furstenberg_khasminskii
+from fpsolve import ExponentSolver, OrnsteinUhlenbeck, PlaneSystem, Problem, VibroImpactOscillator, sensitivities
+from fpsolve.analysis import furstenberg_khasminskii
 from fpsolve.arrays import identity
-from fpsolve.exponent.quantities import impact_rate
-from fpsolve.exponent.solver import ExponentSolver
+from fpsolve.exponent import impact_rate
 from fpsolve.fem.phase import PhaseAxis
-from fpsolve.model import CoefficientMatrix, Jump, Problem, White, noise_kind
+from fpsolve.model import CoefficientMatrix, Jump, White, noise_kind
 
 STIFFNESS, DAMPING = ((0.0, 0.0), (-1.0, 0.0)), ((0.0, 0.0), (0.0, 1.0))
 WALL = Jump(math.pi / 2, math.log(0.8))

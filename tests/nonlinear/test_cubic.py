@@ -8,18 +8,10 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
+from fpsolve import OrnsteinUhlenbeck, PlaneSystem, Problem, VibroImpactOscillator
 from fpsolve.arrays import identity
 from fpsolve.errors import FpsolveError
-from fpsolve.model import (
-    CoefficientMatrix,
-    CubicTerms,
-    Jump,
-    OrnsteinUhlenbeck,
-    PlaneSystem,
-    Problem,
-    System,
-    VibroImpactOscillator,
-)
+from fpsolve.model import CoefficientMatrix, CubicTerms, Jump, System
 from fpsolve.model.settling import comes_down
 from fpsolve.nonlinear import stationary_response
 from fpsolve.simulation import simulated_response

@@ -5,11 +5,18 @@ import math
 import numpy as np
 import pytest
 
-from fpsolve import ExponentSolver, lyapunov_exponent, stability_index
+from fpsolve import (
+    ExponentSolver,
+    NonGaussianNoise,
+    OrnsteinUhlenbeck,
+    Problem,
+    VibroImpactOscillator,
+    lyapunov_exponent,
+    stability_index,
+)
 from fpsolve.errors import FpsolveError
 from fpsolve.fem.factors import one_thread
 from fpsolve.fem.noise_axes import PolynomialAxis
-from fpsolve.model import NonGaussianNoise, OrnsteinUhlenbeck, Problem, VibroImpactOscillator
 from fpsolve.nonlinear import stationary_response
 from fpsolve.nonlinear.elimination import Tail, solved
 from fpsolve.nonlinear.operator import Elements, Flow, Plane

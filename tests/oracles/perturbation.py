@@ -11,11 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from fpsolve import NonGaussianNoise, OrnsteinUhlenbeck, VibroImpactOscillator
 from fpsolve.arrays import FloatArray
-from fpsolve.model.noise import Noise
-from fpsolve.model.noises.non_gaussian import NonGaussianNoise
-from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
-from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
+from fpsolve.model import Noise
 
 
 def reduced(noise: Noise) -> OrnsteinUhlenbeck:

@@ -17,7 +17,8 @@ import numpy as np
 import pytest
 
 import fpsolve
-from fpsolve.proofs import prove, prove_lyapunov_exponent
+from fpsolve import prove
+from fpsolve.proofs import prove_lyapunov_exponent
 from fpsolve.proofs.balls import precision
 from fpsolve.proofs.claims import Bound, MomentBound
 from fpsolve.proofs.search import Galerkin, bases, certificate_of

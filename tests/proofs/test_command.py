@@ -24,7 +24,7 @@ from fpsolve.model.noises.non_gaussian import NonGaussianNoise
 from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
 from fpsolve.output.records import Records, append
 from fpsolve.page.terminal import print_blocks
-from fpsolve.proofs.certificate import Certificate, Enclosure
+from fpsolve.proofs import Certificate, Enclosure
 from fpsolve.show.proof import show
 from fpsolve.study import prove as study
 from fpsolve.study.prove import CurveProof, Plan

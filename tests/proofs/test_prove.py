@@ -7,9 +7,10 @@ import time
 import pytest
 
 import fpsolve
+from fpsolve import prove
 from fpsolve.errors import NoSuchExponent
-from fpsolve.exponent.adapt import Budget
-from fpsolve.proofs import objection, prove, prove_lyapunov_exponent, prove_stability_index, search
+from fpsolve.exponent import Budget
+from fpsolve.proofs import objection, prove_lyapunov_exponent, prove_stability_index, search
 from fpsolve.proofs.statement import statement_of
 from tests import random_proofs
 

@@ -7,12 +7,11 @@ import pytest
 from scipy.special import i0, i1
 
 import fpsolve
+from fpsolve import Problem, prove
 from fpsolve.arrays import identity
 from fpsolve.errors import NoSuchExponent
 from fpsolve.model import CoefficientMatrix, Jump, MarkovChain, ParametricOscillator, SineWiener, Telegraph, White
-from fpsolve.model.problem import Problem
-from fpsolve.proofs import objection, prove, prove_lyapunov_exponent, search
-from fpsolve.proofs.certificate import Certificate
+from fpsolve.proofs import Certificate, objection, prove_lyapunov_exponent, search
 from tests import random_proofs
 from tests.conftest import sampled
 from tests.oracles.harmonics import moment_exponent

@@ -11,10 +11,17 @@ import numpy as np
 import pytest
 
 import fpsolve
-from fpsolve.model import Jump, MarkovChain, ParametricOscillator, SineWiener, Telegraph, White
-from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeckByIntensity
-from fpsolve.model.problem import Problem
-from fpsolve.proofs import prove, prove_lyapunov_exponent
+from fpsolve import Problem, prove
+from fpsolve.model import (
+    Jump,
+    MarkovChain,
+    OrnsteinUhlenbeckByIntensity,
+    ParametricOscillator,
+    SineWiener,
+    Telegraph,
+    White,
+)
+from fpsolve.proofs import prove_lyapunov_exponent
 from fpsolve.proofs.claims import Bound, MomentBound
 from tests.conftest import sampled
 from tests.oracles import certificate_checker as checker

@@ -1,9 +1,6 @@
 """What the tests of the simulation share: problems of moderate and of strong noise, and their Λ(p)."""
 
-from fpsolve.exponent.function import moment_lyapunov
-from fpsolve.model.noises.non_gaussian import NonGaussianNoise
-from fpsolve.model.problem import Problem
-from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
+from fpsolve import NonGaussianNoise, Problem, VibroImpactOscillator, moment_lyapunov
 
 MODERATE = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=0.5, impact="restitution")
 STRONG = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=1.0, impact="restitution")

@@ -2,8 +2,7 @@
 
 import pytest
 
-from fpsolve.model.problem import Problem
-from fpsolve.simulation.estimators import simulate
+from fpsolve import Problem, simulate
 from tests.simulation.problems import REDUCED, STRONG, exact
 
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from fpsolve import OrnsteinUhlenbeck, PlaneSystem, Problem, VibroImpactOscillator
 from fpsolve.errors import FpsolveError
-from fpsolve.model import OrnsteinUhlenbeck, PlaneSystem, Problem, VibroImpactOscillator
+from fpsolve.simulation import simulated_response
 from fpsolve.simulation.bounces import FREE, CubicMotion, DampedMotion, motion_of, move
-from fpsolve.simulation.response import simulated_response
 
 RATES = "v", "-omega**2*x + epsilon**2*v*(c1 - c2*x**2 - c3*v**2) + epsilon*xi*v"
 NUMBERS = {"omega": 1.3, "epsilon": 0.5, "c1": 0.4, "c2": 0.5, "c3": 0.2}

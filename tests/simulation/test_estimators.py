@@ -7,13 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fpsolve.exponent.solver import ExponentSolver
-from fpsolve.model.noises.non_gaussian import NonGaussianNoise
-from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
-from fpsolve.model.problem import Problem
-from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
+from fpsolve import ExponentSolver, NonGaussianNoise, OrnsteinUhlenbeck, Problem, VibroImpactOscillator, simulate
 from fpsolve.simulation import batches, estimators
-from fpsolve.simulation.estimators import simulate
 from fpsolve.simulation.setup import largest_step, transient
 from tests.conftest import FIG1, UNIT_NOISE, sampled
 from tests.simulation.problems import MODERATE, NOISE, REDUCED, STRONG, exact

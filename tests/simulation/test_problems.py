@@ -6,17 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
+from fpsolve import NonGaussianNoise, PlaneSystem, Problem, VibroImpactOscillator, simulate
 from fpsolve.arrays import identity
 from fpsolve.errors import FpsolveError
-from fpsolve.model.noise import Noise
-from fpsolve.model.noises.markov_chain import MarkovChain
-from fpsolve.model.noises.non_gaussian import NonGaussianNoise
-from fpsolve.model.plane import CoefficientMatrix
-from fpsolve.model.problem import Problem
-from fpsolve.model.systems.plane_system import PlaneSystem
-from fpsolve.model.systems.vibro_impact import DAMPING, VibroImpactOscillator
-from fpsolve.simulation.estimators import simulate
-from fpsolve.simulation.response import simulated_response
+from fpsolve.model import CoefficientMatrix, MarkovChain, Noise
+from fpsolve.model.systems.vibro_impact import DAMPING
+from fpsolve.simulation import simulated_response
 from fpsolve.simulation.setup import PROGRESS_STEPS
 from tests.conftest import sampled
 

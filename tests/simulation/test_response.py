@@ -6,12 +6,8 @@ import numpy as np
 import pytest
 from scipy.stats import gamma
 
-from fpsolve.exponent.solver import ExponentSolver
-from fpsolve.model.noises.non_gaussian import NonGaussianNoise
-from fpsolve.model.problem import Problem
-from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
-from fpsolve.simulation import batches
-from fpsolve.simulation.response import simulated_response
+from fpsolve import ExponentSolver, NonGaussianNoise, Problem, VibroImpactOscillator
+from fpsolve.simulation import batches, simulated_response
 from fpsolve.simulation.setup import default_step
 
 NOISE = NonGaussianNoise(D0=0.3, tau0=0.5, r0=0.9).ou_reduction()

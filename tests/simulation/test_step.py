@@ -11,9 +11,8 @@ from hypothesis import strategies as st
 from scipy.integrate import quad_vec
 from scipy.stats import kstest
 
-from fpsolve.model.noises.non_gaussian import NonGaussianNoise
-from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck, linear_step
-from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
+from fpsolve import NonGaussianNoise, OrnsteinUhlenbeck, VibroImpactOscillator
+from fpsolve.model.noises.ornstein_uhlenbeck import linear_step
 from fpsolve.simulation.bounces import DampedMotion, motion_of, move
 from fpsolve.simulation.coefficients import coefficients
 from fpsolve.simulation.kernels import advance

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fpsolve import ExponentSolver, OrnsteinUhlenbeck, PlaneSystem, Problem
+from fpsolve import ExponentSolver, NonGaussianNoise, OrnsteinUhlenbeck, PlaneSystem, Problem
 from fpsolve.arrays import identity
 from fpsolve.cli import main
 from fpsolve.commands.options import BAD_INPUT, CHECK_FAILED
@@ -17,14 +17,13 @@ from fpsolve.model import (
     Filter,
     LinearSystem,
     MarkovChain,
-    NonGaussianNoise,
     ParametricOscillator,
     Poisson,
     SineWiener,
     Telegraph,
     White,
 )
-from fpsolve.theory.moments import even_moment, hierarchy_exponent
+from fpsolve.theory import even_moment, hierarchy_exponent
 from tests.oracles import filtered, moment_hierarchy, planar, two_noises
 
 FREE, STIFFNESS = [[0.0, 1.0], [-1.0, -0.1]], [[0.0, 0.0], [-1.0, 0.0]]

@@ -6,15 +6,13 @@ import numpy as np
 import pytest
 from numpy.polynomial.hermite_e import hermegauss
 
+from fpsolve import ExponentSolver, OrnsteinUhlenbeck, PlaneSystem, Problem, VibroImpactOscillator
 from fpsolve.arrays import identity
 from fpsolve.exponent.fields import fields
-from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.messages import Code
-from fpsolve.model import Bounded, CoefficientMatrix, PlaneSystem, White
-from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
-from fpsolve.model.problem import Problem
-from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
-from fpsolve.theory.perturbation import perturbed_moments, scale_of, weak_noise_note
+from fpsolve.model import Bounded, CoefficientMatrix, White
+from fpsolve.theory import scale_of
+from fpsolve.theory.perturbation import perturbed_moments, weak_noise_note
 from tests.oracles import perturbation
 
 OU = OrnsteinUhlenbeck(alpha=1.7, sigma=0.9)

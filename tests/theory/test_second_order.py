@@ -5,17 +5,11 @@ import math
 import numpy as np
 import pytest
 
+from fpsolve import ExponentSolver, NonGaussianNoise, OrnsteinUhlenbeck, PlaneSystem, Problem, VibroImpactOscillator
 from fpsolve.arrays import identity
 from fpsolve.errors import NoPerturbationTheory
-from fpsolve.exponent.solver import ExponentSolver
-from fpsolve.model.noises.markov_chain import MarkovChain
-from fpsolve.model.noises.non_gaussian import NonGaussianNoise
-from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
-from fpsolve.model.plane import CoefficientMatrix, Jump
-from fpsolve.model.problem import Problem
-from fpsolve.model.systems.plane_system import PlaneSystem
-from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
-from fpsolve.theory.perturbation import first_order_eigenfunction, scale_of, second_order
+from fpsolve.model import CoefficientMatrix, Jump, MarkovChain
+from fpsolve.theory import first_order_eigenfunction, scale_of, second_order
 from tests.conftest import keeping
 from tests.oracles import perturbation
 

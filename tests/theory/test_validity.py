@@ -3,10 +3,7 @@
 import numpy as np
 import pytest
 
-from fpsolve.exponent.function import moment_lyapunov
-from fpsolve.model.noises.non_gaussian import NonGaussianNoise
-from fpsolve.model.problem import Problem
-from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
+from fpsolve import NonGaussianNoise, Problem, VibroImpactOscillator, moment_lyapunov
 from fpsolve.theory.perturbation import weak_noise_note
 from tests.conftest import FIG1, FIG1_NOISE
 from tests.oracles import perturbation
