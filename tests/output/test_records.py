@@ -228,17 +228,21 @@ def test_meshes_have_keys_of_their_own():
 
 def test_every_setting_of_a_case_is_in_what_is_asked_of_a_part(tmp_path):
     """Each key of a file that changes numbers changes the settings of the parts that it is about, and of no other."""
-    base = everything(case_in(tmp_path, TEXT, [ALL]))
+    base = everything(case_in(tmp_path, TEXT, [ALL, "oscillator.c3=0.1"]))
     for sets, parts in {
         "moments.p=[2.0, 1.0]": {"moment", "classes", "sensitivities"},
         "excursions.phi=0.3": {"excursions"},
+        "excursions.xi=0.4": {"excursions"},
         "excursions.levels=[5.0]": set(),
+        "response.rtol=1e-5": {"response"},
+        "response.grid={phi=25}": {"response"},
+        "oscillator.c1=0.2": set(),
         "output.eigenfunctions=[-1.0]": {"eigenfunctions"},
         "moments.rtol=1e-6": set(),
         "budget.memory=1.0": set(),
         "title='other'": set(),
     }.items():
-        other = everything(case_in(tmp_path, TEXT, [ALL, sets]))
+        other = everything(case_in(tmp_path, TEXT, [ALL, "oscillator.c3=0.1", sets]))
         assert {name for name in base | other if base.get(name) != other.get(name)} == parts, sets
 
 
