@@ -42,6 +42,8 @@ class Table:
         lines: of a text the line of each row.
         rows: of a file with several spectra over one abscissa each of them, shape (k, n).
         notes: what was assumed to read it.
+        sideways: what it holds if the names of its columns, which are numbers, are frequencies; None where they are no
+            numbers.
     """
 
     path: Path
@@ -52,6 +54,7 @@ class Table:
     lines: Sequence[int] | IntArray = ()
     rows: FloatArray | None = None
     notes: tuple[str, ...] = ()
+    sideways: Table | None = None
 
     def unit_of(self, name: str) -> str:
         """The unit of a column, also of one whose cells are no numbers."""

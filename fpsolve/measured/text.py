@@ -153,8 +153,7 @@ def read_text_table(path: Path, skip: int = 0) -> Table:
         if (found := len(_cells(lines[i - 1], separator))) != count:
             told = f"has {found} cells, and {'the header' if names else 'the first row'} has {count}"
             raise Unreadable(f"{told}; complete the row, or remove it", i)
-    if names and all(map(_is_number, names[-LEAST_FREQUENCIES:])):
-        return _on_its_side(path, table, names)
+    sideways = _sideways(path, table, names) if names and all(map(_is_number, names[-LEAST_FREQUENCIES:])) else None
     ends = [k for k in range(count) if not first[k] and not any(table.cells(k))]
     if names:
         twice = next((name for name in names if name and names.count(name) > 1), None)
@@ -166,7 +165,8 @@ def read_text_table(path: Path, skip: int = 0) -> Table:
     places = {name: k for k, name in enumerate(names) if k not in ends}
     columns = _Columns(table, places, dict(zip(names, units, strict=True)))
     notes = () if not above or header else (f"left out the lines 1 to {above[-1]}, which have no names of columns",)
-    return Table(path, _without_index(columns), abscissa=_stamps(columns, first), lines=table.numbers, notes=notes)
+    read = _without_index(columns), None, _stamps(columns, first)
+    return Table(path, *read, lines=table.numbers, notes=notes, sideways=sideways)
 
 
 def _is_number(cell: str) -> bool:
@@ -278,7 +278,7 @@ def _names(text: str, separator: str | None, count: int) -> list[str] | None:
     return found if not numbers or (is_wide and all(np.diff([float(found[k]) for k in tail]) > 0)) else None
 
 
-def _on_its_side(path: Path, rows: _Lines, names: Sequence[str]) -> Table:
+def _sideways(path: Path, rows: _Lines, names: Sequence[str]) -> Table:
     """A spectrum in each row, over the frequencies in the header."""
     begin = next(k for k, name in enumerate(names) if _is_number(name))
     f = np.array([float(name) for name in names[begin:]])

@@ -155,6 +155,11 @@ def binary_uff(end):
     return end.join(lines).encode() + data + f"{end}    -1{end}".encode()
 
 
+TEXT_RECORDS["channels.csv"] = (
+    "t," + ",".join(f"{k}" for k in range(1, 7)) + "\n" + rows(T, *[0 * T] * 5, X),
+    G,
+    {"column": "6", "unit": "g"},
+)
 BINARY_RECORDS = {
     "58b.uff": (lambda: binary_uff("\n"), G, {}),
     "58b_crlf.uff": (lambda: binary_uff("\r\n"), G, {}),
@@ -334,6 +339,13 @@ def test_units_are_never_guessed_silently(tmp_path):
     assert "taken as m/s²" in note
     assert "--unit" in note
     assert read_record(path, of="acceleration", unit="g").values == pytest.approx(G * (X - X.mean()))
+
+
+def test_channels_that_are_called_by_numbers_are_no_frequencies(tmp_path):
+    (tmp_path / "a.csv").write_text("f (Hz),1,2,3,4,5\n" + rows(F, *[D] * 5), encoding="utf-8")
+    with pytest.raises(FpsolveError, match="several columns of values; state one by --column"):
+        read_spectrum(tmp_path / "a.csv", sided="one")
+    assert read_spectrum(tmp_path / "a.csv", sided="one", column="3").density == pytest.approx(D / 2)
 
 
 def test_rows_are_left_out_at_the_beginning(tmp_path):
