@@ -18,16 +18,15 @@ import numpy as np
 from fpsolve.case.case import Case, Curve
 from fpsolve.case.refusals import obstacle
 from fpsolve.case.sections import Varied
-from fpsolve.errors import FpsolveError
 from fpsolve.exponent.error import Failure, Moment
 from fpsolve.exponent.quantities import INDICES
-from fpsolve.messages import Code, Message, Remedy, Severity, message_of
+from fpsolve.messages import Code, Message, Severity, message_of
 from fpsolve.model.problem import Problem
 from fpsolve.parts.every import BY_NAME, PARTS
 from fpsolve.parts.indices import JUMPS
 from fpsolve.parts.moments import CLASSES, NO_MOMENTS, Moments, unfinished
 from fpsolve.parts.moments import PART as MOMENTS
-from fpsolve.parts.part import Entry, Job, Numerics, Part, Reason, Settings, attempt, fault
+from fpsolve.parts.part import Entry, Job, Numerics, Part, Reason, Settings, attempt
 from fpsolve.parts.response import NAME as RESPONSE
 from fpsolve.study.results import Comparison, CurveResult, Solved
 
@@ -278,17 +277,10 @@ def solved(
     p = np.array(order.asked[MOMENTS.name]["p"])
     if reason := obstacle(curve.base, curve.varied, p, with_moments=False):
         return Solved(failed(curve, f"{order.line}{reason}"), {}, {})
-    try:
-        return solve_curve(curve, order.asked, numerics, progress, order.entries, order.begun, grow)
-    except FpsolveError as failure:
-        reason = failure.message
-    except MemoryError:
-        reason = Message(Code.NO_MEMORY, remedy=Remedy.MEMORY)
-    except OSError:
-        raise
-    except Exception as failure:
-        reason = fault(failure)
-    return Solved(failed(curve, reason), {}, {})
+    found = attempt(
+        lambda: solve_curve(curve, order.asked, numerics, progress, order.entries, order.begun, grow), curve.label
+    )
+    return Solved(failed(curve, found.message), {}, {}) if isinstance(found, Reason) else found
 
 
 def failed(curve: Curve, reason: str) -> CurveResult:
