@@ -19,7 +19,7 @@ POINTS = 400
 """Frequencies of a spectrum, equally spaced in the logarithm."""
 BELOW, ABOVE = 10.0, 20.0
 """How far these reach below and above the peak and the frequency that is wanted, as a factor."""
-LEAST = 1e-12
+LEAST = 1e-6
 """Share of the largest density below which values are left out."""
 
 

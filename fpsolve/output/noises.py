@@ -209,7 +209,8 @@ def draw_noise(outcome: NoiseOutcome, source: Path, shown: Convention, folder: P
         axes = figure.subplots()
         if (band := band_of(fit)) is not None:
             axes.fill_between(x, factor * band[0], factor * band[1], color="0.75", linewidth=0, label="95 % interval")
-        axes.loglog(x, factor * spectrum.density, ".", color="0.35", markersize=4, label="measured")
+        source_label = "formula" if spectrum.is_formula else "measured"
+        axes.loglog(x, factor * spectrum.density, ".", color="0.35", markersize=4, label=source_label)
         values, _ = density_of(fit, fine.tolist())
         axes.loglog(shown.frequency(fine), factor * values, "-", color=COLOURS[0], label="fitted")
         for each in fit.misfit:
