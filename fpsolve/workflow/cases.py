@@ -18,7 +18,6 @@ from fpsolve.files import writable
 from fpsolve.messages import Code, Message
 from fpsolve.model.kinds import is_ours
 from fpsolve.output.charts import draw_chart, write_chart
-from fpsolve.output.designs import write_design
 from fpsolve.output.directions import draw_densities
 from fpsolve.output.figures import draw, draw_rates, draw_response, draw_sensitivities, draw_stationary_responses
 from fpsolve.output.tables import write_samples, write_simulation
@@ -31,7 +30,6 @@ from fpsolve.show.chart import show as show_chart
 from fpsolve.show.notes import MONTE_CARLO, note_on, notes
 from fpsolve.signals import signals_held
 from fpsolve.study.chart import Chart, chart_work, refuse_no_chart, solve_chart
-from fpsolve.study.design import DesignOutcome, refuse_no_design, solve_design
 from fpsolve.study.hierarchy import compare_with_hierarchy, even_moments_asked
 from fpsolve.study.results import Comparison, CurveResult, SimulatedCurve
 from fpsolve.study.simulate import refuse_obstacles, simulation_work
@@ -41,7 +39,6 @@ from fpsolve.workflow.folders import (
     AGAIN,
     ANEW,
     CHART,
-    DESIGNED,
     SIMULATED,
     SOLVED,
     kept,
@@ -49,7 +46,7 @@ from fpsolve.workflow.folders import (
     own_folder,
     saying_if_interrupted,
 )
-from fpsolve.workflow.progress import NODES, PERCENT, POINTS, SETS, SILENT, SOLVES, Phase, Watch, ignore
+from fpsolve.workflow.progress import NODES, PERCENT, POINTS, SETS, SILENT, Phase, Watch, ignore
 from fpsolve.workflow.reports import facts_since, shown_at_the_end
 from fpsolve.workflow.sets import Lines, Simulations, Sweep
 
@@ -314,27 +311,6 @@ def chart_case(
                 write_chart(case, chart, folder)
                 lines.keep(chart.lines[-1])
     return chart
-
-
-def design_case(case: Case, out: str | Path = "results", *, watch: Watch = SILENT) -> DesignOutcome:
-    """Find the design of a case, and write design.json and, where there is one, design.toml into `out`/<case>/.
-
-    Raises:
-        OutputError: the folder cannot be made or written to, or another run writes into it.
-        FpsolveError: the case has no design, or several curves; nothing is written.
-        KeyboardInterrupt: nothing is kept.
-    """
-    refuse_no_design(case)
-    started = datetime.now(UTC)
-    with (
-        own_folder(case, out, (DESIGNED,)) as folder,
-        saying_if_interrupted(lambda: "; nothing is kept", ANEW),
-        writable(folder),
-    ):
-        with watch.bar(Phase(case.name, "design", unit=SOLVES)) as progress:
-            found = solve_design(case, progress)
-        write_design(case, found, folder, facts_since(case, started))
-    return found
 
 
 def check_case(case: Case, *, by_hierarchy: bool = False, pool: Pool | None = None, watch: Watch = SILENT) -> Outcome:

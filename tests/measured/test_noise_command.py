@@ -11,9 +11,9 @@ import pytest
 from fpsolve import OrnsteinUhlenbeck
 from fpsolve.case.case import load_case
 from fpsolve.cli import main
+from fpsolve.commands.noise import natural_frequencies
 from fpsolve.commands.options import BAD_INPUT
 from fpsolve.measured import read_spectrum, weak_exponent, weak_moment
-from fpsolve.study.noise import natural_frequencies
 from tests.kit import read_json
 
 ROOT = Path(__file__).parents[2]
