@@ -254,6 +254,8 @@ def read_record(
         if rate is None:
             step, more = _step(table, times)
             notes = (*notes, *more)
+            if not (over or table.abscissa or table.unit_of(times) or times.lower() in TIME_NAMES):
+                notes += (f"the column {times} is taken as times in s, which nothing in the file says; state --rate",)
         values = _numbers(table, name)
         stated = powers(unit or values.unit) if (unit or values.unit).strip() else None
         factor, more = _factor(of, stated, unit or values.unit, name)
@@ -378,7 +380,9 @@ def _step(table: Table, name: str) -> tuple[float, tuple[str, ...]]:
     steps = np.diff(t)
     digit = max(column.resolution * factor, float(np.finfo(float).eps * np.max(abs(t))))
     if t.size < 2 or not np.all(steps > -digit) or not t[-1] > t[0]:
-        raise ValueError(f"has times in {name} that do not increase; sort the rows, or state --rate")
+        raise ValueError(
+            f"has times in {name} that do not increase; sort the rows, name others by --over, or state --rate"
+        )
     span = float(column.values[-1] - column.values[0])
     if column.resolution > 1e-12 * abs(span):  # in whole digits, of which large times have lost some
         span = round(span / column.resolution) * column.resolution

@@ -29,13 +29,18 @@ MOST_TEXT, MOST_LINES = 2**26, 4_000_000
 """Bytes and lines of a text; to read it takes some twelve times as many bytes, or 200 a line."""
 LEAST_FREQUENCIES = 5
 """Numbers at the end of a header that are taken for frequencies."""
+LETTERS = ("g", "m", "V")
+"""Units of one letter, which may be names, too."""
 SAMPLE = 2000
 """Lines at the beginning and at the end by which the separator is found."""
+TIMES_ALIKE = "alike, such as 2026-01-31 12:00:00.5"
+"""How times are to be written."""
 _MARK = re.compile(r"^\s*(?:#+|%+|//+)\s?")
 _NUMBER = re.compile(r"[+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[ed][+-]?\d+)?|[+-]?(?:nan|inf)|", re.IGNORECASE)
 _DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+(e[+-]?\d+)?", re.IGNORECASE)
 _DAY, _CLOCK = r"\d{4}[-/]\d\d?[-/]\d\d?", r"\d\d?:\d\d(?::\d\d(?:\.\d*)?)?(?: ?[AP]M)?"
 _STAMP = re.compile(rf"(?:{_DAY}|\d\d?/\d\d?/\d\d(?:\d\d)?)(?:[T ]+{_CLOCK})?(?:Z| ?[+-]\d\d:?\d\d)?|{_CLOCK}")
+_OTHER_TIME = re.compile(r"\d+:\d\d|\d\d?\.\d\d?\.\d")
 _SPACED = re.compile(r"\S+(?:[ \t]+(?:[\[(]\S*[\])]|[\[(][^\])]*[\])])(?=\s|$))?")
 """Names between spaces, each with its unit in brackets."""
 SEPARATORS = ("\t", ";", ",", None)
@@ -89,6 +94,7 @@ def _number(name: str, cell: str, line: int) -> float:
         return float(cell.lower().replace("d", "e"))
     except ValueError:
         remedy = "write decimal points" if _DECIMAL_COMMA.fullmatch(cell) else "write a number or remove the row"
+        remedy = f"write times {TIMES_ALIKE}" if _OTHER_TIME.match(cell) else remedy
         told = f'"{cell}"' if cell else "nothing"
         raise Unreadable(f"has {told} in the column {name}; {remedy}", line) from None
 
@@ -115,7 +121,7 @@ def _times(name: str, cells: Sequence[str], numbers: IntArray) -> Column:
             raise ValueError
     except (ValueError, TypeError, OverflowError):
         wrong = next((i for i, cell in enumerate(cells) if not _STAMP.fullmatch(cell)), 0)
-        text = f'has "{cells[wrong]}" in the column {name}; write all times alike, such as 2026-01-31 12:00:00.5'
+        text = f'has "{cells[wrong]}" in the column {name}; write all times {TIMES_ALIKE}'
         raise Unreadable(text, int(numbers[wrong])) from None
     if clock:
         seconds += 86400.0 * np.cumsum(np.diff(seconds, prepend=0.0) < -43200)
@@ -194,19 +200,23 @@ def _like_row(cells: Sequence[str]) -> bool:
 
 
 def _shape(lines: Sequence[str], separators: Sequence[str | None]) -> tuple[str | None, int]:
-    """The separator by which most lines are rows of one shape, and how many cells these have. Raises Unreadable."""
-    best: tuple[int, int] = (0, 0)
+    """The separator by which most lines are rows of one shape, and how many cells these have. Raises Unreadable.
+
+    Of two, it is the one by which more rows have nothing but numbers: a semicolon, where commas are in numbers.
+    """
+    most, best = (0, 0), 0
     chosen: str | None = None
     for separator in separators:
-        counts = Counter(len(cells) for cells in (_cells(each, separator) for each in lines) if _like_row(cells))
-        found = max(((rows, count) for count, rows in counts.items()), default=(0, 0))
-        if found[0] > best[0] or (found[0] == best[0] and found[1] > best[1] and separator is not None):
-            best, chosen = found, separator
-    if not best[0]:
+        rows = [cells for cells in (_cells(each, separator) for each in lines) if _like_row(cells)]
+        counts, whole = Counter(map(len, rows)), Counter(len(cells) for cells in rows if all(map(_fits, cells)))
+        found, count = max((((many, whole[count]), count) for count, many in counts.items()), default=((0, 0), 0))
+        if found > most or (found == most and count > best and separator is not None):
+            most, best, chosen = found, count, separator
+    if not best:
         raise Unreadable(f"{NO_TABLE}; it needs a header and a row for each frequency or time")
-    if best[1] > MOST_COLUMNS:
-        raise Unreadable(f"has {best[1]} columns; export at most {MOST_COLUMNS}")
-    return chosen, best[1]
+    if best > MOST_COLUMNS:
+        raise Unreadable(f"has {best} columns; export at most {MOST_COLUMNS}")
+    return chosen, best
 
 
 def _start(lines: Sequence[str], separator: str | None, count: int) -> int:
@@ -232,8 +242,11 @@ def _header(
         above: the lines above the table, with remarks.
         first: the cells of its first row.
         separator: of these.
+
+    Letters that may be units, and numbers of channels, are names only where there are no others above.
     """
     units, count = [""] * len(first), len(first)
+    otherwise: tuple[list[str], list[str], int] = [], [], 0
     for line, text in reversed(above):
         found = next(
             filter(None, (_names(_MARK.sub("", text, 1), each, count) for each in (separator, *SEPARATORS))), None
@@ -241,11 +254,16 @@ def _header(
         if found is None:
             continue
         split = [heading(each) for each in found]
+        below = zip(split, units, strict=True)
+        named = [name for name, _ in split], [unit or other for (_, unit), other in below], line
         if all(not name or _is_unit(name) for name in found):
             units = [each.strip("()[] ") for each in found]
-            continue
-        return [name for name, _ in split], [unit or below for (_, unit), below in zip(split, units, strict=True)], line
-    return [], [], 0
+        elif _counts(found) or all(not name or name in LETTERS or _is_unit(name) for name in found):
+            otherwise = otherwise if otherwise[0] else named
+            units = units if _counts(found) else found
+        else:
+            return named
+    return otherwise
 
 
 def _is_unit(text: str) -> bool:
@@ -275,7 +293,18 @@ def _names(text: str, separator: str | None, count: int) -> list[str] | None:
     numbers = [k for k, each in enumerate(found) if _is_number(each)]
     tail = range(numbers[0], count) if numbers else range(0)
     is_wide = len(tail) >= LEAST_FREQUENCIES and [*tail] == numbers and numbers[0] > 0
-    return found if not numbers or (is_wide and all(np.diff([float(found[k]) for k in tail]) > 0)) else None
+    is_rising = is_wide and all(np.diff([float(found[k]) for k in tail]) > 0)
+    return found if not numbers or is_rising or _counts(found) else None
+
+
+def _counts(names: Sequence[str]) -> bool:
+    """Whether all names but the first are numbers of channels, from 0 or 1 on."""
+    first, *tail = names
+    return (
+        len(tail) > 1
+        and not (first and _fits(first))
+        and any(tail == [str(begin + k) for k in range(len(tail))] for begin in (0, 1))
+    )
 
 
 def _sideways(path: Path, rows: _Lines, names: Sequence[str]) -> Table:

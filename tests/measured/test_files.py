@@ -121,6 +121,10 @@ TEXT_RECORDS = {
     "excel.csv": ("sep=;\nt (s);a (g)\n" + rows(T, X, separator=";"), G, {}),
     "trailing.csv": ("t (s),a (g),\n" + rows(T, X).replace("\n", ",\n"), G, {}),
     "fortran.dat": (" t(s)  a(g)\n" + rows(T, X, separator="  ", form="{:.8E}").replace("E", "D"), G, {}),
+    "letters.csv": ("TIME,CH1\ns,g\n" + rows(T, X), G, {}),
+    "channels.csv": ("t (ms),1,2\n" + rows(1000 * T, 0 * X, X), G, {"unit": "g", "column": "2"}),
+    "many channels.csv": ("t,0,1,2,3,4\n" + rows(T, T, T, X, T, T), G, {"unit": "g", "column": "2"}),
+    "channels below.csv": ("t (ms),a (V),b (g)\nChannel,1,2\n" + rows(1000 * T, 0 * X, X), G, {"column": "b"}),
     "bare.txt": (rows(X), G, {"rate": RATE, "unit": "g"}),
     "preamble_numbers.txt": ("station 17\n3 4 5\nt (s) a (g)\n" + rows(T, X, separator=" "), G, {}),
     "words.csv": (
@@ -295,6 +299,12 @@ def unix(t, digits=3):
 
 REFUSED = {
     "commas.csv": ("t (s);a (g)\n" + rows(T, X, separator=";").replace(".", ","), {}, "write decimal points"),
+    "commas in all.csv": (
+        "Zeit;Beschleunigung\ns;m/s²\n" + rows(T, X, separator=";", form="{:.9f}").replace(".", ","),
+        {},
+        r":3: has \"0,000000000\" in the column Zeit; write decimal points",
+    ),
+    "days.csv": ("t,a\n" + stamped(["01.03.2026 12:00:00"] * 99, X[:99]), {}, "write times alike, such as 2026"),
     "gap.csv": ("t (s),a (g)\n" + rows(T[GAP], X[GAP]), {}, r"uneven steps, 20.02 s at line 1002"),
     "gap unix.csv": (unix(T[GAP]), {}, r"uneven steps, 20.02 s at line 1002"),
     "half is missing.csv": (unix(T[HALF]), {}, "uneven steps"),
@@ -335,6 +345,12 @@ def test_units_are_never_guessed_silently(tmp_path):
     path = tmp_path / "a.csv"
     path.write_text("t (s),a\n" + rows(T, X), encoding="utf-8")
     assert read_record(path, of="stiffness").notes == ()
+    path.write_text("Sample,a\n" + rows(range(4096), X), encoding="utf-8")
+    [note] = read_record(path, of="stiffness").notes
+    assert "Sample is taken as times in s" in note
+    assert "--rate" in note
+    assert read_record(path, of="stiffness", rate=RATE, column="a").notes == ()
+    path.write_text("t (s),a\n" + rows(T, X), encoding="utf-8")
     [note] = read_record(path, of="acceleration").notes
     assert "taken as m/s²" in note
     assert "--unit" in note
