@@ -337,7 +337,7 @@ def _part_keys(asked: str, numerics: Numerics) -> dict[str, tuple[str, str]]:
 @lru_cache(maxsize=16)
 def begun_key(numerics: Numerics) -> str:
     """What Λ(p) is found by while other p are being solved."""
-    return part_key(MOMENTS, {}, numerics)
+    return part_key(MOMENTS, {}, numerics, is_limited=True)
 
 
 def record_of_set(curve: Curve, asked: Asked, numerics: Numerics, entries: Mapping[str, Entry]) -> Record:
@@ -348,6 +348,7 @@ def record_of_set(curve: Curve, asked: Asked, numerics: Numerics, entries: Mappi
         said = list(messages_of(part, entry, curve, numerics))
         if not any(each.tells_of(code) for each in said for code in (Code.NO_MEMORY, Code.FAULT)):
             is_limited = entry.reason is not None or any(each.severity is not Severity.NOTE for each in said)
+            is_limited |= entry.found is not None and part.lacks(entry.found, asked[name])
             found = None if entry.found is None else codec(part.kind).plain(entry.found)
             record[keys[name][is_limited]] = [found, _REASON.plain(entry.reason), entry.seconds]
     return record
@@ -365,7 +366,7 @@ def messages_of(part: Part, entry: Entry, curve: Curve, numerics: Numerics) -> I
         yield entry.reason.message
     elif entry.found is not None:
         yield from part.said(entry.found, curve, numerics)
-        yield from (failure.reason for failure in getattr(entry.found, "failures", ()))
+        yield from part.reasons(entry.found)
 
 
 def entries_of(

@@ -2,21 +2,28 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from fpsolve.parts.part import Job, Part, Settings
+from fpsolve.model.quantity import LYAPUNOV_EXPONENT, MOMENT
+from fpsolve.parts.part import Job, Part, Settings, attempt
 
 if TYPE_CHECKING:
     from fpsolve.case.case import Case
 
 
 def _settings(case: Case, number: int) -> Settings:
-    return {}
+    """The p of the largest size that a case states, whether Λ(p) is asked for or not."""
+    return {"p": max(case.p.tolist(), key=abs, default=0.0)}
 
 
 def _solve(job: Job, settings: Settings) -> dict[str, Any]:
-    """z in noise units; nothing where no p was solved."""
+    """z in noise units; nothing where no p was solved. One is solved where all numbers are from an earlier run."""
     known = job.solver.whole.known
+    if not known:
+        has_moment = settings["p"] in job.found(MOMENT.name).columns.p
+        if has_moment or job.found(LYAPUNOV_EXPONENT.name):
+            attempt(partial(job.solver.solution, settings["p"] if has_moment else 0.0), "")
     p = max(known, key=abs, default=None)
     if p is None:
         return {}

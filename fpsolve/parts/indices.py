@@ -135,12 +135,17 @@ def _jumps_are_whole(found: OfJumps, curve: Curve, settings: Settings) -> bool:
     )
 
 
+def _reasons_of_jumps(found: OfJumps) -> Iterator[Message]:
+    return (each.reason.message for of_jump in found for each in of_jump.values() if each.reason)
+
+
 JUMPS: Part = Part(
     "jumps",
     _jump_settings,
     _solve_jumps,
     OfJumps,
     content=_content_of_jumps,
+    reasons=_reasons_of_jumps,
     is_whole=_jumps_are_whole,
     is_quantity=False,
 )

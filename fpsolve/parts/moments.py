@@ -159,7 +159,21 @@ def _row(case: Case, result: CurveResult) -> Row:
     return {"p": result.moments.p} | {each.name: getattr(result.moments, name) for name, each in OVER_P.items()}
 
 
-PART: Part = Part(MOMENT.name, _settings, _solve, Moments, said=_said, is_whole=_is_whole, columns=_columns, row=_row)
+def _reasons(found: Moments) -> Iterator[Message]:
+    return (each.reason for each in found.failures)
+
+
+PART: Part = Part(
+    MOMENT.name,
+    _settings,
+    _solve,
+    Moments,
+    said=_said,
+    columns=_columns,
+    row=_row,
+    reasons=_reasons,
+    is_whole=_is_whole,
+)
 
 
 def _solve_classes(job: Job, settings: Settings) -> tuple[InvariantClass, ...]:
@@ -218,6 +232,7 @@ CLASSES: Part = Part(
     tuple[InvariantClass, ...],
     said=_said_of_classes,
     content=_content_of_classes,
+    lacks=lambda found, settings: any({*each.p.tolist()} != {*settings["p"]} for each in found),
     is_whole=_classes_are_whole,
     is_quantity=False,
 )

@@ -69,11 +69,6 @@ class Reason:
     symbol: str
     place: str = ""
 
-    @property
-    def is_passing(self) -> bool:
-        """Whether it may be gone when the number is tried again."""
-        return self.message.tells_of(Code.NO_MEMORY) or self.message.tells_of(Code.FAULT)
-
 
 @dataclass(frozen=True, eq=False)
 class Entry:
@@ -203,6 +198,8 @@ class Part:
         row: the numbers of a curve in these columns.
         content: what summary.json has of it beyond the tables; None where it is not asked for.
         files: writes into a folder the files that a curve has beyond the tables.
+        reasons: why some of it is missing.
+        lacks: whether it lacks something that is asked for, as another part lacks it.
         is_whole: whether what a record holds is what can be written and drawn.
         uses_solver: whether rtol and the mesh of Λ(p) decide its numbers.
         is_drawn: whether there is more than a record holds, so that a further run solves it again.
@@ -222,6 +219,8 @@ class Part:
     row: Callable[[Case, CurveResult], Row] = _no_row
     content: Callable[[Case, CurveResult], Mapping[str, Any]] = _no_row
     files: Callable[[CurveResult, Path], None] | None = None
+    reasons: Callable[[Any], Iterable[Message]] = _nothing
+    lacks: Callable[[Any, Settings], bool] = lambda *_: False
     is_whole: Callable[[Any, Curve, Settings], bool] = lambda *_: True
     uses_solver: bool = True
     is_drawn: bool = False

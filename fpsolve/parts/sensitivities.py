@@ -61,6 +61,11 @@ def _content(case: Case, result: CurveResult) -> Mapping[str, Any]:
     return {NAME: {**numbers(lambda each: each.value), "errors": errors}}
 
 
+def _lacks(found: Sensitivities, settings: Settings) -> bool:
+    is_there = {*found.p.tolist()} == {*settings["p"]} and found.indices.keys() == {*settings["indices"]}
+    return not (is_there and all(found.moments))
+
+
 def _is_whole(found: Sensitivities, curve: Curve, settings: Settings) -> bool:
     """Whether the derivatives are of p that were asked for, by parameters of the curve."""
     keys, rows = found.theta.keys(), [*found.moments, *found.indices.values()]
@@ -85,5 +90,6 @@ PART: Part = Part(
     is_usual=lambda case: case.output.sensitivities,
     said=_said,
     content=_content,
+    lacks=_lacks,
     is_whole=_is_whole,
 )

@@ -49,7 +49,6 @@ from fpsolve.workflow.progress import MOMENTS, SETS, Advance, Phase
 
 Found = tuple[int, Address | CurveResult | None, bool]
 """The number of a curve, its numbers where they are new, and whether some of these are missing."""
-Orders = tuple[Order, ...]
 SOLVED_RECORDS, SIMULATED_RECORDS = "records/solved", "records/simulated"
 LINE_RECORDS = "records/charted"
 REST = 50

@@ -20,14 +20,17 @@ from fpsolve.case.sections import MonteCarloSection
 from fpsolve.cli import main
 from fpsolve.errors import NotConverged, OutputError
 from fpsolve.exponent.adapt import Budget
+from fpsolve.exponent.error import Moment
 from fpsolve.fem.mesh import make_mesh
-from fpsolve.messages import Code
+from fpsolve.messages import Code, Message
 from fpsolve.output import records as plain
 from fpsolve.output.records import (
     Records,
     Results,
     _packed,
     append,
+    begun_record,
+    entries_of,
     part_key,
     record_of_set,
     set_key,
@@ -35,7 +38,8 @@ from fpsolve.output.records import (
 )
 from fpsolve.parts import PARTS
 from fpsolve.parts.every import BY_NAME
-from fpsolve.parts.part import Numerics
+from fpsolve.parts.indices import JumpIndex
+from fpsolve.parts.part import Entry, Job, Numerics, Reason
 from fpsolve.study import solve
 from fpsolve.study.solve import everything, solve_curve
 from tests.kit import ALL, case_in, from_record, solve_sets
@@ -231,6 +235,7 @@ def test_every_setting_of_a_case_is_in_what_is_asked_of_a_part(tmp_path):
     base = everything(case_in(tmp_path, TEXT, [ALL, "oscillator.c3=0.1"]))
     for sets, parts in {
         "moments.p=[2.0, 1.0]": {"moment", "classes", "sensitivities"},
+        "moments.p=[2.0, 3.0]": {"moment", "classes", "sensitivities", "discretisation"},
         "excursions.phi=0.3": {"excursions"},
         "excursions.xi=0.4": {"excursions"},
         "excursions.levels=[5.0]": set(),
@@ -320,6 +325,45 @@ def test_what_a_budget_has_limited_is_solved_again_with_another(tmp_path, monkey
     assert run(small) == set()
     [result] = fpsolve.run(case_in(tmp_path, TEXT, asking(*names, more=[small, "oscillator.epsilon=2.0"])), tmp_path)
     assert result.lyapunov_exponent is not None  # which the larger budget has found
+
+
+def test_what_lacks_something_for_a_small_budget_is_solved_again_with_another(tmp_path):
+    """Sensitivities of p that failed, and impacts at one of several places; what lacks nothing stays."""
+    case = case_in(tmp_path, TEXT, [ALL, "vary={}"])
+    [solved], [curve], asked, numerics = solve_sets(case), case.curves(), everything(case), Numerics.of(case)
+    more = replace(numerics, budget=Budget(seconds=500.0))
+    found = solved.entries["sensitivities"].found
+    failed = Reason("failed", Message(Code.NO_MEMORY), "N")
+    lacking = {
+        "sensitivities": replace(found, p=found.p[1:], moments=found.moments[1:]),
+        "jumps": ({"impact_rate": JumpIndex(None, failed)},),
+    }
+    for entries, is_kept in ((solved.entries, True), ({"sensitivities": Entry(lacking["sensitivities"])}, False)):
+        record = record_of_set(curve, asked, numerics, entries)
+        assert "sensitivities" in entries_of(record, curve, asked, numerics)[0]
+        assert ("sensitivities" in entries_of(record, curve, asked, more)[0]) == is_kept
+    [jumps] = BY_NAME["jumps"].reasons(lacking["jumps"])
+    assert jumps.tells_of(Code.NO_MEMORY)  # so that it is not recorded
+
+
+def test_moments_of_an_unfinished_run_are_taken_with_its_budget_alone(tmp_path):
+    case = case_in(tmp_path, TEXT, ["vary={}", "output.quantities=['moment']"])
+    [curve], asked, numerics = case.curves(), everything(case), Numerics.of(case)
+    job = Job(curve, numerics, begun={2.0: Moment(0.1, 0.2, 0.0, 0.05, 0.0)})
+    record = json.loads(json.dumps(begun_record(job)))
+    assert entries_of(record, curve, asked, numerics)[1] == job.begun
+    assert not entries_of(record, curve, asked, replace(numerics, budget=Budget(unknowns=500)))[1]
+
+
+def test_the_discretisation_is_that_of_the_moments_asked_for(tmp_path):
+    """Also after a run of other moments, and where Λ(p) is known already."""
+    sets = ["vary={}", "output.quantities=['moment', 'lyapunov_exponent']", "output.eigenfunctions=[]"]
+    found = {}
+    for p, folder in (("0.5", "one"), ("40.0", "one"), ("40.0", "other"), ("0.5", "one")):
+        [result] = fpsolve.run(case_in(tmp_path, TEXT, [*sets, f"moments.p=[{p}]"]), tmp_path / folder)
+        found[p, folder] = result.discretisation
+    assert found["40.0", "one"] == found["40.0", "other"]
+    assert found["40.0", "one"]["unknowns"] > found["0.5", "one"]["unknowns"]
 
 
 def test_what_there_is_not_is_told_where_a_case_lists_it_without_solving_it_again(tmp_path, monkeypatch):
