@@ -738,6 +738,8 @@ def measurement_of(
             raise FpsolveError(f"got --{name} {each:g}; must be > 0{' and < 1' if name == 'rtol' else ', in seconds'}")
     wanted = replace(wanted, **limits)
     if stated.named:
+        of_files = "rate", "segment", "method", "sided", "averages", "column", "over", "row", "skip", "log_log"
+        _refuse_stated(stated, of_files, "is for a file, and a density was named")
         return _named(stated, of, 2 * modes.omega[0]), wanted, source
     how: dict[str, Any] = {
         "of": of,
@@ -751,16 +753,12 @@ def measurement_of(
     if spectrum is not None:
         if stated.method == "whittle":
             raise FpsolveError("--method whittle is for a record, and a spectrum was named; leave it out")
-        if stated.segment is not None:
-            raise FpsolveError("--segment is for a record, and a spectrum was named; leave it out")
+        _refuse_stated(stated, ["segment"], "is for a record, and a spectrum was named")
         if stated.rate is not None and record is None:
             raise FpsolveError("--rate is for a record, and a spectrum was named; leave it out, or name it by --record")
     if spectrum is None and record is not None:
-        for name in ("sided", "averages", "row", "log_log"):
-            if getattr(stated, name) not in (None, False):
-                raise FpsolveError(
-                    f"--{name.replace('_', '-')} is for a spectrum, and a record was named; leave it out"
-                )
+        names = "sided", "averages", "row", "log_log"
+        _refuse_stated(stated, names, "is for a spectrum, and a record was named")
         return record, wanted, source
     data = read_spectrum(
         spectrum or source,
@@ -774,6 +772,13 @@ def measurement_of(
         **how,
     )
     return data, wanted, source
+
+
+def _refuse_stated(stated: Statement, names: Sequence[str], told: str) -> None:
+    """Refuse options that are for something else. Raises `FpsolveError`."""
+    for name in names:
+        if getattr(stated, name) != getattr(NOTHING_STATED, name):
+            raise FpsolveError(f"--{name.replace('_', '-')} {told}; leave it out")
 
 
 def _named(stated: Statement, of: str, near: float) -> Spectrum:

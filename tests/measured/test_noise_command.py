@@ -284,6 +284,8 @@ def test_a_named_density_becomes_a_case(capsys):
     for more, said in (
         (["--record", "a.csv"], "in place of a file"),
         (["--scale", "0"], "state another --scale"),
+        (["--sided", "two"], "--sided is for a file, and a density was named; leave it out"),
+        (["--log-log"], "--log-log is for a file"),
     ):
         assert main(["noise", *options, *more]) == BAD_INPUT
         assert said in capsys.readouterr().err
