@@ -77,7 +77,15 @@ def test_of_unknown_names_the_nearest_are_told(name, near, capsys):
     assert f'got "{name}"; must be the name of a case' in said
     assert ('did you mean "' + near in said) == bool(near)
     assert "`fpsolve new` lists all" in said
+    assert "--kind" not in said
     assert files(Path()) == set()
+
+
+def test_where_a_file_stands_for_the_name_of_a_case_the_command_that_writes_one_is_told(capsys):
+    assert main(["new", "my own.toml"]) == BAD_INPUT
+    assert "write `fpsolve new 'my own.toml' --kind system`" in capsys.readouterr().err
+    assert main(["new", "my own.toml", "--kind", "system"]) == 0
+    assert load_case("my own.toml").problem
 
 
 def test_the_package_is_the_command():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import shlex
 import tomllib
 from collections.abc import Mapping
 from functools import cache
@@ -56,7 +57,12 @@ def copy_case(name: str, target: Path | None = None) -> Path:
     source = known.get(name.removesuffix(".toml").rpartition("/")[2])
     if source is None:
         text = f"got {shown(name)}; must be the name of a case;{nearest(name, known)} `fpsolve new` lists all of them"
-        raise FpsolveError(text)
+        more = (
+            f"; for one of your own write `fpsolve new {shlex.quote(name)} --kind system`"
+            if name.endswith(".toml")
+            else ""
+        )
+        raise FpsolveError(text + more)
     path = Path(source.name) if target is None else target / source.name if target.is_dir() else target
     text = f"#:schema {SCHEMA}\n{_NAMED.sub('', source.read_text(encoding='utf-8'))}"
     copies = {path: text}
