@@ -37,6 +37,8 @@ BETWEEN = 400
 """Frequencies between the first and the last break point of a spectrum."""
 UNEVEN = 1e-3
 """By which share of it steps of a record may differ."""
+ANGULAR = ("omega", "ω", "w")
+"""Names of frequencies in rad/s."""
 FREQUENCY_NAMES = ("f", "fn", "freq", "frequency", "frequencies", "omega", "ω", "w", "frequency_hz", "f_hz")
 TIME_NAMES = ("t", "time", "zeit", "seconds", "time_s")
 DAMPING_NAMES = ("xi", "ξ", "zeta", "ζ", "damping", "dampings", "damping ratio", "damping_ratio", "damping_ratios")
@@ -104,6 +106,9 @@ def read_spectrum(
         for found, where in ((stated, f_name), (signal.per, name)):
             if found and per and found != per:
                 raise ValueError(f"has {found} in the unit of {where}, and {per} was stated; state --per {found}")
+        if f_name.lower() in ANGULAR and signal.per == "Hz" and not (per or stated):
+            text = f"has a density per Hz, but frequencies called {f_name}; state --per Hz if they are in Hz"
+            raise ValueError(f"{text}, or convert one of both")
         per = per or stated or signal.per  # type: ignore[assignment]
         if per is None or not per:
             raise ValueError('states no unit of its frequencies; state per, "Hz" or "rad/s" (--per)')
@@ -278,7 +283,7 @@ def read_modes(path: str | Path) -> tuple[Mode, ...]:
         if over is None:
             raise ValueError(f"has no column of natural frequencies, such as Fn; {_has(table)}")
         column = table.columns[over]
-        per = FREQUENCIES.get(among(column.unit, FREQUENCIES), "rad/s" if over.lower() in ("omega", "ω", "w") else "Hz")
+        per = FREQUENCIES.get(among(column.unit, FREQUENCIES), "rad/s" if over.lower() in ANGULAR else "Hz")
         f = column.values / (2 * math.pi if per == "rad/s" else 1.0)
         damping = next((names[each] for each in DAMPING_NAMES if each in names), None)
         zeta: FloatArray = np.full(f.size, math.nan)

@@ -364,6 +364,14 @@ def test_channels_that_are_called_by_numbers_are_no_frequencies(tmp_path):
     assert read_spectrum(tmp_path / "a.csv", sided="one", column="3").density == pytest.approx(D / 2)
 
 
+def test_frequencies_that_are_called_omega_are_not_taken_in_hertz(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text("omega,G (1/Hz)\n" + rows(F, D), encoding="utf-8")
+    with pytest.raises(FpsolveError, match="frequencies called omega; state --per Hz"):
+        read_spectrum(path, sided="one")
+    assert read_spectrum(path, sided="one", per="Hz").frequencies == pytest.approx(2 * math.pi * F)
+
+
 def test_rows_are_left_out_at_the_beginning(tmp_path):
     (tmp_path / "a.csv").write_text("t (s),a (g)\n" + rows(T, X), encoding="utf-8")
     np.save(tmp_path / "b.npy", X)
