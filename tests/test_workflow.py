@@ -722,6 +722,25 @@ def test_an_interrupted_curve_keeps_its_moments_and_goes_on(tmp_path, monkeypatc
     assert read_json(folder / "summary.json")["complete"]
 
 
+def test_of_an_interrupted_curve_only_the_p_that_are_asked_for_are_in_tables(tmp_path, monkeypatch):
+    """Where it was begun with others, too, which are kept for the next time."""
+    solution, asked = ExponentSolver.solution, set[float]()
+
+    def interrupted(self, p, tolerance=None):
+        asked.add(p)
+        if len(asked) > 2:
+            raise KeyboardInterrupt
+        return solution(self, p, tolerance)
+
+    monkeypatch.setattr(ExponentSolver, "solution", interrupted)
+    for p, count in (([-1.0, 2.0, 3.0], 2), ([0.5, 1.5], 0), ([-1.0, 2.0, 3.0], 2)):
+        with pytest.raises(KeyboardInterrupt):
+            fpsolve.run(case_in(tmp_path, TEXT, [*GROWING, f"moments.p={p}"]), tmp_path / "out")
+        found = table(tmp_path / "out/test").keys()
+        assert len(found) == count
+        assert found <= set(p)
+
+
 @pytest.mark.parametrize("name", ["stability_index", "critical_impact_factor"])
 def test_an_interrupted_curve_keeps_its_indices(tmp_path, monkeypatch, name):
     """λ comes before δ_p, and what was found is not sought again."""

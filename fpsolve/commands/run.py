@@ -70,10 +70,10 @@ def run(
         if json:
             print(whole_summary(case, outcome.results, outcome.facts))
         else:
-            what = done_of(case, len(outcome.results), sum(each.status.fails for each in outcome.results))
+            what = done_of(case, len(outcome.results), outcome.failed)
             options.print_written(case, what, start, known_of(case, outcome.known, outcome.outdated))
         if outcome.interruption:
             return INTERRUPTED
-        if outcome.failures or (outcome.samples and outcome.samples.failed):
+        if outcome.failed or (outcome.samples and outcome.samples.failed):
             code = NOT_CONVERGED
     return code

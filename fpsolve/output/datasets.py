@@ -7,7 +7,7 @@ import json
 import math
 import os
 import warnings
-from collections.abc import Hashable, Iterable, Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from glob import glob
 from itertools import chain
@@ -23,8 +23,7 @@ from fpsolve.exponent.quantities import MOMENT
 from fpsolve.files import atomic
 from fpsolve.model.quantity import STATUS, P
 from fpsolve.results.table import Table
-from fpsolve.study.columns import columns_of, row_of
-from fpsolve.study.results import CurveResult, Status
+from fpsolve.study.results import Status
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -32,7 +31,6 @@ if TYPE_CHECKING:
 SET = "set"
 """The dimension of parameter sets that are no product."""
 RESULTS = "results.nc"
-NO_P = np.zeros(0)
 ROW = "row"
 """The dimension of many runs."""
 MOST_COMPRESSED = 1000
@@ -54,7 +52,7 @@ class Variable:
     attributes: Mapping[str, Any]
 
 
-def write_dataset(case: Case, results: Iterable[CurveResult], folder: Path, facts: Mapping[str, Any]) -> None:
+def write_dataset(case: Case, table: Table, folder: Path, facts: Mapping[str, Any]) -> None:
     """results.nc, for xarray and whatever reads netCDF-4; what is missing or failed is NaN.
 
     There is a dimension for each varied key, or `set` for those of a list, and p.
@@ -62,12 +60,13 @@ def write_dataset(case: Case, results: Iterable[CurveResult], folder: Path, fact
     xarray would write the same, but takes with pandas and Dask as long to import as small cases take in all.
 
     Args:
+        table: the numbers of all curves.
         facts: on the run, see `facts_of`; they become attributes, tables as JSON.
     """
     import h5netcdf
     import h5py
 
-    variables, coordinates = _variables(case, results), _coordinates(case)
+    variables, coordinates = _variables(case, table), _coordinates(case)
     beside = " ".join(name for name, each in coordinates.items() if each.dims != (name,))
     content = io.BytesIO()  # HDF5 does not survive a full disk
     with h5netcdf.File(content, "w") as file:
@@ -88,15 +87,12 @@ def write_dataset(case: Case, results: Iterable[CurveResult], folder: Path, fact
         draft.write_bytes(content.getvalue())
 
 
-def _variables(case: Case, results: Iterable[CurveResult]) -> dict[str, Variable]:
+def _variables(case: Case, table: Table) -> dict[str, Variable]:
     """The numbers of all sets."""
-    vary, planned = case.vary, case.planned
+    vary = case.vary
     is_list = bool(vary) and vary.mode != "product"
     over: tuple[str, ...] = (SET,) if is_list else vary.keys
-    shape = (planned,) if is_list else tuple(len(vary.values(key)) for key in over)
-    table = Table(columns_of(case), planned, case.p if MOMENT.name in case.asked else NO_P)
-    for result in results:
-        table.put(result.curve.number - 1, row_of(case, result))
+    shape = (case.planned,) if is_list else tuple(len(vary.values(key)) for key in over)
     found = {name: (each.quantity, each.values) for name, each in table.items()}
     status = np.where(np.isnan(table[STATUS.name].values), Status.MISSING, table[STATUS.name].values)
     found[STATUS.name] = STATUS, status.astype(np.int8)

@@ -52,6 +52,8 @@ from fpsolve.study.chart import charted
 from fpsolve.study.results import CurveResult, SimulatedCurve
 from fpsolve.study.solve import Asked, everything, result_of
 
+SOLVED_RECORDS = "records/solved"
+"""The folder of the records of sets."""
 RESULT_VERSION = 5
 """Of what is computed from the same parameters; records of another one are computed anew."""
 SHARED_SECONDS = 60.0
@@ -98,7 +100,7 @@ class Records:
 
     def look(self) -> Records:
         """Find what has been written by now, since the last look."""
-        for path in self._files():
+        for path in self.files:
             start = self._seen.get(path.name, 0)
             with path.open("rb") as file:
                 file.seek(start)
@@ -125,6 +127,8 @@ class Records:
 
     def addresses(self, key: str) -> tuple[Address, ...]:
         """All records of a key."""
+        if not self._addresses:
+            self.look()
         return self._addresses.get(key, ())
 
     def expect(self, address: Address) -> None:
@@ -156,10 +160,11 @@ class Records:
         """Start over."""
         self._addresses.clear()
         self._seen.clear()
-        for path in self._files():
+        for path in self.files:
             path.unlink()
 
-    def _files(self) -> list[Path]:
+    @property
+    def files(self) -> list[Path]:
         """The files of records; folders and pipes are none, whatever they are called."""
         return sorted(path for path in self.folder.glob("*.jsonl") if path.is_file())
 
@@ -197,23 +202,37 @@ class Results(Sequence[CurveResult]):
             self._given[number] = found
         self._kept.pop(number, None)
 
+    def add_all(self) -> None:
+        """Count all curves among those that are known, each with the records that are found when it is looked at."""
+        self._order = list(range(1, self._case.planned + 1))
+
+    @property
+    def are_kept(self) -> bool:
+        """Whether all that is known is in records, where a further run finds it."""
+        return not self._given
+
     def find(self, curve: Curve) -> bool:
         """Look for the records of a curve; whether they have all that is asked of it, which can be read."""
         places = self._records.addresses(set_key(curve))
         if not places:
             return False
         self._places[curve.number] = places
-        asked, (entries, _) = self.asked(curve.number), self.entries(curve)
-        is_whole = asked.keys() <= entries.keys() or (MOMENTS.name in entries and entries[MOMENTS.name].reason)
-        if is_whole:
+        entries, _ = self.entries(curve)
+        if is_whole := self._is_whole(curve, entries):
             self.add(curve.number)
             self._keep(curve, entries, {})
-        return bool(is_whole)
+        return is_whole
+
+    def _is_whole(self, curve: Curve, entries: Mapping[str, Entry]) -> bool:
+        has_failed = MOMENTS.name in entries and entries[MOMENTS.name].reason is not None
+        return has_failed or self.asked(curve.number).keys() <= entries.keys()
 
     def entries(self, curve: Curve) -> tuple[dict[str, Entry], dict[float, Moment]]:
         """Of a curve the entries that are known and asked for, and Λ(p), by p, where others are still to be solved."""
         record: Record = {}
-        for place in self._places.get(curve.number, ()):
+        if curve.number not in self._places:
+            self._places[curve.number] = self._records.addresses(set_key(curve))
+        for place in self._places[curve.number]:
             with suppress(OSError, ValueError):  # which counts as none
                 found = self._records.read(place)
                 record |= found if isinstance(found, dict) else {}
@@ -249,7 +268,9 @@ class Results(Sequence[CurveResult]):
         """The result of a curve, which stays in memory as long as there is room."""
         result = result_of(curve, self.asked(curve.number), self._numerics, entries, begun)
         size = sum(place.size for place in self._places.get(curve.number, ()))
-        if size <= self._room:
+        if not self._is_whole(curve, entries):
+            self._given[curve.number] = result
+        elif size <= self._room:
             self._room -= size
             self._kept[curve.number] = result
         return result
@@ -323,7 +344,7 @@ def part_key(part: Part, settings: Settings, numerics: Numerics, *, is_limited: 
 
 
 @lru_cache(maxsize=64)
-def _part_keys(asked: str, numerics: Numerics) -> dict[str, tuple[str, str]]:
+def part_keys(asked: str, numerics: Numerics) -> dict[str, tuple[str, str]]:
     """The keys of what is asked for, as JSON: of entries that no budget limits, and of others."""
     return {
         name: (
@@ -342,7 +363,7 @@ def begun_key(numerics: Numerics) -> str:
 
 def record_of_set(curve: Curve, asked: Asked, numerics: Numerics, entries: Mapping[str, Entry]) -> Record:
     """The record of what was solved of a set, without what failed for a reason that may be gone the next time."""
-    keys, record = _part_keys(json.dumps(asked), numerics), Record()
+    keys, record = part_keys(json.dumps(asked), numerics), Record()
     for name, entry in entries.items():
         part = BY_NAME[name]
         said = list(messages_of(part, entry, curve, numerics))
@@ -377,7 +398,7 @@ def entries_of(
     An entry that cannot be read, or does not fit, is none.
     """
     entries = dict[str, Entry]()
-    for name, keys in _part_keys(json.dumps(asked), numerics).items():
+    for name, keys in part_keys(json.dumps(asked), numerics).items():
         for data in (record[key] for key in reversed(keys) if key in record):  # what no budget limits counts
             with suppress(ValueError):
                 entries[name] = _entry_of(data, BY_NAME[name], curve, asked[name])

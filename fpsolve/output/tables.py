@@ -27,7 +27,7 @@ from fpsolve.model.kinds import version_of
 from fpsolve.model.quantity import MOMENT, Quantity
 from fpsolve.parts.every import PARTS
 from fpsolve.parts.intervals import SAMPLE, Samples, plain_spread
-from fpsolve.results.table import Row, plain, rows_over_p
+from fpsolve.results.table import NO_P, Row, Table, plain, rows_over_p
 from fpsolve.study.columns import columns_of, row_of
 from fpsolve.study.results import CurveResult, SimulatedCurve, Status
 
@@ -64,8 +64,8 @@ def _packages() -> dict[str, str]:
 
 def write_results(
     case: Case, results: Sequence[CurveResult], folder: Path, facts: Mapping[str, Any], finished: int | None = None
-) -> None:
-    """summary.json, which says whether all curves of the case are there, moments.csv and curves.csv, in one go.
+) -> Table:
+    """Write summary.json, which says whether all curves are there, moments.csv and curves.csv; return their numbers.
 
     Of many curves summary.json has the state, the messages and what no other table has; see `MOST_SUMMARISED`.
 
@@ -76,6 +76,7 @@ def write_results(
     columns, is_short = columns_of(case), case.planned > MOST_SUMMARISED
     over_p, of_curve = _names(columns)
     of_curve = [name for name in of_curve if not name.endswith("_perturbation")]  # which others have
+    table = Table(columns, case.planned, case.p if MOMENT.name in case.asked else NO_P)
     with ExitStack() as stack:
         summary, moments, curves = (
             stack.enter_context(draft(folder / name)) for name in ("summary.json", "moments.csv", "curves.csv")
@@ -86,11 +87,13 @@ def write_results(
         summary.write(_beginning(case, len(results) if finished is None else finished, facts, held=is_short))
         for number, result in enumerate(results):
             row, varied = row_of(case, result), result.curve.varied.values()
+            table.put(result.curve.number - 1, row)
             content = _short_summary(case, result) if is_short else _summary(case, result, row, columns)
             summary.write(_entry(case, number, content))
             by_moment.writerows([*varied, *each] for each in rows_over_p(row, over_p))
             by_curve.writerow([*varied, *(_cell(row.get(name)) for name in of_curve)])
         summary.write(_END)
+    return table
 
 
 def _names(columns: Sequence[Quantity]) -> tuple[list[str], list[str]]:

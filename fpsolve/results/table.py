@@ -16,6 +16,8 @@ from fpsolve.arrays import FloatArray
 from fpsolve.data import Quantity
 
 Row = Mapping[str, Any]
+NO_P = np.zeros(0)
+"""The p of curves that have no numbers over p."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -137,7 +137,8 @@ def result_of(
     if (entry := entries.get(MOMENTS.name)) and entry.reason:
         return failed(curve, entry.reason.message)
     known = {name: entry.found for name, entry in entries.items() if name in asked and entry.found is not None}
-    moments: Moments = known.get(MOMENTS.name) or (unfinished(curve.problem, begun) if begun else Moments(NO_MOMENTS))
+    wanted = {p: begun[p] for p in asked.get(MOMENTS.name, {}).get("p", ()) if begun and p in begun}
+    moments: Moments = known.get(MOMENTS.name) or (unfinished(curve.problem, wanted) if wanted else Moments(NO_MOMENTS))
     said: dict[Severity, list[Message]] = {each: [] for each in Severity}
     reasons = list[tuple[Part, Reason]]()
     for part in PARTS:

@@ -48,13 +48,12 @@ from fpsolve.workflow.folders import (
 )
 from fpsolve.workflow.progress import NODES, PERCENT, POINTS, SETS, SILENT, Phase, Watch, ignore
 from fpsolve.workflow.reports import facts_since, shown_at_the_end
+from fpsolve.workflow.seal import TABLES
 from fpsolve.workflow.sets import Lines, Simulations, Sweep
 
 if TYPE_CHECKING:
     from fpsolve.workflow.reports import Reporter
 
-TABLES = "summary.json", "curves.csv", "moments.csv", "results.nc"
-"""The files with all numbers of a run."""
 SAMPLING = ("sample.json",)
 """The file with all numbers of samples."""
 SIMULATION = ("monte_carlo.json",)
@@ -76,6 +75,7 @@ class Outcome:
         facts: versions, the command and the time of a run that solves, see `facts_of`.
         known: how many of its curves an earlier run had finished.
         outdated: how many records of its curves another version has written; these are not used.
+        failed: how many of its curves have failed in a run, also in part.
         samples: what the samples of its uncertain parameters say; None where there are none.
     """
 
@@ -87,6 +87,7 @@ class Outcome:
     facts: Mapping[str, Any] = field(default_factory=dict)
     known: int = 0
     outdated: int = 0
+    failed: int = 0
     samples: Samples | None = None
 
     @property
@@ -106,8 +107,9 @@ def run(
 ) -> tuple[CurveResult, ...]:
     """Solve a case, write `out`/<name of the case>/, and return the results, one for each curve.
 
-    Sets that an earlier run finished there, also one that was killed, are not solved again. Each run rewrites all other
-    files, and removes what a simulation of other parameters wrote. summary.json says whether all curves are there.
+    Sets that an earlier run finished there, also one that was killed, are not solved again, and tables that have all of
+    them stay. Each run rewrites all other files, and removes what a simulation of other parameters wrote. summary.json
+    says whether all curves are there.
 
     Args:
         case: a case file, or what `load_case` made of it.
@@ -168,7 +170,7 @@ def run_case(
     interruption = ""
     simulators = pool if pool and pool.is_elsewhere else None
     replaced = (SOLVED, SIMULATED) if monte_carlo else (SOLVED,)
-    with own_folder(case, out, replaced) as folder:
+    with own_folder(case, out, replaced, is_fresh=is_fresh) as folder:
         sweep = _solve(case, folder, pool or serial(), watch, is_fresh=is_fresh)
 
         def show() -> None:
@@ -187,7 +189,7 @@ def run_case(
                     show_claims(sweep.results, folder),
                     intervals.show_samples(case, samples) if samples else (),
                     simulation.show(case, simulated, sweep.results, folder) if simulated else (),
-                    notes(case, sweep.results),
+                    sweep.told.notes,
                     notes(case, simulated, MONTE_CARLO),
                     (note_on(case.name, each) for each in (samples.remarks if samples else ())),
                 )
@@ -198,7 +200,7 @@ def run_case(
         told = saying_if_interrupted(lambda: f"; what was {'done' if simulated else 'solved'} is kept in {folder}")
         with told, shown_at_the_end(show):
             watch.shown(results.show(case, sweep.results, folder))
-            watch.noted(notes(case, sweep.results))
+            watch.noted(sweep.told.notes)
             if case.uncertain.sample:
                 samples = _sample(case, sweep, folder, pool or serial(), watch, is_fresh=is_fresh)
             if monte_carlo:
@@ -212,7 +214,8 @@ def run_case(
         interruption,
         facts=sweep.facts,
         known=sweep.known,
-        outdated=sweep.records.outdated,
+        outdated=sweep.told.outdated,
+        failed=sweep.told.failed,
         samples=samples,
     )
 

@@ -14,13 +14,16 @@ from pathlib import Path
 from time import monotonic
 from typing import Any, ClassVar
 
+import numpy as np
+
 from fpsolve.analysis.stability import Boundary
 from fpsolve.analysis.zero import Zero
 from fpsolve.case.case import Case, Curve
 from fpsolve.case.sections import Varied
-from fpsolve.model.quantity import MOMENT
+from fpsolve.model.quantity import MOMENT, STATUS
 from fpsolve.output.datasets import write_dataset
 from fpsolve.output.records import (
+    SOLVED_RECORDS,
     Address,
     Line,
     Records,
@@ -42,15 +45,17 @@ from fpsolve.parts.every import BY_NAME, PARTS
 from fpsolve.parts.moments import PART as OF_P
 from fpsolve.parts.part import Job, Numerics
 from fpsolve.pool import Pool, serial
-from fpsolve.study.results import CurveResult, SimulatedCurve, Solved
+from fpsolve.results.table import Table
+from fpsolve.show.notes import notes
+from fpsolve.study.results import CurveResult, SimulatedCurve, Solved, Status
 from fpsolve.study.simulate import simulate_curve, simulate_curves, simulation_steps, simulation_work
 from fpsolve.study.solve import Order, batches, result_of, solve_batch
 from fpsolve.workflow.progress import MOMENTS, SETS, Advance, Phase
+from fpsolve.workflow.seal import Told, seal, sealed
 
 Found = tuple[int, Address | CurveResult | None, bool]
 """The number of a curve, its numbers where they are new, and whether some of these are missing."""
-SOLVED_RECORDS, SIMULATED_RECORDS = "records/solved", "records/simulated"
-LINE_RECORDS = "records/charted"
+SIMULATED_RECORDS, LINE_RECORDS = "records/simulated", "records/charted"
 REST = 50
 """Tables are rewritten when so many times as long has gone by as the last time took, so that all of it costs little."""
 
@@ -102,6 +107,7 @@ class Sweep(_Kept):
     """All sets of a case on the way to being solved."""
 
     place = SOLVED_RECORDS
+    told: Told
 
     def __init__(self, case: Case, folder: Path, *, is_fresh: bool = False) -> None:
         super().__init__(case, folder.resolve(), is_fresh=is_fresh)
@@ -110,7 +116,13 @@ class Sweep(_Kept):
         self.results, self.facts = Results(case, self.records, self.numerics), dict[str, Any]()
         self._settled, self._due, self._unfinished = 0, 0.0, set[int]()
         self._steps_each = max(case.p.size if MOMENT.name in case.asked else 0, 1) if case.planned == 1 else 1
-        self.find()
+        self.sealed = None if is_fresh else sealed(case, self.folder)
+        if self.sealed:
+            self.told, self.facts = self.sealed, facts_of(case, self.started, monotonic() - self._clock)
+            self.results.add_all()
+            self._settled = case.planned
+        else:
+            self.find()
         self.known = len(self.results)
 
     @property
@@ -154,6 +166,8 @@ class Sweep(_Kept):
         is_alone = self.case.planned == 1 and not pool.is_elsewhere
         if self._settled:
             progress(self._settled * self._steps_each, known=True)
+        if self.sealed:
+            return
         kept = partial(keep, self.folder, self.numerics)
         growing = self._grow if is_alone else partial(grow, self.folder, self.numerics)
         task = partial(solve_batch, problem=self.case.problem, numerics=self.numerics, keep=kept, grow=growing)
@@ -172,20 +186,27 @@ class Sweep(_Kept):
                 if monotonic() >= self._due:
                     self.write_tables()
 
-    def write_tables(self) -> None:
+    def write_tables(self) -> Table:
+        """Write summary.json, moments.csv and curves.csv; return their numbers."""
         started, self.facts = monotonic(), facts_of(self.case, self.started, monotonic() - self._clock)
-        write_results(self.case, self.results, self.folder, self.facts, self.done)
+        table = write_results(self.case, self.results, self.folder, self.facts, self.done)
         self._due = monotonic() + REST * (monotonic() - started)
+        return table
 
     def write_all(self) -> None:
-        """Write the tables, results.nc, the series over the curves, and the files of parts."""
-        self.write_tables()
+        """Write the tables, results.nc, the series over the curves, and the files of parts; sealed tables stay."""
+        table = None if self.sealed else self.write_tables()
         write_curves(self.case, self.folder)
         writers = [part.files for part in PARTS if part.files and part.name in self.results.asked(1)]
         for result in self.results if writers else ():
             for write in writers:
                 write(result, self.folder)
-        write_dataset(self.case, self.results, self.folder, self.facts)
+        if table is not None:
+            write_dataset(self.case, table, self.folder, self.facts)
+            failed = int(np.isin(table[STATUS.name].values, [each for each in Status if each.fails]).sum())
+            self.told = Told(failed, self.records.outdated, tuple(notes(self.case, self.results)))
+            if self.done == self.case.planned and self.results.are_kept and not self._is_drawn(1):
+                seal(self.case, self.folder, self.told)
 
     def _is_drawn(self, number: int) -> bool:
         """Whether pictures of a set are wanted, which are drawn in each run."""

@@ -17,6 +17,7 @@ from fpsolve.errors import FpsolveError, NotConverged
 from fpsolve.exponent.quantities import INDICES
 from fpsolve.model.quantity import MOMENT
 from fpsolve.output.datasets import write_dataset
+from fpsolve.output.tables import write_results
 from tests.kit import ALL, case_in, case_text, read_json
 
 TEXT = case_text("[moments]\np = [2.0, 0.0, -1.0]\n[output]\neigenfunctions = []\nfigure = false\n")
@@ -74,7 +75,7 @@ def test_a_full_disk_is_an_error_and_leaves_nothing_behind(tmp_path):
     resource.setrlimit(resource.RLIMIT_FSIZE, (4000, most))
     try:
         with pytest.raises(OSError, match="too large"):
-            write_dataset(case, results, tmp_path / "full", {})
+            write_dataset(case, write_results(case, results, tmp_path, {}), tmp_path / "full", {})
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, limits)
     assert not list((tmp_path / "full").iterdir())

@@ -12,6 +12,7 @@ from fpsolve.case.vary import map_key
 from fpsolve.drawing import label_of
 from fpsolve.output.datasets import write_dataset
 from fpsolve.output.figures import Encoding, draw
+from fpsolve.output.tables import write_results
 from fpsolve.theory.perturbation import second_order
 from tests.conftest import sampled
 from tests.output.drawing import case_of, drawn_case, results_of, texts, tick_labels, words
@@ -192,7 +193,7 @@ def test_a_parameter_is_called_alike_in_all_figures(drawn, tmp_path):
     along, over_it, bar = (
         drawn[0].axes[0].get_ylabel(), drawn[1].axes[0].get_xlabel(), drawn[2].axes[1].get_ylabel(),
     )  # fmt: skip
-    write_dataset(case, results_of(case), tmp_path, {})
+    write_dataset(case, write_results(case, results_of(case), tmp_path, {}), tmp_path, {})
     with xr.open_dataset(tmp_path / "results.nc") as found:
         assert {along, over_it, bar, label_of(found["noise.D0"].attrs)} == {"noise intensity $D_0$ (1/time)"}
         assert drawn[2].axes[0].get_xlabel() == label_of(found["p"].attrs) == "order of the moment $p$"
