@@ -8,6 +8,7 @@ lies on its side: these are frequencies, and each row is a spectrum.
 from __future__ import annotations
 
 import csv
+import math
 import re
 import warnings
 from collections import Counter
@@ -176,7 +177,11 @@ def read_text_table(path: Path, skip: int = 0) -> Table:
 
 
 def _is_number(cell: str) -> bool:
-    return bool(cell) and _NUMBER.fullmatch(cell) is not None
+    """Whether a heading is a number with a decimal point."""
+    try:
+        return math.isfinite(float(cell))
+    except ValueError:
+        return False
 
 
 def _cells(line: str, separator: str | None) -> list[str]:

@@ -357,6 +357,13 @@ def test_units_are_never_guessed_silently(tmp_path):
     assert read_record(path, of="acceleration", unit="g").values == pytest.approx(G * (X - X.mean()))
 
 
+@pytest.mark.parametrize("slip", ["4,2500", "4d0"])
+def test_a_slip_in_the_frequencies_of_a_header_is_refused(slip, tmp_path):
+    (tmp_path / "a.txt").write_text(buoy().replace(f" {F[84]:.4f} ", f" {slip} ", 1), encoding="utf-8")
+    with pytest.raises(FpsolveError, match="several columns of values"):
+        read_spectrum(tmp_path / "a.txt", per="Hz", sided="one")
+
+
 def test_channels_that_are_called_by_numbers_are_no_frequencies(tmp_path):
     (tmp_path / "a.csv").write_text("f (Hz),1,2,3,4,5\n" + rows(F, *[D] * 5), encoding="utf-8")
     with pytest.raises(FpsolveError, match="several columns of values; state one by --column"):
