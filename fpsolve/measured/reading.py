@@ -112,10 +112,8 @@ def read_spectrum(
         per = per or stated or signal.per  # type: ignore[assignment]
         if per is None or not per:
             raise ValueError('states no unit of its frequencies; state per, "Hz" or "rad/s" (--per)')
-        known = (
-            None if unit is None else _density_unit(unit, "--unit") if _is_density(unit) else Density(powers(unit), "")
-        )
-        factor, more = _factor(of, (known or signal).signal, unit or density.unit, name)
+        known = signal.signal if unit is None else _signal_of(unit)
+        factor, more = _factor(of, known, unit or density.unit, name)
         keep = slice(None) if table.rows is None else density.values > 0  # buoys write 0 where there are no waves
         values = density.values[keep] * (factor * checked_scale(scale)) ** 2
         _refuse_wrong_rows(table, f.values, density.values[keep], f_name, name)
@@ -141,11 +139,13 @@ def _between(f: FloatArray, density: FloatArray) -> tuple[FloatArray, FloatArray
     return places, np.exp(np.interp(np.log(places), np.log(f), np.log(density)))
 
 
-def _is_density(unit: str) -> bool:
+def _signal_of(unit: str) -> Powers | None:
+    """The unit of the signal in one that is stated, of the signal or of its density."""
     try:
-        return density_unit(unit).signal is not None
+        of_density = density_unit(unit).signal
     except ValueError:
-        return False
+        of_density = None
+    return powers(unit) if of_density is None else of_density
 
 
 def _of_rows(table: Table, name: str, row: int | None) -> tuple[Column, tuple[str, ...]]:

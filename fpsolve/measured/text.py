@@ -172,8 +172,14 @@ def read_text_table(path: Path, skip: int = 0) -> Table:
     places = {name: k for k, name in enumerate(names) if k not in ends}
     columns = _Columns(table, places, dict(zip(names, units, strict=True)))
     notes = () if not above or header else (f"left out the lines 1 to {above[-1]}, which have no names of columns",)
-    read = _without_index(columns), None, _stamps(columns, first)
-    return Table(path, *read, lines=table.numbers, notes=notes, sideways=sideways)
+    return Table(
+        path,
+        _without_index(columns),
+        abscissa=_stamps(columns, first),
+        lines=table.numbers,
+        notes=notes,
+        sideways=sideways,
+    )
 
 
 def _is_number(cell: str) -> bool:
