@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
+from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
@@ -61,6 +62,21 @@ def write_vtk(path: Path, grid: Any, facts: Facts) -> None:
     writer.WriteToOutputStringOn()
     writer.Write()
     write_text(path, writer.GetOutputString())
+
+
+def name_at(stem: str, p: float) -> str:
+    """The file of an eigenfunction, seen from its collection."""
+    return f"{stem}/p{p + 0.0:+}.vtu"
+
+
+def collection_of(entries: Iterable[tuple[float, str, str]]) -> str:
+    """The XML of a ParaView collection: times, the file for each, and a name for it that may be empty."""
+    sets = [
+        f'    <DataSet timestep="{time}"{f" name={quoteattr(name)}" if name else ""} file={quoteattr(file)}/>'
+        for time, file, name in entries
+    ]
+    head = '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n  <Collection>'
+    return "\n".join([head, *sets, "  </Collection>", "</VTKFile>", ""])
 
 
 def pyvista_module() -> Any:

@@ -807,7 +807,7 @@ def test_an_output_in_ascii_has_words_for_greek(case, command, monkeypatch):
             "interrupted after 2 of 2 curves; what was done is kept in results/test",
         ),
         ("fpsolve.page.terminal", "print_blocks", "interrupted; what was solved is kept in results/test"),
-        ("fpsolve.workflow.cases", "draw", "interrupted; what was solved is kept in results/test"),
+        ("fpsolve.show.results", "write_figures", "interrupted; what was solved is kept in results/test"),
     ],
 )
 def test_an_interrupt_says_what_is_kept_in_every_phase(case, capsys, monkeypatch, module, name, message):

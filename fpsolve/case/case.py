@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from hashlib import sha256
@@ -145,6 +145,13 @@ class Curve:
     def suffix(self) -> str:
         """What the names of its files end in: nothing for the first curve, "-2" for the second."""
         return "" if self.number == 1 else f"-{self.number}"
+
+    def held(self, time_unit: str, varied: Collection[str] = ()) -> list[str]:
+        """The parameters but the varied ones in words, without the nonlinear ones that are 0, for a figure."""
+        known, linear = self.problem.parameters, self.problem.differentiable
+        left = {*varied, *(key for key, each in known.items() if each.value == 0 and key not in linear)}
+        held = {key: value for key, value in self.parameters.items() if key not in left}
+        return [known[key].quantity.timed(time_unit).stated(value) for key, value in held.items()]
 
     @property
     def theory_reduces_noise(self) -> bool:

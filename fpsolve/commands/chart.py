@@ -38,7 +38,7 @@ def chart(
         if options.quiet:
             print_blocks(note_on(case.name, each) for each in dict.fromkeys(found.failures))
         else:
-            print_blocks(show_chart(case, found, options.out / case.name))
+            print_blocks(show_chart(case, found))
         options.print_written(case, traced(found), start)
         if found.failures:
             code = NOT_CONVERGED

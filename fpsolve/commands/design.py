@@ -28,8 +28,8 @@ from fpsolve.files import writable, write_json, write_text
 from fpsolve.messages import Code, Message
 from fpsolve.output.tables import head
 from fpsolve.page.page import Block, Column, Grid, Sentence
+from fpsolve.results.text import plural
 from fpsolve.show.notes import note_on
-from fpsolve.show.text import plural
 from fpsolve.workflow.folders import ANEW, DESIGNED, own_folder, saying_if_interrupted
 from fpsolve.workflow.progress import SILENT, SOLVES, Phase, Watch
 from fpsolve.workflow.reports import facts_since

@@ -56,8 +56,8 @@ from fpsolve.model import Noise, ParametricOscillator, PlaneSystem, Problem, Vib
 from fpsolve.model.plane import System
 from fpsolve.model.systems.vibro_impact import ImpactLaw
 from fpsolve.page.page import Block, Column, Grid, Sentence
+from fpsolve.results.text import percent, sampled
 from fpsolve.show.notes import note_on
-from fpsolve.show.text import percent, sampled
 from fpsolve.workflow.progress import SILENT, SOLVES, Phase, Watch
 
 NON_GAUSSIAN = "non-gaussian"

@@ -1,4 +1,4 @@
-"""Results become files, text and pictures."""
+"""Results become tables, records and figures."""
 
 import lazy_loader
 

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterable
+from collections.abc import Sequence
+from functools import partial
+from html import escape
 from pathlib import Path
 from string import ascii_lowercase
 from textwrap import wrap
@@ -15,11 +17,13 @@ import numpy as np
 from fpsolve.analysis.regions import P_BIFURCATIONS, Regions
 from fpsolve.analysis.zero import Axis, Zero
 from fpsolve.arrays import FloatArray
-from fpsolve.case.case import Case, Curve
+from fpsolve.case.case import Case
 from fpsolve.case.sections import Varied
 from fpsolve.drawing import COLOURS, Format, figure_for, label_axes, scale_axis
 from fpsolve.files import parsed_json, plain_text, write_csv, write_json
 from fpsolve.output.tables import head, in_case_words
+from fpsolve.page.page import Drawing
+from fpsolve.page.plots import line_of, plot_of
 from fpsolve.study.chart import Chart, charted
 
 _TINTS = ("#FFFFFF", "#F3EFE6", "#E9DFCB", "#DBCBAA", "#C9B388")
@@ -82,13 +86,19 @@ def write_chart(case: Case, chart: Chart, folder: Path) -> None:
     write_json(folder / "chart.json", summary)
 
 
-def draw_chart(case: Case, chart: Chart, folder: Path, *, into: Path | None = None) -> None:
-    """chart.png and .pdf, or `into` another file: the lines, their closed forms dashed, and the regions with names."""
-    frame, unit = (charted(case).x.axis, charted(case).y.axis), case.units.time
+def chart_figure(case: Case, chart: Chart) -> Drawing:
+    """chart.png and .pdf; none where there is no line."""
+    keys = f"{charted(case).x.key} and {charted(case).y.key}"
+    job, plot = partial(_draw, case, chart), partial(_plot_of_chart, case, chart)
+    return Drawing(f"Where stability ends, over {keys}", job, "chart", case.headline, plot=plot)
+
+
+def _draw(case: Case, chart: Chart, paths: Sequence[Path], heading: str) -> None:
+    """The lines, their closed forms dashed, and the regions with names."""
+    frame = charted(case).x.axis, charted(case).y.axis
     keys = frame[0].key, frame[1].key
-    held = held_in_words(case.curve({}), keys, unit)
-    paths = [into] if into else [folder / "chart.png", folder / "chart.pdf"]
-    with figure_for(paths, "" if into else case.headline, held, _FORM) as figure:
+    held = case.curve({}).held(case.units.time, keys)
+    with figure_for(paths, heading, held, _FORM) as figure:
         axes = figure.add_subplot()
         label_axes(axes, *(case.about(key).attributes for key in keys))
         for axis, side in zip((axes.xaxis, axes.yaxis), frame, strict=True):
@@ -117,6 +127,19 @@ def draw_chart(case: Case, chart: Chart, folder: Path, *, into: Path | None = No
                 axes.plot([], [], marker, label=name, color="0.35", markersize=7, markerfacecolor="none")
         for name, letter in small.items():
             axes.plot([], [], " ", label=f"{letter}: {name}")
+
+
+def _plot_of_chart(case: Case, chart: Chart) -> dict[str, Any]:
+    """The lines, with their special points."""
+    lines = []
+    for line in chart.lines:
+        for branch in line.branches:
+            x, y, labels = branch.x.tolist(), branch.y.tolist(), list(branch.labels)
+            ends = slice(1 if branch.closed else 0)
+            text = [escape(label) for label in labels + labels[ends]]
+            lines.append(line_of(line.zero.equation, x + x[ends], y + y[ends], text=text))
+    frame = charted(case).x, charted(case).y
+    return plot_of("Where stability ends", lines, [{"title": {"text": escape(a.key)}, "type": a.scale} for a in frame])
 
 
 def read_line(folder: Path, keys: tuple[str, str], zero: Zero, parameters: Varied) -> tuple[list[FloatArray], bool]:
@@ -153,14 +176,6 @@ def read_line(folder: Path, keys: tuple[str, str], zero: Zero, parameters: Varie
         csv.Error,
     ):  # there is none, or it is none of ours
         return [], True
-
-
-def held_in_words(curve: Curve, varied: Iterable[str], time_unit: str) -> list[str]:
-    """The parameters of a curve that are not varied, for below a title, without the nonlinear ones that are 0."""
-    known, linear = curve.problem.parameters, curve.problem.differentiable
-    left = {*varied, *(key for key, each in known.items() if each.value == 0 and key not in linear)}
-    held = {key: value for key, value in curve.parameters.items() if key not in left}
-    return [known[key].quantity.timed(time_unit).stated(value) for key, value in held.items()]
 
 
 def _shade(axes: Any, regions: Regions, frame: tuple[Axis, Axis]) -> dict[str, str]:

@@ -14,8 +14,8 @@ from fpsolve.exponent.directions import Directions
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.model.problem import parameter_lines
 from fpsolve.model.quantity import PHASE, density_unit
-from fpsolve.output.nodes import FIELDS, Nodes
 from fpsolve.output.surfaces import Picture, Surface, can_render, flat_picture, picture_in_space
+from fpsolve.parts.nodes import FIELDS, Nodes
 
 FINER = 2
 """So many times as many nodes either way as a file for ParaView has; there they carry polynomials."""

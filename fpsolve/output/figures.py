@@ -7,8 +7,10 @@ value of a key.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
+from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +25,6 @@ from fpsolve.drawing import (
     COLOURS,
     FORMATS,
     Format,
-    draw_bars,
     draw_colours,
     draw_dots,
     figure_for,
@@ -37,17 +38,17 @@ from fpsolve.drawing import (
 )
 from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, STABILITY_INDEX
-from fpsolve.model.plane import System
 from fpsolve.model.problem import Problem
 from fpsolve.model.quantity import (
     GROWTH,
     MOMENT,
     RATE_FUNCTION,
     P,
-    ResponseQuantities,
 )
-from fpsolve.output.charts import held_in_words, read_line
-from fpsolve.parts.response import CurveResponse, ResponseDensity
+from fpsolve.output.charts import read_line
+from fpsolve.page.limits import EACH
+from fpsolve.page.page import Drawing
+from fpsolve.page.plots import line_of, plot_of
 from fpsolve.study.results import CurveResult, SimulatedCurve
 from fpsolve.theory import perturbation
 from fpsolve.theory.perturbation import perturbed_moments
@@ -140,24 +141,36 @@ def _several(varied: Sequence[Varied]) -> tuple[dict[str, int], list[str]]:
     return {key: counts[key] for key in several if key not in texts}, texts
 
 
-def draw(
+def main_figure(
+    case: Case, results: Sequence[CurveResult], simulated: Sequence[SimulatedCurve], folder: Path
+) -> Drawing:
+    """figure.png and .pdf: finite elements, perturbation theory, dots of a simulation.
+
+    Over two keys with many values it is a map. There is none with `[output] figure = false`, and without a [figure]
+    none of a case that does not ask for Λ(p).
+
+    Args:
+        folder: where a chart may have traced the line of the zeros of a map.
+    """
+    over = "p" if case.figure.x == "p" else case.about(case.figure.x).words
+    title = f"The {case.figure.quantity.words}, {case.figure.quantity.symbol}, over {over}"
+    job, plot = partial(_draw, case, results, simulated, folder), partial(_plot_of_moments, case, results)
+    return Drawing(title, job, "figure", case.caption, plot=plot)
+
+
+def _draw(
     case: Case,
     results: Sequence[CurveResult],
     simulated: Sequence[SimulatedCurve],
     folder: Path,
-    *,
-    into: Path | None = None,
+    paths: Sequence[Path],
+    heading: str,
 ) -> None:
-    """Draw figure.png and .pdf, or `into` another file: finite elements, perturbation theory, dots of a simulation.
-
-    Over two keys with many values it is a map. There is none with `[output] figure = false`, and without a [figure]
-    none of a case that does not ask for Λ(p).
-    """
     setting = case.figure
     if not case.output.figure or setting.needed not in case.asked or not results:
         return
-    held = held_in_words(results[0].curve, case.vary.keys, case.units.time)
-    with figure_for(*headed(folder, "figure", into, case.caption), held, FORMATS[setting.width]) as figure:
+    held = results[0].curve.held(case.units.time, case.vary.keys)
+    with figure_for(paths, heading, held, FORMATS[setting.width]) as figure:
         axes = figure.add_subplot()
         if other := map_key(setting, case.vary):
             _draw_map(axes, case, results, (setting.x, other), folder)
@@ -172,15 +185,34 @@ def draw(
         draw_series(axes, case, series, setting.quantity.closed_form + ", reduced noise" * case.theory_reduces_noise)
 
 
-def draw_rates(case: Case, results: Sequence[CurveResult], folder: Path, *, into: Path | None = None) -> None:
-    """Draw rate_function.png and .pdf, if the case asks for it: I(s) at s = Λ′(p) of every p, 0 at s = λ."""
+def _plot_of_moments(case: Case, results: Sequence[CurveResult]) -> dict[str, Any] | None:
+    """Λ(p) of the first curves, if the case asks for it."""
+    if MOMENT.name not in case.asked:
+        return None
+    moments = [(result.curve.label or MOMENT.symbol, result.moments) for result in results[:EACH]]
+    lines = [
+        line_of(name, each.p.tolist(), each.value.tolist(), error_y={"array": each.error_estimate.tolist()})
+        for name, each in moments
+    ]
+    unit = escape(MOMENT.timed(case.units.time).unit)
+    return plot_of("Λ(p)", lines, [{"title": {"text": "p"}}, {"title": {"text": f"{MOMENT.symbol} ({unit})"}}])
+
+
+def rate_figure(case: Case, results: Sequence[CurveResult]) -> Drawing:
+    """rate_function.png and .pdf, if the case asks for it."""
+    title = f"The {RATE_FUNCTION.words}, {RATE_FUNCTION.symbol}"
+    return Drawing(title, partial(_draw_rates, case, results), "rate_function", case.headline)
+
+
+def _draw_rates(case: Case, results: Sequence[CurveResult], paths: Sequence[Path], heading: str) -> None:
+    """I(s) at s = Λ′(p) of every p, 0 at s = λ."""
     if RATE_FUNCTION.name not in case.asked or not case.output.figure or not results:
         return
-    held, is_few = held_in_words(results[0].curve, case.vary.keys, case.units.time), len(results) <= MOST_NAMED
+    held, is_few = results[0].curve.held(case.units.time, case.vary.keys), len(results) <= MOST_NAMED
     shown = _some(len(results))
     series = [_rates(result, with_theory=i in shown) for i, result in enumerate(results)]
     form = FORMATS[case.figure.width]
-    with figure_for(*headed(folder, "rate_function", into, case.headline), held, form) as figure:
+    with figure_for(paths, heading, held, form) as figure:
         axes = figure.add_subplot()
         label_axes(axes, *(each.timed(case.units.time).attributes for each in (GROWTH, RATE_FUNCTION)))
         mark_zero(axes)
@@ -191,100 +223,22 @@ def draw_rates(case: Case, results: Sequence[CurveResult], folder: Path, *, into
         axes.ticklabel_format(style="sci", scilimits=(-2, 3), useMathText=True)
 
 
-def draw_sensitivities(case: Case, results: Iterable[CurveResult], folder: Path, *, into: Path | None = None) -> None:
-    """Draw sensitivities.png and .pdf of every curve, if the case says so: θ ∂/∂θ of λ and of some Λ(p), scaled."""
-    for result in results if case.output.sensitivities else ():
-        found = result.sensitivities
-        if found is None:
-            continue
-        scale, bars = perturbation.scale_of(result.curve.problem), dict[str, list[float]]()
-        for label, (p, slopes) in found.shown().items():
-            size = float(scale.moment(p)) if p else scale.linear
-            bars[label] = [found.theta[key] * slopes[key].value / size for key in slopes]
-        held = held_in_words(result.curve, (), case.units.time)
-        name = f"sensitivities{result.curve.suffix}"
-        with figure_for(*headed(folder, name, into, case.headline), held) as figure:
-            words = r"effect of a relative change, $\theta\,\partial/\partial\theta$, over the scale"
-            draw_bars(figure.add_subplot(xlabel=words), bars, [case.about(key).shown for key in found.theta])
+def simulated_response_figure(case: Case, simulated: SimulatedCurve) -> Drawing:
+    """monte_carlo_response.png and .pdf of a curve, if it has a response."""
+    curve = simulated.curve
+    title, name = f"Simulated stationary response{curve.of}", f"monte_carlo_response{curve.suffix}"
+    return Drawing(title, partial(_draw_response, simulated), name, case.headline)
 
 
-def draw_response(case: Case, simulated: SimulatedCurve, folder: Path, *, into: Path | None = None) -> None:
-    """Draw monte_carlo_response.png and .pdf of a curve: the density of (x, ẋ) and of the amplitude."""
+def _draw_response(simulated: SimulatedCurve, paths: Sequence[Path], heading: str) -> None:
+    """The density of (x, ẋ) and of the amplitude."""
     if simulated.response is None:
         return
-    name = f"monte_carlo_response{simulated.curve.suffix}"
-    held = held_in_words(simulated.curve, (), "time")
-    with figure_for(*headed(folder, name, into, case.headline), held, Format(width=10.5)) as figure:
+    with figure_for(paths, heading, simulated.curve.held("time"), Format(width=10.5)) as figure:
         plane, radial = figure.subplots(1, 2)
         simulated.response.plot(plane)
         figure.get_layout_engine().set(wspace=0.1)
         simulated.response.plot_amplitude(radial)
-
-
-def draw_stationary_responses(
-    case: Case,
-    results: Iterable[CurveResult],
-    simulated: Sequence[SimulatedCurve],
-    folder: Path,
-    *,
-    into: Path | None = None,
-) -> None:
-    """Draw response.png and .pdf of every curve with a stationary density: of both variables, and of the amplitude.
-
-    Beside that of the amplitude stands a simulated one, where there is one; above both, what they do at rest.
-    """
-    samples = {each.curve.key: each.response for each in simulated if each.response}
-    for result in results if case.has_response and case.output.figure else ():
-        found = result.response
-        if found is None or found.density is None:
-            continue
-        held = held_in_words(result.curve, (), case.units.time)
-        name = f"response{result.curve.suffix}"
-        with figure_for(*headed(folder, name, into, case.headline), held, Format(width=10.5)) as figure:
-            plane, radial = figure.subplots(1, 2)
-            figure.get_layout_engine().set(wspace=0.1)
-            _draw_joint_density(plane, found, found.density, result.curve.problem.system, case)
-            _draw_amplitudes(radial, found, found.density, result.curve.problem.system.response, case)
-            if sample := samples.get(result.curve.key):
-                x = 0.5 * (sample.amplitude_edges[1:] + sample.amplitude_edges[:-1])
-                look: dict[str, Any] = {"marker": ".", "color": "black", "markersize": points(4), "capsize": points(2)}
-                words = "Monte Carlo ± 2 standard errors"
-                draw_dots(radial, x, sample.amplitude_density, sample.amplitude_error, label=words, **look)
-
-
-def _draw_joint_density(axes: Any, found: CurveResponse, density: ResponseDensity, system: System, case: Case) -> None:
-    """ρ of both variables in colours over four decades; what is below has the colour of the lowest."""
-    from matplotlib.colors import LogNorm
-
-    of = system.response
-    about, x, v = (each.timed(case.units.time).attributes for each in (of.density, of.first, of.second))
-    a, (phi, of_plane), most = density.amplitude[:, None], density.plane(of.has_wall), float(density.of_plane.max())
-    shown, look = np.maximum(of_plane, 1e-4 * most), {"norm": LogNorm(1e-4 * most, most), "shading": "gouraud"}
-    draw_colours(axes, a * np.cos(phi), -system.aspect * a * np.sin(phi), shown, about, **look)
-    label_axes(axes, x, v)
-    axes.set_title(_at_rest("a crater around rest", found.stability_index, -2))
-
-
-def _draw_amplitudes(
-    axes: Any, found: CurveResponse, density: ResponseDensity, about: ResponseQuantities, case: Case
-) -> None:
-    """ρ(a) as a line."""
-    axes.plot(density.amplitude, density.of_amplitude, color=COLOURS[0], label="finite elements")
-    label_axes(axes, *(each.timed(case.units.time).attributes for each in (about.amplitude, about.amplitude_density)))
-    end = density.amplitude[0] + density.amplitude[-1]
-    axes.set(xlim=(0, end), ylim=(0, 1.1 * float(density.of_amplitude.max())))
-    axes.set_title(_at_rest("a hump away from rest", found.stability_index, -1))
-
-
-def _at_rest(words: str, index: float, limit: int) -> str:
-    """What a density does at rest: it vanishes there where δ_p is below a limit, and is infinite where it is above."""
-    below = index < limit
-    return rf"{words if below else 'infinite at rest'}: $\delta_p = {index:.3g} {'<' if below else '>'} {limit}$"
-
-
-def headed(folder: Path, name: str, into: Path | None, heading: str) -> tuple[list[Path], str]:
-    """Where a figure goes, and its heading; one drawn into a page has none, as the page has it."""
-    return ([into], "") if into else ([folder / f"{name}.{ending}" for ending in ("png", "pdf")], heading)
 
 
 def _some(count: int) -> set[int]:

@@ -64,7 +64,7 @@ def _picture(drawing: Drawing, path: Path, name: str) -> Mapping[str, str]:
     """SVG, or the content of a PNG file in base64, or why there is none; empty where there is nothing to draw."""
     nothing = {"svg": "", "png": "", "missing": ""}
     try:
-        drawing.draw(into=path)
+        drawing.draw([path], "")
         if not path.exists():
             return {}
         if drawing.kind == "png":

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, Literal
 
 from fpsolve.messages import Severity
@@ -73,16 +74,25 @@ class Drawing:
     """A picture, which a page has and a terminal has not.
 
     Attributes:
-        title: below it.
-        draw: draws it `into` a file, or does not where there is nothing to draw.
-        kind: of that file.
+        title: below it in a page.
+        draw: draws it with a heading into files, or does not where there is nothing to draw.
+        name: of its own files; empty where it has none.
+        heading: in these; a page has one itself.
+        kind: of the file for a page.
         plot: gives what plotly takes for a page in which the pointer shows numbers, or None; None where there is none.
     """
 
     title: str
-    draw: Callable[..., None]
+    draw: Callable[[Sequence[Path], str], None]
+    name: str = ""
+    heading: str = ""
     kind: Literal["svg", "png"] = "svg"
     plot: Callable[[], Mapping[str, Any] | None] | None = None
+
+    def write(self, folder: Path) -> None:
+        """Draw it as .png and .pdf into a folder, if it has files of its own."""
+        if self.name:
+            self.draw([folder / f"{self.name}.{ending}" for ending in ("png", "pdf")], self.heading)
 
 
 @dataclass(frozen=True)

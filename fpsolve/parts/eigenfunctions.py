@@ -1,24 +1,55 @@
-"""Eigenfunctions over phase and noise, and the stationary density, which are files for ParaView."""
+"""Eigenfunctions over phase and noise, and the stationary density: files for ParaView, and their pictures on a page.
+
+The files have Lagrange quadrilaterals on the full circle, x = φ, y = ξ. They show the elements' polynomials at
+their `Nodes`; their field data name the curve. Where the noise has states, y is the number of the state, each a strip.
+Field data are numbers, as meshio refuses texts: a text is the codes of its letters,
+`bytes(mesh.field_data["held"]).decode()`.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+import sys
+import tempfile
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import lru_cache, partial
+from importlib.resources import files
+from pathlib import Path
+from subprocess import DEVNULL, TimeoutExpired
+from subprocess import run as run_child
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from fpsolve.analysis.density import negative_share, stationary_density
-from fpsolve.errors import NotConverged
+from fpsolve.arrays import FloatArray
+from fpsolve.data import plain_unit
+from fpsolve.errors import FpsolveError, NotConverged
 from fpsolve.exponent.eigen import PrincipalPair
-from fpsolve.exponent.fields import MOST_NEGATIVE, UNRESOLVED
+from fpsolve.exponent.fields import MOST_NEGATIVE, UNRESOLVED, xi_marginal
+from fpsolve.files import write_text
 from fpsolve.messages import Code, Message
+from fpsolve.model.problem import Problem
 from fpsolve.model.quantity import MOMENT
+from fpsolve.page.limits import PICTURES
+from fpsolve.page.page import Drawing
+from fpsolve.parts.nodes import Nodes
 from fpsolve.parts.part import Job, Numerics, Part, Reason, Settings, attempt
+from fpsolve.vtk import Facts, collection_of, field_data, name_at, pyvista_module, write_vtk
 
 if TYPE_CHECKING:
     from fpsolve.case.case import Case, Curve
+    from fpsolve.study.results import CurveResult, SimulatedCurve
 
 NAME = "eigenfunctions"
+CURVES = "curves.pvd"
+"""The file of the series over curves."""
+MOST_STATES = 8
+"""States of the noise that a picture names."""
+PATIENCE = 120.0
+"""Seconds that pictures of eigenfunctions may take."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,6 +121,189 @@ def _is_usual(case: Case) -> bool:
     return is_drawn or case.output.asks_for_eigenfunctions
 
 
+def _draw(found: Eigenfunctions, curve: Curve, folder: Path) -> None:
+    """Write the eigenfunctions of a curve; with the first curve the stationary density too, if that is wanted."""
+    if found.stationary is None:
+        return
+    about = ({**curve.parameters, "curve": float(curve.number)}, curve.varied)
+    if curve.number == 1 and found.has_density:
+        write_density(folder / "density.vtu", found.stationary, *about)
+    if found.pairs:
+        copy_show_script(folder)
+        write_eigenfunctions(folder, found.pairs, found.stationary, f"eigenfunctions{curve.suffix}", *about)
+
+
+def write_eigenfunctions(
+    directory: Path,
+    pairs: Sequence[PrincipalPair],
+    stationary: PrincipalPair,
+    stem: str = "eigenfunctions",
+    parameters: Facts = MappingProxyType({}),
+    varied: Collection[str] = (),
+) -> list[Path]:
+    """Write `<stem>.pvd`, a time series over p, and `<stem>/p….vtu`, one file for each p.
+
+    Point data: `T`; `T_adjoint`, T*; `tilted_density`, T T*; `stationary_density`, T* at p = 0; `z` = ξ/std.
+    T, which ParaView shows first, has mean 1 over P_s(ξ)/2π, see `fields`, and is cut off beyond e^±600;
+    ∫T T* dφ dξ = 1. Where the noise has states `z` is the number of one, and densities are per radian.
+    Field data: `p`; `Lambda`, Λ(p); each of the parameters; and in words, with units, `varied`, those
+    that are varied, and `held`, the others; `impacts`, where T jumps, and `along_y`, what stands along y.
+
+    Args:
+        directory: the folder, made where it is missing.
+        pairs: the eigenpairs, at most one of them written for each p.
+        stationary: the pair at p = 0 of the same oscillator and noise, on any mesh.
+        stem: name of the collection and of the folder of its files.
+        parameters: of the oscillator and the noise, by dotted keys such as "noise.D0".
+        varied: the keys of those that differ between curves.
+
+    Returns:
+        The files written, the collection first.
+    """
+    names = {pair.p: name_at(stem, pair.p) for pair in sorted(pairs, key=lambda pair: pair.p)}
+    problem = stationary.generator.problem
+    facts = {**_frame(problem), **field_data(parameters, varied, problem)}
+    for pair in pairs:
+        grid = Nodes.of(pair)
+        found = grid.fields(pair)
+        data = {
+            "T": found.right,
+            "T_adjoint": found.adjoint,
+            "tilted_density": found.product,
+            "stationary_density": grid.fields(stationary).adjoint,
+            "z": grid.z,
+        }
+        _write_grid(directory / names[pair.p], grid, data, {"p": pair.p, "Lambda": pair.value, **facts})
+    collection = directory / f"{stem}.pvd"
+    write_text(collection, collection_of((p, name, "") for p, name in names.items()))
+    return [collection, *(directory / name for name in names.values())]
+
+
+def write_density(
+    path: Path,
+    stationary: PrincipalPair,
+    parameters: Facts = MappingProxyType({}),
+    varied: Collection[str] = (),
+) -> Path:
+    """Write the stationary density of (φ, ξ), per radian and unit of ξ, with its marginals, to a `.vtu` file.
+
+    Point data: `stationary_density`, which ParaView shows first, `phi_marginal`, `xi_marginal`, `z`. Field data:
+    `lyapunov_exponent`, λ; `p` and `Lambda`, which are 0; and the parameters as in `write_eigenfunctions`.
+    """
+    grid, space = Nodes.of(stationary), stationary.space
+    over_xi = space.table(stationary.left) @ (space.xi.mass() @ space.xi.constant)
+    data = {
+        "stationary_density": grid.fields(stationary).adjoint,
+        "phi_marginal": grid.phase_table(stationary) @ over_xi[:, None],
+        "xi_marginal": space.turns * xi_marginal(stationary, grid.samples(stationary)),
+        "z": grid.z,
+    }
+    problem = stationary.generator.problem
+    known = {"p": 0.0, "Lambda": 0.0, "lyapunov_exponent": stationary.derivative, **_frame(problem)}
+    _write_grid(path, grid, data, {**known, **field_data(parameters, varied, problem)})
+    return path
+
+
+def write_curves(case: Case, folder: Path) -> Path | None:
+    """Write `curves.pvd`, a time series over the curves of which there are eigenfunctions in a folder, all at one p.
+
+    The time is the varied value where there is one that is a number, and else the number of the curve; the name of each
+    entry tells which, and p. Nothing is written of a single curve.
+    """
+    p, shown = case.usual_p, case.curves() if case.shown.size and case.output.asks_for_eigenfunctions else ()
+    names = [(curve, name_at(f"eigenfunctions{curve.suffix}", p)) for curve in shown]
+    there = [(curve, name) for curve, name in names if (folder / name).is_file()]
+    if case.planned == 1 or not there:
+        return None
+    keys = [key for key in case.vary.keys if len(case.vary.values(key)) > 1]
+    if len(keys) == 1 and not case.vary.is_text(keys[0]):
+        entries = [(float(curve.varied[keys[0]]), name, f"{curve.label}, p = {p:g}") for curve, name in there]
+    else:
+        entries = [(float(each.number), name, f"curve {each.number}: {each.label}, p = {p:g}") for each, name in there]
+    write_text(folder / CURVES, collection_of(sorted(entries)))
+    return folder / CURVES
+
+
+def copy_show_script(directory: Path) -> Path:
+    """Put `show.py`, which draws a collection in ParaView, into the folder."""
+    target = directory / "show.py"
+    write_text(target, files("fpsolve.output").joinpath("show.py").read_text(encoding="utf-8"))
+    return target
+
+
+def _write_grid(path: Path, grid: Nodes, data: Mapping[str, FloatArray], facts: Facts) -> None:
+    """Write a .vtu file; arrays of point data broadcast to (φ-nodes, ξ-nodes), and the first is shown first."""
+    pyvista, connectivity = pyvista_module(), grid.cells()
+    count, size = connectivity.shape
+    cells = np.column_stack([np.full(count, size), connectivity]).ravel()
+    kinds = np.full(count, pyvista.CellType.LAGRANGE_QUADRILATERAL, dtype=np.uint8)
+    output = pyvista.UnstructuredGrid(cells, kinds, grid.points())
+    for name, values in data.items():
+        output.point_data[name] = np.broadcast_to(values, (grid.phi.size, grid.z.size)).ravel()
+    output.GetPointData().SetActiveScalars(next(iter(data)))
+    write_vtk(path, output, facts)
+
+
+def _frame(problem: Problem) -> Facts:
+    """What pictures say of the axes: where T jumps, in radians, and what stands along y."""
+    turns = {round((jump.phase + turn) % (2 * math.pi), 12) for jump in problem.system.jumps for turn in (0, math.pi)}
+    noise, unit = problem.noise, plain_unit(problem.noise_quantity.unit).replace("²", "^2")
+    along = "noise xi" if unit in ("1", "unknown") else f"noise xi ({unit})"
+    if noise.has_states:
+        states = [] if noise.is_white else [f"xi = {each:g}" for each in noise.reached]
+        along = "; ".join(
+            [
+                f"{noise.kind or 'white'} noise" if noise.is_white else "states",
+                *(states if len(states) <= MOST_STATES else ()),
+            ]
+        )
+    return {"impacts": sorted(turns) or [math.nan], "along_y": along}
+
+
+def _figures(case: Case, result: CurveResult, folder: Path, simulated: SimulatedCurve | None) -> Iterator[Drawing]:
+    """A picture at one p for a page, where the eigenfunction was written."""
+    source = _picture_source(case, result.curve, folder)
+    if case.problem.dimension == 2 and case.shown.size and source.is_file():
+        title = f"Eigenfunction T(φ, ξ) of p = {case.usual_p:g}{result.curve.of}"
+        yield Drawing(title, partial(_render, case, source, folder), kind="png")
+
+
+def _picture_source(case: Case, curve: Curve, folder: Path) -> Path:
+    return folder.resolve() / name_at(f"eigenfunctions{curve.suffix}", case.usual_p)
+
+
+def _render(case: Case, source: Path, folder: Path, paths: Sequence[Path], heading: str) -> None:
+    """Write the picture of a file, which is made with those of the other curves that a page shows."""
+    shown = {source, *(_picture_source(case, curve, folder) for curve in case.curves(stop=PICTURES))}
+    there = sorted(path for path in shown if path.is_file())
+    pictures, reason = _rendered(tuple((path, path.stat().st_mtime_ns) for path in there))
+    if source not in pictures:
+        raise FpsolveError(f"{reason}; show.py draws it in ParaView")
+    for path in paths:
+        path.write_bytes(pictures[source])
+
+
+@lru_cache(1)
+def _rendered(files: Sequence[tuple[Path, int]]) -> tuple[dict[Path, bytes], str]:
+    """All pictures by a process of its own, which may crash; and why some are missing.
+
+    Args:
+        files: each with its time, so that those of another run are drawn anew.
+    """
+    reason = "nothing was drawn"
+    with tempfile.TemporaryDirectory() as place:
+        pictures = {path: Path(place) / f"{number}.png" for number, (path, _) in enumerate(files)}
+        # with -P no file of the working folder is taken for a module
+        command = [sys.executable or "python", "-P", "-m", "fpsolve.output.pictures"]
+        command += [str(each) for pair in pictures.items() for each in pair]
+        try:
+            done = run_child(command, stdin=DEVNULL, capture_output=True, timeout=PATIENCE, check=False)
+            reason = f"the process that draws it ended with {done.returncode}" if done.returncode else reason
+        except (OSError, TimeoutExpired) as failure:
+            reason = str(failure)
+        return {path: picture.read_bytes() for path, picture in pictures.items() if picture.is_file()}, reason
+
+
 PART: Part = Part(
     NAME,
     _settings,
@@ -98,5 +312,6 @@ PART: Part = Part(
     NAME,
     is_usual=_is_usual,
     said=said_of_pictures,
-    is_drawn=True,
+    draw=_draw,
+    figures=_figures,
 )

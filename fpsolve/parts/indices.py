@@ -4,17 +4,30 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from fpsolve.analysis.excursions import SYMBOL
 from fpsolve.data import Quantity
 from fpsolve.errors import NoSuchExponent
-from fpsolve.exponent.error import Absent, Estimate
-from fpsolve.exponent.quantities import BY_JUMP, INDICES, MOMENT, STABILITY_INDEX, Index
-from fpsolve.messages import Code, Message, Remedy
+from fpsolve.exponent.error import Absent, Estimate, digits
+from fpsolve.exponent.quantities import (
+    BY_JUMP,
+    CRITICAL_IMPACT_FACTOR,
+    CRITICAL_RESTITUTION,
+    INDICES,
+    MOMENT,
+    STABILITY_INDEX,
+    VARIANCE_RATE,
+    Index,
+)
+from fpsolve.messages import Code, Message, Remedy, message_of
+from fpsolve.page.page import Block, Column, Grid, Sentence, filled
+from fpsolve.parts.intervals import INTERVAL, spreads_of
 from fpsolve.parts.part import Job, Numerics, Part, Reason, Settings, attempt
 from fpsolve.results.table import Row, pair
+from fpsolve.results.text import DIGITS, NUMBER_COLUMNS, fate, interval, row_of, short, sign_of
 
 if TYPE_CHECKING:
     from fpsolve.case.case import Case, Curve
@@ -166,13 +179,108 @@ def _row_of_theory(case: Case, result: CurveResult) -> Row:
     return {INDICES[name].perturbation.name: each for name, each in numbers.items() if name in is_there}
 
 
+def asked(case: Case) -> list[Index]:
+    """The indices that a case asks for."""
+    return [index for name, index in INDICES.items() if name in case.asked]
+
+
+def told_indices(case: Case) -> list[Index]:
+    """The indices that a case asks for, without those of impacts where it names none, and not one ray has them."""
+    has_impacts = len(case.system.jumps) == 1 or case.output.lists_quantities
+    return [index for index in asked(case) if has_impacts or index.name not in BY_JUMP]
+
+
+def index_text(index: Index, result: CurveResult, most: int = 17) -> str:
+    """An index of a curve with its digits, or that there is none, or that it was not found out."""
+    estimate = result.estimates[index.name]
+    if estimate is not None:
+        return digits(estimate.value, estimate.error_estimate, most)
+    told = map(message_of, (*(failure.reason for failure in result.failures), *result.warnings))
+    unsolved = {Code.INDEX_FAILED, Code.INDEX_MISSING} if result.failures else {Code.INDEX_FAILED}
+    if any(each.code in unsolved and index.symbol in each.data["symbols"] for each in told):
+        return "not solved"
+    if result.curve.problem.has_algebraic_tails and index in (STABILITY_INDEX, VARIANCE_RATE):
+        return "not computed"
+    return "none" if index == CRITICAL_RESTITUTION else "none found"
+
+
+def _show(case: Case, result: CurveResult) -> Iterator[Block]:
+    """The table of all indices, where the figure is not over a parameter; and what they mean."""
+    if any(result.estimates.values()) and case.figure.x == "p":
+        yield index_grid(case, result)
+    yield from show_meaning(case, result)
+
+
+def index_grid(case: Case, result: CurveResult) -> Grid:
+    """λ, δ_p and the other indices that are asked for, those of impacts for each ray that has them."""
+    spreads, problem = spreads_of(case, result).indices, result.curve.problem
+    rows: list[list[str]] = []
+    for index in told_indices(case):
+        found, spread = result.estimates[index.name], spreads.get(index.name)
+        row, theory = row_of(index, found, case.units.time), index.theory(problem) if found else math.nan
+        row[2] = index_text(index, result)
+        row.append(f"{theory:.6g}, Eq. {index.closed_form}" if math.isfinite(theory) else "")
+        rows.append([*row, interval(spread.low, spread.high) if spread else ""])
+    for ray, of_ray in zip(problem.system.jumps, result.jumps, strict=False):
+        for name, found in of_ray.items():
+            about = replace(INDICES[name], words=f"{INDICES[name].words} at φ = {ray.phase:.6g}")
+            rows += [[*row_of(about, found, case.units.time), "", ""]] if found else []
+    return filled("", [*NUMBER_COLUMNS, Column("perturbation theory", 3), Column(INTERVAL, 1)], rows)
+
+
+def show_meaning(case: Case, result: CurveResult) -> Iterator[Sentence]:
+    """What λ, Λ(2), δ_p and R_c say, each that is there."""
+    exponent, index, unit = result.lyapunov_exponent, result.stability_index, case.units.time
+    path = 0.0 if exponent is None else sign_of(exponent.value, exponent.error_estimate)
+    if exponent is not None:
+        rest = ""
+        if path > 0 and result.curve.problem.system.is_nonlinear:
+            rest = " near rest" + (", and settles into the stationary response" if result.response else "")
+        elif path > 0:
+            rest = ", and passes every level in the end"
+        yield Sentence(f"λ = {short(exponent)}{fate('almost every path', exponent.value, path, unit)}{rest}.")
+    found = result.moments
+    for p, value, error in zip(found.p.tolist(), found.value.tolist(), found.error_estimate.tolist(), strict=True):
+        if p == 2:
+            sign = sign_of(value, error)
+            text = f"Λ(2) = {digits(value, error, DIGITS)}{fate('the mean square', value, sign, unit)}"
+            if sign > 0 > path:
+                text += (
+                    ", carried by bursts of rare paths. A design that is judged by the mean square, by energy or by "
+                    "fatigue is unstable, though one record most likely looks calm"
+                )
+            yield Sentence(f"{text}.")
+    power = "" if index is None else digits(abs(index.value), index.error_estimate, 4)
+    if index is not None and index.value > 0:
+        yield Sentence(
+            f"δ_p = {short(index)} > 0: moments of the orders 0 < p < δ_p decay, those of p > δ_p grow. The "
+            f"probability that a path ever exceeds A times its start, {SYMBOL}, falls as A^-{power}."
+        )
+    elif index is not None:
+        yield Sentence(
+            f"δ_p = {short(index)} < 0: moments of the orders δ_p < p < 0 decay, as almost every path grows. The "
+            f"probability that a path ever falls below a small share a of its start goes as a^{power}."
+        )
+    critical = result.estimates[CRITICAL_IMPACT_FACTOR.name]
+    if critical is not None:
+        loss = "more loss" if critical.value < 1 else "any loss"
+        yield Sentence(
+            f"R_c = {short(critical)}: with this factor of the speed at an impact λ would be 0; {loss} makes almost "
+            "every path decay."
+        )
+
+
 THEORY: Part = Part(
     "theory",
     _theory_settings,
     _solve_theory,
     dict[str, float],
     row=_row_of_theory,
+    show=_show,
     is_quantity=False,
     uses_solver=False,
 )
-"""The indices by perturbation theory, which a record has so that tables need not make the problem of each curve."""
+"""The indices by perturbation theory, which a record has so that tables need not make the problem of each curve.
+
+All indices are shown beside them.
+"""

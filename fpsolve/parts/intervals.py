@@ -13,11 +13,13 @@ from fpsolve.analysis.spreads import LEVEL, UNCERTAIN, Spread, latin_hypercube, 
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import FpsolveError
 from fpsolve.exponent.error import Estimate
-from fpsolve.exponent.quantities import INDICES, MOMENT
+from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, MOMENT
 from fpsolve.messages import Code, Message
 from fpsolve.model.quantity import Quantity, moment_at
+from fpsolve.page.page import Block, Column, Grid, Sentence
 from fpsolve.parts.part import Part, Settings
 from fpsolve.results.table import Row
+from fpsolve.results.text import interval, percent
 
 if TYPE_CHECKING:
     from fpsolve.case.case import Case
@@ -30,6 +32,8 @@ APART = 0.1
 """Of the width of an interval, by which two of them differ so that it is told."""
 SHARES = (0.5 - 0.5 * LEVEL, 0.5, 0.5 + 0.5 * LEVEL)
 """Quantiles of an interval, and the median."""
+INTERVAL = f"{LEVEL:.0%} interval"
+"""The heading of intervals in tables."""
 ENDS = ("low", "high")
 """Names of the ends of an interval."""
 
@@ -289,4 +293,34 @@ def plain_spread(spread: Spread) -> dict[str, float]:
     }
 
 
-PART: Part = Part("intervals", _settings, columns=_columns, row=_row, content=_content, is_quantity=False)
+def _show(case: Case, result: CurveResult) -> Iterator[Sentence]:
+    """With which probability λ and Λ(2), or else the first Λ(p), have their sign, to first order."""
+    spreads = spreads_of(case, result)
+    exponent = spreads.indices.get(LYAPUNOV_EXPONENT.name)
+    chosen = [(LYAPUNOV_EXPONENT.symbol, exponent)] if exponent else []
+    p = 2.0 if 2.0 in spreads.moments else next(iter(spreads.moments), None)
+    chosen += [(moment_at(p).symbol, spreads.moments[p])] if p is not None else []
+    told = []
+    for symbol, spread in chosen:
+        is_below = spread.below >= 0.5
+        sure = percent(spread.below if is_below else 1 - spread.below)
+        told.append(f"{symbol} {'<' if is_below else '>'} 0 with {sure}")
+    if told:
+        yield Sentence(f"As parameters are uncertain, {', and '.join(told)}.")
+
+
+def show_samples(case: Case, samples: Samples) -> Iterator[Block]:
+    """The intervals of the samples, their medians, and the intervals to first order."""
+    columns = [Column("quantity"), Column(f"samples, {LEVEL:.0%}"), Column("median", 1), Column("P(< 0)")]
+    remark = f"{samples.planned} samples of a Latin hypercube, seed {samples.seed}"
+    grid = Grid(case.headline, [*columns, Column(f"first order, {LEVEL:.0%}"), Column("apart", 2)], remark=remark)
+    for each in samples.rows:
+        is_there = each.count > 0
+        numbers = [interval(each.low, each.high), f"{each.median:.6g}", percent(each.below)]
+        first = interval(each.spread.low, each.spread.high)
+        apart = f"{each.apart:.0%}" if is_there else ""
+        grid.rows.append([each.quantity.symbol, *(numbers if is_there else ["none", "", ""]), first, apart])
+    yield grid
+
+
+PART: Part = Part("intervals", _settings, columns=_columns, row=_row, content=_content, show=_show, is_quantity=False)

@@ -12,19 +12,26 @@ import numpy as np
 from fpsolve.arrays import FloatArray
 from fpsolve.data import Quantity
 from fpsolve.errors import NoSuchExponent
-from fpsolve.exponent.error import Failure, Moment
+from fpsolve.exponent.error import Failure, Moment, digits
 from fpsolve.exponent.function import solve_moments
 from fpsolve.exponent.solver import InvariantClass
 from fpsolve.messages import Code, Message
 from fpsolve.model.problem import Problem, refuse_infinite
 from fpsolve.model.quantity import LYAPUNOV_EXPONENT, MOMENT, OVER_P
+from fpsolve.page.page import Column, Grid
+from fpsolve.parts.intervals import INTERVAL, spreads_of
 from fpsolve.parts.part import Job, Numerics, Part, Settings
 from fpsolve.results.table import Row, pair
+from fpsolve.results.text import interval, percent, units_in_words
 from fpsolve.theory.perturbation import perturbed_moments, weak_noise_note
 
 if TYPE_CHECKING:
     from fpsolve.case.case import Case, Curve
     from fpsolve.study.results import CurveResult
+
+
+STAR = "* for the noise reduced by Eqs. (12)-(14)"
+"""The remark on perturbation theory of another noise than that which is solved."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,6 +170,31 @@ def _reasons(found: Moments) -> Iterator[Message]:
     return (each.reason for each in found.failures)
 
 
+def _show(case: Case, result: CurveResult) -> Iterator[Grid]:
+    """The table; where the figure is over a parameter, all curves share another one."""
+    if result.moments.p.size and case.figure.x == "p":
+        yield moment_grid(case, result)
+
+
+def moment_grid(case: Case, result: CurveResult) -> Grid:
+    """Λ(p) at each p, with its error, its interval, and perturbation theory."""
+    found, spreads, is_reduced = result.moments, spreads_of(case, result).moments, result.curve.theory_reduces_noise
+    has_theory = any(map(math.isfinite, found.perturbation))
+    columns = [Column("p"), Column(MOMENT.symbol), Column("± error")]
+    columns += [Column(INTERVAL), Column("P(Λ < 0)")] * bool(spreads)
+    theory = Column(f"perturbation, Eq. {MOMENT.closed_form}{'*' if is_reduced else ''}", 1)
+    columns += [theory, Column("difference", 2)] * has_theory
+    remarks = STAR * (is_reduced and has_theory), units_in_words(case.units.time, [MOMENT])
+    grid = Grid("", columns, remark="; ".join(filter(None, remarks)))
+    for p, value, error, closed in zip(found.p, found.value, found.error_estimate, found.perturbation, strict=True):
+        spread = spreads.get(float(p))
+        uncertain = ["", ""] if spread is None else [interval(spread.low, spread.high), percent(spread.below)]
+        compared = [f"{closed + 0.0:.6g}", f"{value - closed + 0.0:.2e}"] * has_theory
+        shown = f"{error:.0e}" if error else "0"
+        grid.rows.append([f"{p + 0.0:g}", digits(value, error), shown, *uncertain * bool(spreads), *compared])
+    return grid
+
+
 PART: Part = Part(
     MOMENT.name,
     _settings,
@@ -173,6 +205,7 @@ PART: Part = Part(
     row=_row,
     reasons=_reasons,
     is_whole=_is_whole,
+    show=_show,
 )
 
 

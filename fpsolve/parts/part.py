@@ -21,12 +21,13 @@ from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.parameters import Section
 from fpsolve.model.problem import Problem
 from fpsolve.model.quantity import STABILITY_INDEX
+from fpsolve.page.page import Block, Drawing
 from fpsolve.results.table import Row
 from fpsolve.signals import is_interrupt
 
 if TYPE_CHECKING:  # which stand above
     from fpsolve.case.case import Case, Curve
-    from fpsolve.study.results import CurveResult
+    from fpsolve.study.results import CurveResult, SimulatedCurve
 
 Settings = Mapping[str, Any]
 """What is asked of a part, as JSON can hold it: with the curve and the `Numerics` it decides its numbers."""
@@ -198,11 +199,13 @@ class Part:
         row: the numbers of a curve in these columns.
         content: what summary.json has of it beyond the tables; None where it is not asked for.
         files: writes into a folder the files that a curve has beyond the tables.
+        draw: writes into a folder what a curve has beyond a record, so that a further run solves it again.
+        show: what a terminal and a report say of each of a few curves.
+        figures: of a curve in a folder, beside its simulation if there is one.
         reasons: why some of it is missing.
         lacks: whether it lacks something that is asked for, as another part lacks it.
         is_whole: whether what a record holds is what can be written and drawn.
         uses_solver: whether rtol and the mesh of Λ(p) decide its numbers.
-        is_drawn: whether there is more than a record holds, so that a further run solves it again.
     """
 
     name: str
@@ -219,8 +222,15 @@ class Part:
     row: Callable[[Case, CurveResult], Row] = _no_row
     content: Callable[[Case, CurveResult], Mapping[str, Any]] = _no_row
     files: Callable[[CurveResult, Path], None] | None = None
+    draw: Callable[[Any, Curve, Path], None] | None = None
+    show: Callable[[Case, CurveResult], Iterable[Block]] = _nothing
+    figures: Callable[[Case, CurveResult, Path, SimulatedCurve | None], Iterable[Drawing]] | None = None
     reasons: Callable[[Any], Iterable[Message]] = _nothing
     lacks: Callable[[Any, Settings], bool] = lambda *_: False
     is_whole: Callable[[Any, Curve, Settings], bool] = lambda *_: True
     uses_solver: bool = True
-    is_drawn: bool = False
+
+    @property
+    def is_drawn(self) -> bool:
+        """Whether there is more than a record holds."""
+        return self.draw is not None

@@ -3,21 +3,26 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from fpsolve.analysis.sensitivity import DIFFERENTIATED, Sensitivities, Slopes, solve_sensitivities
+from fpsolve.drawing import draw_bars, figure_for
 from fpsolve.exponent.error import MEANINGLESS, Estimate
 from fpsolve.messages import Message
 from fpsolve.model.quantity import MOMENT
+from fpsolve.page.page import Drawing
 from fpsolve.parts.indices import is_estimate
 from fpsolve.parts.part import Job, Numerics, Part, Settings
+from fpsolve.theory.perturbation import scale_of
 
 if TYPE_CHECKING:
     from fpsolve.case.case import Case, Curve
-    from fpsolve.study.results import CurveResult
+    from fpsolve.study.results import CurveResult, SimulatedCurve
 
 NAME = "sensitivities"
 
@@ -81,6 +86,24 @@ def _is_whole(found: Sensitivities, curve: Curve, settings: Settings) -> bool:
     )
 
 
+def _figures(case: Case, result: CurveResult, folder: Path, simulated: SimulatedCurve | None) -> Iterator[Drawing]:
+    """sensitivities.png and .pdf, if the case asks for them."""
+    if case.output.sensitivities and result.sensitivities:
+        title, name = f"Effect of the parameters{result.curve.of}", f"sensitivities{result.curve.suffix}"
+        yield Drawing(title, partial(_draw, case, result.curve, result.sensitivities), name, case.headline)
+
+
+def _draw(case: Case, curve: Curve, found: Sensitivities, paths: Sequence[Path], heading: str) -> None:
+    """θ ∂/∂θ of λ and of some Λ(p), scaled."""
+    scale, bars = scale_of(curve.problem), dict[str, list[float]]()
+    for label, (p, slopes) in found.shown().items():
+        size = float(scale.moment(p)) if p else scale.linear
+        bars[label] = [found.theta[key] * slopes[key].value / size for key in slopes]
+    with figure_for(paths, heading, curve.held(case.units.time)) as figure:
+        words = r"effect of a relative change, $\theta\,\partial/\partial\theta$, over the scale"
+        draw_bars(figure.add_subplot(xlabel=words), bars, [case.about(key).shown for key in found.theta])
+
+
 PART: Part = Part(
     NAME,
     _settings,
@@ -90,6 +113,7 @@ PART: Part = Part(
     is_usual=lambda case: case.output.sensitivities,
     said=_said,
     content=_content,
+    figures=_figures,
     lacks=_lacks,
     is_whole=_is_whole,
 )

@@ -1,4 +1,4 @@
-"""What is said of a case: one function for each feature, which yields the blocks that terminal and report share."""
+"""What is said of a case and of all its curves together, in blocks that terminal and report share."""
 
 import lazy_loader
 

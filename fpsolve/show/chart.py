@@ -3,27 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from functools import partial
-from pathlib import Path
 
 from fpsolve.analysis.regions import Region
 from fpsolve.analysis.zero import Zero
 from fpsolve.case.case import Case
 from fpsolve.case.vary import short_names
-from fpsolve.output.charts import draw_chart
-from fpsolve.page.page import Block, Column, Drawing, Grid, Sentence
+from fpsolve.output.charts import chart_figure
+from fpsolve.page.page import Block, Column, Grid, Sentence
+from fpsolve.results.text import plural
 from fpsolve.show.notes import note_on
-from fpsolve.show.plots import of_chart
-from fpsolve.show.text import plural
 from fpsolve.study.chart import Chart, charted
 
 
-def show(case: Case, chart: Chart, folder: Path) -> Iterator[Block]:
+def show(case: Case, chart: Chart) -> Iterator[Block]:
     """The lines with their special points, and the regions from the largest to the smallest."""
-    keys = f"{charted(case).x.key} and {charted(case).y.key}"
     if chart.lines:
-        job, plot = partial(draw_chart, case, chart, folder), partial(of_chart, case, chart)
-        yield Drawing(f"Where stability ends, over {keys}", job, plot=plot)
+        yield chart_figure(case, chart)
     yield chart_grid(case, chart)
     zeros = [line.zero for line in chart.lines]
     for each in () if chart.regions is None else chart.regions.each:

@@ -8,8 +8,8 @@ from fpsolve.case.case import Case
 from fpsolve.case.vary import short_names
 from fpsolve.data import written
 from fpsolve.exponent.error import digits
+from fpsolve.page.limits import EACH, ROWS
 from fpsolve.page.page import Block, Column, Grid, Sentence
-from fpsolve.show.limits import EACH, ROWS
 from fpsolve.study.results import Comparison
 
 

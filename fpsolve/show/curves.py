@@ -16,13 +16,14 @@ from fpsolve.data import written
 from fpsolve.exponent.error import digits
 from fpsolve.exponent.quantities import LYAPUNOV_EXPONENT, MOMENT, STABILITY_INDEX, Index
 from fpsolve.model.quantity import OSCILLATOR_RESPONSE, moment_at
+from fpsolve.page.limits import EACH, EXTREMES, FAILURES, MOMENTS, ROWS
 from fpsolve.page.page import Block, Column, Grid, Sentence
 from fpsolve.parts.excursions import NAME as EXCURSIONS
+from fpsolve.parts.excursions import bounds_text
+from fpsolve.parts.indices import index_text, told_indices
 from fpsolve.parts.intervals import spreads_of
-from fpsolve.show.excursions import bounds_text
-from fpsolve.show.limits import EACH, EXTREMES, FAILURES, MOMENTS, ROWS
-from fpsolve.show.moments import STAR, index_text, told_indices, units_in_words
-from fpsolve.show.text import DIGITS, interval, short
+from fpsolve.parts.moments import STAR
+from fpsolve.results.text import DIGITS, interval, short, units_in_words
 from fpsolve.study.results import CurveResult
 
 MAIN = LYAPUNOV_EXPONENT, STABILITY_INDEX
@@ -63,7 +64,8 @@ def curve_grid(case: Case, results: Sequence[CurveResult]) -> Grid:
     if len(results) > EACH or any(result.status for result in results):
         is_whole = len(results) <= ROWS and not any(result.status for result in results)
         shown.append(Shown(Column("status", 1 if is_whole else 0), lambda result: result.status.word))
-    units = units_in_words(case, told_indices(case) + [MOMENT] * (case.figure.x == "p" and MOMENT.name in case.asked))
+    numbers = told_indices(case) + [MOMENT] * (case.figure.x == "p" and MOMENT.name in case.asked)
+    units = units_in_words(case.units.time, numbers)
     grid = table_of(case, results, shown, lambda result: result.status.fails)
     theories = [each.heading for each in grid.columns if each.heading.startswith("Eq.")]
     told = [THEORY] * bool(theories) + [STAR] * any("*" in each for each in theories) + [units] * bool(units)

@@ -14,8 +14,8 @@ from fpsolve.case.case import Case
 from fpsolve.data import plain_unit, written
 from fpsolve.model.plane import affine
 from fpsolve.model.problem import Problem
+from fpsolve.page.limits import EACH
 from fpsolve.page.page import Block, Column, Sentence, filled
-from fpsolve.show.limits import EACH
 
 
 def show(case: Case) -> Iterator[Block]:

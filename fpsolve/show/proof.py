@@ -16,6 +16,7 @@ from fpsolve.exponent.quantities import LYAPUNOV_EXPONENT, STABILITY_INDEX
 from fpsolve.files import plain_text
 from fpsolve.model.problem import Problem
 from fpsolve.output.proofs import PROOF
+from fpsolve.page.limits import EACH, PROOFS, ROWS
 from fpsolve.page.page import Block, Column, Grid, Sentence
 from fpsolve.proofs.balls import MissingFlint
 from fpsolve.proofs.certificate import Enclosure, MalformedProof
@@ -23,7 +24,6 @@ from fpsolve.proofs.claims import CurveClaims, claims_from, plain, verdicts
 from fpsolve.proofs.questions import ExcursionBound, IndexEnclosure
 from fpsolve.proofs.statement import statement_of
 from fpsolve.show.curves import Shown, table_of
-from fpsolve.show.limits import EACH, PROOFS, ROWS
 from fpsolve.study.prove import CurveProof
 from fpsolve.study.results import CurveResult
 

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from functools import partial
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from fpsolve.case.case import Case
-from fpsolve.model.quantity import RATE_FUNCTION
-from fpsolve.output.figures import draw, draw_rates, draw_sensitivities
+from fpsolve.output.figures import main_figure, rate_figure
+from fpsolve.page.limits import EACH, PICTURES
 from fpsolve.page.page import Block, Drawing, Sentence
-from fpsolve.show import curves, excursions, intervals, moments, plots, response
-from fpsolve.show.eigenfunctions import directions_of, eigenfunctions_of
-from fpsolve.show.limits import EACH, PICTURES
-from fpsolve.show.text import duration, plural
+from fpsolve.parts.every import PARTS
+from fpsolve.results.text import duration, plural
+from fpsolve.show import curves
 from fpsolve.study.results import CurveResult, SimulatedCurve
 
 
@@ -21,34 +19,41 @@ def show(
     case: Case, results: Sequence[CurveResult], folder: Path, simulated: Sequence[SimulatedCurve] = ()
 ) -> Iterator[Block]:
     """The solved curves, one by one or in one table, beside those that are simulated."""
-    over = "p" if case.figure.x == "p" else case.about(case.figure.x).words
-    title = f"The {case.figure.quantity.words}, {case.figure.quantity.symbol}, over {over}"
-    plot = partial(plots.of_moments, case, results)
-    yield Drawing(title, partial(draw, case, results, simulated, folder), plot=plot)
-    yield Drawing(f"The {RATE_FUNCTION.words}, {RATE_FUNCTION.symbol}", partial(draw_rates, case, results, folder))
-    has_tables = len(results) <= EACH and case.figure.x == "p"
-    if not has_tables:
+    yield main_figure(case, results, simulated, folder)
+    yield rate_figure(case, results)
+    is_short, over_p = len(results) <= EACH, case.figure.x == "p"
+    samples = {each.curve.number: each for each in simulated}
+    if not (is_short and over_p):
         yield from curves.show(case, results)
-    drawn = results[:PICTURES]
-    eigenfunctions = eigenfunctions_of(case, [result.curve for result in drawn], folder)
-    for place, result in enumerate(results if len(results) <= EACH else drawn):
-        told: list[Block] = []
-        if has_tables:
-            told += moments.show_tables(case, result)
-        if len(results) <= EACH:
-            told += moments.show_meaning(case, result)
-            told += excursions.show(case, result)
-            told += intervals.show(case, result)
-            told += response.show(case, result)
-        if place < PICTURES:
-            job = partial(draw_sensitivities, case, [result], folder)
-            told.append(Drawing(f"Effect of the parameters{result.curve.of}", job))
-            told += directions_of(case, result, folder)
-            told += response.draw(case, result, simulated, folder)
-            told += [each] if (each := eigenfunctions.get(result.curve.number)) else []
-        if any(not isinstance(each, Drawing) for each in told):
-            yield Sentence("", case.heading(result.curve) if has_tables else result.curve.label)
+    for place, result in enumerate(results if is_short else results[:PICTURES]):
+        told = [block for part in PARTS for block in part.show(case, result)] if is_short else []
+        if told:
+            yield Sentence("", case.heading(result.curve) if over_p else result.curve.label)
         yield from told
+        if place < PICTURES:
+            yield from figures_of(case, result, folder, samples)
+
+
+def figures_of(
+    case: Case, result: CurveResult, folder: Path, simulated: Mapping[int, SimulatedCurve]
+) -> Iterator[Drawing]:
+    """The figures of a curve, beside the simulations by the numbers of their curves."""
+    for part in PARTS:
+        if part.figures:
+            yield from part.figures(case, result, folder, simulated.get(result.curve.number))
+
+
+def write_figures(
+    case: Case, results: Sequence[CurveResult], simulated: Sequence[SimulatedCurve], folder: Path
+) -> None:
+    """Write all figures that have files: those of all curves together, and those of each."""
+    main_figure(case, results, simulated, folder).write(folder)
+    rate_figure(case, results).write(folder)
+    samples = {each.curve.number: each for each in simulated}
+    has_more = any(part.figures and part.settings(case, 2) is not None for part in PARTS)
+    for result in results if has_more else results[:1]:
+        for figure in figures_of(case, result, folder, samples):
+            figure.write(folder)
 
 
 def last_line(folder: Path, what: str, seconds: float, known: str = "") -> Sentence:

@@ -5,18 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 from fpsolve.case.case import Case
 from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, MOMENT
-from fpsolve.output.figures import draw_response
-from fpsolve.page.page import Block, Column, Drawing, Grid, Sentence, filled
+from fpsolve.output.figures import simulated_response_figure
+from fpsolve.page.limits import EACH, PICTURES
+from fpsolve.page.page import Block, Column, Grid, Sentence, filled
+from fpsolve.results.text import fate, sampled, sign_of, units_in_words
 from fpsolve.show.curves import Shown, table_of
-from fpsolve.show.limits import EACH, PICTURES
-from fpsolve.show.moments import units_in_words
 from fpsolve.show.notes import MONTE_CARLO
-from fpsolve.show.text import fate, sampled, sign_of
 from fpsolve.study.results import CurveResult, SimulatedCurve
 
 SURE = 3
@@ -25,9 +23,7 @@ COMPARED = Column("finite elements", 2), Column("s.e. away", 1)
 """The columns of what finite elements have found."""
 
 
-def show(
-    case: Case, simulated: Sequence[SimulatedCurve], results: Sequence[CurveResult], folder: Path
-) -> Iterator[Block]:
+def show(case: Case, simulated: Sequence[SimulatedCurve], results: Sequence[CurveResult] = ()) -> Iterator[Block]:
     """The simulated curves, one by one or a row each."""
     solved = {result.curve.key: result for result in results}
     is_short, over_p = len(simulated) <= EACH, case.figure.x == "p"
@@ -48,8 +44,7 @@ def show(
             yield Sentence(f"λ = {sampled(value, error)} ± {error:.1e}{meaning}.")
         yield Sentence(f"{found.paths} paths over a time of {found.time:.4g} in steps of {found.step:.4g}")
         if each.response and each.curve.number <= PICTURES:
-            job = partial(draw_response, case, each, folder)
-            yield Drawing(f"Simulated stationary response{each.curve.of}", job)
+            yield simulated_response_figure(case, each)
 
 
 def moment_grid(case: Case, simulated: SimulatedCurve, result: CurveResult | None) -> Grid:
@@ -63,7 +58,7 @@ def moment_grid(case: Case, simulated: SimulatedCurve, result: CurveResult | Non
         known = (exact.get(each.p) if each.p else 0.0) if result else None
         cells = _cells(each.value, each.standard_error, known)
         rows.append([f"{each.p:g}", *cells, f"{each.effective_paths:.0f}"])
-    return filled("", columns, rows, units_in_words(case, [MOMENT]))
+    return filled("", columns, rows, units_in_words(case.units.time, [MOMENT]))
 
 
 def number_grid(case: Case, simulated: SimulatedCurve, result: CurveResult | None) -> Grid:
@@ -78,7 +73,7 @@ def number_grid(case: Case, simulated: SimulatedCurve, result: CurveResult | Non
             about, found = response.about.means[name], means.get(name)
             rows.append([about.words, about.symbol, *_cells(*number, found.value if found else None)])
     columns = [Column("quantity", 3, is_text=True), Column("symbol"), Column("value"), Column("± s.e."), *COMPARED]
-    units = units_in_words(case, [INDICES[name] for name in simulated.estimates])
+    units = units_in_words(case.units.time, [INDICES[name] for name in simulated.estimates])
     return filled("", columns, rows, units)
 
 
@@ -93,7 +88,7 @@ def exponent_grid(case: Case, simulated: Sequence[SimulatedCurve], solved: Mappi
     columns = [Column(LYAPUNOV_EXPONENT.symbol), Column("± s.e."), *COMPARED]
     shown = [Shown(column, partial(cell, i)) for i, column in enumerate(columns)]
     shown[0] = shown[0]._replace(number=lambda each: each.result.lyapunov_exponent)
-    return replace(table_of(case, simulated, shown), remark=units_in_words(case, [LYAPUNOV_EXPONENT]))
+    return replace(table_of(case, simulated, shown), remark=units_in_words(case.units.time, [LYAPUNOV_EXPONENT]))
 
 
 def _cells(value: float | None, error: float | None, known: float | None) -> list[str]:

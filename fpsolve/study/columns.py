@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from fpsolve.case.case import Case
-from fpsolve.exponent.quantities import INDICES, Index
 from fpsolve.model.quantity import MOMENT, SECONDS, STATUS, Quantity
 from fpsolve.parts.every import PARTS
 from fpsolve.results.table import Row
@@ -14,11 +13,6 @@ COUNTS = (
     Quantity("p_failed", "p failed", "number of p that failed"),
 )
 """The numbers of p of a curve."""
-
-
-def asked(case: Case) -> list[Index]:
-    """The indices that a case asks for."""
-    return [index for name, index in INDICES.items() if name in case.asked]
 
 
 def columns_of(case: Case) -> tuple[Quantity, ...]:

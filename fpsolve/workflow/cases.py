@@ -17,15 +17,14 @@ from fpsolve.errors import NotConverged, WorkersDied
 from fpsolve.files import writable
 from fpsolve.messages import Code, Message
 from fpsolve.model.kinds import is_ours
-from fpsolve.output.charts import draw_chart, write_chart
-from fpsolve.output.directions import draw_densities
-from fpsolve.output.figures import draw, draw_rates, draw_response, draw_sensitivities, draw_stationary_responses
+from fpsolve.output.charts import chart_figure, write_chart
+from fpsolve.output.figures import simulated_response_figure
 from fpsolve.output.tables import write_samples, write_simulation
 from fpsolve.output.vtk import write_simulated_response
-from fpsolve.parts.intervals import Samples, sampled_case, samples_of
+from fpsolve.parts.intervals import Samples, sampled_case, samples_of, show_samples
 from fpsolve.parts.part import Numerics
 from fpsolve.pool import Pool, cluster, parallel, serial
-from fpsolve.show import intervals, results, simulation
+from fpsolve.show import results, simulation
 from fpsolve.show.chart import show as show_chart
 from fpsolve.show.notes import MONTE_CARLO, note_on, notes
 from fpsolve.signals import signals_held
@@ -175,11 +174,7 @@ def run_case(
 
         def show() -> None:
             with watch.bar(Phase(case.name, "figures")), writable(folder):
-                draw(case, sweep.results, simulated, folder)
-                draw_rates(case, sweep.results, folder)
-                draw_sensitivities(case, sweep.results, folder)
-                draw_stationary_responses(case, sweep.results, simulated, folder)
-                draw_densities(case, sweep.results, folder)
+                results.write_figures(case, sweep.results, simulated, folder)
             if reporter is not None:
                 from fpsolve.show.proof import show_claims  # which takes a tenth of a second
 
@@ -187,8 +182,8 @@ def run_case(
                 blocks = chain(
                     results.show(case, sweep.results, folder, simulated),
                     show_claims(sweep.results, folder),
-                    intervals.show_samples(case, samples) if samples else (),
-                    simulation.show(case, simulated, sweep.results, folder) if simulated else (),
+                    show_samples(case, samples) if samples else (),
+                    simulation.show(case, simulated, sweep.results) if simulated else (),
                     sweep.told.notes,
                     notes(case, simulated, MONTE_CARLO),
                     (note_on(case.name, each) for each in (samples.remarks if samples else ())),
@@ -206,7 +201,7 @@ def run_case(
             if monte_carlo:
                 simulations = Simulations(case, folder, is_fresh=is_fresh)
                 interruption = _simulate(simulations, watch, simulated, simulators)
-                watch.shown(simulation.show(case, simulated, sweep.results, folder))
+                watch.shown(simulation.show(case, simulated, sweep.results))
                 watch.noted(notes(case, simulated, MONTE_CARLO))
     return Outcome(
         sweep.results,
@@ -254,11 +249,11 @@ def simulate_case(
     ):
         simulations = Simulations(case, folder, is_fresh=is_fresh)
         interruption = _simulate(simulations, watch, simulated, pool)
-        watch.shown(simulation.show(case, simulated, (), folder))
+        watch.shown(simulation.show(case, simulated))
         watch.noted(notes(case, simulated, MONTE_CARLO))
         if reporter is not None:
             facts = facts_since(case, started)
-            blocks = chain(simulation.show(case, simulated, (), folder), notes(case, simulated, MONTE_CARLO))
+            blocks = chain(simulation.show(case, simulated), notes(case, simulated, MONTE_CARLO))
             reporter.write(case, folder, watch, blocks, facts=facts, files=SIMULATION, complete=not interruption)
     return Outcome((), tuple(simulated), interruption, known=simulations.known, outdated=simulations.records.outdated)
 
@@ -295,9 +290,9 @@ def chart_case(
     def show() -> None:
         if chart.lines:
             with writable(folder):
-                draw_chart(case, chart, folder)
+                chart_figure(case, chart).write(folder)
             if reporter is not None:
-                facts, blocks = facts_since(case, started), show_chart(case, chart, folder)
+                facts, blocks = facts_since(case, started), show_chart(case, chart)
                 reporter.write(case, folder, watch, blocks, facts=facts, files=CHARTED, complete=chart.complete)
 
     with (
@@ -377,7 +372,7 @@ def _sample(case: Case, sweep: Sweep, folder: Path, pool: Pool, watch: Watch, *,
     samples = samples_of(case, sweep.results[0], solved.results)
     with writable(folder):
         write_samples(case, samples, folder)
-    watch.shown(intervals.show_samples(case, samples))
+    watch.shown(show_samples(case, samples))
     watch.noted(note_on(case.name, each) for each in samples.remarks)
     return samples
 
@@ -390,7 +385,7 @@ def _simulate(simulations: Simulations, watch: Watch, simulated: list[SimulatedC
             simulated.append(each)
             write_simulation(case, each, folder)
             write_simulated_response(each, folder)
-            draw_response(case, each, folder)
+            simulated_response_figure(case, each).write(folder)
     whole = len(simulated) - simulated[-1].interrupted
     if whole == case.planned:
         return ""

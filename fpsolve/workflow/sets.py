@@ -40,7 +40,7 @@ from fpsolve.output.records import (
     simulation_key,
 )
 from fpsolve.output.tables import facts_of, write_results
-from fpsolve.output.vtk import write_curves, write_functions
+from fpsolve.parts.eigenfunctions import write_curves
 from fpsolve.parts.every import BY_NAME, PARTS
 from fpsolve.parts.moments import PART as OF_P
 from fpsolve.parts.part import Job, Numerics
@@ -62,7 +62,9 @@ REST = 50
 
 def keep(folder: Path, numerics: Numerics, order: Order, curve: Curve, solved: Solved) -> Found:
     """Write what was found of a set into the folder of its case, and say where the numbers are."""
-    write_functions(solved, curve, folder)
+    for name, found in solved.pictures.items():
+        if draw := BY_NAME[name].draw:
+            draw(found, curve, folder)
     if not solved.entries and order.entries:  # its numbers were known
         return curve.number, None, False
     is_failed = solved.result.status.fails

@@ -9,7 +9,7 @@ import numpy as np
 
 from fpsolve.exponent.error import Estimate, Failure
 from fpsolve.exponent.quantities import INDICES
-from fpsolve.output.figures import draw
+from fpsolve.output.figures import main_figure
 from fpsolve.study.results import CurveResult, MomentColumns
 from fpsolve.theory.perturbation import second_order
 from tests.kit import case_in, case_text
@@ -42,7 +42,7 @@ def _result(case, curve, *, has_failed):
 
 def drawn_case(folder: Path, sets=(), *, fails=lambda number: False):
     case = case_of(folder, sets)
-    draw(case, results_of(case, fails), [], folder)
+    main_figure(case, results_of(case, fails), [], folder).write(folder)
     return case
 
 

@@ -6,7 +6,7 @@ from vtkmodules.vtkCommonDataModel import vtkLagrangeQuadrilateral
 
 from fpsolve.fem.mesh import CylinderMesh, make_mesh
 from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
-from fpsolve.output.vtk import write_eigenfunctions
+from fpsolve.parts.eigenfunctions import write_eigenfunctions
 
 HARD = VibroImpactOscillator(omega=1.0, restitution=0.3, c1=0.1, epsilon=0.2)
 FINE = {"phi_degree": 14, "xi_cells": 8}

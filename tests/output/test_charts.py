@@ -7,7 +7,7 @@ import pytest
 
 from fpsolve.analysis.regions import Region, Regions
 from fpsolve.analysis.zero import Zero
-from fpsolve.output.charts import draw_chart
+from fpsolve.output.charts import chart_figure
 from tests.kit import case_in, case_text
 from tests.output.drawing import words
 
@@ -38,7 +38,7 @@ def picture(tmp_path, drawn):
         lines = [SimpleNamespace(zero=Zero("lyapunov_exponent"), branches=(LINE,))]
         lines.append(SimpleNamespace(zero=Zero("moment", 2.0), branches=()))
         chart = SimpleNamespace(lines=lines, closed_forms=[[], []], regions=Regions(each, index))
-        draw_chart(case_in(tmp_path, case_text(CHART)), chart, tmp_path)
+        chart_figure(case_in(tmp_path, case_text(CHART)), chart).write(tmp_path)
         return drawn[-1]
 
     return make

@@ -8,7 +8,7 @@ import pyvista
 import xarray
 
 from fpsolve import load_case, run
-from fpsolve.output.directions import draw_densities
+from fpsolve.parts.directions import PART
 
 ROOT = Path(__file__).parents[2]
 STATED = [
@@ -73,8 +73,10 @@ def test_files_of_two_modes(modes):
 def test_figure_of_two_modes(modes, tmp_path):
     case, results, folder = modes
     drawn = load_case(case.path, [*STATED[:-1], STATED[-1].replace("false", "true")])
-    draw_densities(drawn, results, folder, into=tmp_path / "densities.svg")
+    [figure] = PART.figures(drawn, results[0], folder, None)
+    figure.draw([tmp_path / "densities.svg"], "")
     assert (tmp_path / "densities.svg").exists()
+    assert not [*PART.figures(case, results[0], folder, None)]
     assert not (folder / "densities.png").exists()  # as the case wants no figures
 
 

@@ -15,8 +15,8 @@ from fpsolve.model.problem import Problem
 from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
 from fpsolve.output import surfaces
 from fpsolve.output.eigenfunctions import draw_eigenfunction, surface_of
-from fpsolve.output.nodes import FIELDS
 from fpsolve.output.surfaces import can_render, flat_figure
+from fpsolve.parts.nodes import FIELDS
 from tests.conftest import FIG1, UNIT_NOISE
 
 pytestmark = pytest.mark.usefixtures("pictures")

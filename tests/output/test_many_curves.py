@@ -11,7 +11,7 @@ import xarray as xr
 from fpsolve.case.vary import map_key
 from fpsolve.drawing import label_of
 from fpsolve.output.datasets import write_dataset
-from fpsolve.output.figures import Encoding, draw
+from fpsolve.output.figures import Encoding, main_figure
 from fpsolve.output.tables import write_results
 from fpsolve.theory.perturbation import second_order
 from tests.conftest import sampled
@@ -271,7 +271,7 @@ def test_when_it_is_a_map(drawn, tmp_path, count, more, key):
     case = case_of(tmp_path, list(filter(None, sets)))
     assert (map_key(case.figure, case.vary) or "") == key
     if more:
-        draw(case, results_of(case), [], tmp_path)
+        main_figure(case, results_of(case), [], tmp_path).write(tmp_path)
         [mesh] = [each for each in drawn[0].axes[0].collections if type(each).__name__ == "QuadMesh"]
         assert mesh.get_array().shape == (count, 3)
 
@@ -281,7 +281,7 @@ def test_thousands_of_curves_take_seconds(pictures, tmp_path):
     case = case_of(tmp_path, ["vary.noise.D0={start=0.1, stop=3.0, num=2500}"])
     results = results_of(case)
     started = time.process_time()
-    draw(case, results, [], tmp_path)
+    main_figure(case, results, [], tmp_path).write(tmp_path)
     assert time.process_time() - started < 5  # some 1 where nothing else runs
     assert (tmp_path / "figure.pdf").stat().st_size < 500_000
 

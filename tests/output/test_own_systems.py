@@ -27,11 +27,11 @@ from fpsolve.model import (
 )
 from fpsolve.model.kinds import NOISES
 from fpsolve.output.eigenfunctions import draw_eigenfunction, surface_of
-from fpsolve.output.figures import draw
+from fpsolve.output.figures import main_figure
 from fpsolve.output.surfaces import flat_figure
 from fpsolve.output.tables import write_results
-from fpsolve.output.vtk import write_eigenfunctions, write_functions
 from fpsolve.page.terminal import print_blocks
+from fpsolve.parts.eigenfunctions import PART, write_eigenfunctions
 from fpsolve.show.notes import left_out, notes, shows_perturbed_moments
 from fpsolve.show.results import show
 from fpsolve.simulation import MonteCarlo
@@ -187,7 +187,7 @@ def test_short_logarithmic_axes_have_round_ticks(pictures, start, stop):
 
 def test_a_short_list_of_moments_is_on_an_even_axis(drawn, tmp_path):
     case = case_in(tmp_path, own("telegraph") + MOMENTS + '[output]\nquantities = ["moment"]\n')
-    draw(case, solve_case(case), [], tmp_path)
+    main_figure(case, solve_case(case), [], tmp_path).write(tmp_path)
     assert drawn[0].axes[0].get_xscale() == "linear"
 
 
@@ -319,7 +319,7 @@ def test_noise_without_a_picture_is_named():
 def test_files_say_where_the_impacts_are(tmp_path):
     case = case_in(tmp_path, PLANE + "[moments]\np = [2.0]\n")
     [solved] = solve_sets(case)
-    write_functions(solved, solved.result.curve, tmp_path)
+    PART.draw(solved.pictures[PART.name], solved.result.curve, tmp_path)
     facts = pyvista.read(tmp_path / "eigenfunctions/p+2.0.vtu").field_data
     assert facts["impacts"] == pytest.approx([0.0, np.pi / 2, np.pi, 1.5 * np.pi], abs=1e-11)
     assert bytes(facts["along_y"]).decode() == "states; xi = -0.5; xi = 0.5"

@@ -10,7 +10,7 @@ from matplotlib.colors import to_hex
 
 from fpsolve.case.case import load_case
 from fpsolve.drawing import figure_for
-from fpsolve.output.figures import Series, draw, draw_response, draw_series
+from fpsolve.output.figures import Series, draw_series, main_figure, simulated_response_figure
 from fpsolve.simulation.response import Response
 from tests.kit import solve_case
 
@@ -96,7 +96,8 @@ def test_the_labels_of_a_response_have_units_and_room(drawn, tmp_path):
         density=np.ones((30, 20)), amplitude_edges=edges, amplitude_density=density, amplitude_error=0.01 * density,
         outside=0.0, impact_rate=1.0, time=1.0,
     )  # fmt: skip
-    draw_response(CASE, SimpleNamespace(response=response, curve=CASE.curve({})), tmp_path)
+    simulated = SimpleNamespace(response=response, curve=CASE.curve({}))
+    simulated_response_figure(CASE, simulated).write(tmp_path)
     plane, radial, bar = drawn[0].axes
     labels = [plane.xaxis.label, plane.yaxis.label, bar.yaxis.label, radial.xaxis.label, radial.yaxis.label]
     units = ["(length)", "(length/time)", "(time/length²)", "(length)", "(1/length)"]
@@ -111,7 +112,7 @@ def test_the_labels_of_a_response_have_units_and_room(drawn, tmp_path):
 def test_stability_index_of_a_case_is_marked_where_p_reaches_it(drawn, tmp_path, p, count):
     case = load_case(CASE.path, [f"moments.p={p}"])
     results = solve_case(case)
-    draw(case, results, [], tmp_path)
+    main_figure(case, results, [], tmp_path).write(tmp_path)
     found = [x for x, _, _ in marks(drawn[0])]
     assert found == [results[0].stability_index.value][:count]
 
@@ -124,5 +125,5 @@ def test_theory_that_is_not_drawn_is_not_computed(drawn, tmp_path, monkeypatch):
     results = solve_case(case)
     make, made = type(case).curve, []
     monkeypatch.setattr(type(case), "curve", lambda *arguments: made.append(1) or make(*arguments))
-    draw(case, results, [], tmp_path)
+    main_figure(case, results, [], tmp_path).write(tmp_path)
     assert len(made) <= 3 * 400  # of three lines, as the legend says

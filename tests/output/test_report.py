@@ -20,9 +20,10 @@ from fpsolve.errors import OutputError, Remedy
 from fpsolve.model import OrnsteinUhlenbeck, PlaneSystem, Problem, White
 from fpsolve.output import pictures
 from fpsolve.output.tables import facts_of
-from fpsolve.show import eigenfunctions, problem, proof, results
+from fpsolve.page.page import Drawing
+from fpsolve.parts.indices import show_meaning
+from fpsolve.show import problem, proof, results
 from fpsolve.show.chart import region_meaning
-from fpsolve.show.moments import show_meaning
 from fpsolve.show.problem import equations_of, noises_of
 from fpsolve.workflow import reports
 from fpsolve.workflow.folders import CHART, PROVEN, SIMULATED, SOLVED, own_folder
@@ -93,7 +94,7 @@ def solved(tmp_path_factory):
     """A run of Fig. 1's oscillator, without rendering, which takes a process of its own."""
     folder = tmp_path_factory.mktemp("reports")
     with painted(), pytest.MonkeyPatch.context() as patch:
-        patch.setattr(eigenfunctions, "run_child", lambda *_, **__: SimpleNamespace(returncode=-11))
+        patch.setattr("fpsolve.parts.eigenfunctions.run_child", lambda *_, **__: SimpleNamespace(returncode=-11))
         assert run(folder, ONE, "--report", "--set", "noise.D0=1.0") == 0
     return folder / "test"
 
@@ -202,9 +203,9 @@ def test_a_simulation_has_a_page(tmp_path):
     assert "effective windows" in Page(tmp_path / "test/report.html").text
 
 
-@pytest.mark.parametrize(("module", "name"), [(problem, "equations_of"), (results, "eigenfunctions_of")])
+@pytest.mark.parametrize(("module", "name"), [(problem, "equations_of"), (reports, "page_of")])
 def test_a_fault_in_the_report_costs_nothing_else(tmp_path, monkeypatch, capsys, module, name):
-    def fault(*_):
+    def fault(*_, **__):
         raise RuntimeError("a fault")
 
     monkeypatch.setattr(module, name, fault)
@@ -217,10 +218,10 @@ def test_a_fault_in_the_report_costs_nothing_else(tmp_path, monkeypatch, capsys,
 
 
 def test_a_figure_that_fails_is_told_in_its_place(tmp_path, monkeypatch):
-    def fault(*_, **__):
+    def fault(*_):
         raise RuntimeError("no ink")
 
-    monkeypatch.setattr(results, "draw", fault)
+    monkeypatch.setattr(results, "main_figure", lambda *_: Drawing("a figure", fault))
     assert run(tmp_path, OWN, "--report") == 0
     assert "this picture could not be drawn: RuntimeError: no ink" in Page(tmp_path / "test/report.html").text
 

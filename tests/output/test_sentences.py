@@ -7,8 +7,8 @@ from types import SimpleNamespace
 import pytest
 
 from fpsolve.cli import main
-from fpsolve.show.excursions import bounds_text
-from fpsolve.show.moments import show_meaning
+from fpsolve.parts.excursions import bounds_text
+from fpsolve.parts.indices import show_meaning
 from tests.kit import case_in, read_json, solve_case
 
 TEXT = """

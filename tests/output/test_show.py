@@ -16,7 +16,7 @@ import pytest
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem.mesh import write_mesh
 from fpsolve.model.problem import Problem
-from fpsolve.output.vtk import copy_show_script, write_density
+from fpsolve.parts.eigenfunctions import copy_show_script, write_density
 from tests.conftest import UNIT_NOISE
 from tests.output.eigenfunctions import COARSE, HARD, MESHES, MOMENTS, written
 

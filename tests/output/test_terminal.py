@@ -16,12 +16,12 @@ from fpsolve.model.quantity import OSCILLATOR_RESPONSE
 from fpsolve.page.letters import encodable
 from fpsolve.page.page import Column, Grid, Note
 from fpsolve.page.terminal import print_blocks
+from fpsolve.results.text import duration
 from fpsolve.show import simulation
 from fpsolve.show.comparison import show as show_comparisons
 from fpsolve.show.curves import curve_grid
 from fpsolve.show.notes import notes
 from fpsolve.show.results import show as show_results
-from fpsolve.show.text import duration
 from fpsolve.study.results import Comparison, CurveResult, MomentColumns
 from fpsolve.study.simulate import simulate_curves
 from fpsolve.study.solve import failed
@@ -75,8 +75,8 @@ def test_quantities_are_whole(case, solved, capsys, terminal):
         (60, 80, 200),
         (
             ([*show_results(case, solved, place)], {"λ", "δ_p", "Λ″(0)", "N", "R_c", *MEANS} - {"⟨x⟩"}),
-            ([*simulation.show(case, simulated, (), place)], {"λ", "Λ″(0)", *MEANS} - {"⟨A²⟩", "⟨A⁴⟩"}),
-            ([*simulation.show(case, simulated, solved, place)], {"λ", "Λ″(0)", *MEANS} - {"⟨A²⟩", "⟨A⁴⟩"}),
+            ([*simulation.show(case, simulated)], {"λ", "Λ″(0)", *MEANS} - {"⟨A²⟩", "⟨A⁴⟩"}),
+            ([*simulation.show(case, simulated, solved)], {"λ", "Λ″(0)", *MEANS} - {"⟨A²⟩", "⟨A⁴⟩"}),
         ),
     ):
         terminal(width)

@@ -20,7 +20,8 @@ from fpsolve.fem.mesh import make_mesh
 from fpsolve.model.noises.non_gaussian import NonGaussianNoise
 from fpsolve.model.problem import Problem
 from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
-from fpsolve.output.vtk import write_density, write_eigenfunctions, write_simulated_response
+from fpsolve.output.vtk import write_simulated_response
+from fpsolve.parts.eigenfunctions import write_density, write_eigenfunctions
 from fpsolve.study import solve
 from fpsolve.workflow import run
 from tests.conftest import FIG1, UNIT_NOISE, sampled
@@ -397,7 +398,7 @@ import sys
 from pathlib import Path
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.model.problem import Problem
-from fpsolve.output.vtk import write_eigenfunctions
+from fpsolve.parts.eigenfunctions import write_eigenfunctions
 from tests.conftest import FIG1, UNIT_NOISE
 assert "pyvista" not in sys.modules
 pair = ExponentSolver(Problem(FIG1, UNIT_NOISE)).pair(0.0)

@@ -14,11 +14,10 @@ import fpsolve
 from fpsolve.errors import CaseError, NotConverged
 from fpsolve.messages import Code, Message
 from fpsolve.model.quantity import OSCILLATOR_RESPONSE
-from fpsolve.output.figures import draw_stationary_responses
 from fpsolve.parts import response
+from fpsolve.parts.indices import show_meaning
 from fpsolve.parts.intervals import sampled_case
-from fpsolve.show.moments import show_meaning
-from fpsolve.show.response import shape
+from fpsolve.parts.response import PART, shape
 from fpsolve.show.simulation import number_grid
 from fpsolve.study.results import Status
 from fpsolve.study.solve import Numerics, compare, everything, expected, solve_curve
@@ -239,7 +238,8 @@ def test_p_bifurcations_are_told(result, case, index, words, titles, tmp_path, m
     edges = np.linspace(0, 3, 31)
     sample = SimpleNamespace(amplitude_edges=edges, amplitude_density=edges[1:], amplitude_error=0.1 * edges[1:])
     simulated = SimpleNamespace(curve=result.curve, response=sample)
-    draw_stationary_responses(case, [other], [simulated], tmp_path, into=tmp_path / "a.svg")
+    [figure] = PART.figures(case, other, tmp_path, simulated)
+    figure.draw([tmp_path / "a.svg"], "")
     plane, radial, _ = figures[0].axes
     assert [axes.get_title().partition(":")[0] for axes in (plane, radial)] == titles
     np.testing.assert_array_equal(radial.lines[0].get_ydata(), result.response.density.of_amplitude)

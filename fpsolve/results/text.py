@@ -1,8 +1,9 @@
-"""Numbers, counts and times as text."""
+"""Numbers, units, counts and times as text."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
 from fpsolve.data import Quantity
 from fpsolve.exponent.error import Estimate, digits
@@ -10,8 +11,6 @@ from fpsolve.page.page import Column
 
 DIGITS = 7
 """Digits of a number in a sentence, or in a table of many curves."""
-
-
 NUMBER_COLUMNS = (
     Column("quantity", 5, is_text=True), Column("symbol"), Column("value"), Column("± error"), Column("unit", 4)
 )  # fmt: skip
@@ -77,3 +76,9 @@ def fate(what: str, rate: float, sign: float, time_unit: str) -> str:
         return f" cannot be distinguished from 0 within its error: {what} is at the border of stability, or near it"
     time = f"in a time of {math.log(2) / abs(rate):.3g}" + ("" if time_unit == "time" else f" {time_unit}")
     return f" > 0: {what} grows, doubling {time}" if sign > 0 else f" < 0: {what} decays, halving {time}"
+
+
+def units_in_words(unit: str, quantities: Iterable[Quantity]) -> str:
+    """The unit of those that have one, where the unit of time has a name: "λ, N in 1/s"; else nothing."""
+    timed = [each.symbol for each in quantities if each.unit != each.timed(unit).unit]
+    return f"{', '.join(timed)} in 1/{unit}" if timed else ""
