@@ -8,7 +8,7 @@ import pytest
 
 from fpsolve.analysis.zero import Zero
 from fpsolve.errors import OutputError
-from fpsolve.output.charts import read_line
+from fpsolve.output.figures import read_line
 from fpsolve.workflow.folders import SOLVED, own_folder
 from tests.kit import case_in, case_text, read_json
 

@@ -19,6 +19,7 @@ import xarray
 import fpsolve
 from fpsolve.analysis import stationary_density, tilted_density
 from fpsolve.case.remedies import CASE_WORDS
+from fpsolve.commands import check_case, compare
 from fpsolve.errors import CaseError, FpsolveError, NotConverged, OutputError
 from fpsolve.exponent import INDICES as KNOWN
 from fpsolve.exponent.fields import UNRESOLVED
@@ -27,8 +28,8 @@ from fpsolve.files import alone
 from fpsolve.output.tables import write_results
 from fpsolve.parts import PARTS
 from fpsolve.study import solve
-from fpsolve.study.solve import compare, solve_curve
-from fpsolve.workflow import Watch, check_case, run_case, sets, simulate_case
+from fpsolve.study.solve import solve_curve
+from fpsolve.workflow import Watch, run_case, sets, simulate_case
 from tests.conftest import painted
 from tests.kit import (
     COSTLY,

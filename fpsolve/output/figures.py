@@ -6,6 +6,8 @@ value of a key.
 
 from __future__ import annotations
 
+import csv
+import io
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -38,6 +40,7 @@ from fpsolve.drawing import (
 )
 from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, STABILITY_INDEX
+from fpsolve.files import parsed_json, plain_text
 from fpsolve.model.problem import Problem
 from fpsolve.model.quantity import (
     GROWTH,
@@ -45,7 +48,6 @@ from fpsolve.model.quantity import (
     RATE_FUNCTION,
     P,
 )
-from fpsolve.output.charts import read_line
 from fpsolve.page.limits import EACH
 from fpsolve.page.page import Drawing
 from fpsolve.page.plots import line_of, plot_of
@@ -520,6 +522,42 @@ def _draw_map(axes: Any, case: Case, results: Sequence[CurveResult], keys: tuple
     for i, branch in enumerate(branches):
         label = "" if i else words
         axes.plot(*branch, color="black", linewidth=points(2.6), label=label, scalex=False, scaley=False)
+
+
+def read_line(folder: Path, keys: tuple[str, str], zero: Zero, parameters: Varied) -> tuple[list[FloatArray], bool]:
+    """The branches of a line of the chart in a folder over two keys, each of shape (2, n), and whether it is finished.
+
+    There are none where the chart has no such line, or is not of these parameters.
+
+    Args:
+        keys: of the abscissa and of the ordinate, in whichever order the chart has them.
+        parameters: those of which the chart must hold all but the two keys.
+    """
+    try:
+        summary = parsed_json(plain_text(folder / "chart.json"))
+        found = summary["x"]["key"], summary["y"]["key"]
+        if set(found) != set(keys) or not summary["parameters"].items() <= parameters.items():
+            return [], True
+        table = csv.DictReader(io.StringIO(plain_text(folder / "chart.csv"), newline=""))
+        rows = [row for row in table if row["line"] == zero.name]
+        branches = []
+        of_line = (each for line in summary["lines"] if line["line"] == zero.name for each in line["branches"])
+        for number, branch in enumerate(of_line, start=1):
+            points = [[float(row[key]) for key in "xy"] for row in rows if row["branch"] == str(number)]
+            path = np.array(points + points[:1] if branch["closed"] else points).T
+            if len(path) != 2 or not np.isfinite(path).all():
+                raise ValueError("a branch has no points")
+            branches.append(path if found == keys else path[::-1])
+        return branches, bool(summary["complete"])
+    except (
+        OSError,
+        ValueError,
+        LookupError,
+        TypeError,
+        AttributeError,
+        csv.Error,
+    ):  # there is none, or it is none of ours
+        return [], True
 
 
 def _draw_values(axes: Any, values: FloatArray, edges: tuple[FloatArray, FloatArray], about: Mapping[str, Any]) -> None:

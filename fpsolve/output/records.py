@@ -32,9 +32,6 @@ from typing import Any, Literal, NamedTuple, TypeVar, get_args, get_origin, get_
 
 import numpy as np
 
-from fpsolve.analysis.continuation import Trace
-from fpsolve.analysis.scan import Scan
-from fpsolve.analysis.stability import Boundary
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case, Curve
 from fpsolve.case.remedies import CASE_WORDS
@@ -48,7 +45,6 @@ from fpsolve.parts.every import BY_NAME
 from fpsolve.parts.moments import PART as MOMENTS
 from fpsolve.parts.moments import Moments, begun_of, unfinished
 from fpsolve.parts.part import Entry, Job, Numerics, Part, Reason, Settings
-from fpsolve.study.chart import charted
 from fpsolve.study.results import CurveResult, SimulatedCurve
 from fpsolve.study.solve import Asked, everything, result_of
 
@@ -79,15 +75,6 @@ class Address:
     file: str
     start: int
     size: int
-
-
-@dataclass(frozen=True, eq=False)
-class Line:
-    """What is recorded of a finished line of a chart, see `Boundary`."""
-
-    traces: tuple[Trace, ...]
-    scan: Scan
-    seconds: float
 
 
 class Records:
@@ -425,40 +412,22 @@ def _entry_of(data: Any, part: Part, curve: Curve, settings: Settings) -> Entry:
 
 def simulation_key(curve: Curve, orders: Sequence[float], setting: MonteCarloSection) -> str:
     settings = setting.model_dump(mode="json")
-    return f"{RESULT_VERSION}-{_digest(SimulatedCurve, orders=list(orders), setting=settings)}-{curve.digest}"
+    return f"{RESULT_VERSION}-{digest_of(SimulatedCurve, orders=list(orders), setting=settings)}-{curve.digest}"
 
 
-def line_key(case: Case, line: Boundary) -> str:
-    """What the record of a line of a chart is found by."""
-    frame = [repr(each) for each in (line.zero, line.x, line.y, line.step, line.budget)]
-    digest = _digest(Line, frame=frame, nodes=charted(case).nodes)
-    return f"{RESULT_VERSION}-{digest}-{case.curve({}).digest}"
-
-
-def line_of(record: Record, line: Boundary) -> Boundary:
-    """A finished line from its record, with what it was begun with. Raises `ValueError` where that has another form."""
-    found = Line(**_made(Line, record))
-    samples = [point.sample for trace in found.traces for point in trace.points]
-    count = found.scan.nodes.size
-    shapes = found.scan.nodes.shape, found.scan.values.shape, found.scan.gradients.shape
-    is_whole = shapes == ((count,), (count, count), (count, count, 2)) and all(trace.points for trace in found.traces)
-    is_whole &= all(each.at.shape == each.gradient.shape == (2,) and np.isfinite(each.at).all() for each in samples)
-    if not is_whole:
-        raise ValueError("this is no record of a line")
-    return replace(line, traces=found.traces, scan=found.scan, seconds=found.seconds, complete=True)
-
-
-def record_of(found: SimulatedCurve | Line) -> Record:
+def record_of(found: Any) -> Record:
+    """The record of a dataclass, without its curve."""
     kind: Any = type(found)
     return {name: each.plain(getattr(found, name)) for name, each in _recorded(kind).items()}
 
 
 def simulated_of(record: Mapping[str, Any], curve: Curve) -> SimulatedCurve:
     """The simulation of a curve from its record. Raises `ValueError` where that has another form."""
-    return SimulatedCurve(curve, **_made(SimulatedCurve, record))
+    return SimulatedCurve(curve, **made_of(SimulatedCurve, record))
 
 
-def _made(kind: type, record: Mapping[str, Any]) -> dict[str, Any]:
+def made_of(kind: type, record: Mapping[str, Any]) -> dict[str, Any]:
+    """The attributes of a dataclass from its record. Raises `ValueError` where that has another form."""
     with _read_as(f"a {kind.__name__}"):
         return {name: each.made(record[name]) for name, each in _recorded(kind).items()}
 
@@ -492,7 +461,7 @@ def simulation_fits(simulated: SimulatedCurve, orders: Sequence[float]) -> bool:
     return is_whole and all(map(math.isfinite, numbers))
 
 
-def _digest(kind: type, **content: Any) -> str:
+def digest_of(kind: type, **content: Any) -> str:
     """A digest of what results of a kind follow from beside their curve, and of their form."""
     form = {name: each.form for name, each in _recorded(kind).items()}
     return _hash({"form": form, **content})

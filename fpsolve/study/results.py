@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 from fpsolve.analysis.excursions import Excursion
 from fpsolve.analysis.sensitivity import Sensitivities
 from fpsolve.case.case import Curve
-from fpsolve.case.sections import Expectation, Varied
 from fpsolve.data import Quantity, Result, dataset
 from fpsolve.exponent.error import Estimate, Failure
 from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, STABILITY_INDEX, VARIANCE_RATE
@@ -188,14 +187,3 @@ class SimulatedCurve:
             LYAPUNOV_EXPONENT.name: (found.lyapunov_exponent, found.lyapunov_exponent_error),
             VARIANCE_RATE.name: (found.variance_rate, found.variance_rate_error),
         }
-
-
-@dataclass(frozen=True)
-class Comparison:
-    """One expectation of a case and what was computed; `met` says whether they agree."""
-
-    expectation: Expectation
-    varied: Varied
-    value: float | None
-    tolerance: float
-    met: bool

@@ -27,8 +27,7 @@ from fpsolve.parts.indices import JUMPS
 from fpsolve.parts.moments import CLASSES, NO_MOMENTS, Moments, unfinished
 from fpsolve.parts.moments import PART as MOMENTS
 from fpsolve.parts.part import Entry, Job, Numerics, Part, Reason, Settings, attempt
-from fpsolve.parts.response import NAME as RESPONSE
-from fpsolve.study.results import Comparison, CurveResult, Solved
+from fpsolve.study.results import CurveResult, Solved
 
 Kept = TypeVar("Kept")
 Asked = Mapping[str, Settings]
@@ -43,36 +42,6 @@ def everything(case: Case, number: int = 1) -> Asked:
     """What a case asks for, of the curve with a number."""
     asked = {part.name: part.settings(case, number) for part in PARTS if part.solve}
     return {name: settings for name, settings in asked.items() if settings is not None}
-
-
-def expected(case: Case, varied: Varied) -> Asked:
-    """What the expectations of a case compare, of the curve with these values."""
-    chosen = [each for each in case.expect if each.selects(varied)]
-    p = np.unique([each.p for each in chosen if each.p is not None])
-    asked: dict[str, Settings] = {MOMENTS.name: {"p": p.tolist(), "slopes": False}}
-    asked |= {name: {} for name in INDICES if any(each.quantity == name for each in chosen)}
-    if any(each.of_response for each in chosen):
-        asked[RESPONSE] = {"rtol": case.response.rtol, "grid": None}
-    return asked
-
-
-def compare(case: Case, results: Sequence[CurveResult]) -> list[Comparison]:
-    """Every expectation of a case against every curve that it selects."""
-    found = []
-    for wanted, result in ((each, result) for each in case.expect for result in results):
-        if not wanted.selects(result.curve.varied):
-            continue
-        if wanted.p is not None:
-            at = np.flatnonzero(np.isclose(result.moments.p, wanted.p, rtol=0, atol=1e-12))
-            value = float(result.moments.value[at[0]]) if at.size else None
-        else:
-            numbers = result.response.numbers if result.response else {}
-            estimate = numbers.get(wanted.of_response) if wanted.of_response else result.estimates[wanted.quantity]
-            value = None if estimate is None else estimate.value
-        tolerance = max(wanted.atol or 0.0, (wanted.rtol or 0.0) * abs(wanted.value))
-        met = value is not None and abs(value - wanted.value) <= tolerance
-        found.append(Comparison(wanted, dict(result.curve.varied), value, tolerance, met))
-    return found
 
 
 def solve_curve(
@@ -287,8 +256,3 @@ def solved(
 def failed(curve: Curve, reason: str) -> CurveResult:
     """The result of a curve of which nothing was found."""
     return CurveResult(curve, NO_MOMENTS, dict.fromkeys(INDICES), failures=(Failure(None, message_of(reason)),))
-
-
-def result_alone(order: Order, curve: Curve, solved: Solved) -> CurveResult:
-    """For a `solve_batch` that keeps nothing but the numbers."""
-    return solved.result

@@ -1,43 +1,31 @@
-"""What can be done with a case: run, simulate, chart and check it. All but the check write files and then draw."""
+"""What can be done with a case: run and simulate it. Both write files and then draw."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
-from functools import partial
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fpsolve.case.case import Case, load_case
-from fpsolve.case.sections import Varied
 from fpsolve.errors import NotConverged, WorkersDied
 from fpsolve.files import writable
 from fpsolve.messages import Code, Message
-from fpsolve.model.kinds import is_ours
-from fpsolve.output.charts import chart_figure, write_chart
 from fpsolve.output.figures import simulated_response_figure
 from fpsolve.output.tables import write_samples, write_simulation
 from fpsolve.output.vtk import write_simulated_response
 from fpsolve.parts.intervals import Samples, sampled_case, samples_of, show_samples
-from fpsolve.parts.part import Numerics
 from fpsolve.pool import Pool, cluster, parallel, serial
 from fpsolve.show import results, simulation
-from fpsolve.show.chart import show as show_chart
 from fpsolve.show.notes import MONTE_CARLO, note_on, notes
 from fpsolve.signals import signals_held
-from fpsolve.study.chart import Chart, chart_work, refuse_no_chart, solve_chart
-from fpsolve.study.hierarchy import compare_with_hierarchy, even_moments_asked
-from fpsolve.study.results import Comparison, CurveResult, SimulatedCurve
+from fpsolve.study.results import CurveResult, SimulatedCurve
 from fpsolve.study.simulate import refuse_obstacles, simulation_work
-from fpsolve.study.solve import Order, batches, compare, expected, result_alone, solve_batch
-from fpsolve.testing import check_noise
 from fpsolve.workflow.folders import (
     AGAIN,
-    ANEW,
-    CHART,
     SIMULATED,
     SOLVED,
     kept,
@@ -45,10 +33,10 @@ from fpsolve.workflow.folders import (
     own_folder,
     saying_if_interrupted,
 )
-from fpsolve.workflow.progress import NODES, PERCENT, POINTS, SETS, SILENT, Phase, Watch, ignore
+from fpsolve.workflow.progress import PERCENT, SILENT, Phase, Watch, ignore
 from fpsolve.workflow.reports import facts_since, shown_at_the_end
 from fpsolve.workflow.seal import TABLES
-from fpsolve.workflow.sets import Lines, Simulations, Sweep
+from fpsolve.workflow.sets import Simulations, Sweep
 
 if TYPE_CHECKING:
     from fpsolve.workflow.reports import Reporter
@@ -57,8 +45,6 @@ SAMPLING = ("sample.json",)
 """The file with all numbers of samples."""
 SIMULATION = ("monte_carlo.json",)
 """The file with all numbers of a simulation."""
-CHARTED = "chart.csv", "chart.json"
-"""The files with all numbers of a chart."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,8 +55,6 @@ class Outcome:
         results: its curves, solved; what did not converge is in their `failures`.
         simulated: its curves, simulated.
         interruption: where an interrupt ended the simulation, what is kept, and how to go on; empty without interrupt.
-        comparisons: what the case expects beside what was computed.
-        faults: of a noise that is no kind of fpsolve, see `check_noise`.
         facts: versions, the command and the time of a run that solves, see `facts_of`.
         known: how many of its curves an earlier run had finished.
         outdated: how many records of its curves another version has written; these are not used.
@@ -81,8 +65,6 @@ class Outcome:
     results: Sequence[CurveResult] = ()
     simulated: tuple[SimulatedCurve, ...] = ()
     interruption: str = ""
-    comparisons: tuple[Comparison, ...] = ()
-    faults: tuple[Message, ...] = ()
     facts: Mapping[str, Any] = field(default_factory=dict)
     known: int = 0
     outdated: int = 0
@@ -176,7 +158,7 @@ def run_case(
             with watch.bar(Phase(case.name, "figures")), writable(folder):
                 results.write_figures(case, sweep.results, simulated, folder)
             if reporter is not None:
-                from fpsolve.show.proof import show_claims  # which takes a tenth of a second
+                from fpsolve.show.claims import show_claims  # which takes a tenth of a second
 
                 is_whole = not interruption and len(simulated) == case.planned * monte_carlo
                 blocks = chain(
@@ -256,89 +238,6 @@ def simulate_case(
             blocks = chain(simulation.show(case, simulated), notes(case, simulated, MONTE_CARLO))
             reporter.write(case, folder, watch, blocks, facts=facts, files=SIMULATION, complete=not interruption)
     return Outcome((), tuple(simulated), interruption, known=simulations.known, outdated=simulations.records.outdated)
-
-
-def chart_case(
-    case: Case,
-    out: str | Path = "results",
-    *,
-    pool: Pool | None = None,
-    reporter: Reporter | None = None,
-    watch: Watch = SILENT,
-) -> Chart:
-    """Trace the lines of the chart of a case, and write chart.csv, .json, .png and .pdf into `out`/<name of the case>/.
-
-    The tables are written again after every branch. What an earlier chart wrote there is removed first, and what was
-    solved or simulated with other parameters; but lines that it has finished are not traced again.
-
-    Args:
-        pool: who scans the plane; this process if none is given.
-        reporter: writes report.html, if one is wanted.
-
-    Raises:
-        OutputError: the folder cannot be made or written to, or another run writes into it.
-        FpsolveError: the case has no chart, or several curves; nothing is written.
-        KeyboardInterrupt: its text says what is kept; the figure shows that.
-    """
-    refuse_no_chart(case)
-    chart, started = Chart((), ()), datetime.now(UTC)
-
-    def traced() -> str:
-        count = sum(len(line.traces) for line in chart.lines)
-        return kept(count, f"branch{'es' if count != 1 else ''} of {len(chart.closed_forms) or 'its'} lines", folder)
-
-    def show() -> None:
-        if chart.lines:
-            with writable(folder):
-                chart_figure(case, chart).write(folder)
-            if reporter is not None:
-                facts, blocks = facts_since(case, started), show_chart(case, chart)
-                reporter.write(case, folder, watch, blocks, facts=facts, files=CHARTED, complete=chart.complete)
-
-    with (
-        own_folder(case, out, (CHART,)) as folder,
-        saying_if_interrupted(traced),
-        watch.bar(Phase(case.name, "scan", chart_work(case), NODES)) as progress,
-        watch.bar(Phase(case.name, "lines", unit=POINTS)) as stepped,
-        writable(folder),
-        pool or serial() as workers,
-    ):
-        lines = Lines(case, folder)
-        with shown_at_the_end(show):
-            for chart in solve_chart(case, progress=progress, stepped=stepped, map=workers.map, known=lines.find):
-                write_chart(case, chart, folder)
-                lines.keep(chart.lines[-1])
-    return chart
-
-
-def check_case(case: Case, *, by_hierarchy: bool = False, pool: Pool | None = None, watch: Watch = SILENT) -> Outcome:
-    """Solve what a case expects, and return it with the `comparisons`; nothing is written.
-
-    A noise of a kind that fpsolve does not know itself is checked, too.
-
-    With `by_hierarchy` that is Λ of its even p, by the moment hierarchy.
-    """
-    found: list[CurveResult] = []
-    numerics = replace(Numerics.of(case), is_stated=True)
-
-    def order(number: int, varied: Varied) -> Order:
-        asked = even_moments_asked(case) if by_hierarchy else expected(case, varied)
-        return Order(number, varied, asked, case.vary.line_of(number))
-
-    with (
-        saying_if_interrupted(lambda: kept(len(found), of_curves(case)), ANEW),
-        watch.bar(Phase(case.name, "solving", case.planned, SETS)) as progress,
-        pool or serial() as workers,
-    ):
-        task = partial(solve_batch, problem=case.problem, numerics=numerics, keep=result_alone)
-        for _, results in workers.run(task, batches(case, order)):
-            for result in results:
-                found.append(result)
-                progress(failed=result.status.fails)
-    found.sort(key=lambda result: result.curve.number)
-    comparisons = compare_with_hierarchy(case, found) if by_hierarchy else compare(case, found)
-    faults = [fault for each in case.problem.noise.parts.values() if not is_ours(each) for fault in check_noise(each)]
-    return Outcome(found, comparisons=tuple(comparisons), faults=tuple(faults))
 
 
 def _solve(case: Case, folder: Path, pool: Pool, watch: Watch, *, is_fresh: bool) -> Sweep:

@@ -16,8 +16,6 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from fpsolve.analysis.stability import Boundary
-from fpsolve.analysis.zero import Zero
 from fpsolve.case.case import Case, Curve
 from fpsolve.case.sections import Varied
 from fpsolve.model.quantity import MOMENT, STATUS
@@ -25,13 +23,10 @@ from fpsolve.output.datasets import write_dataset
 from fpsolve.output.records import (
     SOLVED_RECORDS,
     Address,
-    Line,
     Records,
     Results,
     append,
     begun_record,
-    line_key,
-    line_of,
     record_of,
     record_of_set,
     set_key,
@@ -55,7 +50,7 @@ from fpsolve.workflow.seal import Told, seal, sealed
 
 Found = tuple[int, Address | CurveResult | None, bool]
 """The number of a curve, its numbers where they are new, and whether some of these are missing."""
-SIMULATED_RECORDS, LINE_RECORDS = "records/simulated", "records/charted"
+SIMULATED_RECORDS = "records/simulated"
 REST = 50
 """Tables are rewritten when so many times as long has gone by as the last time took, so that all of it costs little."""
 
@@ -223,26 +218,6 @@ class Sweep(_Kept):
         [curve] = self.case.curves(number - 1, number)
         entries, begun = self.results.entries(curve)
         return replace(order, entries=entries, begun=begun)
-
-
-class Lines:
-    """The lines of a chart, of which an earlier run may have finished some."""
-
-    def __init__(self, case: Case, folder: Path) -> None:
-        self.case, self.records, self._kept = case, Records(folder.resolve() / LINE_RECORDS).look(), set[Zero]()
-
-    def find(self, line: Boundary) -> Boundary | None:
-        """A line as it was finished, if it was; otherwise None."""
-        found = self.records.made(line_key(self.case, line), lambda record: line_of(record, line))
-        self._kept |= {line.zero} if found else set()
-        return found
-
-    def keep(self, line: Boundary) -> None:
-        """Keep a line once it is finished."""
-        if line.complete and line.scan is not None and line.zero not in self._kept:
-            record = record_of(Line(line.traces, line.scan, line.seconds))
-            append(self.records.folder, line_key(self.case, line), record)
-            self._kept.add(line.zero)
 
 
 class Simulations(_Kept):

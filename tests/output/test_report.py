@@ -15,6 +15,7 @@ from fpsolve.analysis.regions import Region
 from fpsolve.analysis.zero import Zero
 from fpsolve.case.case import load_case
 from fpsolve.cli import main
+from fpsolve.commands.chart import region_meaning
 from fpsolve.commands.options import BAD_INPUT
 from fpsolve.errors import OutputError, Remedy
 from fpsolve.model import OrnsteinUhlenbeck, PlaneSystem, Problem, White
@@ -22,8 +23,7 @@ from fpsolve.output import pictures
 from fpsolve.output.tables import facts_of
 from fpsolve.page.page import Drawing
 from fpsolve.parts.indices import show_meaning
-from fpsolve.show import problem, proof, results
-from fpsolve.show.chart import region_meaning
+from fpsolve.show import claims, problem, results
 from fpsolve.show.problem import equations_of, noises_of
 from fpsolve.workflow import reports
 from fpsolve.workflow.folders import CHART, PROVEN, SIMULATED, SOLVED, own_folder
@@ -292,7 +292,7 @@ def test_a_proof_that_was_altered_is_not_called_proven(alter, why, tmp_path):
 
 def test_a_proof_that_would_take_long_to_check_is_said_not_to_be_checked(tmp_path, monkeypatch):
     pytest.importorskip("flint")
-    monkeypatch.setattr(proof, "MOST_CHECKED", 0)
+    monkeypatch.setattr(claims, "MOST_CHECKED", 0)
     text = f'{PROVABLE}[output]\nquantities = ["moment"]\nfigure = false\n'
     assert run(tmp_path, text, "--width", "0.01", command="prove", name="proven.toml") == 0
     assert run(tmp_path, text, "--report", name="proven.toml") == 0
@@ -331,8 +331,8 @@ figure = false
 def test_charts_have_a_page(tmp_path, monkeypatch):
     for name, nodes in (
         ("analysis.stability.NODES", 7),
-        ("study.chart.NODES", 7),
-        ("study.chart.CLOSED_FORM_NODES", 31),
+        ("commands.chart.NODES", 7),
+        ("commands.chart.CLOSED_FORM_NODES", 31),
     ):
         monkeypatch.setattr(f"fpsolve.{name}", nodes)
     assert run(tmp_path, CHARTED, "--report", "--interactive", command="chart", name="plane.toml") == 0

@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 from fpsolve.case.sections import Expectation
+from fpsolve.commands.check import Comparison
+from fpsolve.commands.check import show as show_comparisons
 from fpsolve.exponent.error import Estimate, Failure
 from fpsolve.exponent.quantities import INDICES
 from fpsolve.messages import Code, Message, Severity
@@ -18,11 +20,10 @@ from fpsolve.page.page import Column, Grid, Note
 from fpsolve.page.terminal import print_blocks
 from fpsolve.results.text import duration
 from fpsolve.show import simulation
-from fpsolve.show.comparison import show as show_comparisons
 from fpsolve.show.curves import curve_grid
 from fpsolve.show.notes import notes
 from fpsolve.show.results import show as show_results
-from fpsolve.study.results import Comparison, CurveResult, MomentColumns
+from fpsolve.study.results import CurveResult, MomentColumns
 from fpsolve.study.simulate import simulate_curves
 from fpsolve.study.solve import failed
 from tests.kit import ALL, TEXT, case_in, solve_case

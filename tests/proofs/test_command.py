@@ -18,16 +18,14 @@ import pytest
 import fpsolve
 from fpsolve.case.case import load_case
 from fpsolve.cli import main
+from fpsolve.commands import prove as command
 from fpsolve.commands.options import BAD_INPUT, NOT_CONVERGED
-from fpsolve.commands.prove import check_proof, prove_case
+from fpsolve.commands.prove import CurveProof, Plan, check_proof, prove_case, show
 from fpsolve.model.noises.non_gaussian import NonGaussianNoise
 from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
 from fpsolve.output.records import Records, append
 from fpsolve.page.terminal import print_blocks
 from fpsolve.proofs import Certificate, Enclosure
-from fpsolve.show.proof import show
-from fpsolve.study import prove as study
-from fpsolve.study.prove import CurveProof, Plan
 from tests.conftest import sampled, started
 from tests.kit import case_in, read_json
 from tests.oracles import fourier_hermite
@@ -292,7 +290,7 @@ def forged(record):
 
 def noting(asked, most=None):
     """`prove_bounds` that notes each p it is asked for, up to so many: then comes an interrupt."""
-    prove_one = study.prove_bounds
+    prove_one = command.prove_bounds
 
     def prove_bounds(problem, stated, p, width, *, budget):
         if len(asked) == most:
@@ -310,7 +308,7 @@ def interrupted(tmp_path_factory):
     sets = ["moments.p=[0.0, 1.0, 2.0]", "output={ quantities = ['moment', 'lyapunov_exponent'] }", "figure.mark=[]"]
     case = case_in(folder, MOMENTS, sets, "proven")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(study, "prove_bounds", noting(asked, 2))
+        patch.setattr(command, "prove_bounds", noting(asked, 2))
         with pytest.raises(KeyboardInterrupt, match="run it again to go on"):
             prove_case(case, folder, width=1e-2)
     assert asked == ["0.0", "1.0"]
@@ -329,7 +327,7 @@ def test_an_interrupted_run_goes_on_with_the_bounds_that_follow(interrupted, tmp
         for key, record in places:
             change(record)
             append(path.parent, key, record)
-    monkeypatch.setattr(study, "prove_bounds", noting(asked))
+    monkeypatch.setattr(command, "prove_bounds", noting(asked))
     [proof] = prove_case(case, tmp_path, width=1e-2)
     assert asked == (["2.0", None] if change is None else ["0.0", "1.0", "2.0", None])
     assert all(found.is_proven for _, found in proof.moments)

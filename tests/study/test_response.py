@@ -11,6 +11,7 @@ import pyvista
 from scipy.integrate import simpson
 
 import fpsolve
+from fpsolve.commands import compare, expected
 from fpsolve.errors import CaseError, NotConverged
 from fpsolve.messages import Code, Message
 from fpsolve.model.quantity import OSCILLATOR_RESPONSE
@@ -20,7 +21,7 @@ from fpsolve.parts.intervals import sampled_case
 from fpsolve.parts.response import PART, shape
 from fpsolve.show.simulation import number_grid
 from fpsolve.study.results import Status
-from fpsolve.study.solve import Numerics, compare, everything, expected, solve_curve
+from fpsolve.study.solve import Numerics, everything, solve_curve
 from tests.kit import case_in, case_text, read_json
 
 SECTIONS = """[moments]

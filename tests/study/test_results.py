@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from fpsolve.cli import main
+from fpsolve.commands import compare
 from fpsolve.study.simulate import simulate_curves
-from fpsolve.study.solve import compare
 from tests.kit import ALL, INDICES, case_in, case_text, from_record, solve_sets
 
 SECTIONS = """[moments]
