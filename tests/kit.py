@@ -13,8 +13,9 @@ from fpsolve.case import Case
 from fpsolve.output.records import entries_of, record_of_set
 from fpsolve.parts.part import Numerics
 from fpsolve.study import CurveResult, solve_curve
-from fpsolve.study.results import Solved
+from fpsolve.study.results import SimulatedCurve, Solved
 from fpsolve.study.solve import everything, result_of
+from fpsolve.workflow.simulation import simulate_curve
 
 ALL = 'output.quantities="all"'
 """Sets what a case asks for to everything."""
@@ -88,6 +89,12 @@ def solve_sets(case: Case) -> list[Solved]:
 def solve_case(case: Case) -> list[CurveResult]:
     """The numbers alone."""
     return [solved.result for solved in solve_sets(case)]
+
+
+def simulate_curves(case: Case) -> list[SimulatedCurve]:
+    """The simulation of every curve, without a folder."""
+    orders = case.simulated.tolist()
+    return [simulate_curve(curve, orders, case.monte_carlo) for curve in case.curves()]
 
 
 def from_record(case: Case, solved: Solved) -> CurveResult:

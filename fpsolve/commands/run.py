@@ -47,8 +47,8 @@ def run(
     from fpsolve.parts.intervals import refuse_wrong_samples
     from fpsolve.show.notes import left_out
     from fpsolve.show.results import done_of, known_of
-    from fpsolve.study.simulate import refuse_obstacles
     from fpsolve.workflow.cases import run_case
+    from fpsolve.workflow.simulation import refuse_obstacles
 
     code, reporter, out = 0, options.reporter(), options.out
     typed = {} if sample is None else {f"--sample {sample}": f"uncertain.sample={sample}"}

@@ -40,8 +40,7 @@ def simulate(
     Example: fpsolve simulate cases/fig1.toml --paths 100000 --seed 1 --estimator population
     """
     from fpsolve.show.results import done_of, known_of
-    from fpsolve.study.simulate import refuse_obstacles
-    from fpsolve.workflow.cases import simulate_case
+    from fpsolve.workflow.simulation import refuse_obstacles, simulate_case
 
     reporter = options.reporter()
     stated = {"paths": paths, "time": time, "seed": seed, "estimator": estimator}
@@ -61,7 +60,7 @@ def simulate(
         if outcome.interruption:
             print_error(outcome.interruption)
         what = done_of(case, sum(not each.interrupted for each in outcome.simulated))
-        options.print_written(case, what, start, known_of(case, outcome.known, outcome.outdated))
+        options.print_written(case, what, start, known_of(case, outcome.known, outcome.records.outdated))
         if outcome.interruption:
             return INTERRUPTED
     return 0

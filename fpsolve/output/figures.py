@@ -26,7 +26,6 @@ from fpsolve.case.vary import legend, map_key
 from fpsolve.drawing import (
     COLOURS,
     FORMATS,
-    Format,
     draw_colours,
     draw_dots,
     figure_for,
@@ -223,24 +222,6 @@ def _draw_rates(case: Case, results: Sequence[CurveResult], paths: Sequence[Path
         )
         axes.margins(x=0.03)
         axes.ticklabel_format(style="sci", scilimits=(-2, 3), useMathText=True)
-
-
-def simulated_response_figure(case: Case, simulated: SimulatedCurve) -> Drawing:
-    """monte_carlo_response.png and .pdf of a curve, if it has a response."""
-    curve = simulated.curve
-    title, name = f"Simulated stationary response{curve.of}", f"monte_carlo_response{curve.suffix}"
-    return Drawing(title, partial(_draw_response, simulated), name, case.headline)
-
-
-def _draw_response(simulated: SimulatedCurve, paths: Sequence[Path], heading: str) -> None:
-    """The density of (x, ẋ) and of the amplitude."""
-    if simulated.response is None:
-        return
-    with figure_for(paths, heading, simulated.curve.held("time"), Format(width=10.5)) as figure:
-        plane, radial = figure.subplots(1, 2)
-        simulated.response.plot(plane)
-        figure.get_layout_engine().set(wspace=0.1)
-        simulated.response.plot_amplitude(radial)
 
 
 def _some(count: int) -> set[int]:

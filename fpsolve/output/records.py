@@ -35,7 +35,6 @@ import numpy as np
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case, Curve
 from fpsolve.case.remedies import CASE_WORDS
-from fpsolve.case.sections import MonteCarloSection
 from fpsolve.data import Quantity
 from fpsolve.errors import OutputError, Remedy
 from fpsolve.exponent.error import Moment
@@ -410,20 +409,10 @@ def _entry_of(data: Any, part: Part, curve: Curve, settings: Settings) -> Entry:
     raise ValueError(f"this is no entry of {part.name}")
 
 
-def simulation_key(curve: Curve, orders: Sequence[float], setting: MonteCarloSection) -> str:
-    settings = setting.model_dump(mode="json")
-    return f"{RESULT_VERSION}-{digest_of(SimulatedCurve, orders=list(orders), setting=settings)}-{curve.digest}"
-
-
 def record_of(found: Any) -> Record:
     """The record of a dataclass, without its curve."""
     kind: Any = type(found)
     return {name: each.plain(getattr(found, name)) for name, each in _recorded(kind).items()}
-
-
-def simulated_of(record: Mapping[str, Any], curve: Curve) -> SimulatedCurve:
-    """The simulation of a curve from its record. Raises `ValueError` where that has another form."""
-    return SimulatedCurve(curve, **made_of(SimulatedCurve, record))
 
 
 def made_of(kind: type, record: Mapping[str, Any]) -> dict[str, Any]:
@@ -439,26 +428,6 @@ def _read_as(what: str) -> Iterator[None]:
         yield
     except (LookupError, TypeError, AttributeError, ValueError, ArithmeticError, RecursionError, zlib.error) as failure:
         raise ValueError(f"this is no record of {what}: {failure!r}") from failure
-
-
-def simulation_fits(simulated: SimulatedCurve, orders: Sequence[float]) -> bool:
-    """Whether the numbers of a simulation are of the p that were asked for, and can be written and drawn."""
-    found, response = simulated.result, simulated.response
-    numbers = [found.lyapunov_exponent, found.lyapunov_exponent_error, found.variance_rate, found.variance_rate_error]
-    numbers += [found.time, found.step]
-    for each in found.estimates:
-        numbers += [each.p, each.effective_paths, each.value or 0.0, each.standard_error or 0.0]
-    is_whole = [each.p for each in found.estimates] == list(orders)
-    if response is not None:
-        edges = response.x_edges, response.v_edges, response.amplitude_edges
-        *cells, count = [each.size - 1 for each in edges]
-        numbers += [response.outside, response.impact_rate or 0.0, response.time, *sum(response.means.values(), ())]
-        is_whole &= (
-            all(each.ndim == 1 and each.size > 1 and bool(np.all(np.diff(each) > 0)) for each in edges)
-            and response.density.shape == tuple(cells)
-            and response.amplitude_density.shape == response.amplitude_error.shape == (count,)
-        )
-    return is_whole and all(map(math.isfinite, numbers))
 
 
 def digest_of(kind: type, **content: Any) -> str:

@@ -1,4 +1,4 @@
-"""Results as tables: summary.json, moments.csv, curves.csv, response.csv; monte_carlo.json and its response."""
+"""Results as tables: summary.json, moments.csv, curves.csv; sample.json."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ import socket
 import sys
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import asdict
 from datetime import datetime
 from functools import cache
 from importlib.metadata import version
@@ -21,7 +20,7 @@ from fpsolve import __version__
 from fpsolve.analysis.spreads import LEVEL
 from fpsolve.case.case import Case, Curve
 from fpsolve.case.remedies import CASE_WORDS
-from fpsolve.files import draft, write_csv, write_json
+from fpsolve.files import draft, write_json
 from fpsolve.messages import message_of
 from fpsolve.model.kinds import version_of
 from fpsolve.model.quantity import MOMENT, Quantity
@@ -29,7 +28,7 @@ from fpsolve.parts.every import PARTS
 from fpsolve.parts.intervals import SAMPLE, Samples, plain_spread
 from fpsolve.results.table import NO_P, Row, Table, plain, rows_over_p
 from fpsolve.study.columns import columns_of, row_of
-from fpsolve.study.results import CurveResult, SimulatedCurve, Status
+from fpsolve.study.results import CurveResult, Status
 
 MOST_INDENTED = 100
 """Curves of a summary that is made for eyes, too."""
@@ -155,33 +154,6 @@ def write_samples(case: Case, samples: Samples, folder: Path) -> None:
     write_json(folder / f"{SAMPLE}.json", content)
 
 
-def write_simulation(case: Case, simulated: SimulatedCurve, folder: Path) -> None:
-    """monte_carlo.json of a curve, and monte_carlo_response.csv where there is a response."""
-    suffix, result, response = simulated.curve.suffix, simulated.result, simulated.response
-    content = {
-        **head(case),
-        **_parameters(simulated.curve),
-        "estimates": [asdict(estimate) for estimate in result.estimates],
-        **_with_errors(simulated.estimates),
-        **{name: getattr(result, name) for name in ("paths", "time", "step", "seed", "impacts")},
-        "response": response
-        and {
-            "means": _with_errors(response.means),
-            **({} if response.impact_rate is None else {"impact_rate": response.impact_rate}),
-            **{name: getattr(response, name) for name in ("outside", "time")},
-        },
-        "warnings": in_case_words(simulated.warnings),
-    }
-    write_json(folder / f"monte_carlo{suffix}.json", content)
-    if response is None:
-        return
-    edges = response.amplitude_edges
-    columns = (edges[:-1], edges[1:], response.amplitude_density, response.amplitude_error)
-    rows = (map(float, row) for row in zip(*columns, strict=True))
-    header = ["amplitude_from", "amplitude_to", "density", "standard_error"]
-    write_csv(folder / f"monte_carlo_response{suffix}.csv", header, rows)
-
-
 def in_case_words(messages: Sequence[str]) -> list[str]:
     """Messages as those read them who work with case files."""
     return [message_of(each).words(CASE_WORDS) for each in messages]
@@ -193,7 +165,8 @@ def head(case: Case) -> dict[str, Any]:
     return {"case": case.name, "title": case.title, "fpsolve_version": __version__, **units}
 
 
-def _parameters(curve: Curve) -> dict[str, dict[str, Any]]:
+def parameters_of(curve: Curve) -> dict[str, dict[str, Any]]:
+    """What the table of a curve says of it."""
     return {"parameters": dict(curve.parameters), "varied": dict(curve.varied)}
 
 
@@ -202,7 +175,7 @@ def _summary(case: Case, result: CurveResult, row: Row, columns: Sequence[Quanti
     over_p, of_curve = _names(columns)
     moments = [dict(zip(over_p, each, strict=True)) for each in rows_over_p(row, over_p)]
     return {
-        **_parameters(result.curve),
+        **parameters_of(result.curve),
         **({"moments": moments} if MOMENT.name in case.asked else {}),
         **{name: _cell(row.get(name)) for name in of_curve},
         **_beyond_tables(case, result),
@@ -228,7 +201,3 @@ def _told(result: CurveResult) -> dict[str, list[str]]:
 def _beyond_tables(case: Case, result: CurveResult) -> dict[str, Any]:
     """What neither results.nc nor a CSV file has."""
     return {name: each for part in PARTS for name, each in part.content(case, result).items()}
-
-
-def _with_errors(numbers: Mapping[str, tuple[float, float]]) -> dict[str, dict[str, float]]:
-    return {name: {"value": value, "standard_error": error} for name, (value, error) in numbers.items()}

@@ -2,5 +2,4 @@ from .columns import columns_of as columns_of
 from .columns import row_of as row_of
 from .results import CurveResult as CurveResult
 from .results import SimulatedCurve as SimulatedCurve
-from .simulate import simulate_curves as simulate_curves
 from .solve import solve_curve as solve_curve

@@ -1,11 +1,10 @@
-"""What can be done with a case: run and simulate it. Both write files and then draw."""
+"""What can be done with a case: run it, which writes files and then draws."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, field
-from datetime import UTC, datetime
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,18 +13,14 @@ from fpsolve.case.case import Case, load_case
 from fpsolve.errors import NotConverged, WorkersDied
 from fpsolve.files import writable
 from fpsolve.messages import Code, Message
-from fpsolve.output.figures import simulated_response_figure
-from fpsolve.output.tables import write_samples, write_simulation
-from fpsolve.output.vtk import write_simulated_response
+from fpsolve.output.tables import write_samples
 from fpsolve.parts.intervals import Samples, sampled_case, samples_of, show_samples
 from fpsolve.pool import Pool, cluster, parallel, serial
-from fpsolve.show import results, simulation
+from fpsolve.show import results
 from fpsolve.show.notes import MONTE_CARLO, note_on, notes
 from fpsolve.signals import signals_held
 from fpsolve.study.results import CurveResult, SimulatedCurve
-from fpsolve.study.simulate import refuse_obstacles, simulation_work
 from fpsolve.workflow.folders import (
-    AGAIN,
     SIMULATED,
     SOLVED,
     kept,
@@ -33,18 +28,18 @@ from fpsolve.workflow.folders import (
     own_folder,
     saying_if_interrupted,
 )
-from fpsolve.workflow.progress import PERCENT, SILENT, Phase, Watch, ignore
-from fpsolve.workflow.reports import facts_since, shown_at_the_end
+from fpsolve.workflow.progress import SILENT, Phase, Watch, ignore
+from fpsolve.workflow.reports import shown_at_the_end
 from fpsolve.workflow.seal import TABLES
-from fpsolve.workflow.sets import Simulations, Sweep
+from fpsolve.workflow.sets import Sweep
+from fpsolve.workflow.simulation import SIMULATION, Simulations, refuse_obstacles
+from fpsolve.workflow.simulation import show as show_simulated
 
 if TYPE_CHECKING:
     from fpsolve.workflow.reports import Reporter
 
 SAMPLING = ("sample.json",)
 """The file with all numbers of samples."""
-SIMULATION = ("monte_carlo.json",)
-"""The file with all numbers of a simulation."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,7 +160,7 @@ def run_case(
                     results.show(case, sweep.results, folder, simulated),
                     show_claims(sweep.results, folder),
                     show_samples(case, samples) if samples else (),
-                    simulation.show(case, simulated, sweep.results) if simulated else (),
+                    show_simulated(case, simulated, sweep.results) if simulated else (),
                     sweep.told.notes,
                     notes(case, simulated, MONTE_CARLO),
                     (note_on(case.name, each) for each in (samples.remarks if samples else ())),
@@ -182,9 +177,8 @@ def run_case(
                 samples = _sample(case, sweep, folder, pool or serial(), watch, is_fresh=is_fresh)
             if monte_carlo:
                 simulations = Simulations(case, folder, is_fresh=is_fresh)
-                interruption = _simulate(simulations, watch, simulated, simulators)
-                watch.shown(simulation.show(case, simulated, sweep.results))
-                watch.noted(notes(case, simulated, MONTE_CARLO))
+                simulated = simulations.simulated
+                interruption = simulations.run(watch, simulators, sweep.results)
     return Outcome(
         sweep.results,
         tuple(simulated),
@@ -195,49 +189,6 @@ def run_case(
         failed=sweep.told.failed,
         samples=samples,
     )
-
-
-def simulate_case(
-    case: Case,
-    out: str | Path = "results",
-    *,
-    pool: Pool | None = None,
-    is_fresh: bool = False,
-    reporter: Reporter | None = None,
-    watch: Watch = SILENT,
-) -> Outcome:
-    """Simulate a case and write `out`/<name of the case>/monte_carlo.json, for further curves monte_carlo-2.json, ….
-
-    Of a system with terms of degree 3 the stationary response is written too. What an earlier simulation wrote there is
-    removed first, and a run with other parameters. An interrupt (Ctrl-C) ends the simulation; what is done is estimated
-    and written, and curves that are finished are not simulated again the next time.
-
-    Args:
-        pool: who simulates, such as a `cluster`; None for all processors of this machine.
-        is_fresh: whether to simulate all curves again.
-        reporter: writes report.html, if one is wanted.
-
-    Raises:
-        OutputError: the folder cannot be made or written to, or another run writes into it.
-        FpsolveError: a curve cannot be simulated; nothing is written.
-        KeyboardInterrupt: nothing was done yet, which its text says.
-    """
-    refuse_obstacles(case)
-    simulated: list[SimulatedCurve] = []
-    started = datetime.now(UTC)
-    with (
-        own_folder(case, out, (SIMULATED,)) as folder,
-        saying_if_interrupted(lambda: kept(len(simulated), of_curves(case), folder)),
-    ):
-        simulations = Simulations(case, folder, is_fresh=is_fresh)
-        interruption = _simulate(simulations, watch, simulated, pool)
-        watch.shown(simulation.show(case, simulated))
-        watch.noted(notes(case, simulated, MONTE_CARLO))
-        if reporter is not None:
-            facts = facts_since(case, started)
-            blocks = chain(simulation.show(case, simulated), notes(case, simulated, MONTE_CARLO))
-            reporter.write(case, folder, watch, blocks, facts=facts, files=SIMULATION, complete=not interruption)
-    return Outcome((), tuple(simulated), interruption, known=simulations.known, outdated=simulations.records.outdated)
 
 
 def _solve(case: Case, folder: Path, pool: Pool, watch: Watch, *, is_fresh: bool) -> Sweep:
@@ -274,19 +225,3 @@ def _sample(case: Case, sweep: Sweep, folder: Path, pool: Pool, watch: Watch, *,
     watch.shown(show_samples(case, samples))
     watch.noted(note_on(case.name, each) for each in samples.remarks)
     return samples
-
-
-def _simulate(simulations: Simulations, watch: Watch, simulated: list[SimulatedCurve], pool: Pool | None) -> str:
-    """Simulate the curves of a case into a list, and write each; what to say where an interrupt ended it."""
-    case, folder = simulations.case, simulations.folder
-    with watch.bar(Phase(case.name, "simulation", simulation_work(case), PERCENT)) as progress, writable(folder):
-        for each in simulations.curves(progress, pool):
-            simulated.append(each)
-            write_simulation(case, each, folder)
-            write_simulated_response(each, folder)
-            simulated_response_figure(case, each).write(folder)
-    whole = len(simulated) - simulated[-1].interrupted
-    if whole == case.planned:
-        return ""
-    place = f"in the simulation of curve {whole + 1} of {case.planned}"
-    return f"interrupted {place}; what was done is kept in {folder}; {AGAIN}"

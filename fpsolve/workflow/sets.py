@@ -1,18 +1,13 @@
-"""The sets of a case: a pool solves them, each is kept as it is finished, and the tables are written as they grow.
-
-They are simulated one after the other, here or on a cluster, and kept alike.
-"""
+"""The sets of a case: a pool solves them, each is kept as it is finished, and the tables are written as they grow."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from contextlib import nullcontext
 from dataclasses import replace
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
 from time import monotonic
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -27,12 +22,8 @@ from fpsolve.output.records import (
     Results,
     append,
     begun_record,
-    record_of,
     record_of_set,
     set_key,
-    simulated_of,
-    simulation_fits,
-    simulation_key,
 )
 from fpsolve.output.tables import facts_of, write_results
 from fpsolve.parts.eigenfunctions import write_curves
@@ -42,8 +33,7 @@ from fpsolve.parts.part import Job, Numerics
 from fpsolve.pool import Pool, serial
 from fpsolve.results.table import Table
 from fpsolve.show.notes import notes
-from fpsolve.study.results import CurveResult, SimulatedCurve, Solved, Status
-from fpsolve.study.simulate import simulate_curve, simulate_curves, simulation_steps, simulation_work
+from fpsolve.study.results import CurveResult, Solved, Status
 from fpsolve.study.solve import Order, batches, result_of, solve_batch
 from fpsolve.workflow.progress import MOMENTS, SETS, Advance, Phase
 from fpsolve.workflow.seal import Told, seal, sealed
@@ -79,35 +69,22 @@ def grow(folder: Path, numerics: Numerics, order: Order, job: Job) -> None:
         append(folder / SOLVED_RECORDS, set_key(job.curve), record)
 
 
-class _Kept:
-    """The curves of a case, of which an earlier run may have kept some.
+class Sweep:
+    """All sets of a case on the way to being solved, of which an earlier run may have kept some.
 
     Args:
-        case: whose curves these are.
+        case: whose sets these are.
         folder: where they are kept.
-        is_fresh: whether to do all of them again.
+        is_fresh: whether to solve all of them again.
     """
 
-    place: ClassVar[str]
-
-    def __init__(self, case: Case, folder: Path, *, is_fresh: bool = False) -> None:
-        self.case, self.folder, self.records = case, folder, Records(folder / self.place)
-        if is_fresh:
-            self.records.remove()
-
-    def looked_through(self) -> Iterable[Curve]:
-        """All of them if there are records."""
-        return self.case.curves() if self.records.look().are_there else ()
-
-
-class Sweep(_Kept):
-    """All sets of a case on the way to being solved."""
-
-    place = SOLVED_RECORDS
     told: Told
 
     def __init__(self, case: Case, folder: Path, *, is_fresh: bool = False) -> None:
-        super().__init__(case, folder.resolve(), is_fresh=is_fresh)
+        self.case, self.folder = case, folder.resolve()
+        self.records = Records(self.folder / SOLVED_RECORDS)
+        if is_fresh:
+            self.records.remove()
         self.started, self._clock = datetime.now(UTC), monotonic()
         self.numerics = Numerics.of(case)
         self.results, self.facts = Results(case, self.records, self.numerics), dict[str, Any]()
@@ -136,7 +113,7 @@ class Sweep(_Kept):
 
     def find(self) -> None:
         """Look for the records of all sets, also those that a worker has finished without reporting them."""
-        for curve in self.looked_through():
+        for curve in self.case.curves() if self.records.look().are_there else ():
             if self.results.find(curve):
                 self._unfinished.discard(curve.number)
                 self._settled += not self._is_drawn(curve.number)
@@ -218,49 +195,3 @@ class Sweep(_Kept):
         [curve] = self.case.curves(number - 1, number)
         entries, begun = self.results.entries(curve)
         return replace(order, entries=entries, begun=begun)
-
-
-class Simulations(_Kept):
-    """The simulations of the curves of a case; finished ones are taken from their records."""
-
-    place = SIMULATED_RECORDS
-
-    def __init__(self, case: Case, folder: Path, *, is_fresh: bool = False) -> None:
-        super().__init__(case, folder, is_fresh=is_fresh)
-        self.asked: dict[str, Any] = {"orders": case.simulated.tolist(), "setting": case.monte_carlo}
-        self._known = {curve.number for curve in self.looked_through() if self._found(curve)}
-
-    @property
-    def known(self) -> int:
-        return len(self._known)
-
-    def curves(self, progress: Advance, pool: Pool | None) -> Iterator[SimulatedCurve]:
-        """The simulations in the order of the curves; an interrupt ends them with what is done.
-
-        Args:
-            progress: called as often as `simulation_work` counts.
-            pool: who simulates; None for all processors of this machine.
-        """
-        others = [curve for curve in self.case.curves() if curve.number not in self._known]
-        if self._known:
-            progress(simulation_work(self.case) - sum(map(simulation_steps, others)), known=True)
-
-        def made(pool: Pool) -> Iterator[SimulatedCurve]:
-            for curve, found in zip(others, pool.map(partial(simulate_curve, **self.asked), others), strict=True):
-                progress(simulation_steps(curve))
-                yield found
-
-        with pool or nullcontext():
-            elsewhere = made(pool) if pool else None
-            for found in simulate_curves(self.case, progress=progress, known=self._found, made=elsewhere):
-                if not found.interrupted and found.curve.number not in self._known:
-                    append(self.records.folder, self._key(found.curve), record_of(found))
-                yield found
-
-    def _found(self, curve: Curve) -> SimulatedCurve | None:
-        """Its simulation, if that is known; a record of another form does not count."""
-        found = self.records.made(self._key(curve), lambda record: simulated_of(record, curve))
-        return found if found and simulation_fits(found, self.asked["orders"]) else None
-
-    def _key(self, curve: Curve) -> str:
-        return simulation_key(curve, **self.asked)

@@ -19,14 +19,13 @@ from fpsolve.page.letters import encodable
 from fpsolve.page.page import Column, Grid, Note
 from fpsolve.page.terminal import print_blocks
 from fpsolve.results.text import duration
-from fpsolve.show import simulation
 from fpsolve.show.curves import curve_grid
 from fpsolve.show.notes import notes
 from fpsolve.show.results import show as show_results
 from fpsolve.study.results import CurveResult, MomentColumns
-from fpsolve.study.simulate import simulate_curves
 from fpsolve.study.solve import failed
-from tests.kit import ALL, TEXT, case_in, solve_case
+from fpsolve.workflow import simulation
+from tests.kit import ALL, TEXT, case_in, simulate_curves, solve_case
 
 NONLINEAR = ["vary={}", "oscillator.c1=0.8", "oscillator.c2=0.5", "response.rtol=0.01"]
 NONLINEAR += ["monte_carlo={ paths = 64, time = 100.0 }", "output.quantities='all'"]

@@ -20,10 +20,10 @@ from fpsolve.fem.mesh import make_mesh
 from fpsolve.model.noises.non_gaussian import NonGaussianNoise
 from fpsolve.model.problem import Problem
 from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
-from fpsolve.output.vtk import write_simulated_response
 from fpsolve.parts.eigenfunctions import write_density, write_eigenfunctions
 from fpsolve.study import solve
 from fpsolve.workflow import run
+from fpsolve.workflow.simulation import write_simulated_response
 from tests.conftest import FIG1, UNIT_NOISE, sampled
 from tests.kit import ALL
 from tests.oracles.perturbation import first_order_eigenfunction

@@ -19,9 +19,9 @@ from fpsolve.parts import response
 from fpsolve.parts.indices import show_meaning
 from fpsolve.parts.intervals import sampled_case
 from fpsolve.parts.response import PART, shape
-from fpsolve.show.simulation import number_grid
 from fpsolve.study.results import Status
 from fpsolve.study.solve import Numerics, everything, solve_curve
+from fpsolve.workflow.simulation import number_grid
 from tests.kit import case_in, case_text, read_json
 
 SECTIONS = """[moments]

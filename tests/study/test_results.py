@@ -8,8 +8,7 @@ import pytest
 
 from fpsolve.cli import main
 from fpsolve.commands import compare
-from fpsolve.study.simulate import simulate_curves
-from tests.kit import ALL, INDICES, case_in, case_text, from_record, solve_sets
+from tests.kit import ALL, INDICES, case_in, case_text, from_record, simulate_curves, solve_sets
 
 SECTIONS = """[moments]
 p = [1.0]

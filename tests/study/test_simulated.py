@@ -8,12 +8,12 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from fpsolve.output.records import record_of, simulated_of, simulation_fits
+from fpsolve.output.records import record_of
 from fpsolve.simulation.estimators import MomentEstimate, MonteCarlo
 from fpsolve.simulation.response import BINS, Response
 from fpsolve.study.results import SimulatedCurve
-from fpsolve.study.simulate import simulate_curve, simulate_curves
-from tests.kit import case_in, case_text
+from fpsolve.workflow.simulation import simulate_curve, simulated_of, simulation_fits
+from tests.kit import case_in, case_text, simulate_curves
 
 SECTIONS = "[moments]\np = [-1.0, 2.0]\n[monte_carlo]\npaths = 4096\ntime = 40.0\n"
 CASE = case_text(SECTIONS, noise={"D0": 0.1}, epsilon=0.5, c1=0.8, c2=0.5)

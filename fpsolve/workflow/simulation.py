@@ -1,0 +1,421 @@
+"""Simulations of the curves of a case: their estimates, records, files, and what is said of them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import nullcontext
+from dataclasses import asdict, replace
+from datetime import UTC, datetime
+from functools import partial
+from itertools import chain
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fpsolve.case.case import Case, Curve
+from fpsolve.case.sections import MonteCarloSection
+from fpsolve.drawing import Format, figure_for
+from fpsolve.errors import FpsolveError
+from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, MOMENT
+from fpsolve.files import writable, write_csv, write_json
+from fpsolve.messages import Code, Message
+from fpsolve.output.records import RESULT_VERSION, Records, append, digest_of, made_of, record_of
+from fpsolve.output.tables import head, in_case_words, parameters_of
+from fpsolve.page.limits import EACH, PICTURES
+from fpsolve.page.page import Block, Column, Drawing, Grid, Sentence, filled
+from fpsolve.pool import Pool, processors
+from fpsolve.results.text import fate, sampled, sign_of, units_in_words
+from fpsolve.show.curves import Shown, table_of
+from fpsolve.show.notes import MONTE_CARLO, notes
+from fpsolve.simulation.setup import PROGRESS_STEPS, obstacles, simulated_parts
+from fpsolve.study.results import CurveResult, SimulatedCurve
+from fpsolve.vtk import field_data, pyvista_module, write_vtk
+from fpsolve.workflow.folders import AGAIN, SIMULATED, kept, of_curves, own_folder, saying_if_interrupted
+from fpsolve.workflow.progress import PERCENT, SILENT, Advance, Phase, Watch
+from fpsolve.workflow.reports import facts_since
+
+if TYPE_CHECKING:
+    from fpsolve.workflow.reports import Reporter
+
+RECORDS = "records/simulated"
+"""The folder of the records of simulations."""
+SIMULATION = ("monte_carlo.json",)
+"""The file with all numbers of a simulation."""
+SIGNIFICANT = 3.0
+"""Standard errors by which λ must exceed 0 before a stationary response is sought."""
+SURE = 3
+"""Standard errors from 0 at which a simulated sign is told."""
+COMPARED = Column("finite elements", 2), Column("s.e. away", 1)
+"""The columns of what finite elements have found."""
+
+
+def simulation_work(case: Case) -> int:
+    """How often the simulation of a case reports progress."""
+    return sum(map(simulation_steps, case.curves()))
+
+
+def simulation_steps(curve: Curve) -> int:
+    """How often the simulation of a curve does."""
+    return PROGRESS_STEPS * (3 if curve.problem.system.is_nonlinear else 1)
+
+
+def refuse_obstacles(case: Case) -> None:
+    """Refuse a case some curve of which cannot be simulated, or a number of processors that is none.
+
+    Raises:
+        FpsolveError: with the curve and the reason.
+    """
+    processors()
+    for curve in case.curves():
+        place = f"with {curve.label}: " if curve.varied else ""
+        try:
+            parts = simulated_parts(curve.problem)
+        except FpsolveError as failure:
+            raise FpsolveError(f"{case.path}: {place}{failure}") from None
+        found = obstacles(*parts, time=case.monte_carlo.time, step=case.monte_carlo.step)
+        for name, sentence in found.items():
+            raise FpsolveError(f"{case.path}: monte_carlo.{name}: {place}{sentence}")
+
+
+def simulate_curve(
+    curve: Curve, orders: Sequence[float], setting: MonteCarloSection, progress: Callable[[], None] = lambda: None
+) -> SimulatedCurve:
+    """Simulate one curve, and with terms of degree 3 its stationary response; a task that pickles small.
+
+    Args:
+        curve: the parameters.
+        orders: p of the moments.
+        setting: [monte_carlo] of the case, whose p are not used.
+        progress: called as often as `simulation_work` counts; a task for another process has none.
+
+    Raises:
+        KeyboardInterrupt: nothing was done yet.
+        FpsolveError: as `simulate`.
+    """
+    from fpsolve.simulation.estimators import simulate
+
+    result = simulate(
+        curve.problem, orders, estimator=setting.estimator,
+        paths=setting.paths, time=setting.time, step=setting.step, seed=setting.seed, progress=progress,
+    )  # fmt: skip
+    if not curve.problem.system.is_nonlinear or result.interrupted:
+        return SimulatedCurve(curve, result, None, result.warnings, result.interrupted)
+    value, error, noted = result.lyapunov_exponent, result.lyapunov_exponent_error, result.warnings
+    try:
+        if value <= SIGNIFICANT * error:
+            for _ in range(2 * PROGRESS_STEPS):
+                progress()
+            at_rest = Message(Code.AT_REST, value=value, error=error, most=SIGNIFICANT if value > 0 else None)
+            return SimulatedCurve(curve, result, None, (*noted, at_rest))
+        from fpsolve.simulation.response import no_simulation, simulated_response
+
+        if reason := no_simulation(curve.problem):
+            for _ in range(2 * PROGRESS_STEPS):
+                progress()
+            return SimulatedCurve(curve, result, None, (*noted, reason))
+        response = simulated_response(
+            curve.problem, value, result.variance_rate, paths=max(result.paths // 8, 32),
+            time=result.time, step=result.step, seed=result.seed, progress=progress,
+        )  # fmt: skip
+    except KeyboardInterrupt:
+        return SimulatedCurve(curve, result, None, (*noted, Message(Code.RESPONSE_NOT_REACHED)), interrupted=True)
+    if response.interrupted:
+        noted = (*noted, Message(Code.RESPONSE_STOPPED, time=response.time))
+    return SimulatedCurve(curve, result, response, noted, response.interrupted)
+
+
+def simulated_of(record: Mapping[str, Any], curve: Curve) -> SimulatedCurve:
+    """The simulation of a curve from its record. Raises `ValueError` where that has another form."""
+    return SimulatedCurve(curve, **made_of(SimulatedCurve, record))
+
+
+def simulation_fits(simulated: SimulatedCurve, orders: Sequence[float]) -> bool:
+    """Whether the numbers of a simulation are of the p that were asked for, and can be written and drawn."""
+    found, response = simulated.result, simulated.response
+    numbers = [found.lyapunov_exponent, found.lyapunov_exponent_error, found.variance_rate, found.variance_rate_error]
+    numbers += [found.time, found.step]
+    for each in found.estimates:
+        numbers += [each.p, each.effective_paths, each.value or 0.0, each.standard_error or 0.0]
+    is_whole = [each.p for each in found.estimates] == list(orders)
+    if response is not None:
+        edges = response.x_edges, response.v_edges, response.amplitude_edges
+        *cells, count = [each.size - 1 for each in edges]
+        numbers += [response.outside, response.impact_rate or 0.0, response.time, *sum(response.means.values(), ())]
+        is_whole &= (
+            all(each.ndim == 1 and each.size > 1 and bool(np.all(np.diff(each) > 0)) for each in edges)
+            and response.density.shape == tuple(cells)
+            and response.amplitude_density.shape == response.amplitude_error.shape == (count,)
+        )
+    return is_whole and all(map(math.isfinite, numbers))
+
+
+class Simulations:
+    """The simulations of the curves of a case, of which an earlier run may have kept some.
+
+    Args:
+        case: whose curves these are.
+        folder: where they are written and kept.
+        is_fresh: whether to do all of them again.
+
+    Attributes:
+        simulated: what is done, in the order of the curves.
+        interruption: where an interrupt ended the simulation, what is kept, and how to go on; empty without interrupt.
+        known: how many an earlier run had finished.
+    """
+
+    def __init__(self, case: Case, folder: Path, *, is_fresh: bool = False) -> None:
+        self.case, self.folder, self.records = case, folder, Records(folder / RECORDS)
+        if is_fresh:
+            self.records.remove()
+        self.simulated, self.interruption = list[SimulatedCurve](), ""
+        self._orders = case.simulated.tolist()
+        curves = case.curves() if self.records.look().are_there else ()
+        self._known = {curve.number for curve in curves if self._found(curve)}
+
+    @property
+    def known(self) -> int:
+        return len(self._known)
+
+    def run(self, watch: Watch, pool: Pool | None = None, results: Sequence[CurveResult] = ()) -> str:
+        """Simulate the curves, write what is found of each, and show it; the `interruption`.
+
+        Args:
+            pool: who simulates; None for all processors of this machine.
+            results: what is solved of the same curves.
+        """
+        case = self.case
+        work = Phase(case.name, "simulation", simulation_work(case), PERCENT)
+        with watch.bar(work) as progress, writable(self.folder):
+            for each in self._curves(progress, pool):
+                self.simulated.append(each)
+                write_simulation(case, each, self.folder)
+        whole = len(self.simulated) - self.simulated[-1].interrupted
+        if whole < case.planned:
+            place = f"in the simulation of curve {whole + 1} of {case.planned}"
+            self.interruption = f"interrupted {place}; what was done is kept in {self.folder}; {AGAIN}"
+        watch.shown(show(case, self.simulated, results))
+        watch.noted(notes(case, self.simulated, MONTE_CARLO))
+        return self.interruption
+
+    def _curves(self, progress: Advance, pool: Pool | None) -> Iterator[SimulatedCurve]:
+        """The simulations in the order of the curves; an interrupt (Ctrl-C) ends them with what is done."""
+        others = [curve for curve in self.case.curves() if curve.number not in self._known]
+        if self._known:
+            progress(simulation_work(self.case) - sum(map(simulation_steps, others)), known=True)
+        task = partial(simulate_curve, orders=self._orders, setting=self.case.monte_carlo)
+        with pool or nullcontext():
+            elsewhere = iter(pool.map(task, others)) if pool else None
+            for curve in self.case.curves():
+                found = self._found(curve) if curve.number in self._known else None
+                try:
+                    if found is None and elsewhere:
+                        found = next(elsewhere)
+                        progress(simulation_steps(curve))
+                    elif found is None:
+                        found = simulate_curve(curve, self._orders, self.case.monte_carlo, progress)
+                except KeyboardInterrupt:
+                    if curve.number == 1:
+                        raise
+                    return
+                if not found.interrupted and curve.number not in self._known:
+                    append(self.records.folder, self._key(curve), record_of(found))
+                yield found
+                if found.interrupted:
+                    return
+
+    def _found(self, curve: Curve) -> SimulatedCurve | None:
+        """Its simulation, if that is known; a record of another form does not count."""
+        found = self.records.made(self._key(curve), lambda record: simulated_of(record, curve))
+        return found if found and simulation_fits(found, self._orders) else None
+
+    def _key(self, curve: Curve) -> str:
+        """What the record of a curve is found by."""
+        setting = self.case.monte_carlo.model_dump(mode="json")
+        return f"{RESULT_VERSION}-{digest_of(SimulatedCurve, orders=self._orders, setting=setting)}-{curve.digest}"
+
+
+def write_simulation(case: Case, simulated: SimulatedCurve, folder: Path) -> None:
+    """monte_carlo.json of a curve, and where there is a response, monte_carlo_response.csv, .vti, .png and .pdf."""
+    suffix, result, response = simulated.curve.suffix, simulated.result, simulated.response
+    content = {
+        **head(case),
+        **parameters_of(simulated.curve),
+        "estimates": [asdict(estimate) for estimate in result.estimates],
+        **_with_errors(simulated.estimates),
+        **{name: getattr(result, name) for name in ("paths", "time", "step", "seed", "impacts")},
+        "response": response
+        and {
+            "means": _with_errors(response.means),
+            **({} if response.impact_rate is None else {"impact_rate": response.impact_rate}),
+            **{name: getattr(response, name) for name in ("outside", "time")},
+        },
+        "warnings": in_case_words(simulated.warnings),
+    }
+    write_json(folder / f"monte_carlo{suffix}.json", content)
+    if response is None:
+        return
+    edges = response.amplitude_edges
+    columns = (edges[:-1], edges[1:], response.amplitude_density, response.amplitude_error)
+    rows = (map(float, row) for row in zip(*columns, strict=True))
+    header = ["amplitude_from", "amplitude_to", "density", "standard_error"]
+    write_csv(folder / f"monte_carlo_response{suffix}.csv", header, rows)
+    write_simulated_response(simulated, folder)
+    simulated_response_figure(case, simulated).write(folder)
+
+
+def _with_errors(numbers: Mapping[str, tuple[float, float]]) -> dict[str, dict[str, float]]:
+    return {name: {"value": value, "standard_error": error} for name, (value, error) in numbers.items()}
+
+
+def write_simulated_response(simulated: SimulatedCurve, folder: Path) -> None:
+    """Write the joint density of x and ẋ, if there is one, as cell data `density` of monte_carlo_response.vti.
+
+    Field data: `lyapunov_exponent` and its standard error, `lyapunov_exponent_error`, and the parameters as in
+    `write_eigenfunctions`.
+    """
+    response, curve, found = simulated.response, simulated.curve, simulated.result
+    if response is None:
+        return
+    path, x, v = folder / f"monte_carlo_response{curve.suffix}.vti", response.x_edges, response.v_edges
+    size, spacing = (x.size, v.size, 1), (x[1] - x[0], v[1] - v[0], 1.0)
+    grid = pyvista_module().ImageData(dimensions=size, spacing=spacing, origin=(x[0], v[0], 0.0))
+    grid.cell_data["density"] = response.density.ravel(order="F")
+    known = {name: getattr(found, name) for name in ("lyapunov_exponent", "lyapunov_exponent_error")}
+    parameters = {**curve.parameters, "curve": float(curve.number)}
+    write_vtk(path, grid, {**known, **field_data(parameters, curve.varied, curve.problem)})
+
+
+def simulated_response_figure(case: Case, simulated: SimulatedCurve) -> Drawing:
+    """monte_carlo_response.png and .pdf of a curve, if it has a response."""
+    curve = simulated.curve
+    title, name = f"Simulated stationary response{curve.of}", f"monte_carlo_response{curve.suffix}"
+    return Drawing(title, partial(_draw_response, simulated), name, case.headline)
+
+
+def _draw_response(simulated: SimulatedCurve, paths: Sequence[Path], heading: str) -> None:
+    """The density of (x, ẋ) and of the amplitude."""
+    if simulated.response is None:
+        return
+    with figure_for(paths, heading, simulated.curve.held("time"), Format(width=10.5)) as figure:
+        plane, radial = figure.subplots(1, 2)
+        simulated.response.plot(plane)
+        figure.get_layout_engine().set(wspace=0.1)
+        simulated.response.plot_amplitude(radial)
+
+
+def show(case: Case, simulated: Sequence[SimulatedCurve], results: Sequence[CurveResult] = ()) -> Iterator[Block]:
+    """The simulated curves, one by one or a row each."""
+    solved = {result.curve.key: result for result in results}
+    is_short, over_p = len(simulated) <= EACH, case.figure.x == "p"
+    if not (is_short and over_p):
+        yield exponent_grid(case, simulated, solved)
+        if not is_short:
+            yield Sentence(f"{len(simulated)} curves; all numbers are in {MONTE_CARLO}, one for each curve")
+    for each in simulated if is_short else ():
+        result = solved.get(each.curve.key)
+        yield Sentence("", case.heading(each.curve) if over_p else each.curve.label)
+        if over_p:
+            yield moment_grid(case, each, result)
+        yield number_grid(case, each, result)
+        found, unit = each.result, case.units.time
+        if result is None:
+            value, error = found.lyapunov_exponent, found.lyapunov_exponent_error
+            meaning = fate("almost every path", value, sign_of(value, SURE * error), unit)
+            yield Sentence(f"λ = {sampled(value, error)} ± {error:.1e}{meaning}.")
+        yield Sentence(f"{found.paths} paths over a time of {found.time:.4g} in steps of {found.step:.4g}")
+        if each.response and each.curve.number <= PICTURES:
+            yield simulated_response_figure(case, each)
+
+
+def moment_grid(case: Case, simulated: SimulatedCurve, result: CurveResult | None) -> Grid:
+    """p, Λ(p) and its standard error; where it is known the value by finite elements, and how far away it is."""
+    is_direct = any(each.estimator == "direct" for each in simulated.result.estimates)
+    effective = "effective windows" if is_direct else "effective paths"  # a path has many windows
+    columns = [Column("p"), Column(MOMENT.symbol), Column("± s.e."), *COMPARED, Column(effective, 3)]
+    exact = dict(zip(result.moments.p.tolist(), result.moments.value.tolist(), strict=True)) if result else {}
+    rows = []
+    for each in simulated.result.estimates:
+        known = (exact.get(each.p) if each.p else 0.0) if result else None
+        cells = _cells(each.value, each.standard_error, known)
+        rows.append([f"{each.p:g}", *cells, f"{each.effective_paths:.0f}"])
+    return filled("", columns, rows, units_in_words(case.units.time, [MOMENT]))
+
+
+def number_grid(case: Case, simulated: SimulatedCurve, result: CurveResult | None) -> Grid:
+    """λ, Λ″(0) and the means of a response with their standard errors, beside the finite elements."""
+    rows = []
+    for name, number in simulated.estimates.items():
+        found = result.estimates[name] if result else None
+        rows.append([INDICES[name].words, INDICES[name].symbol, *_cells(*number, found.value if found else None)])
+    if response := simulated.response:
+        means = result.response.means if result and result.response else {}
+        for name, number in response.means.items():
+            about, found = response.about.means[name], means.get(name)
+            rows.append([about.words, about.symbol, *_cells(*number, found.value if found else None)])
+    columns = [Column("quantity", 3, is_text=True), Column("symbol"), Column("value"), Column("± s.e."), *COMPARED]
+    units = units_in_words(case.units.time, [INDICES[name] for name in simulated.estimates])
+    return filled("", columns, rows, units)
+
+
+def exponent_grid(case: Case, simulated: Sequence[SimulatedCurve], solved: Mapping[Any, CurveResult]) -> Grid:
+    """λ of each curve by both methods."""
+
+    def cell(i: int, each: SimulatedCurve) -> str:
+        result, found = solved.get(each.curve.key), each.result
+        known = result.lyapunov_exponent.value if result and result.lyapunov_exponent else None
+        return _cells(found.lyapunov_exponent, found.lyapunov_exponent_error, known)[i]
+
+    columns = [Column(LYAPUNOV_EXPONENT.symbol), Column("± s.e."), *COMPARED]
+    shown = [Shown(column, partial(cell, i)) for i, column in enumerate(columns)]
+    shown[0] = shown[0]._replace(number=lambda each: each.result.lyapunov_exponent)
+    return replace(table_of(case, simulated, shown), remark=units_in_words(case.units.time, [LYAPUNOV_EXPONENT]))
+
+
+def _cells(value: float | None, error: float | None, known: float | None) -> list[str]:
+    """A number with its standard error; what is known of it, and how far away that is."""
+    row = ["none", ""] if value is None or error is None else [sampled(value, error), f"{error:.1e}"]
+    away = "" if known is None or value is None or not error else f"{(value - known) / error:+.1f}"
+    return [*row, "" if known is None else f"{known:.6g}", away]
+
+
+def simulate_case(
+    case: Case,
+    out: str | Path = "results",
+    *,
+    pool: Pool | None = None,
+    is_fresh: bool = False,
+    reporter: Reporter | None = None,
+    watch: Watch = SILENT,
+) -> Simulations:
+    """Simulate a case and write `out`/<name of the case>/monte_carlo.json, for further curves monte_carlo-2.json, ….
+
+    Of a system with terms of degree 3 the stationary response is written too. What an earlier simulation wrote there is
+    removed first, and a run with other parameters. An interrupt (Ctrl-C) ends the simulation; what is done is estimated
+    and written, and curves that are finished are not simulated again the next time.
+
+    Args:
+        pool: who simulates, such as a `cluster`; None for all processors of this machine.
+        is_fresh: whether to simulate all curves again.
+        reporter: writes report.html, if one is wanted.
+
+    Raises:
+        OutputError: the folder cannot be made or written to, or another run writes into it.
+        FpsolveError: a curve cannot be simulated; nothing is written.
+        KeyboardInterrupt: nothing was done yet, which its text says.
+    """
+    refuse_obstacles(case)
+    simulations: Simulations | None = None
+    started = datetime.now(UTC)
+    with (
+        own_folder(case, out, (SIMULATED,)) as folder,
+        saying_if_interrupted(lambda: kept(len(simulations.simulated) if simulations else 0, of_curves(case), folder)),
+    ):
+        simulations = Simulations(case, folder, is_fresh=is_fresh)
+        interruption = simulations.run(watch, pool)
+        if reporter is not None:
+            simulated, facts = simulations.simulated, facts_since(case, started)
+            blocks = chain(show(case, simulated), notes(case, simulated, MONTE_CARLO))
+            reporter.write(case, folder, watch, blocks, facts=facts, files=SIMULATION, complete=not interruption)
+    return simulations
