@@ -172,7 +172,33 @@ def test_what_failed_is_told_again(tmp_path, capsys, monkeypatch):
     assert seal_of(tmp_path).failed == 1
 
 
-def test_what_is_drawn_in_each_run_is_not_sealed(tmp_path):
+def test_pictures_are_drawn_again_beside_tables_that_stay(tmp_path):
     (tmp_path / "test.toml").write_text(case_text("[moments]\np = [2.0]\n[output]\neigenfunctions = [2.0]\n"))
     run(tmp_path)
-    assert seal_of(tmp_path) is None
+    [picture] = (tmp_path / "out/test/eigenfunctions").glob("*.vtu")
+    before, drawn = tables(tmp_path), picture.read_bytes()
+    picture.unlink()
+    outcome = run(tmp_path)
+    assert outcome.known == 1
+    assert picture.read_bytes() == drawn
+    assert tables(tmp_path) == before
+    assert seal_of(tmp_path)
+
+
+def test_many_curves_are_told_from_their_tables(tmp_path, capsys, monkeypatch):
+    """The extreme ones of a run that finds all sealed are those of the run that solved them."""
+    monkeypatch.chdir(tmp_path)
+    sets = '[vary]\n"noise.D0" = { start = 0.1, stop = 0.9, num = 18 }\n"oscillator.omega" = [0.5, 1.0, 2.0]\n'
+    (tmp_path / "test.toml").write_text(case_text(f"[moments]\np = [2.0]\n{BARE}{sets}"))
+    said = list[str]()
+    for _ in range(2):
+        assert main(["run", "test.toml", "--out", "out"]) == 0
+        said.append(capsys.readouterr().out.partition("written:")[0])
+    assert said[0] == said[1]
+    assert "54 curves: 54 converged" in said[1]
+    rows = list(csv.DictReader((tmp_path / "out/test/curves.csv").read_text().splitlines()))
+    by_exponent = sorted(rows, key=lambda row: float(row["lyapunov_exponent"]))
+    for word, row in (("least λ", by_exponent[0]), ("largest λ", by_exponent[-1])):
+        [line] = [line for line in said[1].splitlines() if word in line]
+        shown = [float(cell) for cell in line.split("│")[1:3]]
+        assert shown == pytest.approx([float(row["noise.D0"]), float(row["oscillator.omega"])], rel=1e-5)

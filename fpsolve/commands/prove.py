@@ -53,7 +53,7 @@ from fpsolve.proofs.statement import DECIMAL, Statement, linear_values, statemen
 from fpsolve.proofs.verify import objection
 from fpsolve.reading import Unreadable, Words, read_text
 from fpsolve.show.claims import PROOF
-from fpsolve.show.curves import Shown, table_of
+from fpsolve.show.curves import Shown, grid_of
 from fpsolve.show.results import done_of
 from fpsolve.workflow.folders import PROVEN, kept, own_folder, saying_if_interrupted
 from fpsolve.workflow.progress import BOUNDS, SILENT, Phase, Watch
@@ -365,7 +365,7 @@ def proofs_grid(case: Case, proofs: Sequence[CurveProof]) -> Grid:
         Shown(Column("paths", 2), lambda each: FATES[each.exponent.sign] if each.exponent else ""),
     ]
     each_p = [Shown(Column(f"p = {_order(each)}", 3), partial(fate, i)) for i, each in enumerate(p)]
-    return table_of(
+    return grid_of(
         case, proofs[:ROWS], shown + (each_p if len(p) <= PROOFS else [Shown(Column("moments", 3), _counted)])
     )
 

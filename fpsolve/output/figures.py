@@ -45,12 +45,15 @@ from fpsolve.model.quantity import (
     GROWTH,
     MOMENT,
     RATE_FUNCTION,
+    STATUS,
     P,
 )
 from fpsolve.page.limits import EACH
 from fpsolve.page.page import Drawing
 from fpsolve.page.plots import line_of, plot_of
-from fpsolve.study.results import CurveResult, SimulatedCurve
+from fpsolve.results.table import Table
+from fpsolve.study.columns import table_of
+from fpsolve.study.results import CurveResult, SimulatedCurve, Status
 from fpsolve.theory import perturbation
 from fpsolve.theory.perturbation import perturbed_moments
 
@@ -143,7 +146,11 @@ def _several(varied: Sequence[Varied]) -> tuple[dict[str, int], list[str]]:
 
 
 def main_figure(
-    case: Case, results: Sequence[CurveResult], simulated: Sequence[SimulatedCurve], folder: Path
+    case: Case,
+    results: Sequence[CurveResult],
+    simulated: Sequence[SimulatedCurve],
+    folder: Path,
+    table: Table | None = None,
 ) -> Drawing:
     """figure.png and .pdf: finite elements, perturbation theory, dots of a simulation.
 
@@ -152,10 +159,12 @@ def main_figure(
 
     Args:
         folder: where a chart may have traced the line of the zeros of a map.
+        table: the numbers of all curves, if these are known already.
     """
     over = "p" if case.figure.x == "p" else case.about(case.figure.x).words
     title = f"The {case.figure.quantity.words}, {case.figure.quantity.symbol}, over {over}"
-    job, plot = partial(_draw, case, results, simulated, folder), partial(_plot_of_moments, case, results)
+    table = table_of(case, results) if table is None else table
+    job, plot = partial(_draw, case, results, simulated, folder, table), partial(_plot_of_moments, case, results)
     return Drawing(title, job, "figure", case.caption, plot=plot)
 
 
@@ -164,6 +173,7 @@ def _draw(
     results: Sequence[CurveResult],
     simulated: Sequence[SimulatedCurve],
     folder: Path,
+    table: Table,
     paths: Sequence[Path],
     heading: str,
 ) -> None:
@@ -174,7 +184,7 @@ def _draw(
     with figure_for(paths, heading, held, FORMATS[setting.width]) as figure:
         axes = figure.add_subplot()
         if other := map_key(setting, case.vary):
-            _draw_map(axes, case, results, (setting.x, other), folder)
+            _draw_map(axes, case, results, table, (setting.x, other), folder)
             return
         samples = {each.curve.key: each for each in simulated}
         pairs = [(result, samples.get(result.curve.key)) for result in results]
@@ -182,7 +192,7 @@ def _draw(
             shown = _some(len(pairs))
             series = [_moment_series(case, *pair, with_theory=i in shown) for i, pair in enumerate(pairs)]
         else:
-            series = _over_parameter(case, pairs)
+            series = _over_parameter(case, pairs, _numbers(case, table))
         draw_series(axes, case, series, setting.quantity.closed_form + ", reduced noise" * case.theory_reduces_noise)
 
 
@@ -262,7 +272,7 @@ def _rates(result: CurveResult, *, with_theory: bool) -> Series:
     return Series(dict(result.curve.varied), s, found.rate_function[known], line, values)
 
 
-def _over_parameter(case: Case, pairs: Sequence[Pair]) -> list[Series]:
+def _over_parameter(case: Case, pairs: Sequence[Pair], numbers: FloatArray) -> list[Series]:
     """A number over the parameter: one series for each set of the other parameters that vary."""
     key = case.figure.x
     groups: dict[tuple[tuple[str, Value], ...], list[Pair]] = {}
@@ -280,7 +290,7 @@ def _over_parameter(case: Case, pairs: Sequence[Pair]) -> list[Series]:
             Series(
                 dict(others),
                 x,
-                np.array([_number(case, result) for result, _ in group]),
+                numbers[[result.curve.number - 1 for result, _ in group]],
                 line,
                 np.array([_theory(case, case.curve({**dict(others), key: float(each)}).problem) for each in line]),
                 _columns([(at, *dot) for at, dot in dots if dot]),
@@ -293,13 +303,12 @@ def _value(estimate: Estimate | None) -> float | None:
     return None if estimate is None else estimate.value
 
 
-def _number(case: Case, result: CurveResult) -> float:
-    """What a figure over parameters shows of a curve; NaN where there is none."""
+def _numbers(case: Case, table: Table) -> FloatArray:
+    """What a figure over parameters shows of each curve; NaN where there is none."""
+    found = table[case.figure.needed].values
     if case.figure.moment is None:
-        found = _value(result.estimates[case.figure.needed])
-        return math.nan if found is None else found
-    at = np.flatnonzero(np.isclose(result.moments.p, case.figure.moment, rtol=0, atol=1e-12))
-    return float(result.moments.value[at[0]]) if at.size else math.nan
+        return found
+    return found[:, int(np.argmin(abs(case.p - case.figure.moment)))]  # which is among them, but for its last digits
 
 
 def _theory(case: Case, problem: Problem) -> float:
@@ -457,7 +466,9 @@ def _mark(axes: Any, series: Sequence[Series], colours: Any) -> None:
         axes.plot([], [], label=f"slope {LYAPUNOV_EXPONENT.latex} at $p = 0$", **line)
 
 
-def _draw_map(axes: Any, case: Case, results: Sequence[CurveResult], keys: tuple[str, str], folder: Path) -> None:
+def _draw_map(
+    axes: Any, case: Case, results: Sequence[CurveResult], table: Table, keys: tuple[str, str], folder: Path
+) -> None:
     """A quantity over two keys in colours around zero, hatched where it is not known, grey where there is none.
 
     The line of its zeros is dashed between the values, and black where a chart has traced it in the same folder.
@@ -466,14 +477,15 @@ def _draw_map(axes: Any, case: Case, results: Sequence[CurveResult], keys: tuple
     from matplotlib.patches import Rectangle
 
     setting = case.figure
-    x, y = (np.sort(np.array(case.vary.values(key), dtype=float)) for key in keys)
-    values, failed = np.full((y.size, x.size), math.nan), np.ones((y.size, x.size), dtype=bool)
-    for result in results:
-        column, row = (
-            axis.searchsorted(float(result.curve.varied[key])) for axis, key in zip((x, y), keys, strict=True)
-        )
-        values[row, column] = number = _number(case, result)
-        failed[row, column] = math.isnan(number) and result.status.fails
+    x, y = (np.array(case.vary.values(key), dtype=float) for key in keys)
+    is_x_first = case.vary.keys.index(keys[0]) < case.vary.keys.index(keys[1])
+    shape, order = ((x.size, y.size) if is_x_first else (y.size, x.size)), np.ix_(np.argsort(y), np.argsort(x))
+    values, status = (
+        (each.reshape(shape).T if is_x_first else each.reshape(shape))[order]
+        for each in (_numbers(case, table), table[STATUS.name].values)
+    )
+    x, y = np.sort(x), np.sort(y)
+    failed = np.isnan(values) & ~np.isin(status, [each for each in Status if not each.fails])
     edges = _edges(x), _edges(y)
     label_axes(axes, *(case.about(key).attributes for key in keys))
     _draw_values(axes, values, edges, setting.quantity.timed(case.units.time).attributes)
@@ -491,8 +503,8 @@ def _draw_map(axes: Any, case: Case, results: Sequence[CurveResult], keys: tuple
         cells = [Rectangle((left[j], low[i]), width[j], height[i]) for i, j in np.argwhere(where)]
         if cells:
             axes.add_collection(PatchCollection(cells, linewidth=0, label=label, **style))
-    known = values[np.isfinite(values)]
-    if known.size and known.min() < 0 < known.max():
+    finite = values[np.isfinite(values)]
+    if finite.size and finite.min() < 0 < finite.max():
         wide = points(1.5)
         look: dict[str, Any] = {"colors": _BETWEEN, "linestyles": "--", "linewidths": wide, "zorder": 3}
         axes.contour(x, y, np.ma.masked_invalid(values), levels=[0.0], **look)

@@ -40,10 +40,13 @@ from fpsolve.errors import OutputError, Remedy
 from fpsolve.exponent.error import Moment
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import Code, Message, Severity, message_of
+from fpsolve.output.tables import says_more
 from fpsolve.parts.every import BY_NAME
 from fpsolve.parts.moments import PART as MOMENTS
 from fpsolve.parts.moments import Moments, begun_of, unfinished
 from fpsolve.parts.part import Entry, Job, Numerics, Part, Reason, Settings
+from fpsolve.results.table import Table
+from fpsolve.study.columns import row_of, table_of
 from fpsolve.study.results import CurveResult, SimulatedCurve
 from fpsolve.study.solve import Asked, everything, result_of
 
@@ -55,10 +58,12 @@ SHARED_SECONDS = 60.0
 """After which a file that another machine has written is there, if it ever is."""
 LONGEST, MOST_NUMBERS = 2**28, 2**24
 """Of a line, in bytes, and of an array."""
-KEPT = 2**24
-"""Bytes of the records whose results stay in memory once they are read, as each table and figure asks for all."""
+KEPT = 2**21
+"""Bytes of the records whose results stay in memory once they are read, as of few curves all are asked for again."""
 MOST_LISTED = 8
 """Numbers of an array that is a list in a record; longer ones take less room and time compressed."""
+_OF_ANOTHER_FORM = LookupError, TypeError, AttributeError, ValueError, ArithmeticError, RecursionError, zlib.error
+"""What is raised where data have another form than what is made of them."""
 _AS_IT_IS = getattr(os, "O_BINARY", 0)
 """The flag of files whose line ends Windows leaves alone."""
 _NAMES: dict[int, str] = {}
@@ -67,7 +72,7 @@ Record = dict[str, Any]
 Made = TypeVar("Made")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Address:
     """Where a record is: its file, where it begins in it, and how long it is, in bytes."""
 
@@ -133,7 +138,8 @@ class Records:
             found = _parsed(file.read(address.size))
         if found is None:
             raise ValueError(f"{self.folder / address.file} has changed")
-        return found[1]
+        with _read_as("anything"):
+            return json.loads(found[1].decode())
 
     def made(self, key: str, make: Callable[[Record], Made]) -> Made | None:
         """What is made of the record of a key; None where there is none, or none of the form that `make` takes."""
@@ -162,6 +168,9 @@ class Results(Sequence[CurveResult]):
         case: whose curves these are.
         records: those of its folder.
         numerics: how the curves are solved.
+
+    Attributes:
+        says: whether anything is said of a curve beyond its numbers, shape (curves,); of those in the `table`.
     """
 
     def __init__(self, case: Case, records: Records, numerics: Numerics) -> None:
@@ -169,6 +178,8 @@ class Results(Sequence[CurveResult]):
         self._first, self._further = everything(case, 1), everything(case, 2)
         self._places: dict[int, tuple[Address, ...]] = {}
         self._given: dict[int, CurveResult] = {}
+        self._table, self._unread = table_of(case), set[int]()
+        self.says = np.ones(case.planned, dtype=bool)
         self._order: list[int] = []
         self._kept: dict[int, CurveResult] = {}
         self._room = KEPT
@@ -187,10 +198,29 @@ class Results(Sequence[CurveResult]):
         elif found is not None:
             self._given[number] = found
         self._kept.pop(number, None)
+        self._unread.add(number)
 
-    def add_all(self) -> None:
+    def add_all(self, table: Table) -> None:
         """Count all curves among those that are known, each with the records that are found when it is looked at."""
-        self._order = list(range(1, self._case.planned + 1))
+        self._table, self._order = table, list(range(1, self._case.planned + 1))
+
+    @property
+    def table(self) -> Table:
+        """The numbers of all that are known."""
+        for number in sorted(self._unread):
+            self._put(self.of(number))
+        return self._table
+
+    @property
+    def telling(self) -> Iterator[CurveResult]:
+        """Those of which more is said than their numbers."""
+        return (self.of(number) for number in self._order if self.says[number - 1])
+
+    def _put(self, result: CurveResult) -> None:
+        number = result.curve.number
+        self._table.put(number - 1, row_of(self._case, result))
+        self.says[number - 1] = says_more(self._case, result)
+        self._unread.discard(number)
 
     @property
     def are_kept(self) -> bool:
@@ -206,7 +236,7 @@ class Results(Sequence[CurveResult]):
         entries, _ = self.entries(curve)
         if is_whole := self._is_whole(curve, entries):
             self.add(curve.number)
-            self._keep(curve, entries, {})
+            self._put(self._keep(curve, entries, {}))
         return is_whole
 
     def _is_whole(self, curve: Curve, entries: Mapping[str, Entry]) -> bool:
@@ -294,14 +324,12 @@ def append(folder: Path, key: str, record: Record) -> Address:
     return Address(path.name, start, len(line))
 
 
-def _parsed(line: bytes) -> tuple[str, Record] | None:
-    """A key and its record; None where the line is torn or damaged."""
-    _, mark, content = line.removesuffix(b"}\n").partition(b', "record": ')
+def _parsed(line: bytes) -> tuple[str, bytes] | None:
+    """A key and its record as JSON; None where the line is torn or damaged."""
+    start, mark, content = line.removesuffix(b"}\n").partition(b', "record": ')
     try:
-        head = json.loads(line.decode())
-        if not mark or zlib.crc32(content) != head["crc32"]:
-            return None
-        return str(head["key"]), head["record"]
+        head = json.loads(start.decode() + "}")
+        return (str(head["key"]), content) if mark and zlib.crc32(content) == head["crc32"] else None
     except (ValueError, KeyError, TypeError, RecursionError):
         return None
 
@@ -385,28 +413,29 @@ def entries_of(
     """
     entries = dict[str, Entry]()
     for name, keys in part_keys(json.dumps(asked), numerics).items():
-        for data in (record[key] for key in reversed(keys) if key in record):  # what no budget limits counts
-            with suppress(ValueError):
-                entries[name] = _entry_of(data, BY_NAME[name], curve, asked[name])
+        for key in reversed(keys):  # what no budget limits counts
+            if key in record and (entry := _entry_of(record[key], BY_NAME[name], curve, asked[name])):
+                entries[name] = entry
     begun = dict[float, Moment]()
     if (data := record.get(begun_key(numerics))) is not None:
-        with suppress(ValueError):
-            found = _entry_of(data, replace(MOMENTS, is_whole=lambda *_: True), curve, {}).found
-            if MOMENTS.is_whole(found, curve, {"p": found.columns.p.tolist()}):
-                begun = begun_of(found)
+        fits = replace(
+            MOMENTS, is_whole=lambda found, *_: MOMENTS.is_whole(found, curve, {"p": found.columns.p.tolist()})
+        )
+        if (entry := _entry_of(data, fits, curve, {})) and entry.found is not None:
+            begun = begun_of(entry.found)
     return entries, begun
 
 
-def _entry_of(data: Any, part: Part, curve: Curve, settings: Settings) -> Entry:
-    """An entry from what a record has of it. Raises `ValueError` where that has another form, or does not fit."""
-    with _read_as(part.name):
+def _entry_of(data: Any, part: Part, curve: Curve, settings: Settings) -> Entry | None:
+    """An entry from what a record has of it; None where that has another form, or does not fit."""
+    try:
         plain, reason, seconds = data
         found = None if plain is None else codec(part.kind).made(plain)
         entry = Entry(found, _REASON.made(reason), _number(seconds))
         is_known = part.is_whole(found, curve, settings) if found is not None else entry.reason is not None
-        if is_known and 0 <= entry.seconds < math.inf:
-            return entry
-    raise ValueError(f"this is no entry of {part.name}")
+        return entry if is_known and 0 <= entry.seconds < math.inf else None
+    except _OF_ANOTHER_FORM:
+        return None
 
 
 def record_of(found: Any) -> Record:
@@ -426,7 +455,7 @@ def _read_as(what: str) -> Iterator[None]:
     """Raises `ValueError` where data have another form."""
     try:
         yield
-    except (LookupError, TypeError, AttributeError, ValueError, ArithmeticError, RecursionError, zlib.error) as failure:
+    except _OF_ANOTHER_FORM as failure:
         raise ValueError(f"this is no record of {what}: {failure!r}") from failure
 
 
@@ -539,7 +568,7 @@ def _packed(value: FloatArray) -> Record | list[float | str]:
 
 def _unpacked(packed: Any) -> FloatArray:
     if isinstance(packed, list):
-        return np.array([each if type(each) is float else _number(each) for each in packed], dtype=float)
+        return np.array(list(map(_number, packed)), dtype=float)
     shape = tuple(_checked(size, int) for size in packed["shape"])
     if min(shape, default=1) < 0 or (count := math.prod(shape)) > MOST_NUMBERS:
         raise ValueError(f"there is no array of shape {shape}")
@@ -551,7 +580,9 @@ def _unpacked(packed: Any) -> FloatArray:
 
 
 def _number(data: Any) -> float:
-    return float(data if data in ("nan", "inf", "-inf") else _checked(data, int | float))
+    if type(data) is float:
+        return data
+    return float(data if data in ("nan", "inf", "-inf") else _checked(data, int))
 
 
 def _text(data: Any) -> str:

@@ -8,7 +8,7 @@ import platform
 import shlex
 import socket
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from datetime import datetime
 from functools import cache
@@ -16,18 +16,22 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from fpsolve import __version__
 from fpsolve.analysis.spreads import LEVEL
 from fpsolve.case.case import Case, Curve
 from fpsolve.case.remedies import CASE_WORDS
+from fpsolve.case.vary import BLOCK
 from fpsolve.files import draft, write_json
 from fpsolve.messages import message_of
 from fpsolve.model.kinds import version_of
-from fpsolve.model.quantity import MOMENT, Quantity
+from fpsolve.model.quantity import MOMENT, STATUS, Quantity
 from fpsolve.parts.every import PARTS
 from fpsolve.parts.intervals import SAMPLE, Samples, plain_spread
-from fpsolve.results.table import NO_P, Row, Table, plain, rows_over_p
-from fpsolve.study.columns import columns_of, row_of
+from fpsolve.results.table import Column, Row, Table, plain, rows_over_p
+from fpsolve.study.columns import COUNTS, columns_of, row_of, table_of
 from fpsolve.study.results import CurveResult, Status
 
 MOST_INDENTED = 100
@@ -62,7 +66,13 @@ def _packages() -> dict[str, str]:
 
 
 def write_results(
-    case: Case, results: Sequence[CurveResult], folder: Path, facts: Mapping[str, Any], finished: int | None = None
+    case: Case,
+    results: Sequence[CurveResult],
+    folder: Path,
+    facts: Mapping[str, Any],
+    finished: int | None = None,
+    table: Table | None = None,
+    says: NDArray[np.bool_] | None = None,
 ) -> Table:
     """Write summary.json, which says whether all curves are there, moments.csv and curves.csv; return their numbers.
 
@@ -71,11 +81,14 @@ def write_results(
     Args:
         facts: on the run, see `facts_of`.
         finished: how many of them are; all if None.
+        table: their numbers, if these are known already.
+        says: of which curves of the case there is more; of all if None.
     """
+    table = table_of(case, results) if table is None else table
     columns, is_short = columns_of(case), case.planned > MOST_SUMMARISED
     over_p, of_curve = _names(columns)
     of_curve = [name for name in of_curve if not name.endswith("_perturbation")]  # which others have
-    table = Table(columns, case.planned, case.p if MOMENT.name in case.asked else NO_P)
+    known = np.flatnonzero(~np.isnan(table[STATUS.name].values))
     with ExitStack() as stack:
         summary, moments, curves = (
             stack.enter_context(draft(folder / name)) for name in ("summary.json", "moments.csv", "curves.csv")
@@ -84,13 +97,23 @@ def write_results(
         by_moment.writerow([*case.vary.keys, *over_p])
         by_curve.writerow([*case.vary.keys, *of_curve])
         summary.write(_beginning(case, len(results) if finished is None else finished, facts, held=is_short))
-        for number, result in enumerate(results):
-            row, varied = row_of(case, result), result.curve.varied.values()
-            table.put(result.curve.number - 1, row)
-            content = _short_summary(case, result) if is_short else _summary(case, result, row, columns)
-            summary.write(_entry(case, number, content))
-            by_moment.writerows([*varied, *each] for each in rows_over_p(row, over_p))
-            by_curve.writerow([*varied, *(_cell(row.get(name)) for name in of_curve)])
+        for start in range(0, known.size, BLOCK):
+            block = known[start : start + BLOCK]
+            sets = list(case.vary.sets_at(block))
+            cells = zip(*(_cells(table[name], block) for name in of_curve), strict=True)
+            by_curve.writerows([*varied.values(), *row] for varied, row in zip(sets, cells, strict=True))
+            for at, row in _over_p(case, table, over_p[1:], block):
+                by_moment.writerow([*sets[at].values(), *row])
+            for place, (number, varied) in enumerate(zip(block.tolist(), sets, strict=True), start):
+                if not is_short:
+                    result = results[place]
+                    content = _summary(case, result, row_of(case, result), columns)
+                elif says is None or says[number]:
+                    content = _short_summary(case, results[place])
+                else:
+                    word = Status(int(table[STATUS.name].values[number])).word
+                    content = {"varied": varied, "status": word, "warnings": [], "notes": []}
+                summary.write(_entry(case, place, content))
         summary.write(_END)
     return table
 
@@ -98,6 +121,27 @@ def write_results(
 def _names(columns: Sequence[Quantity]) -> tuple[list[str], list[str]]:
     """Of the columns over p, which comes first, and of the others."""
     return ["p", *(each.name for each in columns if each.dims)], [each.name for each in columns if not each.dims]
+
+
+def _cells(column: Column, places: NDArray[np.int64]) -> list[Any]:
+    """What stands in a table at some curves: the word of a status, nothing where there is no number."""
+    values = column.values[places]
+    if column.quantity in (STATUS, *COUNTS):
+        numbers = values.astype(int).tolist()
+        return [Status(each).word for each in numbers] if column.quantity is STATUS else numbers
+    return list(map(plain, values.tolist()))
+
+
+def _over_p(
+    case: Case, table: Table, names: Sequence[str], places: NDArray[np.int64]
+) -> Iterator[tuple[int, tuple[Any, ...]]]:
+    """Of some curves a row for each p that was solved, after the number of the curve among these."""
+    if not names:
+        return
+    solved = ~np.isnan(table[MOMENT.name].values[places])
+    at, of_p = np.nonzero(solved)
+    columns = [map(plain, table[name].values[places][solved].tolist()) for name in names]
+    yield from zip(at.tolist(), zip(case.p[of_p].tolist(), *columns, strict=True), strict=True)
 
 
 def _cell(number: Any) -> Any:
@@ -196,6 +240,11 @@ def _told(result: CurveResult) -> dict[str, list[str]]:
         "warnings": in_case_words([*result.warnings, *(failure.reason for failure in result.failures)]),
         "notes": in_case_words(result.notes),
     }
+
+
+def says_more(case: Case, result: CurveResult) -> bool:
+    """Whether there is more of a curve than its numbers in tables."""
+    return any(result.remarks.values()) or bool(_beyond_tables(case, result))
 
 
 def _beyond_tables(case: Case, result: CurveResult) -> dict[str, Any]:

@@ -165,6 +165,10 @@ JUMPS: Part = Part(
 """The indices of impacts, of each place of several."""
 
 
+_BY_THEORY = {name: index.perturbation.name for name, index in INDICES.items()}
+"""The names of the columns of perturbation theory."""
+
+
 def _theory_settings(case: Case, number: int) -> Settings | None:
     return {} if any(name in case.asked for name in INDICES) else None
 
@@ -176,7 +180,7 @@ def _solve_theory(job: Job, settings: Settings) -> dict[str, float]:
 def _row_of_theory(case: Case, result: CurveResult) -> Row:
     numbers: Mapping[str, float] = result.parts.get("theory", {})
     is_there = {name for name in case.asked if result.estimates.get(name)}
-    return {INDICES[name].perturbation.name: each for name, each in numbers.items() if name in is_there}
+    return {_BY_THEORY[name]: each for name, each in numbers.items() if name in is_there}
 
 
 def asked(case: Case) -> list[Index]:

@@ -9,13 +9,16 @@ from dataclasses import replace
 from functools import partial
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from fpsolve.analysis.spreads import LEVEL, UNCERTAIN
+from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case
 from fpsolve.case.vary import short_names
 from fpsolve.data import written
 from fpsolve.exponent.error import digits
 from fpsolve.exponent.quantities import LYAPUNOV_EXPONENT, MOMENT, STABILITY_INDEX, Index
-from fpsolve.model.quantity import OSCILLATOR_RESPONSE, moment_at
+from fpsolve.model.quantity import OSCILLATOR_RESPONSE, STATUS, moment_at
 from fpsolve.page.limits import EACH, EXTREMES, FAILURES, MOMENTS, ROWS
 from fpsolve.page.page import Block, Column, Grid, Sentence
 from fpsolve.parts.excursions import NAME as EXCURSIONS
@@ -23,8 +26,9 @@ from fpsolve.parts.excursions import bounds_text
 from fpsolve.parts.indices import index_text, told_indices
 from fpsolve.parts.intervals import spreads_of
 from fpsolve.parts.moments import STAR
+from fpsolve.results.table import Table
 from fpsolve.results.text import DIGITS, interval, short, units_in_words
-from fpsolve.study.results import CurveResult
+from fpsolve.study.results import CurveResult, Status
 
 MAIN = LYAPUNOV_EXPONENT, STABILITY_INDEX
 """The indices that come first, and that have a column over a parameter."""
@@ -38,47 +42,50 @@ class Shown(NamedTuple):
     Attributes:
         column: its place.
         text: what stands there, also where there is no number.
-        number: of which the extreme curves are sought, None where it is not there; None for the other columns.
+        numbers: those of all curves, of which the extreme ones are sought, NaN where there is none; None for the
+            other columns.
     """
 
     column: Column
     text: Callable[[Any], str]
-    number: Callable[[Any], float | None] | None = None
+    numbers: FloatArray | None = None
 
 
-def show(case: Case, results: Sequence[CurveResult]) -> Iterator[Block]:
-    """The table, and of many curves how many converged."""
-    yield curve_grid(case, results)
+def show(case: Case, results: Sequence[CurveResult], table: Table) -> Iterator[Block]:
+    """What was solved of each curve in one grid, and of many curves how many converged."""
+    yield curve_grid(case, results, table)
     if len(results) <= EACH:
         return
-    counts = Counter(result.status for result in results)
+    counts = Counter(_status(table))
     states = ", ".join(f"{counts[each]} {each.word}" for each in sorted(counts, key=lambda each: (each.fails, each)))
     is_short = len(results) > ROWS and sum(count for each, count in counts.items() if each.fails) > FAILURES
     shown = f"; of those that are not converged the first {FAILURES} are shown" if is_short else ""
     yield Sentence(f"{len(results)} curves: {states}{shown}; all numbers are in curves.csv and results.nc")
 
 
-def curve_grid(case: Case, results: Sequence[CurveResult]) -> Grid:
-    """What was solved of each curve, beside perturbation theory."""
-    shown = list(_quantities(case))
-    if len(results) > EACH or any(result.status for result in results):
-        is_whole = len(results) <= ROWS and not any(result.status for result in results)
+def curve_grid(case: Case, results: Sequence[CurveResult], table: Table) -> Grid:
+    """What was solved of each curve, beside perturbation theory.
+
+    Args:
+        table: the numbers of all curves.
+    """
+    shown, status = list(_quantities(case, table)), _status(table)
+    if len(results) > EACH or any(status):
+        is_whole = len(results) <= ROWS and not any(status)
         shown.append(Shown(Column("status", 1 if is_whole else 0), lambda result: result.status.word))
     numbers = told_indices(case) + [MOMENT] * (case.figure.x == "p" and MOMENT.name in case.asked)
     units = units_in_words(case.units.time, numbers)
-    grid = table_of(case, results, shown, lambda result: result.status.fails)
+    grid = grid_of(case, results, shown, [place for place, each in enumerate(status) if each.fails])
     theories = [each.heading for each in grid.columns if each.heading.startswith("Eq.")]
     told = [THEORY] * bool(theories) + [STAR] * any("*" in each for each in theories) + [units] * bool(units)
     return replace(grid, remark="; ".join(told))
 
 
-def table_of(
-    case: Case, found: Sequence[Any], shown: Iterable[Shown], has_failed: Callable[[Any], bool] = lambda _: False
-) -> Grid:
-    """A row for what was found of each curve, or of more than `ROWS` for the extreme and the first failed ones."""
-    shown = [each for each in shown if each.number or any(map(each.text, found))]
+def grid_of(case: Case, found: Sequence[Any], shown: Iterable[Shown], failed: Sequence[int] = ()) -> Grid:
+    """A row for what was found of each curve, or of more than `ROWS` for the extreme and the first `failed` ones."""
+    shown = [each for each in shown if each.numbers is not None or any(map(each.text, found))]
     is_digest = len(found) > ROWS
-    chosen = _chosen(found, shown, has_failed) if is_digest else [(each, "") for each in found]
+    chosen = _chosen(found, shown, failed) if is_digest else [(each, "") for each in found]
     columns = [Column(name) for name in short_names(case.vary.keys)] + [each.column for each in shown]
     grid = Grid(case.headline, columns + [Column("which", is_text=True)] * is_digest)
     for each, which in chosen:
@@ -87,29 +94,28 @@ def table_of(
     return grid
 
 
-def _chosen(found: Sequence[Any], shown: Sequence[Shown], has_failed: Callable[[Any], bool]) -> list[tuple[Any, str]]:
+def _chosen(found: Sequence[Any], shown: Sequence[Shown], failed: Sequence[int]) -> list[tuple[Any, str]]:
     """What has the extreme values of the first quantities, and some that failed, each with the reason."""
-    sought = [(column.heading, number) for column, _, number in shown if number][:EXTREMES]
-    extremes: dict[str, tuple[float, Any]] = {}
-    reasons: dict[int, tuple[Any, list[str]]] = {}
-    for each in found:
-        if len(reasons) < FAILURES and has_failed(each):
-            reasons[each.curve.number] = each, []
-        for heading, number in sought:
-            if (value := number(each)) is not None:
-                for word, size in (("least", value), ("largest", -value)):
-                    if size < extremes.get(f"{word} {heading}", (math.inf,))[0]:
-                        extremes[f"{word} {heading}"] = size, each
-    for reason, (_, each) in extremes.items():
-        reasons.setdefault(each.curve.number, (each, []))[1].append(reason)
-    return [(each, ", ".join(told)) for _, (each, told) in sorted(reasons.items())]
+    reasons: dict[int, list[str]] = {place: [] for place in failed[:FAILURES]}
+    for column, _, numbers in [each for each in shown if each.numbers is not None][:EXTREMES]:
+        if numbers is not None and np.isfinite(numbers).any():
+            for word, place in (("least", np.nanargmin(numbers)), ("largest", np.nanargmax(numbers))):
+                reasons.setdefault(int(place), []).append(f"{word} {column.heading}")
+    return [(found[place], ", ".join(told)) for place, told in sorted(reasons.items())]
 
 
-def _quantities(case: Case) -> Iterator[Shown]:
+def _status(table: Table) -> list[Status]:
+    """Of all curves that are known."""
+    values = table[STATUS.name].values
+    return [Status(int(each)) for each in values[~np.isnan(values)].tolist()]
+
+
+def _quantities(case: Case, table: Table) -> Iterator[Shown]:
     """What has a column, the most important first: λ, δ_p, the other indices, then Λ at the p of a case if few."""
+    known = ~np.isnan(table[STATUS.name].values)
     over_p, told = case.figure.x == "p", sorted(told_indices(case), key=lambda index: index not in MAIN)
     for rank, index in enumerate(told if over_p else [each for each in told if each in MAIN]):
-        yield _index(index, rank + 1 if rank > 1 else 0)
+        yield _index(index, rank + 1 if rank > 1 else 0, table[index.name].values[known])
         if case.uncertain and index.name in UNCERTAIN:
             yield Shown(Column(f"{LEVEL:.0%} of {index.symbol}", 1), partial(_interval, case, index.name))
         if not over_p:
@@ -130,18 +136,20 @@ def _quantities(case: Case) -> Iterator[Shown]:
     p = [float(each) for each in case.p if each] if over_p and MOMENT.name in case.asked else []
     if len(p) > MOMENTS:
         p = [] if told else [p[0], p[-1]]
-    yield from (_moment(each, 2 if told else 0) for each in p)
+    for each in p:
+        [place] = np.flatnonzero(case.p == each)
+        yield _moment(each, 2 if told else 0, table[MOMENT.name].values[known, place])
 
 
-def _index(index: Index, rank: int) -> Shown:
+def _index(index: Index, rank: int, numbers: FloatArray) -> Shown:
     def text(result: CurveResult) -> str:
         is_lost = result.estimates[index.name] is None and result.status.fails
         return "" if is_lost else index_text(index, result, DIGITS)
 
-    return Shown(Column(index.symbol, rank), text, lambda result: getattr(result.estimates[index.name], "value", None))
+    return Shown(Column(index.symbol, rank), text, numbers)
 
 
-def _moment(p: float, rank: int) -> Shown:
+def _moment(p: float, rank: int, numbers: FloatArray) -> Shown:
     def found(result: CurveResult) -> list[tuple[float, float]]:
         moments = result.moments
         rows = zip(moments.p.tolist(), moments.value.tolist(), moments.error_estimate.tolist(), strict=True)
@@ -150,7 +158,7 @@ def _moment(p: float, rank: int) -> Shown:
     return Shown(
         Column(moment_at(p).symbol, rank),
         lambda result: "".join(digits(*each, most=DIGITS) for each in found(result)),
-        lambda result: next((value for value, _ in found(result)), None),
+        numbers,
     )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 from fpsolve.case.case import MOST_DRAWN, Case, Curve
@@ -22,26 +22,32 @@ MONTE_CARLO = "monte_carlo*.json"
 """The files of all messages of a simulation."""
 
 
-def notes(case: Case, found: Sequence[CurveResult | SimulatedCurve], file: str = SUMMARY) -> Iterator[Note]:
+def notes(
+    case: Case, found: Iterable[CurveResult | SimulatedCurve], file: str = SUMMARY, *, count: int | None = None
+) -> Iterator[Note]:
     """What is said of the curves of a case: of whom, what, whose numbers these are, where the others are.
 
     Args:
         case: whose curves these are.
         found: what was found of them.
         file: that holds all messages; empty where nothing is written.
+        count: how many curves there are with those of which nothing is said, if these are left out.
     """
+    if count is None:
+        found = tuple(found)
+        count = len(found)
     groups: dict[Severity, dict[Any, list[tuple[Message, Curve]]]] = {severity: {} for severity in WORDS}
     for each in found:
         for severity, messages in each.remarks.items():
             for message in map(message_of, messages):
                 is_on_theory = message.code in (Code.STRONG_NOISE, Code.LOAD_LEFT_OUT)
-                if not is_on_theory or (file and shows_perturbed_moments(case, len(found))):
+                if not is_on_theory or (file and shows_perturbed_moments(case, count)):
                     groups[severity].setdefault(message.kind, []).append((message, each.curve))
     for severity, kinds in groups.items():
         for group in list(kinds.values())[:NOTES]:
             worst, whose = max(group, key=lambda one: -math.inf if one[0].size is None else one[0].size)
             curves = {curve.number: curve for _, curve in group}
-            who, rest = f"{case.name}: {len(curves)} of {len(found)} curves", ""
+            who, rest = f"{case.name}: {len(curves)} of {count} curves", ""
             if len(curves) <= NAMED:
                 *others, last = [curve.label for curve in curves.values()]
                 comma = "; " if any("," in label for label in (*others, last)) else ", "

@@ -10,21 +10,32 @@ from fpsolve.output.figures import main_figure, rate_figure
 from fpsolve.page.limits import EACH, PICTURES
 from fpsolve.page.page import Block, Drawing, Sentence
 from fpsolve.parts.every import PARTS
+from fpsolve.results.table import Table
 from fpsolve.results.text import duration, plural
 from fpsolve.show import curves
+from fpsolve.study.columns import table_of
 from fpsolve.study.results import CurveResult, SimulatedCurve
 
 
 def show(
-    case: Case, results: Sequence[CurveResult], folder: Path, simulated: Sequence[SimulatedCurve] = ()
+    case: Case,
+    results: Sequence[CurveResult],
+    folder: Path,
+    simulated: Sequence[SimulatedCurve] = (),
+    table: Table | None = None,
 ) -> Iterator[Block]:
-    """The solved curves, one by one or in one table, beside those that are simulated."""
-    yield main_figure(case, results, simulated, folder)
+    """The solved curves, one by one or in one table, beside those that are simulated.
+
+    Args:
+        table: the numbers of all curves, if these are known already.
+    """
+    table = table_of(case, results) if table is None else table
+    yield main_figure(case, results, simulated, folder, table)
     yield rate_figure(case, results)
     is_short, over_p = len(results) <= EACH, case.figure.x == "p"
     samples = {each.curve.number: each for each in simulated}
     if not (is_short and over_p):
-        yield from curves.show(case, results)
+        yield from curves.show(case, results, table)
     for place, result in enumerate(results if is_short else results[:PICTURES]):
         told = [block for part in PARTS for block in part.show(case, result)] if is_short else []
         if told:
@@ -44,14 +55,16 @@ def figures_of(
 
 
 def write_figures(
-    case: Case, results: Sequence[CurveResult], simulated: Sequence[SimulatedCurve], folder: Path
+    case: Case, results: Sequence[CurveResult], simulated: Sequence[SimulatedCurve], folder: Path, table: Table
 ) -> None:
     """Write all figures that have files: those of all curves together, and those of each."""
-    main_figure(case, results, simulated, folder).write(folder)
+    main_figure(case, results, simulated, folder, table).write(folder)
     rate_figure(case, results).write(folder)
     samples = {each.curve.number: each for each in simulated}
-    has_more = any(part.figures and part.settings(case, 2) is not None for part in PARTS)
-    for result in results if has_more else results[:1]:
+    of_first, of_others = (
+        any(part.figures and part.settings(case, number) is not None for part in PARTS) for number in (1, 2)
+    )
+    for result in results if of_others else results[:1] if of_first else ():
         for figure in figures_of(case, result, folder, samples):
             figure.write(folder)
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 from fpsolve.case.case import Case
 from fpsolve.model.quantity import MOMENT, SECONDS, STATUS, Quantity
 from fpsolve.parts.every import PARTS
-from fpsolve.results.table import Row
+from fpsolve.results.table import NO_P, Row, Table
 from fpsolve.study.results import CurveResult
 
 COUNTS = (
@@ -32,3 +34,11 @@ def row_of(case: Case, result: CurveResult) -> Row:
     count, solved = case.p.size if MOMENT.name in case.asked else 0, result.moments.p.size
     counts = {"p_solved": solved, "p_failed": count - solved}
     return {**row, **counts, STATUS.name: result.status, SECONDS.name: round(result.seconds, 6)}
+
+
+def table_of(case: Case, results: Iterable[CurveResult] = ()) -> Table:
+    """The numbers of some curves of a case, with room for all."""
+    table = Table(columns_of(case), case.planned, case.p if MOMENT.name in case.asked else NO_P)
+    for result in results:
+        table.put(result.curve.number - 1, row_of(case, result))
+    return table

@@ -151,13 +151,13 @@ def run_case(
 
         def show() -> None:
             with watch.bar(Phase(case.name, "figures")), writable(folder):
-                results.write_figures(case, sweep.results, simulated, folder)
+                results.write_figures(case, sweep.results, simulated, folder, sweep.results.table)
             if reporter is not None:
                 from fpsolve.show.claims import show_claims  # which takes a tenth of a second
 
                 is_whole = not interruption and len(simulated) == case.planned * monte_carlo
                 blocks = chain(
-                    results.show(case, sweep.results, folder, simulated),
+                    results.show(case, sweep.results, folder, simulated, sweep.results.table),
                     show_claims(sweep.results, folder),
                     show_samples(case, samples) if samples else (),
                     show_simulated(case, simulated, sweep.results) if simulated else (),
@@ -171,7 +171,7 @@ def run_case(
 
         told = saying_if_interrupted(lambda: f"; what was {'done' if simulated else 'solved'} is kept in {folder}")
         with told, shown_at_the_end(show):
-            watch.shown(results.show(case, sweep.results, folder))
+            watch.shown(results.show(case, sweep.results, folder, (), sweep.results.table))
             watch.noted(sweep.told.notes)
             if case.uncertain.sample:
                 samples = _sample(case, sweep, folder, pool or serial(), watch, is_fresh=is_fresh)

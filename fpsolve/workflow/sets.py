@@ -14,7 +14,7 @@ import numpy as np
 from fpsolve.case.case import Case, Curve
 from fpsolve.case.sections import Varied
 from fpsolve.model.quantity import MOMENT, STATUS
-from fpsolve.output.datasets import write_dataset
+from fpsolve.output.datasets import read_table, write_dataset
 from fpsolve.output.records import (
     SOLVED_RECORDS,
     Address,
@@ -36,7 +36,7 @@ from fpsolve.show.notes import notes
 from fpsolve.study.results import CurveResult, Solved, Status
 from fpsolve.study.solve import Order, batches, result_of, solve_batch
 from fpsolve.workflow.progress import MOMENTS, SETS, Advance, Phase
-from fpsolve.workflow.seal import Told, seal, sealed
+from fpsolve.workflow.seal import SEAL, Told, seal, sealed
 
 Found = tuple[int, Address | CurveResult | None, bool]
 """The number of a curve, its numbers where they are new, and whether some of these are missing."""
@@ -89,13 +89,15 @@ class Sweep:
         self.numerics = Numerics.of(case)
         self.results, self.facts = Results(case, self.records, self.numerics), dict[str, Any]()
         self._settled, self._due, self._unfinished = 0, 0.0, set[int]()
+        self._are_drawn = [any(BY_NAME[name].is_drawn for name in self.results.asked(number)) for number in (1, 2)]
         self._steps_each = max(case.p.size if MOMENT.name in case.asked else 0, 1) if case.planned == 1 else 1
         self.sealed = None if is_fresh else sealed(case, self.folder)
         if self.sealed:
             self.told, self.facts = self.sealed, facts_of(case, self.started, monotonic() - self._clock)
-            self.results.add_all()
-            self._settled = case.planned
+            self.results.add_all(read_table(case, self.folder))
+            self._settled = case.planned - self._are_drawn[0] - (case.planned - 1) * self._are_drawn[1]
         else:
+            (self.folder / SEAL).unlink(missing_ok=True)
             self.find()
         self.known = len(self.results)
 
@@ -140,7 +142,7 @@ class Sweep:
         is_alone = self.case.planned == 1 and not pool.is_elsewhere
         if self._settled:
             progress(self._settled * self._steps_each, known=True)
-        if self.sealed:
+        if self.sealed and not any(self._are_drawn):
             return
         kept = partial(keep, self.folder, self.numerics)
         growing = self._grow if is_alone else partial(grow, self.folder, self.numerics)
@@ -149,6 +151,7 @@ class Sweep:
             task = partial(task, progress=progress)
         with serial() if is_alone else pool as workers:
             for _, solved in workers.run(task, batches(self.case, self._order)):
+                are_new = any(found is not None for _, found, _ in solved)
                 for number, found, is_failed in solved:
                     if isinstance(found, Address):
                         self.records.expect(found)
@@ -157,13 +160,14 @@ class Sweep:
                         self.results.add(number, found)
                     is_reported = is_alone and not self.known  # p by p
                     progress(0 if is_reported else self._steps_each, failed=int(is_failed))
-                if monotonic() >= self._due:
+                if are_new and monotonic() >= self._due:
                     self.write_tables()
 
     def write_tables(self) -> Table:
         """Write summary.json, moments.csv and curves.csv; return their numbers."""
         started, self.facts = monotonic(), facts_of(self.case, self.started, monotonic() - self._clock)
-        table = write_results(self.case, self.results, self.folder, self.facts, self.done)
+        results = self.results
+        table = write_results(self.case, results, self.folder, self.facts, self.done, results.table, results.says)
         self._due = monotonic() + REST * (monotonic() - started)
         return table
 
@@ -178,19 +182,21 @@ class Sweep:
         if table is not None:
             write_dataset(self.case, table, self.folder, self.facts)
             failed = int(np.isin(table[STATUS.name].values, [each for each in Status if each.fails]).sum())
-            self.told = Told(failed, self.records.outdated, tuple(notes(self.case, self.results)))
-            if self.done == self.case.planned and self.results.are_kept and not self._is_drawn(1):
+            said = notes(self.case, self.results.telling, count=len(self.results))
+            self.told = Told(failed, self.records.outdated, tuple(said))
+            if self.done == self.case.planned and self.results.are_kept:
                 seal(self.case, self.folder, self.told)
 
     def _is_drawn(self, number: int) -> bool:
         """Whether pictures of a set are wanted, which are drawn in each run."""
-        return any(BY_NAME[name].is_drawn for name in self.results.asked(number))
+        return self._are_drawn[number > 1]
 
     def _order(self, number: int, varied: Varied) -> Order | None:
-        if self.results.has(number) and not self._is_drawn(number):
+        is_known = self.results.has(number)
+        if is_known and not self._is_drawn(number):
             return None
         order = Order(number, varied, self.results.asked(number), self.case.vary.line_of(number))
-        if not self.results.is_begun(number):
+        if not (is_known or self.results.is_begun(number)):
             return order
         [curve] = self.case.curves(number - 1, number)
         entries, begun = self.results.entries(curve)

@@ -27,7 +27,7 @@ from fpsolve.page.limits import EACH, PICTURES
 from fpsolve.page.page import Block, Column, Drawing, Grid, Sentence, filled
 from fpsolve.pool import Pool, processors
 from fpsolve.results.text import fate, sampled, sign_of, units_in_words
-from fpsolve.show.curves import Shown, table_of
+from fpsolve.show.curves import Shown, grid_of
 from fpsolve.show.notes import MONTE_CARLO, notes
 from fpsolve.simulation.setup import PROGRESS_STEPS, obstacles, simulated_parts
 from fpsolve.study.results import CurveResult, SimulatedCurve
@@ -369,8 +369,8 @@ def exponent_grid(case: Case, simulated: Sequence[SimulatedCurve], solved: Mappi
 
     columns = [Column(LYAPUNOV_EXPONENT.symbol), Column("± s.e."), *COMPARED]
     shown = [Shown(column, partial(cell, i)) for i, column in enumerate(columns)]
-    shown[0] = shown[0]._replace(number=lambda each: each.result.lyapunov_exponent)
-    return replace(table_of(case, simulated, shown), remark=units_in_words(case.units.time, [LYAPUNOV_EXPONENT]))
+    shown[0] = shown[0]._replace(numbers=np.array([each.result.lyapunov_exponent for each in simulated]))
+    return replace(grid_of(case, simulated, shown), remark=units_in_words(case.units.time, [LYAPUNOV_EXPONENT]))
 
 
 def _cells(value: float | None, error: float | None, known: float | None) -> list[str]:

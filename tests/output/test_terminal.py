@@ -22,6 +22,7 @@ from fpsolve.results.text import duration
 from fpsolve.show.curves import curve_grid
 from fpsolve.show.notes import notes
 from fpsolve.show.results import show as show_results
+from fpsolve.study.columns import table_of
 from fpsolve.study.results import CurveResult, MomentColumns
 from fpsolve.study.solve import failed
 from fpsolve.workflow import simulation
@@ -426,6 +427,6 @@ y = "stability_index"
 """
     case = case_in(tmp_path, text)
     results = [failed(curve, "nothing was solved") for curve in case.curves()]
-    found = curve_grid(case, results)
+    found = curve_grid(case, results, table_of(case, results))
     assert not [column.heading for column in found.columns if column.heading.startswith("Eq.")]
     assert not found.remark
