@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cache, partial
 from typing import TYPE_CHECKING, Any
 
 from fpsolve.analysis.excursions import SYMBOL
@@ -165,8 +165,9 @@ JUMPS: Part = Part(
 """The indices of impacts, of each place of several."""
 
 
-_BY_THEORY = {name: index.perturbation.name for name, index in INDICES.items()}
-"""The names of the columns of perturbation theory."""
+@cache
+def _column_of_theory(name: str) -> str:
+    return INDICES[name].perturbation.name
 
 
 def _theory_settings(case: Case, number: int) -> Settings | None:
@@ -180,7 +181,7 @@ def _solve_theory(job: Job, settings: Settings) -> dict[str, float]:
 def _row_of_theory(case: Case, result: CurveResult) -> Row:
     numbers: Mapping[str, float] = result.parts.get("theory", {})
     is_there = {name for name in case.asked if result.estimates.get(name)}
-    return {_BY_THEORY[name]: each for name, each in numbers.items() if name in is_there}
+    return {_column_of_theory(name): each for name, each in numbers.items() if name in is_there}
 
 
 def asked(case: Case) -> list[Index]:
