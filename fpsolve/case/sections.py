@@ -32,6 +32,7 @@ from fpsolve.errors import MeshError
 from fpsolve.explain import (
     BY_KIND,
     LIST,
+    NUMBER,
     TABLE,
     WORD,
     Refusal,
@@ -316,15 +317,7 @@ def _limits(value: Any) -> tuple[float, float]:
     )
 
 
-def _time_unit(value: Any) -> Any:
-    if type(value) is str and re.fullmatch(r"[^\W\d_]{1,12}", value):
-        return value
-    text = f'got {shown_with_kind(value)}; must be a unit of 1 to 12 letters; write, for example, time = "s"'
-    raise ValueError(text)
-
-
 Limits = Annotated[tuple[float, float], BeforeValidator(_limits)]
-UnitName = Annotated[str, Field(min_length=1, max_length=12)]
 
 
 class FigureSection(Section):
@@ -388,8 +381,7 @@ class UnitsSection(Section):
 
     time: Annotated[
         str,
-        BeforeValidator(_time_unit, json_schema_input_type=UnitName),
-        parameter("what the unit of time is called", 'time = "s"'),
+        parameter("what the unit of time is called: 1 to 12 letters", 'time = "s"', pattern=r"^[^\W\d_]{1,12}$"),
     ] = "time"
 
 
@@ -568,15 +560,6 @@ class DesignSection(Section):
     ]
 
 
-def _where(table: Any) -> Any:
-    """The flat table of a `where`, every entry a finite number or a text."""
-    if not isinstance(table, dict):
-        return table
-    table = flat(table)
-    refuse(((key,), item, "") for key, item in table.items() if not is_number(item) and type(item) is not str)
-    return table
-
-
 class Expectation(Section):
     """[[expect]]: a value that the result must have, on the curves that `where` selects."""
 
@@ -587,8 +570,11 @@ class Expectation(Section):
     atol: Annotated[float | None, parameter("absolute tolerance", "atol = 1e-6", gt=0)] = None
     source: Annotated[Text, parameter("where the value comes from", 'source = "Eq. (37), second order"')]
     where: Annotated[
-        dict[str, Value],
-        BeforeValidator(_where, json_schema_input_type=dict[str, Value | dict[str, Value]]),
+        dict[str, Annotated[Annotated[float, Tag(NUMBER)] | Annotated[str, Tag(WORD)], BY_KIND]],
+        BeforeValidator(
+            lambda table: flat(table) if isinstance(table, dict) else table,
+            json_schema_input_type=dict[str, Value | dict[str, Value]],
+        ),
         parameter("which curves: some of the varied keys", 'where = { "noise.D0" = 1.0 }'),
     ] = Field(default_factory=dict)
 

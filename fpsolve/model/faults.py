@@ -173,7 +173,7 @@ def _noun(annotation: Any, plural: str = "") -> str:
         return _not_empty(inner) + _noun(arguments[0], plural)
     if origin in (Union, UnionType):
         first, *others = (_noun(argument, plural) for argument in arguments if argument is not NoneType)
-        return " or ".join([first, *map(_with_article, others)])
+        return " or ".join([first, *(others if plural else map(_with_article, others))])
     if texts := choices(annotation):
         names = ", ".join(f'"{text}"' for text in texts)
         return f"{'some' if plural else 'one'} of {names}" if len(texts) > 1 else names
