@@ -591,7 +591,7 @@ def prove(
     if (check is None) == (not cases):
         raise FpsolveError("name either cases to prove, or with --check a proof.json to verify")
     if check is not None:
-        if width is not None or options not in (OPTIONS_OF_REPORTS, Reporting(out=options.out, quiet=options.quiet)):
+        if width is not None or options != Reporting(quiet=options.quiet):
             raise FpsolveError("--check takes a proof.json and nothing else, as that says all that is verified")
         checked = check_proof(check)
         for text in checked.objections:

@@ -11,9 +11,9 @@ import pytest
 from fpsolve import OrnsteinUhlenbeck
 from fpsolve.case.case import load_case
 from fpsolve.cli import main
-from fpsolve.commands.noise import natural_frequencies
 from fpsolve.commands.options import BAD_INPUT
 from fpsolve.measured import read_spectrum, weak_exponent, weak_moment
+from fpsolve.workflow.measurement import natural_frequencies
 from tests.kit import read_json
 
 ROOT = Path(__file__).parents[2]
@@ -204,7 +204,7 @@ REFUSED = {
     "many averages": ([*AT_2, "--averages", "1e300"], "from 1 to 1e+12"),
     "no number": ([*AT_2, "--damping-ratio", "nan"], "got --damping-ratio nan"),
     "rate": ([*AT_2, "--rate", "10"], "--rate is for a record"),
-    "whittle": ([*AT_2, "--method", "whittle"], "--method whittle is for a record"),
+    "whittle": ([*AT_2, "--method", "whittle"], "--method is for a record"),
     "whittle of moments": (
         ["--record", "record.csv", "--method", "whittle", "--kind", "non-gaussian", "--frequency", "2"],
         "got --method whittle for --kind non-gaussian",

@@ -140,6 +140,7 @@ def test_algebraic_tails_are_refused_also_where_the_moments_are_finite(case, tmp
         (["--check", "a.json", "--width", "1"], "--check takes a proof.json and nothing else"),
         (["--check", "a.json", "--set", "noise.D0=1.0"], "--check takes a proof.json and nothing else"),
         (["--check", "a.json", "--jobs", "2"], "--check takes a proof.json and nothing else"),
+        (["--check", "a.json", "--out", "other"], "--check takes a proof.json and nothing else"),
     ],
 )
 def test_what_cannot_be_checked(tmp_path, monkeypatch, capsys, arguments, words):

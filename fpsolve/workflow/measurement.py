@@ -1,0 +1,596 @@
+"""From a measurement to a noise, and to what it means: the fit, its files, and what is said of it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from scipy.special import chdtri
+
+from fpsolve import __version__
+from fpsolve.analysis.spreads import LEVEL, Spread
+from fpsolve.arrays import FloatArray, one
+from fpsolve.case.case import Case
+from fpsolve.case.new import Modes, case_text, sum_text
+from fpsolve.case.remedies import CASE_WORDS
+from fpsolve.case.rewrite import with_noise
+from fpsolve.drawing import COLOURS, figure_for, label_axes, plain_numbers
+from fpsolve.errors import FpsolveError, NotConverged
+from fpsolve.exponent.adapt import Budget
+from fpsolve.fem.factors import one_thread
+from fpsolve.files import alone, writable, write_json, write_text
+from fpsolve.measured import (
+    NoiseFit,
+    Record,
+    Spectrum,
+    Verdict,
+    fit_noise,
+    non_gaussian_from_record,
+    of_relative_stiffness,
+    of_stability_height,
+    of_support_acceleration,
+    verdict,
+    weak_exponent,
+    weak_moment,
+)
+from fpsolve.measured.fit import NAMES
+from fpsolve.measured.signals import SIGNALS
+from fpsolve.measured.spectrum import SIDES, UNITS
+from fpsolve.measured.stability import STEPS
+from fpsolve.measured.weak import Where
+from fpsolve.messages import Code, Message
+from fpsolve.model import Noise, ParametricOscillator, PlaneSystem, Problem, VibroImpactOscillator
+from fpsolve.model.plane import System
+from fpsolve.model.systems.vibro_impact import ImpactLaw
+from fpsolve.page.page import Block, Column, Grid, Sentence
+from fpsolve.results.text import percent, sampled
+from fpsolve.show.notes import note_on
+from fpsolve.workflow.progress import SILENT, SOLVES, Phase, Watch
+
+NON_GAUSSIAN = "non-gaussian"
+STEPS_OF_A_FIT = 1 + STEPS
+"""How often `measure` calls `progress` at most."""
+RTOL = 1e-4
+"""Of λ and Λ(2), whose errors by the fit are some percent."""
+SECONDS = 20.0
+"""Of a processor for λ and for Λ(2) each."""
+STILL = 1e-6
+"""Of a modulus: imaginary parts below are none."""
+
+
+@dataclass(frozen=True, eq=False)
+class Wanted:
+    """What is to be fitted, and for what.
+
+    Attributes:
+        of: what was measured, one of `SIGNALS`.
+        kind, terms, method: as for `fit_noise`, or the kind "non-gaussian" of a record.
+        modes: natural frequencies, and damping ratios that may be NaN.
+        height: GM where its variation was measured.
+        case: whose system the noise is for; None for an oscillator with the first mode's damping.
+        segment: of a record, in s; None for what the frequencies need.
+        rtol, seconds: tolerance and time for λ and for Λ(2).
+    """
+
+    of: str
+    kind: str
+    terms: int
+    method: Literal["spectrum", "whittle"]
+    modes: Modes
+    height: float | None = None
+    case: Case | None = None
+    segment: float | None = None
+    rtol: float = RTOL
+    seconds: float = SECONDS
+
+    @property
+    def noise_in(self) -> Where:
+        return SIGNALS[self.of].noise_in
+
+
+class Critical(NamedTuple):
+    """A damping ratio above which a moment decays in weak noise without walls, and its standard error."""
+
+    value: float
+    error: float
+
+
+@dataclass(frozen=True, eq=False)
+class NoiseOutcome:
+    """What became of a measurement.
+
+    Attributes:
+        fit: of the relative stiffness, or of the damping in 1/s.
+        scaled: the same in the unit in which the system takes it.
+        exponent, moment: the critical damping ratios for λ and for Λ(2), of one mode.
+        verdict: of the system; None where there is no system, or nothing of it was solved.
+        failure: why it, or a part of it, was not solved.
+    """
+
+    wanted: Wanted
+    fit: NoiseFit
+    scaled: NoiseFit
+    exponent: Critical | None = None
+    moment: Critical | None = None
+    verdict: Verdict | None = None
+    failure: Message | None = None
+
+
+def natural_frequencies(system: System) -> tuple[float, ...]:
+    """The moduli of the complex pairs of eigenvalues without noise, increasing: ω of an oscillator, in rad/time."""
+    still: FloatArray = np.sum(
+        [system.epsilon**each.order * np.array(each.matrix) for each in system.terms if each.g == one], axis=0
+    )
+    values = np.linalg.eigvals(still)
+    return tuple(sorted(float(abs(each)) for each in values if each.imag > STILL * abs(each)))
+
+
+def refuse_wrong_case(case: Case, wanted_of: str, terms: int) -> None:
+    """Refuse a case whose noise cannot be replaced by one that was measured. Raises `FpsolveError`."""
+    noise_in, unit = SIGNALS[wanted_of].noise_in, case.system.noise_unit
+    sections = case.system.noise_sections
+    if len(sections) > 1:
+        raise FpsolveError(
+            f"{case.path}: has the noises {', '.join(sections)}; a fit replaces the only noise of a case"
+        )
+    if any(key.startswith("noise.") for key in case.vary.keys):
+        raise FpsolveError(f"{case.path}: varies its noise, which the fit replaces; leave these keys out of [vary]")
+    if terms > 1:
+        raise FpsolveError(f"got --terms {terms} for {case.path}, which has one noise; state --damping-ratio instead")
+    place = {"1/time": "damping", "1/time²": "stiffness"}.get(unit, noise_in)
+    if place != noise_in:
+        raise FpsolveError(
+            f"{case.path}: has its noise in the {place}, but the {noise_in} was measured; use [oscillator] for noise "
+            'in the damping, and [system] with kind = "parametric" for noise in the stiffness'
+        )
+    if case.units.time not in ("time", "s"):
+        raise FpsolveError(f"{case.path}: has the unit of time {case.units.time}, and measurements are in s; use s")
+
+
+def measure(data: Spectrum | Record, wanted: Wanted, progress: Callable[[], None] = lambda: None) -> NoiseOutcome:
+    """Fit a noise to what was measured, and say what it means.
+
+    Args:
+        data: in the unit of its signal, 1, 1/s, m/s² or m.
+        wanted: see there.
+        progress: called once for the fit, and as `verdict` does.
+
+    Raises:
+        FpsolveError: the kind does not fit, or nothing was measured where it matters.
+    """
+    converted = data.scaled(
+        of_support_acceleration()
+        if wanted.of == "acceleration"
+        else of_stability_height(wanted.height)
+        if wanted.of == "height" and wanted.height is not None
+        else 1.0
+    )
+    omega = wanted.modes.omega
+    try:
+        if wanted.kind == NON_GAUSSIAN:
+            if not isinstance(converted, Record):
+                raise ValueError("a spectrum does not tell r0; name a record by --record")
+            if wanted.terms > 1:
+                raise ValueError(f"got --terms {wanted.terms} for --kind {NON_GAUSSIAN}, which has one; leave it out")
+            if wanted.method != "spectrum":
+                raise ValueError(
+                    f"got --method {wanted.method} for --kind {NON_GAUSSIAN}, which has none; leave it out"
+                )
+            fit = non_gaussian_from_record(converted)
+        else:
+            second = omega[1] if len(omega) > 1 else None
+            fit = fit_noise(
+                converted,
+                wanted.kind,
+                frequency=omega[0],
+                second_frequency=second,
+                noise_in=wanted.noise_in,
+                terms=wanted.terms,
+                method=wanted.method,
+                segment=wanted.segment,
+            )
+    except ValueError as error:
+        raise FpsolveError(str(error)) from None
+    fit = replace(fit, messages=(*(Message(Code.AS_READ, text=each) for each in data.notes), *fit.messages))
+    progress()
+    scaled = fit.scaled(_factor(wanted))
+    found = {"exponent": None, "moment": None, "verdict": None, "failure": None} | _critical(fit, wanted)
+    system = _system(wanted, len(fit.parts))
+    if system is not None and wanted.terms < len(NAMES):
+        try:
+            problem = Problem(system, scaled.noise)
+            rtol, budget = max(problem.usual_rtol, wanted.rtol), Budget(seconds=wanted.seconds)
+            known = verdict(problem, scaled, rtol=rtol, budget=budget, progress=progress)
+            found |= {"verdict": known, "failure": known.failure}
+        except NotConverged as failure:
+            found["failure"] = failure.message
+        except ValueError as error:
+            raise FpsolveError(str(error)) from None
+    return NoiseOutcome(wanted, fit, scaled, **found)
+
+
+def _factor(wanted: Wanted) -> float:
+    """What the relative stiffness, or the damping, is multiplied by to be ξ of the system."""
+    system = wanted.case.system if wanted.case else None
+    if system is None:
+        return of_relative_stiffness(wanted.modes.omega[0]) if wanted.noise_in == "stiffness" else 1.0
+    if system.noise_unit == "1/time²":
+        return of_relative_stiffness(natural_frequencies(system)[0])
+    return 1 / system.epsilon if system.noise_unit == "1/time" else 1.0
+
+
+def _system(wanted: Wanted, terms: int) -> System | None:
+    """The system of the case, or an oscillator with the damping and the wall that are stated; None without either."""
+    if wanted.case:
+        return wanted.case.system
+    omega, zeta, r = wanted.modes.omega[0], wanted.modes.zeta[0], wanted.modes.restitution
+    if math.isnan(zeta) or len(wanted.modes.omega) > 1 or terms == len(NAMES):
+        return None
+    if terms > 1:
+        names = NAMES[:terms]
+        drive, sign = (" + ".join(names), "+") if wanted.noise_in == "damping" else (" + ".join(names), "-")
+        force = f"{sign} ({drive}) * {'v' if wanted.noise_in == 'damping' else 'x'}"
+        return PlaneSystem.of_equations(
+            ("x", "v"),
+            ("v", f"-omega**2 * x - 2*zeta*omega * v {force}"),
+            {"omega": omega, "zeta": zeta},
+            noises={name: f"noise.{name}" for name in names},
+            walls=[] if r is None else [{"at": "x = 0", "restitution": r}],
+        )
+    if wanted.noise_in == "stiffness":
+        return ParametricOscillator(stiffness=omega**2, damping=zeta * omega, restitution=r or 1.0)
+    return VibroImpactOscillator(omega, r or 1.0, -2 * zeta * omega, 1.0, impact=ImpactLaw.RESTITUTION)
+
+
+def _critical(fit: NoiseFit, wanted: Wanted) -> dict[str, Any]:
+    """The damping ratios at which λ and Λ(2) vanish in weak noise, with errors as those of `verdict`."""
+    if len(wanted.modes.omega) > 1:
+        return {}
+    omega = wanted.modes.omega[0]
+
+    def ratios(each: NoiseFit) -> FloatArray:
+        at_double, at_zero = each.spectral_density(2 * omega), each.spectral_density(0.0)
+        exponent = weak_exponent(omega, 0.0, at_double, wanted.noise_in) / omega
+        return np.array([exponent, weak_moment(2, omega, 0.0, at_double, at_zero, wanted.noise_in) / (2 * omega)])
+
+    values, slopes = ratios(fit), slopes_of(fit, ratios)
+    errors = np.sqrt(np.maximum(np.einsum("ki,kl,li->i", slopes, fit.covariance, slopes), 0.0))
+    errors = np.hypot(errors, fit.off * values)
+    exponent, moment = (Critical(float(a), float(b)) for a, b in zip(values, errors, strict=True))
+    return {"exponent": exponent, "moment": moment}
+
+
+def slopes_of(fit: NoiseFit, numbers: Any) -> FloatArray:
+    """∂/∂θ of numbers of a fit, shape (k, n), by central differences.
+
+    Args:
+        fit: at whose parameters θ.
+        numbers: takes a fit and gives an array of shape (n,).
+    """
+    rows = []
+    for key, value in fit.parameters.items():
+        h = 1e-5 * value
+        up, down = (numbers(fit.at({key: value + step})) for step in (h, -h))
+        rows.append((up - down) / (2 * h))
+    return np.array(rows)
+
+
+def density_of(fit: NoiseFit, omega: Sequence[float]) -> tuple[FloatArray, FloatArray]:
+    """S(ω) of a fit at several ω, and its standard errors to first order."""
+
+    def densities(each: NoiseFit) -> FloatArray:
+        return np.array([each.spectral_density(w) for w in omega])
+
+    slopes = slopes_of(fit, densities)
+    return densities(fit), np.sqrt(np.maximum(np.einsum("ki,kl,li->i", slopes, fit.covariance, slopes), 0.0))
+
+
+FILES = ("noise.json", "noise.png", "noise.pdf", "noise.toml")
+SIGNAL_WORDS = {"stiffness": "relative stiffness", "damping": "damping"}
+
+
+@dataclass(frozen=True)
+class Convention:
+    """How densities are shown: as the file has them, or one-sided per Hz.
+
+    Attributes:
+        per: "Hz" or "rad/s".
+        sided: "one" or "two".
+    """
+
+    per: str
+    sided: str
+
+    @property
+    def factor(self) -> float:
+        """G over S: 2 for one-sided values per Hz, 1/π per rad/s."""
+        return 1 / SIDES[self.sided] / (2 * math.pi if self.per == "rad/s" else 1.0)
+
+    def frequency(self, omega: Any) -> Any:
+        """ω in the unit of frequencies."""
+        return omega / UNITS[self.per]
+
+    @property
+    def symbol(self) -> str:
+        return "f" if self.per == "Hz" else "ω"
+
+    def unit(self, noise_in: str) -> str:
+        """Of densities."""
+        per = {"Hz": "Hz", "rad/s": "(rad/s)"}[self.per]
+        return f"1/{per}" if noise_in == "stiffness" else f"1/s^2/{per}"
+
+
+def noise_sections(outcome: NoiseOutcome) -> str:
+    """[noise] as a case file has it, with standard errors as remarks; of a sum [noise.first] and so on."""
+    wanted, fit = outcome.wanted, outcome.scaled
+    sections = wanted.case.system.noise_sections if wanted.case else ("noise",)
+    if len(fit.parts) > 1:
+        sections = tuple(f"noise.{name}" for name in NAMES)
+    unit = (
+        wanted.case.system.noise_unit if wanted.case else {"stiffness": "1/time²", "damping": "1/time"}[wanted.noise_in]
+    )
+    told = {"1/time²": "ω² times the relative stiffness, in 1/s²", "1/time": "the damping, in 1/s"}
+    about = told.get(unit, f"the {SIGNAL_WORDS[wanted.noise_in]}")
+    found = ""
+    for name, section, noise in zip(NAMES, sections if len(fit.parts) > 1 else sections[:1], fit.parts, strict=False):
+        found += f"\n{f'[{section}]':34}  # {about}\n" + "".join(f"{line}\n" for line in _lines(noise, fit, name))
+    return found
+
+
+def _lines(noise: Noise, fit: NoiseFit, part: str) -> Iterator[str]:
+    yield f'kind = "{noise.kind}"'
+    errors = fit.errors
+    values = {name: each for name, each in noise.values.items() if not isinstance(each, str)}
+    if noise.kind == "filter":
+        yield from (_line(name, values[name], errors, part, len(fit.parts)) for name in ("omega", "zeta", "s"))
+        error = errors.get("c1", errors.get(f"{part}.c1"))
+        remark = "c0 and c1 of ξ = c0 y + c1 y′" + (f", c1 ± {error:.2g}" if error is not None else "")
+        output = f"output = [{_number(values['c0'], 0.0)}, {_number(values['c1'], error or 0.0)}]"
+        yield f"{output:34}  # {remark}"
+    else:
+        yield from (_line(name, values[name], errors, part, len(fit.parts)) for name in values)
+
+
+def _line(name: str, value: float, errors: Mapping[str, float], part: str, parts: int) -> str:
+    error = errors.get(name if parts == 1 else f"{part}.{name}")
+    text = f"{name} = {_number(value, error or 0.0)}"
+    return text if error is None else f"{text:34}  # ± {error:.2g}"
+
+
+def _number(value: float, error: float) -> str:
+    """With four digits more than its error has, as TOML has it."""
+    digits = 10 if not error else min(max(4 + math.ceil(math.log10(abs(value) / error)), 5), 12)
+    text = f"{value:.{digits}g}"
+    return text if any(letter in text for letter in ".en") else f"{text}.0"
+
+
+def write_noise(outcome: NoiseOutcome, source: Path, shown: Convention, folder: Path) -> list[str]:
+    """noise.json, noise.png, noise.pdf, and noise.toml where there is a system: their names."""
+    text = case_of(outcome, folder)
+    write_json(folder / "noise.json", summary(outcome, source))
+    if text:
+        write_text(folder / "noise.toml", text)
+    else:  # of other options
+        (folder / "noise.toml").unlink(missing_ok=True)
+    draw_noise(outcome, source, shown, folder)
+    return [name for name in FILES if text or name != "noise.toml"]
+
+
+def case_of(outcome: NoiseOutcome, folder: Path) -> str:
+    """The case with the noise, ready to run; empty where there is no system."""
+    wanted, sections = outcome.wanted, noise_sections(outcome)
+    if wanted.case:
+        return with_noise(wanted.case, sections, folder)
+    count = len(outcome.fit.parts)
+    if math.isnan(wanted.modes.zeta[0]) or len(wanted.modes.omega) > 1 or count == len(NAMES):
+        return ""
+    if count > 1:
+        return sum_text(wanted.modes, NAMES[:count], wanted.noise_in, sections)
+    kind = "parametric" if wanted.noise_in == "stiffness" else "oscillator"
+    return case_text(kind, wanted.modes, sections)
+
+
+def summary(outcome: NoiseOutcome, source: Path) -> dict[str, Any]:
+    """All numbers; null where one is not known."""
+    wanted, fit, scaled = outcome.wanted, outcome.fit, outcome.scaled
+
+    def numbers(each: NoiseFit) -> dict[str, Any]:
+        return {
+            "parameters": dict(each.parameters),
+            "errors": dict(each.errors),
+            "covariance": each.covariance.tolist(),
+        }
+
+    def spread(each: Spread | None) -> dict[str, float] | None:
+        if each is None:
+            return None
+        return {"value": each.value, "standard_error": each.deviation, "probability_below_0": each.below}
+
+    def critical(each: Critical | None) -> dict[str, float] | None:
+        if each is None:
+            return None
+        return {"value": each.value, "standard_error": each.error}
+
+    omega = [each.omega for each in fit.misfit]
+    densities, errors = density_of(fit, omega) if omega else (np.zeros(0), np.zeros(0))
+    return {
+        "file": source.name,
+        "fpsolve_version": __version__,
+        "of": wanted.of,
+        "noise_in": wanted.noise_in,
+        "kind": wanted.kind,
+        "method": fit.method,
+        "units": {"time": "s"},
+        "natural_frequencies": list(wanted.modes.omega),
+        "fit": {"signal": SIGNAL_WORDS[wanted.noise_in], **numbers(fit)},
+        "noise": numbers(scaled),
+        "frequencies": [
+            {
+                "name": each.name,
+                "omega": each.omega,
+                "density": float(density),
+                "density_error": float(error),
+                "measured_over_fitted": 1 + each.relative,
+                "measured_over_fitted_error": each.error,
+            }
+            for each, density, error in zip(fit.misfit, densities, errors, strict=True)
+        ],
+        "critical_damping_ratio": {"lyapunov_exponent": critical(outcome.exponent), "moment": critical(outcome.moment)},
+        "lyapunov_exponent": outcome.verdict and spread(outcome.verdict.exponent),
+        "second_moment": outcome.verdict and spread(outcome.verdict.moment),
+        "warnings": [each.words(CASE_WORDS) for each in (*fit.messages, *filter(None, [outcome.failure]))],
+    }
+
+
+def band_of(fit: NoiseFit) -> tuple[FloatArray, FloatArray] | None:
+    """Ends of the interval that holds S with `LEVEL` by each measured value, of the law of a mean of periodograms."""
+    spectrum = fit.spectrum
+    if spectrum.relative_error is None:
+        return None
+    freedom = 2 / spectrum.relative_error**2
+    tail = 0.5 * (1 - LEVEL)
+    ends = (spectrum.density * freedom / chdtri(freedom, share) for share in (tail, 1 - tail))
+    low, high = ends
+    return low, high
+
+
+def draw_noise(outcome: NoiseOutcome, source: Path, shown: Convention, folder: Path) -> None:
+    """noise.png and .pdf: what was measured with its 95 % interval, what was fitted, the frequencies that matter."""
+    fit, noise_in = outcome.fit, outcome.wanted.noise_in
+    spectrum, words = fit.spectrum, SIGNAL_WORDS[noise_in]
+    paths = [folder / f"noise.{ending}" for ending in ("png", "pdf")]
+    factor, x = shown.factor, shown.frequency(spectrum.frequencies)
+    fine = np.geomspace(spectrum.frequencies[0], spectrum.frequencies[-1], 400)
+    kind = fit.parts[0].kind
+    title = f"{source.name}: {SIGNALS[outcome.wanted.of].words}, fitted by {kind} noise"
+    if len(fit.parts) > 1:
+        title = title.replace(f"{kind} noise", f"{len(fit.parts)} {kind} noises")
+    with figure_for(paths, title) as figure:
+        axes = figure.subplots()
+        if (band := band_of(fit)) is not None:
+            axes.fill_between(x, factor * band[0], factor * band[1], color="0.75", linewidth=0, label="95 % interval")
+        source_label = "formula" if spectrum.is_formula else "measured"
+        axes.loglog(x, factor * spectrum.density, ".", color="0.35", markersize=4, label=source_label)
+        values, _ = density_of(fit, fine.tolist())
+        axes.loglog(shown.frequency(fine), factor * values, "-", color=COLOURS[0], label="fitted")
+        for each in fit.misfit:
+            place = shown.frequency(each.omega) if each.omega else x[0]
+            axes.axvline(place, color=COLOURS[1], linestyle=(0, (4, 2)), linewidth=1.2)
+            name = each.name.replace("ω", shown.symbol) if each.omega else "← 0"
+            axes.annotate(name, (place, 1.0), (3, -3), xycoords=("data", "axes fraction"), textcoords="offset points",
+                          va="top", color=COLOURS[1], fontsize="small")  # fmt: skip
+        axes.plot([], [], color=COLOURS[1], linestyle=(0, (4, 2)), linewidth=1.2, label="what stability depends on")
+        axes.set_xlim(0.9 * x[0], x[-1] / 0.9)
+        for axis in (axes.xaxis, axes.yaxis):
+            plain_numbers(axis)
+        low, high = np.nanmin(factor * spectrum.density), np.nanmax(factor * spectrum.density)
+        axes.set_ylim(0.3 * low, 3 * high)
+        sides = {"one": "one-sided", "two": "two-sided"}[shown.sided]
+        symbol = {"Hz": "$f$", "rad/s": r"$\omega$"}[shown.per]
+        label_axes(
+            axes,
+            {"long_name": "frequency", "symbol": symbol, "units": shown.per},
+            {
+                "long_name": f"{sides} density of {words}",
+                "symbol": f"$G({symbol.strip('$')})$",
+                "units": shown.unit(noise_in),
+            },
+        )
+
+
+def show(outcome: NoiseOutcome, source: Path, shown: Convention) -> Iterator[Block]:
+    """The fit, its meaning, and what limits it."""
+    if outcome.fit.misfit:
+        yield misfit_grid(outcome, source, shown)
+    yield from map(Sentence, sentences(outcome))
+    for message in (*outcome.fit.messages, *filter(None, [outcome.failure])):
+        yield note_on(source.name, message)
+
+
+def misfit_grid(outcome: NoiseOutcome, source: Path, shown: Convention) -> Grid:
+    """A row for each frequency that matters."""
+    fit, noise_in = outcome.fit, outcome.wanted.noise_in
+    headings = "", f"{shown.symbol} ({shown.per})", "S fitted", "± s.e.", "measured/fitted"
+    unit = "s" if noise_in == "stiffness" else "1/s"
+    remark = f"S of the {SIGNAL_WORDS[noise_in]}, two-sided, in {unit}; G = {shown.factor:.4g} S as in the figure"
+    title = f"{source.name}: where stability depends on the noise"
+    grid = Grid(title, [*map(Column, headings), Column("± s.e.", 1)], remark=remark)
+    values, errors = density_of(fit, [each.omega for each in fit.misfit])
+    for each, value, error in zip(fit.misfit, values.tolist(), errors.tolist(), strict=True):
+        name, frequency = each.name.replace("ω", shown.symbol), f"{shown.frequency(each.omega):.4g}"
+        numbers = f"{value:.4g}", f"{error:.2g}", f"{1 + each.relative:.4g}", f"{each.error:.2g}"
+        grid.rows.append([name, frequency, *numbers])
+    return grid
+
+
+def sentences(outcome: NoiseOutcome) -> Iterator[str]:
+    """What the fit means: critical damping ratios, and λ and Λ(2) of the system with their probabilities."""
+    if outcome.exponent and outcome.moment:
+        walls = " without walls" if outcome.wanted.modes.restitution not in (None, 1.0) or outcome.wanted.case else ""
+        exponent, moment = _percent(outcome.exponent), _percent(outcome.moment)
+        yield f"In weak noise{walls} λ < 0 above {exponent} of critical damping, and Λ(2) < 0 above {moment}."
+    if outcome.verdict is None:
+        if outcome.failure is None:
+            yield _missing(outcome)
+        return
+    for symbol, each, below, above in (
+        ("λ", outcome.verdict.exponent, "almost every path decays", "almost every path grows"),
+        ("Λ(2)", outcome.verdict.moment, "the mean square decays", "the mean square grows"),
+    ):
+        if each is None:
+            continue
+        number = f"{symbol} = {sampled(each.value, each.deviation)} ± {each.deviation:.1g} 1/s"
+        is_below = each.below >= 0.5
+        sure = percent(each.below if is_below else 1 - each.below)
+        yield f"{number}: {symbol} {'<' if is_below else '>'} 0 with {sure}, {below if is_below else above}."
+    off = f", and that it is {outcome.fit.off:.0%} off where stability depends on it" if outcome.fit.off else ""
+    yield f"The probabilities count the standard errors of the fit{off}; see the page From a measurement to a case."
+
+
+def _missing(outcome: NoiseOutcome) -> str:
+    """What to do for λ and Λ(2)."""
+    if len(outcome.fit.parts) == len(NAMES):
+        return "No case takes three noises; for λ and Λ(2) use --terms 1 or 2."
+    if len(outcome.wanted.modes.omega) > 1:
+        return "For λ and Λ(2) of two modes state their case by --case; `fpsolve new my.toml --kind modes` starts one."
+    return "For λ and Λ(2) of an oscillator state its damping by --damping-ratio."
+
+
+def _percent(each: Critical) -> str:
+    """A damping ratio in percent with two digits of its error."""
+    value, error = 100 * each.value, 100 * each.error
+    return f"({sampled(value, error) if error > 0 else f'{value:.4g}'} ± {error:.1g}) %"
+
+
+def noise_case(
+    data: Spectrum | Record, wanted: Wanted, source: Path, shown: Convention, out: Path, watch: Watch = SILENT
+) -> tuple[NoiseOutcome, Path, list[str]]:
+    """Fit a noise, and write it with a figure into a folder called as the file of the measurement.
+
+    Args:
+        data, wanted: see `measure`.
+        source: the file.
+        shown: how densities are shown.
+        out: where the folder is made.
+        watch: of the progress, with a bar for the fit and what it means.
+
+    Returns:
+        What became of it, the folder, and the names of the files.
+
+    Raises:
+        FpsolveError: there is no fit; nothing is written.
+        OutputError: the folder cannot be made or written to, or another run writes into it.
+    """
+    folder = out / source.name  # with its ending, so that it is none of a case
+    try:
+        with one_thread(), watch.bar(Phase(source.stem, "solving", STEPS_OF_A_FIT, SOLVES)) as progress:
+            outcome = measure(data, wanted, progress)  # the arrays are small
+    except FpsolveError as error:
+        raise FpsolveError(f"{source}: {error}") from None
+    with alone(folder), writable(folder):
+        names = write_noise(outcome, source, shown, folder)
+    return outcome, folder, names
