@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -42,7 +42,7 @@ class Table:
         lines: of a text the line of each row.
         rows: of a file with several spectra over one abscissa each of them, shape (k, n).
         notes: what was assumed to read it.
-        sideways: what it holds if the names of its columns, which are numbers, are frequencies; None where they are no
+        sideways: reads it with the names of its columns, which are numbers, as frequencies; None where they are no
             numbers.
     """
 
@@ -54,7 +54,7 @@ class Table:
     lines: Sequence[int] | IntArray = ()
     rows: FloatArray | None = None
     notes: tuple[str, ...] = ()
-    sideways: Table | None = None
+    sideways: Callable[[], Table] | None = None
 
     def unit_of(self, name: str) -> str:
         """The unit of a column, also of one whose cells are no numbers."""
@@ -67,8 +67,8 @@ class Table:
 
 
 def heading(text: str) -> tuple[str, str]:
-    """The name and the unit of a column: "a (m/s²)" or "a [m/s²]"."""
+    """The name and the unit of a column: "a (m/s²)", "a [m/s²]" or "a / (m/s²)"."""
     found = _HEADING.fullmatch(text.strip())
     if found is None or not found["name"]:
         return text.strip(), ""
-    return found["name"], (found["square"] or found["round"] or "").strip()
+    return found["name"].removesuffix("/").rstrip(), (found["square"] or found["round"] or "").strip()

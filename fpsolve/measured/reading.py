@@ -94,7 +94,7 @@ def read_spectrum(
         if sided not in ("one", "two"):
             raise ValueError('states not whether the density is one-sided; state sided, "one" or "two" (--sided)')
         if table.sideways is not None and column is None and not _of_frequencies(table, over):
-            table = table.sideways
+            table = table.sideways()
         f_name = _abscissa(table, FREQUENCY_NAMES, FREQUENCIES, "frequencies, such as f (Hz),", over)
         f = _numbers(table, f_name)
         _refuse_other_unit(f_name, f)
@@ -259,7 +259,8 @@ def read_record(
         if rate is None:
             step, more = _step(table, times)
             notes = (*notes, *more)
-            if not (over or table.abscissa or table.unit_of(times) or times.lower() in TIME_NAMES):
+            is_told = over or table.abscissa or _unit_of_times(table.columns[times]) or times.lower() in TIME_NAMES
+            if not is_told:
                 notes += (f"the column {times} is taken as times in s, which nothing in the file says; state --rate",)
         values = _numbers(table, name)
         stated = powers(unit or values.unit) if (unit or values.unit).strip() else None
@@ -372,6 +373,16 @@ def _ordinate(table: Table, over: str, wanted: str | None) -> str:
     return others[0]
 
 
+def _unit_of_times(column: Column) -> str:
+    """The unit of times, which of those since 1970 in ms, µs or ns their size tells; empty where nothing tells it."""
+    if column.unit or not column.values.size:
+        return among(column.unit, TIMES)
+    ends = column.values[[0, -1]]
+    return next(
+        (unit for unit in ("ms", "us", "ns") if np.all((ends * TIMES[unit] > 1e9) & (ends * TIMES[unit] < 4e9))), ""
+    )
+
+
 def _step(table: Table, name: str) -> tuple[float, tuple[str, ...]]:
     """The step of times, which must be even but for the digits that are written, and what was assumed of them.
 
@@ -380,7 +391,10 @@ def _step(table: Table, name: str) -> tuple[float, tuple[str, ...]]:
     column = _numbers(table, name)
     if column.unit and not among(column.unit, TIMES):
         raise ValueError(f'has times in "{column.unit}"; must be one of {", ".join(TIMES)}; state --rate instead')
-    factor = TIMES.get(among(column.unit, TIMES), 1.0)
+    unit = _unit_of_times(column)
+    factor = TIMES.get(unit, 1.0)
+    is_since_1970 = bool(unit) and not column.unit
+    notes = (f"the times in {name} are taken as {unit} since 1970; --rate states other ones",) * is_since_1970
     t = column.values * factor
     steps = np.diff(t)
     digit = max(column.resolution * factor, float(np.finfo(float).eps * np.max(abs(t))))
@@ -394,13 +408,13 @@ def _step(table: Table, name: str) -> tuple[float, tuple[str, ...]]:
     step = span * factor / (t.size - 1)
     exact = 4 * float(np.finfo(float).eps * np.max(abs(t)))
     if np.max(np.abs(steps - step)) <= max(UNEVEN * step, exact):
-        return step, ()
+        return step, notes
     beside = t - t[0] - step * np.arange(t.size)
     if np.ptp(beside) <= 2 * digit and np.max(steps) <= 1.5 * step + exact:
         note = (
             f"the times in {name} are rounded to {digit:.2g} s, and the mean step {step:.9g} s is taken; --rate states"
         )
-        return step, (f"{note} another",)
+        return step, (*notes, f"{note} another")
     i = int(np.argmax(np.abs(steps - step)))
     raise ValueError(
         f"has times in {name} with uneven steps, {steps[i]:.6g} s at {table.place(i + 1)} and {step:.6g} s on average; "

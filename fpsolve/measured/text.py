@@ -12,8 +12,9 @@ import math
 import re
 import warnings
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 
@@ -32,6 +33,12 @@ LEAST_FREQUENCIES = 5
 """Numbers at the end of a header that are taken for frequencies."""
 LETTERS = ("g", "m", "V")
 """Units of one letter, which may be names, too."""
+NAMED_WITH_UNITS: Sequence[tuple[str, Iterable[str]]] = (
+    (r"t|times?|timestamp|zeit", ("s", "ms", "us", "ns")),
+    (r"f|freq|frequency", FREQUENCIES),
+    (r"(acc|accel|acceleration)(_\w+)?", SIGNALS["acceleration"].units),
+)
+"""Names in whose end a unit may stand, and which units may."""
 SAMPLE = 2000
 """Lines at the beginning and at the end by which the separator is found."""
 TIMES_ALIKE = "alike, such as 2026-01-31 12:00:00.5"
@@ -160,7 +167,9 @@ def read_text_table(path: Path, skip: int = 0) -> Table:
         if (found := len(_cells(lines[i - 1], separator))) != count:
             told = f"has {found} cells, and {'the header' if names else 'the first row'} has {count}"
             raise Unreadable(f"{told}; complete the row, or remove it", i)
-    sideways = _sideways(path, table, names) if names and all(map(_is_number, names[-LEAST_FREQUENCIES:])) else None
+    if not names and separator == "," and count == 2:
+        _refuse_decimal_commas(table)
+    is_sideways = bool(names) and all(map(_is_number, names[-LEAST_FREQUENCIES:]))
     ends = [k for k in range(count) if not first[k] and not any(table.cells(k))]
     if names:
         twice = next((name for name in names if name and names.count(name) > 1), None)
@@ -178,8 +187,20 @@ def read_text_table(path: Path, skip: int = 0) -> Table:
         abscissa=_stamps(columns, first),
         lines=table.numbers,
         notes=notes,
-        sideways=sideways,
+        sideways=partial(_sideways, path, table, names) if is_sideways else None,
     )
+
+
+def _refuse_decimal_commas(rows: _Lines) -> None:
+    """Refuse two whole numbers in each row, of which the first do not increase: they are one with a decimal comma."""
+    whole, behind = rows.cells(0), rows.cells(1)
+    if not all(map(str.isdigit, behind)) or not all(re.fullmatch(r"[+-]?\d+", each) for each in whole):
+        return
+    if any(int(a) >= int(b) for a, b in pairwise(whole)):
+        text = (
+            f'has "{whole[0]},{behind[0]}"; write decimal points; if these are two columns, name them in a line above'
+        )
+        raise Unreadable(text, int(rows.numbers[0]))
 
 
 def _is_number(cell: str) -> bool:
@@ -264,7 +285,7 @@ def _header(
         )
         if found is None:
             continue
-        split = [heading(each) for each in found]
+        split = [_heading(each) for each in found]
         below = zip(split, units, strict=True)
         named = [name for name, _ in split], [unit or other for (_, unit), other in below], line
         if all(not name or _is_unit(name) for name in found):
@@ -275,6 +296,17 @@ def _header(
         else:
             return named
     return otherwise
+
+
+def _heading(text: str) -> tuple[str, str]:
+    """A name and its unit, in brackets, as in "Acc / g", or at the end of a name that tells what it is, as in acc_g."""
+    name, unit = heading(text)
+    over = re.fullmatch(r"(.+?)\s+/\s+(\S+)", name)
+    if not unit and over and (over[2] in LETTERS or _is_unit(over[2])):
+        return over[1], over[2]
+    first, _, last = name.lower().rpartition("_")
+    units = next((units for words, units in NAMED_WITH_UNITS if re.fullmatch(words, first)), ())
+    return name, unit or among(last, units)
 
 
 def _is_unit(text: str) -> bool:

@@ -76,6 +76,12 @@ TEXT_RECORDS = {
     "savetxt.csv": ("# t (s),a (g)\n" + rows(T, X), G, {}),
     "savetxt_spaces.txt": ("# t (s) a (g)\n" + rows(T, X, separator=" "), G, {}),
     "percent.dat": ("% made by a program\n% time [s]\ta [m/s^2]\n" + rows(T, X, separator="\t"), 1.0, {}),
+    "quotients.csv": ("Time / ms,Acc / g\n" + rows(1000 * T, X), G, {}),
+    "quotients in brackets.csv": ("t / s,a / (cm/s^2)\n" + rows(T, X), 0.01, {}),
+    "ends of names.csv": ("Time_ms,acc_x_g\n" + rows(1000 * T, X), G, {}),
+    "no units.csv": ("time,a_g\n" + rows(T, X), 1.0, {}),
+    "unix ms.csv": ("time,a (g)\n" + stamped([f"{1000 * (EPOCH + t):.0f}" for t in T], X), G, {}),
+    "unix us.csv": ("stamp,a (g)\n" + stamped([f"{1e6 * (EPOCH + t):.0f}" for t in T], X), G, {}),
     "slashes.txt": ("// t (s); a (cm/s2)\n" + rows(T, X, separator=";"), 0.01, {}),
     "openfast.out": (
         "\nPredictions were generated on 01-Mar-2026 at 12:00:00 using OpenFAST\nlinked with NWTC Library\n\n"
@@ -304,6 +310,12 @@ REFUSED = {
         {},
         r":3: has \"0,000000000\" in the column Zeit; write decimal points",
     ),
+    "one column of commas.csv": (
+        "\n".join(f"{x:.3f}".replace(".", ",") for x in X),
+        {"rate": RATE},
+        r':1: has "0,035"; write decimal points; if these are two columns, name them in a line above',
+    ),
+    "a name over commas.csv": ("acc\n" + "\n".join(f"{x:.3f}".replace(".", ",") for x in X), {"rate": RATE}, ":2: has"),
     "days.csv": ("t,a\n" + stamped(["01.03.2026 12:00:00"] * 99, X[:99]), {}, "write times alike, such as 2026"),
     "gap.csv": ("t (s),a (g)\n" + rows(T[GAP], X[GAP]), {}, r"uneven steps, 20.02 s at line 1002"),
     "gap unix.csv": (unix(T[GAP]), {}, r"uneven steps, 20.02 s at line 1002"),
@@ -355,6 +367,21 @@ def test_units_are_never_guessed_silently(tmp_path):
     assert "taken as m/s²" in note
     assert "--unit" in note
     assert read_record(path, of="acceleration", unit="g").values == pytest.approx(G * (X - X.mean()))
+
+
+def test_times_since_1970_are_told_by_their_size(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text("stamp,a\n" + stamped([f"{1000 * (EPOCH + t):.0f}" for t in T], X), encoding="utf-8")
+    found = read_record(path)
+    assert found.notes == ("the times in stamp are taken as ms since 1970; --rate states other ones",)
+    assert found.step == pytest.approx(1 / RATE, rel=1e-9)
+    assert read_record(path, rate=10.0, column="a").notes == ()
+
+
+def test_whole_numbers_that_increase_are_a_column_of_their_own(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text(rows(range(99), np.arange(99) % 7), encoding="utf-8")
+    assert read_record(path).values.size == 99
 
 
 @pytest.mark.parametrize("slip", ["4,2500", "4d0"])
