@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from io import BytesIO
 from typing import Literal
 
@@ -14,8 +13,8 @@ from fpsolve.exponent.directions import Directions
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.model.problem import parameter_lines
 from fpsolve.model.quantity import PHASE, density_unit
-from fpsolve.output.surfaces import Picture, Surface, can_render, flat_picture, picture_in_space
 from fpsolve.parts.nodes import FIELDS, Nodes
+from fpsolve.parts.surfaces import Picture, Surface, picture_of
 
 FINER = 2
 """So many times as many nodes either way as a file for ParaView has; there they carry polynomials."""
@@ -47,18 +46,7 @@ def draw_eigenfunction(
         if cylinder:
             raise ValueError("got cylinder = True, which is for functions of phase and noise; leave it out")
         return _picture_of_directions(pair, _known(field), cmap)
-    surface = surface_of(pair, field)
-    if surface.is_lines:
-        return flat_picture(surface, cmap)
-    if can_render():
-        return picture_in_space(surface, cmap, cylinder=cylinder)
-    if cylinder:
-        warnings.warn(
-            "this machine cannot render, so that the plane is drawn; to draw a cylinder install OpenGL, as "
-            "by apt-get install libegl1 libgl1-mesa-dri",
-            stacklevel=2,
-        )
-    return flat_picture(surface, cmap)
+    return picture_of(surface_of(pair, field), cmap, cylinder=cylinder)
 
 
 def _known(field: str) -> str:

@@ -9,15 +9,12 @@ Field data are numbers, as meshio refuses texts: a text is the codes of its lett
 from __future__ import annotations
 
 import math
-import sys
-import tempfile
+import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache, partial
+from functools import partial
 from importlib.resources import files
 from pathlib import Path
-from subprocess import DEVNULL, TimeoutExpired
-from subprocess import run as run_child
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
@@ -26,17 +23,17 @@ import numpy as np
 from fpsolve.analysis.density import negative_share, stationary_density
 from fpsolve.arrays import FloatArray
 from fpsolve.data import plain_unit
-from fpsolve.errors import FpsolveError, NotConverged
+from fpsolve.errors import NotConverged
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.fields import MOST_NEGATIVE, UNRESOLVED, xi_marginal
 from fpsolve.files import write_text
 from fpsolve.messages import Code, Message
 from fpsolve.model.problem import Problem
-from fpsolve.model.quantity import MOMENT
-from fpsolve.page.limits import PICTURES
+from fpsolve.model.quantity import MOMENT, NOISE, PHASE, UNNAMED
 from fpsolve.page.page import Drawing
 from fpsolve.parts.nodes import Nodes
 from fpsolve.parts.part import Job, Numerics, Part, Reason, Settings, attempt
+from fpsolve.parts.surfaces import Surface, picture_of
 from fpsolve.vtk import Facts, collection_of, field_data, name_at, pyvista_module, write_vtk
 
 if TYPE_CHECKING:
@@ -48,8 +45,8 @@ CURVES = "curves.pvd"
 """The file of the series over curves."""
 MOST_STATES = 8
 """States of the noise that a picture names."""
-PATIENCE = 120.0
-"""Seconds that pictures of eigenfunctions may take."""
+FURTHEST = 4.0
+"""Standard deviations of the noise up to which T is shown; beyond, where next to no path is, it only grows."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -262,46 +259,49 @@ def _frame(problem: Problem) -> Facts:
 
 def _figures(case: Case, result: CurveResult, folder: Path, simulated: SimulatedCurve | None) -> Iterator[Drawing]:
     """A picture at one p for a page, where the eigenfunction was written."""
-    source = _picture_source(case, result.curve, folder)
+    source = folder / name_at(f"eigenfunctions{result.curve.suffix}", case.usual_p)
     if case.problem.dimension == 2 and case.shown.size and source.is_file():
         title = f"Eigenfunction T(φ, ξ) of p = {case.usual_p:g}{result.curve.of}"
-        yield Drawing(title, partial(_render, case, source, folder), kind="png")
+        yield Drawing(title, partial(_paint, source), kind="png")
 
 
-def _picture_source(case: Case, curve: Curve, folder: Path) -> Path:
-    return folder.resolve() / name_at(f"eigenfunctions{curve.suffix}", case.usual_p)
-
-
-def _render(case: Case, source: Path, folder: Path, paths: Sequence[Path], heading: str) -> None:
-    """Write the picture of a file, which is made with those of the other curves that a page shows."""
-    shown = {source, *(_picture_source(case, curve, folder) for curve in case.curves(stop=PICTURES))}
-    there = sorted(path for path in shown if path.is_file())
-    pictures, reason = _rendered(tuple((path, path.stat().st_mtime_ns) for path in there))
-    if source not in pictures:
-        raise FpsolveError(f"{reason}; show.py draws it in ParaView")
+def _paint(source: Path, paths: Sequence[Path], heading: str) -> None:
+    """The picture of a file."""
     for path in paths:
-        path.write_bytes(pictures[source])
+        picture_of(surface_from(source)).save(path)
 
 
-@lru_cache(1)
-def _rendered(files: Sequence[tuple[Path, int]]) -> tuple[dict[Path, bytes], str]:
-    """All pictures by a process of its own, which may crash; and why some are missing.
-
-    Args:
-        files: each with its time, so that those of another run are drawn anew.
-    """
-    reason = "nothing was drawn"
-    with tempfile.TemporaryDirectory() as place:
-        pictures = {path: Path(place) / f"{number}.png" for number, (path, _) in enumerate(files)}
-        # with -P no file of the working folder is taken for a module
-        command = [sys.executable or "python", "-P", "-m", "fpsolve.output.pictures"]
-        command += [str(each) for pair in pictures.items() for each in pair]
-        try:
-            done = run_child(command, stdin=DEVNULL, capture_output=True, timeout=PATIENCE, check=False)
-            reason = f"the process that draws it ended with {done.returncode}" if done.returncode else reason
-        except (OSError, TimeoutExpired) as failure:
-            reason = str(failure)
-        return {path: picture.read_bytes() for path, picture in pictures.items() if picture.is_file()}, reason
+def surface_from(path: Path) -> Surface:
+    """T of a file, on the nodes of the elements."""
+    grid = pyvista_module().read(path)
+    phi, xi = np.asarray(grid.points)[:, :2].T
+    count = int(np.argmax(phi != phi[0])) or phi.size
+    rows = (-1, count)
+    z, facts = np.asarray(grid.point_data["z"]).reshape(rows)[0], grid.field_data
+    along, y = bytes(facts["along_y"]).decode(), xi.reshape(rows)[0]
+    is_lines = not along.startswith("noise xi")  # y is the number of a state, each a strip on which T is constant
+    if is_lines:
+        numbers, near = np.unique(np.round(y), return_index=True)
+        stated = [float(each) for each in re.findall(r"xi = (\S+?)(?:;|$)", along)]
+        y = y.copy()
+        y[near] = stated if len(stated) == numbers.size else numbers
+    else:
+        near = np.flatnonzero(np.abs(z) <= FURTHEST)
+        near = near if near.size > 1 else np.arange(z.size)
+    impacts = [each for each in np.asarray(facts["impacts"]).tolist() if not math.isnan(each)]
+    about = {"phi": PHASE.attributes, "xi": {**NOISE.attributes, "units": "1"}}
+    about["values"] = {**UNNAMED.attributes, "long_name": "eigenfunction", "symbol": "$T$", "units": "1"}
+    return Surface(
+        phi=phi.reshape(rows)[:, :1].T,
+        xi=y[near],
+        values=np.asarray(grid.point_data["T"]).reshape(rows)[:, near],
+        about=about,
+        name="T",
+        title=f"p = {float(facts['p'][0]):g}, Λ(p) = {float(facts['Lambda'][0]):.6g}",
+        lines=bytes(facts["held"]).decode().splitlines() if "held" in facts else (),
+        impacts=[each % (2 * math.pi) for each in impacts],
+        is_lines=is_lines,
+    )
 
 
 PART: Part = Part(

@@ -13,10 +13,10 @@ from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.model.noises.non_gaussian import NonGaussianNoise
 from fpsolve.model.problem import Problem
 from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
-from fpsolve.output import surfaces
 from fpsolve.output.eigenfunctions import draw_eigenfunction, surface_of
-from fpsolve.output.surfaces import can_render, flat_figure
+from fpsolve.parts import surfaces
 from fpsolve.parts.nodes import FIELDS
+from fpsolve.parts.surfaces import can_render, flat_figure
 from tests.conftest import FIG1, UNIT_NOISE
 
 pytestmark = pytest.mark.usefixtures("pictures")
@@ -68,11 +68,11 @@ def test_it_finds_out_once(probe, tmp_path):
 def test_who_draws(pair, monkeypatch, answer):
     """Where nothing can be rendered the plane is drawn, and of a cylinder a warning tells how to get it."""
     drawn = []
-    monkeypatch.setattr("fpsolve.output.eigenfunctions.can_render", lambda: answer)
+    monkeypatch.setattr("fpsolve.parts.surfaces.can_render", lambda: answer)
     monkeypatch.setattr(
-        "fpsolve.output.eigenfunctions.picture_in_space", lambda *_, cylinder: drawn.append(f"space {cylinder}")
+        "fpsolve.parts.surfaces.picture_in_space", lambda *_, cylinder: drawn.append(f"space {cylinder}")
     )
-    monkeypatch.setattr("fpsolve.output.eigenfunctions.flat_picture", lambda *_: drawn.append("plane"))
+    monkeypatch.setattr("fpsolve.parts.surfaces.flat_picture", lambda *_: drawn.append("plane"))
     draw_eigenfunction(pair)
     if answer:
         draw_eigenfunction(pair, cylinder=True)
@@ -131,7 +131,7 @@ def assert_not_blank(picture, shape):
 
 
 def test_picture_of_the_plane(pair, monkeypatch, tmp_path):
-    monkeypatch.setattr("fpsolve.output.eigenfunctions.can_render", lambda: False)
+    monkeypatch.setattr("fpsolve.parts.surfaces.can_render", lambda: False)
     picture = draw_eigenfunction(pair, "tilted_density", cmap="magma")
     assert_not_blank(picture, (750, 1080, 3))
     assert picture.save(tmp_path / "picture.png").read_bytes() == picture.png == picture._repr_png_()

@@ -28,10 +28,10 @@ from fpsolve.model import (
 from fpsolve.model.kinds import NOISES
 from fpsolve.output.eigenfunctions import draw_eigenfunction, surface_of
 from fpsolve.output.figures import main_figure
-from fpsolve.output.surfaces import flat_figure
 from fpsolve.output.tables import write_results
 from fpsolve.page.terminal import print_blocks
 from fpsolve.parts.eigenfunctions import PART, write_eigenfunctions
+from fpsolve.parts.surfaces import flat_figure
 from fpsolve.show.notes import left_out, notes, shows_perturbed_moments
 from fpsolve.show.results import show
 from fpsolve.simulation import MonteCarlo

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import subprocess
 import sys
+import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -129,6 +130,19 @@ def can_render() -> bool:
     return done.returncode == 0
 
 
+def picture_of(surface: Surface, cmap: str = "viridis", *, cylinder: bool = False) -> Picture:
+    """The function in space where this machine can render it, which lines need not; else in the plane."""
+    if not surface.is_lines and can_render():
+        return picture_in_space(surface, cmap, cylinder=cylinder)
+    if cylinder and not surface.is_lines:
+        warnings.warn(
+            "this machine cannot render, so that the plane is drawn; to draw a cylinder install OpenGL, as "
+            "by apt-get install libegl1 libgl1-mesa-dri",
+            stacklevel=3,
+        )
+    return flat_picture(surface, cmap)
+
+
 def flat_picture(surface: Surface, cmap: str) -> Picture:
     """The function in colours over the plane, or as lines, by matplotlib."""
     content = BytesIO()
@@ -137,7 +151,7 @@ def flat_picture(surface: Surface, cmap: str) -> Picture:
 
 
 def flat_figure(surface: Surface, cmap: str) -> Figure:
-    """The same as a figure that belongs to no window."""
+    """The figure of `flat_picture`, which belongs to no window."""
     from matplotlib import rc_context
     from matplotlib.figure import Figure
 
