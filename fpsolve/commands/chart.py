@@ -42,7 +42,7 @@ from fpsolve.theory.perturbation import second_order
 from fpsolve.workflow.folders import CHART, kept, own_folder, saying_if_interrupted
 from fpsolve.workflow.progress import NODES as SCANNED
 from fpsolve.workflow.progress import POINTS, SILENT, Phase, Watch
-from fpsolve.workflow.reports import Reporter, facts_since, shown_at_the_end
+from fpsolve.workflow.reports import facts_since, shown_at_the_end, write_report
 
 LINE_RECORDS = "records/charted"
 """The folder of the records of lines."""
@@ -449,7 +449,6 @@ def chart_case(
     out: str | Path = "results",
     *,
     pool: Pool | None = None,
-    reporter: Reporter | None = None,
     watch: Watch = SILENT,
 ) -> Chart:
     """Trace the lines of the chart of a case, and write chart.csv, .json, .png and .pdf into `out`/<name of the case>/.
@@ -459,7 +458,6 @@ def chart_case(
 
     Args:
         pool: who scans the plane; this process if none is given.
-        reporter: writes report.html, if one is wanted.
 
     Raises:
         OutputError: the folder cannot be made or written to, or another run writes into it.
@@ -477,9 +475,8 @@ def chart_case(
         if chart.lines:
             with writable(folder):
                 chart_figure(case, chart).write(folder)
-            if reporter is not None:
-                facts, blocks = facts_since(case, started), show(case, chart)
-                reporter.write(case, folder, watch, blocks, facts=facts, files=FILES, complete=chart.complete)
+            facts = facts_since(case, started)
+            write_report(case, folder, watch, show(case, chart), facts=facts, files=FILES, complete=chart.complete)
 
     with (
         own_folder(case, out, (CHART,)) as folder,
@@ -510,14 +507,13 @@ def chart(
 
     Example: fpsolve chart cases/chart.toml --set chart.x.stop=3.0
     """
-    code, reporter = 0, options.reporter()
-    loaded = options.load(cases)
+    code, loaded = 0, options.load(cases)
     for case in loaded:
         refuse_no_chart(case)
     pool = options.pool()
     for case in loaded:
         start = monotonic()
-        found = chart_case(case, options.out, pool=pool, reporter=reporter, watch=options.watch())
+        found = chart_case(case, options.out, pool=pool, watch=options.watch())
         if options.quiet:
             print_blocks(note_on(case.name, each) for each in dict.fromkeys(found.failures))
         else:

@@ -6,8 +6,9 @@ import os
 import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
+from importlib.util import find_spec
 from pathlib import Path
 from shlex import quote
 from time import monotonic
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
     from fpsolve.case.case import Case
     from fpsolve.pool import Pool
     from fpsolve.workflow.progress import Watch
-    from fpsolve.workflow.reports import Reporter
 
 CHECK_FAILED, BAD_INPUT, NOT_CONVERGED = 1, 2, 3
 """Exit codes of commands."""
@@ -155,11 +155,8 @@ class Reporting(Writing, Working):
         bool, Parameter(help="Also write report.html: one page with all results and figures.", negative="")
     ] = False
 
-    def reporter(self) -> Reporter | None:
-        """Who writes reports, if one is wanted. Raises `FpsolveError` where what it needs is not installed."""
-        from fpsolve.workflow.reports import Reporter
-
-        return Reporter() if self.report else None
+    def watch(self, *, is_json: bool = False) -> Watch:
+        return replace(super().watch(is_json=is_json), has_report=self.report)
 
 
 @Parameter(name="*")
@@ -176,10 +173,11 @@ class Pointing(Reporting):
         ),
     ] = False
 
-    def reporter(self) -> Reporter | None:
-        from fpsolve.workflow.reports import Reporter
-
-        return Reporter(is_interactive=self.interactive) if self.report or self.interactive else None
+    def watch(self, *, is_json: bool = False) -> Watch:
+        if self.interactive and find_spec("plotly") is None:
+            raise FpsolveError("--interactive needs plotly; install it by pip install 'fpsolve[interactive]'")
+        has_report = self.report or self.interactive
+        return replace(super().watch(is_json=is_json), has_report=has_report, is_interactive=self.interactive)
 
 
 OPTIONS_OF_WORK, OPTIONS_OF_FILES, OPTIONS_OF_REPORTS, ALL_OPTIONS = Working(), Writing(), Reporting(), Pointing()

@@ -57,7 +57,7 @@ from fpsolve.show.curves import Shown, grid_of
 from fpsolve.show.results import done_of
 from fpsolve.workflow.folders import PROVEN, kept, own_folder, saying_if_interrupted
 from fpsolve.workflow.progress import BOUNDS, SILENT, Phase, Watch
-from fpsolve.workflow.reports import Reporter, facts_since, shown_at_the_end
+from fpsolve.workflow.reports import facts_since, shown_at_the_end, write_report
 
 ORDERS = "moments.p"
 Literals = Mapping[float, str]
@@ -488,7 +488,6 @@ def prove_case(
     *,
     width: float | None = None,
     pool: Pool | None = None,
-    reporter: Reporter | None = None,
     watch: Watch = SILENT,
 ) -> list[CurveProof]:
     """Prove bounds on Λ at every p of every curve, and on λ, δ_p and excursions; write proof.json into `out`/<case>/.
@@ -496,7 +495,6 @@ def prove_case(
     Args:
         width: wanted upper − lower; 1e-7 of the scale of each number if None.
         pool: who proves; this process if none is given.
-        reporter: writes report.html, if one is wanted.
 
     Raises:
         FpsolveError: a curve cannot be proven, or the width is none; nothing is written.
@@ -509,10 +507,9 @@ def prove_case(
     started = datetime.now(UTC)
 
     def report() -> None:
-        if reporter is not None and proofs:
+        if proofs:
             facts, is_whole = facts_since(case, started), len(answers) == plan.total
-            blocks = show(case, proofs)
-            reporter.write(case, folder, watch, blocks, facts=facts, files=[PROOF], complete=is_whole)
+            write_report(case, folder, watch, show(case, proofs), facts=facts, files=[PROOF], complete=is_whole)
 
     def write() -> list[CurveProof]:
         proofs = plan.gathered(answers)
@@ -607,14 +604,13 @@ def prove(
             told = "they are labels, as the certificates state matrices or rates, of which the bounds are"
             print(f"note: {', '.join(checked.claims.labels)} were not verified: {told}")
         return 0
-    code, reporter = 0, options.reporter()
-    loaded = options.load(cases or [])
+    code, loaded = 0, options.load(cases or [])
     for case in loaded:
         refuse_unprovable_case(case, width)
     pool = options.pool()
     for case in loaded:
         start = monotonic()
-        proofs = prove_case(case, options.out, width=width, pool=pool, reporter=reporter, watch=options.watch())
+        proofs = prove_case(case, options.out, width=width, pool=pool, watch=options.watch())
         if not options.quiet:
             print_blocks(show(case, proofs))
         unmet = sum(not each.is_met for each in proofs)

@@ -50,7 +50,7 @@ def run(
     from fpsolve.workflow.cases import run_case
     from fpsolve.workflow.simulation import refuse_obstacles
 
-    code, reporter, out = 0, options.reporter(), options.out
+    code = 0
     typed = {} if sample is None else {f"--sample {sample}": f"uncertain.sample={sample}"}
     typed |= {"--all": 'output.quantities="all"'} if everything else {}
     loaded = options.load(cases, typed)
@@ -61,8 +61,8 @@ def run(
     pool = options.pool(() if sample else loaded)
     for case in loaded:
         start, watch = monotonic(), options.watch(is_json=json)
-        how: dict[str, Any] = {"monte_carlo": monte_carlo, "is_fresh": fresh, "reporter": reporter}
-        outcome = run_case(case, out, pool=pool, watch=watch, **how)
+        how: dict[str, Any] = {"monte_carlo": monte_carlo, "is_fresh": fresh}
+        outcome = run_case(case, options.out, pool=pool, watch=watch, **how)
         if outcome.interruption:
             print_error(outcome.interruption)
         if not (options.quiet or outcome.interruption):

@@ -42,7 +42,6 @@ def simulate(
     from fpsolve.show.results import done_of, known_of
     from fpsolve.workflow.simulation import refuse_obstacles, simulate_case
 
-    reporter = options.reporter()
     stated = {"paths": paths, "time": time, "seed": seed, "estimator": estimator}
     typed = {
         f"--{name} {value:{'g' if name == 'time' else ''}}": f"monte_carlo.{name}={value}"
@@ -55,7 +54,7 @@ def simulate(
     pool = options.pool()
     for case in loaded:
         start, watch = monotonic(), options.watch()
-        how: dict[str, Any] = {"is_fresh": fresh, "reporter": reporter, "watch": watch}
+        how: dict[str, Any] = {"is_fresh": fresh, "watch": watch}
         outcome = simulate_case(case, options.out, pool=pool if options.scheduler else None, **how)
         if outcome.interruption:
             print_error(outcome.interruption)

@@ -7,7 +7,7 @@ from contextlib import nullcontext
 from dataclasses import dataclass, field
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from fpsolve.case.case import Case, load_case
 from fpsolve.errors import NotConverged, WorkersDied
@@ -29,14 +29,11 @@ from fpsolve.workflow.folders import (
     saying_if_interrupted,
 )
 from fpsolve.workflow.progress import SILENT, Phase, Watch, ignore
-from fpsolve.workflow.reports import shown_at_the_end
+from fpsolve.workflow.reports import shown_at_the_end, write_report
 from fpsolve.workflow.seal import TABLES
 from fpsolve.workflow.sets import Sweep
 from fpsolve.workflow.simulation import SIMULATION, Simulations, refuse_obstacles
 from fpsolve.workflow.simulation import show as show_simulated
-
-if TYPE_CHECKING:
-    from fpsolve.workflow.reports import Reporter
 
 SAMPLING = ("sample.json",)
 """The file with all numbers of samples."""
@@ -122,7 +119,6 @@ def run_case(
     monte_carlo: bool = False,
     pool: Pool | None = None,
     is_fresh: bool = False,
-    reporter: Reporter | None = None,
     watch: Watch = SILENT,
 ) -> Outcome:
     """Solve a case, simulate it too if `monte_carlo` is true, and draw both in one figure.
@@ -132,7 +128,6 @@ def run_case(
     Args:
         pool: who solves; this process if none is given.
         is_fresh: whether to solve all sets again.
-        reporter: writes report.html, if one is wanted.
 
     Raises:
         OutputError: the folder cannot be made or written to, or another run writes into it.
@@ -152,7 +147,7 @@ def run_case(
         def show() -> None:
             with watch.bar(Phase(case.name, "figures")), writable(folder):
                 results.write_figures(case, sweep.results, simulated, folder, sweep.results.table)
-            if reporter is not None:
+            if watch.has_report:
                 from fpsolve.show.claims import show_claims  # which takes a tenth of a second
 
                 is_whole = not interruption and len(simulated) == case.planned * monte_carlo
@@ -167,7 +162,7 @@ def run_case(
                 )
                 files = TABLES + SIMULATION * bool(simulated) + SAMPLING * bool(samples)
                 is_whole &= sweep.done == case.planned
-                reporter.write(case, folder, watch, blocks, facts=sweep.facts, files=files, complete=is_whole)
+                write_report(case, folder, watch, blocks, facts=sweep.facts, files=files, complete=is_whole)
 
         told = saying_if_interrupted(lambda: f"; what was {'done' if simulated else 'solved'} is kept in {folder}")
         with told, shown_at_the_end(show):

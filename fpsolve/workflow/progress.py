@@ -64,12 +64,16 @@ class Watch:
         shown: takes what was found once it is there; it is made when it is asked for.
         noted: takes what limits this.
         said: takes notes about files.
+        has_report: whether report.html is written, too.
+        is_interactive: whether its drawings tell their numbers where the pointer is.
     """
 
     bar: Callable[[Phase], AbstractContextManager[Advance]] = lambda _: nullcontext(ignore)
     shown: Callable[[Iterable[Block]], None] = lambda _: None
     noted: Callable[[Iterable[Block]], None] = lambda _: None
     said: Callable[[Iterable[Block]], None] = lambda _: None
+    has_report: bool = False
+    is_interactive: bool = False
 
 
 SILENT = Watch()

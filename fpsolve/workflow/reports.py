@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
 from datetime import UTC, datetime
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -31,67 +29,51 @@ _OTHERS = "summary.json", "monte_carlo.json", "chart.json", "design.json", "proo
 """What a command says that it has done."""
 
 
-@dataclass(frozen=True)
-class Reporter:
-    """Writes reports.
+def write_report(
+    case: Case,
+    folder: Path,
+    watch: Watch,
+    blocks: Iterable[Block],
+    *,
+    facts: Mapping[str, Any],
+    files: Sequence[str],
+    complete: bool = True,
+) -> None:
+    """Write the report of what a command found into a folder, if one is wanted; a fault in that is said and no more.
 
     Args:
-        is_interactive: whether Λ(p) and charts tell their numbers where the pointer is.
+        blocks: what was found.
+        facts: on the run, see `facts_of`.
+        files: the names of those that hold all numbers.
+        complete: whether all was done that was planned.
 
     Raises:
-        FpsolveError: that needs plotly, which is not installed.
+        OutputError: it cannot be written.
     """
-
-    is_interactive: bool = False
-
-    def __post_init__(self) -> None:
-        if self.is_interactive and find_spec("plotly") is None:
-            raise FpsolveError("--interactive needs plotly; install it by pip install 'fpsolve[interactive]'")
-
-    def write(
-        self,
-        case: Case,
-        folder: Path,
-        watch: Watch,
-        blocks: Iterable[Block],
-        *,
-        facts: Mapping[str, Any],
-        files: Sequence[str],
-        complete: bool = True,
-    ) -> None:
-        """Write the report of what a command found into a folder; a fault in that is said and nothing more.
-
-        Args:
-            blocks: what was found.
-            facts: on the run, see `facts_of`.
-            files: the names of those that hold all numbers.
-            complete: whether all was done that was planned.
-
-        Raises:
-            OutputError: it cannot be written.
-        """
-        others = [name for name in _OTHERS if name not in files and (folder / name).is_file()]
-        also = f" Other commands wrote {', '.join(others)} there; their own --report shows it." if others else ""
-        with watch.bar(Phase(case.name, "report")), writable(folder):
-            try:
-                text = page_of(
-                    blocks,
-                    is_interactive=self.is_interactive,
-                    title=case.headline,
-                    state=COMPLETE if complete else INCOMPLETE,
-                    equations=problem.equations_of(next(case.curves(0, 1)).problem),
-                    about=list(problem.show(case)),
-                    facts=facts,
-                    file=case.path.name,
-                    more=f"All numbers are in {', '.join(files)}, in the folder of the results, {folder.name}.{also}",
-                )
-            except OSError:
-                raise
-            except Exception as failure:  # what is finished is there already, and shall not be lost for its picture
-                message = Message(Code.NO_REPORT, kind=type(failure).__name__, text=str(failure))
-                watch.said([note_on(case.name, message)])
-            else:
-                write_text(folder / REPORT, text)
+    if not watch.has_report:
+        return
+    others = [name for name in _OTHERS if name not in files and (folder / name).is_file()]
+    also = f" Other commands wrote {', '.join(others)} there; their own --report shows it." if others else ""
+    with watch.bar(Phase(case.name, "report")), writable(folder):
+        try:
+            text = page_of(
+                blocks,
+                is_interactive=watch.is_interactive,
+                title=case.headline,
+                state=COMPLETE if complete else INCOMPLETE,
+                equations=problem.equations_of(next(case.curves(0, 1)).problem),
+                about=list(problem.show(case)),
+                facts=facts,
+                file=case.path.name,
+                more=f"All numbers are in {', '.join(files)}, in the folder of the results, {folder.name}.{also}",
+            )
+        except OSError:
+            raise
+        except Exception as failure:  # what is finished is there already, and shall not be lost for its picture
+            message = Message(Code.NO_REPORT, kind=type(failure).__name__, text=str(failure))
+            watch.said([note_on(case.name, message)])
+        else:
+            write_text(folder / REPORT, text)
 
 
 @contextmanager

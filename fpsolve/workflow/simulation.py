@@ -10,7 +10,7 @@ from datetime import UTC, datetime
 from functools import partial
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -34,10 +34,7 @@ from fpsolve.study.results import CurveResult, SimulatedCurve
 from fpsolve.vtk import field_data, pyvista_module, write_vtk
 from fpsolve.workflow.folders import AGAIN, SIMULATED, kept, of_curves, own_folder, saying_if_interrupted
 from fpsolve.workflow.progress import PERCENT, SILENT, Advance, Phase, Watch
-from fpsolve.workflow.reports import facts_since
-
-if TYPE_CHECKING:
-    from fpsolve.workflow.reports import Reporter
+from fpsolve.workflow.reports import facts_since, write_report
 
 RECORDS = "records/simulated"
 """The folder of the records of simulations."""
@@ -386,7 +383,6 @@ def simulate_case(
     *,
     pool: Pool | None = None,
     is_fresh: bool = False,
-    reporter: Reporter | None = None,
     watch: Watch = SILENT,
 ) -> Simulations:
     """Simulate a case and write `out`/<name of the case>/monte_carlo.json, for further curves monte_carlo-2.json, ….
@@ -398,7 +394,6 @@ def simulate_case(
     Args:
         pool: who simulates, such as a `cluster`; None for all processors of this machine.
         is_fresh: whether to simulate all curves again.
-        reporter: writes report.html, if one is wanted.
 
     Raises:
         OutputError: the folder cannot be made or written to, or another run writes into it.
@@ -414,8 +409,8 @@ def simulate_case(
     ):
         simulations = Simulations(case, folder, is_fresh=is_fresh)
         interruption = simulations.run(watch, pool)
-        if reporter is not None:
-            simulated, facts = simulations.simulated, facts_since(case, started)
-            blocks = chain(show(case, simulated), notes(case, simulated, MONTE_CARLO))
-            reporter.write(case, folder, watch, blocks, facts=facts, files=SIMULATION, complete=not interruption)
+        simulated = simulations.simulated
+        blocks = chain(show(case, simulated), notes(case, simulated, MONTE_CARLO))
+        facts = facts_since(case, started)
+        write_report(case, folder, watch, blocks, facts=facts, files=SIMULATION, complete=not interruption)
     return simulations

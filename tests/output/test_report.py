@@ -229,7 +229,7 @@ def test_a_figure_that_fails_is_told_in_its_place(tmp_path, monkeypatch):
 
 
 def test_without_plotly_it_is_named_before_anything_is_solved(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(reports, "find_spec", lambda _: None)
+    monkeypatch.setattr("fpsolve.commands.options.find_spec", lambda _: None)
     assert run(tmp_path, ONE, "--interactive") == BAD_INPUT
     assert "pip install 'fpsolve[interactive]'" in capsys.readouterr().err
     assert not (tmp_path / "test").exists()
