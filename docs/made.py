@@ -14,11 +14,11 @@ from sphinx_gallery.scrapers import figure_rst
 
 import fpsolve
 from fpsolve.case import Case
-from fpsolve.commands import check_case
 from fpsolve.data import plain_unit
 from fpsolve.exponent import Budget
 from fpsolve.model.kinds import NOISES, SYSTEMS, noise_kind, system_kind
 from fpsolve.model.parameters import Parametrised, example_of, meaning_of, symbol_of, unit_of
+from fpsolve.workflow import check_case
 
 ROOT = Path(__file__).parents[1]
 CASES = [*sorted(ROOT.glob("cases/*.toml")), *sorted(ROOT.glob("cases/systems/*.toml"))]

@@ -15,7 +15,7 @@ from fpsolve.parts.part import Numerics
 from fpsolve.study import CurveResult, solve_curve
 from fpsolve.study.results import SimulatedCurve, Solved
 from fpsolve.study.solve import everything, result_of
-from fpsolve.workflow.simulation import simulate_curve
+from fpsolve.workflow.simulate import simulate_curve
 
 ALL = 'output.quantities="all"'
 """Sets what a case asks for to everything."""

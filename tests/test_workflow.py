@@ -19,7 +19,6 @@ import xarray
 import fpsolve
 from fpsolve.analysis import stationary_density, tilted_density
 from fpsolve.case.remedies import CASE_WORDS
-from fpsolve.commands import check_case, compare
 from fpsolve.errors import CaseError, FpsolveError, NotConverged, OutputError
 from fpsolve.exponent import INDICES as KNOWN
 from fpsolve.exponent.fields import UNRESOLVED
@@ -29,7 +28,7 @@ from fpsolve.output.tables import write_results
 from fpsolve.parts import PARTS
 from fpsolve.study import solve
 from fpsolve.study.solve import solve_curve
-from fpsolve.workflow import Watch, run_case, sets, simulate_case
+from fpsolve.workflow import Watch, check_case, compare, run_case, sets, simulate_case
 from tests.conftest import painted
 from tests.kit import (
     COSTLY,

@@ -1,217 +1,13 @@
-"""`fpsolve check`: what a case expects, or the moment hierarchy says, beside what is computed."""
+"""`fpsolve check`: what cases expect beside what is computed."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
-from functools import partial
 from typing import Annotated
 
-import numpy as np
 from cyclopts import Parameter
 
-from fpsolve.arrays import FloatArray
-from fpsolve.case.case import Case, Curve
-from fpsolve.case.sections import Expectation, Varied
-from fpsolve.case.vary import short_names
 from fpsolve.commands.options import CHECK_FAILED, NOT_CONVERGED, OPTIONS_OF_WORK, Cases, Working
-from fpsolve.data import written
-from fpsolve.errors import FpsolveError, NoHierarchy
-from fpsolve.exponent.error import digits
-from fpsolve.exponent.quantities import INDICES
-from fpsolve.messages import Message, Severity
-from fpsolve.model.kinds import is_ours
-from fpsolve.page.limits import EACH, ROWS
-from fpsolve.page.page import Block, Column, Grid, Sentence
-from fpsolve.page.terminal import print_blocks
-from fpsolve.parts.moments import PART as MOMENTS
-from fpsolve.parts.part import Numerics, Settings
-from fpsolve.parts.response import NAME as RESPONSE
-from fpsolve.pool import Pool, serial
-from fpsolve.show.notes import note_on, notes
-from fpsolve.study.results import CurveResult, Solved
-from fpsolve.study.solve import Asked, Order, batches, solve_batch
-from fpsolve.testing import check_noise
-from fpsolve.theory.moments import hierarchy_exponent, refuse_open_hierarchy
-from fpsolve.workflow.folders import ANEW, kept, of_curves, saying_if_interrupted
-from fpsolve.workflow.progress import SETS, SILENT, Phase, Watch
-
-SOURCE = "moment hierarchy; ± the stated error"
-"""The source of values by the hierarchy."""
-
-
-@dataclass(frozen=True)
-class Comparison:
-    """One expectation of a case and what was computed; `met` says whether they agree."""
-
-    expectation: Expectation
-    varied: Varied
-    value: float | None
-    tolerance: float
-    met: bool
-
-    @classmethod
-    def of(cls, wanted: Expectation, result: CurveResult) -> Comparison:
-        """An expectation beside a curve."""
-        if wanted.p is not None:
-            at = np.flatnonzero(np.isclose(result.moments.p, wanted.p, rtol=0, atol=1e-12))
-            value = float(result.moments.value[at[0]]) if at.size else None
-        else:
-            numbers = result.response.numbers if result.response else {}
-            estimate = numbers.get(wanted.of_response) if wanted.of_response else result.estimates[wanted.quantity]
-            value = None if estimate is None else estimate.value
-        tolerance = max(wanted.atol or 0.0, (wanted.rtol or 0.0) * abs(wanted.value))
-        met = value is not None and abs(value - wanted.value) <= tolerance
-        return cls(wanted, dict(result.curve.varied), value, tolerance, met)
-
-
-@dataclass(frozen=True, eq=False)
-class Checked:
-    """What a check found.
-
-    Attributes:
-        results: the curves, with what was compared alone; what did not converge is in their `failures`.
-        comparisons: what was expected beside what was computed.
-        faults: of a noise that is no kind of fpsolve, see `check_noise`.
-    """
-
-    results: Sequence[CurveResult]
-    comparisons: Sequence[Comparison]
-    faults: Sequence[Message]
-
-    @property
-    def failures(self) -> tuple[Message, ...]:
-        """Why some p or indices of some curves are missing."""
-        return tuple(failure.reason for result in self.results for failure in result.failures)
-
-
-def expected(case: Case, varied: Varied) -> Asked:
-    """What the expectations of a case compare, of the curve with these values."""
-    chosen = [each for each in case.expect if each.selects(varied)]
-    p = np.unique([each.p for each in chosen if each.p is not None])
-    asked: dict[str, Settings] = {MOMENTS.name: {"p": p.tolist(), "slopes": False}}
-    asked |= {name: {} for name in INDICES if any(each.quantity == name for each in chosen)}
-    if any(each.of_response for each in chosen):
-        asked[RESPONSE] = {"rtol": case.response.rtol, "grid": None}
-    return asked
-
-
-def compare(case: Case, results: Sequence[CurveResult]) -> list[Comparison]:
-    """Every expectation of a case against every curve that it selects."""
-    pairs = ((wanted, result) for wanted in case.expect for result in results)
-    return [Comparison.of(*pair) for pair in pairs if pair[0].selects(pair[1].curve.varied)]
-
-
-def even_moments(case: Case) -> FloatArray:
-    """The even p > 0 of a case, shape (n,)."""
-    return case.p[(case.p > 0) & (case.p % 2 == 0)]
-
-
-def refuse_no_hierarchy(case: Case) -> None:
-    """Refuse a case without an even p, or some curve of which has no hierarchy. Raises `FpsolveError`."""
-    orders = even_moments(case)
-    if not orders.size:
-        raise FpsolveError(f"{case.path}: moments.p: has no even p > 0, and the hierarchy is for these; add 2.0")
-    for curve in case.curves():
-        try:
-            refuse_open_hierarchy(curve.problem, float(orders.max()))
-        except NoHierarchy as failure:
-            place = f"{case.path}: with {curve.label}" if curve.varied else str(case.path)
-            raise FpsolveError(f"{place}: {failure}") from None
-
-
-def compare_with_hierarchy(case: Case, results: Sequence[CurveResult]) -> list[Comparison]:
-    """Λ of the even p of every curve beside the hierarchy; they agree within the stated error and rounding."""
-    found = []
-    for result in results:
-        errors = dict(zip(result.moments.p.tolist(), result.moments.error_estimate.tolist(), strict=True))
-        for p in even_moments(case).tolist():
-            value, rounding = hierarchy_exponent(result.curve.problem, p)
-            error = errors.get(p, 0.0) + rounding
-            wanted = Expectation(quantity="moment", p=p, value=value, atol=error, source=SOURCE)
-            found.append(Comparison.of(wanted, result))
-    return found
-
-
-def _result_alone(order: Order, curve: Curve, solved: Solved) -> CurveResult:
-    return solved.result
-
-
-def check_case(case: Case, *, by_hierarchy: bool = False, pool: Pool | None = None, watch: Watch = SILENT) -> Checked:
-    """Solve what a case expects, and compare; nothing is written.
-
-    A noise of a kind that fpsolve does not know itself is checked, too.
-
-    With `by_hierarchy` Λ of its even p is compared with the moment hierarchy.
-    """
-    found: list[CurveResult] = []
-    numerics = replace(Numerics.of(case), is_stated=True)
-
-    def order(number: int, varied: Varied) -> Order:
-        even = {MOMENTS.name: {"p": even_moments(case).tolist(), "slopes": True}}
-        return Order(number, varied, even if by_hierarchy else expected(case, varied), case.vary.line_of(number))
-
-    with (
-        saying_if_interrupted(lambda: kept(len(found), of_curves(case)), ANEW),
-        watch.bar(Phase(case.name, "solving", case.planned, SETS)) as progress,
-        pool or serial() as workers,
-    ):
-        task = partial(solve_batch, problem=case.problem, numerics=numerics, keep=_result_alone)
-        for _, results in workers.run(task, batches(case, order)):
-            for result in results:
-                found.append(result)
-                progress(failed=result.status.fails)
-    found.sort(key=lambda result: result.curve.number)
-    comparisons = compare_with_hierarchy(case, found) if by_hierarchy else compare(case, found)
-    faults = [fault for each in case.problem.noise.parts.values() if not is_ours(each) for fault in check_noise(each)]
-    return Checked(found, comparisons, faults)
-
-
-def show(case: Case, comparisons: Sequence[Comparison]) -> Iterator[Block]:
-    """A row for each value, or of many values for those that differ, and how many agree."""
-    if not comparisons:
-        yield Sentence(f"{case.name}: nothing is expected; add [[expect]] to the case")
-        return
-    shown = comparisons if len(comparisons) <= ROWS else [each for each in comparisons if not each.met]
-    if shown:
-        yield _grid(case, shown[:ROWS], is_short=len(comparisons) > EACH)
-    if len(shown) > ROWS:
-        yield Sentence(f"{case.name}: {len(shown) - ROWS} more differ")
-    yield Sentence(agreement(comparisons) if shown else f"{case.name}: {agreement(comparisons)}")
-
-
-def agreement(comparisons: Sequence[Comparison]) -> str:
-    """How many agree: "3 of 4 ok"."""
-    return f"{sum(item.met for item in comparisons)} of {len(comparisons)} ok"
-
-
-def _grid(case: Case, comparisons: Sequence[Comparison], *, is_short: bool) -> Grid:
-    """A row for each value: with its source, or in one line, with two digits more than the tolerance has."""
-    first = (
-        [Column("quantity"), *map(Column, short_names(case.vary.keys))]
-        if is_short
-        else [Column("quantity", is_text=True)]
-    )
-    tolerance = [Column("±", 2)] if is_short else []
-    numbers = [Column("expected"), *tolerance, Column("computed"), Column("difference", 1), Column("")]
-    grid = Grid(f"{case.name}: {case.headline}", [*first, *numbers])
-    for item in comparisons:
-        wanted, value = item.expectation, item.value
-        quantity = wanted.quantity if wanted.p is None else f"{wanted.quantity}, p = {wanted.p:g}"
-        error = f"{item.tolerance:.0e}"
-        expected, computed = (
-            "none" if each is None else digits(each, item.tolerance / 100, 12) if is_short else f"{each:.12g}"
-            for each in (wanted.value, value)
-        )
-        if is_short:
-            row = [quantity, *map(written, item.varied.values()), expected, error, computed]
-        else:
-            where = "".join(f"\n{key} = {written(each)}" for key, each in item.varied.items())
-            row = [f"{quantity}{where}\n{wanted.source}", f"{expected}\n± {error}", computed]
-            grid.ends.add(len(grid.rows))
-        difference = "" if value is None else f"{value - wanted.value:.1e}"
-        grid.rows.append([*row, difference, "ok" if item.met else "differs"])
-    return grid
+from fpsolve.messages import Severity
 
 
 def check(
@@ -233,6 +29,10 @@ def check(
 
     Example: fpsolve check cases/fig1.toml cases/minimal.toml
     """
+    from fpsolve.page.terminal import print_blocks
+    from fpsolve.show.notes import note_on, notes
+    from fpsolve.workflow.check import agreement, check_case, refuse_no_hierarchy, show
+
     code, loaded = 0, options.load(cases)
     for case in loaded if hierarchy else ():
         refuse_no_hierarchy(case)

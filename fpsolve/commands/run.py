@@ -48,7 +48,7 @@ def run(
     from fpsolve.show.notes import left_out
     from fpsolve.show.results import done_of, known_of
     from fpsolve.workflow.cases import run_case
-    from fpsolve.workflow.simulation import refuse_obstacles
+    from fpsolve.workflow.simulate import refuse_obstacles
 
     code = 0
     typed = {} if sample is None else {f"--sample {sample}": f"uncertain.sample={sample}"}

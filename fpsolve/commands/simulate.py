@@ -40,7 +40,7 @@ def simulate(
     Example: fpsolve simulate cases/fig1.toml --paths 100000 --seed 1 --estimator population
     """
     from fpsolve.show.results import done_of, known_of
-    from fpsolve.workflow.simulation import refuse_obstacles, simulate_case
+    from fpsolve.workflow.simulate import refuse_obstacles, simulate_case
 
     stated = {"paths": paths, "time": time, "seed": seed, "estimator": estimator}
     typed = {

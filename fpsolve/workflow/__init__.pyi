@@ -1,8 +1,14 @@
 from .cases import Outcome as Outcome
 from .cases import run as run
 from .cases import run_case as run_case
+from .chart import chart_case as chart_case
+from .check import check_case as check_case
+from .check import compare as compare
+from .check import expected as expected
 from .measurement import noise_case as noise_case
 from .progress import Phase as Phase
 from .progress import Watch as Watch
-from .simulation import simulate_case as simulate_case
-from .simulation import simulate_curve as simulate_curve
+from .prove import check_proof as check_proof
+from .prove import prove_case as prove_case
+from .simulate import simulate_case as simulate_case
+from .simulate import simulate_curve as simulate_curve

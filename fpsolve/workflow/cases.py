@@ -32,8 +32,8 @@ from fpsolve.workflow.progress import SILENT, Phase, Watch, ignore
 from fpsolve.workflow.reports import shown_at_the_end, write_report
 from fpsolve.workflow.seal import TABLES
 from fpsolve.workflow.sets import Sweep
-from fpsolve.workflow.simulation import SIMULATION, Simulations, refuse_obstacles
-from fpsolve.workflow.simulation import show as show_simulated
+from fpsolve.workflow.simulate import SIMULATION, Simulations, refuse_obstacles
+from fpsolve.workflow.simulate import show as show_simulated
 
 SAMPLING = ("sample.json",)
 """The file with all numbers of samples."""

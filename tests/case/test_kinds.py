@@ -13,7 +13,6 @@ import pytest
 from fpsolve.case.case import load_case
 from fpsolve.case.vary import legend
 from fpsolve.cli import main
-from fpsolve.commands.prove import refuse_unprovable_case
 from fpsolve.errors import CaseError
 from fpsolve.model.kinds import noise_kind, source_of, version_of
 from fpsolve.model.noises.markov_chain import MarkovChain, Telegraph
@@ -24,6 +23,7 @@ from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
 from fpsolve.output.records import set_key
 from fpsolve.output.tables import facts_of
 from fpsolve.simulation.setup import simulated_parts
+from fpsolve.workflow.prove import refuse_unprovable_case
 
 OSCILLATOR = """\
 title = "kinds"

@@ -7,7 +7,7 @@ import pytest
 
 from fpsolve.analysis.regions import Region, Regions
 from fpsolve.analysis.zero import Zero
-from fpsolve.commands.chart import chart_figure
+from fpsolve.workflow.chart import chart_figure
 from tests.kit import case_in, case_text
 from tests.output.drawing import words
 

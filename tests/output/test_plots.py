@@ -12,7 +12,7 @@ from fpsolve.case.case import load_case
 from fpsolve.drawing import figure_for
 from fpsolve.output.figures import Series, draw_series, main_figure
 from fpsolve.simulation.response import Response
-from fpsolve.workflow.simulation import simulated_response_figure
+from fpsolve.workflow.simulate import simulated_response_figure
 from tests.kit import solve_case
 
 pytestmark = pytest.mark.usefixtures("pictures")

@@ -14,7 +14,6 @@ from fpsolve.analysis.regions import Region
 from fpsolve.analysis.zero import Zero
 from fpsolve.case.case import load_case
 from fpsolve.cli import main
-from fpsolve.commands.chart import region_meaning
 from fpsolve.commands.options import BAD_INPUT
 from fpsolve.errors import OutputError, Remedy
 from fpsolve.model import OrnsteinUhlenbeck, PlaneSystem, Problem, White
@@ -26,6 +25,7 @@ from fpsolve.parts.surfaces import can_render, picture_of
 from fpsolve.show import claims, problem, results
 from fpsolve.show.problem import equations_of, noises_of
 from fpsolve.workflow import reports
+from fpsolve.workflow.chart import region_meaning
 from fpsolve.workflow.folders import CHART, PROVEN, SIMULATED, SOLVED, own_folder
 from fpsolve.workflow.reports import shown_at_the_end
 from tests.conftest import painted
@@ -333,8 +333,8 @@ figure = false
 def test_charts_have_a_page(tmp_path, monkeypatch):
     for name, nodes in (
         ("analysis.stability.NODES", 7),
-        ("commands.chart.NODES", 7),
-        ("commands.chart.CLOSED_FORM_NODES", 31),
+        ("workflow.chart.NODES", 7),
+        ("workflow.chart.CLOSED_FORM_NODES", 31),
     ):
         monkeypatch.setattr(f"fpsolve.{name}", nodes)
     assert run(tmp_path, CHARTED, "--report", "--interactive", command="chart", name="plane.toml") == 0

@@ -9,8 +9,6 @@ import numpy as np
 import pytest
 
 from fpsolve.case.sections import Expectation
-from fpsolve.commands.check import Comparison
-from fpsolve.commands.check import show as show_comparisons
 from fpsolve.exponent.error import Estimate, Failure
 from fpsolve.exponent.quantities import INDICES
 from fpsolve.messages import Code, Message, Severity
@@ -25,7 +23,9 @@ from fpsolve.show.results import show as show_results
 from fpsolve.study.columns import table_of
 from fpsolve.study.results import CurveResult, MomentColumns
 from fpsolve.study.solve import failed
-from fpsolve.workflow import simulation
+from fpsolve.workflow import simulate as simulation
+from fpsolve.workflow.check import Comparison
+from fpsolve.workflow.check import show as show_comparisons
 from tests.kit import ALL, TEXT, case_in, simulate_curves, solve_case
 
 NONLINEAR = ["vary={}", "oscillator.c1=0.8", "oscillator.c2=0.5", "response.rtol=0.01"]

@@ -23,7 +23,7 @@ from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
 from fpsolve.parts.eigenfunctions import write_density, write_eigenfunctions
 from fpsolve.study import solve
 from fpsolve.workflow import run
-from fpsolve.workflow.simulation import write_simulated_response
+from fpsolve.workflow.simulate import write_simulated_response
 from tests.conftest import FIG1, UNIT_NOISE, sampled
 from tests.kit import ALL
 from tests.oracles.perturbation import first_order_eigenfunction

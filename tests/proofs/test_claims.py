@@ -8,10 +8,10 @@ import pytest
 
 from fpsolve.cli import main
 from fpsolve.commands.options import BAD_INPUT, CHECK_FAILED
-from fpsolve.commands.prove import prove_case
 from fpsolve.proofs import claims
 from fpsolve.proofs.certificate import MalformedProof
 from fpsolve.proofs.claims import claims_from, plain, verdicts
+from fpsolve.workflow.prove import prove_case
 from tests.kit import case_in
 from tests.proofs.case import CASE
 

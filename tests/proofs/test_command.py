@@ -18,14 +18,14 @@ import pytest
 import fpsolve
 from fpsolve.case.case import load_case
 from fpsolve.cli import main
-from fpsolve.commands import prove as command
 from fpsolve.commands.options import BAD_INPUT, NOT_CONVERGED
-from fpsolve.commands.prove import CurveProof, Plan, check_proof, prove_case, show
 from fpsolve.model.noises.non_gaussian import NonGaussianNoise
 from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
 from fpsolve.output.records import Records, append
 from fpsolve.page.terminal import print_blocks
 from fpsolve.proofs import Certificate, Enclosure
+from fpsolve.workflow import prove as command
+from fpsolve.workflow.prove import CurveProof, Plan, check_proof, prove_case, show
 from tests.conftest import sampled, started
 from tests.kit import case_in, read_json
 from tests.oracles import fourier_hermite
@@ -372,8 +372,8 @@ def test_curves_that_are_done_are_written_before_the_end(case, monkeypatch):
     def write(case, proofs, folder, *, is_whole):
         kept.append((len(proofs), is_whole))
 
-    monkeypatch.setattr("fpsolve.commands.prove.EVERY", 0.0)
-    monkeypatch.setattr("fpsolve.commands.prove.write_proof", write)
+    monkeypatch.setattr("fpsolve.workflow.prove.EVERY", 0.0)
+    monkeypatch.setattr("fpsolve.workflow.prove.write_proof", write)
     overrides = [
         "--set=vary.noise.r0=[0.9,0.95]",
         "--set=moments.p=[1.0]",

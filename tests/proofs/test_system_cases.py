@@ -6,8 +6,8 @@ import pytest
 
 from fpsolve.cli import main
 from fpsolve.commands.options import BAD_INPUT
-from fpsolve.commands.prove import check_proof, prove_case
 from fpsolve.proofs.claims import claims_from
+from fpsolve.workflow.prove import check_proof, prove_case
 from tests.kit import case_in, read_json
 from tests.oracles import certificate_checker as checker
 

@@ -8,11 +8,10 @@ import pytest
 from fpsolve import ExponentSolver, load_case
 from fpsolve.analysis.zero import Zero
 from fpsolve.cli import main
-from fpsolve.commands import chart_case
-from fpsolve.commands.chart import chart_work, solve_chart
 from fpsolve.errors import CaseError
 from fpsolve.output.figures import read_line
-from fpsolve.workflow import Watch, run
+from fpsolve.workflow import Watch, chart_case, run
+from fpsolve.workflow.chart import chart_work, solve_chart
 from tests.conftest import painted
 from tests.kit import case_text, read_csv, read_json
 
@@ -38,8 +37,8 @@ def few_nodes():
     """Scans with fewer nodes than usual, which take a fifth of the time."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("fpsolve.analysis.stability.NODES", 7)
-        patch.setattr("fpsolve.commands.chart.NODES", 7)
-        patch.setattr("fpsolve.commands.chart.CLOSED_FORM_NODES", 31)
+        patch.setattr("fpsolve.workflow.chart.NODES", 7)
+        patch.setattr("fpsolve.workflow.chart.CLOSED_FORM_NODES", 31)
         yield
 
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from fpsolve.case.case import load_case
-from fpsolve.commands import compare
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.study.solve import Numerics, everything, solve_curve
+from fpsolve.workflow import compare
 from tests.conftest import sampled
 from tests.oracles import perturbation
 

@@ -11,7 +11,6 @@ import pyvista
 from scipy.integrate import simpson
 
 import fpsolve
-from fpsolve.commands import compare, expected
 from fpsolve.errors import CaseError, NotConverged
 from fpsolve.messages import Code, Message
 from fpsolve.model.quantity import OSCILLATOR_RESPONSE
@@ -21,7 +20,8 @@ from fpsolve.parts.intervals import sampled_case
 from fpsolve.parts.response import PART, shape
 from fpsolve.study.results import Status
 from fpsolve.study.solve import Numerics, everything, solve_curve
-from fpsolve.workflow.simulation import number_grid
+from fpsolve.workflow import compare, expected
+from fpsolve.workflow.simulate import number_grid
 from tests.kit import case_in, case_text, read_json
 
 SECTIONS = """[moments]

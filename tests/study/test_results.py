@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from fpsolve.cli import main
-from fpsolve.commands import compare
+from fpsolve.workflow import compare
 from tests.kit import ALL, INDICES, case_in, case_text, from_record, simulate_curves, solve_sets
 
 SECTIONS = """[moments]

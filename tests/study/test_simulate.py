@@ -16,7 +16,7 @@ from fpsolve.errors import NotConverged
 from fpsolve.files import LOCK
 from fpsolve.output import figures
 from fpsolve.simulation import response
-from fpsolve.workflow import simulation as simulated
+from fpsolve.workflow import simulate as simulated
 from tests.conftest import heed_signals
 from tests.kit import case_text, read_csv, read_json
 from tests.oracles import closed_forms

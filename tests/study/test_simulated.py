@@ -12,7 +12,7 @@ from fpsolve.output.records import record_of
 from fpsolve.simulation.estimators import MomentEstimate, MonteCarlo
 from fpsolve.simulation.response import BINS, Response
 from fpsolve.study.results import SimulatedCurve
-from fpsolve.workflow.simulation import simulate_curve, simulated_of, simulation_fits
+from fpsolve.workflow.simulate import simulate_curve, simulated_of, simulation_fits
 from tests.kit import case_in, case_text, simulate_curves
 
 SECTIONS = "[moments]\np = [-1.0, 2.0]\n[monte_carlo]\npaths = 4096\ntime = 40.0\n"

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from fpsolve.case.case import load_case
-from fpsolve.commands import compare, expected
-from fpsolve.commands.chart import solve_chart
 from fpsolve.study.solve import Numerics, solve_curve
+from fpsolve.workflow import compare, expected
+from fpsolve.workflow.chart import solve_chart
 
 CASES = sorted((Path(__file__).parents[2] / "cases/systems").glob("*.toml"))
 DIGITS = 2e-13
@@ -38,7 +38,7 @@ def test_every_case_meets_its_expectations_within_the_stated_error(path):
 def test_the_chart_of_white_noise(monkeypatch):
     """The mean square is neutral on s² = 4b."""
     monkeypatch.setattr("fpsolve.analysis.stability.NODES", 7)
-    monkeypatch.setattr("fpsolve.commands.chart.CLOSED_FORM_NODES", 7)
+    monkeypatch.setattr("fpsolve.workflow.chart.CLOSED_FORM_NODES", 7)
     path = next(path for path in CASES if path.stem == "white_noise_chart")
     *_, chart = solve_chart(load_case(path, ["chart.zero=[{ moment = 2.0 }]"]))
     [line] = chart.lines

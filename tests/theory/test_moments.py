@@ -240,7 +240,7 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeyp
     assert "4 of 4 ok" in said
     assert "moment, p = 4" in said
     assert "-0.0332610990213" in said
-    monkeypatch.setattr("fpsolve.commands.check.hierarchy_exponent", lambda problem, p: (0.1, 1e-12))
+    monkeypatch.setattr("fpsolve.workflow.check.hierarchy_exponent", lambda problem, p: (0.1, 1e-12))
     assert main([*command, "--quiet"]) == CHECK_FAILED
     assert capsys.readouterr().out == "hierarchy: 0 of 4 ok\n"
 

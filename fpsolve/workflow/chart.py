@@ -1,0 +1,491 @@
+"""Charts of where stability ends in a plane of two parameters: lines, their crossings, regions, closed forms."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from functools import partial
+from html import escape
+from pathlib import Path
+from string import ascii_lowercase
+from textwrap import wrap
+from typing import Any
+
+import numpy as np
+
+from fpsolve.analysis.continuation import Trace
+from fpsolve.analysis.regions import P_BIFURCATIONS, Region, Regions, regions
+from fpsolve.analysis.scan import Row, Scan, ScannedRow, scan_row
+from fpsolve.analysis.stability import NODES, Boundary, crossed, empty_scan
+from fpsolve.analysis.zero import Axis, Zero
+from fpsolve.arrays import FloatArray
+from fpsolve.case.case import Case
+from fpsolve.case.sections import ChartSection
+from fpsolve.case.vary import short_names
+from fpsolve.drawing import COLOURS, Format, figure_for, label_axes, scale_axis
+from fpsolve.errors import FpsolveError, NoPerturbationTheory
+from fpsolve.files import writable, write_csv, write_json
+from fpsolve.messages import Code, Message, message_of
+from fpsolve.model.problem import Problem
+from fpsolve.output.records import RESULT_VERSION, Record, Records, append, digest_of, made_of, record_of
+from fpsolve.output.tables import head, in_case_words
+from fpsolve.page.page import Block, Column, Drawing, Grid, Sentence
+from fpsolve.page.plots import line_of, plot_of
+from fpsolve.pool import Pool, serial
+from fpsolve.results.text import plural
+from fpsolve.show.notes import note_on
+from fpsolve.theory.perturbation import second_order
+from fpsolve.workflow.folders import CHART, kept, own_folder, saying_if_interrupted
+from fpsolve.workflow.progress import NODES as SCANNED
+from fpsolve.workflow.progress import POINTS, SILENT, Phase, Watch
+from fpsolve.workflow.reports import facts_since, shown_at_the_end, write_report
+
+LINE_RECORDS = "records/charted"
+"""The folder of the records of lines."""
+FILES = "chart.csv", "chart.json"
+"""The files with all numbers of a chart."""
+Map = Callable[[Callable[[Row], ScannedRow], Iterable[Row]], Iterable[ScannedRow]]
+"""The builtin `map`, or that of an executor: results in the order of the tasks."""
+CLOSED_FORM_NODES = 41
+"""Of the grid, each way, on which the closed forms are evaluated."""
+TINTS = ("#FFFFFF", "#F3EFE6", "#E9DFCB", "#DBCBAA", "#C9B388")
+"""Of regions, the darker the more of the quantities grow there."""
+NAMED = 0.01
+"""Share of the frame from which on a region has room for a letter; smaller ones are in chart.json only."""
+CLOSED_FORM: dict[str, Any] = {"linestyle": (0, (2, 3)), "linewidth": 1.4, "zorder": 3}
+FORM = Format(height=4.0)
+SPECIAL = {"fold": ("fold", "^"), "crossing": ("crossing", "o"), "at ": ("value asked for", "s")}
+"""Beginnings of labels, what the legend calls such points, and their markers."""
+
+
+@dataclass(frozen=True, eq=False)
+class Chart:
+    """What a case says of stability in a plane of two parameters.
+
+    Attributes:
+        lines: one for each entry of `zero` that is begun, in their order.
+        closed_forms: for each entry of `zero` the branches of its closed form, Eqs. (38)-(39), each of shape (n, 2), in
+            the parameters themselves.
+        regions: once all lines are traced.
+        complete: whether they are, none stopped by the budget.
+    """
+
+    lines: tuple[Boundary, ...]
+    closed_forms: tuple[tuple[FloatArray, ...], ...]
+    regions: Regions | None = None
+    complete: bool = False
+
+    @property
+    def failures(self) -> tuple[Message, ...]:
+        """Why lines end inside of the frame, or may lack branches."""
+        obstacles = [text for line in self.lines for trace in line.traces for text in trace.obstacles]
+        return (*obstacles, *(text for line in self.lines for text in line.obstacles))
+
+    @property
+    def remarks(self) -> tuple[Message, ...]:
+        """What has no line, which lines end inside of the frame, and where no F exists, with the reasons."""
+        found = [line.remark() for line in self.lines if line.complete or line.obstacles]
+        for line in self.lines:
+            reasons = (text for trace in line.traces for text in trace.obstacles)
+            ends = dict.fromkeys(each for each in reasons if each not in line.obstacles)
+            holes = [each for each in line.scan.reasons if each not in line.obstacles] if line.scan else []
+            found += [Message(Code.LINE_ENDS, line=line.zero.equation, reason=each) for each in ends]
+            found += [Message(Code.HOLES, symbol=line.zero.symbol, reason=each) for each in holes]
+        return tuple(message_of(each) for each in found if each)
+
+
+def charted(case: Case) -> ChartSection:
+    """The frame of a case and the lines in it. Raises `FpsolveError` where it has none."""
+    if case.chart is not None:
+        return case.chart
+    raise FpsolveError(
+        f'{case.path}: chart: missing; add [chart] with x = {{ key = "oscillator.omega", start = 0.3, '
+        'stop = 5.0 }, y like it, and zero = ["lyapunov_exponent", { moment = 2.0 }]'
+    )
+
+
+def refuse_no_chart(case: Case) -> None:
+    """Refuse a case without a chart, or that varies another key than its two. Raises `FpsolveError`."""
+    frame = charted(case)
+    if set(case.vary.keys) - {frame.x.key, frame.y.key}:
+        raise FpsolveError(
+            f"{case.path}: vary: a chart has one set of the other parameters; remove [vary], or write --set vary={{}}"
+        )
+
+
+def chart_work(case: Case) -> int:
+    """How often `solve_chart` reports progress: once for each node of each scan."""
+    frame = charted(case)
+    return (frame.nodes or NODES) ** 2 * len(frame.zero)
+
+
+def solve_chart(
+    case: Case,
+    *,
+    progress: Callable[[], None] = lambda: None,
+    stepped: Callable[[], None] = lambda: None,
+    map: Map = map,
+    known: Callable[[Boundary], Boundary | None] = lambda _: None,
+) -> Iterator[Chart]:
+    """What there is so far, after each scan, branch and line, and in the end the whole chart.
+
+    Args:
+        case: with a chart, see `refuse_no_chart`.
+        progress: called once for each node of each scan, see `chart_work`.
+        stepped: called once for each point that is traced.
+        map: computes the rows of all scans, as the builtin does or in other processes, while branches are traced here.
+        known: gives a line that an earlier run has finished.
+    """
+    frame = charted(case)
+    x, y = frame.x.axis, frame.y.axis
+    curve = case.curve({})
+    problem = curve.problem
+    chart = Chart((), _closed_forms(problem, frame.zero, (x, y)))
+    scan = empty_scan(frame.nodes) if frame.nodes else None
+    begun = [Boundary(zero, x, y, problem, scan=scan, budget=case.budget) for zero in frame.zero]
+    finished = [known(line) for line in begun]
+    tasks = [row for line, earlier in zip(begun, finished, strict=True) if earlier is None for row in line.rows()]
+    rows = iter(map(scan_row, tasks))
+    for each, earlier in zip(begun, finished, strict=True):
+        done = chart.lines
+        if earlier is not None:
+            chart = replace(chart, lines=(*done, earlier))
+            yield chart
+            continue
+        for line in each.solve(rows, progress, stepped):
+            chart = replace(chart, lines=(*done, line))
+            yield chart
+    lines = tuple(crossed(chart.lines))
+    yield Chart(lines, chart.closed_forms, regions(lines), complete=all(line.complete for line in lines))
+
+
+def _closed_forms(
+    problem: Problem, zeros: Sequence[Zero], axes: tuple[Axis, Axis]
+) -> tuple[tuple[FloatArray, ...], ...]:
+    """The lines ε²Λ₂(p)/p = 0 in the parameters themselves, for noise that is reduced as in the paper."""
+    from contourpy import contour_generator
+
+    shares = np.linspace(0, 1, CLOSED_FORM_NODES)
+    x, y = axes
+    linear, quadratic = np.full((2, shares.size, shares.size), np.nan)
+    for i, u in enumerate(shares):
+        for j, v in enumerate(shares):
+            try:
+                theory = second_order(problem.at({x.key: float(x.value(u)), y.key: float(y.value(v))}))
+            except (ValueError, NoPerturbationTheory):  # no such problem, or not this form of one
+                continue
+            linear[j, i], quadratic[j, i] = theory.lyapunov_exponent, theory.quadratic
+    found = []
+    for zero in zeros:
+        values = np.ma.masked_invalid(linear + zero.p * quadratic)
+        lines: list[FloatArray] = contour_generator(shares, shares, values, line_type="Separate").lines(0.0)  # type: ignore[assignment]
+        found.append(tuple(np.stack([x.value(line[:, 0]), y.value(line[:, 1])], axis=1) for line in lines))
+    return tuple(found)
+
+
+@dataclass(frozen=True, eq=False)
+class Line:
+    """What is recorded of a finished line of a chart, see `Boundary`."""
+
+    traces: tuple[Trace, ...]
+    scan: Scan
+    seconds: float
+
+
+class Lines:
+    """The lines of a chart, of which an earlier run may have finished some."""
+
+    def __init__(self, case: Case, folder: Path) -> None:
+        self.case, self.records, self._kept = case, Records(folder.resolve() / LINE_RECORDS).look(), set[Zero]()
+
+    def find(self, line: Boundary) -> Boundary | None:
+        """A line as it was finished, if it was; otherwise None."""
+        found = self.records.made(_line_key(self.case, line), lambda record: _line_of(record, line))
+        self._kept |= {line.zero} if found else set()
+        return found
+
+    def keep(self, line: Boundary) -> None:
+        """Keep a line once it is finished."""
+        if line.complete and line.scan is not None and line.zero not in self._kept:
+            record = record_of(Line(line.traces, line.scan, line.seconds))
+            append(self.records.folder, _line_key(self.case, line), record)
+            self._kept.add(line.zero)
+
+
+def _line_key(case: Case, line: Boundary) -> str:
+    """What the record of a line of a chart is found by."""
+    frame = [repr(each) for each in (line.zero, line.x, line.y, line.step, line.budget)]
+    digest = digest_of(Line, frame=frame, nodes=charted(case).nodes)
+    return f"{RESULT_VERSION}-{digest}-{case.curve({}).digest}"
+
+
+def _line_of(record: Record, line: Boundary) -> Boundary:
+    """A finished line from its record, with what it was begun with. Raises `ValueError` where that has another form."""
+    found = Line(**made_of(Line, record))
+    samples = [point.sample for trace in found.traces for point in trace.points]
+    count = found.scan.nodes.size
+    shapes = found.scan.nodes.shape, found.scan.values.shape, found.scan.gradients.shape
+    is_whole = shapes == ((count,), (count, count), (count, count, 2)) and all(trace.points for trace in found.traces)
+    is_whole &= all(each.at.shape == each.gradient.shape == (2,) and np.isfinite(each.at).all() for each in samples)
+    if not is_whole:
+        raise ValueError("this is no record of a line")
+    return replace(line, traces=found.traces, scan=found.scan, seconds=found.seconds, complete=True)
+
+
+def write_chart(case: Case, chart: Chart, folder: Path) -> None:
+    """Write chart.csv, and chart.json, which says whether all is there."""
+    rows = (
+        [line.zero.name, number, *map(float, point), label]
+        for line in chart.lines
+        for number, branch in enumerate(line.branches, start=1)
+        for *point, label in zip(branch.x, branch.y, branch.width, branch.labels, strict=True)
+    )
+    write_csv(folder / "chart.csv", ["line", "branch", "x", "y", "width", "label"], rows)
+    zeros, frame = charted(case).zero, {"x": charted(case).x.axis, "y": charted(case).y.axis}
+    keys = [axis.key for axis in frame.values()]
+    summary = {
+        **head(case),
+        "complete": chart.complete,
+        "planned": len(zeros),
+        "done": sum(line.complete for line in chart.lines),
+        "parameters": {key: value for key, value in case.curve({}).parameters.items() if key not in keys},
+        **{
+            side: {"key": axis.key, "start": axis.start, "stop": axis.stop, "scale": axis.scale, "at": list(axis.at)}
+            for side, axis in frame.items()
+        },
+        "lines": [
+            {
+                "line": line.zero.name,
+                "equation": line.zero.equation,
+                "appears": _appears(line.zero),
+                "rtol": line.rtol,
+                "scan": None if line.scan is None else {"nodes": [line.scan.nodes.size] * 2, "rtol": line.scan_rtol},
+                "branches": [
+                    {"points": branch.x.size, "closed": branch.closed, "obstacles": list(branch.obstacles)}
+                    for branch in line.branches
+                ],
+                "obstacles": list(line.obstacles),
+            }
+            for line in chart.lines
+        ],
+        "closed_forms": [
+            {"line": zero.name, "equation": "(38)-(39)", "branches": [branch.tolist() for branch in branches]}
+            for zero, branches in zip(zeros, chart.closed_forms, strict=True)
+        ],
+        "regions": [
+            {"name": each.name, "signs": each.signs, "share": each.share}
+            | {side: float(axis.value(at)) for (side, axis), at in zip(frame.items(), each.at, strict=True)}
+            for each in (chart.regions.each if chart.regions else ())
+        ],
+        "warnings": in_case_words(chart.remarks),
+    }
+    write_json(folder / "chart.json", summary)
+
+
+def chart_figure(case: Case, chart: Chart) -> Drawing:
+    """chart.png and .pdf; none where there is no line."""
+    keys = f"{charted(case).x.key} and {charted(case).y.key}"
+    job, plot = partial(_draw, case, chart), partial(_plot_of_chart, case, chart)
+    return Drawing(f"Where stability ends, over {keys}", job, "chart", case.headline, plot=plot)
+
+
+def _draw(case: Case, chart: Chart, paths: Sequence[Path], heading: str) -> None:
+    """The lines, their closed forms dashed, and the regions with names."""
+    frame = charted(case).x.axis, charted(case).y.axis
+    keys = frame[0].key, frame[1].key
+    held = case.curve({}).held(case.units.time, keys)
+    with figure_for(paths, heading, held, FORM) as figure:
+        axes = figure.add_subplot()
+        label_axes(axes, *(case.about(key).attributes for key in keys))
+        for axis, side in zip((axes.xaxis, axes.yaxis), frame, strict=True):
+            scale_axis(axis, side.scale, (side.start, side.stop))
+        small = {} if chart.regions is None else _shade(axes, chart.regions, frame)
+        for i, line in enumerate(chart.lines):
+            colour, appears = COLOURS[i % len(COLOURS)], _appears(line.zero)
+            for branch in line.branches:
+                path = (np.append(each, each[:1]) if branch.closed else each for each in (branch.x, branch.y))
+                axes.plot(*path, color=colour, linewidth=2)
+                for start, (_, marker) in SPECIAL.items():
+                    chosen = np.array([start in label for label in branch.labels])
+                    hollow = {"color": colour, "markersize": 7, "markerfacecolor": "white"}
+                    axes.plot(branch.x[chosen], branch.y[chosen], marker, **hollow)
+            if line.branches:
+                name = f"{line.zero.latex}: {appears}" if appears else line.zero.latex
+                axes.plot([], [], color=colour, linewidth=2, label=name)
+            for points in chart.closed_forms[i]:
+                axes.plot(points[:, 0], points[:, 1], color=colour, **CLOSED_FORM)
+        if any(chart.closed_forms):
+            words = "closed form, Eqs. (38)-(39), in the colour of its line"
+            axes.plot([], [], label=words, color="0.35", **CLOSED_FORM)
+        labels = [label for line in chart.lines for branch in line.branches for label in branch.labels]
+        for start, (name, marker) in SPECIAL.items():
+            if any(start in label for label in labels):
+                axes.plot([], [], marker, label=name, color="0.35", markersize=7, markerfacecolor="none")
+        for name, letter in small.items():
+            axes.plot([], [], " ", label=f"{letter}: {name}")
+
+
+def _shade(axes: Any, regions: Regions, frame: tuple[Axis, Axis]) -> dict[str, str]:
+    """Draw a tint for each region, and its name, or where that has no room a letter; the letters by the names."""
+    from matplotlib.colors import ListedColormap
+
+    x, y = frame
+    edges = np.linspace(0, 1, regions.index.shape[0] + 1)
+    unstable = [sum(sign > 0 for sign in each.signs.values()) for each in regions.each]
+    tints = np.array([*unstable, np.nan])[regions.index]
+    style: dict[str, Any] = {"cmap": ListedColormap(TINTS), "vmin": -0.5, "vmax": len(TINTS) - 0.5}
+    axes.pcolormesh(x.value(edges), y.value(edges), tints.T, rasterized=True, **style)
+    letters, small = iter(ascii_lowercase), dict[str, str]()
+    middle: dict[str, Any] = {"ha": "center", "va": "center", "color": "0.15", "zorder": 4}
+    for number, each in enumerate(regions.each):
+        tint = TINTS[min(unstable[number], len(TINTS) - 1)]
+        middle["bbox"] = {"facecolor": tint, "edgecolor": "none", "pad": 1.5, "alpha": 0.85}  # over a closed form
+        name = each.name.replace("δ_p", r"$\delta_p$")
+        parts = name.split(", ")
+        narrow = [line for part in parts for line in ([part] if "$" in part else wrap(part, 14))]
+        for lines in (parts, narrow):
+            words = axes.text(0, 0, "\n".join(lines), fontsize=9.5, **middle)
+            if place := _room(words, regions.index == number):
+                words.set_position((x.value(place[0]), y.value(place[1])))
+                break
+            words.remove()
+        else:
+            if each.share > NAMED:
+                small[name] = rf"$\mathbf{{{next(letters, 'z')}}}$"
+                axes.text(x.value(each.at[0]), y.value(each.at[1]), small[name], fontsize=12, **middle)
+    return small
+
+
+def _room(words: Any, inside: FloatArray) -> tuple[float, float] | None:
+    """Where the middle of words is deepest in a region with all of them inside, in shares of the sides; or None."""
+    from scipy.ndimage import distance_transform_edt, minimum_filter
+
+    box, n, inches = words.get_window_extent(), inside.shape[0], words.figure.dpi
+    shares = 1.15 * box.width / (0.85 * FORM.width * inches), 1.15 * box.height / (FORM.height * inches)
+    fits = minimum_filter(inside, [max(1, round(n * share)) for share in shares], mode="constant")
+    if not fits.any():
+        return None
+    depth = np.where(fits, distance_transform_edt(np.pad(inside, 1))[1:-1, 1:-1], 0)
+    u, v = np.unravel_index(int(np.argmax(depth)), depth.shape)
+    return (float(u) + 0.5) / n, (float(v) + 0.5) / n
+
+
+def _appears(zero: Zero) -> str | None:
+    """Which bifurcation a value of δ_p is, if one."""
+    return P_BIFURCATIONS.get(zero.p) if zero.kind == "stability_index" else None
+
+
+def _plot_of_chart(case: Case, chart: Chart) -> dict[str, Any]:
+    """The lines, with their special points."""
+    lines = []
+    for line in chart.lines:
+        for branch in line.branches:
+            x, y, labels = branch.x.tolist(), branch.y.tolist(), list(branch.labels)
+            ends = slice(1 if branch.closed else 0)
+            text = [escape(label) for label in labels + labels[ends]]
+            lines.append(line_of(line.zero.equation, x + x[ends], y + y[ends], text=text))
+    frame = charted(case).x, charted(case).y
+    return plot_of("Where stability ends", lines, [{"title": {"text": escape(a.key)}, "type": a.scale} for a in frame])
+
+
+def show(case: Case, chart: Chart) -> Iterator[Block]:
+    """The lines with their special points, and the regions from the largest to the smallest."""
+    if chart.lines:
+        yield chart_figure(case, chart)
+    yield chart_grid(case, chart)
+    zeros = [line.zero for line in chart.lines]
+    for each in () if chart.regions is None else chart.regions.each:
+        yield Sentence(f"{each.share:.1%} of the frame: {each.name}.{region_meaning(each, zeros)}")
+    yield from (note_on(case.name, each) for each in chart.remarks)
+
+
+def chart_grid(case: Case, chart: Chart) -> Grid:
+    """The branches of every line, and their special points."""
+    keys = charted(case).x.key, charted(case).y.key
+    names = short_names(keys)
+    columns = [Column("line"), Column("branch", 1), Column("points", 2), *map(Column, names)]
+    grid = Grid(case.headline, [*columns, Column("special point", is_text=True)])
+    for line in chart.lines:
+        for number, branch in enumerate(line.branches, start=1):
+            count = f"{branch.x.size}{', closed' if branch.closed else ''}"
+            grid.rows.append([line.zero.equation, str(number), count, "", "", ""])
+            for i, label in enumerate(branch.labels):
+                if label:
+                    for key, name in zip(keys, names, strict=True):
+                        label = label.replace(f"{key} ", f"{name} ")
+                    grid.rows.append(["", "", "", f"{branch.x[i]:.7g}", f"{branch.y[i]:.7g}", label])
+            grid.ends.add(len(grid.rows) - 1)
+    return grid
+
+
+def region_meaning(region: Region, zeros: Iterable[Zero]) -> str:
+    """What becomes in a region of a chart: "Almost every path decays and the mean square grows."."""
+    told, signs = list[str](), set[int]()
+    for zero in sorted(zeros, key=lambda each: (each.kind == "moment", each.p)):
+        sign = region.signs.get(zero.name, 0)
+        if sign and zero.kind in ("lyapunov_exponent", "moment"):
+            moment = "the mean square" if zero.p == 2 else f"E‖x‖^{zero.p:g}"
+            told.append(
+                f"{moment if zero.kind == 'moment' else 'almost every path'} {'grows' if sign > 0 else 'decays'}"
+            )
+            signs.add(sign)
+    carried = ", which rare paths carry" if len(signs) == 2 and told[0].endswith("path decays") else ""
+    text = " and ".join([", ".join(told[:-1]), told[-1]] if len(told) > 1 else told)
+    return f" {text[0].upper()}{text[1:]}{carried}." if told else ""
+
+
+def traced(chart: Chart) -> str:
+    """How many lines a chart has: "3 lines, 4 branches"."""
+    branches = sum(len(line.branches) for line in chart.lines)
+    return f"{len(chart.lines)} {plural('line', len(chart.lines))}, {branches} {plural('branch', branches)}"
+
+
+def chart_case(
+    case: Case,
+    out: str | Path = "results",
+    *,
+    pool: Pool | None = None,
+    watch: Watch = SILENT,
+) -> Chart:
+    """Trace the lines of the chart of a case, and write chart.csv, .json, .png and .pdf into `out`/<name of the case>/.
+
+    The tables are written again after every branch. What an earlier chart wrote there is removed first, and what was
+    solved or simulated with other parameters; but lines that it has finished are not traced again.
+
+    Args:
+        pool: who scans the plane; this process if none is given.
+
+    Raises:
+        OutputError: the folder cannot be made or written to, or another run writes into it.
+        FpsolveError: the case has no chart, or several curves; nothing is written.
+        KeyboardInterrupt: its text says what is kept; the figure shows that.
+    """
+    refuse_no_chart(case)
+    chart, started = Chart((), ()), datetime.now(UTC)
+
+    def done() -> str:
+        count = sum(len(line.traces) for line in chart.lines)
+        return kept(count, f"branch{'es' if count != 1 else ''} of {len(chart.closed_forms) or 'its'} lines", folder)
+
+    def draw() -> None:
+        if chart.lines:
+            with writable(folder):
+                chart_figure(case, chart).write(folder)
+            facts = facts_since(case, started)
+            write_report(case, folder, watch, show(case, chart), facts=facts, files=FILES, complete=chart.complete)
+
+    with (
+        own_folder(case, out, (CHART,)) as folder,
+        saying_if_interrupted(done),
+        watch.bar(Phase(case.name, "scan", chart_work(case), SCANNED)) as progress,
+        watch.bar(Phase(case.name, "lines", unit=POINTS)) as stepped,
+        writable(folder),
+        pool or serial() as workers,
+    ):
+        lines = Lines(case, folder)
+        with shown_at_the_end(draw):
+            for chart in solve_chart(case, progress=progress, stepped=stepped, map=workers.map, known=lines.find):
+                write_chart(case, chart, folder)
+                lines.keep(chart.lines[-1])
+    return chart

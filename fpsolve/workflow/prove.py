@@ -1,0 +1,555 @@
+"""Proofs of bounds on Λ(p), λ and δ_p of the curves of a case, their file, and the check of one.
+
+Of the numbers of a case the decimals count that it states.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import tomllib
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from decimal import ROUND_CEILING, ROUND_FLOOR, Decimal
+from functools import cached_property, partial
+from hashlib import sha256
+from pathlib import Path
+from time import monotonic
+from typing import Any, TypeAlias, cast
+
+from pydantic import TypeAdapter
+
+from fpsolve import __version__
+from fpsolve.analysis.excursions import SYMBOL
+from fpsolve.case.case import Case, Curve
+from fpsolve.errors import FpsolveError, NoSuchExponent
+from fpsolve.exponent.quantities import LYAPUNOV_EXPONENT, STABILITY_INDEX
+from fpsolve.files import writable, write_text
+from fpsolve.messages import Code, Message
+from fpsolve.output.records import Records, append
+from fpsolve.page.limits import EACH, PROOFS, ROWS
+from fpsolve.page.page import Block, Column, Grid, Sentence
+from fpsolve.parts.excursions import NAME as EXCURSIONS
+from fpsolve.pool import Pool, serial
+from fpsolve.proofs.certificate import NOTHING, Enclosure, MalformedProof, enclosure_of
+from fpsolve.proofs.claims import Claims, claims_from, plain, verdicts
+from fpsolve.proofs.questions import (
+    ExcursionBound,
+    ExcursionEnclosure,
+    IndexEnclosure,
+    check_width,
+    prove_bounds,
+    prove_excursions,
+    prove_index,
+    refuse_unprovable,
+)
+from fpsolve.proofs.statement import DECIMAL, Statement, linear_values, statement_of
+from fpsolve.proofs.verify import objection
+from fpsolve.reading import Unreadable, Words, read_text
+from fpsolve.show.claims import PROOF
+from fpsolve.show.curves import Shown, grid_of
+from fpsolve.workflow.folders import PROVEN, kept, own_folder, saying_if_interrupted
+from fpsolve.workflow.progress import BOUNDS, SILENT, Phase, Watch
+from fpsolve.workflow.reports import facts_since, shown_at_the_end, write_report
+
+ORDERS = "moments.p"
+Literals = Mapping[float, str]
+"""Decimals by their floats."""
+Answer: TypeAlias = Enclosure | IndexEnclosure | ExcursionEnclosure
+Question = partial[Any]
+NOT_PROVEN = "not proven"
+"""The word where no bound is proven."""
+LONGEST = 12
+"""Digits of a p at most in a table."""
+FATES = {1: "grows", -1: "decays", 0: "open"}
+"""The fate of a path or a moment by the sign of its exponent."""
+PROVEN_RECORDS = "records/proven"
+ENCLOSURES = TypeAdapter(Enclosure)
+EVERY = 30.0
+"""Seconds after which the curves that are done are written, so that a run that is killed keeps them."""
+_WORDS = Words("the proof", "a proof", "proof.json", "JSON", "make one with `fpsolve prove`")
+
+
+@dataclass(frozen=True, eq=False)
+class CurveProof:
+    """What is proven of one parameter set.
+
+    Attributes:
+        stated: what is proven of.
+        moments: p as a decimal, and bounds on Λ(p) or None where that was not tried.
+        exponent: bounds on λ; None where they are not asked for, or were not tried.
+        index: bounds on δ_p; the same.
+        excursion: bounds of P(sup ‖x‖ ≥ A); the same.
+    """
+
+    curve: Curve
+    stated: Statement
+    moments: tuple[tuple[str, Enclosure | None], ...]
+    exponent: Enclosure | None = None
+    index: IndexEnclosure | None = None
+    excursion: ExcursionEnclosure | None = None
+
+    @property
+    def excursions(self) -> Mapping[str, ExcursionBound]:
+        """The bounds of P(sup ‖x‖ ≥ A) that hold: "lower", for which λ < 0 is proven too, and "upper"."""
+        found: dict[str, ExcursionBound] = {}
+        if self.excursion is None:
+            return found
+        decays = self.exponent is not None and self.exponent.sign < 0
+        if self.excursion.lower is not None and decays:
+            found["lower"] = self.excursion.lower
+        if self.excursion.upper is not None:
+            found["upper"] = self.excursion.upper
+        return found
+
+    @property
+    def is_met(self) -> bool:
+        """Whether all bounds on Λ(p) and λ that were tried are as close as wanted."""
+        return all(each is None or each.is_met for each in (*(found for _, found in self.moments), self.exponent))
+
+    @property
+    def verdicts(self) -> list[str]:
+        """What is proven of paths and moments."""
+        signs = [(p, 0 if found is None else found.sign) for p, found in self.moments]
+        return verdicts(signs, 0 if self.exponent is None else self.exponent.sign)
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What is to be proven of a case, the same of every curve: Λ at all p; λ, δ_p, excursions if [output] names them.
+
+    Attributes:
+        case: whose curves.
+        width: wanted upper − lower; a share of the scale if None.
+    """
+
+    case: Case
+    width: float | None
+
+    @property
+    def indices(self) -> list[str]:
+        """Those of λ, δ_p and excursions that are asked for."""
+        known = (LYAPUNOV_EXPONENT.name, STABILITY_INDEX.name, EXCURSIONS)
+        return [name for name in known if name in self.case.asked]
+
+    @property
+    def each(self) -> int:
+        return len(self.case.p) + len(self.indices)
+
+    @property
+    def total(self) -> int:
+        return self.each * self.case.planned
+
+    @cached_property
+    def _literals(self) -> Mapping[str, Literals]:
+        keys = (key for curve in self.case.curves(stop=1) for key in linear_values(curve.problem))
+        return literals_of(self.case, (*keys, ORDERS))
+
+    @cached_property
+    def _orders(self) -> list[str]:
+        """All p as decimals: as the case states them, or of a range the floats as they stand."""
+        if self.case.moments.is_range:
+            return [str(Decimal(p)) for p in self.case.p.tolist()]
+        return [decimal_of(p, self._literals[ORDERS]) for p in self.case.p.tolist()]
+
+    def stated(self, curve: Curve) -> Statement:
+        """The linear motion with its parameters as the decimals that the case states. Raises as `statement_of`."""
+        decimals = {
+            key: value if isinstance(value, str) else decimal_of(value, self._literals[key])
+            for key, value in linear_values(curve.problem).items()
+        }
+        return statement_of(curve.problem, decimals)
+
+    def questions(self) -> Iterator[Question]:
+        for curve in self.case.curves():
+            problem, stated, budget = curve.problem, self.stated(curve), self.case.budget
+            yield from (partial(prove_bounds, problem, stated, p, self.width, budget=budget) for p in self._orders)
+            if LYAPUNOV_EXPONENT.name in self.indices:
+                yield partial(prove_bounds, problem, stated, None, self.width, budget=budget)
+            if STABILITY_INDEX.name in self.indices:
+                yield partial(prove_index, problem, stated, budget=budget)
+            if EXCURSIONS in self.indices:
+                yield partial(prove_excursions, problem, stated, budget=budget)
+
+    def gathered(self, answers: Sequence[Answer]) -> list[CurveProof]:
+        """What is proven of each curve, from the first answers, in the order of the questions."""
+        found, rest = [], iter(answers)
+        for curve in self.case.curves(stop=-(-len(answers) // self.each)):
+            moments = tuple((p, cast("Enclosure | None", next(rest, None))) for p in self._orders)
+            indices: dict[str, Any] = {name: next(rest, None) for name in self.indices}
+            names = (LYAPUNOV_EXPONENT.name, STABILITY_INDEX.name, EXCURSIONS)
+            found.append(CurveProof(curve, self.stated(curve), moments, *map(indices.get, names)))
+        return found
+
+
+def refuse_unprovable_case(case: Case, width: float | None) -> None:
+    """Refuse a width that is not positive, and a case some curve of which cannot be proven.
+
+    Raises:
+        FpsolveError: with the curve and the reason.
+    """
+    try:
+        check_width(width)
+    except ValueError as failure:
+        raise FpsolveError(f"--width: {failure}") from None
+    plan = Plan(case, width)
+    for curve in case.curves():
+        place = f"{case.path}: with {curve.label}" if curve.varied else str(case.path)
+        try:
+            refuse_unprovable(plan.stated(curve))
+        except (TypeError, ValueError) as failure:
+            raise FpsolveError(f"{place}: {failure}") from None
+        except NoSuchExponent as failure:
+            raise NoSuchExponent(Message(Code.PLACED, place=place, reason=failure.message)) from None
+
+
+def answer(question: Question) -> Answer:
+    """The task: proves what is asked."""
+    return question()
+
+
+def literals_of(case: Case, keys: Iterable[str]) -> Mapping[str, Literals]:
+    """The decimals that the file and the command line state for dotted keys; those of [vary] for a varied one."""
+    found = list(_leaves(tomllib.loads(case.text, parse_float=Decimal)))
+    for override in case.overrides:
+        with suppress(ValueError):  # a bare word
+            new = list(_leaves(tomllib.loads(override, parse_float=Decimal)))
+            ((replaced, _),) = _leaves(tomllib.loads(f"{override.partition('=')[0]} = 0"))
+            found = [each for each in found if not _is_in(each[0], replaced)] + new
+    places = {key: f"vary.{key}" if key in case.vary.keys else key for key in keys}
+    return {
+        key: {float(number) + 0.0: f"{number}" for path, number in found if _is_in(path, place)}
+        for key, place in places.items()
+    }
+
+
+def decimal_of(value: float, literals: Literals) -> str:
+    """A number as the decimal that is stated, or else, as for those of a range, the shortest that is read as it."""
+    shortest = repr(float(value))
+    text = literals.get(value, shortest) if value else shortest
+    return text if DECIMAL.fullmatch(text) and Decimal(text) != Decimal(shortest) else shortest
+
+
+def _leaves(data: Any, path: str = "") -> Iterator[tuple[str, Decimal | int]]:
+    """The finite numbers in tables and lists, each after the dotted keys of the tables in which it stands."""
+    if isinstance(data, dict):
+        for name, inner in data.items():
+            yield from _leaves(inner, f"{path}.{name}" if path else name)
+    elif isinstance(data, list):
+        for inner in data:
+            yield from _leaves(inner, path)
+    elif isinstance(data, Decimal | int) and not isinstance(data, bool) and Decimal(data).is_finite():
+        yield path, data
+
+
+def _is_in(path: str, place: str) -> bool:
+    return f"{path}.".startswith(f"{place}.")
+
+
+def write_proof(case: Case, proofs: Sequence[CurveProof], folder: Path, *, is_whole: bool) -> None:
+    """proof.json: for each curve its parameters, and every bound with the certificate from which it follows.
+
+    A bound has a line. Numbers among the parameters are written as the decimals of which the bounds hold.
+    """
+    head = {"fpsolve": __version__, "case": case.name, "complete": is_whole}
+    lines = ",\n".join(f" {json.dumps(key)}: {json.dumps(value)}" for key, value in head.items())
+    curves = []
+    for proof in proofs:
+        written = {key: _line(value) for key, value in proof.curve.parameters.items()}
+        written |= {key: text for key, text in proof.stated.parameters.items() if DECIMAL.fullmatch(text)}
+        moments = ",\n".join(f"    {_moment(p, found)}" for p, found in proof.moments)
+        parts = {
+            "parameters": f"{{{', '.join(f'{json.dumps(key)}: {text}' for key, text in written.items())}}}",
+            "moments": f"[\n{moments}\n   ]",
+            "lyapunov_exponent": "null" if proof.exponent is None else _line(_bound(proof.exponent)),
+            "stability_index": "null" if proof.index is None else _index(proof.index),
+            "verdicts": _line(proof.verdicts),
+        }
+        if proof.excursions:
+            rare = ", ".join(_excursion(sense, each) for sense, each in proof.excursions.items())
+            parts["excursions"] = f"[{rare}]"
+        text = ",\n".join(f"   {json.dumps(key)}: {value}" for key, value in parts.items())
+        curves.append(f"  {{\n{text}\n  }}")
+    write_text(folder / PROOF, "\n".join(["{", f'{lines},\n "curves": [', ",\n".join(curves), " ]", "}", ""]))
+
+
+def _bound(found: Enclosure | None) -> dict[str, Any]:
+    """lower, upper and the certificate; null where nothing is proven."""
+    if found is None or found.certificate is None:
+        return {"lower": None, "upper": None, "certificate": None}
+    ends = (end if math.isfinite(end) else None for end in (found.lower, found.upper))
+    return dict(zip(("lower", "upper"), ends, strict=True)) | {"certificate": found.certificate.model_dump(mode="json")}
+
+
+def _moment(p: str, found: Enclosure | None) -> str:
+    """The bounds on Λ(p); p as the decimal of which they hold."""
+    return f'{{"p": {p}, {_line(_bound(found))[1:]}'
+
+
+def _index(found: IndexEnclosure) -> str:
+    """Bounds on δ_p, and Λ at two p beside it."""
+    ends = (found.lower, found.upper) if found.is_proven else (None, None)
+    moments = ", ".join(_moment(p, each) for p, each in found.moments)
+    return f'{{"lower": {_line(ends[0])}, "upper": {_line(ends[1])}, "moments": [{moments}]}}'
+
+
+def _excursion(sense: str, found: ExcursionBound) -> str:
+    """A bound of excursions, and the bounds on Λ(p) from which it follows."""
+    return f'{{"sense": "{sense}", "factor": {_line(found.factor)}, "moment": {_moment(found.p, found.moment)}}}'
+
+
+def _line(data: Any) -> str:
+    return json.dumps(data, allow_nan=False, ensure_ascii=False)
+
+
+def show(case: Case, proofs: Sequence[CurveProof]) -> Iterator[Block]:
+    """The bounds and what follows from them."""
+    if len(proofs) > EACH:
+        yield proofs_grid(case, proofs)
+        return
+    for proof in proofs:
+        yield Sentence("", case.heading(proof.curve))
+        yield proof_grid(proof)
+        told = proof.verdicts
+        if sum(found is not None and found.sign != 0 for _, found in proof.moments) > PROOFS:
+            path = verdicts([], 0 if proof.exponent is None else proof.exponent.sign)
+            told = [*path, f"of {len(proof.moments)} moments {_counted(proof)}"]
+        if told:
+            yield Sentence(f"Proven: {'; '.join(told)}.")
+        if proof.excursion is not None:
+            rare = excursion_in_words(proof)
+            yield Sentence(f"Proven: {rare}." if rare else f"{SYMBOL} {NOT_PROVEN}")
+
+
+def proof_grid(proof: CurveProof) -> Grid:
+    """The bounds on Λ at each p, λ and δ_p, how far they are apart, and what the moment or almost every path does."""
+    columns = [Column("quantity"), Column("≥"), Column("≤"), Column("width", 2), Column("what it says", 1)]
+    grid = Grid("", columns)
+    bounds: list[tuple[str, Enclosure | IndexEnclosure | None, str]]
+    bounds = [(f"Λ({_order(p)})", found, _fate(p, found)) for p, found in proof.moments]
+    if (path := proof.exponent) is not None:
+        bounds.append((LYAPUNOV_EXPONENT.symbol, path, FATES[path.sign] if path.is_proven else NOT_PROVEN))
+    if proof.index is not None:
+        bounds.append((STABILITY_INDEX.symbol, proof.index, "" if proof.index.is_proven else NOT_PROVEN))
+    for symbol, found, fate in bounds:
+        row = ["", "", ""]
+        if found is not None and found.is_proven:
+            size = found.upper - found.lower
+            width = f"{size:.0e}".replace("inf", "∞") if size else "0"
+            is_met = not isinstance(found, Enclosure) or found.is_met
+            row = [*bounds_text(found), width if is_met else f"{width}, too wide"]
+        grid.rows.append([symbol, *row, fate])
+    return grid
+
+
+def proofs_grid(case: Case, proofs: Sequence[CurveProof]) -> Grid:
+    """How many Λ(p) are proven of each curve, the bounds on λ, and what becomes of paths and moments."""
+    p, symbol = [p for p, _ in proofs[0].moments], LYAPUNOV_EXPONENT.symbol
+
+    def proven(proof: CurveProof) -> str:
+        return f"{sum(found is not None and found.is_proven for _, found in proof.moments)} of {len(p)}"
+
+    def fate(i: int, proof: CurveProof) -> str:
+        return _fate(*proof.moments[i])
+
+    shown = [
+        Shown(Column("proven"), proven),
+        Shown(Column(symbol, 1), lambda each: _between(each.exponent) if each.exponent else ""),
+        Shown(Column("paths", 2), lambda each: FATES[each.exponent.sign] if each.exponent else ""),
+    ]
+    each_p = [Shown(Column(f"p = {_order(each)}", 3), partial(fate, i)) for i, each in enumerate(p)]
+    return grid_of(
+        case, proofs[:ROWS], shown + (each_p if len(p) <= PROOFS else [Shown(Column("moments", 3), _counted)])
+    )
+
+
+def _fate(p: str, found: Enclosure | None) -> str:
+    if found is None or not found.is_proven:
+        return "not tried" if found is None else NOT_PROVEN
+    return FATES[found.sign] if float(p) else "is constant"
+
+
+def _order(p: str) -> str:
+    """p for the eye."""
+    return text if len(text := plain(p)) <= LONGEST else f"{float(p):.10g}"
+
+
+def _counted(proof: CurveProof) -> str:
+    """ "31 grow, 1 decays"."""
+    signs = [found.sign for _, found in proof.moments if found is not None]
+    counts = {word: signs.count(sign) for sign, word in FATES.items() if sign}
+    told = [f"{n} {word if n == 1 else word.removesuffix('s')}" for word, n in counts.items() if n]
+    return ", ".join(told) or "none is known"
+
+
+def _between(found: Enclosure | IndexEnclosure) -> str:
+    """ "in [0.0010257274, 0.0010257275]"."""
+    return f"in [{', '.join(bounds_text(found))}]" if found.is_proven else NOT_PROVEN
+
+
+def bounds_text(found: Enclosure | IndexEnclosure) -> tuple[str, str]:
+    """Both bounds with two digits of how far they are apart, of a single one five digits, rounded outward."""
+    if found.lower == found.upper:
+        return f"{found.lower:g}", f"{found.upper:g}"
+    known = [end for end in (found.lower, found.upper) if math.isfinite(end)]
+    size, digits = (found.upper - found.lower, 2) if len(known) > 1 else (abs(known[0]) or 1.0, 5)
+    step = Decimal(1).scaleb(math.floor(math.log10(size)) + 1 - digits)
+    low, high = (
+        f"{Decimal(repr(end)).quantize(step, rounding)}" if math.isfinite(end) else f"{end}".replace("inf", "∞")
+        for end, rounding in ((found.lower, ROUND_FLOOR), (found.upper, ROUND_CEILING))
+    )
+    return low, high
+
+
+def excursion_in_words(proof: CurveProof) -> str:
+    """What is proven of excursions: "0.757 A^-0.3784 ≤ P(sup ‖x‖ ≥ A) ≤ 1.34 A^-0.3783 for every A > 1"."""
+    found, text = proof.excursions, SYMBOL
+    if not found:
+        return ""
+    if "lower" in found:
+        text = f"{_power(found['lower'], ROUND_FLOOR)} ≤ {text}"
+    if "upper" in found:
+        text = f"{text} ≤ {_power(found['upper'], ROUND_CEILING)}"
+    return f"{text} for every A > 1, a start (1, 0) and any noise at the start"
+
+
+def _power(found: ExcursionBound, rounding: str) -> str:
+    """c A^−p with the digits of c rounded outward."""
+    factor = Decimal(repr(found.factor))
+    step = Decimal(1).scaleb(factor.adjusted() - 3)
+    return f"{factor.quantize(step, rounding)} A^-{found.p}"
+
+
+class Kept:
+    """Bounds on Λ(p) and λ that an earlier run has proven, each verified anew from its certificate.
+
+    Args:
+        folder: of their records.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.records, self._known = Records(folder).look(), dict[str, Enclosure | None]()
+
+    def find(self, question: Question) -> Enclosure | None:
+        """What was proven, if it was, and follows."""
+        if (key := self._key(question)) not in self._known:
+            self._known[key] = self._read(key)
+        return self._known[key]
+
+    def add(self, question: Question, found: Answer) -> None:
+        """Keep what was proven."""
+        if isinstance(found, Enclosure):
+            append(self.records.folder, self._key(question), {"enclosure": ENCLOSURES.dump_python(found)})
+
+    def _read(self, key: str) -> Enclosure | None:
+        if (address := self.records.address(key)) is None:
+            return None
+        try:
+            found = ENCLOSURES.validate_python(self.records.read(address)["enclosure"])
+        except (OSError, ValueError, LookupError, TypeError):
+            return None
+        if found.certificate is None:
+            return found if found == replace(NOTHING, wanted=found.wanted) else None
+        whole = enclosure_of(found.certificate)
+        is_same = (whole.lower, whole.upper) == (found.lower, found.upper)
+        return found if is_same and not objection(found.certificate) else None
+
+    @staticmethod
+    def _key(question: Question) -> str:
+        """From the function and its arguments; the problem among these follows from what is stated."""
+        _, *asked = question.args
+        told = [__version__, question.func.__name__, *map(repr, asked), repr(question.keywords)]
+        return sha256("\n".join(told).encode()).hexdigest()
+
+
+@dataclass(frozen=True)
+class Checked:
+    """What became of the claims of a file.
+
+    Attributes:
+        claims: all of them.
+        objections: which do not follow, and why.
+    """
+
+    claims: Claims
+    objections: Sequence[str]
+
+
+def prove_case(
+    case: Case,
+    out: str | Path = "results",
+    *,
+    width: float | None = None,
+    pool: Pool | None = None,
+    watch: Watch = SILENT,
+) -> list[CurveProof]:
+    """Prove bounds on Λ at every p of every curve, and on λ, δ_p and excursions; write proof.json into `out`/<case>/.
+
+    Args:
+        width: wanted upper − lower; 1e-7 of the scale of each number if None.
+        pool: who proves; this process if none is given.
+
+    Raises:
+        FpsolveError: a curve cannot be proven, or the width is none; nothing is written.
+        OutputError: the folder cannot be made or written to, or another run writes into it.
+        KeyboardInterrupt: its text says what is kept.
+    """
+    refuse_unprovable_case(case, width)
+    plan = Plan(case, width)
+    answers, proofs = list[Answer](), list[CurveProof]()
+    started = datetime.now(UTC)
+
+    def report() -> None:
+        if proofs:
+            facts, is_whole = facts_since(case, started), len(answers) == plan.total
+            write_report(case, folder, watch, show(case, proofs), facts=facts, files=[PROOF], complete=is_whole)
+
+    def write() -> list[CurveProof]:
+        proofs = plan.gathered(answers)
+        if proofs:
+            with writable(folder):
+                write_proof(plan.case, proofs, folder, is_whole=len(answers) == plan.total)
+        return proofs
+
+    with (
+        own_folder(case, out, (PROVEN,)) as folder,
+        saying_if_interrupted(lambda: kept(len(answers), f"of {plan.total} bounds", folder)),
+        watch.bar(Phase(case.name, "proving", plan.total, BOUNDS)) as progress,
+        pool or serial() as workers,
+    ):
+        written = monotonic()
+        with shown_at_the_end(report):
+            try:
+                kept_bounds = Kept(folder / PROVEN_RECORDS)
+                fresh = workers.map(answer, (each for each in plan.questions() if kept_bounds.find(each) is None))
+                for question in plan.questions():
+                    found: Answer | None = kept_bounds.find(question)
+                    is_known = found is not None
+                    if found is None:
+                        kept_bounds.add(question, found := next(fresh))
+                    answers.append(found)
+                    progress(failed=not found.is_proven, known=is_known)
+                    if monotonic() - written > EVERY and len(answers) % plan.each == 0:
+                        write()
+                        written = monotonic()
+            finally:
+                proofs = write()
+    return proofs
+
+
+def check_proof(path: Path) -> Checked:
+    """Verify all claims of a proof.json from their certificates alone.
+
+    Raises:
+        MalformedProof: it is none.
+        MissingFlint: python-flint is not installed.
+    """
+    try:
+        claims = claims_from(read_text(path, _WORDS))
+    except Unreadable as failure:
+        raise MalformedProof(f"{path}: {failure.sentence}") from None
+    except MalformedProof as failure:
+        raise MalformedProof(f"{path}: {failure}; make one with `fpsolve prove`") from None
+    return Checked(claims, tuple(claims.objections()))
