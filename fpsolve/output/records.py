@@ -459,10 +459,10 @@ def _read_as(what: str) -> Iterator[None]:
         raise ValueError(f"this is no record of {what}: {failure!r}") from failure
 
 
-def digest_of(kind: type, **content: Any) -> str:
-    """A digest of what results of a kind follow from beside their curve, and of their form."""
+def key_of(kind: type, curve: Curve, **content: Any) -> str:
+    """What a record of a kind is found by: the version, a digest of form and content, and that of the curve."""
     form = {name: each.form for name, each in _recorded(kind).items()}
-    return _hash({"form": form, **content})
+    return f"{RESULT_VERSION}-{_hash({'form': form, **content})}-{curve.digest}"
 
 
 def _hash(content: Any) -> str:

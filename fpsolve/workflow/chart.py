@@ -28,7 +28,7 @@ from fpsolve.errors import FpsolveError, NoPerturbationTheory
 from fpsolve.files import writable, write_csv, write_json
 from fpsolve.messages import Code, Message, message_of
 from fpsolve.model.problem import Problem
-from fpsolve.output.records import RESULT_VERSION, Record, Records, append, digest_of, made_of, record_of
+from fpsolve.output.records import Record, Records, append, key_of, made_of, record_of
 from fpsolve.output.tables import head, in_case_words
 from fpsolve.page.page import Block, Column, Drawing, Grid, Sentence
 from fpsolve.page.plots import line_of, plot_of
@@ -216,8 +216,7 @@ class Lines:
 def _line_key(case: Case, line: Boundary) -> str:
     """What the record of a line of a chart is found by."""
     frame = [repr(each) for each in (line.zero, line.x, line.y, line.step, line.budget)]
-    digest = digest_of(Line, frame=frame, nodes=charted(case).nodes)
-    return f"{RESULT_VERSION}-{digest}-{case.curve({}).digest}"
+    return key_of(Line, case.curve({}), frame=frame, nodes=charted(case).nodes)
 
 
 def _line_of(record: Record, line: Boundary) -> Boundary:

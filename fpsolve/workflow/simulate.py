@@ -21,7 +21,7 @@ from fpsolve.errors import FpsolveError
 from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, MOMENT
 from fpsolve.files import writable, write_csv, write_json
 from fpsolve.messages import Code, Message
-from fpsolve.output.records import RESULT_VERSION, Records, append, digest_of, made_of, record_of
+from fpsolve.output.records import Records, append, key_of, made_of, record_of
 from fpsolve.output.tables import head, in_case_words, parameters_of
 from fpsolve.page.limits import EACH, PICTURES
 from fpsolve.page.page import Block, Column, Drawing, Grid, Sentence, filled
@@ -148,6 +148,11 @@ def simulation_fits(simulated: SimulatedCurve, orders: Sequence[float]) -> bool:
     return is_whole and all(map(math.isfinite, numbers))
 
 
+def simulation_key(curve: Curve, orders: Sequence[float], setting: MonteCarloSection) -> str:
+    """What the record of a curve is found by."""
+    return key_of(SimulatedCurve, curve, orders=list(orders), setting=setting.model_dump(mode="json"))
+
+
 class Simulations:
     """The simulations of the curves of a case, of which an earlier run may have kept some.
 
@@ -168,6 +173,7 @@ class Simulations:
             self.records.remove()
         self.simulated, self.interruption = list[SimulatedCurve](), ""
         self._orders = case.simulated.tolist()
+        self._key = partial(simulation_key, orders=self._orders, setting=case.monte_carlo)
         curves = case.curves() if self.records.look().are_there else ()
         self._known = {curve.number for curve in curves if self._found(curve)}
 
@@ -226,11 +232,6 @@ class Simulations:
         """Its simulation, if that is known; a record of another form does not count."""
         found = self.records.made(self._key(curve), lambda record: simulated_of(record, curve))
         return found if found and simulation_fits(found, self._orders) else None
-
-    def _key(self, curve: Curve) -> str:
-        """What the record of a curve is found by."""
-        setting = self.case.monte_carlo.model_dump(mode="json")
-        return f"{RESULT_VERSION}-{digest_of(SimulatedCurve, orders=self._orders, setting=setting)}-{curve.digest}"
 
 
 def write_simulation(case: Case, simulated: SimulatedCurve, folder: Path) -> None:

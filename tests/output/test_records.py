@@ -34,7 +34,6 @@ from fpsolve.output.records import (
     part_key,
     record_of_set,
     set_key,
-    simulation_key,
 )
 from fpsolve.parts import PARTS
 from fpsolve.parts.every import BY_NAME
@@ -42,6 +41,7 @@ from fpsolve.parts.indices import JumpIndex
 from fpsolve.parts.part import Entry, Job, Numerics, Reason
 from fpsolve.study import solve
 from fpsolve.study.solve import everything, solve_curve
+from fpsolve.workflow.simulate import simulation_key
 from tests.kit import ALL, case_in, from_record, solve_sets
 from tests.output.test_datasets import HOPELESS, PRODUCT, TEXT
 
