@@ -46,8 +46,8 @@ ROOMS = {
     "output": "results become files and pictures",
     "show": "what is said of results",
     "page": "blocks on a terminal and in HTML",
-    "workflow": "run, simulate, chart and check a case",
-    "commands": "what each command does",
+    "workflow": "what each command does",
+    "commands": "options that commands share",
 }
 
 
