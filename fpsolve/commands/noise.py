@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from fpsolve.case.case import Case
     from fpsolve.case.new import Modes
     from fpsolve.measured import Record, Spectrum
-    from fpsolve.workflow.measurement import Wanted
+    from fpsolve.workflow.noise import Wanted
 
 CLOSE = 0.02
 """By which share of it two statements of a frequency may differ."""
@@ -132,7 +132,7 @@ def measurement_of(
     """
     from fpsolve.measured import read_record, read_spectrum
     from fpsolve.measured.signals import SIGNALS
-    from fpsolve.workflow.measurement import Wanted, refuse_wrong_case
+    from fpsolve.workflow.noise import Wanted, refuse_wrong_case
 
     of = stated.of or stated.noise_in or "stiffness"
     place = SIGNALS[of].noise_in
@@ -229,7 +229,7 @@ def _modes(stated: Statement, of: str, case: Case | None) -> Modes:
     from fpsolve.case.new import modes_of
     from fpsolve.measured.spectrum import UNITS
     from fpsolve.measured.units import GRAVITY
-    from fpsolve.workflow.measurement import natural_frequencies
+    from fpsolve.workflow.noise import natural_frequencies
 
     restitution, zeta = stated.restitution, stated.damping_ratio
     if zeta is not None and math.isnan(zeta):
@@ -314,7 +314,7 @@ def noise(
     """
     from fpsolve.page.terminal import print_blocks
     from fpsolve.show.results import last_line
-    from fpsolve.workflow.measurement import Convention, noise_case, noise_sections, show
+    from fpsolve.workflow.noise import Convention, noise_case, noise_sections, show
 
     start = monotonic()
     case = Options().load([stated.case])[0] if stated.case else None

@@ -5,7 +5,7 @@ from .chart import chart_case as chart_case
 from .check import check_case as check_case
 from .check import compare as compare
 from .check import expected as expected
-from .measurement import noise_case as noise_case
+from .noise import noise_case as noise_case
 from .progress import Phase as Phase
 from .progress import Watch as Watch
 from .prove import check_proof as check_proof

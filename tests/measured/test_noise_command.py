@@ -13,7 +13,7 @@ from fpsolve.case.case import load_case
 from fpsolve.cli import main
 from fpsolve.commands.options import BAD_INPUT
 from fpsolve.measured import read_spectrum, weak_exponent, weak_moment
-from fpsolve.workflow.measurement import natural_frequencies
+from fpsolve.workflow.noise import natural_frequencies
 from tests.kit import read_json
 
 ROOT = Path(__file__).parents[2]
