@@ -8,6 +8,7 @@ import pytest
 
 from fpsolve.case.case import load_case
 from fpsolve.cli import NOT_CONVERGED, main
+from fpsolve.exponent import ExponentSolver
 from fpsolve.output.records import Records
 from fpsolve.workflow import seal, sets
 from fpsolve.workflow.cases import run_case
@@ -183,6 +184,27 @@ def test_pictures_are_drawn_again_beside_tables_that_stay(tmp_path):
     assert picture.read_bytes() == drawn
     assert tables(tmp_path) == before
     assert seal_of(tmp_path)
+
+
+@pytest.mark.parametrize("values", ["", '[vary]\n"noise.D0" = [0.1, 0.2, 0.3]\n'])
+def test_an_interrupt_in_drawing_leaves_tables_and_seal(tmp_path, monkeypatch, values):
+    text = f"[moments]\np = [2.0]\n[output]\nfigure = false\neigenfunctions = [2.0]\n{values}"
+    (tmp_path / "test.toml").write_text(case_text(text))
+    run(tmp_path)
+    before = tables(tmp_path)
+
+    def stop(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(ExponentSolver, "pair", stop)
+    count = case_of(tmp_path).planned
+    with pytest.raises(KeyboardInterrupt, match=f"^interrupted after {count} of {count} curve"):
+        run(tmp_path)
+    monkeypatch.undo()
+    assert tables(tmp_path) == before
+    assert seal_of(tmp_path)
+    run(tmp_path)
+    assert list((tmp_path / "out/test/eigenfunctions").glob("*.vtu"))
 
 
 def test_many_curves_are_told_from_their_tables(tmp_path, capsys, monkeypatch):

@@ -19,6 +19,7 @@ from fpsolve.messages import Severity
 from fpsolve.output.records import SOLVED_RECORDS, Records, part_keys, set_key
 from fpsolve.page.page import Note
 from fpsolve.parts.part import Numerics
+from fpsolve.study.columns import columns_of
 from fpsolve.study.solve import everything
 
 TABLES = "summary.json", "curves.csv", "moments.csv", "results.nc"
@@ -56,7 +57,8 @@ def _digest(case: Case, folder: Path) -> str:
     """A digest of a case, the version, the records in a folder and its tables. Raises OSError where one is missing."""
     numerics = Numerics.of(case)
     asked = [part_keys(json.dumps(everything(case, number)), numerics) for number in (1, 2)]
-    stated = [__version__, case.text, case.overrides, repr(case), asked, set_key(case.curve({}))]
+    names = [each.name for each in columns_of(case)]
+    stated = [__version__, case.text, case.overrides, repr(case), asked, names, set_key(case.curve({}))]
     found = sha256(json.dumps(stated).encode())
     for values in (*case.vary.columns.values(), case.vary.lines):
         found.update(values.tobytes() if isinstance(values, np.ndarray) else json.dumps(values).encode())

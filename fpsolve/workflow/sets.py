@@ -115,7 +115,7 @@ class Sweep:
 
     def find(self) -> None:
         """Look for the records of all sets, also those that a worker has finished without reporting them."""
-        for curve in self.case.curves() if self.records.look().are_there else ():
+        for curve in self.case.curves() if not self.sealed and self.records.look().are_there else ():
             if self.results.find(curve):
                 self._unfinished.discard(curve.number)
                 self._settled += not self._is_drawn(curve.number)
@@ -128,7 +128,9 @@ class Sweep:
                 self.results.add(number)
 
     def _grow(self, order: Order, job: Job) -> None:
-        """Keep what is known of the only set, and show it in the tables."""
+        """Keep what is known of the only set, and show it in the tables; once it is solved, only pictures are drawn."""
+        if self.results.has(1) and not self._unfinished:
+            return
         grow(self.folder, self.numerics, order, job)
         self._unfinished.add(1)
         self.results.add(1, result_of(job.curve, order.asked, self.numerics, job.entries, job.begun))
