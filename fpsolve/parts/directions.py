@@ -56,6 +56,7 @@ ERROR = Quantity(
     comment="total variation, from coarser ones",
 )
 _DIGITS = str.maketrans("₁₂₃₄²", "12342")
+"""Digits in ASCII."""
 STATIONARY = Quantity("stationary_density", "ρ", "stationary density", r"$\rho$")
 
 

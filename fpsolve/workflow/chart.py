@@ -54,7 +54,9 @@ TINTS = ("#FFFFFF", "#F3EFE6", "#E9DFCB", "#DBCBAA", "#C9B388")
 NAMED = 0.01
 """Share of the frame from which on a region has room for a letter; smaller ones are in chart.json only."""
 CLOSED_FORM: dict[str, Any] = {"linestyle": (0, (2, 3)), "linewidth": 1.4, "zorder": 3}
+"""The look of a closed form."""
 FORM = Format(height=4.0)
+"""The size of a figure."""
 SPECIAL = {"fold": ("fold", "^"), "crossing": ("crossing", "o"), "at ": ("value asked for", "s")}
 """Beginnings of labels, what the legend calls such points, and their markers."""
 

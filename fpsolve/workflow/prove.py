@@ -55,10 +55,13 @@ from fpsolve.workflow.progress import BOUNDS, SILENT, Phase, Watch
 from fpsolve.workflow.reports import facts_since, shown_at_the_end, write_report
 
 ORDERS = "moments.p"
+"""The key of the p of a case."""
 Literals = Mapping[float, str]
 """Decimals by their floats."""
 Answer: TypeAlias = Enclosure | IndexEnclosure | ExcursionEnclosure
+"""Bounds that were found."""
 Question = partial[Any]
+"""A function that finds bounds, with its arguments."""
 NOT_PROVEN = "not proven"
 """The word where no bound is proven."""
 LONGEST = 12
@@ -66,10 +69,13 @@ LONGEST = 12
 FATES = {1: "grows", -1: "decays", 0: "open"}
 """The fate of a path or a moment by the sign of its exponent."""
 PROVEN_RECORDS = "records/proven"
+"""The folder of the records of bounds."""
 ENCLOSURES = TypeAdapter(Enclosure)
+"""The form of bounds in a record."""
 EVERY = 30.0
 """Seconds after which the curves that are done are written, so that a run that is killed keeps them."""
 _WORDS = Words("the proof", "a proof", "proof.json", "JSON", "make one with `fpsolve prove`")
+"""The words of messages on a proof.json."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,8 +86,7 @@ class CurveProof:
         stated: what is proven of.
         moments: p as a decimal, and bounds on Λ(p) or None where that was not tried.
         exponent: bounds on λ; None where they are not asked for, or were not tried.
-        index: bounds on δ_p; the same.
-        excursion: bounds of P(sup ‖x‖ ≥ A); the same.
+        index, excursion: bounds on δ_p, and of P(sup ‖x‖ ≥ A), or None as for λ.
     """
 
     curve: Curve
