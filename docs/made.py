@@ -29,7 +29,7 @@ TWO_AXES = "filtered", "two_noises", "coupled", "coupled_ou"
 OWN_P = "stochastic_mathieu", "flutter"
 """Cases of which their own p are drawn."""
 ROOMS = {
-    "model": "linear systems of two to four variables, and their noises",
+    "model": "linear systems, and their noises",
     "exponent": "Λ(p), its eigenpairs and what follows from them",
     "analysis": "densities, sensitivities, where stability ends",
     "testing": "for authors of a noise",

@@ -1,4 +1,4 @@
-"""Moment Lyapunov exponents of linear systems of two to four variables under random loads, by finite elements.
+"""Moment Lyapunov exponents of linear systems under random loads, by finite elements.
 
 `VibroImpactOscillator` is the system of the paper. `PlaneSystem.of_equations` states others as equations.
 

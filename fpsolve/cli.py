@@ -41,7 +41,7 @@ TRACEBACK = "--traceback"
 
 app = App(
     name="fpsolve",
-    help="""Moment Lyapunov exponents of linear systems of two to four variables under random loads, by finite elements.
+    help="""Moment Lyapunov exponents of linear systems under random loads, by finite elements.
 
     A case file states a vibro-impact oscillator, [oscillator], or any other linear system, [system].
 

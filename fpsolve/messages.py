@@ -37,6 +37,7 @@ class Remedy(StrEnum):
     MESH_FILE = "make one with `write_mesh`"
     REDUCTION = "or the Ornstein-Uhlenbeck reduction of the noise"
     NO_REDUCTION = "the unreduced noise keeps Eq. (7)"
+    SIMULATION = "or `fpsolve.simulation.simulate` it"
     FOLDER = "choose another folder"
     MEMORY = "use a smaller budget, or fewer processes"
 
@@ -66,6 +67,15 @@ class Code(Enum):
         "failure: {what} is not computed: for r0 > 1 the noise has algebraic tails, so that Λ(p) is infinite for p > 0 "
         "and p < -1, and between is carried by paths far out, which a truncated domain does not hold; take λ, or "
         "choose r0 <= 1, {remedy}"
+    )
+    EVEN_ONLY = (
+        "failure: {what} is not computed: of {count} variables{is_struck:? under impulses¦} Λ(p) is found for even "
+        "p > 0 alone, by closed equations of moments; as Λ(p) is convex, λ <= Λ(2)/2 and Λ(p) <= (p/2) Λ(2) for "
+        "0 < p < 2; take even p, {remedy}"
+    )
+    CONVEX_BOUNDS = (
+        "note: bounds, as Λ(p) is convex and Λ(0) = 0: λ <= Λ({p:g})/{p:g} <= {bound:.6g}, and "
+        "Λ(q) <= (q/{p:g}) Λ({p:g}) for 0 < q < {p:g}{root:?; δ_p is ¦}{root}"
     )
     INVARIANT_RAY = (
         "failure: Λ({p:g}) is not known: the phase never leaves the ray at phi = {phase:.6g}, whatever the noise does, "

@@ -8,6 +8,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from fpsolve import load_case
 from fpsolve.case import Case
 from fpsolve.output.records import entries_of, record_of_set
@@ -118,3 +120,19 @@ def read_csv(path: Path) -> list[dict[str, str]]:
 def files(folder: Path) -> set[str]:
     """All files below a folder, by their paths from there."""
     return {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
+
+
+def chain_of_masses(count, damping=0.02, spring=0):
+    """A₀ and A₁ of unit masses and springs from the ground on, one spring k(1 + ξ), and the frequencies.
+
+    The unit of time is that of the first frequency, and all modes have one damping ratio.
+    """
+    stiffness = 2 * np.eye(count) - np.eye(count, k=1) - np.eye(count, k=-1)
+    stiffness[-1, -1] = 1.0
+    stretch = np.eye(count)[spring] - (np.eye(count)[spring - 1] if spring else 0.0)
+    squares, modes = np.linalg.eigh(stiffness)
+    stiffness, load = stiffness / squares[0], np.outer(stretch, stretch) / squares[0]
+    frequencies = np.sqrt(squares / squares[0])
+    damper = modes @ np.diag(2 * damping * frequencies) @ modes.T
+    none, one = np.zeros((count, count)), np.eye(count)
+    return np.block([[none, one], [-stiffness, -damper]]), np.block([[none, none], [-load, none]]), frequencies

@@ -228,7 +228,8 @@ def sensitivities(
     """
     solver = solver_of(problem, mesh, rtol, budget)
     points = checked_moments(p, problem, may_be_empty=True)
-    return solve_sensitivities(solver, points, problem.derivatives(), progress=progress)
+    indices = () if problem.is_closed_only else DIFFERENTIATED
+    return solve_sensitivities(solver, points, problem.derivatives(), indices=indices, progress=progress)
 
 
 def solve_sensitivities(
@@ -339,6 +340,10 @@ class Gradient:
         if abs(p) < SMALL_P:
             return {key: _times(p, each) for key, each in self._by_small_p(p).items()}
         solver, along = held_by(self._solver, p, self._along)
+        if solver.problem.dimension > 2 and (known := solver.even(p)):
+            slopes = {key: known.slope(key) for key in along}
+            sizes = {key: known.scale / abs(by.theta) if by.theta else abs(slopes[key][0]) for key, by in along.items()}
+            return {key: Estimate(*slopes[key], scale=sizes[key]) for key in along}
         solution = solver.solution(p)
         around = PairDerivatives(solution.pair)
         changed = _changed(around, along)

@@ -14,6 +14,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from functools import partial
+from itertools import repeat
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -23,6 +24,7 @@ from scipy.special import ndtr, ndtri
 from fpsolve.analysis.sensitivity import RECORDS, Sensitivities, solve_sensitivities
 from fpsolve.arrays import FloatArray, is_whole, shown
 from fpsolve.data import Result, dataset
+from fpsolve.errors import NotConverged
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.error import Absent, Estimate
 from fpsolve.exponent.function import nonzero_root
@@ -258,16 +260,19 @@ def uncertainty(
         LYAPUNOV_EXPONENT.name: solver.lyapunov_exponent,
         STABILITY_INDEX.name: partial(nonzero_root, solver),
     }
+    values = {} if problem.is_closed_only else values
     found = {name: each for name, solve in values.items() if (each := solve())}
     root = found.get(STABILITY_INDEX.name)
     along = {key: problem.derivative(key) for key in laws}
     slopes = solve_sensitivities(solver, points, along, indices=[*found], root=None if root is None else root.value)
-    moments = [(solver.solution(each).pair.value if each else 0.0) for each in points.tolist()]
+    solved = solver.moments(points)
+    if solved.failures:
+        raise NotConverged(solved.failures[0].reason)
     spreads = {name: spread_of(each.value, slopes.indices.get(name, {}), laws) for name, each in found.items()}
     return Uncertainty(
         laws=laws,
         p=points,
-        moments=tuple(spread_of(value, row, laws) for value, row in zip(moments, slopes.moments, strict=True)),
+        moments=tuple(map(spread_of, solved.value.tolist(), slopes.moments, repeat(laws))),
         indices={name: each for name, each in spreads.items() if each is not None},
         sensitivities=slopes,
     )

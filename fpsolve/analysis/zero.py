@@ -26,6 +26,8 @@ from fpsolve.model.problem import Problem, checked_problem, refuse_infinite
 
 RTOL = 1e-10
 """Error of F that is wanted of two variables, relative to its scale."""
+RTOL_OF_CLOSED = 1e-7
+"""Error of F that is wanted where even moments are all, relative to its scale."""
 RTOL_BEYOND_PLANE = 1e-4
 """Error of F that is wanted of more variables, relative to its scale."""
 HALF = 0.5
@@ -184,6 +186,8 @@ def check_axes(problem: Problem, x: Axis, y: Axis) -> None:
 
 def line_rtol(problem: Problem, zero: Zero) -> float:
     """The error of F that is wanted on a line, over its scale: larger beyond the plane, unless moments are closed."""
+    if problem.is_closed_only:
+        return RTOL_OF_CLOSED
     return RTOL if problem.dimension == 2 or (zero.p > 0 and zero.p % 2 == 0) else RTOL_BEYOND_PLANE
 
 
@@ -197,7 +201,7 @@ def ratio_with_slopes(solver: ExponentSolver, p: float, keys: Sequence[str]) -> 
     """
     value, error = solver.ratio_alone(p)
     if solver.problem.dimension > 2 and (known := solver.even(p)):
-        return value, error, np.array([known.slope(key) for key in keys]) / p
+        return value, error, np.array([known.slope(key)[0] for key in keys]) / p
     held, by_key = held_by(solver, p, {key: solver.problem.derivative(key) for key in keys})
     along = [by_key[key] for key in keys]
     around = PairDerivatives(held.whole.solution(p).pair) if abs(p) >= SMALL_P else held.around_zero
@@ -240,7 +244,7 @@ class Ratio:
         p, solver = self.p, self.solver(theta, is_near=is_near)
         refuse_infinite(solver.problem, p)
         value, error, slopes = ratio_with_slopes(solver, p, self.keys)
-        self._starts = solver.whole.known
+        self._starts = {} if solver.problem.is_closed_only else solver.whole.known
         return Sample(theta, value, slopes, error, solver.scale(p) / abs(p) if p else solver.scales.linear)
 
 

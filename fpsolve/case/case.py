@@ -70,6 +70,7 @@ from fpsolve.parts.every import PARTS
 from fpsolve.parts.excursions import ExcursionSection
 from fpsolve.parts.response import NAME as RESPONSE
 from fpsolve.parts.response import ResponseSection
+from fpsolve.parts.sensitivities import NAME as SENSITIVITIES
 
 COMPUTED = ("oscillator", "system", "noise", "vary", "mesh")
 """The sections that say of what the numbers are."""
@@ -269,8 +270,10 @@ class CaseWithoutParts(Section):
     def asked(self) -> tuple[str, ...]:
         """The names of what is computed: those of [output], or else what is cheap and what other sections name."""
         if self.output.names is not None:
-            return self.output.names
-        named = {*CHEAP, *(CHEAP_OF_WALLS if self.problem.system.jumps else ())}
+            has_all = self.output.lists_quantities or not self.problem.is_closed_only
+            return self.output.names if has_all else (MOMENT.name, SENSITIVITIES)
+        named = {MOMENT.name} if self.problem.is_closed_only else {*CHEAP}
+        named |= {*(CHEAP_OF_WALLS if self.problem.system.jumps else ())}
         named |= {RESPONSE if each.of_response else each.quantity for each in self.expect}
         return tuple(part.name for part in PARTS if part.is_quantity and (part.name in named or part.is_usual(self)))
 
@@ -281,6 +284,8 @@ class CaseWithoutParts(Section):
             return ()
         is_there = {RESPONSE: self.is_nonlinear, EIGENFUNCTIONS: not self.problem.no_picture}
         is_there |= dict.fromkeys(BY_JUMP, bool(self.problem.system.jumps))
+        if self.problem.is_closed_only:
+            is_there |= dict.fromkeys({*QUANTITY_NAMES} - {MOMENT.name, SENSITIVITIES}, False)
         known = {*self.asked} - ({EIGENFUNCTIONS} if not self.output.asks_for_eigenfunctions else set())
         return tuple(name for name in QUANTITY_NAMES if name not in known and is_there.get(name, True))
 

@@ -39,9 +39,10 @@ from fpsolve.case.sections import (
 from fpsolve.case.vary import Vary, assignments, map_key
 from fpsolve.errors import FpsolveError, MeshError, NoSuchExponent
 from fpsolve.explain import Refusal, faults_in, nearest, quoted, shown
+from fpsolve.exponent.quantities import INDICES
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.fem.space import Space
-from fpsolve.model.problem import Problem, refuse_infinite
+from fpsolve.model.problem import Problem, even_only, refuse_infinite
 from fpsolve.parts.every import PARTS
 from fpsolve.parts.part import Part
 from fpsolve.parts.response import NAME as RESPONSE
@@ -123,8 +124,8 @@ def obstacle(base: Problem, varied: Varied, p: FloatArray, *, with_moments: bool
     if not np.all(np.isfinite(sizes)):
         return f"Eqs. (37)-(38) or R^p overflow; {_MODERATE}"
     try:
-        for extreme in extremes if with_moments else ():
-            refuse_infinite(problem, extreme)
+        for each in (p.tolist() if problem.is_closed_only else extremes) if with_moments else ():
+            refuse_infinite(problem, each)
     except NoSuchExponent as error:
         return error.message.words(CASE_WORDS)
     return ""
@@ -225,7 +226,12 @@ def _of_figure(figure: FigureSection, valid: Known, context: Known) -> Iterator[
 
 
 def _of_output(output: OutputSection, valid: Known, context: Known) -> Iterator[Refusal]:
-    """Eigenfunctions at p that are not among the moments, and a figure of what is not computed."""
+    """Eigenfunctions at p that are not among the moments, a figure of what is not computed, and what is none."""
+    problem = problem_of(valid)
+    if problem and output.lists_quantities:
+        for name in {*(output.names or ())} & INDICES.keys():
+            if told := even_only(problem, INDICES[name].symbol):
+                yield ("quantities",), output.quantities, told.words(CASE_WORDS)
     wanted = ((("eigenfunctions", i), p) for i, p in enumerate(output.eigenfunctions or ()))
     yield from _of_orders(valid, wanted, f"choose one of them, {_without('output.eigenfunctions')}")
     figure: FigureSection = valid.get("figure", FigureSection())

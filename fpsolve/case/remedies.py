@@ -12,6 +12,7 @@ CASE_WORDS: Audience = {
     Remedy.MESH_FILE: "make one with `fpsolve mesh`",
     Remedy.REDUCTION: 'or treatment = "ou-reduction"',
     Remedy.NO_REDUCTION: 'treatment = "exact" keeps Eq. (7)',
+    Remedy.SIMULATION: "or simulate it, see [monte_carlo] and `fpsolve simulate`",
     Remedy.FOLDER: "choose another --out",
     Remedy.MEMORY: "use a smaller [budget], or fewer --jobs",
 }

@@ -500,7 +500,7 @@ def solve_moments(
         next(reports, lambda: None)()
 
     result = None
-    if points.size > FEW_MOMENTS and not solver.classes:
+    if points.size > FEW_MOMENTS and not (solver.classes or solver.problem.is_closed_only):
         ends = float(points.min()), float(points.max())
         with suppress(NotConverged):
             function = MomentLyapunovFunction(

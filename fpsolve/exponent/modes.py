@@ -33,7 +33,8 @@ from fpsolve.fem.noise_axes import CountedAxis
 from fpsolve.fem.space import Space, first_axis
 from fpsolve.fem.sphere import Coordinates, DirectionAxis, SphereAxis, group_dimensions
 from fpsolve.model.problem import Problem
-from fpsolve.theory.moments import even_moment, moment_form
+from fpsolve.theory.moments import even_moment
+from fpsolve.theory.powers import moment_form
 
 FIRST_WAVES = 2
 """Number of waves of the first space in each angle."""

@@ -35,6 +35,7 @@ from fpsolve.model.problem import (
     Problem,
     checked_moments,
     checked_problem,
+    even_only,
     negative_refused,
     refuse_infinite,
     refuse_tails,
@@ -47,6 +48,8 @@ if TYPE_CHECKING:
 
 MOST_EQUATIONS = 8000
 """Of even moments."""
+OF_CLOSED = 1e-4
+"""Share of rtol that moments lack of the terms of their equations, as ω is one of these, and Λ a share of ζω."""
 SURELY = 10.0
 """Multiple of the errors of two values from which on they contradict each other."""
 ROUNDED = 1e-6
@@ -154,7 +157,8 @@ class MomentLyapunov(Result):
         failures, values = [each.reason for each in self.failures], self.solver.problem.values
         more = {"warnings": self.warnings, "notes": self.notes, "failures": failures}
         title, places = quantity.MOMENT.words, {quantity.P: self.p}
-        return dataset(title, "finite elements", numbers, places, values, rtol=self.solver.rtol, **more)
+        method = "closed equations of moments" if self.solver.problem.is_closed_only else "finite elements"
+        return dataset(title, method, numbers, places, values, rtol=self.solver.rtol, **more)
 
     def _said(self) -> str:
         if not self.p.size:
@@ -212,7 +216,9 @@ class ExponentSolver:
 
     @cached_property
     def whole(self) -> WholeProblem:
-        """What solves Λ(p); of several classes that of the one with the largest λ."""
+        """What solves Λ(p); of several classes that of the one with the largest λ. Raises `NoSuchExponent`."""
+        if told := even_only(self.problem, "λ, or another number that follows from eigenfunctions,"):
+            raise NoSuchExponent(told)
         if self.classes:
             return max(self.classes, key=lambda each: each.lyapunov_exponent().value).whole
         starts = {} if self.problem.dimension > 2 else self.starts
@@ -293,13 +299,31 @@ class ExponentSolver:
         if p <= 0 or p % 2 or (is_simple and self.problem.dimension == 2) or self.classes:
             return None
         if p not in self._even:
-            countdown = self.budget.countdown(f"Λ({p:g})")
-            with suppress(NoHierarchy, NotConverged, ArithmeticError), one_thread(), counted(countdown):
-                found = even_moment(self.problem, p, 0.1 * self.tolerance(p, 0.0), MOST_EQUATIONS)
-                checked(Estimate(found.value, found.error, self.scale(p)), self.refinement, p)
-                self._even[p] = found
-            self._even.setdefault(p, None)
+            self._even[p] = None
+            with suppress(NoHierarchy, NotConverged, ArithmeticError):
+                self._even[p] = self._solve_even(p)
         return self._even[p]
+
+    def _solve_even(self, p: float) -> EvenMoment:
+        """Λ(p) of an even p by the equations of the moments. Raises `NoHierarchy`, `NotConverged`."""
+        with one_thread(), counted(self.budget.countdown(f"Λ({p:g})")):
+            if self.problem.is_closed_only:  # where Λ has no other scale than that of these equations
+                found = even_moment(self.problem, p, rtol=OF_CLOSED * self.rtol)
+            else:
+                found = even_moment(self.problem, p, 0.1 * self.tolerance(p, 0.0), MOST_EQUATIONS)
+            checked(Estimate(found.value, found.error, self.scale(p)), self.refinement, p)
+        return found
+
+    def closed(self, p: float) -> EvenMoment:
+        """Λ(p) of an even p where these are all that is computed. Raises `NotConverged`."""
+        if p not in self._even:
+            try:
+                self._even[p] = self._solve_even(p)
+            except (NoHierarchy, ArithmeticError) as failure:
+                raise NotConverged(Message(Code.NOT_CONVERGED, p=p, reason=str(failure))) from failure
+        if known := self._even[p]:
+            return known
+        raise NotConverged(Message(Code.NOT_CONVERGED, p=p, reason="the moments were not found"))
 
     def doubt(self, error: float, known: EvenMoment) -> float:
         """The difference beyond which a value with this error contradicts an even moment."""
@@ -389,10 +413,15 @@ class ExponentSolver:
                 self.take(point, rows[i])
                 progress()
                 continue
-            even = self.even(point) if self.problem.dimension > 2 else None
-            if even:
-                rows[i] = known[point] = _of_moments(even)
+            even = None
             try:
+                if self.problem.is_closed_only:
+                    rows[i] = known[point] = _of_moments(self.closed(point))
+                    progress()
+                    continue
+                even = self.even(point) if self.problem.dimension > 2 else None
+                if even:
+                    rows[i] = known[point] = _of_moments(even)
                 solution = self.solution(point)
                 estimate, pair = self.estimate(point, solution), solution.pair
                 if abs(point) >= TINIEST_P and not even:  # else Λ has no scale
@@ -421,7 +450,7 @@ class ExponentSolver:
             solver=self,
             warnings=(*missed(self, found, value, errors), *warnings_of_other_places(self.mesh, pairs)),
             failures=tuple(failures),
-            notes=of_the_start(self, found),
+            notes=(*of_the_start(self, found), *bounds(self, found, value, errors)),
         )
 
     def estimate(self, p: float, solution: Solution) -> Estimate:
@@ -583,3 +612,15 @@ def of_the_start(solver: ExponentSolver, p: FloatArray) -> tuple[Message, ...]:
     are equal at p = −1.
     """
     return (Message(Code.START_MATTERS),) if np.any(p < -1) and solver.problem.has_cones else ()
+
+
+def bounds(solver: ExponentSolver, p: FloatArray, value: FloatArray, error: FloatArray) -> tuple[Message, ...]:
+    """What the even moments of a problem that has no others say of λ, of Λ between them, and of δ_p; or nothing."""
+    if not (solver.problem.is_closed_only and p.size):
+        return ()
+    at, order = int(np.argmin(p)), np.argsort(p)
+    low = float(p[order][value[order] < -error[order]].max(initial=0.0))
+    high = float(p[value > error].min(initial=math.inf))
+    root = f"> {low:g}" * (low > 0) + " and " * (low > 0 and high < math.inf) + f"< {high:g}" * (high < math.inf)
+    bound = float(value[at] + error[at]) / float(p[at])
+    return (Message(Code.CONVEX_BOUNDS, p=p[at], bound=bound, root=root or None),)

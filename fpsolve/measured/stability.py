@@ -10,7 +10,7 @@ import numpy as np
 
 from fpsolve.analysis.sensitivity import Sensitivities, solve_sensitivities
 from fpsolve.analysis.spreads import Spread
-from fpsolve.errors import NotConverged
+from fpsolve.errors import FpsolveError, NoSuchExponent, NotConverged
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.solver import solver_of
@@ -72,7 +72,7 @@ def verdict(
     def moment() -> Spread:
         if even := solver.even(2.0):
             progress()
-            return _spread(even.value, even.error, {key: even.slope(key) for key in keys}, fit, keys)
+            return _spread(even.value, even.error, {key: even.slope(key)[0] for key in keys}, fit, keys)
         found = solver.solution(2.0)
         progress()
         slopes = _slopes(solve_sensitivities(solver, np.array([2.0]), along, indices=[], progress=progress))
@@ -84,11 +84,11 @@ def verdict(
         slopes = _slopes(solve_sensitivities(solver, np.zeros(0), along, indices=[name], progress=progress))
         return _spread(found.value, found.error_estimate, _values(slopes.indices[name]), fit, keys)
 
-    solved, failures = list[Spread | None](), list[NotConverged]()
+    solved, failures = list[Spread | None](), list[FpsolveError]()
     for solve in (moment, exponent):
         try:
             solved.append(solve())
-        except NotConverged as failure:
+        except (NotConverged, NoSuchExponent) as failure:
             solved.append(None)
             failures.append(failure)
     if len(failures) == len(solved):

@@ -39,6 +39,8 @@ HARDLY = 2.0
 """Largest factor by which rates may be larger in a frame that is preferred."""
 BARELY = 0.99
 """Share of the rates at which the search for a frame ends. S changes by powers of two: hardly anything is rounded."""
+MOST_TURNED = 4
+"""Largest number of variables of which frames are tried."""
 MOST_STEPS = 400
 """Largest number of steps of this search: some 60 for each variable and unit of 1e18."""
 ROUNDED = 1e-14
@@ -154,7 +156,7 @@ def own_frame(n: int, motion: Motion, spread: Callable[[str], tuple[float, float
 
     own = best = np.eye(n)
     least, choice = size(own), [own]
-    for is_scaling in (True, False):
+    for is_scaling in (True, False) if n <= MOST_TURNED else ():
         steps = [own + step for step in _steps(n, is_scaling)]
         for _ in range(MOST_STEPS):
             found, number = min((size(best @ step), k) for k, step in enumerate(steps))

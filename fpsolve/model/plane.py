@@ -28,8 +28,10 @@ from fpsolve.model.quantity import ResponseQuantities, response_quantities
 Matrix = Sequence[Sequence[float]]
 Xi = ArrayLike | Mapping[str, ArrayLike]
 """ξ, or with several noises that of each by its name."""
-SHAPES = [(n, n) for n in (2, 3, 4)]
-"""Shapes that matrices of terms may have."""
+MOST_VARIABLES = 200
+"""Largest number of variables of a state."""
+BELOW = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
+"""Digits below a line."""
 
 
 @dataclass(frozen=True)
@@ -159,12 +161,12 @@ class CoefficientMatrix:
 
     Args:
         order: n ≥ 0, the power of ε.
-        matrix: A, two rows of two numbers, or n rows of n for a state of n = 3 or 4.
+        matrix: A, n rows of n numbers for a state of n variables.
         g: a coefficient of ξ: any callable from arrays to arrays or numbers; one that pickles, so that results do.
         noise: the name of that noise where there are several.
 
     Raises:
-        ValueError: the matrix is not square and finite, n = 2 to 4, or the order is negative.
+        ValueError: the matrix is not square and finite, n = 2 to 200, or the order is negative.
     """
 
     order: int
@@ -176,10 +178,12 @@ class CoefficientMatrix:
         entries: FloatArray = np.zeros(0)
         with suppress(ValueError):
             entries = real_array(self.matrix, "matrix")
-        if entries.shape not in SHAPES or not is_whole(self.order, 0):
+        n = len(entries) if entries.ndim == 2 else 0
+        if entries.shape != (n, n) or not 2 <= n <= MOST_VARIABLES or not is_whole(self.order, 0):
             raise ValueError(
                 f"got order = {shown(self.order)} and matrix = {shown(self.matrix)}; must be a whole number >= 0 and "
-                "two rows of two finite numbers, such as ((0.0, 0.0), (0.0, 1.0))"
+                "two rows of two finite numbers, such as ((0.0, 0.0), (0.0, 1.0)), or n rows of n, n <= "
+                f"{MOST_VARIABLES}"
             )
         object.__setattr__(self, "order", int(self.order))
         object.__setattr__(self, "matrix", tuple(map(tuple, entries.tolist())))
@@ -345,7 +349,7 @@ class System(Parametrised):
     @property
     def states(self) -> Sequence[str]:
         """The names of its variables."""
-        return tuple(f"x{'₁₂₃₄'[k]}" for k in range(self.dimension))
+        return tuple(f"x{str(k + 1).translate(BELOW)}" for k in range(self.dimension))
 
     @property
     def driven_by(self) -> frozenset[str]:

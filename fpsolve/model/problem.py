@@ -25,6 +25,7 @@ from fpsolve.model.noise import Noise, NoiseDerivative
 from fpsolve.model.noises.several import noises_of
 from fpsolve.model.parameters import Parameter, Parametrised, cached_by_problem
 from fpsolve.model.plane import (
+    BELOW,
     CoefficientMatrix,
     Harmonics,
     Impulse,
@@ -44,6 +45,8 @@ from fpsolve.model.subsystem import Subsystem, components, couplings, hidden_blo
 
 RATE = "1/time"
 """Unit of ξ for which the units of parameters of noises are stated."""
+MOST_BY_DIRECTIONS = 4
+"""Largest number of variables of which functions of a direction are discretised."""
 PHASES = 360
 """Number of φ at which the direction of the phase is looked at."""
 RTOL = 1e-8
@@ -120,10 +123,10 @@ class Problem:
             _ = self._moved  # refuses what has no meaning
         for jump in self.system.jumps:
             self._refuse_ray(jump)
-        if self.dimension > 2 and (self._moved.impulses or self.noise.has_algebraic_tails):
+        if self.dimension > 2 and self.noise.has_algebraic_tails:
             raise ValueError(
-                f"got {self.noise.kind} noise for {self.dimension} variables; impulses and noise with algebraic tails "
-                "are for two variables only: take another kind, or r0 <= 1"
+                f"got {self.noise.kind} noise for {self.dimension} variables; noise with algebraic tails is for two "
+                "variables only: take another kind, or r0 <= 1"
             )
         if not self.noise.is_random:
             raise ValueError(
@@ -189,6 +192,8 @@ class Problem:
     @property
     def no_picture(self) -> str:
         """Why functions of it cannot be drawn; empty where they can, of more than two variables over directions."""
+        if self.is_closed_only:
+            return "functions of the directions of so many variables are not computed; look at Λ(2)"
         if self.dimension > 2:
             return ""
         if len(self.coloured.parts) > 1:
@@ -285,6 +290,13 @@ class Problem:
         rays = self._resting
         return rays if self.frame is None or not rays else tuple((self.frame.own_phase(rays) % math.pi).tolist())
 
+    @cached_property
+    def is_closed_only(self) -> bool:
+        """Whether Λ(p) is found for even p > 0 alone, from closed equations of moments: directions are too many, or
+        impulses move them.
+        """
+        return self.dimension > MOST_BY_DIRECTIONS or (self.dimension > 2 and bool(self._moved.impulses))
+
     @property
     def unit_rate(self) -> float:
         """Its own unit of rates: ω or the size of the order 0, or of all where there is none."""
@@ -344,6 +356,8 @@ class Problem:
         show more, if there are any. Of two variables ‖x‖ on the first of the `invariant_rays`, and on the second one,
         or else the distance from the first.
         """
+        if self.is_closed_only:
+            return ()
         if self.dimension > 2:
             matrices, n = self._by_noise(self.system.terms), self.dimension
             basis, groups, rounded, names = (
@@ -357,7 +371,7 @@ class Problem:
                 inverse = np.linalg.inv(basis)
                 own, groups, rounded = hidden_blocks([inverse @ each @ basis for each in matrices])
                 basis = basis @ own
-                names = [f"y{'₁₂₃₄'[k]}" for k in range(n)]
+                names = [f"y{str(k + 1).translate(BELOW)}" for k in range(n)]
             return subsystems(self.system, basis, groups, names, rounded, self.size) if len(groups) > 1 else ()
         if not (rays := self._resting):
             return ()
@@ -630,12 +644,24 @@ def refuse_tails(problem: Problem, what: str) -> None:
         raise NoSuchExponent(told)
 
 
+def even_only(problem: Problem, what: str) -> Message | None:
+    """Why a quantity other than Λ(p) of even p > 0 is not computed where these are all, see `is_closed_only`."""
+    if not problem.is_closed_only:
+        return None
+    count = problem.dimension
+    is_struck = count <= MOST_BY_DIRECTIONS
+    return Message(Code.EVEN_ONLY, what=what, count=count, is_struck=is_struck, remedy=Remedy.SIMULATION)
+
+
 def refuse_infinite(problem: Problem, p: float) -> None:
-    """Refuse a p for which E‖x‖^p is infinite, or of any sign not computed.
+    """Refuse a p for which E‖x‖^p is infinite, or not computed.
 
     Raises:
-        NoSuchExponent: p ≠ 0, and the noise has algebraic tails; or jumps, and the phase never leaves some ray.
+        NoSuchExponent: p ≠ 0, and the noise has algebraic tails; or jumps, and the phase never leaves some ray; or p is
+            not even, and the problem `is_closed_only`.
     """
+    if not (p > 0 and p % 2 == 0) and (told := even_only(problem, moment_at(p).symbol)):
+        raise NoSuchExponent(told)
     if p:
         refuse_tails(problem, moment_at(p).symbol)
     if problem.invariant_rays and any(jump.log_factor for jump in problem.motion.jumps):

@@ -19,6 +19,8 @@ def _settings(case: Case, number: int) -> Settings:
 
 def _solve(job: Job, settings: Settings) -> dict[str, Any]:
     """z in noise units; nothing where no p was solved. One is solved where all numbers are from an earlier run."""
+    if job.curve.problem.is_closed_only:
+        return {}
     known = job.solver.whole.known
     if not known:
         has_moment = settings["p"] in job.found(MOMENT.name).columns.p

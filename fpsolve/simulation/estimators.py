@@ -163,7 +163,7 @@ def simulate(
     none, and KeyboardInterrupt is raised.
 
     Args:
-        problem: any linear motion of two to four variables, an oscillator without its c₂ and c₃, and its noise.
+        problem: any linear motion, an oscillator without its c₂ and c₃, and its noise.
         p: orders of the moments, one or several.
         estimator: "direct", cheap and for moderate p; or "population", one simulation for each p.
         paths: how many; a multiple of 32 is used.

@@ -263,7 +263,7 @@ def scale_of(problem: Problem) -> Scale:
 
     Then constant terms, with the mean of the noise, count by the largest |Re| of an eigenvalue of theirs, noise of
     strength c by c min(1, c τ), white noise by the largest ½(h q′ + q²) and ½q², jumps once in a half-turn, impulses
-    that stretch by e^s by their rate times s min(1, s).
+    that stretch by e^s by their rate times s min(1, s). Where even p alone are computed constant terms count alone.
     """
     system, of_noises = problem.motion, dict[str, float]()
     steady = np.zeros((problem.dimension, problem.dimension))
@@ -278,6 +278,9 @@ def scale_of(problem: Problem) -> Scale:
             typical = np.asarray(term.g(noise.mean + noise.standard_deviation * np.array([-1.0, 1.0])))
             driven = size * float(np.sqrt(np.mean(typical**2)))
         of_noises[term.noise] = of_noises.get(term.noise, 0.0) + driven
+    if problem.is_closed_only:  # the size of the noise is that of what it does to the fastest modes
+        abscissa = abs(float(np.max(np.linalg.eigvals(steady).real)))
+        return Scale(abscissa or problem.unit_rate, 0.0)
     jumps = sum(abs(jump.log_factor) for jump in system.jumps) * problem.unit_rate / math.pi
     driven = 0.0
     for name, size in of_noises.items():

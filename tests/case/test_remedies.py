@@ -17,6 +17,7 @@ from fpsolve.model.problem import Problem, refuse_infinite
 from tests.conftest import FIG1
 
 WORDS = {
+    "SIMULATION": "or simulate it, see [monte_carlo] and `fpsolve simulate`",
     "MESH": "use more cells ([mesh] phi_cells, xi_cells), a wider noise interval (xi_min, xi_max) or no [mesh]",
     "CELLS": "use more cells in [mesh], or a smaller rtol where there is none",
     "REACH": "use a [mesh] that reaches there, or no [mesh]",

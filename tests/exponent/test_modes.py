@@ -26,7 +26,7 @@ from fpsolve import (
 )
 from fpsolve.analysis import Axis
 from fpsolve.arrays import identity
-from fpsolve.errors import FpsolveError
+from fpsolve.errors import FpsolveError, NoSuchExponent
 from fpsolve.exponent import principal_pair
 from fpsolve.exponent.modes import BEYOND, SphereStart, first_directions, left_of, modal_coordinates, second_moments
 from fpsolve.fem.space import Space, first_axis
@@ -268,13 +268,14 @@ def test_what_is_refused():
     with pytest.raises(FpsolveError, match="in a linear system nothing limits the amplitude"):
         simulated_response(problem(OU), 0.1, 0.1, paths=32, time=1.0, step=0.1, seed=0)
     heavy = NonGaussianNoise(D0=0.1, tau0=0.5, r0=1.2)
-    for noise in (Poisson(1.0, (0.1,), (1.0,)), heavy):
-        with pytest.raises(ValueError, match="are for two variables only"):
-            problem(noise)
+    with pytest.raises(ValueError, match="is for two variables only"):
+        problem(heavy)
+    with pytest.raises(NoSuchExponent, match=r"Λ\(1\) is not computed: of 4 variables under impulses"):
+        moment_lyapunov(problem(Poisson(1.0, (0.1,), (1.0,))), 1.0)
     with pytest.raises(ValueError, match="got a mesh"):
         moment_lyapunov(problem(OU), 1.0, mesh=make_mesh())
     with pytest.raises(ValueError, match="two rows"):
-        CoefficientMatrix(0, np.eye(5).tolist())
+        CoefficientMatrix(0, np.eye(201).tolist())
 
 
 @pytest.mark.slow

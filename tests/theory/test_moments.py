@@ -2,6 +2,7 @@
 
 import math
 from pathlib import Path
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -24,6 +25,9 @@ from fpsolve.model import (
     White,
 )
 from fpsolve.theory import even_moment, hierarchy_exponent
+from fpsolve.theory.powers import moment_form
+from tests import random_many
+from tests.kit import chain_of_masses
 from tests.oracles import filtered, moment_hierarchy, planar, two_noises
 
 FREE, STIFFNESS = [[0.0, 1.0], [-1.0, -0.1]], [[0.0, 0.0], [-1.0, 0.0]]
@@ -154,6 +158,63 @@ def test_more_variables(rng, n):
     assert hierarchy_exponent(steady, 6)[0] == pytest.approx(6 * np.linalg.eigvals(free).real.max(), abs=1e-11)
 
 
+@pytest.mark.parametrize("seed", [2, 24, 33, 43, 81, 85, 86, pytest.param(161, id="next to skew matrices")])
+def test_random_systems(seed):
+    """One for each kind, as one vector or as matrices: `python -m tests.random_many`."""
+    is_within, told = random_many.compared(seed)
+    assert is_within, told
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("seed", "p"), [(seed, 2) for seed in range(1, 201)] + [(seed, 4) for seed in range(1, 36, 2)])
+def test_all_random_systems(seed, p):
+    is_within, told = random_many.compared(seed, p)
+    assert is_within, told
+
+
+def test_moments_of_order_4(rng):
+    """Six variables under a chain."""
+    is_within, told = random_many.compared(30, 4)
+    assert is_within, told
+
+
+@pytest.mark.parametrize("count", [10, 30, 60])
+def test_bounds_of_many_variables(rng, count):
+    """μ₋X ≤ L(X) ≤ μ₊X for a positive X bounds Λ(2) of white noise from both sides, as L is positive.
+
+    That is of Collatz and Wielandt. L is written here, and X alone is that of the program.
+    """
+    free, matrix = rng.standard_normal((2, count, count)) / math.sqrt(count)
+    found = even_moment(driven(free - np.eye(count), matrix, White(s=0.7)), 2)
+    x = moment_form(found.moments, count, 2)
+    x = np.linalg.cholesky(x * np.sign(np.trace(x)))
+    steady = free - np.eye(count) + 0.5 * 0.49 * matrix @ matrix
+    image = (half := steady @ x @ x.T) + half.T + 0.49 * matrix @ x @ x.T @ matrix.T
+    growth = np.linalg.eigvalsh(np.linalg.solve(x, np.linalg.solve(x, image).T))
+    assert growth.max() - growth.min() < 1e-3
+    assert growth.min() - 1e-12 < found.value < growth.max() + 1e-12
+
+
+def test_many_variables_under_coloured_noise():
+    """A chain of six masses has the same Λ(2) as matrices, and as one vector of 78 numbers for each function."""
+    free, matrix, _ = chain_of_masses(6)
+    problem = driven(free, matrix, OrnsteinUhlenbeck(1.0, 0.4 * math.sqrt(2)))
+    found = even_moment(problem, 2)
+    with mock.patch("fpsolve.theory.moments.MOST_AS_POWERS", 20):
+        other = even_moment(problem, 2)
+    assert abs(found.value - other.value) <= found.error + other.error
+    assert found.error < 1e-10
+
+
+def test_a_chain_of_two_masses():
+    """Under noise in the first spring, by an independent program."""
+    free, matrix, _ = chain_of_masses(2)
+    coloured = driven(free, matrix, OrnsteinUhlenbeck(1.0, 0.1 * math.sqrt(2)))
+    assert hierarchy_exponent(coloured, 2)[0] == pytest.approx(-0.0394544357, abs=1e-10)
+    white = driven(free, matrix, White(s=math.sqrt(coloured.noise.spectral_density(2.0))))
+    assert hierarchy_exponent(white, 2)[0] == pytest.approx(-0.0389353938, abs=1e-10)
+
+
 @pytest.mark.parametrize("unit", [1e-9, 1e6])
 def test_the_unit_of_time_and_of_the_state(rng, unit):
     """Λ is that of the system in units of its own, over the unit of time, to the stated error."""
@@ -274,11 +335,11 @@ def test_slopes_by_parameters(rng):
         for key in keys:
             at, step = problem.values[key], 1e-4 * problem.values[key]
             ahead, behind = (even_moment(problem.at({key: at + each}), 2).value for each in (step, -step))
-            assert found.slope(key) == pytest.approx((ahead - behind) / (2 * step), rel=1e-5, abs=1e-9)
+            assert found.slope(key)[0] == pytest.approx((ahead - behind) / (2 * step), rel=1e-5, abs=1e-9)
     last = Problem(ParametricOscillator(1.0, 0.1), NonGaussianNoise(0.3, 0.7, 1.0))
     before = even_moment(last.at({"noise.r0": 1 - 1e-4}), 2).value
     found = even_moment(last, 2)
-    assert found.slope("noise.r0") == pytest.approx((found.value - before) / 1e-4, rel=1e-3)
+    assert found.slope("noise.r0")[0] == pytest.approx((found.value - before) / 1e-4, rel=1e-3)
     with pytest.raises(KeyError):
         found.slope("noise.none")
 

@@ -1,4 +1,4 @@
-"""A system of two to four variables written as equations: ẋ = v, v̇ = −ω²x − 2ζωv − kx³ − ξx, with walls."""
+"""A system of two or more variables written as equations: ẋ = v, v̇ = −ω²x − 2ζωv − kx³ − ξx, with walls."""
 
 from __future__ import annotations
 
@@ -28,12 +28,10 @@ from fpsolve.model.expressions import (
 )
 from fpsolve.model.faults import TableError, table_of
 from fpsolve.model.parameters import STRICT, parameter, stated_field, unknown_parameter
-from fpsolve.model.plane import CoefficientMatrix, CubicTerms, Jump, System, by_epsilon
+from fpsolve.model.plane import MOST_VARIABLES, CoefficientMatrix, CubicTerms, Jump, System, by_epsilon
 from fpsolve.model.quantity import AMPLITUDE, JOINT_DENSITY, Quantity
 
 EPSILON = "epsilon"
-MOST_VARIABLES = 4
-"""Largest number of variables."""
 MOST_PARAMETERS = 200
 """Largest number of parameters."""
 _NEWTON = 60
@@ -107,14 +105,14 @@ class Wall:
 
 @dataclass(frozen=True)
 class EquationSystem(System):
-    """Rates, each linear in two to four variables and affine in the noise, as text; see `PlaneSystem.of_equations`.
+    """Rates, each linear in the variables and affine in the noise, as text; see `PlaneSystem.of_equations`.
 
     Σ εⁿ (A + ξ B) x has one matrix for each power n of a parameter called epsilon, constant and with the noise. Without
     such a parameter ε = 1, what is constant has the order 0 and the noise the order 1. Of two variables there may be
     terms of degree 3 without the noise.
 
     Args:
-        variables: their names, two to four.
+        variables: their names, two or more.
         drift: their rates.
         named: the values of the parameters by their names.
         noises: what the noise is called in the rates, and the section that states it, one pair.
@@ -134,7 +132,7 @@ class EquationSystem(System):
 
     kind: ClassVar[str] = "equations"
     stated: ClassVar[Mapping[str, FieldInfo]] = {
-        "variables": stated_field(Texts, "the names of the two to four variables", 'variables = ["x", "v"]'),
+        "variables": stated_field(Texts, "the names of the variables, two or more", 'variables = ["x", "v"]'),
         "drift": stated_field(Texts, "the rates of the variables", 'drift = ["v", "-omega**2 * x - xi * x"]'),
         "parameters": stated_field(Parameters, "the parameters by their names", "parameters = { omega = 1.0 }", {}),
         "noises": stated_field(
@@ -155,7 +153,7 @@ class EquationSystem(System):
         for key in ("variables", "drift"):
             texts = tuple(each) if isinstance(each := getattr(self, key), list | tuple) else (each,)
             if not 2 <= len(texts) <= MOST_VARIABLES or not all(isinstance(text, str) for text in texts):
-                raise TableError(f"got {shown(each)}; must be a list of two to four texts", key)
+                raise TableError(f"got {shown(each)}; must be a list of 2 to {MOST_VARIABLES} texts", key)
             object.__setattr__(self, key, texts)
         if len(self.drift) != len(self.variables):
             counts = f"{len(self.drift)} rates of {len(self.variables)} variables"

@@ -15,7 +15,7 @@ from pydantic.fields import FieldInfo
 from fpsolve.arrays import FloatArray, identity, one, real_number, shown
 from fpsolve.model.faults import TableError
 from fpsolve.model.parameters import STRICT, parameter, stated_field, unknown_parameter
-from fpsolve.model.plane import CoefficientMatrix, Jump, System, by_epsilon, is_driven
+from fpsolve.model.plane import MOST_VARIABLES, CoefficientMatrix, Jump, System, by_epsilon, is_driven
 from fpsolve.model.quantity import Quantity
 from fpsolve.model.systems.equations import EquationSystem, Wall
 
@@ -136,7 +136,7 @@ class PlaneSystem(System):
             )
         sizes = sorted({len(term.matrix) for term in self.terms})
         if len(sizes) > 1 or sizes[0] not in self.dimensions:
-            known = " or ".join(map(str, self.dimensions))
+            known = " to ".join(map(str, sorted({min(self.dimensions), max(self.dimensions)})))
             raise ValueError(
                 f"got matrices of {' and '.join(map(str, sizes))} rows; {type(self).__name__} takes {known}, the same "
                 "for all terms" + ("; take LinearSystem for more" if max(sizes) > max(self.dimensions) else "")
@@ -223,7 +223,7 @@ class PlaneSystem(System):
         ((0.0, 1.0), (-4.0, -0.4))
 
         Args:
-            variables: their names, two; three or four for a system beyond the plane, which has no walls.
+            variables: their names, two; more for a system beyond the plane, which has no walls.
             drift: their rates: linear in the variables and affine in the noise, of numbers, names, + - * / **, pi,
                 exp() and sqrt().
             parameters: values by names. One called epsilon is ε, in whose powers all coefficients must be polynomials.
@@ -315,7 +315,7 @@ class PlaneSystem(System):
 
 @dataclass(frozen=True)
 class LinearSystem(PlaneSystem):
-    """ẋ = Σ ε^k g(ξ) A x for a state x of n = 2 to 4 numbers, from its coefficient matrices; see `PlaneSystem`.
+    """ẋ = Σ ε^k g(ξ) A x for a state x of n = 2 to 200 numbers, from its coefficient matrices; see `PlaneSystem`.
 
     >>> from fpsolve.model import CoefficientMatrix
     >>> free = CoefficientMatrix(0, ((0, 1, 0), (-1, -0.2, 0.5), (0, -0.5, -1)))  # an oscillator with a voltage
@@ -332,7 +332,7 @@ class LinearSystem(PlaneSystem):
     """
 
     kind: ClassVar[str] = "linear"
-    dimensions: ClassVar[Sequence[int]] = (2, 3, 4)
+    dimensions: ClassVar[Sequence[int]] = range(2, MOST_VARIABLES + 1)
 
 
 def _parts(

@@ -1,0 +1,129 @@
+"""The rightmost eigenvalue of a generator of positive forms, as moments are, searched from the right.
+
+No eigenvalue is nearer to a real σ > Λ than Λ, as none is on its right: a step to the left from a bound, by a share of
+what is left, finds no other. On the left of Λ another one may be nearer.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigs
+
+from fpsolve.errors import NoHierarchy, SingularMatrix
+
+ROUNDING = 10 * sys.float_info.epsilon
+"""Error by rounding, over the terms of a sum."""
+NEARER = 0.15
+"""Share of σ − Λ that the next σ keeps."""
+MOST_STEPS = 60
+"""Largest number of σ."""
+MOST_POLISHES = 10
+"""Largest number of steps that polish Λ from there."""
+PASSED = 10.0
+"""Factor to the last σ − Λ by which the next Λ is lower where rounding has put σ on the left of it: it is another."""
+KRYLOV = 16
+"""Number of vectors of one search by Arnoldi's method."""
+ROUGH = 1e-2
+"""Tolerance of this search."""
+MOST_RESTARTS = 200
+"""Largest number of its restarts."""
+REMEDY = "compare with `fpsolve simulate`"
+
+Solve = Callable[..., Any]
+"""(σ − H)⁻¹ of a vector, or its transpose for trans = 1."""
+
+
+class Rates(Protocol):
+    """H, in whatever form it is held.
+
+    Attributes:
+        settled: change of Λ over σ − Λ with which the search ends.
+    """
+
+    settled: float
+
+    @property
+    def bound(self) -> float:
+        """A number that no real part of an eigenvalue exceeds."""
+
+    @property
+    def largest(self) -> float:
+        """The size of its largest entry."""
+
+    def solver(self, sigma: float) -> Solve:
+        """(σ − H)⁻¹. Raises `SingularMatrix`."""
+
+
+class Eigenpair(NamedTuple):
+    """An eigenvalue with its right and left vector, yᵀx = 1.
+
+    Attributes:
+        change: of the value by the last step, where that is not rounding.
+    """
+
+    value: float
+    x: Any
+    y: Any
+    change: float
+
+
+def rightmost(h: Rates, x: Any) -> tuple[float, float, Any]:
+    """Roughly the rightmost eigenvalue, σ, and the right vector, from a positive one."""
+    sigma = h.bound + 0.1 * max(1e-3 * h.largest, abs(h.bound), sys.float_info.min)
+    value, away, start = -np.inf, np.inf, x
+    for _ in range(MOST_STEPS):
+        last, (share, x) = value, _largest(h.solver(sigma), x)
+        value = sigma - 1 / share
+        if last - value > PASSED * away:
+            return last, last + away, start
+        if abs(value - last) <= h.settled * (sigma - value):
+            break
+        away = sigma - value
+        sigma = value + NEARER * away
+    return value, sigma, x
+
+
+def polished(h: Any, value: float, sigma: float, x: Any, y: Any) -> Eigenpair:
+    """The eigenvalue to all digits, from a σ on its right, by inverse iteration on both sides.
+
+    Args:
+        h: H, of which `nearest` is the share of σ − Λ that each σ keeps.
+        value: Λ, roughly.
+        sigma: σ.
+        x, y: a right and a left vector.
+    """
+    sigma, change, rounding = value + h.nearest * (sigma - value), 0.0, 0.0
+    for _ in range(MOST_POLISHES):
+        try:
+            solve = h.solver(sigma)
+        except SingularMatrix:  # it is an eigenvalue to the last digit
+            break
+        for _ in range(2):
+            x, y = (each / np.max(np.abs(each)) for each in (solve(x), solve(y, 1)))
+        last, value = value, float(y @ (h @ x)) / float(y @ x)
+        change, rounding = abs(value - last), ROUNDING * h.sizes(x, y) / abs(float(y @ x))
+        if change <= 0.1 * rounding:
+            x, y = solve(x), solve(y, 1)  # as vectors settle half as fast, and derivatives need them
+            break
+        sigma = value + max(1e-3 * rounding, ROUNDING**2 * h.largest, h.nearest * (sigma - value))
+    return Eigenpair(value, x, y / (y @ x), change if change > rounding else 0.0)
+
+
+def _largest(solve: Solve, x: Any) -> tuple[float, Any]:
+    """The eigenvalue of the largest real part of a positive map, roughly, and its vector, from a positive one."""
+    if x.size <= KRYLOV:
+        values, vectors = np.linalg.eig(solve(np.eye(x.size)))
+    else:
+        operator = LinearOperator(2 * (x.size,), matvec=solve, dtype=x.dtype)
+        try:
+            values, vectors = eigs(operator, 1, which="LR", v0=x, tol=ROUGH, ncv=KRYLOV, maxiter=MOST_RESTARTS)
+        except ArpackNoConvergence as failure:
+            raise NoHierarchy(
+                f"no rightmost eigenvalue is found among those of {x.size} equations; {REMEDY}"
+            ) from failure
+    at = int(np.argmax(values.real))
+    return float(values[at].real), vectors[:, at] if np.iscomplexobj(x) else vectors[:, at].real
