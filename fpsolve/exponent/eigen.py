@@ -49,8 +49,12 @@ MOSTLY = 0.5
 DOUBT = 1e-3
 """Share of its terms by which a tangent of Λ may lie too high: the errors of its p."""
 _EPS = float(np.finfo(float).eps)
+BESIDE = 1e-2
+"""Distance of the shift of kept factors from an eigenvalue, over a rate, up to which they serve for its derivatives."""
 REFINEMENTS = 3
 """Number of times that T′ is improved by its residual."""
+REFINED = 1e-14
+"""Share of T′ of a step that is the last one."""
 MAX_ITERATIONS = 12
 """Number of LU factors in an iteration."""
 MAX_SHIFTS = 12
@@ -436,7 +440,7 @@ class PairDerivatives:
     A system is solved with a shift a little off Λ, and what that leaves of T in v is removed.
 
     Args:
-        pair: Λ(p), T and T*.
+        pair: Λ(p), T and T*; its generator may keep factors next to Λ.
 
     Attributes:
         norm: ⟨T*, T⟩ on the domain.
@@ -449,10 +453,17 @@ class PairDerivatives:
         self._pencil = pair.generator.at(pair.p)
         self._operator = self._pencil.matrix.shifted(pair.eigenvalue)
         self.size = self._operator.norm
+        self._kept = [
+            found for shift, found in self._pencil.kept if abs(shift - pair.eigenvalue) <= BESIDE * self._rate
+        ]
+
+    @property
+    def _rate(self) -> float:
+        return self.pair.generator.problem.unit_rate
 
     @cached_property
     def _factor(self) -> Factors:
-        return self._pencil.factorised(self.pair.eigenvalue + 1e-6 * self.pair.generator.problem.unit_rate)
+        return self._kept[0] if self._kept else self._pencil.factorised(self.pair.eigenvalue + 1e-6 * self._rate)
 
     def solve(self, source: FloatArray, *, adjoint: bool = False, refinements: int = REFINEMENTS) -> FloatArray:
         """v from the load f, in `one_thread`; each refinement leaves 1e-6 of a rate over the gap of the spectrum."""
@@ -463,8 +474,11 @@ class PairDerivatives:
         for _ in range(refinements):
             rest = source - operator @ change
             rest -= (other @ rest) / self.norm * weighed
-            change += self._factor.solve(rest, transposed=adjoint)
+            step = self._factor.solve(rest, transposed=adjoint)
+            change += step
             change -= (other @ self.pair.space.weighed(change)) / self.norm * own
+            if length(step) <= REFINED * length(change):
+                break
         return change
 
     @cached_property

@@ -1,4 +1,4 @@
-"""Λ at several p, one by one or as a function: a Chebyshev interpolant of Λ(p)/p, with the stability index from it."""
+"""Λ at several p, one by one or as a function, and the stability index."""
 
 from __future__ import annotations
 
@@ -6,13 +6,11 @@ import math
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
-from functools import cached_property, partial
+from functools import partial
 from itertools import repeat
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.polynomial import Chebyshev
-from numpy.polynomial.chebyshev import chebder, chebval
 from numpy.typing import ArrayLike
 
 from fpsolve.arrays import FloatArray, real_array, real_numbers
@@ -20,8 +18,9 @@ from fpsolve.budget import OverBudget, one_number, under_way
 from fpsolve.data import Result, dataset
 from fpsolve.errors import NotConverged
 from fpsolve.exponent.adapt import Budget, Tolerance
+from fpsolve.exponent.basis import MOST_NODES, Basis, Curve, bases
 from fpsolve.exponent.error import MEANINGLESS, Absent, Estimate, Failure, Moment, checked
-from fpsolve.exponent.solver import TINY_P, ExponentSolver, MomentLyapunov, best_order, missed, of_the_start, solver_of
+from fpsolve.exponent.solver import ExponentSolver, MomentLyapunov, missed, of_the_start, solver_of
 from fpsolve.exponent.starts import warnings_of_other_places
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import Code, Message, Remedy, message_of
@@ -39,48 +38,46 @@ ROUGH = 0.1
 """Error, over |Λ(p)|, at an end of the interval, where the sign alone counts."""
 PRECISE = 0.5
 """Of what rtol allows δ_p, for the error of the last Λ(p)/p."""
-SHARE = 0.4
-"""Of the tolerance of Λ(p)/p, that is left to the interpolation."""
-FEW_NODES = 5
-"""For so many an interpolation is tried, even if few p are asked for."""
+FEW = 17
+"""Number of p of the interval at which a sign of Λ(p)/p is looked for, besides the nodes."""
+AT_ONCE = 256
+"""Number of p that are evaluated together."""
 SHOWN = 201
 """So many p of the interval are drawn."""
-LEVELS = (3, 5, 9, 17, 33, 65)
-"""Numbers of nodes tried; each has the nodes of the one before, and new ones between them."""
-
 SLOPE_SHARE = 1e-3
 """Of what a tangent rises, by which it may lie too high, as slopes have errors."""
 FEW_MOMENTS = 9
 """Up to so many p are solved one by one."""
+WORTH = 0.6
+"""Largest number of nodes of a function, over that of the p that are asked for."""
 
 
 class MomentLyapunovFunction(Result):
-    """Λ(p) on an interval of p, callable on arrays.
+    """Λ(p) of two variables on an interval of p, callable on arrays.
 
-    Λ(p)/p is interpolated at Chebyshev points, value and slope (Hermite), as the eigenvectors give both, with
-    Λ′ = ⟨T*, L′T⟩. There are as many points as rtol needs: the last coefficients of the Chebyshev series are the error.
+    It is solved at few p, with T, T* and their derivatives there, and between these by what they make of L(p), see
+    `exponent.basis`: on one space, or one for each sign of p.
 
     Args:
         problem: a motion and its noise.
         interval: the smallest and the largest p.
-        mesh: a mesh for all p; None chooses one for each p that meets rtol.
+        mesh: a mesh for all p; None chooses one that meets rtol.
         rtol: |error| ≤ rtol·max(|Λ|, the terms of Eq. (37) before they cancel); None is 1e-8, under two noises
-            that are not white 1e-6, for more than two variables 1e-5.
+            that are not white 1e-6.
         budget: what the choice of a mesh may cost for one p; None for the default one.
-        among: p to choose the nodes from, so that those solved are of use; None for the best ones.
         solver: one of the same problem, to go on with; it decides the mesh, rtol and the budget.
-        progress: called after each solve.
-        known: Λ(p) of an earlier run, by p; it takes each that is solved.
+        most: how many p may be solved.
 
     Attributes:
-        nodes: the p that were solved, increasing, shape (n + 1,).
-        interpolation_error: estimate of the largest |error| of Λ(p)/p between the nodes.
+        nodes: the p that were solved, increasing, shape (n,).
+        is_converged: whether more nodes would add nothing that rtol, or the errors on a given mesh, leave visible.
         solver: what solved them; its pairs are the eigenfunctions.
 
     Raises:
         ValueError: the interval is empty or not finite.
-        NoSuchExponent: Λ(p) is infinite in the interval, or the noise has algebraic tails.
-        NotConverged: some p failed, or Λ(p) is not convex, so that a wrong eigenvalue is among the values.
+        NoSuchExponent: Λ(p) is infinite in the interval.
+        NotConverged: some p are not resolved on the mesh, or within the budget; or there is no such function, as of
+            several blocks, of more variables, or where slow noise carries a moment at several places.
     """
 
     def __init__(
@@ -91,76 +88,62 @@ class MomentLyapunovFunction(Result):
         *,
         rtol: float | None = None,
         budget: Budget | None = None,
-        among: FloatArray | None = None,
         solver: ExponentSolver | None = None,
-        progress: Callable[[], None] = lambda: None,
-        known: dict[float, Moment] | None = None,
+        most: int = MOST_NODES,
     ) -> None:
         low, high = (float(end) for end in checked_moments(list(interval), problem))
         if not low < high:
             raise ValueError(f"the interval of p is {interval}; its ends must increase")
         self.interval = low, high
         self.solver = solver or solver_of(problem, mesh, rtol, budget)
-        self._known, self._is_kept = {} if known is None else known, known is not None
-        self.interpolation_error, self._among, self._allowed = math.inf, among, SHARE * self._tolerance(1.0, 0.0)
-        most = LEVELS[-1] if among is None else max(FEW_NODES, 3 * among.size // 10)
-        for count in LEVELS if among is None or self._is_hopeful(most) else ():
-            last = self.interpolation_error
-            self._interpolate(count, progress, self._tolerance)
-            if self.is_converged or _nodes_needed(count, last, self.interpolation_error, self._allowed) > most:
-                break
-        slope = np.array([self._known[p].derivative for p in self.nodes.tolist()])
-        columns = self.nodes, self.nodes * self._values, slope, np.abs(self.nodes) * self._errors
-        if obstacle := broken_convexity(*columns, lambda: self._slope_errors) or contradiction(self.solver, *columns):
+        self._bases = bases(self.solver, low, high, most)
+        self.nodes = np.unique([p for basis in self._bases for p in basis.nodes])
+        self.is_converged = all(basis.is_converged for basis in self._bases)
+        pairs = [basis.nodes[p] for basis in self._bases for p in sorted(basis.nodes)]
+        self.residual = max(node.pair.residual for node in pairs)
+        names, errors = ("p", "value", "derivative"), np.array([node.error for node in pairs])
+        p, value, slope = (np.array([getattr(node.pair, name) for node in pairs]) for name in names)
+        if obstacle := broken_convexity(p, value, slope, errors, lambda: self._slope_errors(p)):
             raise NotConverged(obstacle, remedy=self.solver.refinement)
 
     def __call__(self, p: ArrayLike) -> FloatArray:
         """Λ(p), per unit time, of the shape of p. Raises `ValueError` outside the interval."""
-        p = self._inside(p)
-        return p * self._series(p)
+        return self._curve(p).value
 
     def derivative(self, p: ArrayLike) -> FloatArray:
         """Λ′(p)."""
-        p = self._inside(p)
-        return self._series(p) + p * self._series.deriv()(p)
+        return self._curve(p).derivative
 
     def second_derivative(self, p: ArrayLike) -> FloatArray:
         """Λ″(p)."""
-        p = self._inside(p)
-        return 2 * self._series.deriv()(p) + p * self._series.deriv(2)(p)
+        return self._of_bases(p, Basis.second_derivative)
 
     def error_estimate(self, p: ArrayLike) -> FloatArray:
-        """Estimate of |error of Λ(p)|: |p| times that of the interpolation and that of the nodes.
-
-        On one mesh the errors at the nodes change smoothly with p, on several the largest counts.
-        """
-        p = self._inside(p)
-        at_nodes = np.max(self._errors) if self.solver.mesh is None else np.interp(p, self.nodes, self._errors)
-        return np.abs(p) * (self.interpolation_error + at_nodes)
-
-    @cached_property
-    def _slope_errors(self) -> FloatArray:
-        """Estimate of |error of Λ′| at the nodes."""
-        return np.array([self.solver.slope_error(float(p)) for p in self.nodes])
+        """Estimate of |error of Λ(p)|: what is left between the nodes, that of the space, and rounding."""
+        return self._curve(p).error
 
     def derivative_error(self, p: ArrayLike) -> FloatArray:
-        """Estimate of |error of Λ′(p)|, of the shape of p: that of the interpolation and that of the nodes.
+        """Estimate of |error of Λ′(p)|, of the shape of p: those of the nodes, and what is left between these.
 
-        The slope of what a polynomial of the degree n lacks of Λ(p)/p is at most min(n², n/√(1 − x²)) times as large,
-        x = ±1 at the ends of the interval (Markov, Bernstein).
+        As the fourth power of each distance from a node is in it, its slope is that of a polynomial of the degree
+        n = 4 · nodes, min(n², n/√(1 − x²)) times as large at most, x = ±1 at the ends (Markov, Bernstein).
         """
-        p = self._inside(p)
+        curve, points = self._curve(p), np.asarray(p, dtype=float)
         half = 0.5 * (self.interval[1] - self.interval[0])
-        x, n = (p - self.interval[0]) / half - 1, self._series.degree()
+        x, n = (points - self.interval[0]) / half - 1, 4 * self.nodes.size
         steepness = np.minimum(n**2, n / np.sqrt(np.maximum(1 - x**2, 1e-300))) / half
-        of_ratio = self.interpolation_error + float(np.max(self._errors))
-        return np.asarray(of_ratio * (1 + np.abs(p) * steepness) + np.max(self._slope_errors))
+        return np.asarray(curve.left * steepness + np.max(self._slope_errors(self.nodes)))
 
     def moments(self, p: ArrayLike) -> MomentLyapunov:
-        """Λ(p) at several p; the residual is the largest of the nodes."""
+        """Λ(p) at several p; the residual is the largest of the nodes. Raises `NotConverged` if they contradict."""
         points = checked_moments(p, self.solver.problem)
-        value, error = self(points), self.error_estimate(points)
-        scale = self.solver.scales.moment(points)
+        curve, scale = self._curve(points), self.solver.scales.moment(points)
+        value, error = curve.value, curve.error
+        columns = points, value, curve.derivative, error
+        if obstacle := broken_convexity(*columns, lambda: self.derivative_error(points)):
+            raise NotConverged(obstacle, remedy=self.solver.refinement)
+        if obstacle := contradiction(self.solver, *columns):
+            raise NotConverged(obstacle, remedy=self.solver.refinement)
         is_meaningless = ~(error <= MEANINGLESS * np.maximum(np.abs(value), scale)) & (points != 0)
         for i in np.flatnonzero(is_meaningless):
             estimate = Estimate(float(value[i]), float(error[i]), float(scale[i]), quantity=moment_at(points[i]))
@@ -168,13 +151,13 @@ class MomentLyapunovFunction(Result):
         return MomentLyapunov(
             p=points,
             value=value,
-            derivative=self.derivative(points),
+            derivative=curve.derivative,
             error_estimate=error,
-            residual=np.full(points.size, max(self._known[p].residual for p in self.nodes.tolist())),
+            residual=np.full(points.size, self.residual),
             solver=self.solver,
             warnings=(*missed(self.solver, points, value, error), *self._misplaced()),
             function=self,
-            root=self.root(),
+            root=_sign_change(points, value, curve.derivative),
             notes=of_the_start(self.solver, points),
         )
 
@@ -184,10 +167,9 @@ class MomentLyapunovFunction(Result):
 
     def root(self) -> float | None:
         """Where Λ(p)/p changes its sign in the interval, or None."""
-        p = np.linspace(*self.interval, 201)
-        values = self._series(p)
-        sides = np.flatnonzero((values[:-1] <= 0) & (values[1:] > 0))
-        return float(p[sides[0]] - values[sides[0]] * (p[1] - p[0]) / np.diff(values)[sides[0]]) if sides.size else None
+        p = np.union1d(self.nodes, np.linspace(*self.interval, FEW))
+        curve = self._curve(p)
+        return _sign_change(p, curve.value, curve.derivative)
 
     def lyapunov_exponent(self) -> Estimate:
         """λ = Λ′(0), Eq. (2), solved at p = 0. Raises `NotConverged`."""
@@ -204,92 +186,59 @@ class MomentLyapunovFunction(Result):
     def to_xarray(self, p: ArrayLike | None = None) -> xarray.Dataset:
         """Λ(p) with its derivatives and errors at some p, `SHOWN` of the interval if none are given."""
         p = np.linspace(*self.interval, SHOWN) if p is None else real_numbers(p, "p")
+        curve = self._curve(p)
         numbers = {
-            MOMENT: self(p),
-            MOMENT.error(): self.error_estimate(p),
-            DERIVATIVE: self.derivative(p),
+            MOMENT: curve.value,
+            MOMENT.error(): curve.error,
+            DERIVATIVE: curve.derivative,
             DERIVATIVE.error(): self.derivative_error(p),
             SECOND_DERIVATIVE: self.second_derivative(p),
         }
-        method, values = "finite elements and interpolation", self.solver.problem.values
+        method, values = "finite elements and a reduced basis", self.solver.problem.values
         return dataset(MOMENT.words, method, numbers, {P: p}, values, rtol=self.solver.rtol)
 
     def _said(self) -> str:
         return "p from {:g} to {:g}, {} solved".format(*self.interval, self.nodes.size)
 
-    def _inside(self, p: ArrayLike) -> FloatArray:
+    def _curve(self, p: ArrayLike) -> Curve:
+        """Everything at p, each of its shape. Raises `ValueError` outside the interval."""
+        found = Curve(*self._of_bases(p, Basis.at))
+        value, error = (np.where(np.asarray(p) == 0, 0.0, each) for each in (found.value, found.error))
+        return found._replace(value=value, error=error)  # but for rounding
+
+    def _of_bases(self, p: ArrayLike, function: Callable[[Basis, FloatArray], Any]) -> FloatArray:
+        """What one or more functions of the basis of each p give, the shape of p last."""
         points = real_array(p, "p")
         low, high = self.interval
         slack = 1e-9 * (high - low)
         if not np.all((points >= low - slack) & (points <= high + slack)):
             raise ValueError(f"p must lie in [{low:g}, {high:g}], the interval of this function; make a wider one")
-        return points
+        flat = np.clip(points.ravel(), low, high)
+        parts = np.array_split(np.argsort(flat, kind="stable"), math.ceil(flat.size / AT_ONCE) or 1)
+        found: FloatArray = np.zeros(0)
+        for basis in self._bases:
+            for part in parts:
+                own = part[(flat[part] >= basis.low) & (flat[part] <= basis.high)]
+                values = np.asarray(function(basis, flat[own]))
+                found = found if found.size else np.zeros((*values.shape[:-1], flat.size))
+                found[..., own] = values
+        return found.reshape((*found.shape[:-1], *points.shape))
 
-    def _is_hopeful(self, most: int) -> bool:
-        """Whether it may converge with so many nodes, by the first few, within the usual tolerance."""
-        self._interpolate(LEVELS[0], lambda: None)
-        before, after = (float(np.max(np.abs(part), initial=0.0)) for part in np.split(self._series.coef[2:], [2]))
-        self.interpolation_error = math.inf
-        return _nodes_needed(LEVELS[0], before, after, self._allowed) <= most
-
-    def _interpolate(self, count: int, progress: Callable[[], None], tolerance: Tolerance | None = None) -> None:
-        """Solve at so many Chebyshev points, the outermost first, and interpolate."""
-        x, self.nodes = _nodes(count, self.interval, self._among)
-        ratios = np.empty((x.size, 3))
-        for i in best_order(self.nodes):
-            ratios[i] = self._ratio(float(self.nodes[i]), tolerance)
-            progress()
-        self._values, slopes, self._errors = ratios.T
-        basis, half = np.eye(2 * x.size), 0.5 * (self.interval[1] - self.interval[0])
-        conditions = np.concatenate([chebval(x, basis).T, chebval(x, chebder(basis, axis=0)).T / x.size])
-        coefficients = np.linalg.solve(conditions, np.concatenate([self._values, slopes * half / x.size]))
-        self._series = Chebyshev(coefficients, domain=self.interval)
-        self.interpolation_error = 2 * float(np.max(np.abs(self._series.coef[-3:])))
-
-    def _ratio(self, p: float, tolerance: Tolerance | None) -> tuple[float, float, float]:
-        """Λ(p)/p, its slope and its error, of an earlier run where that is as accurate."""
-        row, allowed = self._known.get(p), tolerance or self.solver.tolerance
-        if row and self.solver.goes_on and abs(p) >= TINY_P and row.error <= allowed(p, row.value):
-            self.solver.take(p, row)
-            value = row.value / p
-            return value, (row.derivative - value) / p, row.error / abs(p)
-        value, slope, error = self.solver.ratio(p, tolerance)
-        pair = self.solver.pair(p)
-        of_slope = self.solver.slope_error(p) if self._is_kept else math.nan
-        self._known[p] = Moment(p * value, pair.derivative, of_slope, abs(p) * error, pair.residual)
-        return value, slope, error
-
-    @property
-    def is_converged(self) -> bool:
-        """Whether more nodes would add nothing that rtol, or the errors of the nodes, leave visible."""
-        at_nodes = np.max(self._errors) if self.solver.mesh is None else np.min(self._errors)
-        return self.interpolation_error <= max(self._allowed, float(at_nodes))
-
-    def _tolerance(self, p: float, value: float) -> float:
-        """That of a node: the same for Λ(p)/p at all of them."""
-        return self.solver.rtol * abs(p) * self.solver.scales.linear
+    def _slope_errors(self, p: FloatArray) -> FloatArray:
+        """Estimate of |error of Λ′| at nodes."""
+        return np.array([self.solver.slope_error(each) for each in p.tolist()])
 
 
-def _nodes_needed(count: int, last: float, error: float, allowed: float) -> float:
-    """How many nodes convergence may take, if the error falls exponentially, as from half as many to `count`."""
-    if not math.isfinite(last):
-        return 2 * count - 1
-    if error <= allowed:
-        return count
-    rate = math.log(max(last / error, 1.1)) / (count // 2)
-    return max(2 * count - 1, count + math.log(error / allowed) / rate)
-
-
-def _nodes(count: int, interval: tuple[float, float], among: FloatArray | None) -> tuple[FloatArray, FloatArray]:
-    """So many Chebyshev points of an interval, or of some p those nearest to them, as x in [-1, 1] and as p."""
-    x, half = -np.cos(np.pi * np.arange(count) / (count - 1)), 0.5 * (interval[1] - interval[0])
-    nodes = 0.5 * (interval[0] + interval[1]) + half * x
-    nodes[[0, -1]] = interval  # and 0 exactly
-    nodes[np.abs(nodes) < 1e-12 * half] = 0.0
-    if among is None:
-        return x, nodes
-    nodes = np.unique(among[np.argmin(np.abs(among - nodes[:, None]), axis=1)])
-    return np.interp(nodes, interval, (-1.0, 1.0)), nodes
+def _sign_change(p: FloatArray, value: FloatArray, slope: FloatArray) -> float | None:
+    """Where Λ(p)/p, which increases, changes its sign, by one step of Newton; None where it does not."""
+    order = np.argsort(p)
+    order = order[p[order] != 0]
+    p, ratio, rise = p[order], value[order] / p[order], slope[order] - value[order] / p[order]
+    sides = np.flatnonzero((ratio[:-1] <= 0) & (ratio[1:] > 0))
+    if not sides.size:
+        return None
+    i = sides[0] + int(abs(ratio[sides[0] + 1]) < abs(ratio[sides[0]]))
+    return float(np.clip(p[i] - ratio[i] * p[i] / rise[i], p[sides[0]], p[sides[0] + 1]))
 
 
 def broken_convexity(
@@ -500,12 +449,10 @@ def solve_moments(
         next(reports, lambda: None)()
 
     result = None
-    if points.size > FEW_MOMENTS and not (solver.classes or solver.problem.is_closed_only):
+    if points.size > FEW_MOMENTS and solver.problem.dimension == 2 and len(solver.classes) < 2:
         ends = float(points.min()), float(points.max())
         with suppress(NotConverged):
-            function = MomentLyapunovFunction(
-                solver.problem, ends, solver=solver, among=points, progress=report, known=known
-            )
+            function = MomentLyapunovFunction(solver.problem, ends, solver=solver, most=round(WORTH * points.size))
             result = function.moments(points) if function.is_converged else None
     result = result or _one_by_one(solver, points, report, known)
     for each in reports:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -43,6 +43,8 @@ class Pencil:
         matrix: that of L(p), its first term with the matrices of noise that `space.mass` has.
         levels: for each axis, see `Axis`.
         ring: the cells of φ, where only their end values couple them.
+        keeps_factors: whether the last factors are kept, for derivatives of a pair.
+        kept: the shift and the factors of the last one.
     """
 
     p: float
@@ -50,6 +52,8 @@ class Pencil:
     matrix: KroneckerSum
     levels: Levels
     ring: Ring | None = None
+    keeps_factors: bool = False
+    kept: list[tuple[float, Factors]] = field(init=False, default_factory=list)
 
     def on(self, axis: int, kept: Mask) -> Pencil:
         """What it is on some functions of an axis, where a mask is true."""
@@ -78,7 +82,11 @@ class Pencil:
 
     def factorised(self, shift: float) -> Factors:
         """LU factors of L(p) − σM, of the kind that takes the fewest operations."""
-        return factorised(self.matrix.shifted(shift), self.levels, is_full=self.space.phi.is_full, ring=self.ring)
+        self.kept.clear()
+        found = factorised(self.matrix.shifted(shift), self.levels, is_full=self.space.phi.is_full, ring=self.ring)
+        if self.keeps_factors:
+            self.kept.append((shift, found))
+        return found
 
 
 class Generator:
@@ -88,6 +96,9 @@ class Generator:
         problem: a motion and its noise.
         chosen: on the half circle (its principal eigenvalue is that of the full circle) or the full circle.
 
+    Attributes:
+        keeps_factors: see `Pencil`.
+
     Raises:
         MeshError: there is no φ-line at a jump, or a cell's polynomials in the noise cannot be told apart.
     """
@@ -96,7 +107,7 @@ class Generator:
         if isinstance(chosen, CylinderMesh):
             chosen = Space.on(chosen, problem.coloured, problem.frame)
         self.problem, self.chosen, self.size = problem, chosen, chosen.size
-        self.phi = chosen.phi
+        self.phi, self.keeps_factors = chosen.phi, False
         self._spaces: dict[float, Space] = {}
         self._changes: dict[ParameterDerivative, tuple[Term, ...]] = {}
         self._last: Pencil | None = None
@@ -126,7 +137,8 @@ class Generator:
         """What is solved at p; the last one is kept."""
         if self._last is None or self._last.p != p:
             space = self.space(p)
-            self._last = Pencil(p, space, self.matrix(p), [axis.levels for axis in space.axes], self._ring)
+            levels = [axis.levels for axis in space.axes]
+            self._last = Pencil(p, space, self.matrix(p), levels, self._ring, self.keeps_factors)
         return self._last
 
     @cached_property

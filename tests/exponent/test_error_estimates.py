@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from fpsolve import ExponentSolver, MomentLyapunovFunction, NonGaussianNoise, Problem, VibroImpactOscillator, make_mesh
+from fpsolve import ExponentSolver, NonGaussianNoise, Problem, VibroImpactOscillator, make_mesh
 from fpsolve.exponent.function import nonzero_root
 from tests.conftest import UNIT_NOISE
 from tests.random_problems import Outcome, problems, solve
@@ -41,10 +41,8 @@ def test_of_indices(problem, exponent, variance):
     assert solver.variance_rate().error_estimate == pytest.approx(variance, rel=0.2)
 
 
-def test_of_a_root_and_between_moments():
+def test_of_a_root():
     assert nonzero_root(ExponentSolver(GAUSSIAN, rtol=1e-4)).error_estimate == pytest.approx(1.315e-5, rel=0.2)
-    function = MomentLyapunovFunction(GAUSSIAN, (-1.0, 2.0), rtol=1e-4)
-    assert function.interpolation_error == pytest.approx(1.037e-8, rel=0.2)
 
 
 @pytest.mark.parametrize(

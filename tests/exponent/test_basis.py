@@ -1,0 +1,99 @@
+"""Λ(p) by a reduced basis: against an independent code and solves, its errors, its derivatives, its spaces."""
+
+import numpy as np
+import pytest
+
+from fpsolve import ExponentSolver, MomentLyapunovFunction, PlaneSystem, Problem
+from fpsolve.errors import NotConverged
+from fpsolve.exponent.basis import Basis, Polynomials
+from fpsolve.exponent.eigen import principal_pair
+from fpsolve.model import Bounded, SineWiener
+from tests.benchmarks.problem import CASES
+from tests.benchmarks.references import REFERENCES
+from tests.random_problems import RTOL, problems
+
+
+@pytest.fixture(scope="module")
+def strong():
+    case = CASES["strong"]
+    return MomentLyapunovFunction(Problem(case.oscillator, case.noise), (-3.0, 3.0), rtol=case.rtol)
+
+
+@pytest.mark.parametrize("low, high", [(-3.0, 2.0), (-1.0, 0.0), (0.0, 4.0), (1.0, 5.0)])
+def test_polynomials_of_their_degree_are_exact(low, high):
+    polynomials = Polynomials(low, high, 6)
+    assert (0.0 in polynomials.points) == (low <= 0 <= high)
+    p = np.linspace(low, high, 31)
+    values = polynomials.points**6 - 2 * polynomials.points**3
+    np.testing.assert_allclose(polynomials.at(p) @ values, p**6 - 2 * p**3, atol=1e-9)
+    np.testing.assert_allclose(polynomials.at(p) @ polynomials.slopes @ values, 6 * p**5 - 6 * p**2, atol=1e-8)
+
+
+def test_few_solves_in_strong_noise_against_a_fourier_hermite_code(strong):
+    """An interpolation over p does not converge here: there are branch points beside the real axis."""
+    case, truth = CASES["strong"], REFERENCES["strong"]
+    assert strong.is_converged
+    assert strong.nodes.size <= 15
+    errors = np.abs(strong(case.p) - truth)
+    assert np.all(errors <= strong.error_estimate(case.p) + 1e-9)
+    assert case.relative_error(strong(case.p), truth) <= case.rtol
+
+
+def test_the_error_falls_with_the_fourth_power_of_the_distance_of_the_nodes():
+    case = CASES["strong"]
+    problem = Problem(case.oscillator, case.noise)
+    p, lefts = np.linspace(0.5, 2.5, 41), []
+    solver = ExponentSolver(problem, rtol=1e-9)
+    exact = Basis(solver, 0.5, 2.5, 40)
+    for most in (3, 5):
+        few = Basis(ExponentSolver(problem, rtol=1e-9), 0.5, 2.5, most)
+        lefts.append(np.max(np.abs(few.at(p).value - exact.at(p).value)))
+        assert not few.is_converged
+    assert lefts[1] < 2**-4 * lefts[0]
+
+
+def test_slopes_and_curvatures_are_those_of_eigenvectors(strong):
+    solver = ExponentSolver(strong.solver.problem, rtol=1e-8)
+    for p in (-2.1, 0.3, 1.7):
+        pair, step = solver.pair(p), 1e-3
+        above, below = (principal_pair(pair.generator, p + way, start=pair).derivative for way in (step, -step))
+        assert abs(strong.derivative(p) - pair.derivative) <= strong.derivative_error(p)
+        assert strong.second_derivative(p) == pytest.approx((above - below) / (2 * step), rel=1e-4)
+
+
+@pytest.mark.parametrize("number", range(0, 40, 5))
+def test_random_problems_between_the_nodes(number):
+    *_, drawn = problems(number + 1)
+    problem, p = drawn.solved, np.array([-2.63, -1.4, -0.07, 0.61, 1.9, 2.87])
+    function = MomentLyapunovFunction(problem, (-3.0, 3.0), rtol=RTOL)
+    exact = ExponentSolver(problem, rtol=0.01 * RTOL)
+    for each, value, error in zip(p.tolist(), function(p), function.error_estimate(p), strict=True):
+        solution = exact.solution(each)
+        assert abs(value - solution.pair.value) <= error + solution.error
+        assert error <= RTOL * max(abs(value), function.solver.scale(each))
+
+
+@pytest.mark.parametrize("noise", [Bounded(0.6, 1.3, 0.4), SineWiener(0.6, 1.1)], ids=repr)
+def test_bounded_noise_between_the_nodes(noise):
+    system = PlaneSystem.of_equations(("x", "v"), ("v", "-x - 0.2*v - xi*x"), {})
+    problem = Problem(system, noise)
+    function, exact = MomentLyapunovFunction(problem, (-1.5, 3.5)), ExponentSolver(problem, rtol=1e-10)
+    for p in (-1.21, 0.43, 2.9):
+        solution = exact.solution(p)
+        assert abs(function(p) - solution.pair.value) <= function.error_estimate(p) + solution.error
+
+
+def test_near_zero_the_error_is_that_of_the_ratio(strong):
+    """Λ(p)/p near p = 0 is λ."""
+    exponent = ExponentSolver(strong.solver.problem, rtol=1e-9).lyapunov_exponent()
+    for p in (1e-7, -1e-5, 1e-4):
+        curvature = 0.5 * abs(p) * strong.second_derivative(0.0)
+        allowed = strong.error_estimate(p) / abs(p) + curvature + exponent.error_estimate
+        assert abs(strong(p) / p - exponent.value) <= 1.01 * allowed
+    assert strong(0.0) == strong.error_estimate(0.0) == 0.0
+
+
+def test_there_is_no_function_of_several_blocks():
+    system = PlaneSystem.of_equations(("x", "v"), ("-x + 0.3*xi*x", "v*(-0.5 + xi)"), {})
+    with pytest.raises(NotConverged, match=r"there is no function Λ\(p\) from p = 0\.5 to p = 3.*; ask for single p"):
+        MomentLyapunovFunction(Problem(system, SineWiener(0.6, 1.1)), (0.5, 3.0))
