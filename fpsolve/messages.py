@@ -172,8 +172,8 @@ class Code(Enum):
         "failure: {p:?Λ({p:g})¦{symbol}} = {value:.6g} has an estimated error of {size:.1g}, too much to mean anything"
     )
     NO_FUNCTION = (
-        "failure: there is no function Λ(p) from p = {low:g} to p = {high:g}, as no space serves all p, or the moments "
-        "are carried at several places, or are of several blocks or of more than two variables; ask for single p"
+        "failure: there is no function Λ(p) from p = {low:g} to p = {high:g}, as no space serves all p, or moments are "
+        "carried at several places, or are of several blocks or of more than two variables; ask for single p"
     )
     NOT_CONVEX = (
         "failure: the computed Λ(p) is not convex between p = {p:g} and p = {other:g}, while the exponent is: a wrong "

@@ -28,7 +28,7 @@ import numpy as np
 from fpsolve.arrays import FloatArray
 from fpsolve.budget import counted
 from fpsolve.errors import NotConverged
-from fpsolve.exponent.adapt import UNSOLVED
+from fpsolve.exponent.adapt import SMALL_P, UNSOLVED
 from fpsolve.exponent.eigen import PairDerivatives, PrincipalPair, principal_pair
 from fpsolve.exponent.error import Solution
 from fpsolve.exponent.starts import FREE_STAGES, Start, other_centers
@@ -47,16 +47,26 @@ INTERPOLATED = 1e-2
 """Share of the tolerance for the polynomials."""
 WITHIN = 0.47
 """Share of a gap between two nodes where its error is looked at, and the next node is put: even p tell too little."""
+BOTH_SIDES = (0.2, 0.8)
+"""Shares of a gap where its error is looked at, too, unless it is hardly anything in the middle."""
+HARDLY = 1e-2
+"""Share of what is allowed up to which it is that."""
 SAFE = 4.0
 """What is left, over its estimate to first order."""
 SHARE = 0.4
 """Of the tolerance, or of the errors of the nodes of a given mesh, for what is left between the nodes."""
+EVEN = 1e-2
+"""Distance from an even p in which effects of the highest modes tell too little of the space."""
+BESIDE = 0.97
+"""A p next to it, over the even p."""
 SURELY = 0.05
 """Share of the tolerance for the errors of two nodes up to which that of the space between them is not looked at."""
 MOST_NODES = 40
 """Number of nodes of a basis."""
 MOST_STEPS = 8
 """Number of steps of the iteration for the eigenvalues of small pencils."""
+MOST_SPACES = 8
+"""Number of times that the space of a basis is refined."""
 MOST_STEPS = 8
 """Number of steps of the iteration for the eigenvalues of small pencils."""
 AT_ONCE = 256
@@ -189,7 +199,9 @@ class Basis:
         self.low, self.high, self._solver, self._has_zero = low, high, solver, low <= 0 <= high
         self.nodes: dict[float, Node] = {}
         self._lefts: dict[tuple[float, float], Left] = {}
-        self._right, self._dual = np.zeros((2, 0, 0))
+        self._refinements = 0
+        self._right: FloatArray = np.zeros((0, 0))
+        self._dual: FloatArray = np.zeros((0, 0))
         outer, other = (low, high) if abs(low) > abs(high) else (high, low)
         inner = 0.0 if self._has_zero else other
         self._generator = solver.solution(outer).pair.generator
@@ -198,7 +210,9 @@ class Basis:
             self.is_converged = self._fill(most)
             self._rounding = self._bound()
         for p, node in self.nodes.items():
-            self.nodes[p] = node._replace(around=None)  # which keeps factors
+            is_even = p != 0 and abs(p - 2 * round(p / 2)) < EVEN and solver.mesh is None
+            error = self._error_beside(p) if is_even else node.error
+            self.nodes[p] = node._replace(around=None, error=error)  # without factors
 
     # nodes
 
@@ -215,11 +229,14 @@ class Basis:
             p = low + WITHIN * (high - low)
             try:
                 if left is None or left.nodes < len(self.nodes):
-                    self._lefts[gap] = self._left_at(p, gap)
+                    self._lefts[gap] = found = self._left_at(p, gap)
+                    if HARDLY * found.allowed < found.error <= found.allowed:
+                        others = (self._left_at(low + share * (high - low), gap) for share in BOTH_SIDES)
+                        self._lefts[gap] = max([found, *others], key=lambda each: each.error / each.allowed)
                 elif len(self.nodes) >= most:
                     return False
                 else:
-                    self._add(*self._solved(p))
+                    self._add(*self._solved(p := left.p))
                     self._lefts |= dict.fromkeys([(low, p), (p, high)], left._replace(of_space=0.0, nodes=0))
             except _Finer as finer:
                 self._begin([*self.nodes, p], finer.space)
@@ -278,6 +295,8 @@ class Basis:
                 raise self._finer(place.space) from None
             around = PairDerivatives(found.pair)
         allowed = solver.tolerance(p, found.pair.value) if p else math.inf
+        if self._has_zero and 0 < abs(p) < 1:
+            allowed = min(allowed, abs(p) * solver.tolerance(SMALL_P, 0.0) / SMALL_P)
         if other_centers(found.pair):
             raise Unsuited
         return self._checked(found, allowed), around
@@ -294,7 +313,8 @@ class Basis:
         most = self._solver.budget.unknowns
         if self.low < 0 < self.high:
             most = min(most, round(MUCH_MORE * self._generator.size))
-        if space.size > most:
+        self._refinements += 1
+        if space.size > most or self._refinements > MOST_SPACES:
             raise Unsuited
         return _Finer(space)
 
@@ -310,7 +330,7 @@ class Basis:
     def _extend(self, right: Sequence[FloatArray], left: Sequence[FloatArray]) -> None:
         """Add vectors to the basis, and what they make of L and M to the small matrices."""
         old = len(self._a[0])
-        self._right, self._dual = _orthonormal(self._right[:old], right), _orthonormal(self._dual[:old], left)
+        self._right, self._dual = orthonormal(self._right[:old], right), orthonormal(self._dual[:old], left)
         forward, backward = self._images(self._right[old:]), self._images(self._dual[old:], adjoint=True)
         for name, after, before in zip(("_a", "_g"), forward, backward, strict=True):
             rows = np.concatenate([getattr(self, name), before @ self._right[:old].T], axis=1)
@@ -380,20 +400,7 @@ class Basis:
         u = np.clip(u, 0, 1)[:, None]
         x, y = (each[i] * (1 - u) + each[j] * u for each in of_nodes)
         a, g = self._pencils(p)
-        tiny = 4 * _EPS * np.max(np.abs(a), initial=0.0)
-        for _ in range(MOST_STEPS):
-            shifted, last = a - (value + tiny)[:, None, None] * g, value
-            try:
-                x = np.linalg.solve(shifted, g @ x[:, :, None])[:, :, 0]
-                y = np.linalg.solve(shifted.swapaxes(1, 2), g.swapaxes(1, 2) @ y[:, :, None])[:, :, 0]
-            except np.linalg.LinAlgError:  # an eigenvalue to the last digit
-                tiny *= 100
-                continue
-            x, y = (each / np.linalg.norm(each, axis=1)[:, None] for each in (x, y))
-            value = _form(y, a, x) / _form(y, g, x)
-            if np.all(np.abs(value - last) <= 1e-13 * np.max(np.abs(a), initial=0.0)):
-                break
-        return Reduced(value, x, y, a, g)
+        return Reduced(*eigenpairs(a, g, value, x, y), a, g)
 
     # errors
 
@@ -423,6 +430,8 @@ class Basis:
                 one, p=p, eigenvalue=value, right=right, left=left / norm, rounding=0.0, generator=self._generator
             )
             of_space = Solution(pair).error
+            if 0.0 in gap:  # where Λ(p)/p is wanted
+                allowed = min(allowed, abs(p) * self._solver.tolerance(SMALL_P, 0.0) / SMALL_P)
             error = math.inf if of_space > allowed else error  # what a node there shall tell
         return Left(p, error, SHARE * allowed, of_space, len(self.nodes))
 
@@ -434,9 +443,9 @@ class Basis:
     def at(self, p: FloatArray) -> Curve:
         """Λ at p in the interval, shape (n,)."""
         value, x, y, _, g = self._reduced(p)
-        norm = _form(y, g, x)
+        norm = form(y, g, x)
         a1, g1 = self._pencils(p, 1)
-        derivative = (_form(y, a1, x) - value * _form(y, g1, x)) / norm
+        derivative = (form(y, a1, x) - value * form(y, g1, x)) / norm
         rounded = np.abs(y)[:, None, :] @ self._rounding
         if self._has_zero:
             rounded[:, 0, 0] *= np.abs(p / max(self.low, self.high, key=abs))
@@ -448,11 +457,11 @@ class Basis:
         """Λ″ at p in the interval, shape (n,)."""
         value, x, y, _, g = found = self._reduced(p)
         (a1, g1), (a2, g2) = (self._pencils(p, k) for k in (1, 2))
-        norm, rate = _form(y, g, x), value[:, None, None]
-        slope = (_form(y, a1 - rate * g1, x) / norm)[:, None, None]
+        norm, rate = form(y, g, x), value[:, None, None]
+        slope = (form(y, a1 - rate * g1, x) / norm)[:, None, None]
         change = a1 - rate * g1 - slope * g
         by_p = _bordered(found, -(change @ x[:, :, None])[:, :, 0])
-        return np.asarray((_form(y, a2 - rate * g2 - 2 * slope * g1, x) + 2 * _form(y, change, by_p)) / norm)
+        return np.asarray((form(y, a2 - rate * g2 - 2 * slope * g1, x) + 2 * form(y, change, by_p)) / norm)
 
     def _left_of(self, p: FloatArray) -> FloatArray:
         """What is left at p, by what is left between the same nodes; near 0 it falls faster than p."""
@@ -464,13 +473,22 @@ class Basis:
             error * np.where(np.array([0.0 in gap for gap in gaps])[i], np.minimum(1.0, np.abs(p / at)), 1.0)
         )
 
+    def _error_beside(self, p: float) -> float:
+        """The error of the space at a node of an even p, where T is too simple, by that at a p next to it."""
+        near = BESIDE * p
+        value, error = self._lifted(near), self.nodes[p].error
+        found = self._reduced(np.array([near]))
+        pair = replace(value, eigenvalue=float(found.value[0]), rounding=0.0)
+        return max(error, Solution(pair).error / BESIDE)
+
     def _error_of_space(self, p: FloatArray) -> FloatArray:
-        """By the largest error over |p| at two of the p around it on each side, as even p may tell nothing."""
-        errors = {q: node.error for q, node in self.nodes.items()}
-        errors |= {left.p: left.of_space for left in self._lefts.values() if left.of_space}
+        """By the larger error over |p| of the places on both sides."""
+        lefts = [self._lefts[gap] for gap in pairwise(sorted(self.nodes)) if gap in self._lefts]
+        errors = {left.p: left.of_space for left in lefts if left.of_space}
+        errors |= {q: node.error for q, node in self.nodes.items()}
         places = np.array(sorted(q for q in errors if q))
         ratios = np.array([errors[q] / abs(q) for q in places.tolist()])
-        i = np.searchsorted(places, p)[:, None] + np.arange(-2, 2)
+        i = np.searchsorted(places, p)[:, None] + np.array([-1, 0])
         return np.asarray(np.abs(p) * np.max(ratios[np.clip(i, 0, places.size - 1)], axis=1))
 
 
@@ -485,7 +503,7 @@ def bases(solver: ExponentSolver, low: float, high: float, most: int = MOST_NODE
     raise NotConverged(Message(Code.NO_FUNCTION, low=low, high=high))
 
 
-def _orthonormal(known: FloatArray, new: Sequence[FloatArray]) -> FloatArray:
+def orthonormal(known: FloatArray, new: Sequence[FloatArray]) -> FloatArray:
     """Orthonormal rows and further ones, made orthonormal to those before."""
     rows = known
     for each in new:
@@ -496,9 +514,29 @@ def _orthonormal(known: FloatArray, new: Sequence[FloatArray]) -> FloatArray:
     return rows
 
 
-def _form(y: FloatArray, matrices: FloatArray, x: FloatArray) -> FloatArray:
+def form(y: FloatArray, matrices: FloatArray, x: FloatArray) -> FloatArray:
     """yᵀAx for each of some matrices, shape (n,)."""
     return np.asarray((y[:, None, :] @ matrices @ x[:, :, None])[:, 0, 0])
+
+
+def eigenpairs(
+    a: FloatArray, g: FloatArray, value: FloatArray, x: FloatArray, y: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Eigenvalues of pencils A − ΛG next to what is given, with both vectors, by two-sided iteration on all at once."""
+    tiny = 4 * _EPS * np.max(np.abs(a), initial=0.0)
+    for _ in range(MOST_STEPS):
+        shifted, last = a - (value + tiny)[:, None, None] * g, value
+        try:
+            x = np.linalg.solve(shifted, g @ x[:, :, None])[:, :, 0]
+            y = np.linalg.solve(shifted.swapaxes(1, 2), g.swapaxes(1, 2) @ y[:, :, None])[:, :, 0]
+        except np.linalg.LinAlgError:  # an eigenvalue to the last digit
+            tiny *= 100
+            continue
+        x, y = (each / np.linalg.norm(each, axis=1)[:, None] for each in (x, y))
+        value = form(y, a, x) / form(y, g, x)
+        if np.all(np.abs(value - last) <= 1e-13 * np.max(np.abs(a), initial=0.0)):
+            break
+    return value, x, y
 
 
 def _bordered(of: Reduced, sources: FloatArray) -> FloatArray:

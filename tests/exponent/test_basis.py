@@ -19,7 +19,7 @@ def strong():
     return MomentLyapunovFunction(Problem(case.oscillator, case.noise), (-3.0, 3.0), rtol=case.rtol)
 
 
-@pytest.mark.parametrize("low, high", [(-3.0, 2.0), (-1.0, 0.0), (0.0, 4.0), (1.0, 5.0)])
+@pytest.mark.parametrize(("low", "high"), [(-3.0, 2.0), (-1.0, 0.0), (0.0, 4.0), (1.0, 5.0)])
 def test_polynomials_of_their_degree_are_exact(low, high):
     polynomials = Polynomials(low, high, 6)
     assert (0.0 in polynomials.points) == (low <= 0 <= high)
