@@ -1,0 +1,447 @@
+"""λ, or Λ(p), over one or two parameters from few solves: a reduced basis of eigenfunctions and their derivatives.
+
+On one space, whose functions move with the parameters θ as the noise does, V holds T and ∂T/∂θ, and W holds T* and
+∂T*/∂θ, at some θ, the nodes. Then W L(p; θ) Vᵀ x = Λ W M(θ) Vᵀ x has Λ(p) and its gradient at the nodes, and elsewhere
+with an error of the fourth order in the distance from them. For p = 0, where T = 1, V holds 1, T′ and ∂T′/∂θ: with
+yᵀW L(0; θ) Vᵀ = 0 and yᵀW M 1 = 1 there is λ = yᵀW L′(0; θ) 1, whose error is the product of those of T* and of T′.
+
+L(p; θ) is a smooth function of the parameters of a motion, and of those of a noise: the small matrices are interpolated
+by polynomials. Where it is none, as where a speed changes its sign at a line between cells, there is no such surface.
+What is left is estimated by both residuals and the inverse at a node, as over p, see `exponent.basis`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from itertools import product
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fpsolve.analysis.zero import Axis, said
+from fpsolve.arrays import FloatArray, real_array, real_number, shown
+from fpsolve.budget import counted
+from fpsolve.data import Result, dataset
+from fpsolve.errors import FpsolveError, NotConverged
+from fpsolve.exponent.adapt import SMALL_P, UNSOLVED, Budget
+from fpsolve.exponent.basis import SAFE, SHARE, SPARE, Polynomials, eigenpairs, form, orthonormal
+from fpsolve.exponent.eigen import PairDerivatives, PrincipalPair, principal_pair
+from fpsolve.exponent.error import Solution
+from fpsolve.exponent.solver import ExponentSolver, solver_of
+from fpsolve.exponent.starts import FREE_STAGES, Start, other_centers
+from fpsolve.fem.axis import KroneckerSum
+from fpsolve.fem.factors import one_thread
+from fpsolve.fem.generator import Generator
+from fpsolve.fem.space import Space
+from fpsolve.messages import Code, Message
+from fpsolve.model.problem import Problem, checked_problem
+from fpsolve.model.quantity import LYAPUNOV_EXPONENT, moment_at
+from fpsolve.theory.perturbation import scale_of
+
+if TYPE_CHECKING:
+    import xarray
+
+DEGREES = (2, 4, 6, 9, 13, 19)
+"""Degrees of the polynomials tried for the small matrices, along each parameter."""
+INTERPOLATED = 1e-2
+"""Share of the tolerance for these."""
+LOOKED_AT = 6
+"""Number of points along each parameter at which it is looked at what is left, half of a gap off the ends."""
+MOST_NODES = 60
+"""Number of nodes of a surface."""
+MOST_SPACES = 6
+"""Number of spaces tried."""
+AT_ONCE = 512
+"""Number of points that are evaluated together."""
+_EPS = float(np.finfo(float).eps)
+
+
+class Node(NamedTuple):
+    """What was solved at a place of the unit square: T and T*, the error of F by the space, and both in the basis."""
+
+    at: FloatArray
+    pair: PrincipalPair
+    error: float
+    around: PairDerivatives | None
+    x: FloatArray
+    y: FloatArray
+
+
+class Values(NamedTuple):
+    """F, its gradient by shares of the axes if that is wanted, shape (n,) and (n, d), and both vectors, (n, size)."""
+
+    value: FloatArray
+    gradient: FloatArray
+    x: FloatArray
+    y: FloatArray
+
+
+class Surface(Result):
+    """λ, or Λ(p), of two variables over one or two parameters, callable on arrays.
+
+    Args:
+        problem: with the values of all other parameters.
+        ranges: of one or two parameters by their keys: (smallest, largest), or (smallest, largest, "log").
+        p: the order of the moment; 0 for λ.
+        rtol: |error| ≤ rtol·max(|F|, the terms of Eq. (37) before they cancel), F being λ or Λ(p); None is 1e-6.
+        budget: for a solve.
+        most: how many solves there may be.
+
+    Attributes:
+        nodes: where it was solved, as shares of the ranges, shape (n, d).
+        error: estimate of the largest |error|.
+        is_converged: whether what is left between the nodes is within rtol.
+
+    Raises:
+        ValueError: a key is no parameter, or a range is none.
+        NotConverged: there is no such surface: the functions do not move smoothly, no space serves all points, or slow
+            noise carries the moment at several places.
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        ranges: Mapping[str, Any],
+        p: float = 0.0,
+        *,
+        rtol: float | None = None,
+        budget: Budget | None = None,
+        most: int = MOST_NODES,
+    ) -> None:
+        self.problem, self.p, self.rtol = checked_problem(problem), real_number(p, "p"), rtol or 1e-6
+        self.axes = tuple(Axis(key, *each) for key, each in ranges.items())
+        if not 1 <= len(self.axes) <= 2:
+            raise ValueError(f"got ranges of {len(self.axes)} parameters; must be one or two")
+        for axis in self.axes:
+            if axis.key not in problem.differentiable:
+                known = ", ".join(problem.differentiable) or "none"
+                raise ValueError(f"got {shown(axis.key)}; the parameters are {known}")
+        self._budget, self._nodes, self._refinements = budget or Budget(), list[Node](), 0
+        if problem.dimension != 2 or problem.classes:
+            raise self._none()
+        corners = [np.array(each, dtype=float) for each in product((0.0, 1.0), repeat=len(self.axes))]
+        places = [np.full(len(self.axes), 0.5), *corners]
+        first = self._solver(places[0]).whole.solution(self.p)
+        self._chosen, self._starts = first.pair.generator.chosen, [first.pair]
+        with one_thread():
+            self._begin(places)
+            self.is_converged = self._fill(most)
+        self.nodes = np.array([node.at for node in self._nodes])
+        self.error = self._left + max(node.error for node in self._nodes)
+        self._nodes = [node._replace(around=None) for node in self._nodes]  # which keep factors
+
+    def _none(self) -> NotConverged:
+        return NotConverged(Message(Code.NO_SURFACE, keys=[axis.key for axis in self.axes]))
+
+    def _problem(self, at: FloatArray) -> Problem:
+        """The problem at shares of the ranges. Raises `FpsolveError` where there is none."""
+        try:
+            return self.problem.at({axis.key: float(axis.value(u)) for axis, u in zip(self.axes, at, strict=True)})
+        except ValueError as failure:
+            raise FpsolveError(Message(Code.NO_PROBLEM, reason=said(failure))) from failure
+
+    def _solver(self, at: FloatArray) -> ExponentSolver:
+        return solver_of(self._problem(at), None, self.rtol, self._budget)
+
+    def _generator(self, at: FloatArray) -> Generator:
+        return Generator(self._problem(at), self._chosen)
+
+    def _allowed(self, at: FloatArray, value: float) -> float:
+        """The largest error allowed of F."""
+        return self.rtol * max(abs(value), self._scale(at))
+
+    def _scale(self, at: FloatArray) -> float:
+        scales = scale_of(self._problem(at))
+        return float(scales.moment(self.p)) if self.p else scales.linear
+
+    # nodes
+
+    def _begin(self, places: Sequence[FloatArray]) -> None:
+        """Make the basis of some places, on the first space that serves all of them."""
+        while True:
+            self._sample()
+            self._nodes.clear()
+            if all(self._add(at) for at in places):
+                return
+
+    def _fill(self, most: int) -> bool:
+        """Add nodes where most is left, until that is allowed; what was left with fewer nodes is a bound."""
+        shares = (np.arange(LOOKED_AT) + 0.5) / LOOKED_AT
+        places = [np.array(each) for each in product(shares, repeat=len(self.axes))]
+        left, count = np.full((len(places), 2), math.inf), np.zeros(len(places), dtype=int)
+        while True:
+            worst = int(np.argmax(left[:, 0]))
+            self._left = float(np.max(left[:, 1]))
+            if left[worst, 0] <= 1:
+                return True
+            if count[worst] < len(self._nodes):
+                left[worst], count[worst] = self._left_at(places[worst]), len(self._nodes)
+            elif len(self._nodes) >= most:
+                return False
+            elif self._add(places[worst]):
+                left[worst] = 0.0
+            else:
+                self._begin([*(node.at for node in self._nodes), places[worst]])
+                left[worst] = 0.0
+
+    def _add(self, at: FloatArray) -> bool:
+        """Solve at a place, and take the eigenfunctions with their derivatives; False for a finer space."""
+        generator, p = self._generator(at), self.p
+        generator.keeps_factors = True
+        start = self._lifted(at, generator) if self._nodes else self._starts
+        place, unit = Start(self.problem, self._chosen), 1.0 if p else SMALL_P  # of λ, the ratio counts
+        with counted(self._budget.countdown("a node of a surface")):
+            try:
+                pair = principal_pair(generator, p, start=start)
+                around = PairDerivatives(pair)
+                near = pair if p else principal_pair(generator, SMALL_P, start=pair)
+            except UNSOLVED as failure:
+                return self._take(place.doubled(failure).space)
+        found = Solution(near)
+        error, allowed = found.error / unit, self._allowed(at, near.value / unit)
+        if other_centers(near):
+            raise self._none()
+        if error > allowed:
+            return self._take(place.refined(found, SPARE * allowed * unit, FREE_STAGES, self._budget.unknowns).space)
+        right, left = self._vectors(at, pair, around)
+        self._extend(right, left)
+        x = self._right @ right[0]
+        self._nodes.append(Node(at, pair, error, around, x, self._dual @ pair.left))
+        return True
+
+    def _take(self, space: Space) -> bool:
+        """Go on with a finer space. Raises `NotConverged` where it has too many unknowns."""
+        self._chosen, self._refinements = space, self._refinements + 1
+        if self._refinements > MOST_SPACES or space.size > self._budget.unknowns:
+            raise self._none()
+        return False
+
+    def _vectors(
+        self, at: FloatArray, pair: PrincipalPair, around: PairDerivatives
+    ) -> tuple[list[FloatArray], list[FloatArray]]:
+        """T, for p = 0 T′, and T*, each with its derivatives by the shares of the ranges."""
+        weighed, value = pair.space.weighed, pair.eigenvalue
+        one = pair.space.constant
+        right, left = [pair.right if self.p else around.by_p], [pair.left]
+        norm = pair.left @ weighed(pair.right)
+        for k in range(len(self.axes)):
+            row = self._rows(at[None], k)[0]
+            by_theta = self._changes(row, right[0], value), self._changes(row, left[0], value, adjoint=True)
+            if self.p:
+                slope = float(left[0] @ by_theta[0] / norm)
+                right.append(around.solve(slope * weighed(right[0]) - by_theta[0]))
+            else:  # A T′ = −(L′ − λM) 1
+                more = by_theta[0] + self._changes(row, one, pair.derivative, kind=1)
+                slope = float(left[0] @ more / (left[0] @ weighed(one)))
+                right.append(around.solve(slope * weighed(one) - more))
+            slope = float(by_theta[1] @ pair.right / norm)
+            left.append(around.solve(slope * weighed(left[0]) - by_theta[1], adjoint=True))
+        return right, left
+
+    def _lifted(self, at: FloatArray, generator: Generator) -> PrincipalPair:
+        """What the basis makes of the pair at a place, to start from."""
+        found, nearest = self._values(at[None]), self._nearest(at)
+        right = found.x[0] @ self._right if self.p else nearest.pair.right
+        left = found.y[0] @ self._dual
+        return replace(nearest.pair, right=right, left=left, generator=generator)
+
+    def _nearest(self, at: FloatArray) -> Node:
+        return min(self._nodes, key=lambda node: float(np.linalg.norm(node.at - at)))
+
+    # the small matrices
+
+    def _sample(self) -> None:
+        """Polynomials in each parameter that L, for p = 0 also L′, and M are, as far as F depends on them."""
+        middle, d = np.full(len(self.axes), 0.5), len(self.axes)
+        generator = self._generator(middle)
+        pair = principal_pair(generator, self.p, start=self._starts)
+        vector, size = pair.left, np.linalg.norm(pair.right) / abs(pair.left @ pair.space.weighed(pair.right))
+        allowed = INTERPOLATED * self._allowed(middle, 0.0) / size
+        self._polynomials = []
+        for k in range(d):
+            test = middle.copy()
+            test[k] = 0.37
+            exact = self._images_at(test, vector)
+            for degree in DEGREES:
+                polynomials, known = Polynomials(0.0, 1.0, degree), []
+                for u in polynomials.points.tolist():
+                    place = middle.copy()
+                    place[k] = u
+                    known.append(self._images_at(place, vector))
+                off = np.linalg.norm(polynomials.at(np.array([0.37]))[0] @ np.array(known) - exact)
+                if off <= max(allowed, degree * _EPS * np.max(np.linalg.norm(known, axis=1))):
+                    break
+            else:
+                raise self._none()
+            self._polynomials.append(polynomials)
+        places = [np.array(each) for each in product(*(each.points for each in self._polynomials))]
+        made = [self._operators(at) for at in places]
+        self._kinds = [[each[kind] for each in made] for kind in range(len(made[0]))]
+        self._spaces = [self._space_at(at) for at in places]
+        one = self._spaces[0].constant
+        self._right = orthonormal(np.zeros((0, one.size)), [] if self.p else [one])
+        self._dual = orthonormal(np.zeros((0, one.size)), [] if self.p else [one])
+        self._small = [np.zeros((len(places), 0, 0)) for _ in range(len(self._kinds) + 1)]
+        if not self.p:
+            self._extend([], [])
+
+    def _operators(self, at: FloatArray) -> tuple[KroneckerSum, ...]:
+        """L, for p = 0 also L′."""
+        generator = self._generator(at)
+        return (generator.matrix(self.p),) if self.p else (generator.matrix(0.0), generator.matrix(0.0, derivative=1))
+
+    def _images_at(self, at: FloatArray, vector: FloatArray) -> FloatArray:
+        """The transposes of these, and M, times a vector, one after the other."""
+        return np.concatenate([*(each.T @ vector for each in self._operators(at)), self._space_at(at).weighed(vector)])
+
+    def _space_at(self, at: FloatArray) -> Space:
+        return self._chosen.at(self.p, self._problem(at).coloured.parts.values())
+
+    def _rows(self, at: FloatArray, derivative: int | None = None) -> FloatArray:
+        """What small matrices at each place, or their derivatives, are of those of all samples, shape (n, samples)."""
+        rows = np.ones((len(at), 1))
+        for k, polynomials in enumerate(self._polynomials):
+            own = polynomials.at(at[:, k])
+            own = own @ polynomials.slopes if k == derivative else own
+            rows = (rows[:, :, None] * own[:, None, :]).reshape(len(at), -1)
+        return rows
+
+    def _changes(
+        self, row: FloatArray, vector: FloatArray, value: float, adjoint: bool = False, kind: int = 0
+    ) -> FloatArray:
+        """The derivative of L − vM, or of L′ − vM, times a vector, from its share of each sample."""
+        total = np.zeros(vector.size)
+        for share, matrix, space in zip(row.tolist(), self._kinds[kind], self._spaces, strict=True):
+            image = (matrix.T if adjoint else matrix) @ vector
+            total += share * (image - value * space.weighed(vector) if value else image)
+        return total
+
+    def _extend(self, right: Sequence[FloatArray], left: Sequence[FloatArray]) -> None:
+        """Add vectors to the basis, and what they make of all samples to the small matrices."""
+        old, shape = self._small[0].shape[1], self._chosen.shape
+        self._right, self._dual = orthonormal(self._right, right), orthonormal(self._dual, left)
+        after, before = self._right[old:], self._dual[old:]
+        for number, small in enumerate(self._small):
+            if number < len(self._kinds):
+                tables, duals = (each.reshape(-1, *shape) for each in (after, before))
+                images = np.array([each.images(tables).reshape(after.shape) for each in self._kinds[number]])
+                adjoint = np.array([each.T.images(duals).reshape(before.shape) for each in self._kinds[number]])
+            else:
+                images, adjoint = (
+                    np.array([[space.weighed(each) for each in side] for space in self._spaces])
+                    for side in (after, before)
+                )
+            rows = np.concatenate([small, adjoint @ self._right[:old].T], axis=1)
+            self._small[number] = np.concatenate([rows, (images @ self._dual.T).swapaxes(1, 2)], axis=2)
+        if not self.p:
+            self._small[0][:, :, 0] = 0.0  # L(0) 1 = 0
+
+    def _pencils(self, rows: FloatArray) -> list[FloatArray]:
+        size = len(self._right)
+        return [(rows @ each.reshape(len(each), -1)).reshape(-1, size, size) for each in self._small]
+
+    def _values(self, at: FloatArray, has_gradient: bool = False) -> Values:
+        """F at some places, shape (n, d), from the small matrices alone."""
+        small = self._pencils(self._rows(at))
+        slopes = [self._pencils(self._rows(at, k)) for k in range(len(self.axes))] if has_gradient else []
+        if not self.p:
+            return self._growth(small, slopes)
+        a, g = small
+        value, x, y = eigenpairs(a, g, *self._guess(at))
+        y = y / form(y, g, x)[:, None]
+        gradient = np.array([form(y, by_a, x) - value * form(y, by_g, x) for by_a, by_g in slopes]).T
+        return Values(value, gradient, x, y)
+
+    def _growth(self, small: Sequence[FloatArray], slopes: Sequence[Sequence[FloatArray]]) -> Values:
+        """λ: Bᵀy = (1, 0, …) with B = (G 1, A V′) gives T*, and Bz = A′1 gives λ = z₁ and −T′."""
+        a, b, g = small
+        source, first = b[:, :, 0], np.zeros(a.shape[:2])
+        first[:, 0] = 1.0
+        whole = np.concatenate([g[:, :, :1], a[:, :, 1:]], axis=2)
+        y = np.linalg.solve(whole.swapaxes(1, 2), first[:, :, None])[:, :, 0]
+        value = np.sum(y * source, axis=1)
+        z = np.linalg.solve(whole, source[:, :, None])[:, :, 0] if slopes or len(value) == 1 else 0.0 * y
+        gradient = []
+        for by_a, by_b, by_g in slopes:
+            by_whole = np.concatenate([by_g[:, :, :1], by_a[:, :, 1:]], axis=2)
+            gradient.append(np.sum(y * by_b[:, :, 0], axis=1) - form(y, by_whole, z))
+        x = np.concatenate([np.zeros((len(z), 1)), -z[:, 1:]], axis=1)
+        return Values(value, np.array(gradient).T, x, y)
+
+    def _guess(self, at: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Λ(p) by the value and the slope of the nearest node, and its vectors."""
+        nodes, size = self._nodes, len(self._right)
+        distance = np.linalg.norm(at[:, None, :] - np.array([node.at for node in nodes]), axis=2)
+        own = np.argmin(distance, axis=1)
+        x, y = (
+            np.array([np.pad(getattr(node, name), (0, size - getattr(node, name).size)) for node in nodes])
+            for name in "xy"
+        )
+        return np.array([node.pair.value for node in nodes])[own], x[own], y[own]
+
+    # errors
+
+    def _left_at(self, at: FloatArray) -> tuple[float, float]:
+        """What is left of F at a place, over its share of what is allowed, and itself."""
+        found = self._values(at[None])
+        value, x, y = float(found.value[0]), found.x[0] @ self._right, found.y[0] @ self._dual
+        operators, space = self._operators(at), self._space_at(at)
+        if self.p:
+            own = operators[0].shifted(value)
+            r, s = own @ x, own.T @ y
+        else:
+            one = space.constant
+            r = operators[0] @ x + operators[1] @ one - value * space.weighed(one)
+            s = operators[0].T @ y
+        around = self._nearest(at).around
+        assert around is not None
+        left = SAFE * abs(float(s @ around.solve(r, refinements=2)))
+        return left / (SHARE * self._allowed(at, value)), left
+
+    # values
+
+    def __call__(self, *values: ArrayLike) -> FloatArray:
+        """F at values of the parameters, broadcast together. Raises `ValueError` outside the ranges."""
+        shares = self._shares(values)
+        parts = np.array_split(shares.reshape(-1, len(self.axes)), math.ceil(shares[..., 0].size / AT_ONCE) or 1)
+        return np.concatenate([self._values(part).value for part in parts]).reshape(shares.shape[:-1])
+
+    def gradient(self, *values: ArrayLike) -> FloatArray:
+        """∂F/∂θ, of the shape of the values, one entry for each parameter last."""
+        shares = self._shares(values)
+        found = self._values(shares.reshape(-1, len(self.axes)), has_gradient=True).gradient.reshape(shares.shape)
+        slopes = [np.vectorize(axis.slope)(shares[..., k]) for k, axis in enumerate(self.axes)]
+        return np.asarray(found / np.stack(slopes, axis=-1))
+
+    def _shares(self, values: Sequence[ArrayLike]) -> FloatArray:
+        """The values as shares of the ranges, one for each parameter last."""
+        if len(values) != len(self.axes):
+            raise ValueError(
+                f"got {len(values)} arrays; must be {len(self.axes)}: {', '.join(a.key for a in self.axes)}"
+            )
+        shares = []
+        for axis, each in zip(self.axes, values, strict=True):
+            points = real_array(each, axis.key)
+            if not np.all((points >= axis.start) & (points <= axis.stop)):
+                raise ValueError(f"{axis.key} must lie in [{axis.start:g}, {axis.stop:g}]; make a wider surface")
+            shares.append(np.clip(np.vectorize(axis.share, otypes=[float])(points), 0, 1))
+        return np.stack(np.broadcast_arrays(*shares), axis=-1)
+
+    def to_xarray(self, points: int = 101) -> xarray.Dataset:
+        """F on a grid of so many points each way."""
+        sides = [np.asarray(axis.value(np.linspace(0, 1, points))) for axis in self.axes]
+        names = [replace(self.problem.parameters[axis.key].quantity, dims=(axis.key,)) for axis in self.axes]
+        keys = tuple(axis.key for axis in self.axes)
+        found = replace(moment_at(self.p) if self.p else LYAPUNOV_EXPONENT, dims=keys)
+        numbers = {found: self(*np.meshgrid(*sides, indexing="ij"))}
+        held = {key: value for key, value in self.problem.values.items() if key not in keys}
+        places = dict(zip(names, sides, strict=True))
+        method, more = "finite elements and a reduced basis", {"error": self.error, "rtol": self.rtol}
+        return dataset(found.words, method, numbers, places, held, **more)
+
+    def _said(self) -> str:
+        symbol, keys = f"Λ({self.p:g})" if self.p else "λ", " and ".join(axis.key for axis in self.axes)
+        return f"{symbol} over {keys}, {len(self._nodes)} solved, ± {self.error:.0e}"

@@ -1,0 +1,112 @@
+"""λ and Λ(p) over one or two parameters by a reduced basis: against solves of their own, closed forms, differences."""
+
+import numpy as np
+import pytest
+
+from fpsolve import ExponentSolver, OrnsteinUhlenbeck, PlaneSystem, Problem, VibroImpactOscillator
+from fpsolve.analysis import Surface
+from fpsolve.errors import NotConverged
+from fpsolve.model import Bounded, White
+
+OSCILLATOR = Problem(
+    VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=0.7), OrnsteinUhlenbeck(alpha=2.0, sigma=1.0)
+)
+MATHIEU = Problem(
+    PlaneSystem.of_equations(
+        ("x", "v"),
+        ("v", "-2*b*v - (1 + load + shake)*x"),
+        {"b": 0.1},
+        noises={"load": "noise.load", "shake": "noise.shake"},
+    ),
+    {"load": Bounded(0.4, 2.0, 0.2), "shake": White(0.2)},
+)
+FRAMES = {
+    "oscillator": (OSCILLATOR, {"oscillator.omega": (0.6, 2.0), "noise.sigma": (0.3, 1.5)}),
+    "tilted and logarithmic": (OSCILLATOR, {"noise.alpha": (0.5, 5.0, "log"), "oscillator.c1": (-0.2, 0.4)}),
+    "one": (OSCILLATOR, {"oscillator.restitution": (0.6, 1.0)}),
+    "two noises": (MATHIEU, {"noise.load.nu": (1.5, 2.4), "system.b": (0.02, 0.2)}),
+}
+
+
+def points(surface, count):
+    rng = np.random.default_rng(1)
+    return [np.asarray(axis.value(rng.uniform(0, 1, count))) for axis in surface.axes]
+
+
+@pytest.mark.parametrize("p", [0.0, 2.0, -0.7])
+@pytest.mark.parametrize("name", FRAMES)
+def test_between_the_nodes_against_solves(name, p):
+    problem, ranges = FRAMES[name]
+    surface = Surface(problem, ranges, p, rtol=1e-5)
+    assert surface.is_converged
+    values = points(surface, 5)
+    for theta, value in zip(zip(*values, strict=True), surface(*values), strict=True):
+        solver = ExponentSolver(problem.at(dict(zip(ranges, map(float, theta), strict=True))), rtol=1e-8)
+        if p:
+            solution = solver.solution(p)
+            exact, doubt = solution.pair.value, solution.error
+        else:
+            exponent = solver.lyapunov_exponent()
+            exact, doubt = exponent.value, exponent.error_estimate
+        assert abs(value - exact) <= surface.error + doubt
+
+
+def test_the_growth_rate_is_affine_in_the_logarithm_of_the_impact_factor():
+    """λ = λ₀ + N ln R, whatever the noise: N is the slope at every R."""
+    surface = Surface(OSCILLATOR, {"oscillator.restitution": (0.6, 1.0)}, rtol=1e-7)
+    r = np.linspace(0.6, 1.0, 9)
+    log_factor = np.array(
+        [OSCILLATOR.at({"oscillator.restitution": float(each)}).system.jumps[0].log_factor for each in r]
+    )
+    steps = np.diff(surface(r)) / np.diff(log_factor)
+    assert np.ptp(steps) <= 4 * surface.error / np.min(np.diff(log_factor))
+
+
+@pytest.mark.parametrize("p", [0.0, 1.3])
+def test_the_gradient_is_that_of_the_values(p):
+    surface = Surface(OSCILLATOR, {"noise.alpha": (0.5, 5.0, "log"), "oscillator.c1": (-0.2, 0.4)}, p, rtol=1e-6)
+    alpha, c1, step = np.array([0.9, 3.0]), np.array([0.1, -0.1]), 1e-4
+    gradient = surface.gradient(alpha, c1)
+    by_alpha = (surface(alpha * (1 + step), c1) - surface(alpha * (1 - step), c1)) / (2 * step * alpha)
+    by_c1 = (surface(alpha, c1 + step) - surface(alpha, c1 - step)) / (2 * step)
+    np.testing.assert_allclose(gradient, np.stack([by_alpha, by_c1], axis=-1), rtol=1e-5, atol=1e-8)
+
+
+def test_shapes_and_labels():
+    surface = Surface(OSCILLATOR, {"oscillator.omega": (0.6, 2.0), "noise.sigma": (0.3, 1.5)}, 2.0, rtol=1e-4)
+    assert surface(1.0, 1.0).shape == ()
+    assert surface([[0.7, 0.8, 0.9]], [[0.5], [1.0]]).shape == (2, 3)
+    grid = surface.to_xarray(11)
+    assert grid["moment"].dims == ("oscillator.omega", "noise.sigma")
+    assert float(grid["moment"].sel({"oscillator.omega": 0.6, "noise.sigma": 1.5})) == pytest.approx(
+        float(surface(0.6, 1.5))
+    )
+    assert grid.attrs["error"] == surface.error
+
+
+@pytest.mark.parametrize(
+    ("ranges", "told"),
+    [
+        ({"oscillator.omega": (2.0, 0.6)}, "must be start < stop"),
+        ({"oscillator.mass": (0.6, 2.0)}, "the parameters are oscillator.omega"),
+        ({}, "must be one or two"),
+    ],
+)
+def test_what_is_no_frame_is_refused(ranges, told):
+    with pytest.raises(ValueError, match=told):
+        Surface(OSCILLATOR, ranges)
+
+
+def test_no_value_outside_of_the_ranges():
+    surface = Surface(OSCILLATOR, {"oscillator.omega": (0.9, 1.1)}, rtol=1e-4)
+    with pytest.raises(ValueError, match=r"oscillator\.omega must lie in \[0\.9, 1\.1\]; make a wider surface"):
+        surface(1.2)
+
+
+def test_three_variables_have_no_surface():
+    problem = Problem(
+        PlaneSystem.of_equations(("x", "v"), ("-x + xi*v", "v*(-0.5 + xi)"), {}),
+        OrnsteinUhlenbeck(alpha=1.0, sigma=1.0),
+    )
+    with pytest.raises(NotConverged, match=r"there is no surface over noise\.sigma"):
+        Surface(problem, {"noise.sigma": (0.5, 1.0)})
