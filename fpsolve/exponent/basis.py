@@ -51,6 +51,8 @@ BOTH_SIDES = (0.2, 0.8)
 """Shares of a gap where its error is looked at, too, unless it is hardly anything in the middle."""
 HARDLY = 1e-2
 """Share of what is allowed up to which it is that."""
+ELSEWHERE = 20.0
+"""What may be left elsewhere in a gap, over that in the middle, where it is looked at there only."""
 SAFE = 4.0
 """What is left, over its estimate to first order."""
 SHARE = 0.4
@@ -229,8 +231,12 @@ class Basis:
             p = low + WITHIN * (high - low)
             try:
                 if left is None or left.nodes < len(self.nodes):
-                    self._lefts[gap] = found = self._left_at(p, gap)
-                    if HARDLY * found.allowed < found.error <= found.allowed:
+                    found = self._left_at(p, gap)
+                    if found.error <= HARDLY * found.allowed:
+                        self._lefts[gap] = found._replace(error=ELSEWHERE * found.error)
+                    elif found.error > found.allowed:
+                        self._lefts[gap] = found
+                    else:
                         others = (self._left_at(low + share * (high - low), gap) for share in BOTH_SIDES)
                         self._lefts[gap] = max([found, *others], key=lambda each: each.error / each.allowed)
                 elif len(self.nodes) >= most:
