@@ -28,7 +28,7 @@ from fpsolve.data import Result, dataset
 from fpsolve.errors import FpsolveError, NotConverged
 from fpsolve.exponent.adapt import SMALL_P, UNSOLVED, Budget
 from fpsolve.exponent.basis import SAFE, SHARE, SPARE, Polynomials, eigenpairs, form, orthonormal
-from fpsolve.exponent.eigen import PairDerivatives, PrincipalPair, principal_pair
+from fpsolve.exponent.eigen import MOSTLY, PairDerivatives, PrincipalPair, principal_pair
 from fpsolve.exponent.error import Solution
 from fpsolve.exponent.solver import ExponentSolver, solver_of
 from fpsolve.exponent.starts import FREE_STAGES, Start, other_centers
@@ -54,6 +54,10 @@ MOST_NODES = 60
 """Number of nodes of a surface."""
 MOST_SPACES = 6
 """Number of spaces tried."""
+SURELY = 0.8
+"""Share of a pair in what is expected of it, from which on it is surely that pair."""
+STEPS_TO_LOST = 16
+"""Number of steps from a node in which a pair is followed where it is not."""
 AT_ONCE = 512
 """Number of points that are evaluated together."""
 _EPS = float(np.finfo(float).eps)
@@ -208,8 +212,8 @@ class Surface(Result):
             return self._take(place.refined(found, SPARE * allowed * unit, FREE_STAGES, self._budget.unknowns).space)
         right, left = self._vectors(at, pair, around)
         self._extend(right, left)
-        x = self._right @ right[0]
-        self._nodes.append(Node(at, pair, error, around, x, self._dual @ pair.left))
+        x, y = np.array(right) @ self._right.T, np.array(left) @ self._dual.T
+        self._nodes.append(Node(at, pair, error, around, x, y))
         return True
 
     def _take(self, space: Space) -> bool:
@@ -243,7 +247,11 @@ class Surface(Result):
 
     def _lifted(self, at: FloatArray, generator: Generator) -> PrincipalPair:
         """What the basis makes of the pair at a place, to start from."""
-        found, nearest = self._values(at[None]), self._nearest(at)
+        nearest = self._nearest(at)
+        try:
+            found = self._values(at[None])
+        except NotConverged:  # too far
+            return replace(nearest.pair, generator=generator)
         right = found.x[0] @ self._right if self.p else nearest.pair.right
         left = found.y[0] @ self._dual
         return replace(nearest.pair, right=right, left=left, generator=generator)
@@ -350,7 +358,7 @@ class Surface(Result):
         if not self.p:
             return self._growth(small, slopes)
         a, g = small
-        value, x, y = eigenpairs(a, g, *self._guess(at))
+        value, x, y = self._followed(at, a, g)
         y = y / form(y, g, x)[:, None]
         gradient = np.array([form(y, by_a, x) - value * form(y, by_g, x) for by_a, by_g in slopes]).T
         return Values(value, gradient, x, y)
@@ -371,22 +379,40 @@ class Surface(Result):
         x = np.concatenate([np.zeros((len(z), 1)), -z[:, 1:]], axis=1)
         return Values(value, np.array(gradient).T, x, y)
 
-    def _guess(self, at: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Λ(p) by the value and the slope of the nearest node, and its vectors."""
-        nodes, size = self._nodes, len(self._right)
-        distance = np.linalg.norm(at[:, None, :] - np.array([node.at for node in nodes]), axis=2)
-        own = np.argmin(distance, axis=1)
-        x, y = (
-            np.array([np.pad(getattr(node, name), (0, size - getattr(node, name).size)) for node in nodes])
-            for name in "xy"
-        )
-        return np.array([node.pair.value for node in nodes])[own], x[own], y[own]
+    def _followed(self, at: FloatArray, a: FloatArray, g: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Λ(p) and its vectors, from those of the nearest node and their derivatives, or on the way from there.
+
+        Raises:
+            NotConverged: it cannot be told which pair is that of the node.
+        """
+        places = np.array([node.at for node in self._nodes])
+        own = np.argmin(np.linalg.norm(at[:, None, :] - places, axis=2), axis=1)
+        size, way = len(self._right), at - places[own]
+        known = [
+            np.array([np.pad(each, ((0, 0), (0, size - each.shape[1]))) for each in side])[own]
+            for side in ([node.x for node in self._nodes], [node.y for node in self._nodes])
+        ]
+        x, y = (each[:, 0] + np.einsum("nk,nki->ni", way, each[:, 1:]) for each in known)
+        value, x, y, share = eigenpairs(a, g, form(y, a, x) / form(y, g, x), x, y)
+        lost = np.flatnonzero(~(share > SURELY))
+        u, v = (each[lost, 0] for each in known)
+        for k in range(1, STEPS_TO_LOST + 1 if lost.size else 0):
+            here = places[own[lost]] + k / STEPS_TO_LOST * way[lost]
+            own_a, own_g = self._pencils(self._rows(here))
+            found, u, v, share = eigenpairs(own_a, own_g, form(v, own_a, u) / form(v, own_g, u), u, v)
+            if not np.all(share > MOSTLY):
+                raise self._none()
+            value[lost], x[lost], y[lost] = found, u, v
+        return value, x, y
 
     # errors
 
     def _left_at(self, at: FloatArray) -> tuple[float, float]:
         """What is left of F at a place, over its share of what is allowed, and itself."""
-        found = self._values(at[None])
+        try:
+            found = self._values(at[None])
+        except NotConverged:
+            return math.inf, math.inf
         value, x, y = float(found.value[0]), found.x[0] @ self._right, found.y[0] @ self._dual
         operators, space = self._operators(at), self._space_at(at)
         if self.p:

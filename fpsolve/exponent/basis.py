@@ -29,7 +29,7 @@ from fpsolve.arrays import FloatArray
 from fpsolve.budget import counted
 from fpsolve.errors import NotConverged
 from fpsolve.exponent.adapt import SMALL_P, UNSOLVED
-from fpsolve.exponent.eigen import PairDerivatives, PrincipalPair, principal_pair
+from fpsolve.exponent.eigen import MOSTLY, PairDerivatives, PrincipalPair, principal_pair
 from fpsolve.exponent.error import Solution
 from fpsolve.exponent.starts import FREE_STAGES, Start, other_centers
 from fpsolve.fem.axis import KroneckerSum
@@ -144,11 +144,12 @@ class Node(NamedTuple):
 
 
 class Reduced(NamedTuple):
-    """Eigenvalues of small pencils A − ΛG at some p, shape (n,), right and left vectors, (n, size), and A and G."""
+    """Eigenvalues of small pencils A − ΛG at some p, shape (n,), vectors, (n, size), shares, (n,), A and G."""
 
     value: FloatArray
     x: FloatArray
     y: FloatArray
+    share: FloatArray
     a: FloatArray
     g: FloatArray
 
@@ -420,7 +421,7 @@ class Basis:
         allowed = self._solver.tolerance(p, value)
         if self._solver.mesh is not None:
             allowed = max(allowed, *(self.nodes[q].error for q in gap))
-        if not tangents - slack <= value <= chord + slack:
+        if not (tangents - slack <= value <= chord + slack and found.share[0] > MOSTLY):
             return Left(p, math.inf, SHARE * allowed, 0.0, len(self.nodes))
         right, left = found.x[0] @ self._right, found.y[0] @ self._dual
         matrix, space = self._generator.matrix(p).shifted(value), self._generator.space(p)
@@ -448,7 +449,9 @@ class Basis:
 
     def at(self, p: FloatArray) -> Curve:
         """Λ at p in the interval, shape (n,)."""
-        value, x, y, _, g = self._reduced(p)
+        value, x, y, share, _, g = self._reduced(p)
+        if not np.all(share > MOSTLY):
+            raise NotConverged(Message(Code.NO_FUNCTION, low=self.low, high=self.high))
         norm = form(y, g, x)
         a1, g1 = self._pencils(p, 1)
         derivative = (form(y, a1, x) - value * form(y, g1, x)) / norm
@@ -461,7 +464,7 @@ class Basis:
 
     def second_derivative(self, p: FloatArray) -> FloatArray:
         """Λ″ at p in the interval, shape (n,)."""
-        value, x, y, _, g = found = self._reduced(p)
+        value, x, y, _, _, g = found = self._reduced(p)
         (a1, g1), (a2, g2) = (self._pencils(p, k) for k in (1, 2))
         norm, rate = form(y, g, x), value[:, None, None]
         slope = (form(y, a1 - rate * g1, x) / norm)[:, None, None]
@@ -527,9 +530,13 @@ def form(y: FloatArray, matrices: FloatArray, x: FloatArray) -> FloatArray:
 
 def eigenpairs(
     a: FloatArray, g: FloatArray, value: FloatArray, x: FloatArray, y: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Eigenvalues of pencils A − ΛG next to what is given, with both vectors, by two-sided iteration on all at once."""
-    tiny = 4 * _EPS * np.max(np.abs(a), initial=0.0)
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Eigenvalues of pencils A − ΛG next to what is given, both vectors, and the shares that these have in the given.
+
+    The iteration is two-sided, and on all pencils at once. The share is that of a_i b_i ⟨y_i, x_i⟩ in ⟨y, x⟩, y and x
+    being the sums of b_i y_i and of a_i x_i: 1 where a pair is what is given, and ½ where another one may be meant.
+    """
+    tiny, first, last_of = 4 * _EPS * np.max(np.abs(a), initial=0.0), x, y
     for _ in range(MOST_STEPS):
         shifted, last = a - (value + tiny)[:, None, None] * g, value
         try:
@@ -542,7 +549,8 @@ def eigenpairs(
         value = form(y, a, x) / form(y, g, x)
         if np.all(np.abs(value - last) <= 1e-13 * np.max(np.abs(a), initial=0.0)):
             break
-    return value, x, y
+    share = form(last_of, g, x) * form(y, g, first) / (form(last_of, g, first) * form(y, g, x))
+    return value, x, y, share
 
 
 def _bordered(of: Reduced, sources: FloatArray) -> FloatArray:
