@@ -4,6 +4,7 @@ import ast
 import json
 import math
 import re
+import shutil
 from contextlib import chdir, redirect_stdout
 from datetime import UTC, datetime
 from functools import cache
@@ -69,7 +70,8 @@ def test_blocks_of_python_run(page):
 
 @pytest.mark.parametrize("page", named(PAGES, "toml"))
 def test_blocks_of_toml_are_cases(page, tmp_path):
-    """A whole case is read; what is less is a part of one."""
+    """A whole case is read; what is less is a part of one, with the matrices of a shipped case beside it."""
+    shutil.copytree(ROOT / "cases/systems/beam", tmp_path / "beam")
     for number, block in enumerate(blocks(page, "toml")):
         if "entry-points" in block:
             continue

@@ -9,12 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from copy import copy
+from pathlib import Path
 from typing import Any, Literal
 
 from pydantic import ValidationError, ValidationInfo, create_model
 from pydantic.fields import FieldInfo
 from pydantic_core import InitErrorDetails
 
+from fpsolve.case.matrices import with_matrices
 from fpsolve.explain import UNBOUNDED, Refusal, details_of, nearest, refuse, shown_with_kind
 from fpsolve.model.faults import TableError, fields_of, table_of
 from fpsolve.model.kinds import is_kind, kind_names, noise_kind, system_kind
@@ -38,7 +40,8 @@ def half_of(half: Half, table: Any, info: ValidationInfo) -> Any:
     if not isinstance(table, dict):
         return table
     if half == "system":
-        return _made(half, table)
+        folder = (info.context or {}).get("folder", Path())
+        return _made(half, with_matrices(table, folder) if table.get("kind") == "modes" else table)
     names, system = names_of(table), info.data.get("system")
     if system is not None:
         refuse(_misnamed(names, system.noise_sections))

@@ -14,6 +14,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from fpsolve.case.matrices import KEYS
 from fpsolve.case.new import Modes, case_text
 from fpsolve.case.schema import SCHEMA, schema_text
 from fpsolve.commands.options import ModeRows, ModesFile
@@ -41,7 +42,7 @@ def described_cases() -> dict[str, str]:
 
 
 def copy_case(name: str, target: Path | None = None) -> Path:
-    """Copy a case, with the mesh that it names, and beside it the schema by which editors complete and check it.
+    """Copy a case, with the files that it names, and beside it the schema by which editors complete and check it.
 
     Args:
         name: of the case; its folder and its ending may stand there, too.
@@ -66,9 +67,12 @@ def copy_case(name: str, target: Path | None = None) -> Path:
     path = Path(source.name) if target is None else target / source.name if target.is_dir() else target
     text = f"#:schema {SCHEMA}\n{_NAMED.sub('', source.read_text(encoding='utf-8'))}"
     copies = {path: text}
-    if mesh := tomllib.loads(text).get("mesh", {}).get("file"):
-        beside = path.parent / Path(mesh).name
-        copies = {beside: (source.parent / mesh).read_text(encoding="utf-8"), path: text.replace(mesh, beside.name)}
+    tables = tomllib.loads(text)
+    stated = [tables.get("mesh", {}).get("file"), *map(tables.get("system", {}).get, KEYS)]
+    for file in (each for each in stated if isinstance(each, str)):
+        beside = path.parent / Path(file).name
+        copies[beside] = (source.parent / file).read_text(encoding="utf-8")
+        copies[path] = copies[path].replace(file, beside.name)
     _write_new(copies, path, f"write `fpsolve new {source.stem} FILE` with another FILE")
     return path
 

@@ -26,14 +26,14 @@ Monomial = tuple[tuple[str, ...], str, int]
 NUMBER: Monomial = (), "", 0
 HIGHEST_DEGREE = 3
 """Highest degree of a term in the state."""
-MOST_LETTERS = 1000
+MOST_LETTERS = 20_000
 """Largest number of characters of an expression."""
 MOST_LEVELS = 50
 """Largest depth of an expression, whose sums and products of any length are one level each."""
 LARGEST_POWER = 10
 """Largest exponent, and largest power of ε."""
 CONSTANTS = {"pi": math.pi}
-_LETTERS = re.compile(r"[A-Za-z0-9_+\-*/().\s]")
+_OTHERS = re.compile(r"[^A-Za-z0-9_+\-*/().\s]")
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _KNOWN = "write numbers, names, + - * / **, parentheses, pi, exp() and sqrt() only"
 _MINUS = ast.Sub, ast.Div, ast.USub
@@ -181,10 +181,9 @@ def _parsed(text: str) -> tuple[str, ast.expr]:
         raise ExpressionError(
             f"has {len(text)} characters; must be at most {MOST_LETTERS}; use parameters to shorten it"
         )
-    for letter in text:
-        if not _LETTERS.fullmatch(letter):
-            more = "write ** for powers" if letter == "^" else _KNOWN
-            raise ExpressionError(f"has the character {letter!a}, which is no arithmetic; {more}")
+    if other := _OTHERS.search(text):
+        more = "write ** for powers" if other[0] == "^" else _KNOWN
+        raise ExpressionError(f"has the character {other[0]!a}, which is no arithmetic; {more}")
     line = " ".join(text.split())
     try:
         with warnings.catch_warnings():

@@ -38,7 +38,7 @@ MOST = 20_000
 """Largest number of equations."""
 MOST_MOMENTS = 1000
 """Largest number of moments for each function of the noise."""
-FIRST = 6
+FIRST = 4
 """Degree of the functions of each noise to begin with."""
 NEXT = 2
 """Number of degrees more that tell the error."""

@@ -31,7 +31,7 @@ ENTRY_BYTES = 250
 """Memory of its factors, in bytes for each of its entries."""
 MANY_ENTRIES = 1e5
 """Number of entries from which on it is factorised where a signal can leave it."""
-SETTLED, NEAREST = 1e-7, 1e-3
+SETTLED, NEAREST, KRYLOV = 1e-7, 1e-3, 16
 """As in `Rates`: each σ takes a factorisation."""
 
 
@@ -204,7 +204,7 @@ class PowerRates:
     matrix: Any
     of_state: int
 
-    settled, nearest = SETTLED, NEAREST
+    settled, nearest, krylov = SETTLED, NEAREST, KRYLOV
 
     def __matmul__(self, x: FloatArray) -> FloatArray:
         return np.asarray(self.matrix @ x)

@@ -11,7 +11,7 @@ to it do: what is left beside the diagonal is kept.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -20,7 +20,6 @@ import numpy as np
 from scipy import sparse
 from scipy.linalg import expm
 from scipy.sparse.csgraph import connected_components
-from scipy.sparse.linalg import LinearOperator, gmres
 
 from fpsolve.arrays import FloatArray
 from fpsolve.budget import charge
@@ -39,15 +38,13 @@ WORST_CONDITION = 1e4
 NEAR = (0.0, 1e-8, 1e-6, 1e-4)
 """Distances, over the norm, of the matrices whose eigenvectors are tried."""
 MOST_VECTORS = 150
-"""Largest number of vectors of GMRES: strong noise takes many, and a restart may stall."""
+"""Largest number of vectors of GMRES, which is not restarted, as it may stall then."""
 MOST_HELD = 3e7
 """Number of numbers in all of these from which on there are fewer."""
-RESTARTS = 3
-"""Number of its restarts."""
 ROUGHLY, EXACTLY = 1e-6, 1e-10
 """Tolerances of GMRES for the search and for the eigenvectors."""
-SETTLED, NEAREST = 1e-3, 0.1
-"""As in `Rates`: GMRES takes longer for a nearer σ."""
+SETTLED, NEAREST, KRYLOV = 1e-3, 0.1, 8
+"""As in `Rates`: GMRES takes longer for a nearer σ, and long for each vector."""
 MOST_NUMBERS = 1_000_000
 """Largest number of second moments, of all functions of the noise."""
 
@@ -241,7 +238,7 @@ class Own:
     u: Any
     u_inverse: Any
 
-    settled = SETTLED
+    settled, krylov = SETTLED, KRYLOV
 
     @classmethod
     def of(cls, h: ProductRates) -> Own:
@@ -277,12 +274,7 @@ class Own:
 
         def solve(x: Any, trans: int = 0) -> Any:
             h = self.rates.T if trans else self.rates
-            operator = LinearOperator(2 * (x.size,), matvec=lambda z: (sigma * z - h @ z) / divisor, dtype=complex)
-            vectors = max(10, min(MOST_VECTORS, int(MOST_HELD / x.size)))
-            found, steps = gmres(operator, x / divisor, rtol=tolerance, atol=0.0, restart=vectors, maxiter=RESTARTS)
-            if steps:
-                raise NoHierarchy(f"{x.size} second moments under noise so strong are not found by iteration; {REMEDY}")
-            found = found.reshape(-1, h.n, h.n)
+            found = gmres(lambda z: (sigma * z - h @ z) / divisor, x / divisor, tolerance).reshape(-1, h.n, h.n)
             return (0.5 * (found + found.swapaxes(1, 2))).ravel()  # H of a skew X would be another
 
         return solve
@@ -305,6 +297,30 @@ class Own:
         n = len(of_state)
         turned = of_state @ x.reshape(-1, n, n).astype(complex) @ of_state.T
         return (of_noise @ turned.reshape(-1, n * n)).ravel()
+
+
+def gmres(image: Callable[[Any], Any], b: Any, tolerance: float) -> Any:
+    """x whose image is b, by the smallest residual in the space of b, its image, that of this, and so on.
+
+    Raises:
+        NoHierarchy: the largest number of these does not suffice.
+    """
+    most, size = max(10, min(MOST_VECTORS, int(MOST_HELD / b.size))), float(np.linalg.norm(b))
+    vectors, images = np.empty((most + 1, b.size), complex), np.zeros((most + 1, most), complex)
+    vectors[0] = b / size
+    for k in range(most):
+        known, new = vectors[: k + 1], image(vectors[k])
+        for _ in range(2):
+            shares = np.conj(known @ np.conj(new))
+            new = new - shares @ known
+            images[: k + 1, k] += shares
+        images[k + 1, k] = np.linalg.norm(new)
+        target = np.eye(1, k + 2)[0]
+        x = np.linalg.lstsq(images[: k + 2, : k + 1], target, rcond=None)[0]
+        if np.linalg.norm(images[: k + 2, : k + 1] @ x - target) <= tolerance:
+            return size * (x @ known)
+        vectors[k + 1] = new / images[k + 1, k]
+    raise NoHierarchy(f"{b.size} second moments under noise so strong are not found by iteration; {REMEDY}")
 
 
 def _cleaned(matrix: Any, without: Any = None) -> Any:

@@ -25,10 +25,8 @@ MOST_POLISHES = 10
 """Largest number of steps that polish Λ from there."""
 PASSED = 10.0
 """Factor to the last σ − Λ by which the next Λ is lower where rounding has put σ on the left of it: it is another."""
-KRYLOV = 16
-"""Number of vectors of one search by Arnoldi's method."""
 ROUGH = 1e-2
-"""Tolerance of this search."""
+"""Tolerance of Arnoldi's method."""
 MOST_RESTARTS = 200
 """Largest number of its restarts."""
 REMEDY = "compare with `fpsolve simulate`"
@@ -42,9 +40,11 @@ class Rates(Protocol):
 
     Attributes:
         settled: change of Λ over σ − Λ with which the search ends.
+        krylov: number of vectors of Arnoldi's method for a σ.
     """
 
     settled: float
+    krylov: int
 
     @property
     def bound(self) -> float:
@@ -76,7 +76,7 @@ def rightmost(h: Rates, x: Any) -> tuple[float, float, Any]:
     sigma = h.bound + 0.1 * max(1e-3 * h.largest, abs(h.bound), sys.float_info.min)
     value, away, start = -np.inf, np.inf, x
     for _ in range(MOST_STEPS):
-        last, (share, x) = value, _largest(h.solver(sigma), x)
+        last, (share, x) = value, _largest(h.solver(sigma), x, h.krylov)
         value = sigma - 1 / share
         if last - value > PASSED * away:
             return last, last + away, start
@@ -113,14 +113,14 @@ def polished(h: Any, value: float, sigma: float, x: Any, y: Any) -> Eigenpair:
     return Eigenpair(value, x, y / (y @ x), change if change > rounding else 0.0)
 
 
-def _largest(solve: Solve, x: Any) -> tuple[float, Any]:
+def _largest(solve: Solve, x: Any, krylov: int) -> tuple[float, Any]:
     """The eigenvalue of the largest real part of a positive map, roughly, and its vector, from a positive one."""
-    if x.size <= KRYLOV:
+    if x.size <= krylov:
         values, vectors = np.linalg.eig(solve(np.eye(x.size)))
     else:
         operator = LinearOperator(2 * (x.size,), matvec=solve, dtype=x.dtype)
         try:
-            values, vectors = eigs(operator, 1, which="LR", v0=x, tol=ROUGH, ncv=KRYLOV, maxiter=MOST_RESTARTS)
+            values, vectors = eigs(operator, 1, which="LR", v0=x, tol=ROUGH, ncv=krylov, maxiter=MOST_RESTARTS)
         except ArpackNoConvergence as failure:
             raise NoHierarchy(
                 f"no rightmost eigenvalue is found among those of {x.size} equations; {REMEDY}"

@@ -117,7 +117,7 @@ def test_reading_has_no_values():
         ("pi(x)", "calls no known function"),
         ("x +", "cannot be read"),
         ("\x00", "has the character '\\x00'"),
-        ("-" * 100_000 + "x", "has 100001 characters; must be at most 1000"),
+        ("-" * 100_000 + "x", "has 100001 characters; must be at most 20000"),
         ("-" * 900 + "x", "is nested too deeply; must be at most 50 levels"),
         ("sqrt(" * 51 + "a" + ")" * 51, "is nested too deeply"),
         ("(" * 400 + "x" + ")" * 400, "cannot be read"),

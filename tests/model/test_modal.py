@@ -104,7 +104,7 @@ def test_one_mode_and_its_matrices_are_one_system_of_the_plane(seed):
 
 FAULTS = {
     "mass: got [[1.0, 1.0], [1.0, 1.0]]; must have an inverse": {"mass": [[1.0, 1.0], [1.0, 1.0]]},
-    "mass: got []; must be a matrix of one row or two": {"mass": []},
+    "mass: got []; must be a matrix of 1 to 100 rows": {"mass": []},
     "stiffness: got ((1.0,),); must be 2 rows of 2": {"stiffness": ((1.0,),)},
     "stiffness[0][1]: the entry has the unknown name k": {"stiffness": [[1.0, "k"], [0.0, 1.0]]},
     "stiffness[1][0]: got None; must be a number": {"stiffness": [[1.0, 0.0], [None, 1.0]]},

@@ -1,4 +1,4 @@
-"""One or two modes by their matrices: M q̈ + (C + G + ξ C_ξ) q̇ + (K + H + ξ K_ξ) q = 0."""
+"""Modes by their matrices: M q̈ + (C + G + ξ C_ξ) q̇ + (K + H + ξ K_ξ) q = 0."""
 
 from __future__ import annotations
 
@@ -7,20 +7,25 @@ from dataclasses import dataclass, replace
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
-from pydantic import Field
+from pydantic import BeforeValidator, Field
 from pydantic.fields import FieldInfo
 
 from fpsolve.arrays import ROUNDED, FloatArray, shown
 from fpsolve.model.expressions import ExpressionError, constant, evaluate, names_in
 from fpsolve.model.faults import TableError
 from fpsolve.model.parameters import stated_field
+from fpsolve.model.plane import MOST_VARIABLES
 from fpsolve.model.systems.equations import EPSILON, EquationSystem
 
 Entry = float | str
 Matrix = Sequence[Sequence[Entry]]
 NoiseMatrix = Matrix | Mapping[str, Matrix]
-_Row = Annotated[tuple[Entry, ...], Field(strict=False, min_length=1, max_length=2)]
-_Stated = Annotated[tuple[_Row, ...], Field(strict=False, min_length=1, max_length=2)]
+MOST_MODES = MOST_VARIABLES // 2
+"""Largest number of modes."""
+_Row = Annotated[tuple[Entry, ...], Field(strict=False, min_length=1, max_length=MOST_MODES)]
+_Rows = Annotated[tuple[_Row, ...], Field(strict=False, min_length=1, max_length=MOST_MODES)]
+_Stated = Annotated[_Rows, BeforeValidator(lambda rows: rows, json_schema_input_type=_Rows | str)]
+"""Rows; a case file may have the name of a file in their place."""
 SINGULAR = 1e12
 """Condition of a mass matrix, its rows and columns of the size 1, from which on it counts as singular."""
 SMALLEST = 1e-300
@@ -29,7 +34,7 @@ SMALLEST = 1e-300
 
 @dataclass(frozen=True)
 class ModalSystem(EquationSystem):
-    """One or two modes by their mass, damping and stiffness; noise in stiffness and damping. See `ModalSystem.of`.
+    """Modes by their mass, damping and stiffness; noise in stiffness and damping. See `ModalSystem.of`.
 
     It is an `EquationSystem` of the variables q and q̇ of each mode, whose rates follow from the matrices.
     """
@@ -37,7 +42,9 @@ class ModalSystem(EquationSystem):
     kind: ClassVar[str] = "modes"
     stated: ClassVar[Mapping[str, FieldInfo]] = {
         "mass": stated_field(
-            _Stated, "M, a row for each mode, numbers or expressions in the parameters", "mass = [[1.0]]"
+            _Stated,
+            "M, a row for each mode, numbers or expressions in the parameters; or a .npy, .mtx or .csv file",
+            "mass = [[1.0]]",
         ),
         "stiffness": stated_field(_Stated, "K", 'stiffness = [["omega**2"]]'),
         "damping": stated_field(_Stated, "C", 'damping = [["2*zeta*omega"]]', ()),
@@ -55,7 +62,7 @@ class ModalSystem(EquationSystem):
             for part in ("stiffness", "damping")
         },
         "modes": stated_field(
-            Annotated[tuple[str, ...], Field(strict=False, min_length=1, max_length=2)],
+            Annotated[tuple[str, ...], Field(strict=False, min_length=1, max_length=MOST_MODES)],
             "the names of the modes",
             'modes = ["heave", "pitch"]',
             (),
@@ -86,11 +93,11 @@ class ModalSystem(EquationSystem):
         ((0.0, 1.0), (-1.0, -0.05))
 
         Args:
-            mass: M, of one row or two, with an inverse.
+            mass: M, with an inverse; of more than two rows names may stand on its diagonal alone.
             stiffness, damping: K and C.
             gyroscopic, circulatory: G and H, skew-symmetric.
             stiffness_noise, damping_noise: K_ξ and C_ξ; of several noises mappings from their names in `noises`.
-            modes: the names of q; ("q1", "q2") if empty. The name of q̇ is that of q with _dot.
+            modes: the names of q; ("q1", "q2", …) if empty. The name of q̇ is that of q with _dot.
             parameters: values by the names that entries of matrices may have, which are numbers, or arithmetic as in
                 the rates of `PlaneSystem.of_equations`.
             noises: what noises are called, and which section of keys each has; {"xi": "noise"} if None.
@@ -156,8 +163,13 @@ class _Rates:
         forces = [[each for matrix, states in parts for each in zip(matrix[j], states, strict=True)] for j in self]
         drift = list[str]()
         for i, speed in enumerate(speeds):
-            terms = [(inverse[i][j], entry, state) for j in self for entry, state in forces[j]]
-            texts = [f"-{_product(a, b)}*{state}" for a, b, state in terms if a != 0.0 and b != 0.0]
+            texts, numbers = list[str](), dict[str, float]()
+            for factor, entry, state in ((inverse[i][j], *each) for j in self for each in forces[j]):
+                if isinstance(factor, str) or isinstance(entry, str):
+                    texts += [f"-{_product(factor, entry)}*{state}"] if factor != 0.0 and entry != 0.0 else []
+                else:
+                    numbers[state] = numbers.get(state, 0.0) - factor * entry
+            texts += [f"+({number!r})*{state}" for state, number in numbers.items() if number]
             drift += [speed, " ".join(texts) or "0"]
         return tuple(name for pair in zip(modes, speeds, strict=True) for name in pair), tuple(drift)
 
@@ -165,8 +177,9 @@ class _Rates:
     def count(self) -> int:
         """The number of modes."""
         mass = self.matrices["mass"]
-        if not isinstance(mass, list | tuple) or len(mass) not in (1, 2):
-            raise TableError(f"got {shown(mass)}; must be a matrix of one row or two, one for each mode", "mass")
+        if not isinstance(mass, list | tuple) or not 1 <= len(mass) <= MOST_MODES:
+            must = f"must be a matrix of 1 to {MOST_MODES} rows, one for each mode"
+            raise TableError(f"got {shown(mass)}; {must}", "mass")
         return len(mass)
 
     def __iter__(self) -> Iterator[int]:
@@ -237,11 +250,12 @@ class _Rates:
         if not any(isinstance(entry, str) for row in mass for entry in row):
             found: list[list[Entry]] = np.linalg.inv(values).tolist()
             return found
-        if self.count == 1:
-            return [[f"1/({mass[0][0]})"]]
+        if not any(entry != 0.0 for i, row in enumerate(mass) for j, entry in enumerate(row) if i != j):
+            return [[f"1/({mass[i][i]})" if i == j else 0.0 for j in self] for i in self]
+        if self.count > 2:
+            must = "of more than two modes must be numbers, or have names on a diagonal and zeros beside it"
+            raise TableError(f"got {shown(mass)}; {must}; write numbers", "mass")
         (a, b), (c, d) = mass
-        if b == c == 0.0:
-            return [[f"1/({a})", 0.0], [0.0, f"1/({d})"]]
         det = f"(({a})*({d}) - ({b})*({c}))"
         minus = [[0.0 if each == 0.0 else f"-({each})/{det}" for each in row] for row in mass]
         return [[f"({d})/{det}", minus[0][1]], [minus[1][0], f"({a})/{det}"]]
