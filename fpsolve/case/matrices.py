@@ -35,7 +35,7 @@ def _read(name: Any, folder: Path, *place: str) -> Any:
         matrix = real_array(_loaded(folder / name), "it")
         fault = "" if matrix.ndim == 2 and len({*matrix.shape}) == 1 else f"has the shape {matrix.shape}"
     except (OSError, ValueError, TypeError) as error:
-        matrix, fault = np.zeros((0, 0)), f"cannot be read: {' '.join(str(error).split())}"
+        matrix, fault = np.zeros((0, 0)), f"cannot be read: {error}"
     if not (folder / name).is_file():
         fault = "is no file"
     must = "must be a square matrix of finite numbers in a .npy, .mtx or .csv file beside the case"

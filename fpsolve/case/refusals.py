@@ -184,7 +184,7 @@ def _of_monte_carlo(section: MonteCarloSection, valid: Known, context: Known) ->
     is_known = section.p is None and "moments" in valid  # then there are such curves, and λ is finite
     for place, varied in zip(vary.checked.tolist(), vary.sets_at(vary.checked), strict=True):
         row = vary.line_of(place + 1)
-        reason, faults = "" if is_known else obstacle(base, varied, p), {}
+        reason, faults = "" if is_known else obstacle(base, varied, p, with_moments=not base.is_closed_only), {}
         with suppress(ValueError):  # that is the reason
             try:
                 faults = obstacles(*simulated_parts(base.at(varied)), time=section.time, step=section.step)

@@ -39,6 +39,9 @@ def simulated_parts(problem: Problem) -> tuple[System, Noise]:
     if not noise.is_simulated:
         need = f"noise that states a step of its paths, but this is a {type(noise).__name__}"
         raise FpsolveError(f"simulation is for {need}; use the finite elements")
+    if problem.dimension > 2 and problem.impulses:
+        told = f"simulation under impulses is for two variables, but there are {problem.dimension}"
+        raise FpsolveError(f"{told}; take even p, which need none")
     bent = [term.g for term in system.terms if affine(term.g) is None]
     if bent and (not noise.has_states or len(noise.parts) > 1):
         found = f"but one has g = {written_coefficient(bent[0]).strip()}"
@@ -56,7 +59,8 @@ def check_settings(problem: Problem, p: float | Sequence[float], estimator: Esti
     """
     if not (problem.noise.is_white or math.isfinite(problem.noise.standard_deviation)):
         raise ValueError("got a noise of infinite variance; must be finite, as for r0 < 5/3")
-    for order in real_numbers(p, "p", may_be_empty=True):
+    orders = real_numbers(p, "p", may_be_empty=True)
+    for order in () if problem.is_closed_only else orders:  # where paths know more than equations
         refuse_infinite(problem, order)
     is_possible = is_whole(paths, BATCHES, MAX_PATHS) and is_whole(seed, 0)
     if estimator not in get_args(Estimator) or not is_possible:

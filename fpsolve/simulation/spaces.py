@@ -1,4 +1,4 @@
-"""Any linear motion of three and four variables, compiled: ẋ = A(ξ) x, as `motions` has it for the plane.
+"""Any linear motion of three or more variables, compiled: ẋ = A(ξ) x, as `motions` has it for the plane.
 
 The steps are the same: Magnus's exponential of order 4 under a diffusion or white noise, exact times of jumps under a
 chain, flows in turn under several noises. Only exp Ω x is not known in closed form: it is the sum of its series, where
@@ -192,8 +192,8 @@ def _summed(omega, terms, begun, now, after):  # type: ignore[no-untyped-def]
         for r in range(n):
             row = omega[r]
             _first(row[0], now[0], row[1], now[1], row[2], now[2], after[r])
-            if n == 4:
-                _more(row[3], now[3], after[r])
+            for c in range(3, n):
+                _more(row[c], now[c], after[r])
         for r in range(n):
             _next(begun[r], after[r], 1 / k, now[r])
 
