@@ -54,6 +54,8 @@ MOST_NODES = 60
 """Number of nodes of a surface."""
 MOST_SPACES = 6
 """Number of spaces tried."""
+NOTHING = 1e-11
+"""Size of a derivative, over that of an eigenfunction, up to which it is rounding."""
 SURELY = 0.8
 """Share of a pair in what is expected of it, from which on it is surely that pair."""
 STEPS_TO_LOST = 16
@@ -134,7 +136,7 @@ class Surface(Result):
             self._begin(places)
             self.is_converged = self._fill(most)
         self.nodes = np.array([node.at for node in self._nodes])
-        self.error = self._left + max(node.error for node in self._nodes)
+        self.error = self._left + self._off + max(node.error + node.pair.rounding for node in self._nodes)
         self._nodes = [node._replace(around=None) for node in self._nodes]  # which keep factors
 
     def _none(self) -> NotConverged:
@@ -211,7 +213,9 @@ class Surface(Result):
         if error > allowed:
             return self._take(place.refined(found, SPARE * allowed * unit, FREE_STAGES, self._budget.unknowns).space)
         right, left = self._vectors(at, pair, around)
-        self._extend(right, left)
+        # where one of two derivatives vanishes, as that of T* by R for p = 0, F needs neither
+        kept = [k for k in range(len(right)) if all(_counts(side[k], side[0]) for side in (right, left))]
+        self._extend([right[k] for k in kept], [left[k] for k in kept])
         x, y = np.array(right) @ self._right.T, np.array(left) @ self._dual.T
         self._nodes.append(Node(at, pair, error, around, x, y))
         return True
@@ -268,7 +272,7 @@ class Surface(Result):
         pair = principal_pair(generator, self.p, start=self._starts)
         vector, size = pair.left, np.linalg.norm(pair.right) / abs(pair.left @ pair.space.weighed(pair.right))
         allowed = INTERPOLATED * self._allowed(middle, 0.0) / size
-        self._polynomials = []
+        self._polynomials, self._off = [], 0.0
         for k in range(d):
             test = middle.copy()
             test[k] = 0.37
@@ -285,6 +289,7 @@ class Surface(Result):
             else:
                 raise self._none()
             self._polynomials.append(polynomials)
+            self._off += float(off * size)
         places = [np.array(each) for each in product(*(each.points for each in self._polynomials))]
         made = [self._operators(at) for at in places]
         self._kinds = [[each[kind] for each in made] for kind in range(len(made[0]))]
@@ -471,3 +476,8 @@ class Surface(Result):
     def _said(self) -> str:
         symbol, keys = f"Λ({self.p:g})" if self.p else "λ", " and ".join(axis.key for axis in self.axes)
         return f"{symbol} over {keys}, {len(self._nodes)} solved, ± {self.error:.0e}"
+
+
+def _counts(derivative: FloatArray, of: FloatArray) -> bool:
+    """Whether a derivative of an eigenfunction is more than rounding."""
+    return bool(np.linalg.norm(derivative) > NOTHING * np.linalg.norm(of))
