@@ -212,9 +212,12 @@ class Basis:
             self._begin(dict.fromkeys([inner, outer, inner + WITHIN * (outer - inner), other]))  # the first vector is 1
             self.is_converged = self._fill(most)
             self._rounding = self._bound()
+        rate = max((node.error / abs(p) for p, node in self.nodes.items() if not _is_even(p)), default=0.0)
         for p, node in self.nodes.items():
-            is_even = p != 0 and abs(p - 2 * round(p / 2)) < EVEN and solver.mesh is None
-            error = self._error_beside(p) if is_even else node.error
+            error = node.error
+            if p and _is_even(p) and solver.mesh is None:
+                is_sure = 0 < rate * abs(p) <= SURELY * solver.tolerance(p, node.pair.value)
+                error = max(error, rate * abs(p)) if is_sure else self._error_beside(p)
             self.nodes[p] = node._replace(around=None, error=error)  # without factors
 
     # nodes
@@ -348,8 +351,7 @@ class Basis:
     def _images(self, vectors: Sequence[FloatArray] | FloatArray, adjoint: bool = False) -> list[FloatArray]:
         """L and M, or their transposes, times some vectors, at each point of the polynomials."""
         tables = np.array(vectors).reshape(-1, *self._generator.chosen.shape)
-        matrices = [each.T if adjoint else each for each in self._matrices]
-        of_l = np.array([each.images(tables) for each in matrices])
+        of_l = np.array([each.images(tables) for each in (self._adjoints if adjoint else self._matrices)])
         of_m = np.array([[space.weighed(each) for each in vectors] for space in self._spaces])
         count = len(self._matrices), len(vectors), -1
         return [of_l.reshape(count), np.broadcast_to(of_m, (*count[:2], of_m.shape[-1]))]
@@ -375,8 +377,10 @@ class Basis:
                 break
         else:
             raise Unsuited
-        if not generator.chosen.is_tilted:
+        weighed = np.array([space.weighed(pair.right) for space in self._spaces])
+        if np.ptp(weighed, axis=0).max() <= _EPS * np.abs(weighed).max():  # M does not depend on p
             self._spaces = self._spaces[:1]
+        self._adjoints = [each.T for each in self._matrices]
         self._a, self._g = np.zeros((2, len(self._matrices), 0, 0))
         self._right, self._dual = np.zeros((2, 0, generator.size))
 
@@ -510,6 +514,11 @@ def bases(solver: ExponentSolver, low: float, high: float, most: int = MOST_NODE
             if low < 0 < high:
                 return Basis(solver, low, 0.0, most), Basis(solver, 0.0, high, most)
     raise NotConverged(Message(Code.NO_FUNCTION, low=low, high=high))
+
+
+def _is_even(p: float) -> bool:
+    """Whether p is an even number, or next to one, also 0."""
+    return abs(p - 2 * round(p / 2)) < EVEN
 
 
 def orthonormal(known: FloatArray, new: Sequence[FloatArray]) -> FloatArray:
