@@ -290,20 +290,19 @@ class Basis:
         solver, known = self._solver, self._solver.whole.known
         if solver.mesh is not None:
             return (found := solver.solution(p)), PairDerivatives(found.pair)
-        if p in known and known[p].pair.generator is self._generator:
-            return known[p], PairDerivatives(known[p].pair)
         starts: PrincipalPair | list[PrincipalPair] = [each.pair for each in known.values()]
         if p in known:
             starts = known[p].pair
         elif self.nodes:
             starts = self._lifted(p)
-        with counted(solver.budget.countdown(f"Λ({p:g})")):
-            try:
-                known[p] = found = Solution(principal_pair(self._generator, p, start=starts))
-            except UNSOLVED as failure:
-                place = Start(solver.problem, self._generator.chosen).doubled(failure)
-                raise self._finer(place.space) from None
-            around = PairDerivatives(found.pair)
+        if p not in known or known[p].pair.generator is not self._generator:
+            with counted(solver.budget.countdown(f"Λ({p:g})")):
+                try:
+                    known[p] = Solution(principal_pair(self._generator, p, start=starts))
+                except UNSOLVED as failure:
+                    place = Start(solver.problem, self._generator.chosen).doubled(failure)
+                    raise self._finer(place.space) from None
+        found, around = known[p], PairDerivatives(known[p].pair)
         allowed = solver.tolerance(p, found.pair.value) if p else math.inf
         if self._has_zero and 0 < abs(p) < 1:
             allowed = min(allowed, abs(p) * solver.tolerance(SMALL_P, 0.0) / SMALL_P)
