@@ -14,7 +14,7 @@ from matplotlib.colors import to_hex
 
 import fpsolve
 from fpsolve import ExponentSolver, OrnsteinUhlenbeck, Problem, VibroImpactOscillator
-from fpsolve.analysis import Axis, design, excursion, growth_law, rate_function, uncertainty
+from fpsolve.analysis import Axis, Surface, design, excursion, growth_law, rate_function, uncertainty
 from fpsolve.case import Curve
 from fpsolve.data import Result
 from fpsolve.errors import FpsolveError
@@ -71,6 +71,8 @@ MAIN = {
     "growth law": "density",
     "series": "moment",
     "excursion": "level",
+    "line": "lyapunov_exponent",
+    "surface": "moment",
 }
 """Results, by their names here, each with its main variable."""
 
@@ -137,6 +139,8 @@ def results(fig1_solver):
         "growth law": growth_law(Problem(FIG1, REDUCED), [50.0, 100.0], [0.01, 0.02]),
         "series": perturbation_series(Problem(FIG1, REDUCED), [1.0, 2.0], order=4),
         "excursion": excursion(Problem(ParametricOscillator(stiffness=1.0, damping=0.08), Telegraph(a=0.8, k=1.0))),
+        "line": Surface(Problem(FIG1, REDUCED), {"oscillator.c1": (0.0, 0.2)}),
+        "surface": Surface(Problem(FIG1, REDUCED), {"oscillator.c1": (0.0, 0.2), "noise.D0": (0.2, 1.0, "log")}, 2.0),
     }
     assert set(found) == set(MAIN)
     return found

@@ -467,7 +467,8 @@ class Surface(Result):
         names = [replace(self.problem.parameters[axis.key].quantity, dims=(axis.key,)) for axis in self.axes]
         keys = tuple(axis.key for axis in self.axes)
         found = replace(moment_at(self.p) if self.p else LYAPUNOV_EXPONENT, dims=keys)
-        numbers = {found: self(*np.meshgrid(*sides, indexing="ij"))}
+        values = self(*np.meshgrid(*sides, indexing="ij"))
+        numbers = {found: values, found.error(): np.full(values.shape, self.error)}
         held = {key: value for key, value in self.problem.values.items() if key not in keys}
         places = dict(zip(names, sides, strict=True))
         method, more = "finite elements and a reduced basis", {"error": self.error, "rtol": self.rtol}

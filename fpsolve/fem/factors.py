@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from functools import cache, cached_property
+from functools import cached_property, lru_cache
 from threading import RLock
 
 import numpy as np
@@ -49,14 +50,15 @@ def one_thread() -> Iterator[None]:
         yield
         return
     try:
-        with _pools().limit(limits=1):
+        with _pools(len(sys.modules)).limit(limits=1):
             yield
     finally:
         _limited.release()
 
 
-@cache
-def _pools() -> ThreadpoolController:
+@lru_cache(maxsize=1)
+def _pools(modules: int) -> ThreadpoolController:
+    """Those of the libraries that are loaded with so many modules: a later one may bring another."""
     return ThreadpoolController()
 
 
