@@ -34,7 +34,7 @@ def points(surface, count):
 
 
 @pytest.mark.parametrize("p", [0.0, 2.0, -0.7])
-@pytest.mark.parametrize("name", FRAMES)
+@pytest.mark.parametrize("name", [*[*FRAMES][:3], pytest.param("two noises", marks=pytest.mark.slow)])
 def test_between_the_nodes_against_solves(name, p):
     problem, ranges = FRAMES[name]
     surface = Surface(problem, ranges, p, rtol=1e-5)
@@ -62,7 +62,7 @@ def test_the_growth_rate_is_affine_in_the_logarithm_of_the_impact_factor():
     assert np.ptp(steps) <= 4 * surface.error / np.min(np.diff(log_factor))
 
 
-@pytest.mark.parametrize("p", [0.0, 1.3])
+@pytest.mark.parametrize("p", [0.0, pytest.param(1.3, marks=pytest.mark.slow)])
 def test_the_gradient_is_that_of_the_values(p):
     surface = Surface(OSCILLATOR, {"noise.alpha": (0.5, 5.0, "log"), "oscillator.c1": (-0.2, 0.4)}, p, rtol=1e-6)
     alpha, c1, step = np.array([0.9, 3.0]), np.array([0.1, -0.1]), 1e-4

@@ -70,7 +70,7 @@ def test_what_is_refused():
         masses(3, NonGaussianNoise(0.1, 0.5, 1.2))
 
 
-@pytest.mark.parametrize("count", [3, 8])
+@pytest.mark.parametrize("count", [3, pytest.param(8, marks=pytest.mark.slow)])
 def test_derivatives(count):
     """Against differences, of one vector and of matrices."""
     problem = masses(count, OrnsteinUhlenbeck(1.0, 0.4))
@@ -84,6 +84,7 @@ def test_derivatives(count):
         assert slopes[key].error_estimate < 1e-5 * abs(slopes[key].value)
 
 
+@pytest.mark.slow
 def test_a_chart_and_uncertain_parameters():
     """Λ(2) = 0 at the points of the line, by Kronecker products."""
     problem = masses(3, OrnsteinUhlenbeck(1.0, 0.4))

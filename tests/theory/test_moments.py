@@ -166,8 +166,11 @@ def test_random_systems(seed):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("seed", "p"), [(seed, 2) for seed in range(1, 201)] + [(seed, 4) for seed in range(1, 36, 2)])
-def test_all_random_systems(seed, p):
+@pytest.mark.parametrize(
+    ("seed", "p"), [(seed, 2) for seed in range(1, 27)] + [(seed, 2) for seed in range(90, 117)] + [(5, 4), (17, 4)]
+)
+def test_more_random_systems(seed, p):
+    """All kinds of up to six variables; `python -m tests.random_many` has others, of up to twelve, too."""
     is_within, told = random_many.compared(seed, p)
     assert is_within, told
 
