@@ -454,6 +454,8 @@ def solve_moments(
         with suppress(NotConverged):
             function = MomentLyapunovFunction(solver.problem, ends, solver=solver, most=round(WORTH * points.size))
             result = function.moments(points) if function.is_converged else None
+            if result and result.warnings and solver.mesh is None:  # single solves round less
+                result = None
     result = result or _one_by_one(solver, points, report, known)
     for each in reports:
         each()

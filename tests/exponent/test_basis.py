@@ -1,9 +1,11 @@
 """Λ(p) by a reduced basis: against an independent code and solves, its errors, its derivatives, its spaces."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from fpsolve import ExponentSolver, MomentLyapunovFunction, PlaneSystem, Problem
+from fpsolve import ExponentSolver, MomentLyapunovFunction, PlaneSystem, Problem, moment_lyapunov
 from fpsolve.errors import NotConverged
 from fpsolve.exponent.basis import Basis, Polynomials
 from fpsolve.exponent.eigen import principal_pair
@@ -97,3 +99,10 @@ def test_there_is_no_function_of_several_blocks():
     system = PlaneSystem.of_equations(("x", "v"), ("-x + 0.3*xi*x", "v*(-0.5 + xi)"), {})
     with pytest.raises(NotConverged, match=r"there is no function Λ\(p\) from p = 0\.5 to p = 3.*; ask for single p"):
         MomentLyapunovFunction(Problem(system, SineWiener(0.6, 1.1)), (0.5, 3.0))
+
+
+def test_in_the_weakest_noise_each_p_is_solved_as_a_basis_rounds_more():
+    problem = Problem(replace(CASES["weak"].oscillator, epsilon=1e-4), CASES["weak"].noise)
+    found = moment_lyapunov(problem, np.linspace(-2.0, 6.0, 12))
+    assert found.function is None
+    assert not found.warnings
