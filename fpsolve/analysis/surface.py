@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.linalg import lstsq, qr
 
 from fpsolve.analysis.zero import Axis, said
 from fpsolve.arrays import FloatArray, real_array, real_number, shown
@@ -48,6 +49,12 @@ DEGREES = (2, 4, 6, 9, 13, 19)
 """Degrees of the polynomials tried for the small matrices, along each parameter."""
 INTERPOLATED = 1e-2
 """Share of the tolerance for these."""
+PROBE = 0.37
+"""Share of an axis at which it is looked at what they leave."""
+ASIDE = 0.29, 0.83
+"""Shares of the other axis at which it is looked at which points of an axis make all others."""
+ROUNDED = 1e-13
+"""Size of a further product, over that of the largest, up to which it is rounding."""
 LOOKED_AT = 6
 """Number of points along each parameter at which it is looked at what is left, half of a gap off the ends."""
 MOST_NODES = 60
@@ -83,6 +90,30 @@ class Values(NamedTuple):
     gradient: FloatArray
     x: FloatArray
     y: FloatArray
+
+
+class Products:
+    """Functions on [0, 1] of few products, known at as few points.
+
+    Args:
+        polynomials: that follow them.
+        known: the functions at the points of these, shape (points, functions).
+
+    Attributes:
+        points: that make all others.
+    """
+
+    def __init__(self, polynomials: Polynomials, known: FloatArray) -> None:
+        _, r, order = qr(known.T, mode="economic", pivoting=True)
+        sizes = np.abs(np.diag(r))
+        chosen = order[: np.count_nonzero(sizes > ROUNDED * sizes[0])]
+        self.points, self._polynomials = polynomials.points[chosen], polynomials
+        self._shares = lstsq(known[chosen].T, known.T)[0].T
+
+    def at(self, u: FloatArray, derivative: int = 0) -> FloatArray:
+        """What the functions at u, or their derivatives, are of those at the points, shape (n, points)."""
+        rows = self._polynomials.at(u)
+        return np.asarray((rows @ self._polynomials.slopes if derivative else rows) @ self._shares)
 
 
 class Surface(Result):
@@ -266,30 +297,36 @@ class Surface(Result):
     # the small matrices
 
     def _sample(self) -> None:
-        """Polynomials in each parameter that L, for p = 0 also L′, and M are, as far as F depends on them."""
-        middle, d = np.full(len(self.axes), 0.5), len(self.axes)
-        generator = self._generator(middle)
-        pair = principal_pair(generator, self.p, start=self._starts)
+        """Points on each axis whose L, for p = 0 also L′, and M make those everywhere, and the basis without nodes.
+
+        The operators are sums of few products of a function of each parameter: as polynomials follow them along an axis,
+        those at a few of its points, chosen by a pivoted QR, make all others.
+        """
+        middle = np.full(len(self.axes), 0.5)
+        pair = principal_pair(self._generator(middle), self.p, start=self._starts)
         vector, size = pair.left, np.linalg.norm(pair.right) / abs(pair.left @ pair.space.weighed(pair.right))
         allowed = INTERPOLATED * self._allowed(middle, 0.0) / size
+        mixed = np.random.default_rng(0).standard_normal(vector.size)
         self._polynomials, self._off = [], 0.0
-        for k in range(d):
-            test = middle.copy()
-            test[k] = 0.37
-            exact = self._images_at(test, vector)
+        for k in range(len(self.axes)):
+            exact = self._images_at(_on_axis(middle, k, PROBE), vector)
             for degree in DEGREES:
-                polynomials, known = Polynomials(0.0, 1.0, degree), []
-                for u in polynomials.points.tolist():
-                    place = middle.copy()
-                    place[k] = u
-                    known.append(self._images_at(place, vector))
-                off = np.linalg.norm(polynomials.at(np.array([0.37]))[0] @ np.array(known) - exact)
+                polynomials = Polynomials(0.0, 1.0, degree)
+                known = np.array([self._images_at(_on_axis(middle, k, u), vector) for u in polynomials.points.tolist()])
+                off = np.linalg.norm(polynomials.at(np.array([PROBE]))[0] @ known - exact)
                 if off <= max(allowed, degree * _EPS * np.max(np.linalg.norm(known, axis=1))):
                     break
             else:
                 raise self._none()
-            self._polynomials.append(polynomials)
             self._off += float(off * size)
+            aside = [np.full(len(self.axes), share) for share in ASIDE]
+            known = np.array(
+                [
+                    np.concatenate([self._images_at(_on_axis(at, k, u), mixed) for at in aside])
+                    for u in polynomials.points.tolist()
+                ]
+            )
+            self._polynomials.append(Products(polynomials, known))
         places = [np.array(each) for each in product(*(each.points for each in self._polynomials))]
         made = [self._operators(at) for at in places]
         self._kinds = [[each[kind] for each in made] for kind in range(len(made[0]))]
@@ -317,8 +354,7 @@ class Surface(Result):
         """What small matrices at each place, or their derivatives, are of those of all samples, shape (n, samples)."""
         rows = np.ones((len(at), 1))
         for k, polynomials in enumerate(self._polynomials):
-            own = polynomials.at(at[:, k])
-            own = own @ polynomials.slopes if k == derivative else own
+            own = polynomials.at(at[:, k], int(k == derivative))
             rows = (rows[:, :, None] * own[:, None, :]).reshape(len(at), -1)
         return rows
 
@@ -477,6 +513,13 @@ class Surface(Result):
     def _said(self) -> str:
         symbol, keys = f"Λ({self.p:g})" if self.p else "λ", " and ".join(axis.key for axis in self.axes)
         return f"{symbol} over {keys}, {len(self._nodes)} solved, ± {self.error:.0e}"
+
+
+def _on_axis(at: FloatArray, k: int, share: float) -> FloatArray:
+    """A place with another share of the axis k."""
+    place = at.copy()
+    place[k] = share
+    return place
 
 
 def _counts(derivative: FloatArray, of: FloatArray) -> bool:

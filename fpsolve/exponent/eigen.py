@@ -191,19 +191,20 @@ def principal_pair(
 
 def _has_states(problem: Problem) -> bool:
     """Whether a noise jumps between states: where some of these are hardly left, they have a positive pair each."""
-    return any(noise.has_states for noise in problem.noise.parts.values())
+    return any(noise.has_states and not noise.is_white for noise in problem.noise.parts.values())
 
 
 def _has_other_positive(generator: Generator, p: float) -> bool:
     """Whether other pairs may seem to have T > 0, too.
 
-    States that hardly mix have a pair each. Where the phase rests, between weak noise, T is about |x|^(p−k) |v|^k for
-    the k-th pair, x along the faster mode and v along the other: for even k its sign does not change.
+    States that hardly mix have a pair each, and so have directions of x that white noise hardly mixes. Where the phase
+    rests, between weak noise, T is about |x|^(p−k) |v|^k for the k-th pair, x along the faster mode and v along the
+    other: for even k its sign does not change.
     """
     problem = generator.problem
     if problem.dimension > 2:  # each search begins at a neighbouring p
         return False
-    if _has_states(problem):
+    if any(noise.has_states for noise in problem.noise.parts.values()):
         return True
     if (frozen := frozen_noise(problem)) is None:
         return problem.may_rest
