@@ -16,7 +16,7 @@ from functools import cached_property
 
 import numpy as np
 
-from fpsolve.analysis.scan import FINE, Field, Sample, Scan
+from fpsolve.analysis.scan import Field, Sample, Scan
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import FpsolveError
 from fpsolve.messages import Code, Message
@@ -41,6 +41,8 @@ BESIDE = 1e-8
 """Distance outside of the frame, in sides of the square, up to which a point is on it."""
 SAME = 1e-3
 """Distance, in sides of the square, in which a curve that runs the same way is taken for one that is known."""
+DOUBT = 10.0
+"""What the second derivatives of F are, over those along a curve, at most."""
 PIECES = 8
 """Number of pieces into which the cubic between two points of a branch is divided."""
 
@@ -142,7 +144,7 @@ def find_branches(
     of the square for 13 nodes, and its cell misses no node.
     """
     known: list[Trace] = []
-    near = 0.25 / ((scan.nodes.size - 1) * (FINE - 1))
+    near = 0.25 / (scan.nodes.size - 1)
     for seed in scan.seeds():
         rough = find_zero(scan, seed)
         if rough is not None and any(trace.holds(rough, near) or _shows(scan, trace, rough, near) for trace in known):
@@ -180,11 +182,16 @@ def find_zero(field: Field, at: FloatArray) -> Sample | None:
 
 
 def correct(
-    field: Field, at: FloatArray, along: FloatArray | None = None, first: Sample | None = None
+    field: Field,
+    at: FloatArray,
+    along: FloatArray | None = None,
+    first: Sample | None = None,
+    bend: float = math.inf,
 ) -> Sample | None:
     """The point F = 0 near a point, on the normal to `along`, or without it on the gradient; None where there is none.
 
-    `first` is F at the point, where that is known.
+    `first` is F at the point, where that is known, and `bend` a bound on half of the second derivatives of F: where a
+    step of Newton's method leaves hardly anything by that, F is not evaluated again.
 
     Raises:
         FpsolveError: F does not exist on the way.
@@ -204,7 +211,11 @@ def correct(
         slope = float(sample.gradient @ direction)
         if slope == 0:
             return None
-        at = sample.at - sample.value / slope * direction
+        step = sample.value / slope
+        at = sample.at - step * direction
+        left = bend * step**2
+        if left <= SHARE_LEFT * sample.nothing and np.all((at >= 0) & (at <= 1)):
+            return sample._replace(at=at, value=0.0, error=sample.error + left)
 
 
 def correct_on_line(field: Field, axis: int, value: float, guess: FloatArray) -> Sample | None:
@@ -242,7 +253,7 @@ def _half(
             at = cubic(before.at, last.at, sign * before.tangent, sign * last.tangent, share)
         reason = Message(Code.NEWTON_UNSETTLED)
         try:
-            sample = correct(field, at, last.tangent)
+            sample = correct(field, at, last.tangent, bend=_bend(before, last))
             if sample is not None and np.linalg.norm(sample.at - at) > MOST_AWAY * np.linalg.norm(at - last.at):
                 sample = None  # perhaps of another curve
             if is_leaving := sample is None and bool(np.any((at < 0) | (at > 1))):
@@ -269,6 +280,14 @@ def _half(
         before, last = last, sample
         step = min(longest, step * min(2.0, MOST_TURN / max(turn, 1e-3)))
     return points, False, Message(Code.TOO_LONG, count=MOST_POINTS)
+
+
+def _bend(before: Sample | None, last: Sample) -> float:
+    """More than half of the second derivatives of F is likely to be, by two points of a curve; infinite for one."""
+    if before is None:
+        return math.inf
+    change = np.linalg.norm(last.gradient - before.gradient) / np.linalg.norm(last.at - before.at)
+    return DOUBT * max(float(change), float(np.linalg.norm(last.gradient)))
 
 
 def _exit(field: Field, last: Sample, beyond: FloatArray) -> Sample | None:

@@ -13,7 +13,7 @@ from fpsolve.analysis.zero import Zero
 from fpsolve.arrays import FloatArray
 
 FINE = 16
-"""Number of pieces, each way, into which a cell of a scan is divided for a picture."""
+"""Number of pieces, each way, into which a cell of the coarsest scan is divided for a picture."""
 _ORDINALS = {1.0: "first", 2.0: "second", 3.0: "third", 4.0: "fourth"}
 P_BIFURCATIONS = {-1.0: "hump of the amplitude density", -2.0: "crater of the joint density"}
 """What the stationary response of the nonlinear oscillator shows where λ > 0 and δ_p is below a value.
@@ -53,13 +53,14 @@ class Regions:
 
 
 def regions(lines: Sequence[Boundary]) -> Regions:
-    """The regions of lines that were all sought in one scan of the frame, on a grid `FINE` times as fine as its own."""
+    """The regions of lines that were all sought in the frame, on a grid `FINE` times as fine as the coarsest scan."""
     from scipy.ndimage import distance_transform_edt
 
-    s = (np.arange(FINE) + 0.5) / FINE
-    values = []
-    for scan in (line.scan for line in lines if line.scan is not None):
+    scans = [line.scan for line in lines if line.scan is not None]
+    points, values = FINE * min(scan.nodes.size - 1 for scan in scans), []
+    for scan in scans:
         cells = range(scan.nodes.size - 1)
+        s = (np.arange(points // len(cells)) + 0.5) * len(cells) / points
         values.append(np.block([[scan.between(i, j, s[:, None], s[None]) for j in cells] for i in cells]))
     signs, exists = np.where(np.stack(values) > 0, 1, -1), np.all(np.isfinite(values), axis=0)
     kinds = np.unique(signs[:, exists].T, axis=0)

@@ -38,8 +38,13 @@ class Sample(NamedTuple):
     scale: float
 
     @property
+    def nothing(self) -> float:
+        """|F| up to which it is 0."""
+        return max(TOLERANCE * self.scale, 0.1 * self.error)
+
+    @property
     def is_zero(self) -> bool:
-        return abs(self.value) <= max(TOLERANCE * self.scale, 0.1 * self.error)
+        return abs(self.value) <= self.nothing
 
     @property
     def tangent(self) -> FloatArray:
@@ -67,6 +72,7 @@ class Scan:
         gradients: ∂F/∂(u, v), shape (n, n, 2).
         reasons: why F does not exist at some nodes, each once.
         seconds: of the processor, that it took.
+        rtol: the error of F that was wanted, relative to its scale.
     """
 
     nodes: FloatArray
@@ -74,6 +80,7 @@ class Scan:
     gradients: FloatArray
     reasons: tuple[Message, ...] = ()
     seconds: float = 0.0
+    rtol: float = 0.0
 
     def between(self, i: int, j: int, s: FloatArray, t: FloatArray) -> FloatArray:
         """F in the cell of the nodes (i, j) to (i + 1, j + 1), s and t in [0, 1], by bicubic interpolation.

@@ -19,10 +19,13 @@ import numpy as np
 from fpsolve.analysis.continuation import LONGEST, SHORTEST, Trace, find_branches, find_zero, trace_branch, with_branch
 from fpsolve.analysis.scan import Row, Scan, ScannedRow, scan_row, scanned
 from fpsolve.analysis.special_points import Placed, crossings, with_folds, with_points, with_values
+from fpsolve.analysis.surface import Surface
 from fpsolve.analysis.zero import Axis, Zero, ZeroField, check_axes, line_rtol, zero_of
 from fpsolve.arrays import FloatArray, is_whole, real_number, shown
+from fpsolve.budget import Countdown
 from fpsolve.data import Result, brief, dataset
 from fpsolve.drawing import add_legend, coloured, label_axes, scale_axis
+from fpsolve.errors import FpsolveError
 from fpsolve.exponent.adapt import Budget
 from fpsolve.messages import Code, Message
 from fpsolve.model.problem import Problem
@@ -34,6 +37,8 @@ if TYPE_CHECKING:
 
 SCAN_RTOL = 1e-5
 """Smallest error of F on the grid of a scan that is asked for, relative to its scale."""
+REDUCED_RTOL = 1e-4
+"""Error of F by a reduced basis, relative to its scale, on a grid twice as fine."""
 COARSER = 10.0
 """Smallest factor from the error of F on the line to that on the grid."""
 NODES = 13
@@ -188,9 +193,14 @@ class Boundary(Result):
             raise ValueError(f"the point has {point_there}, which is not in the frame; choose a wider one")
         return replace(self, x=x, y=y, problem=problem, scan=None, **_ANEW)._from([start])
 
+    @property
+    def nodes(self) -> int:
+        """The number of points of a scan, each way."""
+        return NODES if self.scan is None else self.scan.nodes.size
+
     def rows(self) -> list[Row]:
         """The rows of its scan, tasks for `scan_row`, each of which begins anew; they pickle small."""
-        count, most = NODES if self.scan is None else self.scan.nodes.size, self.budget.line_seconds
+        count, most = self.nodes, self.budget.line_seconds
         share = math.inf if most is None else SCAN_SHARE * most / count
         seconds, key = min((self.budget.seconds, "budget.seconds"), (share, LINE_KEY))
         spent = Message(Code.ROW_SPENT, most=seconds, key=key)
@@ -198,11 +208,29 @@ class Boundary(Result):
         rough = partial(ZeroField, *frame, self.budget, self.scan_rtol, seconds, spent)
         return [Row(rough, count, number) for number in range(count)]
 
+    def reduced_scan(self) -> Scan | None:
+        """F on a grid twice as fine from a reduced basis, see `Surface`; None where there is none."""
+        most, p = self.budget.line_seconds, self.zero.p
+        whole = Countdown(math.inf if most is None else SCAN_SHARE * most)
+        ranges = {axis.key: (axis.start, axis.stop, axis.scale) for axis in (self.x, self.y)}
+        nodes = np.linspace(0, 1, 2 * self.nodes - 1)
+        try:
+            with whole.running():
+                surface = Surface(self.problem, ranges, p, rtol=REDUCED_RTOL, budget=self.budget)
+                found = surface.at_shares(np.array([*product(nodes, nodes)])) if surface.is_converged else None
+        except FpsolveError:
+            return None
+        if found is None:
+            return None
+        values, gradients = (each.reshape(nodes.size, nodes.size, -1) / (p or 1.0) for each in found)
+        return Scan(nodes, values[:, :, 0], gradients, seconds=whole.spent, rtol=REDUCED_RTOL)
+
     def solve(
         self,
         rows: Iterator[ScannedRow] | None = None,
         progress: Callable[[], None] = lambda: None,
         stepped: Callable[[], None] = lambda: None,
+        scan: Scan | None = None,
     ) -> Iterator[Boundary]:
         """The scan, then one branch after the other, and the whole line: what there is so far, each time.
 
@@ -210,9 +238,15 @@ class Boundary(Result):
             rows: what `scan_row` gives for its `rows`, in order, of which no more are taken; None to scan them here.
             progress: called once for each node of the scan.
             stepped: called once for each point of a branch.
+            scan: what there is in place of rows.
         """
-        tasks = self.rows()
-        scan = scanned(tasks, map(scan_row, tasks) if rows is None else rows, progress)
+        if scan is None:
+            tasks = self.rows()
+            made = scanned(tasks, map(scan_row, tasks) if rows is None else rows, progress)
+            scan = replace(made, rtol=self.scan_rtol)
+        else:
+            for _ in range(self.nodes**2):
+                progress()
         now = replace(self, scan=scan, **{**_ANEW, "seconds": scan.seconds})
         yield now
         zero_field = now.zero_field
@@ -319,7 +353,7 @@ def boundary(
     line = Boundary(
         zero_of(zero), x, y, problem, scan=empty_scan(nodes), step=_checked_step(step), budget=budget or Budget()
     )
-    *_, whole = line.solve(progress=progress, stepped=progress)
+    *_, whole = line.solve(progress=progress, stepped=progress, scan=line.reduced_scan())
     return whole
 
 

@@ -23,13 +23,13 @@ from numpy.typing import ArrayLike
 from scipy.linalg import lstsq, qr
 
 from fpsolve.analysis.zero import Axis, said
-from fpsolve.arrays import FloatArray, real_array, real_number, shown
+from fpsolve.arrays import FloatArray, Mask, real_array, real_number, shown
 from fpsolve.budget import counted
 from fpsolve.data import Result, dataset
 from fpsolve.errors import FpsolveError, NotConverged
 from fpsolve.exponent.adapt import SMALL_P, UNSOLVED, Budget
 from fpsolve.exponent.basis import SAFE, SHARE, SPARE, Polynomials, eigenpairs, form, orthonormal
-from fpsolve.exponent.eigen import MOSTLY, PairDerivatives, PrincipalPair, principal_pair
+from fpsolve.exponent.eigen import PairDerivatives, PrincipalPair, principal_pair
 from fpsolve.exponent.error import Solution
 from fpsolve.exponent.solver import ExponentSolver, solver_of
 from fpsolve.exponent.starts import FREE_STAGES, Start, other_centers
@@ -51,20 +51,28 @@ INTERPOLATED = 1e-2
 """Share of the tolerance for these."""
 PROBE = 0.37
 """Share of an axis at which it is looked at what they leave."""
-ASIDE = 0.29, 0.83
-"""Shares of the other axis at which it is looked at which points of an axis make all others."""
+PROBES = 4
+"""Number of places at which it is looked at what products leave."""
+ASIDE = 2, 6
+"""Numbers of lines along an axis that tell which points on it make all others, one after the other."""
 ROUNDED = 1e-13
 """Size of a further product, over that of the largest, up to which it is rounding."""
 LOOKED_AT = 6
 """Number of points along each parameter at which it is looked at what is left, half of a gap off the ends."""
+FOLLOWED = 25
+"""Number of points along each parameter, ends included, at which the pairs must be known of which place they are."""
 MOST_NODES = 60
 """Number of nodes of a surface."""
 MOST_SPACES = 6
 """Number of spaces tried."""
 NOTHING = 1e-11
 """Size of a derivative, over that of an eigenfunction, up to which it is rounding."""
-SURELY = 0.8
-"""Share of a pair in what is expected of it, from which on it is surely that pair."""
+DOUBT = 0.2
+"""Distance from 1 of the share of a pair in what is expected of it, up to which it is surely that pair."""
+LITTLE_DOUBT = 0.05
+"""The same on the way to a place where a node would help."""
+SAME = 1e-9
+"""Share of a function that others do not make, up to which it is rounding."""
 STEPS_TO_LOST = 16
 """Number of steps from a node in which a pair is followed where it is not."""
 AT_ONCE = 512
@@ -73,23 +81,33 @@ _EPS = float(np.finfo(float).eps)
 
 
 class Node(NamedTuple):
-    """What was solved at a place of the unit square: T and T*, the error of F by the space, and both in the basis."""
+    """What was solved at a place of the unit square: T and T*, and the error of F by the space."""
 
     at: FloatArray
     pair: PrincipalPair
     error: float
     around: PairDerivatives | None
+
+
+class Known(NamedTuple):
+    """A place of the unit square where it is known which pair of the small pencil is the principal one, and that."""
+
+    at: FloatArray
     x: FloatArray
     y: FloatArray
 
 
 class Values(NamedTuple):
-    """F, its gradient by shares of the axes if that is wanted, shape (n,) and (n, d), and both vectors, (n, size)."""
+    """F, its gradient by shares of the axes if that is wanted, shape (n,) and (n, d), and both vectors, (n, size).
+
+    `is_told` says whether it is told which pair of the small pencil is the principal one, shape (n,).
+    """
 
     value: FloatArray
     gradient: FloatArray
     x: FloatArray
     y: FloatArray
+    is_told: Mask
 
 
 class Products:
@@ -156,16 +174,20 @@ class Surface(Result):
             if axis.key not in problem.differentiable:
                 known = ", ".join(problem.differentiable) or "none"
                 raise ValueError(f"got {shown(axis.key)}; the parameters are {known}")
-        self._budget, self._nodes, self._refinements = budget or Budget(), list[Node](), 0
+        self._budget, self._nodes, self._known, self._refinements = budget or Budget(), list[Node](), list[Known](), 0
+        self._is_filled = False
+        self._frame: Problem | None = None
         if problem.dimension != 2 or problem.classes:
             raise self._none()
         corners = [np.array(each, dtype=float) for each in product((0.0, 1.0), repeat=len(self.axes))]
         places = [np.full(len(self.axes), 0.5), *corners]
+        self._frame = self._problem(places[0])
         first = self._solver(places[0]).whole.solution(self.p)
         self._chosen, self._starts = first.pair.generator.chosen, [first.pair]
         with one_thread():
+            self._choose(first.pair)
             self._begin(places)
-            self.is_converged = self._fill(most)
+            self.is_converged = self._is_filled = self._fill(most)
         self.nodes = np.array([node.at for node in self._nodes])
         self.error = self._left + self._off + max(node.error + node.pair.rounding for node in self._nodes)
         self._nodes = [node._replace(around=None) for node in self._nodes]  # which keep factors
@@ -176,7 +198,8 @@ class Surface(Result):
     def _problem(self, at: FloatArray) -> Problem:
         """The problem at shares of the ranges. Raises `FpsolveError` where there is none."""
         try:
-            return self.problem.at({axis.key: float(axis.value(u)) for axis, u in zip(self.axes, at, strict=True)})
+            found = self.problem.at({axis.key: float(axis.value(u)) for axis, u in zip(self.axes, at, strict=True)})
+            return found.in_frame_of(self._frame) if self._frame else found
         except ValueError as failure:
             raise FpsolveError(Message(Code.NO_PROBLEM, reason=said(failure))) from failure
 
@@ -201,6 +224,7 @@ class Surface(Result):
         while True:
             self._sample()
             self._nodes.clear()
+            self._known.clear()
             if all(self._add(at) for at in places):
                 return
 
@@ -208,12 +232,17 @@ class Surface(Result):
         """Add nodes where most is left, until that is allowed; what was left with fewer nodes is a bound."""
         shares = (np.arange(LOOKED_AT) + 0.5) / LOOKED_AT
         places = [np.array(each) for each in product(shares, repeat=len(self.axes))]
+        fine = np.array([*product(np.linspace(0, 1, FOLLOWED), repeat=len(self.axes))])
         left, count = np.full((len(places), 2), math.inf), np.zeros(len(places), dtype=int)
         while True:
             worst = int(np.argmax(left[:, 0]))
             self._left = float(np.max(left[:, 1]))
             if left[worst, 0] <= 1:
-                return True
+                if (lost := self._lost(fine)) is None:
+                    return True
+                places.append(lost)
+                left, count = np.vstack([left, [math.inf, math.inf]]), np.append(count, 0)
+                continue
             if count[worst] < len(self._nodes):
                 left[worst], count[worst] = self._left_at(places[worst]), len(self._nodes)
             elif len(self._nodes) >= most:
@@ -224,12 +253,19 @@ class Surface(Result):
                 self._begin([*(node.at for node in self._nodes), places[worst]])
                 left[worst] = 0.0
 
+    def _lost(self, at: FloatArray) -> FloatArray | None:
+        """A place of some, of which it cannot be told which pair of the small pencil is meant; or None."""
+        for part in np.array_split(at, math.ceil(len(at) / AT_ONCE)):
+            if not np.all(is_told := self._values(part).is_told):
+                return np.asarray(part[~is_told][0])
+        return None
+
     def _add(self, at: FloatArray) -> bool:
         """Solve at a place, and take the eigenfunctions with their derivatives; False for a finer space."""
         generator, p = self._generator(at), self.p
         generator.keeps_factors = True
         start = self._lifted(at, generator) if self._nodes else self._starts
-        place, unit = Start(self.problem, self._chosen), 1.0 if p else SMALL_P  # of λ, the ratio counts
+        place, unit = Start(generator.problem, self._chosen), 1.0 if p else SMALL_P  # of λ, the ratio counts
         with counted(self._budget.countdown("a node of a surface")):
             try:
                 pair = principal_pair(generator, p, start=start)
@@ -245,10 +281,16 @@ class Surface(Result):
             return self._take(place.refined(found, SPARE * allowed * unit, FREE_STAGES, self._budget.unknowns).space)
         right, left = self._vectors(at, pair, around)
         # where one of two derivatives vanishes, as that of T* by R for p = 0, F needs neither
-        kept = [k for k in range(len(right)) if all(_counts(side[k], side[0]) for side in (right, left))]
-        self._extend([right[k] for k in kept], [left[k] for k in kept])
-        x, y = np.array(right) @ self._right.T, np.array(left) @ self._dual.T
-        self._nodes.append(Node(at, pair, error, around, x, y))
+        kept, spans = [], (self._right, self._dual)
+        for k in range(len(right)):
+            new = right[k], left[k]
+            if all(_counts(each, side[0], span) for each, side, span in zip(new, (right, left), spans, strict=True)):
+                kept.append(k)
+                spans = orthonormal(spans[0], new[:1]), orthonormal(spans[1], new[1:])
+        if kept:
+            self._extend([right[k] for k in kept], [left[k] for k in kept])
+        self._nodes.append(Node(at, pair, error, around))
+        self._known.append(Known(at, self._right @ right[0], self._dual @ left[0]))
         return True
 
     def _take(self, space: Space) -> bool:
@@ -282,10 +324,8 @@ class Surface(Result):
 
     def _lifted(self, at: FloatArray, generator: Generator) -> PrincipalPair:
         """What the basis makes of the pair at a place, to start from."""
-        nearest = self._nearest(at)
-        try:
-            found = self._values(at[None])
-        except NotConverged:  # too far
+        nearest, found = self._nearest(at), self._values(at[None])
+        if not found.is_told[0]:  # too far
             return replace(nearest.pair, generator=generator)
         right = found.x[0] @ self._right if self.p else nearest.pair.right
         left = found.y[0] @ self._dual
@@ -296,45 +336,53 @@ class Surface(Result):
 
     # the small matrices
 
-    def _sample(self) -> None:
-        """Points on each axis whose L, for p = 0 also L′, and M make those everywhere, and the basis without nodes.
+    def _choose(self, pair: PrincipalPair) -> None:
+        """Choose the places whose L, for p = 0 also L′, and M make those everywhere.
 
-        The operators are sums of few products of a function of each parameter: as polynomials follow them along an axis,
-        those at a few of its points, chosen by a pivoted QR, make all others.
+        The operators are sums of few products of functions of one parameter each, which polynomials follow; those at
+        few of the points of these, that a pivoted QR chooses, make all others. What is left is looked at aside.
         """
-        middle = np.full(len(self.axes), 0.5)
-        pair = principal_pair(self._generator(middle), self.p, start=self._starts)
-        vector, size = pair.left, np.linalg.norm(pair.right) / abs(pair.left @ pair.space.weighed(pair.right))
-        allowed = INTERPOLATED * self._allowed(middle, 0.0) / size
-        mixed = np.random.default_rng(0).standard_normal(vector.size)
-        self._polynomials, self._off = [], 0.0
-        for k in range(len(self.axes)):
-            exact = self._images_at(_on_axis(middle, k, PROBE), vector)
-            for degree in DEGREES:
-                polynomials = Polynomials(0.0, 1.0, degree)
-                known = np.array([self._images_at(_on_axis(middle, k, u), vector) for u in polynomials.points.tolist()])
-                off = np.linalg.norm(polynomials.at(np.array([PROBE]))[0] @ known - exact)
-                if off <= max(allowed, degree * _EPS * np.max(np.linalg.norm(known, axis=1))):
-                    break
-            else:
-                raise self._none()
-            self._off += float(off * size)
-            aside = [np.full(len(self.axes), share) for share in ASIDE]
-            known = np.array(
-                [
-                    np.concatenate([self._images_at(_on_axis(at, k, u), mixed) for at in aside])
-                    for u in polynomials.points.tolist()
-                ]
-            )
-            self._polynomials.append(Products(polynomials, known))
-        places = [np.array(each) for each in product(*(each.points for each in self._polynomials))]
-        made = [self._operators(at) for at in places]
+        size = float(np.linalg.norm(pair.right) / abs(pair.left @ pair.space.weighed(pair.right)))
+        mixed = np.random.default_rng(0).standard_normal(pair.left.size)
+        allowed, count = INTERPOLATED * self._allowed(np.full(len(self.axes), 0.5), 0.0) / size, len(self.axes)
+        probes = np.random.default_rng(1).random((PROBES, count))
+        exact = np.array([self._images_at(at, pair.left) for at in probes])
+        allowed = max(allowed, ROUNDED * float(np.max(np.linalg.norm(exact, axis=1))))
+        for lines in ASIDE:
+            aside = [np.full(count, share) for share in (np.arange(lines) + 0.29) / lines]
+            self._products = [self._products_along(k, aside, mixed, pair.left, allowed) for k in range(count)]
+            self._places = [np.array(each) for each in product(*(each.points for each in self._products))]
+            made = np.array([self._images_at(at, pair.left) for at in self._places])
+            off = float(np.max(np.linalg.norm(self._rows(probes) @ made - exact, axis=1)))
+            self._off = off * size
+            if off <= allowed:
+                return
+        raise self._none()
+
+    def _products_along(
+        self, k: int, aside: Sequence[FloatArray], mixed: FloatArray, vector: FloatArray, allowed: float
+    ) -> Products:
+        """What the operators are made of along an axis, through some places."""
+        exact = self._images_at(_on_axis(aside[0], k, PROBE), vector)
+        for degree in DEGREES:
+            polynomials = Polynomials(0.0, 1.0, degree)
+            points = polynomials.points.tolist()
+            known = np.array([self._images_at(_on_axis(aside[0], k, u), vector) for u in points])
+            off = np.linalg.norm(polynomials.at(np.array([PROBE]))[0] @ known - exact)
+            if off <= max(allowed, degree * _EPS * np.max(np.linalg.norm(known, axis=1))):
+                lines = [[self._images_at(_on_axis(at, k, u), mixed) for at in aside] for u in points]
+                return Products(polynomials, np.array(lines).reshape(len(points), -1))
+        raise self._none()
+
+    def _sample(self) -> None:
+        """L, for p = 0 also L′, and M of this space at the places, and a basis without nodes."""
+        made = [self._operators(at) for at in self._places]
         self._kinds = [[each[kind] for each in made] for kind in range(len(made[0]))]
-        self._spaces = [self._space_at(at) for at in places]
+        self._spaces = [self._space_at(at) for at in self._places]
         one = self._spaces[0].constant
         self._right = orthonormal(np.zeros((0, one.size)), [] if self.p else [one])
         self._dual = orthonormal(np.zeros((0, one.size)), [] if self.p else [one])
-        self._small = [np.zeros((len(places), 0, 0)) for _ in range(len(self._kinds) + 1)]
+        self._small = [np.zeros((len(made), 0, 0)) for _ in range(len(self._kinds) + 1)]
         if not self.p:
             self._extend([], [])
 
@@ -353,8 +401,8 @@ class Surface(Result):
     def _rows(self, at: FloatArray, derivative: int | None = None) -> FloatArray:
         """What small matrices at each place, or their derivatives, are of those of all samples, shape (n, samples)."""
         rows = np.ones((len(at), 1))
-        for k, polynomials in enumerate(self._polynomials):
-            own = polynomials.at(at[:, k], int(k == derivative))
+        for k, products in enumerate(self._products):
+            own = products.at(at[:, k], int(k == derivative))
             rows = (rows[:, :, None] * own[:, None, :]).reshape(len(at), -1)
         return rows
 
@@ -399,10 +447,12 @@ class Surface(Result):
         if not self.p:
             return self._growth(small, slopes)
         a, g = small
-        value, x, y = self._followed(at, a, g)
+        value, x, y, is_told = self._followed(at, a, g)
         y = y / form(y, g, x)[:, None]
-        gradient = np.array([form(y, by_a, x) - value * form(y, by_g, x) for by_a, by_g in slopes]).T
-        return Values(value, gradient, x, y)
+        gradient = (
+            np.array([form(y, by_a, x) - value * form(y, by_g, x) for by_a, by_g in slopes]).reshape(-1, len(at)).T
+        )
+        return Values(value, gradient, x, y, is_told)
 
     def _growth(self, small: Sequence[FloatArray], slopes: Sequence[Sequence[FloatArray]]) -> Values:
         """λ: Bᵀy = (1, 0, …) with B = (G 1, A V′) gives T*, and Bz = A′1 gives λ = z₁ and −T′."""
@@ -418,41 +468,40 @@ class Surface(Result):
             by_whole = np.concatenate([by_g[:, :, :1], by_a[:, :, 1:]], axis=2)
             gradient.append(np.sum(y * by_b[:, :, 0], axis=1) - form(y, by_whole, z))
         x = np.concatenate([np.zeros((len(z), 1)), -z[:, 1:]], axis=1)
-        return Values(value, np.array(gradient).T, x, y)
+        return Values(value, np.array(gradient).reshape(-1, len(value)).T, x, y, np.full(len(value), True))
 
-    def _followed(self, at: FloatArray, a: FloatArray, g: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Λ(p) and its vectors, from those of the nearest node and their derivatives, or on the way from there.
+    def _followed(
+        self, at: FloatArray, a: FloatArray, g: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray, Mask]:
+        """Λ(p) and its vectors, from those at the nearest place where they are known, or on the way from there.
 
-        Raises:
-            NotConverged: it cannot be told which pair is that of the node.
+        The last tells whether they are continued: `LITTLE_DOUBT` is left on the way, while nodes may be added.
         """
-        places = np.array([node.at for node in self._nodes])
+        places = np.array([known.at for known in self._known])
         own = np.argmin(np.linalg.norm(at[:, None, :] - places, axis=2), axis=1)
         size, way = len(self._right), at - places[own]
-        known = [
-            np.array([np.pad(each, ((0, 0), (0, size - each.shape[1]))) for each in side])[own]
-            for side in ([node.x for node in self._nodes], [node.y for node in self._nodes])
-        ]
-        x, y = (each[:, 0] + np.einsum("nk,nki->ni", way, each[:, 1:]) for each in known)
-        value, x, y, share = eigenpairs(a, g, form(y, a, x) / form(y, g, x), x, y)
-        lost = np.flatnonzero(~(share > SURELY))
-        u, v = (each[lost, 0] for each in known)
+        u, v = (
+            np.array([np.pad(each, (0, size - each.size)) for each in side])[own]
+            for side in ([known.x for known in self._known], [known.y for known in self._known])
+        )
+        value, x, y, share = eigenpairs(a, g, form(v, a, u) / form(v, g, u), u, v)
+        lost = np.flatnonzero(~(np.abs(share - 1) < DOUBT))
+        is_told, most = np.full(len(at), True), DOUBT if self._is_filled else LITTLE_DOUBT
+        u, v = u[lost], v[lost]
         for k in range(1, STEPS_TO_LOST + 1 if lost.size else 0):
             here = places[own[lost]] + k / STEPS_TO_LOST * way[lost]
             own_a, own_g = self._pencils(self._rows(here))
             found, u, v, share = eigenpairs(own_a, own_g, form(v, own_a, u) / form(v, own_g, u), u, v)
-            if not np.all(share > MOSTLY):
-                raise self._none()
+            is_told[lost] &= np.abs(share - 1) < most
             value[lost], x[lost], y[lost] = found, u, v
-        return value, x, y
+        return value, x, y, is_told
 
     # errors
 
     def _left_at(self, at: FloatArray) -> tuple[float, float]:
         """What is left of F at a place, over its share of what is allowed, and itself."""
-        try:
-            found = self._values(at[None])
-        except NotConverged:
+        found = self._values(at[None])
+        if not found.is_told[0]:
             return math.inf, math.inf
         value, x, y = float(found.value[0]), found.x[0] @ self._right, found.y[0] @ self._dual
         operators, space = self._operators(at), self._space_at(at)
@@ -466,22 +515,41 @@ class Surface(Result):
         around = self._nearest(at).around
         assert around is not None
         left = SAFE * abs(float(s @ around.solve(r, refinements=2)))
-        return left / (SHARE * self._allowed(at, value)), left
+        share = left / (SHARE * self._allowed(at, value))
+        if share <= 1:
+            self._known.append(Known(at, found.x[0], found.y[0]))
+        return share, left
 
     # values
 
     def __call__(self, *values: ArrayLike) -> FloatArray:
         """F at values of the parameters, broadcast together. Raises `ValueError` outside the ranges."""
         shares = self._shares(values)
-        parts = np.array_split(shares.reshape(-1, len(self.axes)), math.ceil(shares[..., 0].size / AT_ONCE) or 1)
-        return np.concatenate([self._values(part).value for part in parts]).reshape(shares.shape[:-1])
+        return self.at_shares(shares.reshape(-1, len(self.axes)), has_gradient=False)[0].reshape(shares.shape[:-1])
 
     def gradient(self, *values: ArrayLike) -> FloatArray:
         """∂F/∂θ, of the shape of the values, one entry for each parameter last."""
         shares = self._shares(values)
-        found = self._values(shares.reshape(-1, len(self.axes)), has_gradient=True).gradient.reshape(shares.shape)
+        found = self.at_shares(shares.reshape(-1, len(self.axes)))[1].reshape(shares.shape)
         slopes = [np.vectorize(axis.slope)(shares[..., k]) for k, axis in enumerate(self.axes)]
         return np.asarray(found / np.stack(slopes, axis=-1))
+
+    def at_shares(self, shares: FloatArray, has_gradient: bool = True) -> tuple[FloatArray, FloatArray]:
+        """F, shape (n,), and its gradient by them, shape (n, d), at shares of the ranges, shape (n, d)."""
+        values, gradients = np.empty(len(shares)), np.empty(shares.shape if has_gradient else (len(shares), 0))
+        for part in np.array_split(np.arange(len(shares)), math.ceil(len(shares) / AT_ONCE) or 1):
+            found = self._values(shares[part], has_gradient)
+            values[part], gradients[part] = found.value, found.gradient
+            for k in part[~found.is_told]:
+                values[k], gradients[k] = self._solved(shares[k], has_gradient)
+        return values, gradients
+
+    def _solved(self, at: FloatArray, has_gradient: bool) -> tuple[float, list[float]]:
+        """F and its gradient where the small pencil does not tell it, by the whole one."""
+        pair = principal_pair(self._generator(at), self.p, start=self._nearest(at).pair)
+        norm, count = pair.left @ pair.space.weighed(pair.right), len(self.axes) * has_gradient
+        changes = [self._changes(self._rows(at[None], k)[0], pair.right, pair.eigenvalue) for k in range(count)]
+        return pair.value, [float(pair.left @ each / norm) for each in changes]
 
     def _shares(self, values: Sequence[ArrayLike]) -> FloatArray:
         """The values as shares of the ranges, one for each parameter last."""
@@ -522,6 +590,7 @@ def _on_axis(at: FloatArray, k: int, share: float) -> FloatArray:
     return place
 
 
-def _counts(derivative: FloatArray, of: FloatArray) -> bool:
-    """Whether a derivative of an eigenfunction is more than rounding."""
-    return bool(np.linalg.norm(derivative) > NOTHING * np.linalg.norm(of))
+def _counts(derivative: FloatArray, of: FloatArray, known: FloatArray) -> bool:
+    """Whether a derivative of an eigenfunction is more than rounding, and more than others make."""
+    beyond = np.linalg.norm(derivative - (known @ derivative) @ known)
+    return bool(beyond > max(NOTHING * np.linalg.norm(of), SAME * np.linalg.norm(derivative)))

@@ -42,6 +42,8 @@ BACKWARD_ERROR_LIMIT = 1e-11
 """Backward error, over the norm of L, up to which a pair is one."""
 POSITIVE = 1e-2
 """T, or T*, is taken for positive where no more than this share of it has the wrong sign, the least of all found."""
+BESIDE_IT = 1e-6, 1e-2
+"""Distances from an eigenvalue, over a rate of the system, at which it is looked whether others are to its right."""
 SURELY_POSITIVE = 1e-4
 """The same for a pair with which the search ends at once."""
 MOSTLY = 0.5
@@ -146,6 +148,7 @@ def principal_pair(
         raise NumericalFailure(f"L(p) has the size {pencil.matrix.norm:.0e}")
     has_others, has_states = _has_other_positive(generator, p), _has_states(generator.problem)
     tangents, found = _tangents(generator.problem, p, pairs), list[PrincipalPair]()
+    is_known = p == 0 and generator.keeps_constants  # Λ(0) = 0, T = 1
 
     def solved(x: FloatArray, y: FloatArray) -> PrincipalPair:
         pair = _pair(generator, pencil, rayleigh_iteration(pencil, x, y, generator.problem.unit_rate))
@@ -159,7 +162,7 @@ def principal_pair(
             x, y = _carried(pairs, pencil, generator)
         pair = solved(x, y)
         goes_on = bool(pairs) and _share(pencil.space, pair, x, y) > MOSTLY
-        is_told = goes_on or not has_others or math.isfinite(tangents)
+        is_told = goes_on or not has_others or is_known or math.isfinite(tangents)
         most = POSITIVE if goes_on else SURELY_POSITIVE
         is_right = is_told and pair.value >= tangents and min(pair.sign_defects) <= most
         return pair if is_right and pair.residual <= BACKWARD_ERROR_LIMIT else None
@@ -175,9 +178,9 @@ def principal_pair(
         return pair
 
     pair = None
-    if (pairs and not has_states) or not has_others:
+    if pairs or is_known or not has_others:
         pair = from_a_start()
-    if pair is None:
+    if pair is None or (has_states and not is_known and not _is_rightmost(pair, pencil)):
         pair = from_the_right()
         others = [each.value for each in found]
         if has_states and generator.size <= SURVEYED_UNKNOWNS:
@@ -190,21 +193,35 @@ def principal_pair(
 
 
 def _has_states(problem: Problem) -> bool:
-    """Whether a noise jumps between states: where some of these are hardly left, they have a positive pair each."""
-    return any(noise.has_states and not noise.is_white for noise in problem.noise.parts.values())
+    """Whether a noise jumps: what hardly anything leaves, a state or by white noise a direction of x, has its pair."""
+    return any(noise.has_states for noise in problem.noise.parts.values())
+
+
+def _is_rightmost(pair: PrincipalPair, pencil: Pencil) -> bool:
+    """Whether (σ − L)⁻¹1 > 0, as it is for a σ beside Λ if Λ is the rightmost eigenvalue, and also for the adjoint.
+
+    Of another one, by which all else is larger than rounding, it is −1/(Λ′ − σ) of its share.
+    """
+    space, rate = pencil.space, pair.generator.problem.unit_rate
+    source = space.weighed(space.constant)
+    for shift in BESIDE_IT:
+        factor = pencil.factorised(pair.eigenvalue + shift * rate)
+        right, left = -factor.solve(source), -factor.solve(source, transposed=True)
+        if max(_sign_defects(space, right, left)) > SURELY_POSITIVE:
+            return False
+    return True
 
 
 def _has_other_positive(generator: Generator, p: float) -> bool:
     """Whether other pairs may seem to have T > 0, too.
 
-    States that hardly mix have a pair each, and so have directions of x that white noise hardly mixes. Where the phase
-    rests, between weak noise, T is about |x|^(p−k) |v|^k for the k-th pair, x along the faster mode and v along the
-    other: for even k its sign does not change.
+    States that hardly mix have a pair each. Where the phase rests, between weak noise, T is about |x|^(p−k) |v|^k for
+    the k-th pair, x along the faster mode and v along the other: for even k its sign does not change.
     """
     problem = generator.problem
     if problem.dimension > 2:  # each search begins at a neighbouring p
         return False
-    if any(noise.has_states for noise in problem.noise.parts.values()):
+    if _has_states(problem):
         return True
     if (frozen := frozen_noise(problem)) is None:
         return problem.may_rest

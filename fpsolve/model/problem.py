@@ -267,6 +267,12 @@ class Problem:
             lambda name: ((noise := self.named_noise(name)).standard_deviation, noise.correlation_time),
         )
 
+    def in_frame_of(self, other: Problem) -> Problem:
+        """The problem in the coordinates of another one, as L(p) is smooth in parameters in the same ones only."""
+        held = Problem(self.system, self.noise)
+        held.__dict__["_own"] = other._own
+        return held
+
     @cached_property
     def motion(self) -> System:
         """The system along a path of ξ, in the coordinates of `frame`: what is left of it beside white noise."""

@@ -147,15 +147,17 @@ def solve_chart(
     scan = empty_scan(frame.nodes) if frame.nodes else None
     begun = [Boundary(zero, x, y, problem, scan=scan, budget=case.budget) for zero in frame.zero]
     finished = [known(line) for line in begun]
-    tasks = [row for line, earlier in zip(begun, finished, strict=True) if earlier is None for row in line.rows()]
+    scans = [line.reduced_scan() if earlier is None else None for line, earlier in zip(begun, finished, strict=True)]
+    whole = [*zip(begun, finished, scans, strict=True)]
+    tasks = [row for line, earlier, reduced in whole if earlier is None and reduced is None for row in line.rows()]
     rows = iter(map(scan_row, tasks))
-    for each, earlier in zip(begun, finished, strict=True):
+    for each, earlier, reduced in whole:
         done = chart.lines
         if earlier is not None:
             chart = replace(chart, lines=(*done, earlier))
             yield chart
             continue
-        for line in each.solve(rows, progress, stepped):
+        for line in each.solve(rows, progress, stepped, reduced):
             chart = replace(chart, lines=(*done, line))
             yield chart
     lines = tuple(crossed(chart.lines))
@@ -261,7 +263,7 @@ def write_chart(case: Case, chart: Chart, folder: Path) -> None:
                 "equation": line.zero.equation,
                 "appears": _appears(line.zero),
                 "rtol": line.rtol,
-                "scan": None if line.scan is None else {"nodes": [line.scan.nodes.size] * 2, "rtol": line.scan_rtol},
+                "scan": None if line.scan is None else {"nodes": [line.scan.nodes.size] * 2, "rtol": line.scan.rtol},
                 "branches": [
                     {"points": branch.x.size, "closed": branch.closed, "obstacles": list(branch.obstacles)}
                     for branch in line.branches

@@ -573,6 +573,13 @@ def test_each_row_and_each_point_is_told_as_it_is_found(monkeypatch):
     told, seen, sample = [], [], ZeroField._at
     monkeypatch.setattr(ZeroField, "_at", lambda self, *given: (seen.append(len(told)), sample(self, *given))[1])
     found = line(progress=lambda: told.append(1))
+    assert found.scan.nodes.size == 5
+    assert len(told) == 9 + sum(branch.x.size for branch in found.branches)
+    told.clear()
+    seen.clear()
+    monkeypatch.setattr(Boundary, "reduced_scan", lambda self: None)
+    found = line(progress=lambda: told.append(1))
+    assert found.scan.nodes.size == 3
     assert seen[:9] == [0, 0, 0, 3, 3, 3, 6, 6, 6]
     assert len(told) == 9 + sum(branch.x.size for branch in found.branches)
 
