@@ -228,9 +228,13 @@ class WholeProblem:
         """Whether what serves q is likely to serve p, or so small that it is worth a try."""
         if self.problem.dimension > 2:  # every p has waves of its own
             return False
-        axis, frozen = chosen.xi, frozen_noise(self.problem)
         if chosen.size > WORTH_A_TRY and abs(p - q) > max(0.5, 0.4 * min(abs(p), abs(q))):
             return False
+        return self.tilt_fits(chosen, p)
+
+    def tilt_fits(self, chosen: Space, p: float) -> bool:
+        """Whether the tilt of a space is about that at p."""
+        axis, frozen = chosen.xi, frozen_noise(self.problem)
         if frozen is None or not isinstance(axis, PolynomialAxis):
             return True
         away = abs(frozen.tilt(frozen.center(p)) - axis.slope * p) if self.problem.coloured.may_tilt else 0.0

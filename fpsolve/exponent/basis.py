@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
 from itertools import pairwise
@@ -30,9 +30,10 @@ from fpsolve.budget import counted
 from fpsolve.errors import NotConverged
 from fpsolve.exponent.adapt import SMALL_P, UNSOLVED
 from fpsolve.exponent.eigen import MOSTLY, PairDerivatives, PrincipalPair, principal_pair
-from fpsolve.exponent.error import Solution
-from fpsolve.exponent.starts import FREE_STAGES, Start, other_centers
+from fpsolve.exponent.error import Solution, effects_on
+from fpsolve.exponent.starts import Start, other_centers
 from fpsolve.fem.axis import KroneckerSum
+from fpsolve.fem.effects import ModeEffects
 from fpsolve.fem.factors import one_thread
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.space import Space
@@ -49,9 +50,11 @@ WITHIN = 0.47
 """Share of a gap between two nodes where its error is looked at, and the next node is put: even p tell too little."""
 BOTH_SIDES = (0.2, 0.8)
 """Shares of a gap where its error is looked at, too, unless it is hardly anything in the middle."""
-HARDLY = 1e-2
+HARDLY = 0.25
 """Share of what is allowed up to which it is that."""
-ELSEWHERE = 20.0
+HOPELESS = 100.0
+"""What is left over what is allowed from which on nodes elsewhere are not expected to suffice."""
+ELSEWHERE = 4.0
 """What may be left elsewhere in a gap, over that in the middle, where it is looked at there only."""
 SAFE = 4.0
 """What is left, over its estimate to first order."""
@@ -63,10 +66,12 @@ BESIDE = 0.97
 """A p next to it, over the even p."""
 SURELY = 0.05
 """Share of the tolerance for the errors of two nodes up to which that of the space between them is not looked at."""
+FORESEEN = 1.5
+"""Factor of the unknowns of a space up to which the highest modes tell what it lacks."""
+GOAL = 0.01
+"""Share of what is allowed that a finer space is made for, in each direction."""
 MOST_NODES = 40
 """Number of nodes of a basis."""
-MOST_STEPS = 8
-"""Number of steps of the iteration for the eigenvalues of small pencils."""
 MOST_SPACES = 8
 """Number of times that the space of a basis is refined."""
 MOST_STEPS = 8
@@ -75,25 +80,19 @@ AT_ONCE = 256
 """Number of p whose small pencils are solved together."""
 OUTSIDE = 1e-3
 """Share of the distance of chord and tangents by which a value between two nodes may lie outside of both."""
-_EPS = sys.float_info.epsilon
-
-
 SPARE = 0.2
 """Share of the tolerance that a finer space is made for, so that it serves other p too."""
 MUCH_MORE = 1.3
 """Factor of the unknowns beyond which p of both signs have spaces of their own, where one does not serve them all."""
+NOTHING = np.zeros(0)
+_EPS = sys.float_info.epsilon
+Vectors = Sequence[FloatArray] | FloatArray
+Demand = tuple[ModeEffects | None, ...]
+"""The effects of the highest modes along each axis, over what is allowed."""
 
 
 class Unsuited(Exception):
     """No space serves all p of an interval, or slow noise carries a moment at several places."""
-
-
-class _Finer(Exception):
-    """A space does not serve a p; `space` should."""
-
-    def __init__(self, space: Space) -> None:
-        super().__init__()
-        self.space = space
 
 
 class Polynomials:
@@ -132,15 +131,22 @@ class Node(NamedTuple):
 
     Attributes:
         pair, error: Λ(p), T and T*, and the estimate of its error.
+        rate: that over |p|; at p = 0 that of Λ′.
+        demand: of the space; nothing where it was solved on a space before.
         around: what solves with L − Λ, while nodes are added.
+        right, left: T and T′, T* and T*′.
         x, y: T and T* by the vectors of the basis that there were.
     """
 
     pair: PrincipalPair
     error: float
+    rate: float
+    demand: Demand
     around: PairDerivatives | None
-    x: FloatArray
-    y: FloatArray
+    right: Vectors
+    left: Vectors
+    x: FloatArray = NOTHING
+    y: FloatArray = NOTHING
 
 
 class Reduced(NamedTuple):
@@ -161,14 +167,12 @@ class Left(NamedTuple):
         p: where it was looked at.
         error: its estimate.
         allowed: what may be left.
-        of_space: the error of the space there; 0 where it is not known.
         nodes: how many there were.
     """
 
     p: float
     error: float
     allowed: float
-    of_space: float
     nodes: int
 
 
@@ -202,23 +206,31 @@ class Basis:
         self.low, self.high, self._solver, self._has_zero = low, high, solver, low <= 0 <= high
         self.nodes: dict[float, Node] = {}
         self._lefts: dict[tuple[float, float], Left] = {}
-        self._refinements = 0
-        self._right: FloatArray = np.zeros((0, 0))
-        self._dual: FloatArray = np.zeros((0, 0))
+        self._rates: dict[float, float] = {}
+        self._right = self._dual = np.zeros((0, 0))
+        self._degree = 0
         outer, other = (low, high) if abs(low) > abs(high) else (high, low)
         inner = 0.0 if self._has_zero else other
-        self._generator = solver.solution(outer).pair.generator
+        self._middle: float | None = inner + WITHIN * (outer - inner)
+        self._near, self._spaces_left, self._most = solver.solution(outer).pair, MOST_SPACES, solver.budget.unknowns
+        self._generator = self._near.generator
+        self._generator.keeps_factors = solver.mesh is None
+        if low < 0 < high and solver.mesh is None:
+            self._most = min(self._most, round(MUCH_MORE * self._generator.size))
+            if not solver.whole.tilt_fits(self._generator.chosen, other):
+                raise Unsuited
         with one_thread():
-            self._begin(dict.fromkeys([inner, outer, inner + WITHIN * (outer - inner), other]))  # the first vector is 1
+            for p in dict.fromkeys([*[0.0] * self._has_zero, outer, other]):  # the first vector is 1
+                self._solve(p)
             self.is_converged = self._fill(most)
             self._rounding = self._bound()
-        rate = max((node.error / abs(p) for p, node in self.nodes.items() if not _is_even(p)), default=0.0)
+        rate = max((node.rate for p, node in self.nodes.items() if not _is_even(p)), default=0.0)
         for p, node in self.nodes.items():
             error = node.error
             if p and _is_even(p) and solver.mesh is None:
                 is_sure = 0 < rate * abs(p) <= SURELY * solver.tolerance(p, node.pair.value)
                 error = max(error, rate * abs(p)) if is_sure else self._error_beside(p)
-            self.nodes[p] = node._replace(around=None, error=error)  # without factors
+            self.nodes[p] = node._replace(around=None, error=error, rate=error / abs(p) if p else node.rate)
 
     # nodes
 
@@ -232,111 +244,134 @@ class Basis:
             left = lefts[i]
             if left is not None and shares[i] <= 1:
                 return True
-            p = low + WITHIN * (high - low)
-            try:
-                if left is None or left.nodes < len(self.nodes):
-                    found = self._left_at(p, gap)
-                    if found.error <= HARDLY * found.allowed:
-                        self._lefts[gap] = found._replace(error=ELSEWHERE * found.error)
-                    elif found.error > found.allowed:
-                        self._lefts[gap] = found
-                    else:
-                        others = (self._left_at(low + share * (high - low), gap) for share in BOTH_SIDES)
-                        self._lefts[gap] = max([found, *others], key=lambda each: each.error / each.allowed)
-                elif len(self.nodes) >= most:
-                    return False
+            if left is None or left.nodes < (len(self.nodes) if shares[i] <= HOPELESS else 1):
+                near, far = sorted(gap, key=abs)
+                found = self._left_at(near + WITHIN * (far - near), gap)
+                if found.error <= HARDLY * found.allowed:
+                    self._lefts[gap] = found._replace(error=ELSEWHERE * found.error)
+                elif found.error > found.allowed:
+                    self._lefts[gap] = found
                 else:
-                    self._add(*self._solved(p := left.p))
-                    self._lefts |= dict.fromkeys([(low, p), (p, high)], left._replace(of_space=0.0, nodes=0))
-            except _Finer as finer:
-                self._begin([*self.nodes, p], finer.space)
+                    others = (self._left_at(low + share * (high - low), gap) for share in BOTH_SIDES)
+                    self._lefts[gap] = max([found, *others], key=lambda each: each.error / each.allowed)
+            elif len(self.nodes) >= most:
+                return False
+            else:
+                self._solve(left.p)
+                self._lefts |= dict.fromkeys([(low, left.p), (left.p, high)], left._replace(nodes=0))
 
-    def _begin(self, places: Iterable[float], space: Space | None = None) -> None:
-        """Solve at some p, on a finer space if one is given, or on one that is finer still."""
-        if space is not None:
-            self._generator = Generator(self._solver.problem, space)
-        self._generator.keeps_factors = self._solver.mesh is None
-        try:
-            solved = [self._solved(p) for p in places]
-        except _Finer as finer:
-            self._begin(places, finer.space)
-        else:
-            self.nodes.clear()
-            for each in solved:
-                self._add(*each)
+    def _solve(self, p: float) -> None:
+        """Make a p a node: take T, T′, T* and T*′ there into the basis, on a finer space where this one does not serve.
 
-    def _add(self, solution: Solution, around: PairDerivatives) -> None:
-        """Take T, T′, T* and T*′ of a solution into the basis."""
-        pair = solution.pair
-        right, left = [pair.right if pair.p else pair.space.constant], [pair.left]
+        Raises:
+            Unsuited: see there.
+        """
+        solution = self._solution(p)
+        pair, error, around, demand = solution.pair, solution.error, PairDerivatives(solution.pair), Demand()
+        if other_centers(pair):
+            raise Unsuited
+        if self._solver.mesh is None:
+            effects = solution.effects
+            if p == 0:  # those on Λ′, as T is 1
+                effects = effects_on(pair, [(around.by_p, pair.left, self._generator.at(p).matrix)])
+                error = sum(each.error for each in effects if each)
+            demand = _demand(effects, allowed := self._allowed(p, pair.value))
+            if not error <= allowed:
+                if p and pair.rounding > allowed:
+                    raise Unsuited
+                self._refine(demand)
+                return self._solve(p)
         if not self.nodes:
             self._sample(pair)
-        row = (self._polynomials.at(np.array([pair.p])) @ self._polynomials.slopes)[0]
+        right, left = [pair.right if p else pair.space.constant], [pair.left]
+        row = (self._polynomials.at(np.array([p])) @ self._polynomials.slopes)[0]
         for vectors, adjoint in ((right, False), (left, True)):
             of_l, of_m = self._images(vectors, adjoint)
             change = np.tensordot(row, of_l[:, 0] - pair.eigenvalue * of_m[:, 0], 1)
             source = pair.derivative * pair.space.weighed(vectors[0]) - change
-            vectors.append(around.solve(source, adjoint=adjoint))
-        self._extend(right, left)
-        error = solution.error if pair.p else 0.0
-        self.nodes[pair.p] = Node(pair, error, around, self._right @ pair.right, self._dual @ pair.left)
+            vectors.append(around.solve(source, adjoint=adjoint, refinements=2))
+        rate = error / abs(p) if p else error if demand else 0.0
+        return self._take(Node(pair, error if p else 0.0, rate, demand, around, right, left))
 
-    def _solved(self, p: float) -> tuple[Solution, PairDerivatives]:
-        """The solution on the space, and what solves with its factors.
+    def _take(self, node: Node) -> None:
+        """Take the vectors of a node into the basis."""
+        self._extend(node.right, node.left)
+        x, y = self._right @ node.right[0], self._dual @ node.left[0]
+        self.nodes[node.pair.p] = node._replace(x=x, y=y)
 
-        Raises:
-            _Finer: the space does not serve.
-        """
+    def _allowed(self, p: float, value: float = 0.0) -> float:
+        """The error that the space may have at a p; at p = 0 of Λ′."""
+        return (1 - SHARE) * (self._solver.tolerance(p, value) if p else self._solver.tolerance(SMALL_P, 0.0) / SMALL_P)
+
+    def _solution(self, p: float) -> Solution:
+        """The solution on the space."""
         solver, known = self._solver, self._solver.whole.known
         if solver.mesh is not None:
-            return (found := solver.solution(p)), PairDerivatives(found.pair)
-        starts: PrincipalPair | list[PrincipalPair] = [each.pair for each in known.values()]
-        if p in known:
-            starts = known[p].pair
-        elif self.nodes:
-            starts = self._lifted(p)
+            return solver.solution(p)
         if p not in known or known[p].pair.generator is not self._generator:
+            start = known[p].pair if p in known else self._lifted(p)[0] if self.nodes else self._near
+            if p == 0:
+                start = replace(start, right=start.space.constant)
             with counted(solver.budget.countdown(f"Λ({p:g})")):
                 try:
-                    known[p] = Solution(principal_pair(self._generator, p, start=starts))
+                    known[p] = Solution(principal_pair(self._generator, p, start=start))
                 except UNSOLVED as failure:
                     place = Start(solver.problem, self._generator.chosen).doubled(failure)
-                    raise self._finer(place.space) from None
-        found, around = known[p], PairDerivatives(known[p].pair)
-        allowed = solver.tolerance(p, found.pair.value) if p else math.inf
-        if self._has_zero and 0 < abs(p) < 1:
-            allowed = min(allowed, abs(p) * solver.tolerance(SMALL_P, 0.0) / SMALL_P)
-        if other_centers(found.pair):
+                    self._go_to(place.generator)
+                    return self._solution(p)
+        return known[p]
+
+    def _refine(self, demand: Demand) -> None:
+        """Go to a space on which every cell should lack no more than its share of what a p and the nodes allow.
+
+        Where the first space is far too small for that to be foreseen, that of a p in the middle may serve.
+        """
+        chosen = self._generator.chosen
+        of_axes = zip(demand, *(node.demand for node in self.nodes.values() if node.demand), strict=True)
+        most = [each[0] and replace(each[0], highest=np.max([of.highest for of in each], axis=0)) for each in of_axes]
+        new = chosen.refined(most, GOAL, False)
+        middle, self._middle = self._middle, None
+        if middle is not None and not self.nodes and new.size > FORESEEN * chosen.size:
+            pair = self._solver.solution(middle).pair
+            if pair.generator.size > chosen.size:
+                self._near = pair
+                return self._go_to(pair.generator)
+        return self._go_to(Generator(self._solver.problem, new if new.size > chosen.size else new.raised()))
+
+    def _go_to(self, generator: Generator) -> None:
+        """Carry the nodes to another space, but for p = 0, where T is known and T* must be exact.
+
+        Raises:
+            Unsuited: it has too many unknowns.
+        """
+        self._spaces_left -= 1
+        if generator.size > self._most or not self._spaces_left:
             raise Unsuited
-        return self._checked(found, allowed), around
+        nodes, old, self._generator = self.nodes, self._generator, generator
+        generator.keeps_factors, self.nodes = True, {}
+        self._rates.clear()
+        for p, node in nodes.items():
+            if p == 0:
+                self._solve(p)
+                continue
+            carried = self._generator.space(p).carry(np.array([*node.right, *node.left]), old.space(p))
+            right, left = np.split(carried, 2)
+            pair = replace(node.pair, right=right[0], left=left[0], generator=self._generator)
+            if not self.nodes:
+                self._sample(pair)
+            self._take(Node(pair, node.error, node.rate, (), PairDerivatives(pair), right, left))
 
-    def _checked(self, found: Solution, allowed: float) -> Solution:
-        """A solution on the space. Raises `_Finer` where its error is beyond what is allowed."""
-        if math.isinf(allowed) or found.error <= allowed:
-            return found
-        place, most = Start(self._solver.problem, self._generator.chosen), self._solver.budget.unknowns
-        raise self._finer(place.refined(found, SPARE * allowed, FREE_STAGES, most).space)
-
-    def _finer(self, space: Space) -> _Finer:
-        """What tells the next space. Raises `Unsuited` where that has too many unknowns."""
-        most = self._solver.budget.unknowns
-        if self.low < 0 < self.high:
-            most = min(most, round(MUCH_MORE * self._generator.size))
-        self._refinements += 1
-        if space.size > most or self._refinements > MOST_SPACES:
-            raise Unsuited
-        return _Finer(space)
-
-    def _lifted(self, p: float) -> PrincipalPair:
-        """What the basis makes of the pair at p, to start from."""
+    def _lifted(self, p: float) -> tuple[PrincipalPair, bool]:
+        """What the basis makes of the pair at p, and whether it surely goes on from those of the nodes."""
         found, nearest = self._reduced(np.array([p])), min(self.nodes, key=lambda q: abs(q - p))
         norm = float(found.y[0] @ found.g[0] @ found.x[0])
         right, left = found.x[0] @ self._right, found.y[0] @ self._dual / (norm or 1.0)
-        return replace(self.nodes[nearest].pair, p=p, right=right, left=left, generator=self._generator)
+        pair = replace(self.nodes[nearest].pair, p=p, eigenvalue=float(found.value[0]), right=right, left=left)
+        return replace(pair, rounding=0.0, generator=self._generator), bool(found.share[0] > MOSTLY)
 
     # the small pencils
 
-    def _extend(self, right: Sequence[FloatArray], left: Sequence[FloatArray]) -> None:
+    def _extend(self, right: Vectors, left: Vectors) -> None:
         """Add vectors to the basis, and what they make of L and M to the small matrices."""
         old = len(self._a[0])
         self._right, self._dual = orthonormal(self._right[:old], right), orthonormal(self._dual[:old], left)
@@ -347,7 +382,7 @@ class Basis:
         if self._has_zero:
             self._a[self._polynomials.points == 0, :, 0] = 0.0  # L(0) 1 = 0
 
-    def _images(self, vectors: Sequence[FloatArray] | FloatArray, adjoint: bool = False) -> list[FloatArray]:
+    def _images(self, vectors: Vectors, adjoint: bool = False) -> list[FloatArray]:
         """L and M, or their transposes, times some vectors, at each point of the polynomials."""
         tables = np.array(vectors).reshape(-1, *self._generator.chosen.shape)
         of_l = np.array([each.images(tables) for each in (self._adjoints if adjoint else self._matrices)])
@@ -364,14 +399,15 @@ class Basis:
 
         size = np.linalg.norm(pair.left) / abs(pair.left @ pair.space.weighed(pair.right))
         exact = images(generator.matrix(test), generator.space(test))
-        for degree in DEGREES:
+        for degree in DEGREES[self._degree :]:
             self._polynomials = Polynomials(self.low, self.high, degree)
             points = self._polynomials.points.tolist()
             self._matrices, self._spaces = [generator.matrix(p) for p in points], [generator.space(p) for p in points]
             known = np.array([images(*each) for each in zip(self._matrices, self._spaces, strict=True)])
             off = float(np.linalg.norm(self._polynomials.at(np.array([test]))[0] @ known - exact))
-            self._off = off * float(size) / abs(test)
+            self._off = SAFE * off * float(size) / abs(test)
             rounding = degree * _EPS * np.max(np.linalg.norm(known, axis=1))
+            self._degree = DEGREES.index(degree)
             if off <= max(INTERPOLATED * self._solver.tolerance(test, 0.0) / size, rounding):
                 break
         else:
@@ -398,7 +434,7 @@ class Basis:
         slopes = np.array([node.pair.derivative for node in nodes])
         of_nodes = [
             np.array([np.pad(each, (0, size - each.size)) for each in side])
-            for side in zip(*[node[3:] for node in nodes], strict=True)
+            for side in zip(*[node[-2:] for node in nodes], strict=True)
         ]
         i = np.clip(np.searchsorted(at, p) - 1, 0, max(at.size - 2, 0))
         j = np.minimum(i + 1, at.size - 1)
@@ -416,34 +452,31 @@ class Basis:
 
     def _left_at(self, p: float, gap: tuple[float, float]) -> Left:
         """What is left at a p between two nodes: all where its value is not between the chord and both tangents."""
-        found = self._reduced(np.array([p]))
+        pair, goes_on = self._lifted(p)
         (low, one), (high, other) = ((q, self.nodes[q].pair) for q in gap)
-        value, chord = float(found.value[0]), one.value + (other.value - one.value) * (p - low) / (high - low)
+        value, chord = pair.eigenvalue, one.value + (other.value - one.value) * (p - low) / (high - low)
         tangents = max(each.value + each.derivative * (p - each.p) for each in (one, other))
         slack = OUTSIDE * abs(chord - tangents)
         allowed = self._solver.tolerance(p, value)
         if self._solver.mesh is not None:
             allowed = max(allowed, *(self.nodes[q].error for q in gap))
-        if not (tangents - slack <= value <= chord + slack and found.share[0] > MOSTLY):
-            return Left(p, math.inf, SHARE * allowed, 0.0, len(self.nodes))
-        right, left = found.x[0] @ self._right, found.y[0] @ self._dual
-        matrix, space = self._generator.matrix(p).shifted(value), self._generator.space(p)
+        if not (tangents - slack <= value <= chord + slack and goes_on):
+            return Left(p, math.inf, SHARE * allowed, len(self.nodes))
+        matrix = self._generator.matrix(p).shifted(value)
         nearest = self.nodes[min(self.nodes, key=lambda q: abs(q - p))].around
         assert nearest is not None
-        change = nearest.solve(matrix @ right, refinements=2)
-        norm, of_space = float(left @ space.weighed(right)), 0.0
-        error = SAFE * abs(float((matrix.T @ left) @ change / norm))
-        rate = max(node.error / abs(q) for q, node in self.nodes.items() if q)
-        is_sure = rate * abs(p) <= SURELY * allowed or self._solver.mesh is not None
-        if error <= SHARE * allowed and not is_sure:
-            pair = replace(
-                one, p=p, eigenvalue=value, right=right, left=left / norm, rounding=0.0, generator=self._generator
-            )
-            of_space = Solution(pair).error
+        change = nearest.solve(matrix @ pair.right, refinements=1)
+        error = SAFE * abs(float((matrix.T @ pair.left) @ change))
+        if error <= SHARE * allowed and self._solver.mesh is None and not any(low < q < high for q in self._rates):
+            found, most = Solution(pair), self._allowed(p, value)
             if 0.0 in gap:  # where Λ(p)/p is wanted
-                allowed = min(allowed, abs(p) * self._solver.tolerance(SMALL_P, 0.0) / SMALL_P)
-            error = math.inf if of_space > allowed else error  # what a node there shall tell
-        return Left(p, error, SHARE * allowed, of_space, len(self.nodes))
+                most = min(most, abs(p) * self._allowed(0.0))
+            if not found.error <= most:
+                self._refine(_demand(found.effects, most))
+                return self._left_at(p, gap)
+            if not _is_even(p):
+                self._rates[p] = found.error / abs(p)
+        return Left(p, error, SHARE * allowed, len(self.nodes))
 
     def _bound(self) -> FloatArray:
         """What rounding may change in an entry of the small matrix of L, at the largest |p|: shape (size, size)."""
@@ -478,7 +511,7 @@ class Basis:
     def _left_of(self, p: FloatArray) -> FloatArray:
         """What is left at p, by what is left between the same nodes; near 0 it falls faster than p."""
         gaps = [*pairwise(sorted(self.nodes))]
-        lefts = [self._lefts.get(gap, Left(1.0, 0.0, 0.0, 0.0, 0)) for gap in gaps]
+        lefts = [self._lefts.get(gap, Left(1.0, 0.0, 0.0, 0)) for gap in gaps]
         i = np.clip(np.searchsorted([low for low, _ in gaps], p, side="right") - 1, 0, len(gaps) - 1)
         error, at = (np.array([getattr(left, name) for left in lefts])[i] for name in ("error", "p"))
         return np.asarray(
@@ -487,21 +520,13 @@ class Basis:
 
     def _error_beside(self, p: float) -> float:
         """The error of the space at a node of an even p, where T is too simple, by that at a p next to it."""
-        near = BESIDE * p
-        value, error = self._lifted(near), self.nodes[p].error
-        found = self._reduced(np.array([near]))
-        pair = replace(value, eigenvalue=float(found.value[0]), rounding=0.0)
-        return max(error, Solution(pair).error / BESIDE)
+        return max(self.nodes[p].error, Solution(self._lifted(BESIDE * p)[0]).error / BESIDE)
 
     def _error_of_space(self, p: FloatArray) -> FloatArray:
-        """By the larger error over |p| of the places on both sides."""
-        lefts = [self._lefts[gap] for gap in pairwise(sorted(self.nodes)) if gap in self._lefts]
-        errors = {left.p: left.of_space for left in lefts if left.of_space}
-        errors |= {q: node.error for q, node in self.nodes.items()}
-        places = np.array(sorted(q for q in errors if q))
-        ratios = np.array([errors[q] / abs(q) for q in places.tolist()])
-        i = np.searchsorted(places, p)[:, None] + np.array([-1, 0])
-        return np.asarray(np.abs(p) * np.max(ratios[np.clip(i, 0, places.size - 1)], axis=1))
+        """By that over |p| of the places on both sides, which grows or falls exponentially."""
+        rates = self._rates | {q: node.rate for q, node in self.nodes.items() if node.rate}
+        places = np.array(sorted(rates))
+        return np.asarray(np.abs(p) * np.exp(np.interp(p, places, np.log([rates[q] for q in places.tolist()]))))
 
 
 def bases(solver: ExponentSolver, low: float, high: float, most: int = MOST_NODES) -> tuple[Basis, ...]:
@@ -515,12 +540,17 @@ def bases(solver: ExponentSolver, low: float, high: float, most: int = MOST_NODE
     raise NotConverged(Message(Code.NO_FUNCTION, low=low, high=high))
 
 
+def _demand(effects: Sequence[ModeEffects | None], allowed: float) -> Demand:
+    """The effects of the highest modes over what is allowed."""
+    return tuple(each and replace(each, highest=each.highest / allowed) for each in effects)
+
+
 def _is_even(p: float) -> bool:
     """Whether p is an even number, or next to one, also 0."""
     return abs(p - 2 * round(p / 2)) < EVEN
 
 
-def orthonormal(known: FloatArray, new: Sequence[FloatArray]) -> FloatArray:
+def orthonormal(known: FloatArray, new: Vectors) -> FloatArray:
     """Orthonormal rows and further ones, made orthonormal to those before."""
     rows = known
     for each in new:

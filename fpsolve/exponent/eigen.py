@@ -276,7 +276,8 @@ def _carried(pairs: Sequence[PrincipalPair], pencil: Pencil, generator: Generato
         nearest = min(pairs, key=lambda pair: abs(pair.p - p))
         if nearest.generator.chosen is generator.chosen:  # the same functions, of a problem close by
             return nearest.right, nearest.left
-        return space.carry(nearest.right, nearest.space), space.carry(nearest.left, nearest.space)
+        right, left = space.carry(np.array([nearest.right, nearest.left]), nearest.space)
+        return right, left
     nodes = np.array([pair.p for pair in kept])
     weights = np.array([math.prod((p - q) / (node - q) for q in nodes if q != node) for node in nodes])
     return weights @ [pair.right for pair in kept], weights @ [pair.left for pair in kept]

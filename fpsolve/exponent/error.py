@@ -258,7 +258,7 @@ def smoother_first(pair: PrincipalPair) -> tuple[FloatArray, FloatArray, Kroneck
 def mode_effects(pair: PrincipalPair) -> tuple[ModeEffects | None, ...]:
     """The effects along every axis; None along one without cells, as of states."""
     smooth, rough, operator = smoother_first(pair)
-    return _effects(pair, [(smooth, rough, operator)])
+    return effects_on(pair, [(smooth, rough, operator)])
 
 
 def slope_error(pair: PrincipalPair) -> float:
@@ -272,11 +272,11 @@ def slope_error(pair: PrincipalPair) -> float:
     by_p, slope = (
         ((around.adjoint_by_p, around.by_p), slope.T) if pair.p < -1 else ((around.by_p, around.adjoint_by_p), slope)
     )
-    found = _effects(pair, [(by_p[0], rough, operator), (smooth, by_p[1], operator), (smooth, rough, slope)])
+    found = effects_on(pair, [(by_p[0], rough, operator), (smooth, by_p[1], operator), (smooth, rough, slope)])
     return sum(each.error for each in found if each) + slope_rounding(pair)
 
 
-def _effects(
+def effects_on(
     pair: PrincipalPair, products: Sequence[tuple[FloatArray, FloatArray, KroneckerSum]]
 ) -> tuple[ModeEffects | None, ...]:
     """Those of the highest modes on the sum of some ⟨rough, operator smooth⟩ over ⟨T*, T⟩."""

@@ -24,7 +24,7 @@ from fpsolve.model.problem import ParameterDerivative, Problem
 if TYPE_CHECKING:
     from fpsolve.fem.sphere import SphereTerms
 
-KEPT_SPACES = 16
+KEPT_SPACES = 40
 """Number of spaces, of the last p, whose matrices are kept."""
 LANCZOS_STEPS = 16
 """Number of steps of Lanczos after which the end of a spectrum is known to a bound."""

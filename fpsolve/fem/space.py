@@ -161,10 +161,11 @@ class Space:
         return coefficients.reshape(self.shape)
 
     def carry(self, coefficients: FloatArray, old: Space) -> FloatArray:
-        """A function of another space, factor and all, projected on this one."""
+        """Functions of another space, factors and all, projected on this one, shape (…, size)."""
         pairs = zip(self.axes, old.axes, strict=True)
         matrices = [None if new is was else new.projection(was) for new, was in pairs]
-        return np.ravel(along(matrices, old.table(coefficients)))
+        tables = [along(matrices, old.table(each)) for each in np.atleast_2d(coefficients)]
+        return np.reshape(tables, (*coefficients.shape[:-1], self.size))
 
     def evaluate(self, coefficients: FloatArray, *values: Matrix) -> FloatArray:
         """A function without its factor, from the values of the functions of each axis at points of it."""

@@ -666,10 +666,12 @@ def refuse_infinite(problem: Problem, p: float) -> None:
         NoSuchExponent: p ≠ 0, and the noise has algebraic tails; or jumps, and the phase never leaves some ray; or p is
             not even, and the problem `is_closed_only`.
     """
-    if not (p > 0 and p % 2 == 0) and (told := even_only(problem, moment_at(p).symbol)):
-        raise NoSuchExponent(told)
-    if p:
-        refuse_tails(problem, moment_at(p).symbol)
+    if problem.is_closed_only or problem.has_algebraic_tails:
+        symbol = moment_at(p).symbol
+        if not (p > 0 and p % 2 == 0) and (told := even_only(problem, symbol)):
+            raise NoSuchExponent(told)
+        if p:
+            refuse_tails(problem, symbol)
     if problem.invariant_rays and any(jump.log_factor for jump in problem.motion.jumps):
         raise NoSuchExponent(Message(Code.INVARIANT_RAY, p=p, phase=problem.invariant_rays[0]))
 

@@ -126,15 +126,15 @@ def test_an_interval_on_one_side_of_zero():
 
 
 def test_a_wrong_eigenvalue_breaks_convexity(monkeypatch):
-    true = Basis._solved
+    true = Basis._solution
 
     def fooled(self, p):
-        solution, around = true(self, p)
+        solution = true(self, p)
         if 0 < p < 3:
             object.__setattr__(solution.pair, "correction", 1e-3)
-        return solution, around
+        return solution
 
-    monkeypatch.setattr(Basis, "_solved", fooled)
+    monkeypatch.setattr(Basis, "_solution", fooled)
     with pytest.raises(NotConverged, match=r"Λ\(p\) is not convex .*; use a smaller rtol$"):
         MomentLyapunovFunction(Problem(FIG1, WEAK_NOISE), (0.5, 3.0))
 
