@@ -19,7 +19,7 @@ from fpsolve.theory import even_moment
 from tests.oracles import filtered, kronecker
 
 KINDS = "white", "ito", "gaussian", "chain", "sine-wiener", "bounded", "filter", "poisson", "both"
-COUNTS = {"gaussian": 40, "sine-wiener": 16, "bounded": 16, "filter": 14}
+COUNTS = {"gaussian": 40, "both": 60, "sine-wiener": 16, "bounded": 16, "filter": 14}
 
 
 def noise_of(kind, rng, size):

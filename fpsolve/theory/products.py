@@ -25,7 +25,7 @@ from fpsolve.arrays import FloatArray
 from fpsolve.budget import charge
 from fpsolve.errors import NoHierarchy
 from fpsolve.theory.powers import Moving, upper
-from fpsolve.theory.rightmost import REMEDY, Eigenpair, Solve, polished, rightmost
+from fpsolve.theory.rightmost import REMEDY, Eigenpair, Solve, orthogonal, polished, rightmost
 
 LOW_RANK = 3
 """Number of columns, over the rank, from which on a matrix is held as a product of two thin ones."""
@@ -41,7 +41,7 @@ MOST_VECTORS = 150
 """Largest number of vectors of GMRES, which is not restarted, as it may stall then."""
 MOST_HELD = 3e7
 """Number of numbers in all of these from which on there are fewer."""
-ROUGHLY, EXACTLY = 1e-6, 1e-10
+ROUGHLY, EXACTLY = 1e-4, 1e-10
 """Tolerances of GMRES for the search and for the eigenvectors."""
 SETTLED, NEAREST, KRYLOV = 1e-3, 0.1, 8
 """As in `Rates`: GMRES takes longer for a nearer σ, and long for each vector."""
@@ -274,7 +274,14 @@ class Own:
 
         def solve(x: Any, trans: int = 0) -> Any:
             h = self.rates.T if trans else self.rates
-            found = gmres(lambda z: (sigma * z - h @ z) / divisor, x / divisor, tolerance).reshape(-1, h.n, h.n)
+
+            def image(z: Any) -> Any:
+                return (sigma * z - h @ z) / divisor
+
+            b, moved = x / divisor, image(x)
+            share = np.vdot(moved, b) / np.vdot(moved, moved)  # next to an eigenvector little else is left
+            rest = gmres(image, b - share * moved, tolerance * np.linalg.norm(b))
+            found = (share * x + rest).reshape(-1, h.n, h.n)
             return (0.5 * (found + found.swapaxes(1, 2))).ravel()  # H of a skew X would be another
 
         return solve
@@ -300,26 +307,22 @@ class Own:
 
 
 def gmres(image: Callable[[Any], Any], b: Any, tolerance: float) -> Any:
-    """x whose image is b, by the smallest residual in the space of b, its image, that of this, and so on.
+    """x whose image is b but for the tolerance, by the smallest residual in the space of b, its image, and so on.
 
     Raises:
         NoHierarchy: the largest number of these does not suffice.
     """
     most, size = max(10, min(MOST_VECTORS, int(MOST_HELD / b.size))), float(np.linalg.norm(b))
     vectors, images = np.empty((most + 1, b.size), complex), np.zeros((most + 1, most), complex)
+    if size <= tolerance:
+        return 0.0 * b
     vectors[0] = b / size
     for k in range(most):
-        known, new = vectors[: k + 1], image(vectors[k])
-        for _ in range(2):
-            shares = np.conj(known @ np.conj(new))
-            new = new - shares @ known
-            images[: k + 1, k] += shares
-        images[k + 1, k] = np.linalg.norm(new)
+        images[: k + 2, k], vectors[k + 1] = orthogonal(vectors[: k + 1], image(vectors[k]))
         target = np.eye(1, k + 2)[0]
         x = np.linalg.lstsq(images[: k + 2, : k + 1], target, rcond=None)[0]
-        if np.linalg.norm(images[: k + 2, : k + 1] @ x - target) <= tolerance:
-            return size * (x @ known)
-        vectors[k + 1] = new / images[k + 1, k]
+        if size * np.linalg.norm(images[: k + 2, : k + 1] @ x - target) <= tolerance:
+            return size * (x @ vectors[: k + 1])
     raise NoHierarchy(f"{b.size} second moments under noise so strong are not found by iteration; {REMEDY}")
 
 

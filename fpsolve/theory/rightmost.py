@@ -11,7 +11,6 @@ from collections.abc import Callable
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
-from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigs
 
 from fpsolve.errors import NoHierarchy, SingularMatrix
 
@@ -27,7 +26,9 @@ PASSED = 10.0
 """Factor to the last σ − Λ by which the next Λ is lower where rounding has put σ on the left of it: it is another."""
 ROUGH = 1e-2
 """Tolerance of Arnoldi's method."""
-MOST_RESTARTS = 200
+MOST_VECTORS = 40
+"""Number of its vectors from which it is restarted."""
+MOST_RESTARTS = 50
 """Largest number of its restarts."""
 REMEDY = "compare with `fpsolve simulate`"
 
@@ -40,7 +41,7 @@ class Rates(Protocol):
 
     Attributes:
         settled: change of Λ over σ − Λ with which the search ends.
-        krylov: number of vectors of Arnoldi's method for a σ.
+        krylov: least number of vectors of Arnoldi's method for a σ.
     """
 
     settled: float
@@ -117,13 +118,32 @@ def _largest(solve: Solve, x: Any, krylov: int) -> tuple[float, Any]:
     """The eigenvalue of the largest real part of a positive map, roughly, and its vector, from a positive one."""
     if x.size <= krylov:
         values, vectors = np.linalg.eig(solve(np.eye(x.size)))
-    else:
-        operator = LinearOperator(2 * (x.size,), matvec=solve, dtype=x.dtype)
-        try:
-            values, vectors = eigs(operator, 1, which="LR", v0=x, tol=ROUGH, ncv=krylov, maxiter=MOST_RESTARTS)
-        except ArpackNoConvergence as failure:
-            raise NoHierarchy(
-                f"no rightmost eigenvalue is found among those of {x.size} equations; {REMEDY}"
-            ) from failure
-    at = int(np.argmax(values.real))
-    return float(values[at].real), vectors[:, at] if np.iscomplexobj(x) else vectors[:, at].real
+        at = int(np.argmax(values.real))
+        return float(values[at].real), vectors[:, at] if np.iscomplexobj(x) else vectors[:, at].real
+    known, images = np.empty((MOST_VECTORS + 1, x.size), x.dtype), np.zeros(2 * (MOST_VECTORS + 1,), x.dtype)
+    for _ in range(MOST_RESTARTS):  # Arnoldi's method
+        known[0], images[:] = x / np.linalg.norm(x), 0.0
+        for k in range(MOST_VECTORS):
+            images[: k + 2, k], known[k + 1] = orthogonal(known[: k + 1], solve(known[k]))
+            if k + 1 < krylov:
+                continue
+            values, vectors = np.linalg.eig(images[: k + 1, : k + 1])
+            at = int(np.argmax(values.real))
+            left = abs(images[k + 1, k] * vectors[k, at])
+            if left <= ROUGH * abs(values[at]):
+                break
+        x = vectors[:, at] @ known[: k + 1]
+        x = x if np.iscomplexobj(known) else x.real
+        if left <= ROUGH * abs(values[at]):
+            return float(values[at].real), x
+    raise NoHierarchy(f"no rightmost eigenvalue is found among those of {x.size} equations; {REMEDY}")
+
+
+def orthogonal(known: Any, new: Any) -> tuple[Any, Any]:
+    """The shares of orthonormal rows in a vector, and of what is left, and this at the length 1."""
+    shares = np.conj(known @ np.conj(new))
+    rest = new - shares @ known
+    more = np.conj(known @ np.conj(rest))  # once more, as rounding leaves some
+    rest -= more @ known
+    size = np.linalg.norm(rest)
+    return np.append(shares + more, size), rest / (size or 1.0)
