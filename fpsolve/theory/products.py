@@ -280,7 +280,7 @@ class Own:
 
             b, moved = x / divisor, image(x)
             share = np.vdot(moved, b) / np.vdot(moved, moved)  # next to an eigenvector little else is left
-            rest = gmres(image, b - share * moved, tolerance * np.linalg.norm(b))
+            rest = gmres(image, b - share * moved, tolerance * float(np.linalg.norm(b)))
             found = (share * x + rest).reshape(-1, h.n, h.n)
             return (0.5 * (found + found.swapaxes(1, 2))).ravel()  # H of a skew X would be another
 
