@@ -33,6 +33,8 @@ MOST_LEVELS = 50
 LARGEST_POWER = 10
 """Largest exponent, and largest power of ε."""
 CONSTANTS = {"pi": math.pi}
+TIME = "t"
+"""The time in x(t - tau), where it is no parameter."""
 _OTHERS = re.compile(r"[^A-Za-z0-9_+\-*/().\s]")
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _KNOWN = "write numbers, names, + - * / **, parentheses, pi, exp() and sqrt() only"
@@ -200,9 +202,23 @@ def _parsed(text: str) -> tuple[str, ast.expr]:
 def names_in(text: str) -> frozenset[str]:
     """The names in an expression, without those of functions and constants. Raises `ExpressionError`."""
     names = defaultdict[str, Form](constant, dict.fromkeys(CONSTANTS, constant()))  # series of no coefficients
+    earlier = calls_of_time(text)
+    names |= dict.fromkeys(earlier, constant())
     walk = _Walk(text, names, "it")
     walk.value(walk.tree)
-    return frozenset(names).difference(RESERVED)
+    of_calls = [names_in(time) | {name} for name, time in earlier.values()]
+    return frozenset(names).union(*of_calls).difference(RESERVED, earlier, {TIME} if earlier else ())
+
+
+def calls_of_time(text: str) -> Mapping[str, tuple[str, str]]:
+    """By what it writes as x(t - tau) the name x and t - tau, of all but known functions. Raises `ExpressionError`."""
+    found = dict[str, tuple[str, str]]()
+    for node in ast.walk(_parsed(text)[1]):
+        match node:
+            case ast.Call(func=ast.Name(id=name), args=[time], keywords=[]) if name not in {*FUNCTIONS, *_REMEDIES}:
+                if any(isinstance(each, ast.Name) and each.id == TIME for each in ast.walk(time)):
+                    found[ast.unparse(node)] = name, ast.unparse(time)
+    return found
 
 
 def evaluate(text: str, names: Mapping[str, Form], place: str) -> Form:
@@ -352,6 +368,8 @@ class _Walk:
 
     def _call(self, node: ast.Call) -> Form:
         name = self.written(node.func)
+        if (known := ast.unparse(node)) in self._names:
+            return self._names[known]
         if name not in FUNCTIONS:
             known = f"the functions are {' and '.join(FUNCTIONS)}"
             remedy = _REMEDIES.get(name.lower(), f"{known}; write * for products")

@@ -330,12 +330,14 @@ class System(Parametrised):
             begin: "noise", or, for one that terms call axial, "noise.axial".
         impact_parameter: the name of a parameter that is in ln R of the only jump and nowhere else; empty for none.
         cubic: what is of degree 3 in its rates, on which the stationary response depends alone; None for nothing.
+        pasts: which variable each of the last columns of the terms stands for, and how long ago; none without a delay.
         second_unit: its second variable over the second coordinate of the terms.
     """
 
     section: ClassVar[str] = "system"
     noise_unit: ClassVar[str] = "unknown"
     cubic: CubicTerms | None = None
+    pasts: Sequence[tuple[int, float]] = ()
     second_unit: float = 1.0
     epsilon: float
     terms: Sequence[CoefficientMatrix]
@@ -343,7 +345,7 @@ class System(Parametrised):
 
     @cached_property
     def dimension(self) -> int:
-        """n, that of the state."""
+        """n, that of the state with its `pasts`."""
         return max((len(term.matrix) for term in self.terms), default=2)
 
     @property

@@ -246,7 +246,7 @@ class Problem:
 
     @cached_property
     def dimension(self) -> int:
-        """The number of variables of the state."""
+        """The number of variables of the state, with those of the past that move it."""
         return self.system.dimension
 
     @cached_property
@@ -261,6 +261,8 @@ class Problem:
 
     @cached_property
     def _own(self) -> tuple[Frame | None, float]:
+        if self.system.pasts:
+            return None, float(np.linalg.norm(matrix_at(self.drift, 0.0), 2))
         return own_frame(
             self.dimension,
             self._moved,
@@ -299,9 +301,10 @@ class Problem:
     @cached_property
     def is_closed_only(self) -> bool:
         """Whether Λ(p) is found for even p > 0 alone, from closed equations of moments: directions are too many, or
-        impulses move them.
+        impulses move them, or the state is that of a whole delay, with p = 2 alone.
         """
-        return self.dimension > MOST_BY_DIRECTIONS or (self.dimension > 2 and bool(self._moved.impulses))
+        is_struck = self.dimension > 2 and bool(self._moved.impulses)
+        return self.dimension > MOST_BY_DIRECTIONS or is_struck or bool(self.system.pasts)
 
     @property
     def unit_rate(self) -> float:
@@ -651,9 +654,11 @@ def refuse_tails(problem: Problem, what: str) -> None:
 
 
 def even_only(problem: Problem, what: str) -> Message | None:
-    """Why a quantity other than Λ(p) of even p > 0 is not computed where these are all, see `is_closed_only`."""
+    """Why a quantity other than Λ(p) of even p > 0, or p = 2, is not computed where that is all: `is_closed_only`."""
     if not problem.is_closed_only:
         return None
+    if problem.system.pasts:
+        return Message(Code.DELAY_ONLY, what=what, remedy=Remedy.SIMULATION)
     count = problem.dimension
     is_struck = count <= MOST_BY_DIRECTIONS
     return Message(Code.EVEN_ONLY, what=what, count=count, is_struck=is_struck, remedy=Remedy.SIMULATION)
@@ -668,7 +673,8 @@ def refuse_infinite(problem: Problem, p: float) -> None:
     """
     if problem.is_closed_only or problem.has_algebraic_tails:
         symbol = moment_at(p).symbol
-        if not (p > 0 and p % 2 == 0) and (told := even_only(problem, symbol)):
+        is_closed = p == 2 if problem.system.pasts else p > 0 and p % 2 == 0
+        if not is_closed and (told := even_only(problem, symbol)):
             raise NoSuchExponent(told)
         if p:
             refuse_tails(problem, symbol)

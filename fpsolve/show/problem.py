@@ -58,7 +58,8 @@ def equations_of(problem: Problem) -> list[str]:
     cubic = np.array(system.cubic.matrix) if system.cubic else np.zeros((n, 4))
     first = [still[0, 0], *cubic[0], *(each for matrix in driven.values() for each in matrix[0])]
     rows: list[tuple[str, FloatArray, FloatArray, dict[str, FloatArray], Sequence[str]]]
-    names = problem.system.states
+    rates = len(system.states) if system.pasts else n
+    names = (*system.states, *(f"{system.states[k]}(t − {delay:.10g})" for k, delay in system.pasts))
     x = names[0].removesuffix("₁")
     if n == 2 and speed != 0 and not any(first) and len(x) == 1:
         scale, names = np.array([speed, 1.0]), (x, _dotted(x, 1))
@@ -66,8 +67,8 @@ def equations_of(problem: Problem) -> list[str]:
         by_noise = {name: each[1] * scale for name, each in driven.items()}
         rows = [(_dotted(x, 2), still[1] * scale, bent, by_noise, names)]
     else:
-        each = [{key: matrix[i] for key, matrix in driven.items()} for i in range(n)]
-        rows = [(f"d{names[i]}/dt", still[i], cubic[i], each[i], names) for i in range(n)]
+        each = [{key: matrix[i] for key, matrix in driven.items()} for i in range(rates)]
+        rows = [(f"d{names[i]}/dt", still[i], cubic[i], each[i], names) for i in range(rates)]
     lines = [f"{row[0]} = {_sum(*row[1:])}" for row in rows]
     for jump in system.jumps:
         factor = f"{math.exp(jump.log_factor):.10g}"

@@ -39,6 +39,8 @@ def simulated_parts(problem: Problem) -> tuple[System, Noise]:
     if not noise.is_simulated:
         need = f"noise that states a step of its paths, but this is a {type(noise).__name__}"
         raise FpsolveError(f"simulation is for {need}; use the finite elements")
+    if system.pasts:
+        raise FpsolveError("simulation is for systems without a delay; compare with other delays or another noise")
     if problem.dimension > 2 and problem.impulses:
         told = f"simulation under impulses is for two variables, but there are {problem.dimension}"
         raise FpsolveError(f"{told}; take even p, which need none")

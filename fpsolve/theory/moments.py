@@ -27,6 +27,7 @@ from fpsolve.arrays import FloatArray, dense, one
 from fpsolve.data import brief
 from fpsolve.errors import NoHierarchy
 from fpsolve.model.problem import Problem
+from fpsolve.theory.delays import Delayed
 from fpsolve.theory.functions import FUNCTIONS, Functions, functions_of
 from fpsolve.theory.powers import Moving, Powers, ladder, moment_form, multinomials
 from fpsolve.theory.products import MOST_NUMBERS, Products
@@ -132,6 +133,8 @@ def refuse_open_hierarchy(problem: Problem, p: float) -> None:
             "the equations of the moments do not close where a wall changes the state, as that happens at one phase; "
             f"{REMEDY}, or remove the wall"
         )
+    if problem.system.pasts and p != 2:
+        raise NoHierarchy(f"got p = {p:g}; with a delay the equations of the moments are for p = 2; {REMEDY}")
     moments = math.comb(int(p) + problem.dimension - 1, problem.dimension - 1)
     count = moments
     for noise in problem.coloured.parts.values():
@@ -208,7 +211,7 @@ class EvenMoment:
                     steps = offsets[1], offsets[2]
                     value, longer = ((2 * values[k] - 1.5 * values[0] - 0.5 * values[2 * k]) / k for k in steps)
                 lacking = STEEPNESS * max(self.counts) * abs(step / at if at else 1.0) * self.error
-                error = abs(value - longer) / 3 + self.rounding + lacking
+                error = abs(value - longer) / 3 + self.rounding + self.change + lacking
                 return (4 * value - longer) / 3 / step, error / step
         raise ValueError(f"got {key}; Λ(p) has no slope by it")
 
@@ -216,20 +219,20 @@ class EvenMoment:
         """⟨y, Hx⟩ of a problem next to it."""
         refuse_open_hierarchy(problem, self.equations.p)
         near = _Equations(problem, self.equations.p, self.equations)
-        return float(self.y @ near.state.image(*near.over_noise(self.counts), self.x))
+        return float(self.y @ near.state.image(*near.over_noise(self.counts), self.x, self.eigenvalue))
 
     @cached_property
     def is_positive(self) -> bool:
         """Whether E x^α are moments, and T is positive, as far as it is seen: both but for a common sign."""
         form, t = (
-            moment_form(self.moments, self.equations.problem.dimension, self.equations.p),
+            moment_form(self.moments, self.equations.dimension, self.equations.p),
             self._polynomial_values(),
         )
         return _has_one_sign(np.asarray(np.linalg.eigvalsh(form))) and _has_one_sign(t)
 
     def _polynomial_values(self) -> FloatArray:
         """T at some directions; of p = 2 the eigenvalues of its matrix."""
-        n, p = self.equations.problem.dimension, self.equations.p
+        n, p = self.equations.dimension, self.equations.p
         if p == 2:
             return np.asarray(np.linalg.eigvalsh(moment_form(self.polynomial, n, 2)))
         x = np.random.default_rng(0).standard_normal((200, n))
@@ -276,8 +279,13 @@ class _Equations:
         squares = [drift.epsilon**each.order * np.array(each.matrix) for each in diffusions]
         jolts = [(each.rate, np.array(each.exponent)) for each in impulses]
         moving = Moving(steady, matrices, strengths, squares, jolts)
-        form = Products if p == 2 and problem.dimension > MOST_AS_POWERS else Powers
-        self.state: Products | Powers = form(moving, p, like.state.units if like else None)
+        self.state: Products | Powers | Delayed
+        if pasts := problem.system.pasts:
+            self.state = Delayed(moving, pasts)
+        else:
+            form = Products if p == 2 and problem.dimension > MOST_AS_POWERS else Powers
+            self.state = form(moving, p, like.state.units if like else None)
+        self.dimension = problem.dimension - len(pasts)
 
     def moment(self, counts: Sequence[int], most: int) -> EvenMoment | None:
         """Λ(p) with functions of degrees below these; None where they are too many."""
@@ -295,7 +303,8 @@ class _Equations:
             for name in ("unit", "law")
         )
         own, (right, left) = h.on(old), self.state.starts
-        value, x, y, change = own.rightmost(np.kron(law, right), np.kron(mean, left))
+        value, x, y, change, scale = own.rightmost(np.kron(law, right), np.kron(mean, left))
+        h = h.at(value)
         whole = np.zeros((2, old.size, x.size // size))
         whole[:, old] = x.reshape(size, -1), y.reshape(size, -1)
         images = [each.reshape(old.size, -1) for each in (h @ whole[0].ravel(), h.T @ whole[1].ravel())]
@@ -306,7 +315,7 @@ class _Equations:
             effects.append(float(left @ h.on(new).solver(value)(right)) if right.size else 0.0)
         moments = self.state.moments(mean @ x.reshape(size, -1))
         polynomial = self.state.polynomial(law @ y.reshape(size, -1))
-        return EvenMoment(self, tuple(counts), value, effects, own.sizes(x, y), x, y, moments, polynomial, change)
+        return EvenMoment(self, tuple(counts), value, effects, scale, x, y, moments, polynomial, change)
 
     def _axes(self, counts: Sequence[int]) -> list[Functions]:
         return [functions_of(noise, count) for noise, count in zip(self.noises, counts, strict=True)]

@@ -279,7 +279,8 @@ def scale_of(problem: Problem) -> Scale:
             driven = size * float(np.sqrt(np.mean(typical**2)))
         of_noises[term.noise] = of_noises.get(term.noise, 0.0) + driven
     if problem.is_closed_only:  # the size of the noise is that of what it does to the fastest modes
-        abscissa = abs(float(np.max(np.linalg.eigvals(steady).real)))
+        now = len(steady) - len(problem.system.pasts)
+        abscissa = abs(float(np.max(np.linalg.eigvals(steady[:now, :now]).real)))
         return Scale(abscissa or problem.unit_rate, 0.0)
     jumps = sum(abs(jump.log_factor) for jump in system.jumps) * problem.unit_rate / math.pi
     driven = 0.0

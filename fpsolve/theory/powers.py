@@ -183,7 +183,7 @@ class Powers:
             h = h + kron(xi, arrayed(k))
         return PowerRates(h, self.size)
 
-    def image(self, generator: Any, masses: Sequence[Any], x: FloatArray) -> FloatArray:
+    def image(self, generator: Any, masses: Sequence[Any], x: FloatArray, value: float) -> FloatArray:
         """Hx, without H."""
         parts = x.reshape(-1, self.size)
         total = generator @ parts + (self._steady @ parts.T).T
@@ -208,6 +208,10 @@ class PowerRates:
 
     def __matmul__(self, x: FloatArray) -> FloatArray:
         return np.asarray(self.matrix @ x)
+
+    def at(self, value: float) -> PowerRates:
+        """H at an eigenvalue, on which it does not depend here."""
+        return self
 
     @property
     def T(self) -> PowerRates:

@@ -123,7 +123,7 @@ class Products:
         loads = [((self._steady,), None), *zip(self._loads, masses, strict=True)]
         return ProductRates(len(self._steady), self._rate, loads, self._squares, generator)
 
-    def image(self, generator: Any, masses: Sequence[Any], x: FloatArray) -> FloatArray:
+    def image(self, generator: Any, masses: Sequence[Any], x: FloatArray, value: float) -> FloatArray:
         """Hx."""
         return np.asarray(self.rates(generator, masses) @ x)
 
@@ -166,6 +166,10 @@ class ProductRates:
 
     def _over_noise(self, matrix: Any, x: Any) -> Any:
         return (matrix @ x.reshape(self.count, -1)).reshape(x.shape)
+
+    def at(self, value: float) -> ProductRates:
+        """H at an eigenvalue, on which it does not depend here."""
+        return self
 
     @cached_property
     def T(self) -> ProductRates:

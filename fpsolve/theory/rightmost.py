@@ -64,12 +64,14 @@ class Eigenpair(NamedTuple):
 
     Attributes:
         change: of the value by the last step, where that is not rounding.
+        size: of the terms that the value is the sum of.
     """
 
     value: float
     x: Any
     y: Any
     change: float
+    size: float
 
 
 def rightmost(h: Rates, x: Any) -> tuple[float, float, Any]:
@@ -111,7 +113,8 @@ def polished(h: Any, value: float, sigma: float, x: Any, y: Any) -> Eigenpair:
             x, y = solve(x), solve(y, 1)  # as vectors settle half as fast, and derivatives need them
             break
         sigma = value + max(1e-3 * rounding, ROUNDING**2 * h.largest, h.nearest * (sigma - value))
-    return Eigenpair(value, x, y / (y @ x), change if change > rounding else 0.0)
+    y = y / (y @ x)
+    return Eigenpair(value, x, y, change if change > rounding else 0.0, h.sizes(x, y))
 
 
 def _largest(solve: Solve, x: Any, krylov: int) -> tuple[float, Any]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Annotated, Any, ClassVar, Self
@@ -17,10 +18,14 @@ from fpsolve.arrays import ROUNDED, FloatArray, identity, one, real_number, show
 from fpsolve.messages import Code, Message, is_control
 from fpsolve.model.expressions import (
     HIGHEST_DEGREE,
+    NUMBER,
+    TIME,
     ExpressionError,
     Form,
     Monomial,
+    calls_of_time,
     constant,
+    evaluate,
     log_of,
     name_fault,
     names_in,
@@ -87,7 +92,7 @@ def _as_table(value: Any) -> Any:
 Parameters = dict[
     str, Annotated[StatedParameter, BeforeValidator(_as_table, json_schema_input_type=float | StatedParameter)]
 ]
-Texts = Annotated[tuple[str, ...], Field(strict=False, min_length=2, max_length=MOST_VARIABLES)]
+Texts = Annotated[tuple[str, ...], Field(strict=False, min_length=1, max_length=MOST_VARIABLES)]
 
 
 @dataclass(frozen=True)
@@ -152,9 +157,12 @@ class EquationSystem(System):
     def __post_init__(self) -> None:
         for key in ("variables", "drift"):
             texts = tuple(each) if isinstance(each := getattr(self, key), list | tuple) else (each,)
-            if not 2 <= len(texts) <= MOST_VARIABLES or not all(isinstance(text, str) for text in texts):
+            if not 1 <= len(texts) <= MOST_VARIABLES or not all(isinstance(text, str) for text in texts):
                 raise TableError(f"got {shown(each)}; must be a list of 2 to {MOST_VARIABLES} texts", key)
             object.__setattr__(self, key, texts)
+        if len(self.variables) == 1 and not any(map(calls_of_time, self._texts())):
+            told = f"must be 2 to {MOST_VARIABLES} names, as one is enough only where its rate has a delay, x(t - tau)"
+            raise TableError(f"got {shown(self.variables[0])}; {told}", "variables")
         if len(self.drift) != len(self.variables):
             counts = f"{len(self.drift)} rates of {len(self.variables)} variables"
             raise TableError(
@@ -204,8 +212,8 @@ class EquationSystem(System):
             if name.startswith(AMPLITUDE.name) or name == JOINT_DENSITY.name:
                 what = "which has another meaning in the stationary response of terms of degree 3; rename it"
                 raise TableError(f"got the name {name}, {what}", "variables", i)
-        if self.walls and len(self.variables) > 2:
-            why = "a wall is for two variables only"
+        if self.walls and (self.pasts or len(self.variables) > 2):
+            why = "a wall is for two variables without a delay only"
             raise TableError(f"got a wall for {len(self.variables)} variables; {why}; leave walls out", "walls")
         jumps = self.jumps
         if len({jump.phase for jump in jumps}) < len(jumps):
@@ -313,7 +321,7 @@ class EquationSystem(System):
         if EPSILON in names:
             names[EPSILON] = Form({((), "", 1): (1.0, 0.0)})
         names = {
-            **{name: Form({((name,), "", 0): (1.0, 0.0)}) for name in self.variables},
+            **{name: Form({((name,), "", 0): (1.0, 0.0)}) for name in (*self.variables, *self._delays)},
             **{name: Form({((), name, 0): (1.0, 0.0)}) for name, _ in self.noises},
             **names,
         }
@@ -330,6 +338,38 @@ class EquationSystem(System):
             rates.append(total)
         return tuple(rates)
 
+    @cached_property
+    def _delays(self) -> Mapping[str, tuple[int, float]]:
+        """By what is written as x(t - tau) the number of x, and tau. Raises `TableError`."""
+        calls = [(i, *call) for i, text in enumerate(self.drift) for call in calls_of_time(text).items()]
+        names = {name: constant(value) for name, value in self.named}
+        names |= {name: Form({((name,), "", 0): (1.0,)}) for name in (*self.variables, TIME)}
+        names |= {name: Form({((), name, 0): (1.0,)}) for name, _ in self.noises}
+        found = dict[str, tuple[int, float]]()
+        for i, written, (name, time) in calls:
+            try:
+                parts = dict(evaluate(time, names, f"the time of {written}").parts)
+            except ExpressionError as error:
+                raise TableError(str(error), "drift", i) from None
+            delay = -parts.pop(NUMBER, (0.0,))[0]
+            fault = "" if name in self.variables else f"{name} is none of the variables {', '.join(self.variables)}"
+            if parts != {((TIME,), "", 0): (1.0,)}:
+                fault = (
+                    "a delay may not depend on the state, the noise or the time: write x(t - tau), tau a number or an "
+                    "expression in the parameters"
+                )
+            elif not fault and not delay > 0:
+                fault = f"the delay is {delay:g}; must be > 0; change it, or write {name}"
+            if fault:
+                raise TableError(f"got {written}; {fault}", "drift", i)
+            found[written] = self.variables.index(name), delay
+        return found
+
+    @cached_property
+    def pasts(self) -> tuple[tuple[int, float], ...]:  # type: ignore[override]
+        found = tuple(self._delays.values())
+        return found * 2 if len(found) == len(self.variables) == 1 else found  # a matrix has more than two rows here
+
     def _fault(self, monomial: Monomial) -> str:
         """What is wrong with a product in a rate, and what to do; or nothing."""
         states, noise, _ = monomial
@@ -341,6 +381,8 @@ class EquationSystem(System):
             return ""
         if len(self.variables) > 2:
             return f"{told}; of more than two variables all terms must be of degree 1: leave it out"
+        if self.pasts:
+            return f"{told}; with a delay all terms must be of degree 1: leave it out"
         if degree < HIGHEST_DEGREE:
             return f"{told}; must be of degree 1 or {HIGHEST_DEGREE}: leave it out"
         return (
@@ -351,14 +393,15 @@ class EquationSystem(System):
         """The terms of rates, of their values for `at` = 0, of their derivatives for 1."""
         has_orders = EPSILON in dict(self.named)
         names = {name: section[6:] for name, section in self.noises} if len(self.noises) > 1 else {}
-        matrices = dict[tuple[int, str], FloatArray]()
+        columns, matrices = [*self.variables, *self._delays], dict[tuple[int, str], FloatArray]()
+        size = len(self.variables) + len(self.pasts)
         for i, form in enumerate(rates):
             for (states, noise, power), series in form.parts.items():
                 if len(states) > 1:
                     continue
                 order = power if has_orders else int(bool(noise))
-                matrix = matrices.setdefault((order, noise), np.zeros((len(rates), len(rates))))
-                matrix[i, self.variables.index(states[0])] += series[at]
+                matrix = matrices.setdefault((order, noise), np.zeros(2 * (size,)))
+                matrix[i, columns.index(states[0])] += series[at]
         return tuple(
             CoefficientMatrix(order, matrix.tolist(), identity if noise else one, names.get(noise, ""))
             for (order, noise), matrix in sorted(matrices.items(), key=lambda item: item[0])
@@ -463,7 +506,18 @@ class EquationSystem(System):
 
     @property
     def differentiable(self) -> Sequence[str]:
-        return tuple(name for name in self._derivatives if name not in self.inert)
+        return tuple(name for name in self._derivatives if name not in self.inert and self._keeps_ratios(name))
+
+    def _keeps_ratios(self, name: str) -> bool:
+        """Whether delays remain in their ratios with another value of a parameter, as their multiples are known."""
+        if len(self.pasts) < 2:
+            return True
+        value = float(self.values[name])
+        with suppress(ValueError):
+            other = self.at({name: value + OTHER * 1e-3 * (abs(value) or 1.0)})
+            shares = np.array([b / a for (_, a), (_, b) in zip(self.pasts, other.pasts, strict=True)])
+            return bool(np.ptp(shares) <= ROUNDED * shares[0])
+        return False
 
     def derivative(self, name: str) -> tuple[tuple[CoefficientMatrix, ...], tuple[float, ...]]:
         """∂/∂θ of the terms and of ln R, exact but for rounding. Raises `ValueError` where it is infinite."""

@@ -1,0 +1,183 @@
+"""Λ(2) with delays, beside closed forms, published numbers, and the moments of a discretised segment of the path."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.special import wrightomega
+
+from fpsolve import Problem, moment_lyapunov, sensitivities
+from fpsolve.errors import NoHierarchy, NoSuchExponent
+from fpsolve.model import OrnsteinUhlenbeck, White
+from fpsolve.model.faults import TableError
+from fpsolve.model.systems.equations import EquationSystem
+from fpsolve.theory import even_moment
+
+ITO = White(s=1.0, interpretation="ito")
+TURNING = "v", "-(1 + w)*x - 0.1*v + w*x(t - 2*pi/speed) - w*xi*(x - x(t - 2*pi/speed))"
+
+
+def scalar(a: float, b: float, tau: float) -> Problem:
+    """dx = ax dt + b x(t − τ) dW."""
+    return Problem(EquationSystem(("x",), ("a*x + b*xi*x(t - tau)",), (("a", a), ("b", b), ("tau", tau))), ITO)
+
+
+def turning(speed: float, w: float) -> Problem:
+    return Problem(EquationSystem(("x", "v"), TURNING, (("speed", speed), ("w", w))), ITO)
+
+
+def of_scalar(a: float, b: float, tau: float) -> float:
+    """Λ = 2a + b² exp(−Λτ), by Wright's omega."""
+    return float(2 * a + wrightomega(math.log(tau * b**2) - 2 * a * tau).real / tau)
+
+
+def test_one_variable():
+    assert even_moment(scalar(-6.0, 2.0, 1.0), 2).value == pytest.approx(-1.0106337404425, abs=1e-12)
+    rng = np.random.default_rng(1)
+    for _ in range(20):
+        a, b = rng.uniform(-8, 2), rng.uniform(0.1, 4)
+        found = even_moment(scalar(a, b, 1.0), 2)
+        assert abs(found.value - of_scalar(a, b, 1.0)) <= 1e-14 * (found.scale + abs(a))
+        assert found.error <= 1e-13 * (1 + abs(a))
+
+
+@pytest.mark.parametrize(("a", "b"), [(-150.0, 1e-3), (-150.0, 30.0), (-20.0, 0.1), (0.5, 3.0), (50.0, 1.0)])
+@pytest.mark.parametrize("tau", [1.0, 100.0])
+def test_growth_by_many_orders_in_a_delay(a, b, tau):
+    """Λτ from −300 to 100."""
+    found = even_moment(scalar(a / tau, b / math.sqrt(tau), tau), 2)
+    assert found.value * tau == pytest.approx(of_scalar(a, b, 1.0), rel=1e-12, abs=1e-12)
+
+
+def test_an_oscillator():
+    drift = "v", "-x - 0.2*v + 0.1*x(t - 2*pi) + 0.1*xi*(x + x(t - 2*pi))"
+    found = even_moment(Problem(EquationSystem(("x", "v"), drift), ITO), 2)
+    assert math.exp(2 * math.pi * found.value) == pytest.approx(0.50268959725324, abs=2e-14)
+
+
+@pytest.mark.parametrize(("w", "expected"), [(0.1, -0.0856994783178), (0.55, 0.0179434662942)])
+def test_a_tool_that_turns(w, expected):
+    assert even_moment(turning(1.0, w), 2).value == pytest.approx(expected, abs=1e-13)
+
+
+@pytest.mark.parametrize(("speed", "w"), [(0.5, 0.2904437388), (1.0, 0.5257713774), (2.0, 0.1662835280)])
+def test_where_stability_of_turning_ends(speed, w):
+    found = even_moment(turning(speed, w), 2)
+    assert abs(found.value) <= 5e-11 * abs(found.slope("system.w")[0]) + found.error
+
+
+def test_without_noise_it_is_twice_the_rightmost_root():
+    """ẋ = −x(t − τ): s = −exp(−sτ), whose solution is Lambert's W."""
+    drift = ("-x(t - tau) + 1e-30*xi*x",)
+    found = even_moment(Problem(EquationSystem(("x",), drift, (("tau", 1.0),)), ITO), 2)
+    assert abs(found.value - 2 * -0.3181315052047641) <= found.error <= 1e-6
+
+
+def segment(a, b, alpha, beta, tau: float, size: int) -> float:
+    """Λ(2) where x(t − τ) leaves a chain of Chebyshev nodes of the path: of finite order, as paths are rough."""
+    n, nodes = len(a), np.cos(np.pi * np.arange(size + 1) / size)
+    ends = np.r_[2.0, np.ones(size - 1), 2.0] * (-1.0) ** np.arange(size + 1)
+    slopes = np.outer(ends, 1 / ends) / (np.subtract.outer(nodes, nodes) + np.eye(size + 1))
+    slopes -= np.diag(slopes.sum(axis=1))
+    moving, driven = np.kron(slopes * 2 / tau, np.eye(n)), np.zeros(2 * (n * (size + 1),))
+    moving[:n] = 0.0
+    moving[:n, :n], moving[:n, -n:] = a, b
+    driven[:n, :n], driven[:n, -n:] = alpha, beta
+    one = np.eye(len(moving))
+    return float(np.linalg.eigvals(np.kron(moving, one) + np.kron(one, moving) + np.kron(driven, driven)).real.max())
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_discretised_segment_comes_nearer(seed):
+    rng = np.random.default_rng(seed)
+    n, tau = 1 + seed % 2, float(rng.uniform(0.5, 2.0))
+    a, b, alpha, beta = rng.uniform(0.3, 0.8, 4)[:, None, None] * rng.standard_normal((4, n, n))
+    names = ("x", "y")[:n]
+
+    def row(i: int) -> str:
+        now = (f"+ {a[i, j]!r}*{y} + {alpha[i, j]!r}*xi*{y}".replace("np.float64", "") for j, y in enumerate(names))
+        past = (
+            f"+ ({b[i, j]!r} + {beta[i, j]!r}*xi)*{y}(t - {tau!r})".replace("np.float64", "")
+            for j, y in enumerate(names)
+        )
+        return " ".join([*now, *past])
+
+    found = even_moment(Problem(EquationSystem(names, tuple(map(row, range(n)))), ITO), 2)
+    errors = [abs(segment(a, b, alpha, beta, tau, size) - found.value) for size in (4, 8, 16)]
+    assert errors[2] <= 0.02 * (1 + abs(found.value))
+    assert errors[2] < 0.6 * errors[1] < 0.6 * errors[0] or errors[2] < 1e-4
+
+
+def test_several_delays_are_one_chain_of_parts():
+    """x(t − 1), x(t − 2) and a delay of a part: the same with each of them alone, and as if they were one."""
+
+    def value(rate: str) -> float:
+        return even_moment(Problem(EquationSystem(("x",), (rate,)), ITO), 2).value
+
+    one = value("-x + 0.3*x(t - 1) + 0.4*xi*x(t - 1)")
+    assert value("-x + 0.3*x(t - 1) + 0.4*xi*x(t - 1) + 1e-18*x(t - 1/3)") == pytest.approx(one, abs=1e-13)
+    two = value("-x + 0.3*x(t - 2) + 0.4*xi*x(t - 1)")
+    assert two == pytest.approx(value("-2*x/2 + 0.3*x(t - 2) + 0.4*xi*x(t - 1) + 1e-18*x(t - 3)"), abs=1e-13)
+    # without noise in common: Λ = 2a + b² exp(−Λτ) holds with two independent noises and two delays, too
+    system = EquationSystem(
+        ("x",), ("-2*x + eta*x(t - 1) + zeta*x(t - 1.5)",), noises=(("eta", "noise.eta"), ("zeta", "noise.zeta"))
+    )
+    found = even_moment(Problem(system, {"eta": ITO, "zeta": ITO}), 2).value
+    assert found == pytest.approx(-4 + math.exp(-found) + math.exp(-1.5 * found), abs=1e-12)
+
+
+@pytest.mark.parametrize("key", ["system.a", "system.b", "system.tau", "noise.s"])
+def test_derivatives_of_one_variable(key):
+    a, b, tau = -3.0, 1.5, 0.7
+    problem = scalar(a, b, tau)
+    estimate = sensitivities(problem, 2.0).moments[0][key]
+    grown = of_scalar(a, b, tau)
+    fall = math.exp(-grown * tau)
+    by = {"a": 2.0, "b": 2 * b * fall, "tau": -(b**2) * grown * fall, "s": 2 * b**2 * fall}
+    expected = by[key.partition(".")[2]] / (1 + tau * b**2 * fall)
+    assert abs(estimate.value - expected) <= estimate.error_estimate
+    assert estimate.error_estimate <= 1e-6 * abs(expected)
+
+
+def test_stratonovich_is_another_drift():
+    """A + ½α², B + ½αβ."""
+    drift = "-x + 0.2*x(t - 1) + xi*(0.5*x + 0.3*x(t - 1))"
+    found = even_moment(Problem(EquationSystem(("x",), (drift,)), White(s=1.0)), 2).value
+    ito = f"{drift} + 0.125*x + 0.075*x(t - 1)"
+    assert found == pytest.approx(even_moment(Problem(EquationSystem(("x",), (ito,)), ITO), 2).value, abs=1e-13)
+
+
+def test_coloured_noise():
+    drift = "v", "-(1 + 0.5*xi)*x - 0.2*v + 0.1*x(t - 2*pi)"
+    problem = Problem(EquationSystem(("x", "v"), drift), OrnsteinUhlenbeck(alpha=1.0, sigma=0.8))
+    found = even_moment(problem, 2, rtol=1e-9)
+    assert abs(found.value + 0.1108973920228) <= found.error + 1e-13
+
+
+@pytest.mark.parametrize(
+    ("drift", "told"),
+    [
+        ("-x + xi*x(t - x)", "may not depend on the state"),
+        ("-x + xi*x(t - xi)", "may not depend on the state"),
+        ("-x + xi*x(2*t)", "may not depend on the state"),
+        ("-x + xi*x(t + 1)", "the delay is -1; must be > 0"),
+        ("-x + xi*y(t - 1)", "y is none of the variables x"),
+        ("-x + xi*x", "must be 2 to 200 names"),
+        ("-x**3 + xi*x(t - 1)", "must be of degree 1"),
+    ],
+)
+def test_what_is_no_delay(drift, told):
+    with pytest.raises(TableError, match=told):
+        EquationSystem(("x",), (drift,))
+
+
+def test_what_is_refused():
+    with pytest.raises(NoSuchExponent, match=r"with a delay Λ\(2\) alone is found"):
+        moment_lyapunov(scalar(-1.0, 1.0, 1.0), 4.0)
+    with pytest.raises(NoHierarchy, match="must be multiples of one number"):
+        even_moment(Problem(EquationSystem(("x",), ("-x + xi*x(t - 1) + x(t - pi)",)), ITO), 2)
+    wall = {"at": "x = 0", "restitution": 0.8}
+    from fpsolve.model import PlaneSystem
+
+    with pytest.raises(TableError, match="without a delay only"):
+        PlaneSystem.of_equations(("x", "v"), ("v", "-x + xi*x(t - 1)"), walls=[wall])
