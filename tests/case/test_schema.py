@@ -35,7 +35,7 @@ FAULTY = [
     (FIG1, 'y = "moment"', 'y = "moments"'),
     (FIG1, "eigenfunctions = [1.0, 2.0]", 'quantities = ["moment", "lambda"]'),
     (FIG1, 'source = "independent', 'sauce = "independent'),
-    (OWN, 'variables = ["x", "v"]', 'variables = []'),
+    (OWN, 'variables = ["x", "v"]', "variables = []"),
     (OWN, 'words = "damping ratio"', "words = 3"),
     (OWN, "sigma = 1.0\n", ""),
     (OWN, 'kind = "ornstein-uhlenbeck"', 'kind = "white"'),
