@@ -27,6 +27,7 @@ COMMANDS = {
     "run": "Solve cases; write tables, figures and ParaView files.",
     "check": "Compare results with the values that cases expect.",
     "chart": "Trace where stability ends in a plane of two parameters.",
+    "explore": "Look at a case in the browser, with a slider for every parameter.",
     "design": "Find parameters with which λ, Λ(p) or δ_p has a wanted value.",
     "noise": "Fit a noise to what was measured; say what it means for stability.",
     "simulate": "Estimate the exponents from simulated paths.",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping, Sequence
 from itertools import takewhile
 from pathlib import Path
 from typing import Any
@@ -36,6 +36,25 @@ def rewritten(case: Case, values: Mapping[str, float], expect: Mapping[str, Any]
     return text if expect is None else f"{text}\n{tomlkit.dumps({'expect': [expect]})}"
 
 
+def of_one_curve(case: Case, values: Mapping[str, float | str], p: Sequence[float], quantities: Collection[str]) -> str:
+    """The text of a case in its folder with one curve, of these parameters: what it varies, draws or expects is gone.
+
+    Args:
+        values: of the parameters by their keys; those that it varies are among them.
+        p: the orders of the moments.
+        quantities: what it computes at least.
+    """
+    gone = "expect", "vary", "figure"
+    data = {name: each for name, each in _data(case, case.path.parent).items() if name not in gone}
+    for key, value in values.items():
+        _set(data, key, value)
+    if [*p] != case.p.tolist():
+        data["moments"]["p"] = [*p]
+    if (names := case.output.names) is not None and not {*quantities} <= {*names}:
+        data["output"]["quantities"] = [*dict.fromkeys((*names, *quantities))]
+    return _with_data(case.text, data)
+
+
 def with_noise(case: Case, noise: str, folder: Path) -> str:
     """The text of a case with other sections of noise, at its end, and without what it expects.
 
@@ -57,7 +76,7 @@ def _data(case: Case, folder: Path) -> dict[str, Any]:
     return document.data
 
 
-def _set(data: dict[str, Any], key: str, value: float) -> None:
+def _set(data: dict[str, Any], key: str, value: float | str) -> None:
     """Set a parameter where a case states it, or else as the only value of a key that is varied."""
     section, _, name = key.rpartition(".")
     for base in (section, "system") if section == "oscillator" else (section,):

@@ -1,5 +1,4 @@
 from .options import Options as Options
-from .options import Pointing as Pointing
 from .options import Reporting as Reporting
 from .options import Working as Working
 from .options import Writing as Writing

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from time import monotonic
 
-from fpsolve.commands.options import ALL_OPTIONS, NOT_CONVERGED, Cases, Pointing
+from fpsolve.commands.options import ALL_OPTIONS, NOT_CONVERGED, Cases, Reporting
 
 
 def chart(
     cases: Cases,
     *,
-    options: Pointing = ALL_OPTIONS,
+    options: Reporting = ALL_OPTIONS,
 ) -> int:
     """Trace where stability ends in a plane of two parameters; write chart.csv, .json, .png and .pdf into OUT/<case>/.
 

@@ -8,7 +8,6 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from importlib.util import find_spec
 from pathlib import Path
 from shlex import quote
 from time import monotonic
@@ -159,26 +158,5 @@ class Reporting(Writing, Working):
         return replace(super().watch(is_json=is_json), has_report=self.report)
 
 
-@Parameter(name="*")
-@dataclass(frozen=True)
-class Pointing(Reporting):
-    """What commands take whose report can show numbers at the pointer."""
-
-    interactive: Annotated[
-        bool,
-        Parameter(
-            help="Also write report.html, in which the pointer shows numbers. Needs pip install "
-            "'fpsolve[interactive]'.",
-            negative="",
-        ),
-    ] = False
-
-    def watch(self, *, is_json: bool = False) -> Watch:
-        if self.interactive and find_spec("plotly") is None:
-            raise FpsolveError("--interactive needs plotly; install it by pip install 'fpsolve[interactive]'")
-        has_report = self.report or self.interactive
-        return replace(super().watch(is_json=is_json), has_report=has_report, is_interactive=self.interactive)
-
-
-OPTIONS_OF_WORK, OPTIONS_OF_FILES, OPTIONS_OF_REPORTS, ALL_OPTIONS = Working(), Writing(), Reporting(), Pointing()
+OPTIONS_OF_WORK, OPTIONS_OF_FILES, ALL_OPTIONS = Working(), Writing(), Reporting()
 """As they are where none is stated."""

@@ -9,7 +9,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from fpsolve.commands.errors import print_error
-from fpsolve.commands.options import CHECK_FAILED, NOT_CONVERGED, OPTIONS_OF_REPORTS, Reporting
+from fpsolve.commands.options import ALL_OPTIONS, CHECK_FAILED, NOT_CONVERGED, Reporting
 from fpsolve.errors import FpsolveError
 from fpsolve.messages import escaped
 
@@ -26,7 +26,7 @@ def prove(
     check: Annotated[
         Path | None, Parameter(help="Prove nothing, but verify a proof.json from its certificates alone.")
     ] = None,
-    options: Reporting = OPTIONS_OF_REPORTS,
+    options: Reporting = ALL_OPTIONS,
 ) -> int:
     """Prove bounds on the exponents that hold with certainty; write them with certificates into OUT/<case>/proof.json.
 

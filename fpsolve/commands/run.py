@@ -8,7 +8,7 @@ from typing import Annotated, Any
 from cyclopts import Parameter
 
 from fpsolve.commands.errors import print_error
-from fpsolve.commands.options import ALL_OPTIONS, NOT_CONVERGED, Cases, Count, Fresh, Pointing
+from fpsolve.commands.options import ALL_OPTIONS, NOT_CONVERGED, Cases, Count, Fresh, Reporting
 from fpsolve.signals import INTERRUPTED
 
 
@@ -29,7 +29,7 @@ def run(
         Count | None,
         Parameter(help="Also solve so many samples of the parameters that [uncertain] of the case names."),
     ] = None,
-    options: Pointing = ALL_OPTIONS,
+    options: Reporting = ALL_OPTIONS,
 ) -> int:
     """Solve case files; write tables, figures and ParaView files into OUT/<case>/.
 

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 from cyclopts import Parameter
 
 from fpsolve.commands.errors import print_error
-from fpsolve.commands.options import ALL_OPTIONS, Cases, Count, Fresh, Pointing
+from fpsolve.commands.options import ALL_OPTIONS, Cases, Count, Fresh, Reporting
 from fpsolve.signals import INTERRUPTED
 
 
@@ -30,7 +30,7 @@ def simulate(
         Parameter(help="direct, or population for strong noise or large |p|; direct if the case does not state it."),
     ] = None,
     fresh: Fresh = False,
-    options: Pointing = ALL_OPTIONS,
+    options: Reporting = ALL_OPTIONS,
 ) -> int:
     """Simulate the system with its impacts and estimate the exponents; write monte_carlo.json into OUT/<case>/.
 

@@ -12,7 +12,6 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -48,9 +47,7 @@ from fpsolve.model.quantity import (
     STATUS,
     P,
 )
-from fpsolve.page.limits import EACH
 from fpsolve.page.page import Drawing
-from fpsolve.page.plots import line_of, plot_of
 from fpsolve.results.table import Table
 from fpsolve.study.columns import table_of
 from fpsolve.study.results import CurveResult, SimulatedCurve, Status
@@ -164,8 +161,7 @@ def main_figure(
     over = "p" if case.figure.x == "p" else case.about(case.figure.x).words
     title = f"The {case.figure.quantity.words}, {case.figure.quantity.symbol}, over {over}"
     table = table_of(case, results) if table is None else table
-    job, plot = partial(_draw, case, results, simulated, folder, table), partial(_plot_of_moments, case, results)
-    return Drawing(title, job, "figure", case.caption, plot=plot)
+    return Drawing(title, partial(_draw, case, results, simulated, folder, table), "figure", case.caption)
 
 
 def _draw(
@@ -194,19 +190,6 @@ def _draw(
         else:
             series = _over_parameter(case, pairs, _numbers(case, table))
         draw_series(axes, case, series, setting.quantity.closed_form + ", reduced noise" * case.theory_reduces_noise)
-
-
-def _plot_of_moments(case: Case, results: Sequence[CurveResult]) -> dict[str, Any] | None:
-    """Λ(p) of the first curves, if the case asks for it."""
-    if MOMENT.name not in case.asked:
-        return None
-    moments = [(result.curve.label or MOMENT.symbol, result.moments) for result in results[:EACH]]
-    lines = [
-        line_of(name, each.p.tolist(), each.value.tolist(), error_y={"array": each.error_estimate.tolist()})
-        for name, each in moments
-    ]
-    unit = escape(MOMENT.timed(case.units.time).unit)
-    return plot_of("Λ(p)", lines, [{"title": {"text": "p"}}, {"title": {"text": f"{MOMENT.symbol} ({unit})"}}])
 
 
 def rate_figure(case: Case, results: Sequence[CurveResult]) -> Drawing:

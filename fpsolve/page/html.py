@@ -6,6 +6,7 @@ import re
 import tempfile
 from base64 import b64encode
 from collections.abc import Iterable, Iterator, Mapping
+from functools import cache
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -14,8 +15,6 @@ from fpsolve.errors import FpsolveError
 from fpsolve.messages import Code, Message
 from fpsolve.page.page import TONES, WORDS, Block, Drawing
 
-TEMPLATE = "report.html"
-"""The file of this folder that is filled."""
 _FURTHER = re.compile(r"<(metadata|style)\b.*?</\1>", re.DOTALL)
 """Elements of SVG that would be of the whole page, or that no page needs."""
 _COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
@@ -26,37 +25,45 @@ _REFERENCE = re.compile(r'(href="#|url\(#)')
 """The beginning of a reference to an id."""
 
 
-def page_of(blocks: Iterable[Block], *, is_interactive: bool = False, **head: Any) -> str:
+def page_of(blocks: Iterable[Block], **head: Any) -> str:
     """The page.
 
     Args:
         blocks: what stands on it; notes come last, and of each only one.
-        is_interactive: whether drawings that have a plot are scripts in addition.
         head: what else the template has: title, state, equations, about (blocks), facts, file, more.
     """
-    from jinja2 import Environment, StrictUndefined
-
-    with tempfile.TemporaryDirectory() as place:
-        pieces = list(_pieces(blocks, Path(place), is_interactive=is_interactive))
-    notes = dict.fromkeys(each for kind, each in pieces if kind == "Note")
-    has_plots = any(kind == "plot" for kind, _ in pieces)
     head["about"] = [(type(each).__name__, each) for each in head["about"]]
-    page = Environment(autoescape=True, undefined=StrictUndefined).from_string(
-        files("fpsolve.page").joinpath(TEMPLATE).read_text(encoding="utf-8")
-    )
-    script = _plotly() if has_plots else ""
-    return page.render(blocks=pieces, notes=notes, words=WORDS, tones=TONES, plotly=script, **head)
+    return _filled("report.html", blocks, **head)
 
 
-def _pieces(blocks: Iterable[Block], place: Path, *, is_interactive: bool) -> Iterator[tuple[str, Any]]:
+def part_of_page(blocks: Iterable[Block]) -> str:
+    """Blocks alone, for a page that is there already."""
+    return _filled("part.html", blocks, title="")
+
+
+def _filled(template: str, blocks: Iterable[Block], **head: Any) -> str:
+    with tempfile.TemporaryDirectory() as place:
+        pieces = list(_pieces(blocks, Path(place)))
+    notes = dict.fromkeys(each for kind, each in pieces if kind == "Note")
+    return str(_templates().get_template(template).render(blocks=pieces, notes=notes, **head))
+
+
+@cache
+def _templates() -> Any:
+    from jinja2 import Environment, FunctionLoader, StrictUndefined
+
+    loader = FunctionLoader(lambda name: files("fpsolve.page").joinpath(name).read_text(encoding="utf-8"))
+    made = Environment(autoescape=True, undefined=StrictUndefined, loader=loader)
+    made.globals |= {"words": WORDS, "tones": TONES}
+    return made
+
+
+def _pieces(blocks: Iterable[Block], place: Path) -> Iterator[tuple[str, Any]]:
     """What the template prints: blocks by the names of their classes, of drawings what was drawn."""
     for number, block in enumerate(blocks):
         if not isinstance(block, Drawing):
             yield type(block).__name__, block
-            continue
-        if is_interactive and block.plot is not None and (plot := block.plot()):
-            yield "plot", plot
-        if picture := _picture(block, place / f"{number}.{block.kind}", f"d{number}"):
+        elif picture := _picture(block, place / f"{number}.{block.kind}", f"d{number}"):
             yield "picture", {"title": block.title, **picture}
 
 
@@ -81,9 +88,3 @@ def _inlined(svg: str, name: str) -> str:
     head = re.sub(r' (width|height)="[^"]*"', "", head)
     rest = _REFERENCE.sub(rf"\1{name}-", _ID.sub(f'id="{name}-', _FURTHER.sub("", rest)))
     return f'{head} aria-hidden="true">{rest}'
-
-
-def _plotly() -> str:
-    from plotly.offline import get_plotlyjs
-
-    return str(get_plotlyjs())

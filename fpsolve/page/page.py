@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 from fpsolve.messages import Severity
 
@@ -79,7 +79,6 @@ class Drawing:
         name: of its own files; empty where it has none.
         heading: in these; a page has one itself.
         kind: of the file for a page.
-        plot: gives what plotly takes for a page in which the pointer shows numbers, or None; None where there is none.
     """
 
     title: str
@@ -87,7 +86,6 @@ class Drawing:
     name: str = ""
     heading: str = ""
     kind: Literal["svg", "png"] = "svg"
-    plot: Callable[[], Mapping[str, Any] | None] | None = None
 
     def write(self, folder: Path) -> None:
         """Draw it as .png and .pdf into a folder, if it has files of its own."""

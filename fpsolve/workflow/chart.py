@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import partial
-from html import escape
 from pathlib import Path
 from string import ascii_lowercase
 from textwrap import wrap
@@ -31,7 +30,6 @@ from fpsolve.model.problem import Problem
 from fpsolve.output.records import Record, Records, append, key_of, made_of, record_of
 from fpsolve.output.tables import head, in_case_words
 from fpsolve.page.page import Block, Column, Drawing, Grid, Sentence
-from fpsolve.page.plots import line_of, plot_of
 from fpsolve.pool import Pool, serial
 from fpsolve.results.text import plural
 from fpsolve.show.notes import note_on
@@ -289,8 +287,7 @@ def write_chart(case: Case, chart: Chart, folder: Path) -> None:
 def chart_figure(case: Case, chart: Chart) -> Drawing:
     """chart.png and .pdf; none where there is no line."""
     keys = f"{charted(case).x.key} and {charted(case).y.key}"
-    job, plot = partial(_draw, case, chart), partial(_plot_of_chart, case, chart)
-    return Drawing(f"Where stability ends, over {keys}", job, "chart", case.headline, plot=plot)
+    return Drawing(f"Where stability ends, over {keys}", partial(_draw, case, chart), "chart", case.headline)
 
 
 def _draw(case: Case, chart: Chart, paths: Sequence[Path], heading: str) -> None:
@@ -377,19 +374,6 @@ def _room(words: Any, inside: FloatArray) -> tuple[float, float] | None:
 def _appears(zero: Zero) -> str | None:
     """Which bifurcation a value of δ_p is, if one."""
     return P_BIFURCATIONS.get(zero.p) if zero.kind == "stability_index" else None
-
-
-def _plot_of_chart(case: Case, chart: Chart) -> dict[str, Any]:
-    """The lines, with their special points."""
-    lines = []
-    for line in chart.lines:
-        for branch in line.branches:
-            x, y, labels = branch.x.tolist(), branch.y.tolist(), list(branch.labels)
-            ends = slice(1 if branch.closed else 0)
-            text = [escape(label) for label in labels + labels[ends]]
-            lines.append(line_of(line.zero.equation, x + x[ends], y + y[ends], text=text))
-    frame = charted(case).x, charted(case).y
-    return plot_of("Where stability ends", lines, [{"title": {"text": escape(a.key)}, "type": a.scale} for a in frame])
 
 
 def show(case: Case, chart: Chart) -> Iterator[Block]:

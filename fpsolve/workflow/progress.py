@@ -65,7 +65,6 @@ class Watch:
         noted: takes what limits this.
         said: takes notes about files.
         has_report: whether report.html is written, too.
-        is_interactive: whether its drawings tell their numbers where the pointer is.
     """
 
     bar: Callable[[Phase], AbstractContextManager[Advance]] = lambda _: nullcontext(ignore)
@@ -73,7 +72,6 @@ class Watch:
     noted: Callable[[Iterable[Block]], None] = lambda _: None
     said: Callable[[Iterable[Block]], None] = lambda _: None
     has_report: bool = False
-    is_interactive: bool = False
 
 
 SILENT = Watch()

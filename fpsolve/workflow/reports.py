@@ -58,7 +58,6 @@ def write_report(
         try:
             text = page_of(
                 blocks,
-                is_interactive=watch.is_interactive,
                 title=case.headline,
                 state=COMPLETE if complete else INCOMPLETE,
                 equations=problem.equations_of(next(case.curves(0, 1)).problem),

@@ -14,7 +14,6 @@ from fpsolve.analysis.regions import Region
 from fpsolve.analysis.zero import Zero
 from fpsolve.case.case import load_case
 from fpsolve.cli import main
-from fpsolve.commands.options import BAD_INPUT
 from fpsolve.errors import OutputError, Remedy
 from fpsolve.model import OrnsteinUhlenbeck, PlaneSystem, Problem, White
 from fpsolve.output.tables import facts_of
@@ -228,24 +227,6 @@ def test_a_figure_that_fails_is_told_in_its_place(tmp_path, monkeypatch):
     assert "this picture could not be drawn: RuntimeError: no ink" in Page(tmp_path / "test/report.html").text
 
 
-def test_without_plotly_it_is_named_before_anything_is_solved(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr("fpsolve.commands.options.find_spec", lambda _: None)
-    assert run(tmp_path, ONE, "--interactive") == BAD_INPUT
-    assert "pip install 'fpsolve[interactive]'" in capsys.readouterr().err
-    assert not (tmp_path / "test").exists()
-
-
-def test_an_interactive_page_holds_its_script_and_escapes_its_data(tmp_path):
-    pytest.importorskip("plotly")
-    assert run(tmp_path, OWN, "--interactive") == 0
-    text = (tmp_path / "test/report.html").read_text(encoding="utf-8")
-    page = Page(tmp_path / "test/report.html")
-    assert page.tags.count("script") == 2  # that of plotly, and the plot
-    assert not page.outside
-    assert re.search(r'Plotly\.newPlot\("plot-1", \[\{', text)
-    assert NASTY not in text
-
-
 def test_proofs_have_a_page(tmp_path):
     pytest.importorskip("flint")
     text = f'{PROVABLE}[output]\nquantities = ["moment"]\nfigure = false\n'
@@ -337,11 +318,11 @@ def test_charts_have_a_page(tmp_path, monkeypatch):
         ("workflow.chart.CLOSED_FORM_NODES", 31),
     ):
         monkeypatch.setattr(f"fpsolve.{name}", nodes)
-    assert run(tmp_path, CHARTED, "--report", "--interactive", command="chart", name="plane.toml") == 0
+    assert run(tmp_path, CHARTED, "--report", command="chart", name="plane.toml") == 0
     page = Page(tmp_path / "plane/report.html")
     assert "almost surely stable" in page.text
     assert "special point" in page.text
-    assert {"svg", "script"} <= set(page.tags)
+    assert "svg" in page.tags
 
 
 @pytest.mark.parametrize(

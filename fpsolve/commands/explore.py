@@ -1,0 +1,42 @@
+"""`fpsolve explore`: look at a case in a browser."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from fpsolve.commands.options import Options
+from fpsolve.signals import INTERRUPTED
+
+PLAIN = Options()
+
+
+def explore(
+    case: Annotated[Path, Parameter(help="A case file.")],
+    *,
+    no_open: Annotated[bool, Parameter(help="Open no browser; the address is printed.", negative="")] = False,
+    options: Options = PLAIN,
+) -> int:
+    """Show a case in the browser, with a slider for every parameter; end it with Ctrl-C.
+
+    The page is served to this machine alone. It writes nothing: cases and reports are downloads.
+
+    Example: fpsolve explore cases/fig1.toml
+    """
+    import webbrowser
+
+    from fpsolve.page.local import LocalPage
+    from fpsolve.workflow.explore import Explorer
+
+    [loaded] = options.load([case])
+    with LocalPage(Explorer(loaded, f"load_case({loaded.path.name!r}).problem").answer) as page:
+        print(f"{page.address} shows {loaded.name}; Ctrl-C ends it", flush=True)
+        if not no_open:
+            webbrowser.open(page.address)
+        try:
+            page.serve_forever()
+        except KeyboardInterrupt:
+            return INTERRUPTED
+    return 0

@@ -1,0 +1,235 @@
+"use strict";
+const $ = id => document.getElementById(id);
+const page = crypto.randomUUID();
+const SVG = "http://www.w3.org/2000/svg";
+const STEPS = 1000, REST = 300, LISTEN = 2000; // positions of a slider; milliseconds of rest, and between two looks at the server
+let about, number = 0, knobs = [], wanted = 0, isMoving = false, isLost = false, rest, shown, before;
+
+// asking
+
+async function ask(name, more = {}) {
+  const question = {page, number: ++number, values: Object.fromEntries(knobs.map(knob => [knob.key, knob.read()])), ...more};
+  try {
+    const response = await fetch("/" + name, {method: "POST", headers: {"Content-Type": "application/json"}, body: JSON.stringify(question)});
+    return await response.json();
+  } catch {
+    isLost = true;
+    $("state").textContent = "";
+    $("refused").textContent = `fpsolve has ended, and this page does nothing any more; start it again: fpsolve explore ${about ? about.file : ""}`;
+    document.body.classList.add("stale");
+    return {stopped: true};
+  }
+}
+
+// The answer of a kind is shown if nothing newer was asked; what takes longer than a moment says that it works.
+async function work(name, show, more = {}) {
+  const said = setTimeout(() => { $("state").textContent = "working …"; $("stop").disabled = false; }, 150);
+  const answer = await ask(name, more);
+  clearTimeout(said);
+  if (isLost || answer.stopped) return;
+  $("stop").disabled = true;
+  $("refused").textContent = answer.refused || "";
+  document.body.classList.toggle("stale", Boolean(answer.refused));
+  $("state").textContent = answer.refused ? "" : `${name === "move" ? "moving, " : ""}${(1000 * answer.seconds).toFixed(0)} ms`;
+  if (!answer.refused) show(answer);
+}
+
+function moved() {
+  wanted += 1;
+  clearTimeout(rest);
+  if (about.moves) follow();
+  else settle();
+}
+
+function settle() { rest = setTimeout(() => work("solve", showCurve), REST); }
+
+async function follow() { // the last position wins: what lies between two answers is never asked for
+  if (isMoving) return;
+  isMoving = true;
+  for (let seen; seen !== wanted && !isLost;) {
+    seen = wanted;
+    await work("move", showCurve);
+  }
+  isMoving = false;
+  settle();
+}
+
+// the sliders
+
+function knobOf(spec) {
+  const {low, high, log} = spec, box = document.createElement("div"), id = `knob-${spec.key}`;
+  const value = share => log ? low * (high / low) ** share : low + (high - low) * share;
+  const share = value => log ? Math.log(value / low) / Math.log(high / low) : (value - low) / (high - low);
+  const label = Object.assign(document.createElement("label"), {htmlFor: id});
+  const key = Object.assign(document.createElement("span"), {className: "key", textContent: ` ${spec.key}`});
+  label.append([spec.words, spec.symbol, spec.unit && `(${spec.unit})`].filter(Boolean).join(" "), key);
+  const name = spec.words || spec.key;
+  const slider = Object.assign(document.createElement("input"), {type: "range", min: 0, max: STEPS, ariaLabel: `${name}, slider`});
+  const field = Object.assign(document.createElement("input"), {type: "text", inputMode: "decimal", id, autocomplete: "off"});
+  const back = Object.assign(document.createElement("button"), {type: "button", textContent: "↺", ariaLabel: `${name} as the case`, title: "as the case"});
+  const place = () => { slider.value = STEPS * share(Number(field.value)); slider.ariaValueText = field.value; };
+  const set = value => { field.value = value; place(); };
+  slider.oninput = () => { field.value = Number(value(slider.value / STEPS).toPrecision(4)); slider.ariaValueText = field.value; moved(); };
+  field.onchange = () => { place(); moved(); };
+  back.onclick = () => { set(spec.value); moved(); };
+  box.className = "knob";
+  box.append(label, slider, field, back);
+  set(spec.value);
+  return {...spec, box, set, read: () => field.value.trim() === "" || isNaN(field.value) ? field.value : Number(field.value)};
+}
+
+// drawing
+
+function node(parent, name, attributes, text) {
+  const made = document.createElementNS(SVG, name);
+  for (const key in attributes) made.setAttribute(key, attributes[key]);
+  if (text !== undefined) made.textContent = text;
+  return parent.appendChild(made);
+}
+
+function ticks([low, high], log, count) {
+  if (log && high / low > 3) {
+    const found = [];
+    for (let e = Math.floor(Math.log10(low)); e <= Math.log10(high); e++) for (const m of high / low > 300 ? [1] : [1, 2, 5]) found.push(m * 10 ** e);
+    return found.filter(each => each >= low * (1 - 1e-9) && each <= high * (1 + 1e-9));
+  }
+  const rough = (high - low) / count, size = 10 ** Math.floor(Math.log10(rough)), step = [1, 2, 5, 10].find(m => m * size >= rough) * size;
+  const found = [];
+  for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k++) found.push(k * step);
+  return found;
+}
+
+const brief = value => String(Number(value.toPrecision(6)));
+
+// A frame with axes; gives what takes numbers to places in it.
+function frame(svg, x, y) {
+  svg.replaceChildren();
+  const width = svg.clientWidth || 640, height = Math.max(260, Math.min(0.6 * width, 460));
+  svg.setAttribute("viewBox", `0 0 ${width} ${height}`);
+  const box = {left: 78, right: width - 12, top: 12, bottom: height - 44};
+  const along = (axis, from, to) => value => axis.log ? from + (to - from) * Math.log(value / axis.ends[0]) / Math.log(axis.ends[1] / axis.ends[0])
+    : from + (to - from) * (value - axis.ends[0]) / (axis.ends[1] - axis.ends[0]);
+  const X = along(x, box.left, box.right), Y = along(y, box.bottom, box.top);
+  for (const value of x.ticks || ticks(x.ends, x.log, width / 90)) {
+    node(svg, "line", {class: value === 0 ? "zero" : "grid", x1: X(value), x2: X(value), y1: box.top, y2: box.bottom});
+    node(svg, "text", {x: X(value), y: box.bottom + 17, "text-anchor": "middle"}, x.name ? x.name(value) : brief(value));
+  }
+  for (const value of ticks(y.ends, y.log, height / 60)) {
+    node(svg, "line", {class: value === 0 ? "zero" : "grid", x1: box.left, x2: box.right, y1: Y(value), y2: Y(value)});
+    node(svg, "text", {x: box.left - 6, y: Y(value) + 4, "text-anchor": "end"}, brief(value));
+  }
+  node(svg, "text", {x: (box.left + box.right) / 2, y: height - 6, "text-anchor": "middle"}, x.label);
+  node(svg, "text", {transform: `translate(14 ${(box.top + box.bottom) / 2}) rotate(-90)`, "text-anchor": "middle"}, y.label);
+  const clip = node(svg, "clipPath", {id: `clip-${svg.parentNode.id}`});
+  node(clip, "rect", {x: box.left, y: box.top, width: box.right - box.left, height: box.bottom - box.top});
+  const inside = node(svg, "g", {"clip-path": `url(#clip-${svg.parentNode.id})`});
+  node(svg, "rect", {class: "frame", x: box.left, y: box.top, width: box.right - box.left, height: box.bottom - box.top});
+  const back = (axis, from, to, place) => { const s = (place - from) / (to - from); return axis.log ? axis.ends[0] * (axis.ends[1] / axis.ends[0]) ** s : axis.ends[0] + (axis.ends[1] - axis.ends[0]) * s; };
+  return {X, Y, inside, box, at: (u, v) => [back(x, box.left, box.right, u), back(y, box.bottom, box.top, v)]};
+}
+
+const line = ({X, Y}, xs, ys) => xs.map((x, i) => `${i ? "L" : "M"}${X(x).toFixed(2)} ${Y(ys[i]).toFixed(2)}`).join("");
+
+function smooth({X, Y}, xs, ys, slopes) { // cubic pieces with the slopes that are known
+  let d = "";
+  xs.forEach((x, i) => {
+    const at = `${X(x).toFixed(2)} ${Y(ys[i]).toFixed(2)}`, h = i ? (x - xs[i - 1]) / 3 : 0;
+    if (!i) d += `M${at}`;
+    else if (slopes[i] === null || slopes[i - 1] === null) d += `L${at}`;
+    else d += `C${X(x - 2 * h)} ${Y(ys[i - 1] + h * slopes[i - 1])} ${X(x - h)} ${Y(ys[i] - h * slopes[i])} ${at}`;
+  });
+  return d;
+}
+
+function sorted([p, ...rest]) {
+  const order = p.map((_, i) => i).sort((a, b) => p[a] - p[b]);
+  return [p, ...rest].map(each => order.map(i => each[i]));
+}
+
+function drawCurve() {
+  if (!shown) return;
+  const curves = [before, shown].filter(Boolean).map(answer => sorted(answer.curve)), [p, value, slope, error] = curves.at(-1);
+  const all = curves.flatMap(each => each[1]).concat(0), room = 0.06 * (Math.max(...all) - Math.min(...all)) || 1;
+  const ends = [Math.min(...p), Math.max(...p)], low = p.length > 1 ? ends : [Math.min(0, ends[0]), ends[1] + 1];
+  const plot = frame($("curve").querySelector("svg"), {ends: low, label: "order of the moment p"},
+    {ends: [Math.min(...all) - room, Math.max(...all) + room], label: `Λ(p) (${about.unit})`});
+  if (before) node(plot.inside, "path", {class: "line before", d: smooth(plot, ...curves[0])});
+  const down = p.toReversed(), lower = value.map((each, i) => each - error[i]).toReversed();
+  node(plot.inside, "path", {class: "band one", d: `${line(plot, p, value.map((each, i) => each + error[i]))}${line(plot, down, lower).replace("M", "L")}Z`});
+  node(plot.inside, "path", {class: "line one", d: smooth(plot, p, value, slope)});
+  const dots = p.length < 9 ? p.map((each, i) => [each, value[i]]) : [];
+  if (shown.root !== null) dots.push([shown.root, 0]);
+  for (const [x, y] of dots) node(plot.inside, "circle", {class: "dot one", cx: plot.X(x), cy: plot.Y(y), r: 5});
+}
+
+function showCurve(answer) {
+  shown = answer;
+  if (!before && answer.root !== undefined && !wanted) before = answer;
+  $("equations").replaceChildren(...answer.equations.map(text => Object.assign(document.createElement("p"), {className: "equation", textContent: text})));
+  for (const name of ["verdict", "numbers", "table"]) $(name).innerHTML = answer[name]; // escaped by fpsolve
+  drawCurve();
+}
+
+// tabs, downloads
+
+function choose(tab) {
+  for (const each of $("tabs").children) {
+    each.ariaSelected = each === tab;
+    each.tabIndex = each === tab ? 0 : -1;
+    $(each.getAttribute("aria-controls")).hidden = each !== tab;
+  }
+  tab.focus();
+  redraw();
+}
+
+function makeTabs() {
+  for (const panel of document.querySelectorAll("[role=tabpanel]")) {
+    const tab = Object.assign(document.createElement("button"), {type: "button", id: `tab-${panel.id}`, textContent: panel.dataset.name});
+    tab.setAttribute("role", "tab");
+    tab.setAttribute("aria-controls", panel.id);
+    panel.setAttribute("aria-labelledby", tab.id);
+    tab.onclick = () => choose(tab);
+    tab.onkeydown = event => {
+      const other = {ArrowRight: tab.nextSibling, ArrowLeft: tab.previousSibling}[event.key];
+      if (other) choose(other);
+    };
+    $("tabs").append(tab);
+    tab.ariaSelected = panel.id === "curve";
+    tab.tabIndex = panel.id === "curve" ? 0 : -1;
+    panel.hidden = panel.id !== "curve";
+  }
+}
+
+function redraw() { drawCurve(); }
+
+function download({name, text}) {
+  const link = Object.assign(document.createElement("a"), {href: URL.createObjectURL(new Blob([text])), download: name});
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+}
+
+async function copy({text}) {
+  Object.assign($("code"), {hidden: false, value: text});
+  $("code").select();
+  await navigator.clipboard.writeText(text).then(() => { $("state").textContent = "copied"; }, () => {}); // where that is not allowed, it is there to be copied
+}
+
+async function start() {
+  about = await ask("start");
+  if (isLost) return;
+  $("title").textContent = document.title = about.title || "fpsolve explore";
+  knobs = about.knobs.map(knobOf);
+  $("knobs").append(...knobs.map(knob => knob.box));
+  for (const id of ["save", "report"]) $(id).hidden = !about.file;
+  makeTabs();
+  $("reset").onclick = () => { for (const knob of knobs) knob.set(knob.value); moved(); };
+  $("stop").onclick = () => { for (const of of ["curve", "save", "report"]) ask("stop", {of}); $("state").textContent = "stopped"; $("stop").disabled = true; };
+  $("save").onclick = () => work("save", download);
+  $("report").onclick = () => work("report", download);
+  $("python").onclick = () => work("python", copy);
+  addEventListener("resize", redraw);
+  setInterval(() => isLost || ask("listen"), LISTEN);
+  await work("solve", showCurve);
+}
+
+start();

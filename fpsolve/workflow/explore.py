@@ -1,0 +1,300 @@
+"""What `fpsolve explore` answers: numbers, sentences and curves of a case with other values of its parameters.
+
+A question of a page that is newer than another one of its kind ends that before its next factorisation: the last
+position of a slider wins, and nobody waits for what is not wanted any more.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+import threading
+import unicodedata
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
+from datetime import UTC, datetime
+from itertools import chain
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from pydantic import ValidationError
+
+from fpsolve.arrays import FloatArray
+from fpsolve.budget import watched
+from fpsolve.case.case import CHEAP, CHEAP_OF_WALLS, Case
+from fpsolve.case.refusals import obstacle
+from fpsolve.case.remedies import CASE_WORDS
+from fpsolve.case.rewrite import of_one_curve
+from fpsolve.case.sections import FigureSection, OutputSection
+from fpsolve.case.uncertain import Uncertain
+from fpsolve.case.vary import Vary
+from fpsolve.data import plain_unit
+from fpsolve.errors import FpsolveError
+from fpsolve.explain import UNBOUNDED, explain
+from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, MOMENT
+from fpsolve.messages import message_of
+from fpsolve.model.plane import BELOW
+from fpsolve.page.html import page_of, part_of_page
+from fpsolve.page.page import Grid, Sentence
+from fpsolve.parts.indices import THEORY
+from fpsolve.parts.moments import PART as MOMENTS
+from fpsolve.parts.part import Numerics, fault
+from fpsolve.show import results
+from fpsolve.show.notes import notes
+from fpsolve.show.problem import equations_of
+from fpsolve.show.problem import show as show_problem
+from fpsolve.study.results import CurveResult
+from fpsolve.study.solve import everything, solve_curve
+from fpsolve.workflow.reports import COMPLETE, facts_since
+
+MOVING_RTOL = 3e-4
+"""Relative error of Λ(p) while a slider moves, at least."""
+FEW = 9
+"""A case with fewer p is shown at others, too."""
+USUAL_P = np.linspace(-2.0, 4.0, 13)
+"""These, of two variables under one noise that is a number."""
+FEWEST_P = np.array([0.0, 2.0])
+"""These of others, where each takes long."""
+FACTOR = 10.0
+"""From a positive value to the ends of its slider, where nothing says how far it may go."""
+BEYOND = 3.0
+"""The same of a value of any sign."""
+NO_BOUND = 1e3
+"""A bound from which on it keeps formulas from overflow, and tells nothing of what is usual."""
+NUMBERS = {MOMENT.name, *INDICES, "theory", "jumps", "classes", "discretisation"}
+"""The parts that are solved."""
+Answer = Mapping[str, Any]
+"""What JSON can hold."""
+
+
+class Explorer:
+    """Answers to the pages that show a case; several pages do not know of each other.
+
+    Args:
+        case: of its curves the first one is shown.
+        code: Python that makes its problem.
+    """
+
+    def __init__(self, case: Case, code: str) -> None:
+        first = next(case.curves(0, 1)).problem
+        kinds = CHEAP + CHEAP_OF_WALLS * bool(first.system.jumps)
+        coloured, p = first.coloured, case.p
+        self.moves = first.dimension == 2 and len(coloured.parts) == 1 and coloured.basis != "pairs"
+        if not first.has_algebraic_tails:
+            more = USUAL_P if p.size < FEW and self.moves else FEWEST_P
+            p = np.union1d(p, more[1:] if first.is_closed_only else more[more >= first.moments[0]])
+        quantities = kinds[:1] if first.is_closed_only else kinds
+        self.source, self.code, self.first, self.quantities = case, code, first, quantities
+        is_same = np.array_equal(np.sort(case.p), p)
+        changed = {"vary": Vary(), "figure": FigureSection(), "uncertain": Uncertain(), "expect": (), "chart": None}
+        changed["moments"] = case.moments.model_copy(update={} if is_same else {"p": tuple(p.tolist())})
+        changed["output"] = OutputSection(quantities=quantities)
+        self.case = case.model_copy(update={**changed, "system": first.system, "noise": first.noise})
+        self._newest, self._drawing = dict[tuple[str, str], float](), threading.Lock()
+        self._answers: dict[str, tuple[str, Callable[[Mapping[str, Any]], Answer]]] = {
+            "start": ("start", self._start),
+            "move": ("curve", self._move),
+            "solve": ("curve", self._solve),
+            "save": ("save", self._save),
+            "report": ("report", self._report),
+            "python": ("python", self._python),
+        }
+
+    def answer(self, name: str, question: Mapping[str, Any]) -> Answer:
+        """The answer to a question by its name, or a sentence why there is none.
+
+        Args:
+            name: "stop" ends what the page asked for "of" a kind.
+            question: the "page" that asks, its "number", and "values" of parameters by their keys.
+        """
+        kind, answer = self._answers.get(name, (str(question.get("of")), lambda _: {}))
+        asked, number = (str(question.get("page")), kind), question.get("number")
+        if not isinstance(number, int | float):
+            return {"refused": f"got {number!r} as the number of a question; must be a number; load the page again"}
+        self._newest[asked] = max(number, self._newest.get(asked, number))
+
+        def look(_: object = None) -> None:
+            if self._newest[asked] != number:
+                raise KeyboardInterrupt
+
+        try:
+            started = perf_counter()
+            with watched(look):
+                return {**answer(question), "seconds": perf_counter() - started}
+        except KeyboardInterrupt:
+            return {"stopped": True}
+        except FpsolveError as failure:
+            return {"refused": failure.message.words(CASE_WORDS)}
+        except Exception as failure:
+            return {"refused": str(fault(failure))}
+
+    def _start(self, _: Mapping[str, Any]) -> Answer:
+        """The sliders, and what the page is about."""
+        unit = MOMENT.timed(self.case.units.time).unit
+        return {
+            "title": self.source.title,
+            "file": self.source.path.name if self.source.text else "",
+            "knobs": list(self._knobs()),
+            "moves": self.moves,
+            "unit": unit,
+        }
+
+    def _knobs(self) -> Iterator[Answer]:
+        """The parameters that the numbers depend on, each with its words and the ends of its slider."""
+        linear, known = {*self.first.differentiable, *self.first.undifferentiable}, self.first.parameters
+        for key in [key for key in known if key in linear]:
+            about, value = known[key].quantity.timed(self.case.units.time), float(self.first.values[key])
+            low, high, scale = self._range(key, value)
+            unit = "" if about.unit in ("1", "unknown") else plain_unit(about.unit)
+            words = "" if about.words == key else about.words
+            yield {
+                "key": key, "words": words, "symbol": _letters(about.latex), "unit": unit, "value": value,
+                "low": min(low, value), "high": max(high, value), "log": scale == "log",
+                "axis": key in self.first.differentiable,
+            }  # fmt: skip
+
+    def _range(self, key: str, value: float) -> tuple[float, float, str]:
+        """The ends of a slider: those of a chart, of what is varied or designed, of the parameter, or usual ones."""
+        for axis in (self.source.chart.x, self.source.chart.y) if self.source.chart else ():
+            if axis.key == key:
+                return axis.start, axis.stop, axis.scale
+        for each in self.source.design.by if self.source.design else ():
+            if each.key == key and (ends := each.ends(self.first)):
+                return *ends, each.scale
+        varied = self.source.vary.columns.get(key, ())
+        if len(varied) > 1 and not self.source.vary.is_text(key):
+            low, high = float(min(varied)), float(max(varied))
+            return low, high, "log" if low > 0 and high >= 8 * low else "linear"
+        field = self.first.parameters[key].field
+        least = 0.0 if field is None and value > 0 else -math.inf
+        bounds = {"gt": least, "ge": least, "lt": math.inf, "le": math.inf}
+        for rule in field.metadata if field else ():
+            bounds |= {name: float(getattr(rule, name)) for name in bounds if hasattr(rule, name)}
+        low, high = max(bounds["gt"], bounds["ge"]), min(bounds["lt"], bounds["le"])
+        if max(abs(low), abs(high)) < NO_BOUND:
+            inset = 0.01 * (high - low)
+            return low + inset * (low == bounds["gt"]), high - inset * (high == bounds["lt"]), "linear"
+        if value == 0:
+            return (0.0 if low >= 0 else -1.0), 1.0, "linear"
+        if value > 0 and low >= 0:
+            return value / FACTOR, min(FACTOR * value, high), "log"
+        return max(low, -BEYOND * abs(value)), min(BEYOND * abs(value), high), "linear"
+
+    def _at(self, question: Mapping[str, Any]) -> Case:
+        """The case with the values of a question. Raises `FpsolveError` where there is none."""
+        values = question.get("values")
+        known = {each["key"] for each in self._knobs()}
+        if not isinstance(values, dict) or not {*values} <= known:
+            raise FpsolveError(f"got {values!r}; must be values by their keys, which are {', '.join(sorted(known))}")
+        try:
+            problem = self.first.at(values)
+        except ValidationError as failure:
+            ranges = {key.rpartition(".")[2]: each.field or UNBOUNDED for key, each in self.first.parameters.items()}
+            raise FpsolveError("\n".join(f"{key}: {text}" for _, key, text in explain(failure, ranges))) from failure
+        except (TypeError, ValueError) as failure:
+            raise FpsolveError(str(failure)) from failure
+        if sentence := obstacle(self.first, values, self.case.p):
+            raise FpsolveError(sentence)
+        return self.case.model_copy(update={"system": problem.system, "noise": problem.noise})
+
+    def _solved(self, case: Case, *, is_moving: bool = False) -> CurveResult:
+        """What `run` finds of a case; while a slider moves λ and Λ(p) alone, within a larger error."""
+        asked = {name: settings for name, settings in everything(case).items() if name in NUMBERS}
+        numerics = Numerics.of(case)
+        if is_moving:
+            asked = {MOMENT.name: {**asked[MOMENT.name], "slopes": False}, LYAPUNOV_EXPONENT.name: {}}
+            numerics = replace(numerics, rtol=max(numerics.rtol, MOVING_RTOL))
+        found = solve_curve(next(case.curves()), asked, numerics).result
+        if not found.moments.p.size:
+            raise FpsolveError(message_of(found.failures[0].reason))
+        return found
+
+    def _move(self, question: Mapping[str, Any]) -> Answer:
+        """Λ(p) and λ, as fast as that goes."""
+        case, names = self._at(question), (MOMENT.name, LYAPUNOV_EXPONENT.name)
+        case = case.model_copy(update={"output": OutputSection(quantities=names)})
+        return self._told(case, self._solved(case, is_moving=True))
+
+    def _solve(self, question: Mapping[str, Any]) -> Answer:
+        """All numbers, as `run` finds them."""
+        case = self._at(question)
+        return self._told(case, self._solved(case))
+
+    def _told(self, case: Case, result: CurveResult) -> Answer:
+        """The curve, the equation, and what a report says of it."""
+        moments = result.moments
+        names = ("p", "value", "derivative", "error_estimate")
+        index, exponent = result.stability_index, result.lyapunov_exponent
+        shown = [*THEORY.show(case, result)]
+        return {
+            "curve": [listed(getattr(moments, name)) for name in names],
+            "root": index.value if index else None,
+            "exponent": exponent.value if exponent else None,
+            "equations": equations_of(case.problem),
+            "verdict": part_of_page(each for each in shown if isinstance(each, Sentence)),
+            "numbers": part_of_page([*filter(lambda each: isinstance(each, Grid), shown), *notes(case, [result], "")]),
+            "table": part_of_page(MOMENTS.show(case, result)),
+        }
+
+    def _save(self, question: Mapping[str, Any]) -> Answer:
+        """A case of which `run` gives these numbers."""
+        return {"name": f"{self.source.name}-explored.toml", "text": self._text(self._at(question))}
+
+    def _text(self, case: Case) -> str:
+        held = self.source.problem.values
+        values = case.problem.values
+        changed = {key: value for key, value in values.items() if value != held[key] or key in self.source.vary.keys}
+        return of_one_curve(self.source, changed, self.case.p.tolist(), self.quantities)
+
+    def _report(self, question: Mapping[str, Any]) -> Answer:
+        """The report of these numbers."""
+        started, case = datetime.now(UTC), self._at(question)
+        found = self._solved(case)
+        with self._drawing:  # matplotlib draws in one style at a time
+            page = page_of(
+                chain(results.show(case, [found], Path()), notes(case, [found], "")),
+                title=case.headline,
+                state=COMPLETE,
+                equations=equations_of(case.problem),
+                about=list(show_problem(case)),
+                facts={**facts_since(case, started), "case_text": self._text(case) if self.source.text else ""},
+                file=f"{self.source.name}-explored.toml",
+                more="`fpsolve run` of the case below writes all numbers.",
+            )
+        return {"name": f"{self.source.name}-explored.html", "text": page}
+
+    def _python(self, question: Mapping[str, Any]) -> Answer:
+        """Python that computes these numbers."""
+        values, held = self._at(question).problem.values, self.source.problem.values
+        changed = {key: value for key, value in values.items() if value != held[key]}
+        names = ["moment_lyapunov", *self.quantities[1 : 2 if self.first.has_algebraic_tails else 3]]
+        p, rtol = self.case.p.tolist(), self.case.rtol
+        calls = [f"print({name}(problem, {f'{p}, ' * (name == names[0])}rtol={rtol}))" for name in names]
+        lines = [
+            f"from fpsolve import load_case, {', '.join(names)}",
+            "",
+            f"problem = {self.code}.at({changed})",
+            *calls,
+        ]
+        return {"text": "\n".join([*lines, *calls, ""])}
+
+
+def _letters(latex: str) -> str:
+    """A symbol in letters, such as τ₀; empty where it needs more than these."""
+
+    def greek(name: re.Match[str]) -> str:
+        try:
+            return unicodedata.lookup(f"GREEK SMALL LETTER {name[1].upper()}")
+        except KeyError:
+            return name[0]
+
+    text = re.sub(r"\\([a-z]+)", greek, latex.strip("$"))
+    text = re.sub(r"_(\d)", lambda digit: digit[1].translate(BELOW), text)
+    return "" if re.search(r"[\\_^{}]", text) else text
+
+
+def listed(values: FloatArray) -> list[float | None]:
+    """Numbers for JSON, which has no NaN."""
+    return [each if math.isfinite(each) else None for each in np.asarray(values, dtype=float).ravel().tolist()]

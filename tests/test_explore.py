@@ -1,0 +1,368 @@
+"""`fpsolve explore`: what its page asks and is told, whom its server answers, and the page in a real browser."""
+
+import http.client
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+import threading
+import tomllib
+from contextlib import contextmanager
+from pathlib import Path
+from statistics import median
+from time import monotonic
+
+import numpy as np
+import pytest
+
+from fpsolve.case.case import load_case
+from fpsolve.page.local import LocalPage
+from fpsolve.parts.indices import index_text, told_indices
+from fpsolve.parts.part import Numerics
+from fpsolve.study.solve import everything, solve_curve
+from fpsolve.workflow.explore import Explorer
+
+CASES = Path(__file__).parents[1] / "cases"
+INSTALL = "apt-get install -y --no-install-recommends chromium"
+IS_REQUIRED = bool(os.environ.get("FPSOLVE_REQUIRE_CHROMIUM"))
+
+
+def values_of(explorer, **changed):
+    knobs = explorer.answer("start", {"page": "a", "number": 1})["knobs"]
+    return {knob["key"]: knob["value"] for knob in knobs} | {key.replace("__", "."): v for key, v in changed.items()}
+
+
+def question(explorer, number=2, page="a", **changed):
+    return {"page": page, "number": number, "values": values_of(explorer, **changed)}
+
+
+def explorer_of(name):
+    return Explorer(load_case(CASES / f"{name}.toml"), "problem")
+
+
+def cells(html):
+    """The cells of all tables, row by row."""
+    return [re.findall(r"<td[^>]*>([^<]*)</td>", row) for row in re.findall(r"<tr>(.*?)</tr>", html, re.DOTALL)]
+
+
+@pytest.mark.parametrize(
+    ("name", "changed"),
+    [
+        ("fig1", {"noise__D0": 0.7, "oscillator__c1": -0.05}),
+        ("theorem", {"oscillator__omega": 1.3}),
+        ("systems/beam", {"noise__alpha": 2.0}),
+        ("systems/telegraph", {"system__damping": 0.2}),
+    ],
+)
+def test_a_saved_case_gives_the_numbers_of_the_page(tmp_path, name, changed):
+    explorer = explorer_of(name)
+    found = explorer.answer("solve", question(explorer, **changed))
+    saved = explorer.answer("save", question(explorer, **changed))
+    path = (CASES / name).parent / saved["name"]  # not written there: what it names is beside it
+    for each in (CASES / name).parent.iterdir():
+        (tmp_path / each.name).symlink_to(each)
+    (tmp_path / path.name).write_text(saved["text"], encoding="utf-8")
+    case = load_case(tmp_path / path.name)
+    assert case.planned == 1
+    result = solve_curve(next(case.curves()), everything(case), Numerics.of(case)).result
+    assert found["curve"][1] == result.moments.value.tolist()
+    rows = {row[1]: row[2] for row in cells(found["numbers"])[1:] if len(row) > 2}
+    assert rows == {index.symbol: index_text(index, result) for index in told_indices(case)}
+    comments = re.findall("#.*", (CASES / f"{name}.toml").read_text(encoding="utf-8"))
+    assert comments[0] in saved["text"]
+
+
+def test_python_gives_the_problem_of_the_page():
+    explorer = Explorer(load_case(CASES / "fig1.toml"), f"load_case({str(CASES / 'fig1.toml')!r}).problem")
+    text = explorer.answer("python", question(explorer, noise__D0=0.7))["text"]
+    names = {}
+    exec(text.replace("print", ""), names)  # which is ours
+    found = explorer.answer("solve", question(explorer, noise__D0=0.7))
+    assert names["problem"].values["noise.D0"] == 0.7
+    exponent = names["lyapunov_exponent"](names["problem"], rtol=1e-8)
+    assert abs(exponent.value - found["exponent"]) <= 2 * exponent.error_estimate
+
+
+def test_while_a_slider_moves_numbers_are_within_their_error():
+    for name in ("fig1", "strong"):
+        explorer = explorer_of(name)
+        moving, settled = (explorer.answer(each, question(explorer)) for each in ("move", "solve"))
+        differences = np.abs(np.array(moving["curve"][1]) - np.array(settled["curve"][1]))
+        assert np.all(differences <= np.array(moving["curve"][3]) + np.array(settled["curve"][3]))
+
+
+@pytest.mark.parametrize(
+    ("name", "changed", "words"),
+    [
+        ("fig1", {"noise__D0": -1.0}, r"^D0: got -1.0; must be .*>= .*noise intensity.*; write, for example"),
+        ("fig1", {"noise__D0": ""}, r'^D0: got "" .*must be a finite number'),
+        ("fig1", {"noise__D0": float("nan")}, "^D0: got nan; must be "),
+        ("systems/own_equation", {"system__zeta": "abc"}, r"zeta: got 'abc'; must be a finite number"),
+        ("fig1", {"nothing": 1.0}, "must be values by their keys, which are noise.D0, "),
+        ("fig1", {"oscillator__epsilon": 900.0, "oscillator__restitution": 0.01}, "overflow"),
+    ],
+)
+def test_bad_values_are_refused_with_the_sentences_of_cases(name, changed, words):
+    explorer = explorer_of(name)
+    for each in ("move", "solve", "save", "python"):
+        told = explorer.answer(each, question(explorer, **changed))
+        assert re.search(words, told["refused"]), told
+
+
+def test_a_newer_question_of_a_page_ends_an_older_one():
+    explorer, told = explorer_of("strong"), {}
+    started = threading.Event()
+
+    def ask():
+        started.set()
+        told["old"] = explorer.answer("solve", question(explorer, 2))
+
+    explorer._solved(explorer.case, is_moving=True)  # imports are done
+    thread = threading.Thread(target=ask)
+    thread.start()
+    started.wait()
+    while ("a", "curve") not in explorer._newest:
+        pass
+    told["other page"] = explorer.answer("move", question(explorer, 9, page="b"))
+    assert "curve" in told["other page"]
+    explorer.answer("stop", {"page": "a", "number": 3, "of": "curve"})
+    thread.join()
+    assert told["old"] == {"stopped": True}
+
+
+def test_sliders_go_as_far_as_the_case_or_the_parameter_says():
+    def ends(name):
+        knobs = explorer_of(name).answer("start", {"page": "a", "number": 1})["knobs"]
+        return {knob["key"]: (knob["low"], knob["high"], knob["log"]) for knob in knobs}
+
+    fig1, charted = ends("fig1"), ends("chart")
+    assert fig1["noise.D0"] == (0.1, 1.0, True)  # as it varies
+    assert fig1["oscillator.restitution"][1:] == (1.0, False)
+    assert 0 < fig1["oscillator.restitution"][0] < 0.05
+    assert fig1["oscillator.omega"] == (0.1, 10.0, True)
+    assert charted["oscillator.omega"] == (0.3, 5.0, True)
+    assert ends("systems/noisy_damping")["system.c"][2] in (True, False)
+
+
+@contextmanager
+def served(explorer):
+    page = LocalPage(explorer.answer)
+    threading.Thread(target=page.serve_forever, daemon=True).start()
+    try:
+        yield page
+    finally:
+        page.shutdown()
+        page.server_close()
+
+
+def test_only_the_own_page_of_this_machine_is_answered():
+    explorer = explorer_of("fig1")
+    with served(explorer) as page:
+        assert page.server_address[0] == "127.0.0.1"
+
+        def status(method, path, body=None, **headers):
+            connection = http.client.HTTPConnection(*page.server_address)
+            own = {"Host": page.host, "Origin": page.address, "Content-Type": "application/json"}
+            headers = own | {name.replace("_", "-"): value for name, value in headers.items()}
+            connection.request(method, path, body, {key: value for key, value in headers.items() if value})
+            response = connection.getresponse()
+            text = response.read().decode()
+            connection.close()
+            return response.status, text, response.headers
+
+        good = json.dumps({"page": "a", "number": 1})
+        code, text, headers = status("GET", "/", Origin=None)
+        assert code == 200
+        assert "default-src 'none'" in headers["Content-Security-Policy"]
+        assert not re.search(r"https?:", text)
+        assert "fig1.toml" in status("POST", "/start", good)[1]
+        assert str(CASES.parent) not in status("POST", "/start", good)[1]
+        for changed in (
+            {"Host": "evil.example"},
+            {"Host": f"evil.example:{page.server_port}"},
+            {"Origin": "http://evil.example"},
+            {"Origin": "null"},
+            {"Origin": None},
+            {"Content_Type": "text/plain"},
+        ):
+            assert status("POST", "/start", good, **changed)[0] == 403
+        assert status("GET", "/", Host="evil.example")[0] == 403
+        for path in ("/../pyproject.toml", "/etc/passwd", "/fpsolve"):
+            assert status("GET", path)[0] == 403
+        for body in ("", "[]", "{", "[" * 90_000, "1" * 200_000):
+            assert status("POST", "/start", body)[0] == 403
+        assert "refused" in status("POST", "/start", json.dumps({"page": "a"}))[1]
+
+
+@pytest.fixture(scope="module")
+def browser():
+    """Chromium of the system, without a window."""
+    where = shutil.which("chromium")
+    if where is None:
+        message = f"the browser is missing: {INSTALL}"
+        if IS_REQUIRED:
+            pytest.fail(message)
+        pytest.skip(message)
+    api = pytest.importorskip("playwright.sync_api")
+    with api.sync_playwright() as made, made.chromium.launch(executable_path=where, args=["--no-sandbox"]) as chromium:
+        yield chromium
+
+
+def until(page, what):
+    """Wait for what JavaScript says; Playwright's own wait needs eval, which the page does not let run."""
+    for _ in range(600):
+        if page.evaluate(what):
+            return
+        page.wait_for_timeout(100)
+    raise AssertionError(f"never {what}: {page.inner_text('body')}")
+
+
+@contextmanager
+def explored(browser, case, *more, **options):
+    """A page of a server of its own; what the console or the network of the page says is a failure."""
+    command = [sys.executable, "-m", "fpsolve", "explore", str(case), "--no-open", *more]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        try:
+            address = re.search(r"http://127\.0\.0\.1:\d+", process.stdout.readline())[0]
+            context = browser.new_context(**options)
+            page, faults = context.new_page(), []
+            page.on("console", lambda message: faults.append(message.text) if message.type == "error" else None)
+            page.on("pageerror", lambda error: faults.append(str(error)))
+            page.on(
+                "request",
+                lambda sent: None if sent.url.startswith((address, "data:", "blob:")) else faults.append(sent.url),
+            )
+            page.goto(address)
+            page.process, page.faults = process, faults
+            until(page, "document.querySelector('#state').textContent.endsWith(' ms')")
+            yield page
+            assert not faults
+            context.close()
+        finally:
+            process.kill()
+
+
+def at_rest(page):
+    until(page, "/^[0-9]+ ms$/.test(document.querySelector('#state').textContent)")
+
+
+def turn(page, key, value):
+    """Type a value."""
+    before = page.evaluate("wanted")
+    page.fill(f"[id='knob-{key}']", value)
+    page.keyboard.press("Tab")
+    until(page, f"wanted > {before} && !isMoving")
+    page.wait_for_timeout(400)
+    at_rest(page)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "key", "value"),
+    [
+        ("fig1", "noise.D0", "0.7"),
+        ("systems/own_equation", "system.zeta", "0.15"),
+        ("systems/beam", "noise.alpha", "1.5"),
+    ],
+)
+def test_at_rest_the_page_has_the_numbers_of_run(browser, tmp_path, name, key, value):
+    with explored(browser, CASES / f"{name}.toml", "--set", "moments.rtol=1e-4") as page:
+        turn(page, key, value)
+        shown, page_table = cells(page.inner_html("#numbers")), page.inner_html("#table")
+        with page.expect_download() as download:
+            page.click("#save")
+        for each in (CASES / name).parent.iterdir():
+            (tmp_path / each.name).symlink_to(each)
+        saved = tmp_path / download.value.suggested_filename
+        download.value.save_as(saved)
+    data = tomllib.loads(saved.read_text(encoding="utf-8"))
+    assert float(value) == pytest.approx(Explorer(load_case(saved), "").first.values[key])
+    assert "vary" not in data
+    command = [sys.executable, "-m", "fpsolve", "run", str(saved), "--out", str(tmp_path / "out"), "--report"]
+    subprocess.run(command, check=True, capture_output=True)
+    report = cells((tmp_path / "out" / saved.stem / "report.html").read_text(encoding="utf-8"))
+    rows = [row for row in shown if len(row) > 3] or cells(page_table)
+    assert rows
+    assert all(row[:3] in [each[:3] for each in report] for row in rows)  # others tell of uncertain parameters
+
+
+@pytest.mark.slow
+def test_bad_input_reset_and_the_end_of_the_server(browser):
+    with explored(browser, CASES / "fig1.toml") as page:
+        first = page.inner_html("#numbers")
+        page.fill("[id='knob-noise.D0']", "-1")
+        page.keyboard.press("Tab")
+        until(page, "document.querySelector('#refused').textContent.includes('D0: got -1; must be')")
+        assert "stale" in page.get_attribute("body", "class")
+        assert page.locator("#curve path.one").count()  # the last valid curve stays
+        page.click("#reset")
+        page.wait_for_timeout(400)
+        at_rest(page)
+        assert page.inner_text("#refused") == ""
+        assert page.inner_html("#numbers") == first
+        other = page.context.new_page()
+        other.goto(page.url)
+        until(other, "document.querySelector('#state').textContent.endsWith(' ms')")
+        turn(other, "noise.D0", "0.9")
+        assert page.inner_html("#numbers") == first
+        other.close()
+        page.process.kill()
+        until(page, "document.querySelector('#refused').textContent.startsWith('fpsolve has ended')")
+        assert all("ERR_CONNECTION" in each for each in page.faults)
+        page.faults.clear()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("width", [400, 1280])
+def test_the_page_can_be_used_by_everyone(browser, width):
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright")
+    for scheme in ("light", "dark"):
+        size = {"width": width, "height": 900}
+        with explored(browser, CASES / "fig1.toml", viewport=size, color_scheme=scheme) as page:
+            for tab in page.locator("[role=tab]").all():
+                tab.click()
+                found = axe.Axe().run(page).response["violations"]
+                assert not [(each["id"], each["nodes"][0]["html"]) for each in found]
+            assert page.evaluate("document.documentElement.scrollWidth") <= width
+            for slider in page.locator("input[type=range]").all():
+                name = slider.get_attribute("aria-label").removesuffix(", slider")
+                assert page.get_by_label(re.compile("^" + re.escape(name))).count() >= 1
+
+
+MOVES = """
+async count => {
+  const slider = document.querySelectorAll("input[type=range]")[2], svg = document.querySelector("#curve svg");
+  const path = () => svg.querySelector("path.one.line")?.getAttribute("d");
+  const times = [];
+  for (let k = 0; k < count; k++) {
+    const before = path(), start = performance.now();
+    slider.value = 200 + 10 * k;
+    slider.dispatchEvent(new Event("input"));
+    await new Promise(done => new MutationObserver((_, watch) => {
+      if (path() && path() !== before) { watch.disconnect(); done(); }
+    }).observe(svg, {childList: true, subtree: true}));
+    await new Promise(requestAnimationFrame);
+    times.push(performance.now() - start);
+    while (isMoving) await new Promise(done => setTimeout(done, 1));
+  }
+  return times;
+}
+"""
+
+
+def seconds_of_moves(browser, name, count=50):
+    with explored(browser, CASES / f"{name}.toml") as page:
+        page.wait_for_timeout(500)
+        return [time / 1000 for time in page.evaluate(MOVES, count)]
+
+
+@pytest.mark.slow
+def test_a_curve_follows_a_slider_at_once(browser):
+    started = monotonic()
+    fast = median(seconds_of_moves(browser, "fig1"))
+    strong = median(seconds_of_moves(browser, "strong", 10))
+    print(f"slider to curve: fig1 {fast:.3f} s, strong {strong:.3f} s, all {monotonic() - started:.0f} s")
+    assert fast < 0.5  # 50 ms where nothing else runs
+    assert strong < 2.0  # 200 ms
