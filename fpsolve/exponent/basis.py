@@ -46,10 +46,14 @@ DEGREES = (4, 6, 9, 13, 19, 31)
 """Degrees of the polynomials tried for the small matrices."""
 INTERPOLATED = 1e-2
 """Share of the tolerance for the polynomials."""
+FAR = 0.2
+"""Distance from the points of the polynomials that is far enough to see their error."""
 WITHIN = 0.47
 """Share of a gap between two nodes where its error is looked at, and the next node is put: even p tell too little."""
 BOTH_SIDES = (0.2, 0.8)
 """Shares of a gap where its error is looked at, too, unless it is hardly anything in the middle."""
+LEAST = 0.25
+"""What is left there over the most, as it falls to the nodes."""
 HARDLY = 0.25
 """Share of what is allowed up to which it is that."""
 HOPELESS = 100.0
@@ -115,6 +119,10 @@ class Polynomials:
         np.fill_diagonal(self.slopes, 0.0)
         np.fill_diagonal(self.slopes, -self.slopes.sum(axis=1))
 
+    def distance(self, p: FloatArray) -> FloatArray:
+        """The product of the distances from the points, about 2 at most: an interpolation errs in proportion to it."""
+        return np.abs(np.prod((p[:, None] - self.points) / self._unit, axis=1))
+
     def at(self, p: FloatArray) -> FloatArray:
         """The values at p of the polynomials that are 1 at one point and 0 at the others, shape (len(p), n)."""
         gaps = (p[:, None] - self.points) / self._unit
@@ -177,7 +185,7 @@ class Left(NamedTuple):
 
 
 class Curve(NamedTuple):
-    """Λ(p), Λ′(p), the estimate of |error of Λ(p)|, and the part of it by the basis, each of shape (n,)."""
+    """Λ(p), Λ′(p), the estimate of |error of Λ(p)|, and its part by the basis at most, each of shape (n,)."""
 
     value: FloatArray
     derivative: FloatArray
@@ -405,7 +413,6 @@ class Basis:
             self._matrices, self._spaces = [generator.matrix(p) for p in points], [generator.space(p) for p in points]
             known = np.array([images(*each) for each in zip(self._matrices, self._spaces, strict=True)])
             off = float(np.linalg.norm(self._polynomials.at(np.array([test]))[0] @ known - exact))
-            self._off = SAFE * off * float(size) / abs(test)
             rounding = degree * _EPS * np.max(np.linalg.norm(known, axis=1))
             self._degree = DEGREES.index(degree)
             if off <= max(INTERPOLATED * self._solver.tolerance(test, 0.0) / size, rounding):
@@ -415,7 +422,7 @@ class Basis:
         weighed = np.array([space.weighed(pair.right) for space in self._spaces])
         if np.ptp(weighed, axis=0).max() <= _EPS * np.abs(weighed).max():  # M does not depend on p
             self._spaces = self._spaces[:1]
-        self._adjoints = [each.T for each in self._matrices]
+        self._off, self._adjoints = 0.0, [each.T for each in self._matrices]
         self._a, self._g = np.zeros((2, len(self._matrices), 0, 0))
         self._right, self._dual = np.zeros((2, 0, generator.size))
 
@@ -463,9 +470,12 @@ class Basis:
         if not (tangents - slack <= value <= chord + slack and goes_on):
             return Left(p, math.inf, SHARE * allowed, len(self.nodes))
         matrix = self._generator.matrix(p).shifted(value)
+        image = matrix @ pair.right
+        off = abs(float(pair.left @ image)) / max(self._polynomials.distance(np.array([p]))[0], FAR)
+        self._off = max(self._off, SAFE * off)
         nearest = self.nodes[min(self.nodes, key=lambda q: abs(q - p))].around
         assert nearest is not None
-        change = nearest.solve(matrix @ pair.right, refinements=1)
+        change = nearest.solve(image, refinements=1)
         error = SAFE * abs(float((matrix.T @ pair.left) @ change))
         if error <= SHARE * allowed and self._solver.mesh is None and not any(low < q < high for q in self._rates):
             found, most = Solution(pair), self._allowed(p, value)
@@ -495,8 +505,9 @@ class Basis:
         if self._has_zero:
             rounded[:, 0, 0] *= np.abs(p / max(self.low, self.high, key=abs))
         rounding = (rounded @ np.abs(x)[:, :, None])[:, 0, 0] / np.abs(norm)
-        left, of_space = self._left_of(p), self._error_of_space(p)
-        return Curve(value, derivative, left + rounding + np.abs(p) * self._off + of_space, left)
+        most, left = self._left_of(p)
+        error = left + rounding + self._off * self._polynomials.distance(p) + self._error_of_space(p)
+        return Curve(value, derivative, error, most)
 
     def second_derivative(self, p: FloatArray) -> FloatArray:
         """Λ″ at p in the interval, shape (n,)."""
@@ -508,15 +519,19 @@ class Basis:
         by_p = _bordered(found, -(change @ x[:, :, None])[:, :, 0])
         return np.asarray((form(y, a2 - rate * g2 - 2 * slope * g1, x) + 2 * form(y, change, by_p)) / norm)
 
-    def _left_of(self, p: FloatArray) -> FloatArray:
-        """What is left at p, by what is left between the same nodes; near 0 it falls faster than p."""
+    def _left_of(self, p: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """The most that is left between the nodes on both sides, and what is left at p.
+
+        That falls as the fourth power of the distance from each node. One power less is counted, as it may be the most
+        elsewhere than where it was looked at.
+        """
         gaps = [*pairwise(sorted(self.nodes))]
-        lefts = [self._lefts.get(gap, Left(1.0, 0.0, 0.0, 0)) for gap in gaps]
-        i = np.clip(np.searchsorted([low for low, _ in gaps], p, side="right") - 1, 0, len(gaps) - 1)
-        error, at = (np.array([getattr(left, name) for left in lefts])[i] for name in ("error", "p"))
-        return np.asarray(
-            error * np.where(np.array([0.0 in gap for gap in gaps])[i], np.minimum(1.0, np.abs(p / at)), 1.0)
-        )
+        low, high = np.array(gaps).T
+        lefts = [self._lefts.get(gap, Left(math.nan, 0.0, 0.0, 0)) for gap in gaps]
+        error, at = (np.array([getattr(left, name) for left in lefts]) for name in ("error", "p"))
+        most = error / np.fmax((4 * (at - low) * (high - at) / (high - low) ** 2) ** 3, LEAST)
+        i = np.clip(np.searchsorted(low, p, side="right") - 1, 0, low.size - 1)
+        return most[i], most[i] * (4 * (p - low[i]) * (high[i] - p) / (high[i] - low[i]) ** 2) ** 3
 
     def _error_beside(self, p: float) -> float:
         """The error of the space at a node of an even p, where T is too simple, by that at a p next to it."""
