@@ -489,9 +489,9 @@ class Basis:
         return Left(p, error, SHARE * allowed, len(self.nodes))
 
     def _bound(self) -> FloatArray:
-        """What rounding may change in an entry of the small matrix of L, at the largest |p|: shape (size, size)."""
+        """What rounding may change in an entry of the small matrix of L, and by it, at the largest |p|: (size, size)."""
         matrix = abs(self._generator.matrix(max(self.low, self.high, key=abs)))
-        return _EPS * (np.abs(self._dual) @ np.array([matrix @ np.abs(each) for each in self._right]).T)
+        return 2 * _EPS * (np.abs(self._dual) @ np.array([matrix @ np.abs(each) for each in self._right]).T)
 
     def at(self, p: FloatArray) -> Curve:
         """Λ at p in the interval, shape (n,)."""
@@ -501,7 +501,7 @@ class Basis:
         norm = form(y, g, x)
         a1, g1 = self._pencils(p, 1)
         derivative = (form(y, a1, x) - value * form(y, g1, x)) / norm
-        rounded = np.abs(y)[:, None, :] @ self._rounding
+        rounded = np.abs(y)[:, None, :] @ self._rounding * np.abs(self._polynomials.at(p)).sum(axis=1)[:, None, None]
         if self._has_zero:
             rounded[:, 0, 0] *= np.abs(p / max(self.low, self.high, key=abs))
         rounding = (rounded @ np.abs(x)[:, :, None])[:, 0, 0] / np.abs(norm)
