@@ -74,6 +74,8 @@ FORESEEN = 1.5
 """Factor of the unknowns of a space up to which the highest modes tell what it lacks."""
 GOAL = 0.01
 """Share of what is allowed that a finer space is made for, in each direction."""
+NEARLY = 1e-6
+"""Share of T′ in the last step of its refinement: T′ need not be more accurate."""
 MOST_NODES = 40
 """Number of nodes of a basis."""
 MOST_SPACES = 8
@@ -297,7 +299,7 @@ class Basis:
             of_l, of_m = self._images(vectors, adjoint)
             change = np.tensordot(row, of_l[:, 0] - pair.eigenvalue * of_m[:, 0], 1)
             source = pair.derivative * pair.space.weighed(vectors[0]) - change
-            vectors.append(around.solve(source, adjoint=adjoint, refinements=2))
+            vectors.append(around.solve(source, adjoint=adjoint, enough=NEARLY))
         rate = error / abs(p) if p else error if demand else 0.0
         return self._take(Node(pair, error if p else 0.0, rate, demand, around, right, left))
 
@@ -477,7 +479,9 @@ class Basis:
         assert nearest is not None
         change = nearest.solve(image, refinements=1)
         error = SAFE * abs(float((matrix.T @ pair.left) @ change))
-        if error <= SHARE * allowed and self._solver.mesh is None and not any(low < q < high for q in self._rates):
+        is_sure = abs(p) * max(node.rate for node in self.nodes.values()) <= SURELY * allowed
+        is_known = is_sure or self._solver.mesh is not None or any(low < q < high for q in self._rates)
+        if error <= SHARE * allowed and not is_known:
             found, most = Solution(pair), self._allowed(p, value)
             if 0.0 in gap:  # where Λ(p)/p is wanted
                 most = min(most, abs(p) * self._allowed(0.0))

@@ -56,7 +56,7 @@ BESIDE = 1e-2
 REFINEMENTS = 3
 """Number of times that T′ is improved by its residual."""
 REFINED = 1e-14
-"""Share of T′ of a step that is the last one."""
+"""Share of T′ of a step that is the last one, where no other one is enough."""
 MAX_ITERATIONS = 12
 """Number of LU factors in an iteration."""
 MAX_SHIFTS = 12
@@ -484,7 +484,9 @@ class PairDerivatives:
     def _factor(self) -> Factors:
         return self._kept[0] if self._kept else self._pencil.factorised(self.pair.eigenvalue + 1e-6 * self._rate)
 
-    def solve(self, source: FloatArray, *, adjoint: bool = False, refinements: int = REFINEMENTS) -> FloatArray:
+    def solve(
+        self, source: FloatArray, *, adjoint: bool = False, refinements: int = REFINEMENTS, enough: float = REFINED
+    ) -> FloatArray:
         """v from the load f, in `one_thread`; each refinement leaves 1e-6 of a rate over the gap of the spectrum."""
         own, other = self.pair.right, self.pair.left
         weighed, operator, change = self._weighed[0], self._operator, 0.0 * own
@@ -496,7 +498,7 @@ class PairDerivatives:
             step = self._factor.solve(rest, transposed=adjoint)
             change += step
             change -= (other @ self.pair.space.weighed(change)) / self.norm * own
-            if length(step) <= REFINED * length(change):
+            if length(step) <= enough * length(change):
                 break
         return change
 
