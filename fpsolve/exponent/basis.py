@@ -11,6 +11,10 @@ the small matrices are interpolated by polynomials.
 
 With the residuals r = (L − Λ)T and s = (L − Λ)ᵀT* of what the small pencil has at p, and a node q next to it, what is
 left is to first order −sᵀ(L_q − Λ_q)⁻¹r/⟨T*, T⟩. A node is added where that is largest beside what is allowed.
+
+The space is that of the outermost p, refined until it serves Λ′(0), too, as Λ is small next to p = 0. A node that is
+resolved is carried to a finer space as it is: with errors of T and of T*, that of Λ is their product. At p = 0 it is
+solved anew, as Λ′ has the error of T* there.
 """
 
 from __future__ import annotations
@@ -493,7 +497,7 @@ class Basis:
         return Left(p, error, SHARE * allowed, len(self.nodes))
 
     def _bound(self) -> FloatArray:
-        """What rounding may change in an entry of the small matrix of L, and by it, at the largest |p|: (size, size)."""
+        """What rounding may change in an entry of the small matrix of L and by it at the largest |p|, (size, size)."""
         matrix = abs(self._generator.matrix(max(self.low, self.high, key=abs)))
         return 2 * _EPS * (np.abs(self._dual) @ np.array([matrix @ np.abs(each) for each in self._right]).T)
 
