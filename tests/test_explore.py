@@ -17,6 +17,7 @@ from time import monotonic
 import numpy as np
 import pytest
 
+from fpsolve import lyapunov_exponent
 from fpsolve.case.case import load_case
 from fpsolve.page.local import LocalPage
 from fpsolve.parts.indices import index_text, told_indices
@@ -130,6 +131,39 @@ def test_a_newer_question_of_a_page_ends_an_older_one():
     explorer.answer("stop", {"page": "a", "number": 3, "of": "curve"})
     thread.join()
     assert told["old"] == {"stopped": True}
+
+
+def test_pictures_are_of_the_eigenfunction_and_of_a_density():
+    for name in ("fig1", "systems/own_equation"):
+        explorer = explorer_of(name)
+        found = explorer.answer("field", {**question(explorer), "p": 0.0})["panels"]
+        values = np.array(found[-1]["values"])
+        sides = [np.linspace(*ends, count) for ends, count in zip(found[-1]["ends"], values.shape, strict=True)]
+        assert abs(np.trapezoid(np.trapezoid(values, sides[1]), sides[0]) - 1) < 2e-3
+        np.testing.assert_allclose(found[0]["values"], 1, atol=1e-4)  # T = 1 at p = 0
+    assert "got p = 'two'" in explorer.answer("field", {**question(explorer), "p": "two"})["refused"]
+
+
+def test_a_map_of_no_frame_is_refused():
+    explorer = explorer_of("fig1")
+    side = {"key": "noise.D0", "start": 0.1, "stop": 1.0, "scale": "log"}
+    for axes, words in (
+        ([side, side], "both axes"),
+        ([side, {"key": "noise.D0"}], "missing"),
+        ([side, {**side, "key": "none"}], "got none as an axis"),
+        (None, "x"),
+    ):
+        assert words in explorer.answer("map", {**question(explorer), "axes": axes})["refused"]
+
+
+@pytest.mark.slow
+def test_paths_grow_with_the_exponent():
+    explorer = explorer_of("theorem")
+    found = explorer.answer("paths", question(explorer))
+    rates = np.array(found["logs"])[:, -1] / found["time"][-1]
+    assert abs(np.mean(rates) - found["exponent"]) < 5 * np.std(rates) / 3
+    assert len(found["logs"]) == 10
+    assert min(found["motion"]) >= 0  # the wall is at 0
 
 
 def test_sliders_go_as_far_as_the_case_or_the_parameter_says():
@@ -329,6 +363,33 @@ def test_the_page_can_be_used_by_everyone(browser, width):
             for slider in page.locator("input[type=range]").all():
                 name = slider.get_attribute("aria-label").removesuffix(", slider")
                 assert page.get_by_label(re.compile("^" + re.escape(name))).count() >= 1
+
+
+@pytest.mark.slow
+def test_a_click_on_the_map_sets_the_sliders(browser):
+    with explored(browser, CASES / "theorem.toml") as page:
+        page.click("#tab-map")
+        page.select_option("#map select >> nth=0", "oscillator.c1")
+        page.click("#map .go")
+        until(page, "views.map !== undefined")
+        [line] = [each for each in page.evaluate("views.map.answer.lines") if each["name"] == "λ = 0"]
+        (x, y), *_ = line["branches"]
+        problem = load_case(CASES / "theorem.toml").problem
+        for k in (0, len(x) // 2):
+            there = problem.at({"oscillator.c1": x[k], "noise.D0": y[k]})
+            assert abs(lyapunov_exponent(there).value) < 1e-6
+        box = page.locator("#map svg").bounding_box()
+        page.mouse.click(box["x"] + 0.6 * box["width"], box["y"] + 0.4 * box["height"])
+        page.wait_for_timeout(600)
+        circle = page.locator("#map circle").bounding_box()
+        assert abs(circle["x"] + circle["width"] / 2 - box["x"] - 0.6 * box["width"]) < 3
+        assert float(page.input_value("[id='knob-noise.D0']")) != problem.values["noise.D0"]
+        for name in ("field", "paths"):
+            page.click(f"#tab-{name}")
+            page.click(f"#{name} .go")
+            until(page, f"views.{name} !== undefined")
+            assert page.locator(f"#{name} svg").count() == 2
+            assert page.locator(f"#{name} td").count() > 9
 
 
 MOVES = """

@@ -147,7 +147,7 @@ function sorted([p, ...rest]) {
 }
 
 function drawCurve() {
-  if (!shown) return;
+  if (!shown || $("curve").hidden) return;
   const curves = [before, shown].filter(Boolean).map(answer => sorted(answer.curve)), [p, value, slope, error] = curves.at(-1);
   const all = curves.flatMap(each => each[1]).concat(0), room = 0.06 * (Math.max(...all) - Math.min(...all)) || 1;
   const ends = [Math.min(...p), Math.max(...p)], low = p.length > 1 ? ends : [Math.min(0, ends[0]), ends[1] + 1];
@@ -167,7 +167,99 @@ function showCurve(answer) {
   if (!before && answer.root !== undefined && !wanted) before = answer;
   $("equations").replaceChildren(...answer.equations.map(text => Object.assign(document.createElement("p"), {className: "equation", textContent: text})));
   for (const name of ["verdict", "numbers", "table"]) $(name).innerHTML = answer[name]; // escaped by fpsolve
-  drawCurve();
+  redraw();
+}
+
+// the views beside the curve: what was drawn of another position is grey
+
+const views = {}; // the answers by name, each with the position that it is of
+const position = () => JSON.stringify(knobs.map(knob => knob.read()));
+const palette = [[68, 1, 84], [59, 82, 139], [33, 145, 140], [94, 201, 98], [253, 231, 37]]; // viridis, which the colour-blind see
+
+function paint(rows) { // numbers, along x first, as a picture
+  const canvas = Object.assign(document.createElement("canvas"), {width: rows.length, height: rows[0].length}), pen = canvas.getContext("2d");
+  const all = rows.flat(), low = Math.min(...all), high = Math.max(...all), pixels = pen.createImageData(canvas.width, canvas.height);
+  rows.forEach((row, i) => row.forEach((value, j) => {
+    const s = high > low ? 3.999999 * (value - low) / (high - low) : 0, k = Math.floor(s), at = 4 * ((canvas.height - 1 - j) * canvas.width + i);
+    for (let c = 0; c < 3; c++) pixels.data[at + c] = palette[k][c] + (s - k) * (palette[k + 1][c] - palette[k][c]);
+    pixels.data[at + 3] = 255;
+  }));
+  pen.putImageData(pixels, 0, 0);
+  return {href: canvas.toDataURL(), low, high};
+}
+
+const drawings = {
+  map(answer) {
+    const [x, y] = answer.axes.map(({key, start, stop, scale}) => ({ends: [start, stop], log: scale === "log", label: key}));
+    const svg = $("map").querySelector("svg"), plot = frame(svg, x, y);
+    answer.lines.forEach((each, i) => each.branches.forEach(([u, v], k) => {
+      node(plot.inside, "path", {class: `line ${["one", "two"][i]}`, d: line(plot, u, v)});
+      const m = Math.floor(u.length * (0.35 + 0.3 * i));
+      if (!k) node(plot.inside, "text", {class: "name", x: plot.X(u[m]) + 6, y: plot.Y(v[m]) - 6}, each.name);
+    }));
+    for (const {name, at} of answer.regions) name.split(", ").forEach((part, k) =>
+      node(plot.inside, "text", {class: "name", x: plot.X(at[0]), y: plot.Y(at[1]) + 15 * k, "text-anchor": "middle"}, part));
+    const [u, v] = answer.axes.map(({key}) => knobs.find(knob => knob.key === key));
+    node(svg, "circle", {class: "dot two", cx: plot.X(u.read()), cy: plot.Y(v.read()), r: 6});
+    svg.onclick = event => {
+      const place = svg.getBoundingClientRect(), at = plot.at(event.clientX - place.left, event.clientY - place.top);
+      if (at.some((value, i) => value < [x, y][i].ends[0] || value > [x, y][i].ends[1])) return;
+      [u, v].forEach((knob, i) => knob.set(Number(at[i].toPrecision(4))));
+      moved();
+    };
+  },
+  field(answer) {
+    $("field").querySelector(".panels").replaceChildren(...answer.panels.map((each, i) => {
+      const box = document.createElement("div"), svg = document.createElementNS(SVG, "svg"), title = document.createElement("h3");
+      box.id = `panel-${i}`;
+      svg.setAttribute("role", "img");
+      svg.setAttribute("aria-label", `${each.title}; numbers are in the table`);
+      box.append(title, svg);
+      requestAnimationFrame(() => {
+        const [x, y] = each.ends.map((ends, k) => ({ends, label: each.names[k]})), {href, low, high} = paint(each.values);
+        const turn = Math.abs(x.ends[1] - 2 * Math.PI) < 1e-9;
+        if (turn) Object.assign(x, {ticks: [0, 1, 2, 3, 4].map(k => k * Math.PI / 2), name: value => ["0", "π/2", "π", "3π/2", "2π"][Math.round(2 * value / Math.PI)]});
+        const plot = frame(svg, x, y), {left, right, top, bottom} = plot.box;
+        node(plot.inside, "image", {href, x: left, y: top, width: right - left, height: bottom - top, preserveAspectRatio: "none"});
+        title.textContent = `${each.title}, from ${brief(low)} (dark) to ${brief(high)} (bright)`;
+      });
+      return box;
+    }));
+  },
+  paths(answer) {
+    const all = answer.logs.flat(), end = answer.time.at(-1), {exponent} = answer, more = exponent === null ? [] : [exponent * end];
+    const plot = frame($("paths").querySelector("svg"), {ends: [0, end], label: "time"}, {ends: [Math.min(...all, ...more), Math.max(...all, ...more)], label: "ln‖x‖"});
+    for (const each of answer.logs) node(plot.inside, "path", {class: "line path", d: line(plot, answer.time, each)});
+    if (exponent !== null) node(plot.inside, "path", {class: "line two", d: line(plot, [0, end], [0, exponent * end])});
+    const ends = [Math.min(...answer.motion, 0), Math.max(...answer.motion)];
+    const near = frame($("motion").firstChild, {ends: [0, answer.short.at(-1)], label: "time"}, {ends, label: answer.name});
+    node(near.inside, "path", {class: "line one", d: line(near, answer.short, answer.motion)});
+  },
+};
+
+function drawViews() {
+  for (const name in views) {
+    const {answer, of} = views[name], moving = name === "map" ? answer.axes.map(axis => axis.key) : [];
+    const others = text => JSON.parse(text).filter((_, i) => !moving.includes(knobs[i].key)).join();
+    $(name).classList.toggle("stale", others(of) !== others(position()));
+    if (!$(name).hidden) drawings[name](answer);
+  }
+}
+
+function makeViews() {
+  const [first, second] = document.querySelectorAll("#map .axis"), axes = knobs.filter(knob => knob.axis);
+  for (const select of [first, second]) select.append(...axes.map(knob => new Option([knob.words, knob.key].filter(Boolean).join(", "), knob.key)));
+  second.value = (axes.find(knob => knob.key.startsWith("noise.")) || axes.at(-1)).key;
+  const axis = select => { const {key, low, high, log} = axes.find(knob => knob.key === select.value); return {key, start: low, stop: high, scale: log ? "log" : "linear"}; };
+  const questions = {map: () => ({axes: [axis(first), axis(second)]}), field: () => ({p: Number($("field").querySelector(".order").value)}), paths: () => ({})};
+  for (const name in questions) $(name).querySelector(".go").onclick = () => {
+    const of = position();
+    work(name, answer => {
+      views[name] = {answer, of};
+      $(name).querySelector(".told").innerHTML = answer.told; // escaped by fpsolve
+      drawViews();
+    }, questions[name]());
+  };
 }
 
 // tabs, downloads
@@ -200,7 +292,10 @@ function makeTabs() {
   }
 }
 
-function redraw() { drawCurve(); }
+function redraw() {
+  drawCurve();
+  drawViews();
+}
 
 function download({name, text}) {
   const link = Object.assign(document.createElement("a"), {href: URL.createObjectURL(new Blob([text])), download: name});
@@ -222,8 +317,9 @@ async function start() {
   $("knobs").append(...knobs.map(knob => knob.box));
   for (const id of ["save", "report"]) $(id).hidden = !about.file;
   makeTabs();
+  makeViews();
   $("reset").onclick = () => { for (const knob of knobs) knob.set(knob.value); moved(); };
-  $("stop").onclick = () => { for (const of of ["curve", "save", "report"]) ask("stop", {of}); $("state").textContent = "stopped"; $("stop").disabled = true; };
+  $("stop").onclick = () => { for (const of of ["curve", "map", "field", "paths", "report"]) ask("stop", {of}); $("state").textContent = "stopped"; $("stop").disabled = true; };
   $("save").onclick = () => work("save", download);
   $("report").onclick = () => work("report", download);
   $("python").onclick = () => work("python", copy);

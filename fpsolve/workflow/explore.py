@@ -13,6 +13,7 @@ import unicodedata
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from datetime import UTC, datetime
+from functools import partial
 from itertools import chain
 from pathlib import Path
 from time import perf_counter
@@ -48,6 +49,7 @@ from fpsolve.show.problem import show as show_problem
 from fpsolve.study.results import CurveResult
 from fpsolve.study.solve import everything, solve_curve
 from fpsolve.workflow.reports import COMPLETE, facts_since
+from fpsolve.workflow.views import field_of, map_of, paths_of
 
 MOVING_RTOL = 3e-4
 """Relative error of Λ(p) while a slider moves, at least."""
@@ -97,6 +99,9 @@ class Explorer:
             "start": ("start", self._start),
             "move": ("curve", self._move),
             "solve": ("curve", self._solve),
+            "map": ("map", lambda asked: map_of(self._at(asked), asked.get("axes"))),
+            "field": ("field", lambda asked: field_of(self._at(asked), asked.get("p"))),
+            "paths": ("paths", self._paths),
             "save": ("save", self._save),
             "report": ("report", self._report),
             "python": ("python", self._python),
@@ -114,14 +119,10 @@ class Explorer:
         if not isinstance(number, int | float):
             return {"refused": f"got {number!r} as the number of a question; must be a number; load the page again"}
         self._newest[asked] = max(number, self._newest.get(asked, number))
-
-        def look(_: object = None) -> None:
-            if self._newest[asked] != number:
-                raise KeyboardInterrupt
-
+        look = partial(self._look, asked, number)
         try:
             started = perf_counter()
-            with watched(look):
+            with watched(lambda _: look()):
                 return {**answer(question), "seconds": perf_counter() - started}
         except KeyboardInterrupt:
             return {"stopped": True}
@@ -129,6 +130,11 @@ class Explorer:
             return {"refused": failure.message.words(CASE_WORDS)}
         except Exception as failure:
             return {"refused": str(fault(failure))}
+
+    def _look(self, asked: tuple[str, str], number: float) -> None:
+        """End what is not wanted any more."""
+        if self._newest[asked] != number:
+            raise KeyboardInterrupt
 
     def _start(self, _: Mapping[str, Any]) -> Answer:
         """The sliders, and what the page is about."""
@@ -237,6 +243,13 @@ class Explorer:
             "numbers": part_of_page([*filter(lambda each: isinstance(each, Grid), shown), *notes(case, [result], "")]),
             "table": part_of_page(MOMENTS.show(case, result)),
         }
+
+    def _paths(self, question: Mapping[str, Any]) -> Answer:
+        """Simulated paths, and the λ that they grow by."""
+        case, asked = self._at(question), (str(question.get("page")), "paths")
+        exponent = self._solved(case, is_moving=True).lyapunov_exponent
+        found = paths_of(case, partial(self._look, asked, question["number"]))
+        return {**found, "exponent": exponent.value if exponent else None}
 
     def _save(self, question: Mapping[str, Any]) -> Answer:
         """A case of which `run` gives these numbers."""

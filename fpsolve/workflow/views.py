@@ -1,0 +1,179 @@
+"""What `fpsolve explore` shows beside a curve: the map of stability, T and densities, simulated paths."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from pydantic import ValidationError
+
+from fpsolve.analysis.density import stationary_density
+from fpsolve.analysis.zero import check_axes, said
+from fpsolve.arrays import FloatArray
+from fpsolve.case.case import Case
+from fpsolve.case.sections import ChartSection
+from fpsolve.data import plain_unit
+from fpsolve.errors import FpsolveError
+from fpsolve.explain import explain
+from fpsolve.exponent.solver import ExponentSolver
+from fpsolve.page.html import part_of_page
+from fpsolve.page.page import Column, Drawing, Grid, Sentence
+from fpsolve.parts.eigenfunctions import FURTHEST
+from fpsolve.parts.nodes import Nodes
+from fpsolve.parts.part import Numerics
+from fpsolve.results.text import sampled
+from fpsolve.workflow.chart import show, solve_chart
+
+PIXELS = 144, 72
+"""Of a picture, each way."""
+SHOWN = 9, 5
+"""Rows and columns of its table."""
+PATHS, POINTS, PERIODS = 10, 400, 12
+"""Paths, points of each, and half-turns of the motion that is shown."""
+NAMED = 0.02
+"""Share of the frame from which on a region is named."""
+Answer = Mapping[str, Any]
+
+
+def map_of(case: Case, axes: object) -> Answer:
+    """The lines λ = 0 and Λ(2) = 0 over two parameters, as `chart` traces them, and the regions between them.
+
+    Args:
+        axes: two tables such as those of [chart].
+    """
+    zero: list[Any] = [{"moment": 2.0}] if not case.problem.has_algebraic_tails else []
+    zero = zero if case.problem.is_closed_only else ["lyapunov_exponent", *zero]
+    x, y = axes if isinstance(axes, list) and len(axes) == 2 else (None, None)
+    try:
+        frame = ChartSection.model_validate({"x": x, "y": y, "zero": zero})
+        sides = frame.x.axis, frame.y.axis
+        check_axes(case.problem, *sides)
+    except ValidationError as failure:
+        told = [f"{key}: {text}" for _, key, text in explain(failure, ChartSection.model_fields)]
+        raise FpsolveError("\n".join(told)) from failure
+    except ValueError as failure:
+        raise FpsolveError(said(failure)) from failure
+    case = case.model_copy(update={"chart": frame})
+    *_, chart = solve_chart(case)
+    regions = chart.regions.each if chart.regions else ()
+    return {
+        "axes": axes,
+        "lines": [
+            {"name": line.zero.equation, "branches": [closed(each.x, each.y, each.closed) for each in line.branches]}
+            for line in chart.lines
+        ],
+        "regions": [
+            {"name": each.name, "at": [float(side.value(u)) for side, u in zip(sides, each.at, strict=True)]}
+            for each in regions
+            if each.share >= NAMED
+        ],
+        "told": part_of_page(each for each in show(case, chart) if not isinstance(each, Drawing)),
+    }
+
+
+def closed(x: FloatArray, y: FloatArray, is_closed: bool) -> list[list[float]]:
+    """The points of a branch, the first one again at the end where it is closed."""
+    return [np.append(each, each[:is_closed]).tolist() for each in (x, y)]
+
+
+def field_of(case: Case, p: object) -> Answer:
+    """T and the stationary density over phase and noise, of three and four variables densities of directions."""
+    if not isinstance(p, int | float) or not math.isfinite(p):
+        raise FpsolveError(f"got p = {p!r}; must be a finite number; write, for example, 2")
+    problem, own = case.problem, Numerics.of(case)
+    if why := problem.no_picture:
+        raise FpsolveError(why)
+    solver = ExponentSolver(problem, own.mesh, rtol=own.rtol, budget=own.budget)
+    stationary = solver.pair(0.0)
+    if problem.dimension > 2:
+        found: Any = stationary_density(stationary)
+        first, second = found.grid.quantities
+        names = [
+            f"{each.words} ({plain_unit(each.unit)})" if each.unit != "1" else each.words for each in (first, second)
+        ]
+        panels = [panel("stationary density of directions", found.grid.first, found.grid.second, found.values, names)]
+        return {"panels": panels, "told": part_of_page([*told_of(panels), Sentence(f"{found._said()}.")])}
+    stationary_density(stationary)  # which refuses one that misleads
+    pair = solver.pair(float(p))
+    grid, unit = Nodes.of(pair), problem.noise_quantity.unit
+    inside = np.full(grid.z.size, True) if problem.noise.has_states else np.abs(grid.z) <= FURTHEST
+    xi = grid.unit * grid.z[inside]
+    along = "number of the state" if problem.noise.has_states else f"noise ξ ({plain_unit(unit)})"
+    names = ["phase φ (rad)", along.removesuffix(" (unknown)").removesuffix(" (1)")]
+    fields = {
+        f"eigenfunction T of p = {p:g}": grid.fields(pair).right,
+        "stationary density": grid.fields(stationary).adjoint,
+    }
+    panels = [panel(title, grid.phi.ravel(), xi, values[:, inside], names) for title, values in fields.items()]
+    return {"panels": panels, "told": part_of_page(told_of(panels))}
+
+
+def panel(title: str, x: FloatArray, y: FloatArray, values: FloatArray, names: Sequence[str]) -> Answer:
+    """A picture of values at nodes, on pixels between them."""
+    u, v = (np.linspace(each[0], each[-1], count) for each, count in zip((x, y), PIXELS, strict=True))
+    rows = np.array([np.interp(u, x, column) for column in values.T])  # y first
+    pixels = np.array([np.interp(v, y, column) for column in rows.T])
+    ends = [[float(each[0]), float(each[-1])] for each in (x, y)]
+    return {
+        "title": title,
+        "ends": ends,
+        "names": names,
+        "values": [[float(f"{z:.4g}") for z in row] for row in pixels],
+    }
+
+
+def told_of(panels: Sequence[Answer]) -> Iterator[Grid]:
+    """A table for each picture."""
+    shares = [np.linspace(0, size - 1, count) for size, count in zip(PIXELS, SHOWN, strict=True)]
+    places = [each.round().astype(int) for each in shares]
+    for each in panels:
+        (x0, x1), (y0, y1) = each["ends"]
+        x, y = np.linspace(x0, x1, PIXELS[0])[places[0]], np.linspace(y0, y1, PIXELS[1])[places[1]]
+        heads = [Column(f"{each['names'][0]} \\ {each['names'][1]}"), *(Column(f"{value:.3g}") for value in y)]
+        rows: list[Sequence[str]] = [
+            [f"{value:.4g}", *(f"{each['values'][i][j]:.4g}" for j in places[1])]
+            for i, value in zip(places[0], x, strict=True)
+        ]
+        yield Grid(each["title"], heads, rows)
+
+
+def paths_of(case: Case, look: Callable[[], None]) -> Answer:
+    """ln‖x(t)‖ of ten simulated paths, and the motion of one of them, whose wall throws it back."""
+    from fpsolve.simulation.coefficients import coefficients  # which compiles
+    from fpsolve.simulation.kernels import RENORMALISED, advance
+    from fpsolve.simulation.setup import default_step, obstacles, simulated_parts, starting_state, transient
+
+    system, noise = simulated_parts(case.problem)
+    for name, sentence in obstacles(system, noise).items():
+        raise FpsolveError(f"{name}: {sentence}")
+    h, known = default_step(system, noise), coefficients(system, noise)
+    motion, step, rng = known.motion(h), known.noise_step(h), np.random.default_rng(case.monte_carlo.seed)
+    x, u, xi = starting_state(noise, PATHS, rng, dimension=known.dimension)
+    log_norm, push = np.zeros((2, PATHS))
+    state = x, u, xi, log_norm, push
+
+    def followed(count: int) -> Iterator[tuple[float, FloatArray, float]]:
+        """Points with the time, ln‖x‖ of all paths, and the first variable of the first one."""
+        for k in range(POINTS + 1):
+            yield k * count * h, log_norm.copy(), float(x[0] * math.exp(log_norm[0]))
+            look()
+            advance(motion, step, h, *state, count, RENORMALISED, rng)
+
+    long = max(1, round(64 * transient(system, noise) / h / POINTS))
+    time, logs, _ = zip(*followed(long), strict=True)
+    log_norm[:] = 0.0
+    near = max(1, round(PERIODS * known.half_turn / h / POINTS)) if math.isfinite(known.half_turn) else 1
+    short, _, first = zip(*followed(near), strict=True)
+    has_wall = any(abs(math.cos(jump.phase)) < 1e-12 for jump in system.jumps)  # at x = 0
+    rates = logs[-1] / time[-1]
+    mean, error = float(np.mean(rates)), float(np.std(rates, ddof=1) / math.sqrt(PATHS))
+    rows: list[Sequence[str]] = [[f"{k + 1}", f"{each:.4g}"] for k, each in enumerate(rates)]
+    grid = Grid("", [Column("path"), Column("ln‖x‖/t")], rows)
+    said = Sentence(f"Their mean growth rate is {sampled(mean, error)} ± {sampled(error, error)}, a standard error.")
+    return {
+        "time": time, "logs": np.array(logs).T.tolist(), "short": short,
+        "motion": np.abs(first).tolist() if has_wall else first,
+        "name": case.problem.system.states[0].removesuffix("₁"), "told": part_of_page([said, grid]),
+    }  # fmt: skip
