@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import Any, ClassVar, NamedTuple
 
@@ -166,7 +166,7 @@ class CoefficientMatrix:
         noise: the name of that noise where there are several.
 
     Raises:
-        ValueError: the matrix is not square and finite, n = 2 to 200, or the order is negative.
+        ValueError: the matrix is not square and finite, n = 1 to 200, or the order is negative.
     """
 
     order: int
@@ -179,7 +179,7 @@ class CoefficientMatrix:
         with suppress(ValueError):
             entries = real_array(self.matrix, "matrix")
         n = len(entries) if entries.ndim == 2 else 0
-        if entries.shape != (n, n) or not 2 <= n <= MOST_VARIABLES or not is_whole(self.order, 0):
+        if entries.shape != (n, n) or not 1 <= n <= MOST_VARIABLES or not is_whole(self.order, 0):
             raise ValueError(
                 f"got order = {shown(self.order)} and matrix = {shown(self.matrix)}; must be a whole number >= 0 and "
                 "two rows of two finite numbers, such as ((0.0, 0.0), (0.0, 1.0)), or n rows of n, n <= "
@@ -471,6 +471,22 @@ def split_by_noise(system: System, terms: Sequence[CoefficientMatrix]) -> tuple[
             steady.append(CoefficientMatrix(term.order, (offset * np.array(term.matrix)).tolist()))
         driven += slope * system.epsilon**term.order * np.array(term.matrix)
     return steady, driven
+
+
+def as_plane(terms: Sequence[CoefficientMatrix], size: float = 0.0) -> tuple[CoefficientMatrix, ...]:
+    """Terms ax of one variable as (a + J)x of two, J a uniform rotation: others as they are.
+
+    ‖x‖ grows by a alone, whatever the phase is, so that T and P are functions of the noise alone, and Λ(p) is the same.
+
+    Args:
+        terms: of one variable, or of more.
+        size: about how fast it moves, the speed of J is a power of four below it; 0 for no J.
+    """
+    if any(len(term.matrix) > 1 for term in terms):
+        return tuple(terms)
+    speed = 4.0 ** math.floor(math.log(size, 4)) if size else 0.0
+    turn = (CoefficientMatrix(0, ((0.0, speed), (-speed, 0.0))),) if speed else ()
+    return *turn, *(replace(term, matrix=(term.matrix[0][0] * np.eye(2)).tolist()) for term in terms)
 
 
 def by_epsilon(system: System) -> tuple[CoefficientMatrix, ...]:

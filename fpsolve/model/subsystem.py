@@ -6,7 +6,6 @@ Where all matrices of a system are block triangular in coordinates x = Σ V_k y_
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -16,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fpsolve.arrays import ROUNDED, FloatArray
-from fpsolve.model.plane import CoefficientMatrix, Jump, System
+from fpsolve.model.plane import CoefficientMatrix, Jump, System, as_plane
 from fpsolve.model.quantity import Quantity
 
 WORST_CONDITION = 100.0
@@ -54,10 +53,8 @@ class Subsystem(System):
 
     @cached_property
     def terms(self) -> Sequence[CoefficientMatrix]:  # type: ignore[override]
-        if not self.is_scalar:
-            return self.part(self.whole.terms)
-        speed = 4.0 ** math.floor(math.log(self.size or 1.0, 4))
-        return CoefficientMatrix(0, ((0.0, speed), (-speed, 0.0))), *self.part(self.whole.terms)
+        terms = self.part(self.whole.terms)
+        return as_plane(terms, self.size or 1.0) if self.is_scalar else terms
 
     @property
     def jumps(self) -> Sequence[Jump]:  # type: ignore[override]
@@ -81,7 +78,7 @@ class Subsystem(System):
         for term in terms:
             matrix = self.inside(term.matrix)[np.ix_(self.own, self.own)]
             if np.any(matrix):
-                found.append(replace(term, matrix=(matrix[0, 0] * np.eye(2) if self.is_scalar else matrix).tolist()))
+                found.append(replace(term, matrix=matrix.tolist()))
         return tuple(found)
 
     @property
@@ -114,7 +111,7 @@ class Subsystem(System):
     def derivative(self, name: str) -> tuple[tuple[CoefficientMatrix, ...], tuple[float, ...]]:
         """The derivative of the whole system, in the coordinates of this block."""
         terms, _ = self.whole.derivative(name)
-        return self.part(terms), ()
+        return as_plane(self.part(terms)), ()
 
 
 def subsystems(

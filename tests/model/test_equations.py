@@ -264,7 +264,7 @@ def test_it_pickles_and_is_a_key():
 @pytest.mark.parametrize(
     ("changed", "words"),
     [
-        ({"variables": ("x",)}, "variables: got "),
+        ({"variables": ()}, "variables: got "),
         ({"variables": ("x", 3)}, "variables: got "),
         ({"drift": "v, -x"}, "drift: got "),
         ({"drift": ("v", "-x*x - xi*x")}, "drift[1]: the term -x*x of v's rate is of degree 2 in x, v"),

@@ -1,4 +1,4 @@
-"""A system of two or more variables written as equations: ẋ = v, v̇ = −ω²x − 2ζωv − kx³ − ξx, with walls."""
+"""A system of one or more variables written as equations: ẋ = v, v̇ = −ω²x − 2ζωv − kx³ − ξx, with walls."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from fpsolve.model.expressions import (
 )
 from fpsolve.model.faults import TableError, table_of
 from fpsolve.model.parameters import STRICT, parameter, stated_field, unknown_parameter
-from fpsolve.model.plane import MOST_VARIABLES, CoefficientMatrix, CubicTerms, Jump, System, by_epsilon
+from fpsolve.model.plane import MOST_VARIABLES, CoefficientMatrix, CubicTerms, Jump, System, as_plane, by_epsilon
 from fpsolve.model.quantity import AMPLITUDE, JOINT_DENSITY, Quantity
 
 EPSILON = "epsilon"
@@ -117,7 +117,7 @@ class EquationSystem(System):
     terms of degree 3 without the noise.
 
     Args:
-        variables: their names, two or more.
+        variables: their names, one or more.
         drift: their rates.
         named: the values of the parameters by their names.
         noises: what the noise is called in the rates, and the section that states it, one pair.
@@ -137,7 +137,7 @@ class EquationSystem(System):
 
     kind: ClassVar[str] = "equations"
     stated: ClassVar[Mapping[str, FieldInfo]] = {
-        "variables": stated_field(Texts, "the names of the variables, two or more", 'variables = ["x", "v"]'),
+        "variables": stated_field(Texts, "the names of the variables, one or more", 'variables = ["x", "v"]'),
         "drift": stated_field(Texts, "the rates of the variables", 'drift = ["v", "-omega**2 * x - xi * x"]'),
         "parameters": stated_field(Parameters, "the parameters by their names", "parameters = { omega = 1.0 }", {}),
         "noises": stated_field(
@@ -158,11 +158,8 @@ class EquationSystem(System):
         for key in ("variables", "drift"):
             texts = tuple(each) if isinstance(each := getattr(self, key), list | tuple) else (each,)
             if not 1 <= len(texts) <= MOST_VARIABLES or not all(isinstance(text, str) for text in texts):
-                raise TableError(f"got {shown(each)}; must be a list of 2 to {MOST_VARIABLES} texts", key)
+                raise TableError(f"got {shown(each)}; must be a list of 1 to {MOST_VARIABLES} texts", key)
             object.__setattr__(self, key, texts)
-        if len(self.variables) == 1 and not any(map(calls_of_time, self._texts())):
-            told = f"must be 2 to {MOST_VARIABLES} names, as one is enough only where its rate has a delay, x(t - tau)"
-            raise TableError(f"got {shown(self.variables[0])}; {told}", "variables")
         if len(self.drift) != len(self.variables):
             counts = f"{len(self.drift)} rates of {len(self.variables)} variables"
             raise TableError(
@@ -212,7 +209,7 @@ class EquationSystem(System):
             if name.startswith(AMPLITUDE.name) or name == JOINT_DENSITY.name:
                 what = "which has another meaning in the stationary response of terms of degree 3; rename it"
                 raise TableError(f"got the name {name}, {what}", "variables", i)
-        if self.walls and (self.pasts or len(self.variables) > 2):
+        if self.walls and (self.pasts or len(self.variables) != 2):
             why = "a wall is for two variables without a delay only"
             raise TableError(f"got a wall for {len(self.variables)} variables; {why}; leave walls out", "walls")
         jumps = self.jumps
@@ -295,7 +292,8 @@ class EquationSystem(System):
 
     @property
     def states(self) -> Sequence[str]:
-        return self.variables
+        is_plane = len(self.variables) == 1 and not self.pasts
+        return (*self.variables, f"{self.variables[0]}*") if is_plane else self.variables  # as `as_plane` has it
 
     @property
     def values(self) -> Mapping[str, float | str]:
@@ -379,10 +377,10 @@ class EquationSystem(System):
             return f"is not linear in {names}; multiply it by one of these, or leave it out"
         if degree == 1:
             return ""
-        if len(self.variables) > 2:
-            return f"{told}; of more than two variables all terms must be of degree 1: leave it out"
         if self.pasts:
             return f"{told}; with a delay all terms must be of degree 1: leave it out"
+        if len(self.variables) != 2:
+            return f"{told}; of any but two variables all terms must be of degree 1: leave it out"
         if degree < HIGHEST_DEGREE:
             return f"{told}; must be of degree 1 or {HIGHEST_DEGREE}: leave it out"
         return (
@@ -402,11 +400,12 @@ class EquationSystem(System):
                 order = power if has_orders else int(bool(noise))
                 matrix = matrices.setdefault((order, noise), np.zeros(2 * (size,)))
                 matrix[i, columns.index(states[0])] += series[at]
-        return tuple(
+        terms = [
             CoefficientMatrix(order, matrix.tolist(), identity if noise else one, names.get(noise, ""))
             for (order, noise), matrix in sorted(matrices.items(), key=lambda item: item[0])
             if at == 0 or matrix.any()
-        )
+        ]
+        return as_plane(terms, 0.0 if at else max((abs(matrix).max() for matrix in matrices.values()), default=0.0))
 
     @cached_property
     def terms(self) -> tuple[CoefficientMatrix, ...]:  # type: ignore[override]

@@ -15,7 +15,7 @@ from pydantic.fields import FieldInfo
 from fpsolve.arrays import FloatArray, identity, one, real_number, shown
 from fpsolve.model.faults import TableError
 from fpsolve.model.parameters import STRICT, parameter, stated_field, unknown_parameter
-from fpsolve.model.plane import MOST_VARIABLES, CoefficientMatrix, Jump, System, by_epsilon, is_driven
+from fpsolve.model.plane import MOST_VARIABLES, CoefficientMatrix, Jump, System, as_plane, by_epsilon, is_driven
 from fpsolve.model.quantity import Quantity
 from fpsolve.model.systems.equations import EquationSystem, Wall
 
@@ -141,7 +141,10 @@ class PlaneSystem(System):
                 f"got matrices of {' and '.join(map(str, sizes))} rows; {type(self).__name__} takes {known}, the same "
                 "for all terms" + ("; take LinearSystem for more" if max(sizes) > max(self.dimensions) else "")
             )
-        if self.jumps and sizes[0] > 2:
+        if sizes == [1]:
+            size = max(abs(term.matrix[0][0]) for term in self.terms)
+            object.__setattr__(self, "terms", as_plane(self.terms, size or 1.0))
+        if self.jumps and sizes[0] != 2:
             raise ValueError(
                 f"got {len(self.jumps)} jumps of a system of {sizes[0]} variables; jumps are for two "
                 "variables only: leave them out"
@@ -301,7 +304,8 @@ class PlaneSystem(System):
         half = REACH * max(abs(named[name]), LEAST)
         x = np.cos(np.pi * np.arange(NODES) / (NODES - 1))
         around = [_parts(self.build, {**named, name: named[name] + half * each}) for each in x]
-        if any(_form(each) != _form((self.terms, self.jumps)) for each in around):
+        middle = _parts(self.build, named)
+        if any(_form(each) != _form(middle) for each in around):
             raise ValueError(
                 f"the terms, their g or the rays of the jumps change with {name}; only matrices and ln R may"
             )
@@ -309,13 +313,13 @@ class PlaneSystem(System):
         weights = np.asarray(chebyshev.chebval(0.0, chebyshev.chebder(polynomials))) / half
         matrices = _weighed(weights, [[term.matrix for term in terms] for terms, _ in around])
         slopes = _weighed(weights, [[jump.log_factor for jump in jumps] for _, jumps in around])
-        changed = [replace(term, matrix=a.tolist()) for term, a in zip(self.terms, matrices, strict=True) if a.any()]
-        return tuple(changed), tuple(slopes.tolist()) if slopes.any() else ()
+        changed = [replace(term, matrix=a.tolist()) for term, a in zip(middle[0], matrices, strict=True) if a.any()]
+        return as_plane(changed), tuple(slopes.tolist()) if slopes.any() else ()
 
 
 @dataclass(frozen=True)
 class LinearSystem(PlaneSystem):
-    """ẋ = Σ ε^k g(ξ) A x for a state x of n = 2 to 200 numbers, from its coefficient matrices; see `PlaneSystem`.
+    """ẋ = Σ ε^k g(ξ) A x for a state x of n = 1 to 200 numbers, from its coefficient matrices; see `PlaneSystem`.
 
     >>> from fpsolve.model import CoefficientMatrix
     >>> free = CoefficientMatrix(0, ((0, 1, 0), (-1, -0.2, 0.5), (0, -0.5, -1)))  # an oscillator with a voltage
@@ -332,7 +336,7 @@ class LinearSystem(PlaneSystem):
     """
 
     kind: ClassVar[str] = "linear"
-    dimensions: ClassVar[Sequence[int]] = range(2, MOST_VARIABLES + 1)
+    dimensions: ClassVar[Sequence[int]] = range(1, MOST_VARIABLES + 1)
 
 
 def _parts(
