@@ -22,5 +22,6 @@ from .output.datasets import open_results as open_results
 from .proofs.questions import prove as prove
 from .simulation.estimators import simulate as simulate
 from .workflow.cases import run as run
+from .workflow.explore import explore as explore
 
 __version__: str

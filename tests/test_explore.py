@@ -17,7 +17,7 @@ from time import monotonic
 import numpy as np
 import pytest
 
-from fpsolve import lyapunov_exponent
+from fpsolve import explore, lyapunov_exponent
 from fpsolve.case.case import load_case
 from fpsolve.page.local import LocalPage
 from fpsolve.parts.indices import index_text, told_indices
@@ -87,7 +87,7 @@ def test_python_gives_the_problem_of_the_page():
 
 
 def test_while_a_slider_moves_numbers_are_within_their_error():
-    for name in ("fig1", "strong"):
+    for name in ("fig1", "theorem"):
         explorer = explorer_of(name)
         moving, settled = (explorer.answer(each, question(explorer)) for each in ("move", "solve"))
         differences = np.abs(np.array(moving["curve"][1]) - np.array(settled["curve"][1]))
@@ -228,6 +228,25 @@ def test_only_the_own_page_of_this_machine_is_answered():
         for body in ("", "[]", "{", "[" * 90_000, "1" * 200_000):
             assert status("POST", "/start", body)[0] == 403
         assert "refused" in status("POST", "/start", json.dumps({"page": "a"}))[1]
+
+
+def test_a_notebook_shows_the_page_of_a_problem():
+    problem = load_case(CASES / "theorem.toml").problem
+    shown = explore(problem)
+    try:
+        assert f'<iframe src="{shown.address}"' in shown._repr_html_()
+        knobs = shown._page.answer("start", {"page": "a", "number": 1})
+        assert knobs["file"] == ""
+        assert {knob["key"] for knob in knobs["knobs"]} == {*problem.differentiable}
+        found = shown._page.answer("solve", {"page": "a", "number": 2, "values": {"oscillator.c1": 0.05}})
+        other = lyapunov_exponent(problem.at({"oscillator.c1": 0.05}))
+        assert abs(found["exponent"] - other.value) <= 2 * other.error_estimate
+        code = shown._page.answer("python", {"page": "a", "number": 2, "values": {"oscillator.c1": 0.05}})["text"]
+        assert "problem = problem.at({'oscillator.c1': 0.05})" in code
+    finally:
+        shown.close()
+    with pytest.raises(TypeError, match="must be a Problem"):
+        explore(problem.system)
 
 
 @pytest.fixture(scope="module")

@@ -83,4 +83,6 @@ print("mean of the noise on these paths:", density.mean(lambda phi, xi: xi))
 density.plot(cmap="magma")
 
 # %%
+# ``fpsolve.explore(problem)`` shows a slider for every parameter, see :doc:`/guide/explore`.
+#
 # Next: :doc:`your own equation <2_own_equation>`. What the signs mean for a structure is in :doc:`/guide/meaning`.

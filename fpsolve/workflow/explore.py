@@ -24,11 +24,11 @@ from pydantic import ValidationError
 
 from fpsolve.arrays import FloatArray
 from fpsolve.budget import watched
-from fpsolve.case.case import CHEAP, CHEAP_OF_WALLS, Case
+from fpsolve.case.case import CHEAP, CHEAP_OF_WALLS, Case, load_case
 from fpsolve.case.refusals import obstacle
 from fpsolve.case.remedies import CASE_WORDS
 from fpsolve.case.rewrite import of_one_curve
-from fpsolve.case.sections import FigureSection, OutputSection
+from fpsolve.case.sections import FigureSection, Moments, OutputSection
 from fpsolve.case.uncertain import Uncertain
 from fpsolve.case.vary import Vary
 from fpsolve.data import plain_unit
@@ -37,7 +37,9 @@ from fpsolve.explain import UNBOUNDED, explain
 from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, MOMENT
 from fpsolve.messages import message_of
 from fpsolve.model.plane import BELOW
+from fpsolve.model.problem import Problem, checked_problem
 from fpsolve.page.html import page_of, part_of_page
+from fpsolve.page.local import LocalPage
 from fpsolve.page.page import Grid, Sentence
 from fpsolve.parts.indices import THEORY
 from fpsolve.parts.moments import PART as MOMENTS
@@ -311,3 +313,50 @@ def _letters(latex: str) -> str:
 def listed(values: FloatArray) -> list[float | None]:
     """Numbers for JSON, which has no NaN."""
     return [each if math.isfinite(each) else None for each in np.asarray(values, dtype=float).ravel().tolist()]
+
+
+class Explored:
+    """A page that a notebook shows as a cell; `close` ends it.
+
+    Attributes:
+        address: of the page, on this machine.
+    """
+
+    def __init__(self, explorer: Explorer) -> None:
+        self._page = LocalPage(explorer.answer)
+        self.address = self._page.address
+        threading.Thread(target=self._page.serve_forever, daemon=True).start()
+
+    def close(self) -> None:
+        """Serve the page no more."""
+        self._page.shutdown()
+        self._page.server_close()
+
+    def __repr__(self) -> str:
+        return f"{self.address} shows it in a browser of this machine; close() ends it"
+
+    def _repr_html_(self) -> str:
+        return f'<iframe src="{self.address}" title="fpsolve explore" width="100%" height="900"></iframe>'
+
+
+def explore(problem: Problem | Case | str | Path) -> Explored:
+    """What `fpsolve explore` shows, in a notebook: Λ(p) with a slider for every parameter.
+
+    The page is served by this process to this machine alone, at a free port of 127.0.0.1.
+
+    Args:
+        problem: a motion and its noise; or a case, or its file, whose first curve is shown.
+
+    Raises:
+        CaseError: with every fault of the file.
+        TypeError: it is something else.
+    """
+    if isinstance(problem, str | Path):
+        problem = load_case(problem)
+    if isinstance(problem, Case):
+        return Explored(Explorer(problem, f"load_case({problem.path.name!r}).problem"))
+    own, many = checked_problem(problem), Moments(p=tuple(USUAL_P.tolist()))
+    moments = many if own.dimension == 2 and own.moments[0] < 0 else Moments(p=(2.0,))
+    make: Any = Case.model_construct  # the other sections are as where none is stated
+    case = make(title="", system=own.system, noise=own.noise, moments=moments)
+    return Explored(Explorer(case, "problem"))
