@@ -244,7 +244,8 @@ class Basis:
             if p and _is_even(p) and solver.mesh is None:
                 is_sure = 0 < rate * abs(p) <= SURELY * solver.tolerance(p, node.pair.value)
                 error = max(error, rate * abs(p)) if is_sure else self._error_beside(p)
-            self.nodes[p] = node._replace(around=None, error=error, rate=error / abs(p) if p else node.rate)
+            rate_of = error / abs(p) if p else node.rate
+            self.nodes[p] = node._replace(error=error, rate=rate_of, around=None, right=(), left=())
 
     # nodes
 
