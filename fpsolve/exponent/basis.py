@@ -504,7 +504,7 @@ class Basis:
 
     def at(self, p: FloatArray) -> Curve:
         """Λ at p in the interval, shape (n,)."""
-        value, x, y, share, _, g = self._reduced(p)
+        value, x, y, share, _, g = found = self._reduced(p)
         if not np.all(share > MOSTLY):
             raise NotConverged(Message(Code.NO_FUNCTION, low=self.low, high=self.high))
         norm = form(y, g, x)
@@ -514,7 +514,7 @@ class Basis:
         if self._has_zero:
             rounded[:, 0, 0] *= np.abs(p / max(self.low, self.high, key=abs))
         rounding = (rounded @ np.abs(x)[:, :, None])[:, 0, 0] / np.abs(norm)
-        most, left = self._left_of(p)
+        most, left = self._left_of(p, nearness(found))
         error = left + rounding + self._off * self._polynomials.distance(p) + self._error_of_space(p)
         return Curve(value, derivative, error, most)
 
@@ -525,22 +525,26 @@ class Basis:
         norm, rate = form(y, g, x), value[:, None, None]
         slope = (form(y, a1 - rate * g1, x) / norm)[:, None, None]
         change = a1 - rate * g1 - slope * g
-        by_p = _bordered(found, -(change @ x[:, :, None])[:, :, 0])
+        source = np.pad(-(change @ x[:, :, None])[:, :, 0], ((0, 0), (0, 1)))
+        by_p = np.asarray(np.linalg.solve(_bordered(found), source[:, :, None])[:, :-1, 0])
         return np.asarray((form(y, a2 - rate * g2 - 2 * slope * g1, x) + 2 * form(y, change, by_p)) / norm)
 
-    def _left_of(self, p: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _left_of(self, p: FloatArray, near: FloatArray) -> tuple[FloatArray, FloatArray]:
         """The most that is left between the nodes on both sides, and what is left at p.
 
         That falls as the fourth power of the distance from each node. One power less is counted, as it may be the most
-        elsewhere than where it was looked at.
+        elsewhere than where it was looked at. Where another eigenvalue of the small pencil passes, it is as much larger
+        as that is nearer.
         """
         gaps = [*pairwise(sorted(self.nodes))]
         low, high = np.array(gaps).T
         lefts = [self._lefts.get(gap, Left(math.nan, 0.0, 0.0, 0)) for gap in gaps]
         error, at = (np.array([getattr(left, name) for left in lefts]) for name in ("error", "p"))
-        most = error / np.fmax((4 * (at - low) * (high - at) / (high - low) ** 2) ** 3, LEAST)
+        at = np.where(np.isnan(at), 0.5 * (low + high), at)
+        most = error / np.maximum((4 * (at - low) * (high - at) / (high - low) ** 2) ** 3, LEAST)
         i = np.clip(np.searchsorted(low, p, side="right") - 1, 0, low.size - 1)
-        return most[i], most[i] * (4 * (p - low[i]) * (high[i] - p) / (high[i] - low[i]) ** 2) ** 3
+        most = most[i] * np.maximum(1.0, near / nearness(self._reduced(at))[i])
+        return most, most * (4 * (p - low[i]) * (high[i] - p) / (high[i] - low[i]) ** 2) ** 3
 
     def _error_beside(self, p: float) -> float:
         """The error of the space at a node of an even p, where T is too simple, by that at a p next to it."""
@@ -615,11 +619,16 @@ def eigenpairs(
     return value, x, y, share
 
 
-def _bordered(of: Reduced, sources: FloatArray) -> FloatArray:
-    """x′ with (A − ΛG)x′ = f and yᵀGx′ = 0, where yᵀf = 0, for each p."""
+def _bordered(of: Reduced) -> FloatArray:
+    """A − ΛG with Gx below its columns and yᵀG beside its rows, which is regular where Λ is simple, for each p."""
     n, size = of.x.shape
     whole = np.zeros((n, size + 1, size + 1))
     whole[:, :size, :size] = of.a - of.value[:, None, None] * of.g
     whole[:, :size, size] = (of.g @ of.x[:, :, None])[:, :, 0]
     whole[:, size, :size] = (of.y[:, None, :] @ of.g)[:, 0]
-    return np.asarray(np.linalg.solve(whole, np.pad(sources, ((0, 0), (0, 1)))[:, :, None])[:, :size, 0])
+    return whole
+
+
+def nearness(of: Reduced) -> FloatArray:
+    """How near another eigenvalue of the small pencil is, which may be no eigenvalue of L: ‖(A − ΛG)⁻¹‖ beside x."""
+    return np.asarray(np.linalg.norm(np.linalg.inv(_bordered(of)), axis=(1, 2)))

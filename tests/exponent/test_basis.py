@@ -75,6 +75,16 @@ def test_random_problems_between_the_nodes(number):
         assert error <= RTOL * max(abs(value), function.solver.scale(each))
 
 
+def test_where_an_eigenvalue_of_the_small_pencil_alone_passes():
+    """Next to p = 4.84, where the basis has an eigenvalue that L has not, its error is 100 times that beside."""
+    *_, drawn = problems(187)
+    function = MomentLyapunovFunction(drawn.solved, (-3.0, 6.0), rtol=RTOL)
+    exact = ExponentSolver(drawn.solved, rtol=0.01 * RTOL)
+    for p in (4.75, 4.82, 4.84, 4.875):
+        solution = exact.solution(p)
+        assert abs(function(p) - solution.pair.value) <= function.error_estimate(p) + solution.error
+
+
 @pytest.mark.parametrize("noise", [Bounded(0.6, 1.3, 0.4), SineWiener(0.6, 1.1)], ids=repr)
 def test_bounded_noise_between_the_nodes(noise):
     system = PlaneSystem.of_equations(("x", "v"), ("v", "-x - 0.2*v - xi*x"), {})
