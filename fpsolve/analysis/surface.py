@@ -5,9 +5,10 @@ On one space, whose functions move with the parameters θ as the noise does, V h
 with an error of the fourth order in the distance from them. For p = 0, where T = 1, V holds 1, T′ and ∂T′/∂θ: with
 yᵀW L(0; θ) Vᵀ = 0 and yᵀW M 1 = 1 there is λ = yᵀW L′(0; θ) 1, whose error is the product of those of T* and of T′.
 
-L(p; θ) is a smooth function of the parameters of a motion, and of those of a noise: the small matrices are interpolated
-by polynomials. Where it is none, as where a speed changes its sign at a line between cells, there is no such surface.
-What is left is estimated by both residuals and the inverse at a node, as over p, see `exponent.basis`.
+L(p; θ), in the coordinates of one θ, is a sum of products of functions of θ and fixed operators: those at few θ make
+all others. Where it is none, as where a speed changes its sign at a line between cells, there is no such surface.
+What is left is estimated by both residuals and the inverse at a node, as over p, see `exponent.basis`. The principal
+eigenvalue is the largest real one of small residual: the small pencil has others of its own, and of L smaller ones.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from numpy.typing import ArrayLike
 from scipy.linalg import lstsq, qr
 
 from fpsolve.analysis.zero import Axis, said
-from fpsolve.arrays import FloatArray, Mask, real_array, real_number, shown
+from fpsolve.arrays import FloatArray, real_array, real_number, shown
 from fpsolve.budget import counted
 from fpsolve.data import Result, dataset
 from fpsolve.errors import FpsolveError, NotConverged
@@ -45,7 +46,7 @@ from fpsolve.theory.perturbation import scale_of
 if TYPE_CHECKING:
     import xarray
 
-DEGREES = (2, 4, 6, 9, 13, 19)
+DEGREES = (2, 4, 6, 9, 13, 19, 28, 40)
 """Degrees of the polynomials tried for the small matrices, along each parameter."""
 INTERPOLATED = 1e-2
 """Share of the tolerance for these."""
@@ -53,28 +54,32 @@ PROBE = 0.37
 """Share of an axis at which it is looked at what they leave."""
 PROBES = 4
 """Number of places at which it is looked at what products leave."""
-ASIDE = 2, 6
-"""Numbers of lines along an axis that tell which points on it make all others, one after the other."""
+ASIDE = 2, 6, 0
+"""Numbers of lines along an axis that tell which points on it make all others, one after the other; by 0 all do."""
+SEVERAL = 10.0
+"""What is left aside, over what is left along an axis, at most."""
 ROUNDED = 1e-13
 """Size of a further product, over that of the largest, up to which it is rounding."""
 LOOKED_AT = 6
 """Number of points along each parameter at which it is looked at what is left, half of a gap off the ends."""
-FOLLOWED = 25
-"""Number of points along each parameter, ends included, at which the pairs must be known of which place they are."""
+FOLLOWED = 13
+"""Number of points along each parameter, ends included, at which all eigenvalues of the small pencil are judged."""
 MOST_NODES = 60
 """Number of nodes of a surface."""
+MIXED = 48
+"""Number of random sums of the entries of a residual."""
+MORE = 10.0
+"""What a residual is at most, over the largest where it was looked at what is left."""
+FEW = 10
+"""Number of roundings in an entry of a product with L."""
+BETWEEN = 2.0
+"""What is left of F between the places that are looked at, over the most that is left there."""
 MOST_SPACES = 6
 """Number of spaces tried."""
 NOTHING = 1e-11
 """Size of a derivative, over that of an eigenfunction, up to which it is rounding."""
-DOUBT = 0.2
-"""Distance from 1 of the share of a pair in what is expected of it, up to which it is surely that pair."""
-LITTLE_DOUBT = 0.05
-"""The same on the way to a place where a node would help."""
 SAME = 1e-9
 """Share of a function that others do not make, up to which it is rounding."""
-STEPS_TO_LOST = 16
-"""Number of steps from a node in which a pair is followed where it is not."""
 AT_ONCE = 512
 """Number of points that are evaluated together."""
 _EPS = float(np.finfo(float).eps)
@@ -89,25 +94,16 @@ class Node(NamedTuple):
     around: PairDerivatives | None
 
 
-class Known(NamedTuple):
-    """A place of the unit square where it is known which pair of the small pencil is the principal one, and that."""
-
-    at: FloatArray
-    x: FloatArray
-    y: FloatArray
-
-
 class Values(NamedTuple):
     """F, its gradient by shares of the axes if that is wanted, shape (n,) and (n, d), and both vectors, (n, size).
 
-    `is_told` says whether it is told which pair of the small pencil is the principal one, shape (n,).
+    F is NaN where the small pencil has no eigenvalue of small residual.
     """
 
     value: FloatArray
     gradient: FloatArray
     x: FloatArray
     y: FloatArray
-    is_told: Mask
 
 
 class Products:
@@ -115,7 +111,7 @@ class Products:
 
     Args:
         polynomials: that follow them.
-        known: the functions at the points of these, shape (points, functions).
+        known: the functions at the points of these, shape (points, functions); of none all points are kept.
 
     Attributes:
         points: that make all others.
@@ -174,8 +170,7 @@ class Surface(Result):
             if axis.key not in problem.differentiable:
                 known = ", ".join(problem.differentiable) or "none"
                 raise ValueError(f"got {shown(axis.key)}; the parameters are {known}")
-        self._budget, self._nodes, self._known, self._refinements = budget or Budget(), list[Node](), list[Known](), 0
-        self._is_filled = False
+        self._budget, self._nodes, self._most, self._refinements = budget or Budget(), list[Node](), 0.0, 0
         self._frame: Problem | None = None
         if problem.dimension != 2 or problem.classes:
             raise self._none()
@@ -187,9 +182,9 @@ class Surface(Result):
         with one_thread():
             self._choose(first.pair)
             self._begin(places)
-            self.is_converged = self._is_filled = self._fill(most)
+            self.is_converged = self._fill(most)
         self.nodes = np.array([node.at for node in self._nodes])
-        self.error = self._left + self._off + max(node.error + node.pair.rounding for node in self._nodes)
+        self.error = BETWEEN * self._left + self._off + max(node.error + node.pair.rounding for node in self._nodes)
         self._nodes = [node._replace(around=None) for node in self._nodes]  # which keep factors
 
     def _none(self) -> NotConverged:
@@ -224,7 +219,7 @@ class Surface(Result):
         while True:
             self._sample()
             self._nodes.clear()
-            self._known.clear()
+            self._most = 0.0
             if all(self._add(at) for at in places):
                 return
 
@@ -254,11 +249,9 @@ class Surface(Result):
                 left[worst] = 0.0
 
     def _lost(self, at: FloatArray) -> FloatArray | None:
-        """A place of some, of which it cannot be told which pair of the small pencil is meant; or None."""
-        for part in np.array_split(at, math.ceil(len(at) / AT_ONCE)):
-            if not np.all(is_told := self._values(part).is_told):
-                return np.asarray(part[~is_told][0])
-        return None
+        """A place of some where the residual of the small pencil is not as small as where it was looked at; or None."""
+        lost = np.flatnonzero(np.isnan(self._values(at).value))
+        return np.asarray(at[lost[0]]) if lost.size else None
 
     def _add(self, at: FloatArray) -> bool:
         """Solve at a place, and take the eigenfunctions with their derivatives; False for a finer space."""
@@ -290,7 +283,6 @@ class Surface(Result):
         if kept:
             self._extend([right[k] for k in kept], [left[k] for k in kept])
         self._nodes.append(Node(at, pair, error, around))
-        self._known.append(Known(at, self._right @ right[0], self._dual @ left[0]))
         return True
 
     def _take(self, space: Space) -> bool:
@@ -324,8 +316,8 @@ class Surface(Result):
 
     def _lifted(self, at: FloatArray, generator: Generator) -> PrincipalPair:
         """What the basis makes of the pair at a place, to start from."""
-        nearest, found = self._nearest(at), self._values(at[None])
-        if not found.is_told[0]:  # too far
+        nearest, found = self._nearest(at), self._judged(at)
+        if np.isnan(found.value[0]):
             return replace(nearest.pair, generator=generator)
         right = found.x[0] @ self._right if self.p else nearest.pair.right
         left = found.y[0] @ self._dual
@@ -347,15 +339,16 @@ class Surface(Result):
         allowed, count = INTERPOLATED * self._allowed(np.full(len(self.axes), 0.5), 0.0) / size, len(self.axes)
         probes = np.random.default_rng(1).random((PROBES, count))
         exact = np.array([self._images_at(at, pair.left) for at in probes])
-        allowed = max(allowed, ROUNDED * float(np.max(np.linalg.norm(exact, axis=1))))
+        rounding = FEW * _EPS * max(each.norm for at in probes for each in self._operators(at))
+        allowed = max(allowed, rounding * float(np.linalg.norm(pair.left)))
         for lines in ASIDE:
-            aside = [np.full(count, share) for share in (np.arange(lines) + 0.29) / lines]
+            aside = [np.full(count, (line + 0.29) / lines) for line in range(lines)]
             self._products = [self._products_along(k, aside, mixed, pair.left, allowed) for k in range(count)]
             self._places = [np.array(each) for each in product(*(each.points for each in self._products))]
             made = np.array([self._images_at(at, pair.left) for at in self._places])
             off = float(np.max(np.linalg.norm(self._rows(probes) @ made - exact, axis=1)))
             self._off = off * size
-            if off <= allowed:
+            if off <= SEVERAL * allowed:
                 return
         raise self._none()
 
@@ -363,15 +356,16 @@ class Surface(Result):
         self, k: int, aside: Sequence[FloatArray], mixed: FloatArray, vector: FloatArray, allowed: float
     ) -> Products:
         """What the operators are made of along an axis, through some places."""
-        exact = self._images_at(_on_axis(aside[0], k, PROBE), vector)
+        middle = np.full(len(self.axes), 0.5)
+        exact = self._images_at(_on_axis(middle, k, PROBE), vector)
         for degree in DEGREES:
             polynomials = Polynomials(0.0, 1.0, degree)
             points = polynomials.points.tolist()
-            known = np.array([self._images_at(_on_axis(aside[0], k, u), vector) for u in points])
+            known = np.array([self._images_at(_on_axis(middle, k, u), vector) for u in points])
             off = np.linalg.norm(polynomials.at(np.array([PROBE]))[0] @ known - exact)
-            if off <= max(allowed, degree * _EPS * np.max(np.linalg.norm(known, axis=1))):
+            if off <= allowed:
                 lines = [[self._images_at(_on_axis(at, k, u), mixed) for at in aside] for u in points]
-                return Products(polynomials, np.array(lines).reshape(len(points), -1))
+                return Products(polynomials, np.array(lines).reshape(len(points), -1) if aside else np.eye(len(points)))
         raise self._none()
 
     def _sample(self) -> None:
@@ -383,6 +377,8 @@ class Surface(Result):
         self._right = orthonormal(np.zeros((0, one.size)), [] if self.p else [one])
         self._dual = orthonormal(np.zeros((0, one.size)), [] if self.p else [one])
         self._small = [np.zeros((len(made), 0, 0)) for _ in range(len(self._kinds) + 1)]
+        self._mixing = np.random.default_rng(2).standard_normal((MIXED, one.size)) / math.sqrt(MIXED)
+        self._mixed = np.zeros((2, len(made), MIXED, 0))
         if not self.p:
             self._extend([], [])
 
@@ -421,6 +417,7 @@ class Surface(Result):
         old, shape = self._small[0].shape[1], self._chosen.shape
         self._right, self._dual = orthonormal(self._right, right), orthonormal(self._dual, left)
         after, before = self._right[old:], self._dual[old:]
+        mixed = np.zeros((2, len(self._places), MIXED, len(after)))
         for number, small in enumerate(self._small):
             if number < len(self._kinds):
                 tables, duals = (each.reshape(-1, *shape) for each in (after, before))
@@ -431,8 +428,11 @@ class Surface(Result):
                     np.array([[space.weighed(each) for each in side] for space in self._spaces])
                     for side in (after, before)
                 )
+            if self.p:
+                mixed[number] = (images @ self._mixing.T).swapaxes(1, 2)
             rows = np.concatenate([small, adjoint @ self._right[:old].T], axis=1)
             self._small[number] = np.concatenate([rows, (images @ self._dual.T).swapaxes(1, 2)], axis=2)
+        self._mixed = np.concatenate([self._mixed, mixed], axis=3)
         if not self.p:
             self._small[0][:, :, 0] = 0.0  # L(0) 1 = 0
 
@@ -440,19 +440,19 @@ class Surface(Result):
         size = len(self._right)
         return [(rows @ each.reshape(len(each), -1)).reshape(-1, size, size) for each in self._small]
 
-    def _values(self, at: FloatArray, has_gradient: bool = False) -> Values:
+    def _values(self, at: FloatArray, has_gradient: bool = False, most: float | None = None) -> Values:
         """F at some places, shape (n, d), from the small matrices alone."""
         small = self._pencils(self._rows(at))
         slopes = [self._pencils(self._rows(at, k)) for k in range(len(self.axes))] if has_gradient else []
         if not self.p:
             return self._growth(small, slopes)
         a, g = small
-        value, x, y, is_told = self._followed(at, a, g)
+        value, x, y = self._principal(at, a, g, self._most if most is None else most)
         y = y / form(y, g, x)[:, None]
         gradient = (
             np.array([form(y, by_a, x) - value * form(y, by_g, x) for by_a, by_g in slopes]).reshape(-1, len(at)).T
         )
-        return Values(value, gradient, x, y, is_told)
+        return Values(value, gradient, x, y)
 
     def _growth(self, small: Sequence[FloatArray], slopes: Sequence[Sequence[FloatArray]]) -> Values:
         """λ: Bᵀy = (1, 0, …) with B = (G 1, A V′) gives T*, and Bz = A′1 gives λ = z₁ and −T′."""
@@ -468,40 +468,52 @@ class Surface(Result):
             by_whole = np.concatenate([by_g[:, :, :1], by_a[:, :, 1:]], axis=2)
             gradient.append(np.sum(y * by_b[:, :, 0], axis=1) - form(y, by_whole, z))
         x = np.concatenate([np.zeros((len(z), 1)), -z[:, 1:]], axis=1)
-        return Values(value, np.array(gradient).reshape(-1, len(value)).T, x, y, np.full(len(value), True))
+        return Values(value, np.array(gradient).reshape(-1, len(value)).T, x, y)
 
-    def _followed(
-        self, at: FloatArray, a: FloatArray, g: FloatArray
-    ) -> tuple[FloatArray, FloatArray, FloatArray, Mask]:
-        """Λ(p) and its vectors, from those at the nearest place where they are known, or on the way from there.
+    def _judged(self, at: FloatArray) -> Values:
+        """F at a place where it is not known how large the residual may be: hardly larger than the least of all."""
+        most = math.inf
+        if self.p:
+            a, g = self._pencils(self._rows(at[None]))
+            values, vectors = np.linalg.eig(np.linalg.solve(g[0], a[0]))
+            rest = self._rest(np.repeat(at[None], values.size, axis=0), values, vectors.T)
+            most = MORE * float(rest[values.imag == 0].min(initial=math.inf))
+        return self._values(at[None], most=most)
 
-        The last tells whether they are continued: `LITTLE_DOUBT` is left on the way, while nodes may be added.
+    def _principal(
+        self, at: FloatArray, a: FloatArray, g: FloatArray, most: float
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """The largest real eigenvalue of each small pencil whose residual is small, or NaN, with both vectors.
+
+        Larger ones may be of the small pencil alone, and smaller ones of small residual of L, as in tongues.
         """
-        places = np.array([known.at for known in self._known])
-        own = np.argmin(np.linalg.norm(at[:, None, :] - places, axis=2), axis=1)
-        size, way = len(self._right), at - places[own]
-        u, v = (
-            np.array([np.pad(each, (0, size - each.size)) for each in side])[own]
-            for side in ([known.x for known in self._known], [known.y for known in self._known])
-        )
-        value, x, y, share = eigenpairs(a, g, form(v, a, u) / form(v, g, u), u, v)
-        lost = np.flatnonzero(~(np.abs(share - 1) < DOUBT))
-        is_told, most = np.full(len(at), True), DOUBT if self._is_filled else LITTLE_DOUBT
-        u, v = u[lost], v[lost]
-        for k in range(1, STEPS_TO_LOST + 1 if lost.size else 0):
-            here = places[own[lost]] + k / STEPS_TO_LOST * way[lost]
-            own_a, own_g = self._pencils(self._rows(here))
-            found, u, v, share = eigenpairs(own_a, own_g, form(v, own_a, u) / form(v, own_g, u), u, v)
-            is_told[lost] &= np.abs(share - 1) < most
-            value[lost], x[lost], y[lost] = found, u, v
-        return value, x, y, is_told
+        values = np.linalg.eigvals(np.linalg.solve(g, a))
+        ranked = -np.sort(-np.where(values.imag == 0, values.real, -math.inf), axis=1)
+        value, (x, y), left = np.full(len(at), math.nan), np.ones((2, len(at), len(self._right))), np.arange(len(at))
+        for k in range(ranked.shape[1]):
+            left = left[np.isfinite(ranked[left, k])]
+            if not left.size:
+                break
+            start = np.broadcast_to(self._mixing[0, : ranked.shape[1]], (left.size, ranked.shape[1]))
+            found, u, v, _ = eigenpairs(a[left], g[left], ranked[left, k], start, start)
+            is_it = self._rest(at[left], found, u) <= most
+            it, left = left[is_it], left[~is_it]
+            value[it], x[it], y[it] = found[is_it], u[is_it], v[is_it]
+        return value, x, y
+
+    def _rest(self, at: FloatArray, value: Any, x: Any) -> FloatArray:
+        """About ‖(L − ΛM)T‖/‖T‖ at some places, by random sums of its entries, shape (n,)."""
+        rows = self._rows(at)
+        of_l, of_m = ((rows @ each.reshape(len(each), -1)).reshape(len(at), MIXED, -1) for each in self._mixed)
+        rest = ((of_l - value[:, None, None] * of_m) @ x[:, :, None])[:, :, 0]
+        return np.asarray(np.linalg.norm(rest, axis=1) / np.linalg.norm(x, axis=1))
 
     # errors
 
     def _left_at(self, at: FloatArray) -> tuple[float, float]:
         """What is left of F at a place, over its share of what is allowed, and itself."""
-        found = self._values(at[None])
-        if not found.is_told[0]:
+        found = self._judged(at)
+        if np.isnan(found.value[0]):
             return math.inf, math.inf
         value, x, y = float(found.value[0]), found.x[0] @ self._right, found.y[0] @ self._dual
         operators, space = self._operators(at), self._space_at(at)
@@ -517,7 +529,7 @@ class Surface(Result):
         left = SAFE * abs(float(s @ around.solve(r, refinements=2)))
         share = left / (SHARE * self._allowed(at, value))
         if share <= 1:
-            self._known.append(Known(at, found.x[0], found.y[0]))
+            self._most = max(self._most, MORE * float(self._rest(at[None], found.value, found.x)[0]) if self.p else 0.0)
         return share, left
 
     # values
@@ -540,7 +552,7 @@ class Surface(Result):
         for part in np.array_split(np.arange(len(shares)), math.ceil(len(shares) / AT_ONCE) or 1):
             found = self._values(shares[part], has_gradient)
             values[part], gradients[part] = found.value, found.gradient
-            for k in part[~found.is_told]:
+            for k in part[np.isnan(found.value)]:
                 values[k], gradients[k] = self._solved(shares[k], has_gradient)
         return values, gradients
 

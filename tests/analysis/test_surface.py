@@ -5,8 +5,9 @@ import pytest
 
 from fpsolve import ExponentSolver, OrnsteinUhlenbeck, PlaneSystem, Problem, VibroImpactOscillator
 from fpsolve.analysis import Surface
+from fpsolve.arrays import identity
 from fpsolve.errors import NotConverged
-from fpsolve.model import Bounded, White
+from fpsolve.model import Bounded, CoefficientMatrix, White
 
 OSCILLATOR = Problem(
     VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=0.7), OrnsteinUhlenbeck(alpha=2.0, sigma=1.0)
@@ -110,3 +111,54 @@ def test_three_variables_have_no_surface():
     )
     with pytest.raises(NotConverged, match=r"there is no surface over noise\.sigma"):
         Surface(problem, {"noise.sigma": (0.5, 1.0)})
+
+
+def assert_right(surface, count=6):
+    """Values within the error, against solves of their own."""
+    values = points(surface, count)
+    for theta, value in zip(zip(*values, strict=True), surface(*values), strict=True):
+        keys = [axis.key for axis in surface.axes]
+        problem = surface.problem.at(dict(zip(keys, map(float, theta), strict=True)))
+        solution = ExponentSolver(problem).solution(surface.p)
+        assert abs(value - solution.pair.value) <= surface.error + solution.error
+
+
+def mathieu(b, s):
+    equation = "-2*b*v - (1 + load + shake)*x"
+    names = {"load": "noise.load", "shake": "noise.shake"}
+    system = PlaneSystem.of_equations(("x", "v"), ("v", equation), {"b": b}, noises=names)
+    return Problem(system, {"load": Bounded(0.4, 2.0, 0.0), "shake": White(s)})
+
+
+def test_in_a_tongue_two_of_three_real_eigenvalues_of_the_mean_square_are_none():
+    """There E x², E xv, E v² have three real multipliers, of which those of the basis are close to all."""
+    surface = Surface(mathieu(0.03, 0.1), {"noise.load.nu": (0.6, 2.6), "noise.load.mu": (0.05, 0.5)}, 2.0, rtol=1e-4)
+    nu, mu = (1.8916666666666666, 1.8916666666666666, 1.9125, 1.9229166666666666), (0.246875, 0.25625, 0.36640625, 0.35)
+    for one, other, value in zip(nu, mu, surface(nu, mu), strict=True):
+        problem = surface.problem.at({"noise.load.nu": one, "noise.load.mu": other})
+        solution = ExponentSolver(problem, rtol=1e-6).solution(2.0)
+        assert abs(value - solution.pair.value) <= surface.error + solution.error
+
+
+def test_coordinates_are_held():
+    """Those in which a saddle moves least change from one strength of the noise to another."""
+    terms = [
+        CoefficientMatrix(0, ((-6.1e-4, -0.55), (7e-7, 3.7e-3))),
+        CoefficientMatrix(1, ((0.36, 166.0), (2.2e-3, -0.085)), identity),
+    ]
+    problem = Problem(PlaneSystem(terms), White(0.07))
+    surface = Surface(problem, {"noise.s": (0.03, 0.15), "system.epsilon": (0.4, 2.7)}, 2.0, rtol=1e-5)
+    assert len(surface.nodes) < 20
+    assert_right(surface)
+
+
+def test_an_operator_that_is_no_product_in_few_lines():
+    """R^p with a restitution that moves with ε."""
+    ranges = {"oscillator.restitution": (0.4, 1.0), "oscillator.epsilon": (0.2, 0.6)}
+    assert_right(Surface(OSCILLATOR, ranges, 3.0, rtol=1e-6))
+
+
+def test_a_basis_of_the_whole_space():
+    """White noise alone has few functions: what they make already is not taken again."""
+    system = PlaneSystem.of_equations(("x", "v"), ("v", "-x - 0.1*v + n*x"), noises={"n": "noise"})
+    assert_right(Surface(Problem(system, White(0.3)), {"noise.s": (0.05, 3.0)}, 1.0, rtol=1e-9))
