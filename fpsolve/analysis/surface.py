@@ -39,7 +39,7 @@ from fpsolve.fem.factors import one_thread
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.space import Space
 from fpsolve.messages import Code, Message
-from fpsolve.model.problem import Problem, checked_problem
+from fpsolve.model.problem import Problem, checked_problem, refuse_infinite
 from fpsolve.model.quantity import LYAPUNOV_EXPONENT, moment_at
 from fpsolve.theory.perturbation import scale_of
 
@@ -148,6 +148,7 @@ class Surface(Result):
 
     Raises:
         ValueError: a key is no parameter, or a range is none.
+        NoSuchExponent: Λ(p) does not exist everywhere.
         NotConverged: there is no such surface: the functions do not move smoothly, no space serves all points, or slow
             noise carries the moment at several places.
     """
@@ -176,6 +177,8 @@ class Surface(Result):
             raise self._none()
         corners = [np.array(each, dtype=float) for each in product((0.0, 1.0), repeat=len(self.axes))]
         places = [np.full(len(self.axes), 0.5), *corners]
+        for at in places:
+            refuse_infinite(self._problem(at), self.p)
         self._frame = self._problem(places[0])
         first = self._solver(places[0]).whole.solution(self.p)
         self._chosen, self._starts = first.pair.generator.chosen, [first.pair]
@@ -512,6 +515,7 @@ class Surface(Result):
 
     def _left_at(self, at: FloatArray) -> tuple[float, float]:
         """What is left of F at a place, over its share of what is allowed, and itself."""
+        refuse_infinite(self._problem(at), self.p)
         found = self._judged(at)
         if np.isnan(found.value[0]):
             return math.inf, math.inf
