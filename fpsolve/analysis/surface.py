@@ -29,7 +29,7 @@ from fpsolve.budget import counted
 from fpsolve.data import Result, dataset
 from fpsolve.errors import FpsolveError, NotConverged
 from fpsolve.exponent.adapt import SMALL_P, UNSOLVED, Budget
-from fpsolve.exponent.basis import SAFE, SHARE, SPARE, Polynomials, eigenpairs, form, orthonormal
+from fpsolve.exponent.basis import SAFE, SHARE, Polynomials, eigenpairs, form, orthonormal
 from fpsolve.exponent.eigen import PairDerivatives, PrincipalPair, principal_pair
 from fpsolve.exponent.error import Solution
 from fpsolve.exponent.solver import ExponentSolver, solver_of
@@ -74,6 +74,8 @@ FEW = 10
 """Number of roundings in an entry of a product with L."""
 BETWEEN = 2.0
 """What is left of F between the places that are looked at, over the most that is left there."""
+SPARE = 0.2
+"""Share of what is allowed that a finer space is made for, so that it serves other places, too."""
 MOST_SPACES = 6
 """Number of spaces tried."""
 NOTHING = 1e-11

@@ -90,8 +90,6 @@ AT_ONCE = 256
 """Number of p whose small pencils are solved together."""
 OUTSIDE = 1e-3
 """Share of the distance of chord and tangents by which a value between two nodes may lie outside of both."""
-SPARE = 0.2
-"""Share of the tolerance that a finer space is made for, so that it serves other p too."""
 MUCH_MORE = 1.3
 """Factor of the unknowns beyond which p of both signs have spaces of their own, where one does not serve them all."""
 NOTHING = np.zeros(0)

@@ -14,6 +14,7 @@ from fpsolve import (
     ExponentSolver,
     NonGaussianNoise,
     OrnsteinUhlenbeck,
+    PlaneSystem,
     Problem,
     VibroImpactOscillator,
     boundary,
@@ -30,7 +31,7 @@ from fpsolve.errors import FpsolveError
 from fpsolve.exponent import Budget
 from fpsolve.fem import generator
 from fpsolve.messages import Code, Message
-from fpsolve.model import MarkovChain
+from fpsolve.model import Bounded, MarkovChain, White
 from tests.conftest import sampled
 
 NOISE = NonGaussianNoise(D0=0.5, tau0=0.5, r0=0.95)
@@ -483,6 +484,23 @@ def test_a_frame_without_a_line(zero, c1, text):
     found = line(zero, y=Axis("oscillator.c1", *c1))
     assert found.traces == found.branches == ()
     assert found.remark() == text
+
+
+@pytest.mark.slow
+def test_an_island_that_a_coarse_grid_misses():
+    """The tongue of Mathieu's equation at ν = 2/3 shows at no point of a grid of 13 × 13."""
+    equation, names = "-2*b*v - (1 + load + shake)*x", {"load": "noise.load", "shake": "noise.shake"}
+    system = PlaneSystem.of_equations(("x", "v"), ("v", equation), {"b": 0.03}, noises=names)
+    problem = Problem(system, {"load": Bounded(0.4, 2.0, 0.0), "shake": White(0.1)})
+    x, y = Axis("noise.load.nu", 0.6, 1.4), Axis("noise.load.mu", 0.2, 0.8)
+    tongue, other = sorted(
+        boundary(problem, SECOND, x, y, step=0.1).branches, key=lambda branch: float(np.mean(branch.x))
+    )
+    assert 0.6 < np.min(tongue.x) < 2 / 3 - 0.02
+    assert np.max(tongue.x) < 0.66
+    assert np.min(other.x) > 0.8
+    inside = problem.at({"noise.load.nu": float(np.mean(tongue.x)), "noise.load.mu": 0.79})
+    assert ExponentSolver(inside).solution(2.0).pair.value > 0
 
 
 def test_a_remark_only_speaks_of_where_f_exists():
