@@ -128,7 +128,7 @@ def _largest(solve: Solve, x: Any, krylov: int) -> tuple[float, Any]:
         known[0], images[:] = x / np.linalg.norm(x), 0.0
         for k in range(MOST_VECTORS):
             images[: k + 2, k], known[k + 1] = orthogonal(known[: k + 1], solve(known[k]))
-            if k + 1 < krylov:
+            if k + 1 < krylov and images[k + 1, k]:
                 continue
             values, vectors = np.linalg.eig(images[: k + 1, : k + 1])
             at = int(np.argmax(values.real))

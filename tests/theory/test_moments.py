@@ -390,3 +390,9 @@ def test_mathieu_with_white_noise():
     ]
     problem = Problem(LinearSystem(terms), {"load": Bounded(0.5, 2.0, 0.0), "shake": White(s=0.3)})
     assert even_moment(problem, 2).value == pytest.approx(0.06202216, abs=5e-9)
+
+
+def test_a_start_that_is_the_answer():
+    """ẋ = (−1 + ξ)x of 12 variables: Λ(2) = −2 + 2s², and all laws are alike."""
+    found = even_moment(driven(-np.eye(12), np.eye(12), White(s=0.5)), 2)
+    assert found.value == pytest.approx(-1.5, abs=1e-12)
