@@ -306,8 +306,7 @@ def turn(page, key, value):
     before = page.evaluate("wanted")
     page.fill(f"[id='knob-{key}']", value)
     page.keyboard.press("Tab")
-    until(page, f"wanted > {before} && !isMoving")
-    page.wait_for_timeout(400)
+    until(page, f"wanted > {before}")
     at_rest(page)
 
 
@@ -351,7 +350,6 @@ def test_bad_input_reset_and_the_end_of_the_server(browser):
         assert "stale" in page.get_attribute("body", "class")
         assert page.locator("#curve path.one").count()  # the last valid curve stays
         page.click("#reset")
-        page.wait_for_timeout(400)
         at_rest(page)
         assert page.inner_text("#refused") == ""
         assert page.inner_html("#numbers") == first

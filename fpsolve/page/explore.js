@@ -36,6 +36,7 @@ async function work(name, show, more = {}) {
 
 function moved() {
   wanted += 1;
+  $("state").textContent = "moving";
   clearTimeout(rest);
   if (about.moves) follow();
   else settle();
@@ -176,13 +177,13 @@ const views = {}; // the answers by name, each with the position that it is of
 const position = () => JSON.stringify(knobs.map(knob => knob.read()));
 const palette = [[68, 1, 84], [59, 82, 139], [33, 145, 140], [94, 201, 98], [253, 231, 37]]; // viridis, which the colour-blind see
 
-function paint(rows) { // numbers, along x first, as a picture
+function paint(rows) { // numbers, along x first, as a picture; null where there are none
   const canvas = Object.assign(document.createElement("canvas"), {width: rows.length, height: rows[0].length}), pen = canvas.getContext("2d");
-  const all = rows.flat(), low = Math.min(...all), high = Math.max(...all), pixels = pen.createImageData(canvas.width, canvas.height);
+  const all = rows.flat().filter(value => value !== null), low = Math.min(...all), high = Math.max(...all), pixels = pen.createImageData(canvas.width, canvas.height);
   rows.forEach((row, i) => row.forEach((value, j) => {
     const s = high > low ? 3.999999 * (value - low) / (high - low) : 0, k = Math.floor(s), at = 4 * ((canvas.height - 1 - j) * canvas.width + i);
     for (let c = 0; c < 3; c++) pixels.data[at + c] = palette[k][c] + (s - k) * (palette[k + 1][c] - palette[k][c]);
-    pixels.data[at + 3] = 255;
+    pixels.data[at + 3] = value === null ? 0 : 255;
   }));
   pen.putImageData(pixels, 0, 0);
   return {href: canvas.toDataURL(), low, high};

@@ -22,7 +22,6 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
-from fpsolve.arrays import FloatArray
 from fpsolve.budget import watched
 from fpsolve.case.case import CHEAP, CHEAP_OF_WALLS, Case, load_case
 from fpsolve.case.refusals import obstacle
@@ -51,7 +50,7 @@ from fpsolve.show.problem import show as show_problem
 from fpsolve.study.results import CurveResult
 from fpsolve.study.solve import everything, solve_curve
 from fpsolve.workflow.reports import COMPLETE, facts_since
-from fpsolve.workflow.views import field_of, map_of, paths_of
+from fpsolve.workflow.views import field_of, listed, map_of, paths_of
 
 MOVING_RTOL = 3e-4
 """Relative error of Λ(p) while a slider moves, at least."""
@@ -159,7 +158,7 @@ class Explorer:
             words = "" if about.words == key else about.words
             yield {
                 "key": key, "words": words, "symbol": _letters(about.latex), "unit": unit, "value": value,
-                "low": min(low, value), "high": max(high, value), "log": scale == "log",
+                "low": min(low, value), "high": max(high, value), "log": scale == "log" and min(low, value) > 0,
                 "axis": key in self.first.differentiable,
             }  # fmt: skip
 
@@ -308,11 +307,6 @@ def _letters(latex: str) -> str:
     text = re.sub(r"\\([a-z]+)", greek, latex.strip("$"))
     text = re.sub(r"_(\d)", lambda digit: digit[1].translate(BELOW), text)
     return "" if re.search(r"[\\_^{}]", text) else text
-
-
-def listed(values: FloatArray) -> list[float | None]:
-    """Numbers for JSON, which has no NaN."""
-    return [each if math.isfinite(each) else None for each in np.asarray(values, dtype=float).ravel().tolist()]
 
 
 class Explored:

@@ -110,18 +110,17 @@ def field_of(case: Case, p: object) -> Answer:
     return {"panels": panels, "told": part_of_page(told_of(panels))}
 
 
+def listed(values: FloatArray) -> list[float | None]:
+    """Numbers for JSON, which has no NaN."""
+    return [each if math.isfinite(each) else None for each in values.tolist()]
+
+
 def panel(title: str, x: FloatArray, y: FloatArray, values: FloatArray, names: Sequence[str]) -> Answer:
-    """A picture of values at nodes, on pixels between them."""
+    """A picture of values at nodes, on pixels between them, x first."""
     u, v = (np.linspace(each[0], each[-1], count) for each, count in zip((x, y), PIXELS, strict=True))
-    rows = np.array([np.interp(u, x, column) for column in values.T])  # y first
-    pixels = np.array([np.interp(v, y, column) for column in rows.T])
-    ends = [[float(each[0]), float(each[-1])] for each in (x, y)]
-    return {
-        "title": title,
-        "ends": ends,
-        "names": names,
-        "values": [[float(f"{z:.4g}") for z in row] for row in pixels],
-    }
+    rows = np.array([np.interp(u, x, column) for column in values.T])
+    pixels = [listed(np.interp(v, y, column)) for column in rows.T]
+    return {"title": title, "ends": [[u[0], u[-1]], [v[0], v[-1]]], "names": names, "values": pixels}
 
 
 def told_of(panels: Sequence[Answer]) -> Iterator[Grid]:
@@ -132,11 +131,9 @@ def told_of(panels: Sequence[Answer]) -> Iterator[Grid]:
         (x0, x1), (y0, y1) = each["ends"]
         x, y = np.linspace(x0, x1, PIXELS[0])[places[0]], np.linspace(y0, y1, PIXELS[1])[places[1]]
         heads = [Column(f"{each['names'][0]} \\ {each['names'][1]}"), *(Column(f"{value:.3g}") for value in y)]
-        rows: list[Sequence[str]] = [
-            [f"{value:.4g}", *(f"{each['values'][i][j]:.4g}" for j in places[1])]
-            for i, value in zip(places[0], x, strict=True)
-        ]
-        yield Grid(each["title"], heads, rows)
+        numbers = np.array(each["values"], dtype=float)[np.ix_(*places)]
+        rows = [[f"{value:.4g}" for value in (x[i], *row)] for i, row in enumerate(numbers)]
+        yield Grid(each["title"], heads, [*rows])
 
 
 def paths_of(case: Case, look: Callable[[], None]) -> Answer:
@@ -166,6 +163,8 @@ def paths_of(case: Case, look: Callable[[], None]) -> Answer:
     log_norm[:] = 0.0
     near = max(1, round(PERIODS * known.half_turn / h / POINTS)) if math.isfinite(known.half_turn) else 1
     short, _, first = zip(*followed(near), strict=True)
+    if not (np.all(np.isfinite(logs)) and np.all(np.isfinite(first))):
+        raise FpsolveError("the paths leave the range of numbers; take a weaker noise")
     has_wall = any(abs(math.cos(jump.phase)) < 1e-12 for jump in system.jumps)  # at x = 0
     rates = logs[-1] / time[-1]
     mean, error = float(np.mean(rates)), float(np.std(rates, ddof=1) / math.sqrt(PATHS))
