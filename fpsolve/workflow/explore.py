@@ -68,6 +68,8 @@ NO_BOUND = 1e3
 """A bound from which on it keeps formulas from overflow, and tells nothing of what is usual."""
 NUMBERS = {MOMENT.name, *INDICES, "theory", "jumps", "classes", "discretisation"}
 """The parts that are solved."""
+MOST_EQUATIONS = 4
+"""Variables whose rates are shown; of more they would fill pages."""
 Answer = Mapping[str, Any]
 """What JSON can hold."""
 
@@ -239,7 +241,7 @@ class Explorer:
             "curve": [listed(getattr(moments, name)) for name in names],
             "root": index.value if index else None,
             "exponent": exponent.value if exponent else None,
-            "equations": equations_of(case.problem),
+            "equations": equations_of(case.problem) if case.problem.dimension <= MOST_EQUATIONS else [],
             "verdict": part_of_page(each for each in shown if isinstance(each, Sentence)),
             "numbers": part_of_page([*filter(lambda each: isinstance(each, Grid), shown), *notes(case, [result], "")]),
             "table": part_of_page(MOMENTS.show(case, result)),

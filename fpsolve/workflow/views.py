@@ -99,14 +99,16 @@ def field_of(case: Case, p: object) -> Answer:
     pair = solver.pair(float(p))
     grid, unit = Nodes.of(pair), problem.noise_quantity.unit
     inside = np.full(grid.z.size, True) if problem.noise.has_states else np.abs(grid.z) <= FURTHEST
-    xi = grid.unit * grid.z[inside]
+    xi, is_chain = grid.unit * grid.z[inside], problem.noise.has_states
     along = "number of the state" if problem.noise.has_states else f"noise ξ ({plain_unit(unit)})"
     names = ["phase φ (rad)", along.removesuffix(" (unknown)").removesuffix(" (1)")]
     fields = {
         f"eigenfunction T of p = {p:g}": grid.fields(pair).right,
         "stationary density": grid.fields(stationary).adjoint,
     }
-    panels = [panel(title, grid.phi.ravel(), xi, values[:, inside], names) for title, values in fields.items()]
+    panels = [
+        panel(title, grid.phi.ravel(), xi, values[:, inside], names, is_chain) for title, values in fields.items()
+    ]
     return {"panels": panels, "told": part_of_page(told_of(panels))}
 
 
@@ -115,11 +117,14 @@ def listed(values: FloatArray) -> list[float | None]:
     return [each if math.isfinite(each) else None for each in values.tolist()]
 
 
-def panel(title: str, x: FloatArray, y: FloatArray, values: FloatArray, names: Sequence[str]) -> Answer:
-    """A picture of values at nodes, on pixels between them, x first."""
+def panel(
+    title: str, x: FloatArray, y: FloatArray, values: FloatArray, names: Sequence[str], is_chain: bool = False
+) -> Answer:
+    """A picture of values at nodes, on pixels between them, x first; of the states of a chain strips."""
     u, v = (np.linspace(each[0], each[-1], count) for each, count in zip((x, y), PIXELS, strict=True))
     rows = np.array([np.interp(u, x, column) for column in values.T])
-    pixels = [listed(np.interp(v, y, column)) for column in rows.T]
+    near = np.abs(v[:, None] - y).argmin(axis=1)
+    pixels = [listed(column[near] if is_chain else np.interp(v, y, column)) for column in rows.T]
     return {"title": title, "ends": [[u[0], u[-1]], [v[0], v[-1]]], "names": names, "values": pixels}
 
 
