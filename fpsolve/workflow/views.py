@@ -98,17 +98,13 @@ def field_of(case: Case, p: object) -> Answer:
     stationary_density(stationary)  # which refuses one that misleads
     pair = solver.pair(float(p))
     grid, unit = Nodes.of(pair), problem.noise_quantity.unit
-    inside = np.full(grid.z.size, True) if problem.noise.has_states else np.abs(grid.z) <= FURTHEST
+    inside = (np.abs(grid.z) <= FURTHEST) | problem.noise.has_states
     xi, is_chain = grid.unit * grid.z[inside], problem.noise.has_states
     along = "number of the state" if problem.noise.has_states else f"noise ξ ({plain_unit(unit)})"
     names = ["phase φ (rad)", along.removesuffix(" (unknown)").removesuffix(" (1)")]
-    fields = {
-        f"eigenfunction T of p = {p:g}": grid.fields(pair).right,
-        "stationary density": grid.fields(stationary).adjoint,
-    }
-    panels = [
-        panel(title, grid.phi.ravel(), xi, values[:, inside], names, is_chain) for title, values in fields.items()
-    ]
+    phi, shown = grid.phi.ravel(), {f"eigenfunction T of p = {p:g}": grid.fields(pair).right}
+    shown["stationary density"] = grid.fields(stationary).adjoint
+    panels = [panel(title, phi, xi, values[:, inside], names, is_chain) for title, values in shown.items()]
     return {"panels": panels, "told": part_of_page(told_of(panels))}
 
 
