@@ -30,6 +30,10 @@ Xi = ArrayLike | Mapping[str, ArrayLike]
 """ξ, or with several noises that of each by its name."""
 MOST_VARIABLES = 200
 """Largest number of variables of a state."""
+MOST_MULTIPLE = 12
+"""Largest delay, over that of which all are multiples."""
+SAME_DELAY = 1e-9
+"""Share of a delay by which it may differ from such a multiple."""
 BELOW = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 """Digits below a line."""
 
@@ -487,6 +491,18 @@ def as_plane(terms: Sequence[CoefficientMatrix], size: float = 0.0) -> tuple[Coe
     speed = 4.0 ** math.floor(math.log(size, 4)) if size else 0.0
     turn = (CoefficientMatrix(0, ((0.0, speed), (-speed, 0.0))),) if speed else ()
     return *turn, *(replace(term, matrix=(term.matrix[0][0] * np.eye(2)).tolist()) for term in terms)
+
+
+def common_delay(pasts: Sequence[tuple[int, float]]) -> tuple[float, int]:
+    """τ of which all delays are multiples, and the largest multiple. Raises `ValueError` where there is none."""
+    delays = np.unique([delay for _, delay in pasts])
+    multiples = delays / delays[-1] * np.arange(1, MOST_MULTIPLE + 1)[:, None]
+    fits = np.all(np.abs(multiples - np.round(multiples)) <= SAME_DELAY * multiples, axis=1)
+    if not fits.any():
+        told = f"got the delays {', '.join(f'{each:g}' for each in delays)}"
+        raise ValueError(f"{told}; must be multiples of one number, the largest at most {MOST_MULTIPLE} times it")
+    count = int(np.argmax(fits)) + 1
+    return float(delays[-1]) / count, count
 
 
 def by_epsilon(system: System) -> tuple[CoefficientMatrix, ...]:

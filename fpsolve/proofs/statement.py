@@ -144,7 +144,7 @@ def statement_of(problem: Problem, stated: Parameters | None = None) -> Statemen
         stated = {key: str(value) for key, value in linear_values(problem).items()}
     system, noise = problem.system, problem.noise
     if problem.dimension > 2:
-        raise TypeError(f"got a system of {problem.dimension} variables; proofs are for two variables only")
+        raise TypeError(f"got a system of {problem.dimension} variables; proofs are for two, without a delay")
     if len(noise.parts) > 1:
         raise TypeError(f"got the noises {' and '.join(noise.parts)} at once; proofs are for one noise")
     is_told = is_ours(system) and system.exact_motion(_named(system, stated)) is not None

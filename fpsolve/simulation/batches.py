@@ -15,7 +15,7 @@ from numpy.random import SeedSequence, default_rng
 from fpsolve.arrays import FloatArray
 from fpsolve.model.noise import Noise
 from fpsolve.pool import processors
-from fpsolve.simulation.coefficients import Coefficients
+from fpsolve.simulation.coefficients import Coefficients, SplitCoefficients
 from fpsolve.simulation.kernels import RENORMALISED, TALLIES, add_windows, advance, advance_population, close_slice
 from fpsolve.simulation.motions import DrivenMotion, StruckMotion, SwitchedMotion
 from fpsolve.simulation.setup import PROGRESS_STEPS, Estimator, starting_state
@@ -90,7 +90,10 @@ class _Paths:
 
     def __init__(self, plan: Plan, seed: SeedSequence) -> None:
         self.plan, self.rng = plan, default_rng(seed)
-        self.x, self.u, self.xi = starting_state(plan.noise, plan.paths, self.rng, dimension=plan.known.dimension)
+        size = plan.known.size(plan.step)
+        self.x, self.u, self.xi = starting_state(plan.noise, plan.paths, self.rng, dimension=size)
+        if isinstance(plan.known, SplitCoefficients):  # whose noises have a row each
+            self.xi = np.atleast_2d(self.xi)
         self.log_norm, self.push = np.zeros((2, plan.paths))
         self.state = self.x, self.u, self.xi, self.log_norm, self.push
         self.slices = -plan.settling
@@ -164,7 +167,7 @@ class Population(_Paths):
     def __init__(self, plan: Plan, seed: SeedSequence, p: float, *, is_far: bool) -> None:
         super().__init__(plan, seed)
         self.p, self.bias, self.expected = p, 0.0, 0.0
-        self._is_biased = p != 0 and plan.noise.basis == "polynomials" and plan.noise.may_tilt
+        self._is_biased = p != 0 and self.xi.ndim == 1 and plan.noise.basis == "polynomials" and plan.noise.may_tilt
         if is_far and self._is_biased:
             self.bias = p * plan.known.strength * plan.noise.relaxation_time
         self.tallies = np.zeros(1, TALLIES)

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,6 +20,7 @@ from fpsolve.model.plane import System, affine, is_driven, matrix_at, squared_fr
 from fpsolve.simulation.rays import Rays
 
 if TYPE_CHECKING:
+    from fpsolve.simulation.delays import DelayedSpace
     from fpsolve.simulation.motions import DrivenMotion, StruckMotion, SwitchedMotion
     from fpsolve.simulation.several import SplitMotion
     from fpsolve.simulation.spaces import DrivenSpace, SplitSpace, SwitchedSpace
@@ -28,6 +30,8 @@ _FAR = 5.0
 _UNRESOLVED = 1 / 30
 """Of the coefficient of [A₁, [A₁, A₀]] under white noise, its mean for given ∫dW and ∫W dt, as a share of s²h²."""
 
+_DELAYS = 8.0
+"""Delays after which the start is forgotten, about."""
 _PARALLEL = 100.0
 """The condition of the modes from which on they are no coordinates."""
 _ONE_WAY = 1e-12
@@ -76,6 +80,10 @@ class Coefficients:
     def dimension(self) -> int:
         """n."""
         return self.steady.shape[-1]
+
+    def size(self, h: float) -> int:
+        """The number of variables of a path that is moved in steps of length h."""
+        return self.dimension
 
     def motion(self, h: float) -> DrivenMotion | SwitchedMotion | StruckMotion | DrivenSpace | SwitchedSpace:
         """The numbers that move paths by a step of length h."""
@@ -135,6 +143,23 @@ class SplitCoefficients(Coefficients):
         return math.sqrt(sum(size**2 * (h if is_white else h**2) for size, is_white in self.sizes))
 
 
+@dataclass(frozen=True)
+class DelayedCoefficients(SplitCoefficients):
+    """A system with delays, which has a column for each of the `pasts` of its state."""
+
+    pasts: Sequence[tuple[int, float]] = ()
+
+    def size(self, h: float) -> int:
+        return (self.dimension - len(self.pasts)) * (1 + round(max(delay for _, delay in self.pasts) / h))
+
+    def motion(self, h: float) -> DelayedSpace:  # type: ignore[override]
+        from fpsolve.simulation.delays import DelayedSpace
+
+        n = self.dimension - len(self.pasts)
+        rows = np.array([variable + n * round(delay / h) for variable, delay in self.pasts])
+        return DelayedSpace(self.steady[:n].copy(), self.driven[:, :n].copy(), rows)
+
+
 def split_coefficients(system: System, noise: Noise) -> SplitCoefficients:
     """The matrices of a system under several noises."""
     moved = noise.motion(system).drift
@@ -144,7 +169,7 @@ def split_coefficients(system: System, noise: Noise) -> SplitCoefficients:
         if line := affine(term.g):
             steady += line[0] * system.epsilon**term.order * np.array(term.matrix)
     every = sum((np.abs(system.epsilon**term.order * np.array(term.matrix)) for term in system.terms), zero)
-    even = _even_coordinates(matrix_at(moved, 0.0, slice(0, 1)), every)
+    even = np.eye(len(zero)) if system.pasts else _even_coordinates(matrix_at(moved, 0.0, slice(0, 1)), every)
     back, intensity, intensities = np.linalg.inv(even), 0.0, list[float]()
     free = even @ matrix_at(moved, 0.0, slice(0, 1)) @ back
     for name, part in noise.parts.items():
@@ -166,7 +191,14 @@ def split_coefficients(system: System, noise: Noise) -> SplitCoefficients:
             intensity += 2 * sizes[-1][0] ** 2 * time
             intensities.append(2 * part.standard_deviation**2 * time * _exchanged(free, part))
     half_turn = math.pi / _rate(free, intensity)
-    return SplitCoefficients(
+    if system.pasts:
+        kind: Any = partial(DelayedCoefficients, pasts=system.pasts)
+        settling = _DELAYS * max(delay for _, delay in system.pasts)
+    else:
+        kind = SplitCoefficients
+        moves = zip(intensities, even @ np.array(driven) @ back, strict=True)
+        settling = _settling(free, list(moves), half_turn)
+    return kind(
         noise,
         even @ steady @ back,
         even @ np.array(driven) @ back,
@@ -174,14 +206,14 @@ def split_coefficients(system: System, noise: Noise) -> SplitCoefficients:
         math.sqrt(intensity),
         half_turn,
         _rays(system, even, even @ steady @ back),
-        _settling(free, list(zip(intensities, even @ np.array(driven) @ back, strict=True)), half_turn),
+        settling,
         sizes=sizes,
     )
 
 
 def coefficients(system: System, noise: Any) -> Coefficients:
     """The matrices of a system under a noise that can be simulated."""
-    if len(noise.parts) > 1:
+    if len(noise.parts) > 1 or system.pasts:
         return split_coefficients(system, noise)
     moved, diffusions, struck = noise.motion(system)
     is_switched = noise.has_states and not noise.is_white

@@ -53,15 +53,19 @@ def _normalised_by_shape(x, u, log_norm):  # type: ignore[no-untyped-def]
             u[i] /= norm
 
     def space(x, u, log_norm):  # type: ignore[no-untyped-def]
+        norms = np.empty(x.size)
         for i in range(x.size):
-            square = x[i] * x[i]
-            for k in range(u.shape[0]):
-                square += u[k, i] * u[k, i]
-            norm = math.sqrt(square)
-            log_norm[i] += math.log(norm)
-            x[i] /= norm
-            for k in range(u.shape[0]):
-                u[k, i] /= norm
+            norms[i] = x[i] * x[i]
+        for k in range(u.shape[0]):
+            for i in range(x.size):
+                norms[i] += u[k, i] * u[k, i]
+        for i in range(x.size):
+            norms[i] = math.sqrt(norms[i])
+            log_norm[i] += math.log(norms[i])
+            x[i] /= norms[i]
+        for k in range(u.shape[0]):
+            for i in range(x.size):
+                u[k, i] /= norms[i]
 
     return plane if u.ndim == 1 else space
 

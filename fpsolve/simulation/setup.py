@@ -11,9 +11,9 @@ import numpy as np
 from fpsolve.arrays import FloatArray, is_whole, real_numbers, shown
 from fpsolve.errors import FpsolveError
 from fpsolve.model.noise import Noise
-from fpsolve.model.plane import System, affine, written_coefficient
+from fpsolve.model.plane import SAME_DELAY, System, affine, common_delay, written_coefficient
 from fpsolve.model.problem import Problem, checked_problem, refuse_infinite
-from fpsolve.simulation.coefficients import coefficients
+from fpsolve.simulation.coefficients import SplitCoefficients, coefficients
 
 Estimator = Literal["direct", "population"]
 SPLIT = 0.06
@@ -39,8 +39,10 @@ def simulated_parts(problem: Problem) -> tuple[System, Noise]:
     if not noise.is_simulated:
         need = f"noise that states a step of its paths, but this is a {type(noise).__name__}"
         raise FpsolveError(f"simulation is for {need}; use the finite elements")
-    if system.pasts:
-        raise FpsolveError("simulation is for systems without a delay; compare with other delays or another noise")
+    try:
+        _ = common_delay(system.pasts) if system.pasts else None
+    except ValueError as failure:
+        raise FpsolveError(f"simulation is in steps that divide each delay, but {failure}") from failure
     if problem.dimension > 2 and problem.impulses:
         told = f"simulation under impulses is for two variables, but there are {problem.dimension}"
         raise FpsolveError(f"{told}; take even p, which need none")
@@ -85,13 +87,14 @@ def largest_step(oscillator: System, noise: Noise) -> tuple[float, str]:
     turning = 0.5 * (known.steady - known.steady.T)
     turn = float(np.linalg.norm(turning, 2))
     rest = float(np.linalg.norm(known.steady - turning, 2))  # may underflow
-    if len(noise.parts) > 1:
-        strengths = [SPLIT / (size**2 if is_white else size) for size, is_white in known.sizes if size]  # type: ignore[attr-defined]
+    if isinstance(known, SplitCoefficients):
+        strengths = [SPLIT / (size**2 if is_white else size) for size, is_white in known.sizes if size]
         split = {
             "the frequency": 2 * SPLIT / turn if turn else math.inf,
             "the damping": SPLIT / rest if rest else math.inf,
             "the strength of the noise": min(strengths, default=math.inf),
             "the correlation time of the noise": noise.largest_step,
+            "the delay": common_delay(oscillator.pasts)[0] / 4 if oscillator.pasts else math.inf,
         }
         reason = min(split, key=lambda name: split[name])
         return split[reason], reason
@@ -131,7 +134,9 @@ def default_step(oscillator: System, noise: Noise) -> float:
 
 
 def _repeated(oscillator: System, noise: Noise) -> float:
-    """The period of a harmonic load, without one a half-turn."""
+    """The delay, or the period of a harmonic load, without one a half-turn."""
+    if oscillator.pasts:
+        return common_delay(oscillator.pasts)[0]
     return max(part.period for part in noise.parts.values()) or coefficients(oscillator, noise).half_turn
 
 
@@ -149,6 +154,9 @@ def obstacles(
         found["step"] = (
             f"got {step:g}, too large for {reason}; must be > 0 and <= {largest:.4g}; reduce it, or leave it out"
         )
+    elif step is not None and oscillator.pasts and not _divides(step, oscillator):
+        unit, _ = common_delay(oscillator.pasts)
+        found["step"] = f"got {step:.10g}; must be a part of the delay, such as {unit / math.ceil(unit / step):.10g}"
     elif step is not None and step < least <= largest:
         found["step"] = (
             f"got {step:g}, too small: a transient, {settling:.3g}, must take at most {_LONGEST:.0e} steps; must be >= "
@@ -166,6 +174,12 @@ def obstacles(
     elif time is not None and time > _LONGEST * settling:
         found["time"] = f"got {time:g}; must be <= {_LONGEST * settling:.4g}, a million transients; reduce it"
     return found
+
+
+def _divides(step: float, system: System) -> bool:
+    """Whether the delays of a system are whole numbers of steps."""
+    parts = common_delay(system.pasts)[0] / step
+    return abs(parts - round(parts)) <= SAME_DELAY * parts
 
 
 def starting_state(

@@ -25,13 +25,10 @@ from scipy.optimize import brentq
 from fpsolve.arrays import FloatArray, dense
 from fpsolve.budget import charge
 from fpsolve.errors import NoHierarchy
+from fpsolve.model.plane import common_delay
 from fpsolve.theory.powers import Moving, PowerRates, moment_form, upper
 from fpsolve.theory.rightmost import MOST_POLISHES, REMEDY, ROUNDING, Eigenpair
 
-MOST_MULTIPLE = 12
-"""Largest delay, over that of which all are multiples."""
-SAME = 1e-9
-"""Share of a delay by which it may differ from such a multiple."""
 MOST_SIZE = 1200
 """Largest number of second moments at two times, times that multiple."""
 STEP = 2.0
@@ -71,13 +68,10 @@ class Delayed:
 
     def __init__(self, moving: Moving, pasts: Sequence[tuple[int, float]]) -> None:
         self._pasts, self.n = pasts, len(moving.steady) - len(pasts)
-        delays = np.unique([delay for _, delay in pasts])
-        self.last, multiples = float(delays[-1]), delays / delays[-1] * np.arange(MOST_MULTIPLE + 1)[:, None]
-        fits = np.all(np.abs(multiples - np.round(multiples)) <= SAME * multiples, axis=1)
-        self.count = int(np.argmax(fits[1:])) + 1
-        if not fits[self.count]:
-            told = f"got the delays {', '.join(f'{each:g}' for each in delays)}"
-            raise NoHierarchy(f"{told}; must be multiples of one number, the largest at most {MOST_MULTIPLE} times it")
+        try:
+            self.unit, self.count = common_delay(pasts)
+        except ValueError as failure:
+            raise NoHierarchy(str(failure)) from failure
         if (size := self.n**2 * self.count) > MOST_SIZE:
             raise NoHierarchy(f"{size} second moments at two times are more than {MOST_SIZE}; {REMEDY}")
         squares, drift = [*moving.squares], moving.steady + sum(0.5 * each @ each for each in moving.squares)
@@ -90,9 +84,9 @@ class Delayed:
         self.symmetric = np.array([moment_form(each, self.n, 2).ravel() for each in units]).T
 
     @property
-    def unit(self) -> float:
-        """τ."""
-        return self.last / self.count
+    def last(self) -> float:
+        """The largest delay."""
+        return self.unit * self.count
 
     def _split(self, matrix: FloatArray) -> FloatArray:
         """What multiplies x(t − kτ), shape (count + 1, n, n)."""

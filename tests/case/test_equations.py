@@ -174,7 +174,7 @@ def test_a_case_of_three_variables(tmp_path: Path, capsys: pytest.CaptureFixture
     assert curve["discretisation"]["waves"] >= 2
     assert "du/dt = −0.5 v − u" in (tmp_path / "mine/report.html").read_text(encoding="utf-8")
     assert main(["prove", str(path), "--out", str(tmp_path)]) == BAD_INPUT
-    assert "proofs are for two variables only" in capsys.readouterr().err
+    assert "proofs are for two, without a delay" in capsys.readouterr().err
 
 
 def test_a_hundred_thousand_signs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -11,6 +11,7 @@ from fpsolve.errors import NoHierarchy, NoSuchExponent
 from fpsolve.model import OrnsteinUhlenbeck, White
 from fpsolve.model.faults import TableError
 from fpsolve.model.systems.equations import EquationSystem
+from fpsolve.simulation import simulate
 from fpsolve.theory import even_moment
 
 ITO = White(s=1.0, interpretation="ito")
@@ -152,6 +153,29 @@ def test_coloured_noise():
     problem = Problem(EquationSystem(("x", "v"), drift), OrnsteinUhlenbeck(alpha=1.0, sigma=0.8))
     found = even_moment(problem, 2, rtol=1e-9)
     assert abs(found.value + 0.1108973920228) <= found.error + 1e-13
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("names", "drift", "noise"),
+    [
+        (("x", "v"), ("v", "-x - 0.2*v + 0.1*x(t - 2*pi) + 0.1*xi*(x + x(t - 2*pi))"), ITO),
+        (("x",), ("-x + 0.4*x(t - 1) + 0.3*xi*(x + x(t - 0.5))",), ITO),
+        (("x",), ("-x + 0.3*xi*x + 0.4*x(t - 1)",), OrnsteinUhlenbeck(alpha=1.0, sigma=0.8)),
+    ],
+)
+def test_simulated_paths(names, drift, noise):
+    problem = Problem(EquationSystem(names, drift), noise)
+    (found,) = simulate(
+        problem, 2.0, estimator="population", paths=4096, time=101.0 if len(names) == 2 else 30.0
+    ).estimates
+    assert abs(found.value - even_moment(problem, 2, rtol=1e-9).value) <= 4 * found.standard_error
+    assert found.standard_error <= 5e-3
+
+
+def test_steps_of_paths_divide_a_delay():
+    with pytest.raises(ValueError, match="must be a part of the delay, such as"):
+        simulate(scalar(-2.0, 0.5, 1.0), 2.0, step=0.0101)
 
 
 @pytest.mark.parametrize(
