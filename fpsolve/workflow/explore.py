@@ -229,7 +229,8 @@ class Explorer:
     def _solve(self, question: Mapping[str, Any]) -> Answer:
         """All numbers, as `run` finds them."""
         case = self._at(question)
-        return self._told(case, self._solved(case))
+        found = self._solved(case)
+        return {**self._told(case, found), "table": part_of_page(MOMENTS.show(case, found))}
 
     def _told(self, case: Case, result: CurveResult) -> Answer:
         """The curve, the equation, and what a report says of it."""
@@ -244,7 +245,7 @@ class Explorer:
             "equations": equations_of(case.problem) if case.problem.dimension <= MOST_EQUATIONS else [],
             "verdict": part_of_page(each for each in shown if isinstance(each, Sentence)),
             "numbers": part_of_page([*filter(lambda each: isinstance(each, Grid), shown), *notes(case, [result], "")]),
-            "table": part_of_page(MOMENTS.show(case, result)),
+            "table": "",  # which nobody reads while a slider moves
         }
 
     def _paths(self, question: Mapping[str, Any]) -> Answer:
