@@ -4,11 +4,12 @@ import math
 
 import numpy as np
 import pytest
+from scipy.linalg import block_diag
 from scipy.special import wrightomega
 
 from fpsolve import Problem, moment_lyapunov, sensitivities
 from fpsolve.errors import NoHierarchy, NoSuchExponent
-from fpsolve.model import OrnsteinUhlenbeck, White
+from fpsolve.model import MarkovChain, OrnsteinUhlenbeck, Telegraph, White
 from fpsolve.model.faults import TableError
 from fpsolve.model.systems.equations import EquationSystem
 from fpsolve.simulation import simulate
@@ -74,12 +75,17 @@ def test_without_noise_it_is_twice_the_rightmost_root():
     assert abs(found.value - 2 * -0.3181315052047641) <= found.error <= 1e-6
 
 
-def segment(a, b, alpha, beta, tau: float, size: int) -> float:
-    """Λ(2) where x(t − τ) leaves a chain of Chebyshev nodes of the path: of finite order, as paths are rough."""
-    n, nodes = len(a), np.cos(np.pi * np.arange(size + 1) / size)
+def differentiating(size: int) -> np.ndarray:
+    """The slopes at Chebyshev nodes, from 1 to −1."""
+    nodes = np.cos(np.pi * np.arange(size + 1) / size)
     ends = np.r_[2.0, np.ones(size - 1), 2.0] * (-1.0) ** np.arange(size + 1)
     slopes = np.outer(ends, 1 / ends) / (np.subtract.outer(nodes, nodes) + np.eye(size + 1))
-    slopes -= np.diag(slopes.sum(axis=1))
+    return slopes - np.diag(slopes.sum(axis=1))
+
+
+def segment(a, b, alpha, beta, tau: float, size: int) -> float:
+    """Λ(2) where x(t − τ) leaves a chain of Chebyshev nodes of the path: of finite order, as paths are rough."""
+    n, slopes = len(a), differentiating(size)
     moving, driven = np.kron(slopes * 2 / tau, np.eye(n)), np.zeros(2 * (n * (size + 1),))
     moving[:n] = 0.0
     moving[:n, :n], moving[:n, -n:] = a, b
@@ -153,6 +159,36 @@ def test_coloured_noise():
     problem = Problem(EquationSystem(("x", "v"), drift), OrnsteinUhlenbeck(alpha=1.0, sigma=0.8))
     found = even_moment(problem, 2, rtol=1e-9)
     assert abs(found.value + 0.1108973920228) <= found.error + 1e-13
+
+
+@pytest.mark.parametrize(
+    ("noise", "own", "past"),
+    [
+        (Telegraph(a=0.5, k=0.7), (-1.0, 1.0), (0.4, 0.0)),
+        (
+            MarkovChain((-0.6, 0.1, 0.7), ((-1.0, 0.9, 0.1), (0.1, -0.8, 0.7), (0.6, 0.1, -0.7))),
+            (-1.0, 0.5),
+            (0.4, 0.3),
+        ),
+    ],
+)
+def test_chains(noise, own, past):
+    """Beside the moments of a discretised segment for each state; one chain is not reversible, one drives the past."""
+    rate = f"({own[0]} + {own[1]}*xi)*x + ({past[0]} + {past[1]}*xi)*x(t - 1)"
+    found = even_moment(Problem(EquationSystem(("x",), (rate,)), noise), 2)
+    errors = []
+    for size in (3, 6, 9):
+        slopes = differentiating(size) * 2
+        one, blocks = np.eye(size + 1), []
+        for state in noise.states:
+            moving = slopes.copy()
+            moving[0] = 0.0
+            moving[0, 0], moving[0, -1] = own[0] + own[1] * state, past[0] + past[1] * state
+            blocks.append(np.kron(moving, one) + np.kron(one, moving))
+        whole = block_diag(*blocks) + np.kron(np.transpose(noise.rates), np.kron(one, one))
+        errors.append(abs(float(np.linalg.eigvals(whole).real.max()) - found.value))
+    assert errors[2] <= 1e-8
+    assert errors[2] < 0.3 * errors[1] < 0.1 * errors[0]
 
 
 @pytest.mark.slow
