@@ -16,6 +16,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import reduce
 from itertools import product
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -68,8 +69,12 @@ MOST_NODES = 60
 """Number of nodes of a surface."""
 MIXED = 48
 """Number of random sums of the entries of a residual."""
-MORE = 10.0
-"""What a residual is at most, over the largest where it was looked at what is left."""
+LEAST = 100.0
+"""What a residual is at most, over the least of all pairs with T > 0 of the same small pencil."""
+SEEN = 128
+"""Number of points, as likely as the noise is there, at which it is looked whether T > 0."""
+NEGATIVE = 0.05
+"""Share of T there that has the other sign, at most."""
 FEW = 10
 """Number of roundings in an entry of a product with L."""
 BETWEEN = 2.0
@@ -173,7 +178,7 @@ class Surface(Result):
             if axis.key not in problem.differentiable:
                 known = ", ".join(problem.differentiable) or "none"
                 raise ValueError(f"got {shown(axis.key)}; the parameters are {known}")
-        self._budget, self._nodes, self._most, self._refinements = budget or Budget(), list[Node](), 0.0, 0
+        self._budget, self._nodes, self._refinements = budget or Budget(), list[Node](), 0
         self._frame: Problem | None = None
         if problem.dimension != 2 or problem.classes:
             raise self._none()
@@ -224,7 +229,6 @@ class Surface(Result):
         while True:
             self._sample()
             self._nodes.clear()
-            self._most = 0.0
             if all(self._add(at) for at in places):
                 return
 
@@ -321,7 +325,7 @@ class Surface(Result):
 
     def _lifted(self, at: FloatArray, generator: Generator) -> PrincipalPair:
         """What the basis makes of the pair at a place, to start from."""
-        nearest, found = self._nearest(at), self._judged(at)
+        nearest, found = self._nearest(at), self._values(at[None])
         if np.isnan(found.value[0]):
             return replace(nearest.pair, generator=generator)
         right = found.x[0] @ self._right if self.p else nearest.pair.right
@@ -383,9 +387,17 @@ class Surface(Result):
         self._dual = orthonormal(np.zeros((0, one.size)), [] if self.p else [one])
         self._small = [np.zeros((len(made), 0, 0)) for _ in range(len(self._kinds) + 1)]
         self._mixing = np.random.default_rng(2).standard_normal((MIXED, one.size)) / math.sqrt(MIXED)
-        self._mixed = np.zeros((2, len(made), MIXED, 0))
+        self._mixed, self._seen = np.zeros((2, len(made), MIXED, 0)), np.zeros((SEEN, 0))
+        measure = reduce(np.multiply.outer, (axis.measure for axis in self._spaces[0].noises), np.ones(1))
+        all_of = np.broadcast_to(measure, self._evaluated(one).shape).ravel()
+        self._at = np.random.default_rng(4).choice(all_of.size, SEEN, p=all_of / all_of.sum())
         if not self.p:
             self._extend([], [])
+
+    def _evaluated(self, vector: FloatArray) -> FloatArray:
+        """A function at all points of a grid, by phase and noises."""
+        space = self._spaces[0]
+        return space.evaluate(vector, space.phi.inner_values, *(axis.values for axis in space.noises))
 
     def _operators(self, at: FloatArray) -> tuple[KroneckerSum, ...]:
         """L, for p = 0 also L′."""
@@ -438,6 +450,8 @@ class Surface(Result):
             rows = np.concatenate([small, adjoint @ self._right[:old].T], axis=1)
             self._small[number] = np.concatenate([rows, (images @ self._dual.T).swapaxes(1, 2)], axis=2)
         self._mixed = np.concatenate([self._mixed, mixed], axis=3)
+        seen = [self._evaluated(each).ravel()[self._at] for each in after]
+        self._seen = np.concatenate([self._seen, np.array(seen).T.reshape(SEEN, -1)], axis=1)
         if not self.p:
             self._small[0][:, :, 0] = 0.0  # L(0) 1 = 0
 
@@ -445,14 +459,14 @@ class Surface(Result):
         size = len(self._right)
         return [(rows @ each.reshape(len(each), -1)).reshape(-1, size, size) for each in self._small]
 
-    def _values(self, at: FloatArray, has_gradient: bool = False, most: float | None = None) -> Values:
+    def _values(self, at: FloatArray, has_gradient: bool = False) -> Values:
         """F at some places, shape (n, d), from the small matrices alone."""
         small = self._pencils(self._rows(at))
         slopes = [self._pencils(self._rows(at, k)) for k in range(len(self.axes))] if has_gradient else []
         if not self.p:
             return self._growth(small, slopes)
         a, g = small
-        value, x, y = self._principal(at, a, g, self._most if most is None else most)
+        value, x, y = self._principal(at, a, g)
         y = y / form(y, g, x)[:, None]
         gradient = (
             np.array([form(y, by_a, x) - value * form(y, by_g, x) for by_a, by_g in slopes]).reshape(-1, len(at)).T
@@ -475,50 +489,35 @@ class Surface(Result):
         x = np.concatenate([np.zeros((len(z), 1)), -z[:, 1:]], axis=1)
         return Values(value, np.array(gradient).reshape(-1, len(value)).T, x, y)
 
-    def _judged(self, at: FloatArray) -> Values:
-        """F at a place where it is not known how large the residual may be: hardly larger than the least of all."""
-        most = math.inf
-        if self.p:
-            a, g = self._pencils(self._rows(at[None]))
-            values, vectors = np.linalg.eig(np.linalg.solve(g[0], a[0]))
-            rest = self._rest(np.repeat(at[None], values.size, axis=0), values, vectors.T)
-            most = MORE * float(rest[values.imag == 0].min(initial=math.inf))
-        return self._values(at[None], most=most)
+    def _principal(self, at: FloatArray, a: FloatArray, g: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """The largest real eigenvalue of each small pencil with T > 0 and a small residual, or NaN, with both vectors.
 
-    def _principal(
-        self, at: FloatArray, a: FloatArray, g: FloatArray, most: float
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """The largest real eigenvalue of each small pencil whose residual is small, or NaN, with both vectors.
-
-        Larger ones may be of the small pencil alone, and smaller ones of small residual of L, as in tongues.
+        Larger ones may be of the small pencil alone, where T changes its sign or the residual is larger by far.
         """
-        values = np.linalg.eigvals(np.linalg.solve(g, a))
-        ranked = -np.sort(-np.where(values.imag == 0, values.real, -math.inf), axis=1)
-        value, (x, y), left = np.full(len(at), math.nan), np.ones((2, len(at), len(self._right))), np.arange(len(at))
-        for k in range(ranked.shape[1]):
-            left = left[np.isfinite(ranked[left, k])]
-            if not left.size:
-                break
-            start = np.broadcast_to(self._mixing[0, : ranked.shape[1]], (left.size, ranked.shape[1]))
-            found, u, v, _ = eigenpairs(a[left], g[left], ranked[left, k], start, start)
-            is_it = self._rest(at[left], found, u) <= most
-            it, left = left[is_it], left[~is_it]
-            value[it], x[it], y[it] = found[is_it], u[is_it], v[is_it]
-        return value, x, y
+        values, vectors = np.linalg.eig(np.linalg.solve(g, a))
+        seen = (self._seen @ vectors).real
+        negative = np.sum(np.maximum(-seen, 0), axis=1) / np.sum(np.abs(seen), axis=1)
+        may_be = (values.imag == 0) & (np.minimum(negative, 1 - negative) <= NEGATIVE)
+        rest = np.where(may_be, self._rest(at, values, vectors), math.inf)
+        ranked = np.where(may_be & (rest <= LEAST * rest.min(axis=1)[:, None]), values.real, -math.inf)
+        own, best = np.arange(len(at)), np.argmax(ranked, axis=1)
+        x = vectors[own, :, best].real
+        value, x, y, _ = eigenpairs(a, g, values[own, best].real, x, (g @ x[:, :, None])[:, :, 0])
+        return np.where(np.isfinite(ranked[own, best]), value, math.nan), x, y
 
-    def _rest(self, at: FloatArray, value: Any, x: Any) -> FloatArray:
-        """About ‖(L − ΛM)T‖/‖T‖ at some places, by random sums of its entries, shape (n,)."""
+    def _rest(self, at: FloatArray, values: Any, vectors: Any) -> FloatArray:
+        """About ‖(L − ΛM)T‖/‖T‖ of some pairs at each place, by random sums of its entries: shape (n, pairs)."""
         rows = self._rows(at)
         of_l, of_m = ((rows @ each.reshape(len(each), -1)).reshape(len(at), MIXED, -1) for each in self._mixed)
-        rest = ((of_l - value[:, None, None] * of_m) @ x[:, :, None])[:, :, 0]
-        return np.asarray(np.linalg.norm(rest, axis=1) / np.linalg.norm(x, axis=1))
+        rest = np.linalg.norm(of_l @ vectors - (of_m @ vectors) * values[:, None, :], axis=1)
+        return np.asarray(rest / np.linalg.norm(vectors, axis=1))
 
     # errors
 
     def _left_at(self, at: FloatArray) -> tuple[float, float]:
         """What is left of F at a place, over its share of what is allowed, and itself."""
         refuse_infinite(self._problem(at), self.p)
-        found = self._judged(at)
+        found = self._values(at[None])
         if np.isnan(found.value[0]):
             return math.inf, math.inf
         value, x, y = float(found.value[0]), found.x[0] @ self._right, found.y[0] @ self._dual
@@ -534,8 +533,6 @@ class Surface(Result):
         assert around is not None
         left = SAFE * abs(float(s @ around.solve(r, refinements=2)))
         share = left / (SHARE * self._allowed(at, value))
-        if share <= 1:
-            self._most = max(self._most, MORE * float(self._rest(at[None], found.value, found.x)[0]) if self.p else 0.0)
         return share, left
 
     # values
