@@ -13,6 +13,8 @@ from fpsolve.workflow.chart import solve_chart
 CASES = sorted((Path(__file__).parents[2] / "cases/systems").glob("*.toml"))
 DIGITS = 2e-13
 """To which the expected values are known."""
+FEWER = {"delayed_mathieu": 5e-11}
+"""Where they are known to fewer: by semi-discretisation."""
 
 
 @pytest.mark.parametrize("path", CASES, ids=lambda path: path.stem)
@@ -31,7 +33,7 @@ def test_every_case_meets_its_expectations_within_the_stated_error(path):
             error = result.estimates[item.expectation.quantity].error_estimate
         else:
             [error] = result.moments.error_estimate[result.moments.p == item.expectation.p]
-        assert abs(item.value - item.expectation.value) <= error + DIGITS
+        assert abs(item.value - item.expectation.value) <= error + FEWER.get(path.stem, DIGITS)
 
 
 @pytest.mark.slow
