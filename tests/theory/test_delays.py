@@ -110,7 +110,7 @@ def test_a_discretised_segment_comes_nearer(seed):
         return " ".join([*now, *past])
 
     found = even_moment(Problem(EquationSystem(names, tuple(map(row, range(n)))), ITO), 2)
-    errors = [abs(segment(a, b, alpha, beta, tau, size) - found.value) for size in (4, 8, 16)]
+    errors = [abs(segment(a, b, alpha, beta, tau, size) - found.value) for size in (3, 6, 12)]
     assert errors[2] <= 0.02 * (1 + abs(found.value))
     assert errors[2] < 0.6 * errors[1] < 0.6 * errors[0] or errors[2] < 1e-4
 
@@ -157,7 +157,7 @@ def test_stratonovich_is_another_drift():
 def test_coloured_noise():
     drift = "v", "-(1 + 0.5*xi)*x - 0.2*v + 0.1*x(t - 2*pi)"
     problem = Problem(EquationSystem(("x", "v"), drift), OrnsteinUhlenbeck(alpha=1.0, sigma=0.8))
-    found = even_moment(problem, 2, rtol=1e-9)
+    found = even_moment(problem, 2, rtol=1e-7)
     assert abs(found.value + 0.1108973920228) <= found.error + 1e-13
 
 
