@@ -39,6 +39,8 @@ SCAN_RTOL = 1e-5
 """Smallest error of F on the grid of a scan that is asked for, relative to its scale."""
 REDUCED_RTOL = 1e-4
 """Error of F by a reduced basis, relative to its scale, on a grid twice as fine."""
+ONE_SPACE = 4000
+"""Unknowns of one space for the whole frame beyond which each point of a grid is solved on its own."""
 COARSER = 10.0
 """Smallest factor from the error of F on the line to that on the grid."""
 NODES = 13
@@ -216,7 +218,7 @@ class Boundary(Result):
         nodes = np.linspace(0, 1, 2 * self.nodes - 1)
         try:
             with whole.running():
-                surface = Surface(self.problem, ranges, p, rtol=REDUCED_RTOL, budget=self.budget)
+                surface = Surface(self.problem, ranges, p, rtol=REDUCED_RTOL, budget=self.budget, unknowns=ONE_SPACE)
                 found = surface.at_shares(np.array([*product(nodes, nodes)])) if surface.is_converged else None
         except FpsolveError:
             return None

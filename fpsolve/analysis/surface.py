@@ -147,6 +147,7 @@ class Surface(Result):
         rtol: |error| ≤ rtol·max(|F|, the terms of Eq. (37) before they cancel), F being λ or Λ(p); None is 1e-6.
         budget: for a solve.
         most: how many solves there may be.
+        unknowns: of the space that serves all points, at most, or four times those of the middle; None is the budget's.
 
     Attributes:
         nodes: where it was solved, as shares of the ranges, shape (n, d).
@@ -169,6 +170,7 @@ class Surface(Result):
         rtol: float | None = None,
         budget: Budget | None = None,
         most: int = MOST_NODES,
+        unknowns: int | None = None,
     ) -> None:
         self.problem, self.p, self.rtol = checked_problem(problem), real_number(p, "p"), rtol or 1e-6
         self.axes = tuple(Axis(key, *each) for key, each in ranges.items())
@@ -189,6 +191,7 @@ class Surface(Result):
         self._frame = self._problem(places[0])
         first = self._solver(places[0]).whole.solution(self.p)
         self._chosen, self._starts = first.pair.generator.chosen, [first.pair]
+        self._largest = self._budget.unknowns if unknowns is None else max(unknowns, 4 * first.pair.space.size)
         with one_thread():
             self._choose(first.pair)
             self._begin(places)
@@ -297,7 +300,7 @@ class Surface(Result):
     def _take(self, space: Space) -> bool:
         """Go on with a finer space. Raises `NotConverged` where it has too many unknowns."""
         self._chosen, self._refinements = space, self._refinements + 1
-        if self._refinements > MOST_SPACES or space.size > self._budget.unknowns:
+        if self._refinements > MOST_SPACES or space.size > self._largest:
             raise self._none()
         return False
 
