@@ -78,6 +78,12 @@ class Branch:
     closed: bool = False
     obstacles: tuple[Message, ...] = ()
 
+    @property
+    def path(self) -> tuple[FloatArray, FloatArray]:
+        """x and y, of a closed one the first point again at the end."""
+        x, y = (np.append(each, each[: self.closed]) for each in (self.x, self.y))
+        return x, y
+
     def __repr__(self) -> str:
         return brief(self, f"{self.x.size} points{', closed' * self.closed}")
 
@@ -219,10 +225,10 @@ class Boundary(Result):
         try:
             with whole.running():
                 surface = Surface(self.problem, ranges, p, rtol=REDUCED_RTOL, budget=self.budget, unknowns=ONE_SPACE)
-                found = surface.at_shares(np.array([*product(nodes, nodes)])) if surface.is_converged else None
+                if not surface.is_converged:
+                    return None
+                found = surface.at_shares(np.array([*product(nodes, nodes)]))
         except FpsolveError:
-            return None
-        if found is None:
             return None
         values, gradients = (each.reshape(nodes.size, nodes.size, -1) / (p or 1.0) for each in found)
         return Scan(nodes, values[:, :, 0], gradients, seconds=whole.spent, rtol=REDUCED_RTOL)
@@ -309,7 +315,7 @@ class Boundary(Result):
     def _draw(self, found: xarray.Dataset, axes: Axes, **kwargs: Any) -> None:
         style = {"linewidth": 2, "label": self.zero.latex, **coloured(axes, kwargs)}
         for branch in self.branches:
-            axes.plot(*(np.append(each, each[: branch.closed]) for each in (branch.x, branch.y)), **style)
+            axes.plot(*branch.path, **style)
             style.pop("label", None)
         if "label" in style:
             axes.plot([], [], **style)

@@ -8,7 +8,7 @@ yᵀW L(0; θ) Vᵀ = 0 and yᵀW M 1 = 1 there is λ = yᵀW L′(0; θ) 1, who
 L(p; θ), in the coordinates of one θ, is a sum of products of functions of θ and fixed operators: those at few θ make
 all others. Where it is none, as where a speed changes its sign at a line between cells, there is no such surface.
 What is left is estimated by both residuals and the inverse at a node, as over p, see `exponent.basis`. The principal
-eigenvalue is the largest real one of small residual: the small pencil has others of its own, and of L smaller ones.
+eigenvalue is the largest real one of T > 0 and a small residual: the small pencil has others, of its own and of L.
 """
 
 from __future__ import annotations
@@ -16,7 +16,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import reduce
 from itertools import product
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -33,7 +32,7 @@ from fpsolve.exponent.adapt import SMALL_P, UNSOLVED, Budget
 from fpsolve.exponent.basis import SAFE, SHARE, Polynomials, eigenpairs, form, orthonormal
 from fpsolve.exponent.eigen import PairDerivatives, PrincipalPair, principal_pair
 from fpsolve.exponent.error import Solution
-from fpsolve.exponent.solver import ExponentSolver, solver_of
+from fpsolve.exponent.solver import solver_of
 from fpsolve.exponent.starts import FREE_STAGES, Start, other_centers
 from fpsolve.fem.axis import KroneckerSum
 from fpsolve.fem.factors import one_thread
@@ -118,7 +117,7 @@ class Products:
 
     Args:
         polynomials: that follow them.
-        known: the functions at the points of these, shape (points, functions); of none all points are kept.
+        known: the functions at the points of these, shape (points, functions); by the identity all points are kept.
 
     Attributes:
         points: that make all others.
@@ -189,7 +188,7 @@ class Surface(Result):
         for at in places:
             refuse_infinite(self._problem(at), self.p)
         self._frame = self._problem(places[0])
-        first = self._solver(places[0]).whole.solution(self.p)
+        first = solver_of(self._frame, None, self.rtol, self._budget).whole.solution(self.p)
         self._chosen, self._starts = first.pair.generator.chosen, [first.pair]
         self._largest = self._budget.unknowns if unknowns is None else max(unknowns, 4 * first.pair.space.size)
         with one_thread():
@@ -210,9 +209,6 @@ class Surface(Result):
             return found.in_frame_of(self._frame) if self._frame else found
         except ValueError as failure:
             raise FpsolveError(Message(Code.NO_PROBLEM, reason=said(failure))) from failure
-
-    def _solver(self, at: FloatArray) -> ExponentSolver:
-        return solver_of(self._problem(at), None, self.rtol, self._budget)
 
     def _generator(self, at: FloatArray) -> Generator:
         return Generator(self._problem(at), self._chosen)
@@ -261,7 +257,7 @@ class Surface(Result):
                 left[worst] = 0.0
 
     def _lost(self, at: FloatArray) -> FloatArray | None:
-        """A place of some where the residual of the small pencil is not as small as where it was looked at; or None."""
+        """A place of some where no eigenvalue of the small pencil is the principal one; or None."""
         lost = np.flatnonzero(np.isnan(self._values(at).value))
         return np.asarray(at[lost[0]]) if lost.size else None
 
@@ -353,9 +349,10 @@ class Surface(Result):
         exact = np.array([self._images_at(at, pair.left) for at in probes])
         rounding = FEW * _EPS * max(each.norm for at in probes for each in self._operators(at))
         allowed = max(allowed, rounding * float(np.linalg.norm(pair.left)))
+        followed = [self._polynomials_along(k, pair.left, allowed) for k in range(count)]
         for lines in ASIDE:
             aside = [np.full(count, (line + 0.29) / lines) for line in range(lines)]
-            self._products = [self._products_along(k, aside, mixed, pair.left, allowed) for k in range(count)]
+            self._products = [self._products_along(k, each, aside, mixed) for k, each in enumerate(followed)]
             self._places = [np.array(each) for each in product(*(each.points for each in self._products))]
             made = np.array([self._images_at(at, pair.left) for at in self._places])
             off = float(np.max(np.linalg.norm(self._rows(probes) @ made - exact, axis=1)))
@@ -364,10 +361,8 @@ class Surface(Result):
                 return
         raise self._none()
 
-    def _products_along(
-        self, k: int, aside: Sequence[FloatArray], mixed: FloatArray, vector: FloatArray, allowed: float
-    ) -> Products:
-        """What the operators are made of along an axis, through some places."""
+    def _polynomials_along(self, k: int, vector: FloatArray, allowed: float) -> Polynomials:
+        """Those that the operators follow along an axis. Raises `NotConverged` where none do."""
         middle = np.full(len(self.axes), 0.5)
         exact = self._images_at(_on_axis(middle, k, PROBE), vector)
         for degree in DEGREES:
@@ -376,9 +371,16 @@ class Surface(Result):
             known = np.array([self._images_at(_on_axis(middle, k, u), vector) for u in points])
             off = np.linalg.norm(polynomials.at(np.array([PROBE]))[0] @ known - exact)
             if off <= allowed:
-                lines = [[self._images_at(_on_axis(at, k, u), mixed) for at in aside] for u in points]
-                return Products(polynomials, np.array(lines).reshape(len(points), -1) if aside else np.eye(len(points)))
+                return polynomials
         raise self._none()
+
+    def _products_along(
+        self, k: int, polynomials: Polynomials, aside: Sequence[FloatArray], mixed: FloatArray
+    ) -> Products:
+        """What the operators are made of along an axis, by lines through some places."""
+        points = polynomials.points.tolist()
+        lines = [[self._images_at(_on_axis(at, k, u), mixed) for at in aside] for u in points]
+        return Products(polynomials, np.array(lines).reshape(len(points), -1) if aside else np.eye(len(points)))
 
     def _sample(self) -> None:
         """L, for p = 0 also L′, and M of this space at the places, and a basis without nodes."""
@@ -391,16 +393,10 @@ class Surface(Result):
         self._small = [np.zeros((len(made), 0, 0)) for _ in range(len(self._kinds) + 1)]
         self._mixing = np.random.default_rng(2).standard_normal((MIXED, one.size)) / math.sqrt(MIXED)
         self._mixed, self._seen = np.zeros((2, len(made), MIXED, 0)), np.zeros((SEEN, 0))
-        measure = reduce(np.multiply.outer, (axis.measure for axis in self._spaces[0].noises), np.ones(1))
-        all_of = np.broadcast_to(measure, self._evaluated(one).shape).ravel()
+        all_of = np.broadcast_to(self._spaces[0].grid_measure, self._spaces[0].on_grid(one).shape).ravel()
         self._at = np.random.default_rng(4).choice(all_of.size, SEEN, p=all_of / all_of.sum())
         if not self.p:
             self._extend([], [])
-
-    def _evaluated(self, vector: FloatArray) -> FloatArray:
-        """A function at all points of a grid, by phase and noises."""
-        space = self._spaces[0]
-        return space.evaluate(vector, space.phi.inner_values, *(axis.values for axis in space.noises))
 
     def _operators(self, at: FloatArray) -> tuple[KroneckerSum, ...]:
         """L, for p = 0 also L′."""
@@ -452,10 +448,11 @@ class Surface(Result):
                 mixed[number] = (images @ self._mixing.T).swapaxes(1, 2)
             rows = np.concatenate([small, adjoint @ self._right[:old].T], axis=1)
             self._small[number] = np.concatenate([rows, (images @ self._dual.T).swapaxes(1, 2)], axis=2)
-        self._mixed = np.concatenate([self._mixed, mixed], axis=3)
-        seen = [self._evaluated(each).ravel()[self._at] for each in after]
-        self._seen = np.concatenate([self._seen, np.array(seen).T.reshape(SEEN, -1)], axis=1)
-        if not self.p:
+        if self.p:
+            seen = np.array([self._spaces[0].on_grid(each).ravel()[self._at] for each in after])
+            self._mixed = np.concatenate([self._mixed, mixed], axis=3)
+            self._seen = np.concatenate([self._seen, seen.T], axis=1)
+        else:
             self._small[0][:, :, 0] = 0.0  # L(0) 1 = 0
 
     def _pencils(self, rows: FloatArray) -> list[FloatArray]:
@@ -464,12 +461,13 @@ class Surface(Result):
 
     def _values(self, at: FloatArray, has_gradient: bool = False) -> Values:
         """F at some places, shape (n, d), from the small matrices alone."""
-        small = self._pencils(self._rows(at))
+        rows = self._rows(at)
+        small = self._pencils(rows)
         slopes = [self._pencils(self._rows(at, k)) for k in range(len(self.axes))] if has_gradient else []
         if not self.p:
             return self._growth(small, slopes)
         a, g = small
-        value, x, y = self._principal(at, a, g)
+        value, x, y = self._principal(rows, a, g)
         y = y / form(y, g, x)[:, None]
         gradient = (
             np.array([form(y, by_a, x) - value * form(y, by_g, x) for by_a, by_g in slopes]).reshape(-1, len(at)).T
@@ -492,7 +490,7 @@ class Surface(Result):
         x = np.concatenate([np.zeros((len(z), 1)), -z[:, 1:]], axis=1)
         return Values(value, np.array(gradient).reshape(-1, len(value)).T, x, y)
 
-    def _principal(self, at: FloatArray, a: FloatArray, g: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def _principal(self, rows: FloatArray, a: FloatArray, g: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """The largest real eigenvalue of each small pencil with T > 0 and a small residual, or NaN, with both vectors.
 
         Larger ones may be of the small pencil alone, where T changes its sign or the residual is larger by far.
@@ -501,17 +499,16 @@ class Surface(Result):
         seen = (self._seen @ vectors).real
         negative = np.sum(np.maximum(-seen, 0), axis=1) / np.sum(np.abs(seen), axis=1)
         may_be = (values.imag == 0) & (np.minimum(negative, 1 - negative) <= NEGATIVE)
-        rest = np.where(may_be, self._rest(at, values, vectors), math.inf)
+        rest = np.where(may_be, self._rest(rows, values, vectors), math.inf)
         ranked = np.where(may_be & (rest <= LEAST * rest.min(axis=1)[:, None]), values.real, -math.inf)
-        own, best = np.arange(len(at)), np.argmax(ranked, axis=1)
+        own, best = np.arange(len(rows)), np.argmax(ranked, axis=1)
         x = vectors[own, :, best].real
         value, x, y, _ = eigenpairs(a, g, values[own, best].real, x, (g @ x[:, :, None])[:, :, 0])
         return np.where(np.isfinite(ranked[own, best]), value, math.nan), x, y
 
-    def _rest(self, at: FloatArray, values: Any, vectors: Any) -> FloatArray:
+    def _rest(self, rows: FloatArray, values: Any, vectors: Any) -> FloatArray:
         """About ‖(L − ΛM)T‖/‖T‖ of some pairs at each place, by random sums of its entries: shape (n, pairs)."""
-        rows = self._rows(at)
-        of_l, of_m = ((rows @ each.reshape(len(each), -1)).reshape(len(at), MIXED, -1) for each in self._mixed)
+        of_l, of_m = ((rows @ each.reshape(len(each), -1)).reshape(len(rows), MIXED, -1) for each in self._mixed)
         rest = np.linalg.norm(of_l @ vectors - (of_m @ vectors) * values[:, None, :], axis=1)
         return np.asarray(rest / np.linalg.norm(vectors, axis=1))
 
@@ -535,8 +532,7 @@ class Surface(Result):
         around = self._nearest(at).around
         assert around is not None
         left = SAFE * abs(float(s @ around.solve(r, refinements=2)))
-        share = left / (SHARE * self._allowed(at, value))
-        return share, left
+        return left / (SHARE * self._allowed(at, value)), left
 
     # values
 

@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property, reduce
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -42,10 +42,10 @@ BACKWARD_ERROR_LIMIT = 1e-11
 """Backward error, over the norm of L, up to which a pair is one."""
 POSITIVE = 1e-2
 """T, or T*, is taken for positive where no more than this share of it has the wrong sign, the least of all found."""
-BESIDE_IT = 1e-6, 1e-2
-"""Distances from an eigenvalue, over a rate of the system, at which it is looked whether others are to its right."""
 SURELY_POSITIVE = 1e-4
 """The same for a pair with which the search ends at once."""
+BESIDE_IT = 1e-6, 1e-2
+"""Distances from an eigenvalue, over a rate of the system, at which it is looked whether others are to its right."""
 MOSTLY = 0.5
 """Share of the principal pair of another p or discretisation beyond which a pair goes on from it."""
 DOUBT = 1e-3
@@ -438,9 +438,7 @@ def _sign_defects(space: Space, x: FloatArray, y: FloatArray) -> tuple[float, fl
 
     T T* looks where the tilted density lives: a strong tilt hides the sign change of another pair from P_s.
     """
-    noises = space.noises
-    right, left = (space.evaluate(v, space.phi.inner_values, *(axis.values for axis in noises)) for v in (x, y))
-    measure = reduce(np.multiply.outer, (axis.measure for axis in noises))
+    right, left, measure = space.on_grid(x), space.on_grid(y), space.grid_measure
     tilted = np.abs(right * left) * measure
 
     def share(values: FloatArray) -> float:

@@ -167,6 +167,15 @@ class Space:
         tables = [along(matrices, old.table(each)) for each in np.atleast_2d(coefficients)]
         return np.reshape(tables, (*coefficients.shape[:-1], self.size))
 
+    def on_grid(self, coefficients: FloatArray) -> FloatArray:
+        """A function without its factor at all points of a grid, φ first."""
+        return self.evaluate(coefficients, self.phi.inner_values, *(axis.values for axis in self.noises))
+
+    @property
+    def grid_measure(self) -> FloatArray:
+        """∫ of the weight of the noises at the points of that grid, the same for each φ."""
+        return np.asarray(reduce(np.multiply.outer, (axis.measure for axis in self.noises)))
+
     def evaluate(self, coefficients: FloatArray, *values: Matrix) -> FloatArray:
         """A function without its factor, from the values of the functions of each axis at points of it."""
         return along(values, self.table(coefficients))

@@ -304,8 +304,7 @@ def _draw(case: Case, chart: Chart, paths: Sequence[Path], heading: str) -> None
         for i, line in enumerate(chart.lines):
             colour, appears = COLOURS[i % len(COLOURS)], _appears(line.zero)
             for branch in line.branches:
-                path = (np.append(each, each[:1]) if branch.closed else each for each in (branch.x, branch.y))
-                axes.plot(*path, color=colour, linewidth=2)
+                axes.plot(*branch.path, color=colour, linewidth=2)
                 for start, (_, marker) in SPECIAL.items():
                     chosen = np.array([start in label for label in branch.labels])
                     hollow = {"color": colour, "markersize": 7, "markerfacecolor": "white"}

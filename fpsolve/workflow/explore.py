@@ -293,7 +293,6 @@ class Explorer:
             f"from fpsolve import load_case, {', '.join(names)}",
             "",
             f"problem = {self.code}.at({changed})",
-            *calls,
         ]
         return {"text": "\n".join([*lines, *calls, ""])}
 

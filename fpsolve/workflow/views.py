@@ -61,7 +61,7 @@ def map_of(case: Case, axes: object) -> Answer:
     return {
         "axes": axes,
         "lines": [
-            {"name": line.zero.equation, "branches": [closed(each.x, each.y, each.closed) for each in line.branches]}
+            {"name": line.zero.equation, "branches": [[*map(listed, each.path)] for each in line.branches]}
             for line in chart.lines
         ],
         "regions": [
@@ -71,11 +71,6 @@ def map_of(case: Case, axes: object) -> Answer:
         ],
         "told": part_of_page(each for each in show(case, chart) if not isinstance(each, Drawing)),
     }
-
-
-def closed(x: FloatArray, y: FloatArray, is_closed: bool) -> list[list[float]]:
-    """The points of a branch, the first one again at the end where it is closed."""
-    return [np.append(each, each[:is_closed]).tolist() for each in (x, y)]
 
 
 def field_of(case: Case, p: object) -> Answer:
