@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from fpsolve.analysis.regions import Region, Regions
+from fpsolve.analysis.stability import Branch
 from fpsolve.analysis.zero import Zero
 from fpsolve.workflow.chart import chart_figure
 from tests.kit import case_in, case_text
@@ -21,7 +22,7 @@ zero = ["lyapunov_exponent", { moment = 2.0 }]
 """
 N = 80
 LONG = "almost surely unstable, second moment unstable"
-LINE = SimpleNamespace(x=np.array([1.0, 2.0]), y=np.array([0.2, 0.9]), labels=("", ""), closed=False)
+LINE = Branch(x=np.array([1.0, 2.0]), y=np.array([0.2, 0.9]), width=np.zeros(2), labels=("", ""))
 
 
 @pytest.fixture
