@@ -385,7 +385,7 @@ class Code(Enum):
     )
     RESPONSE_LINEAR = (
         "note: no stationary response: it is that of an oscillator with c2 or c3 > 0, or of equations with terms of "
-        "degree 3; in a linear system nothing limits the amplitude"
+        "degree 3, or with a delay and a noise of degree 0; in other linear systems nothing limits the amplitude"
     )
     RESPONSE_GROWS = (
         "note: no stationary response is computed: without noise the terms of degree 3 do not bring large amplitudes "
@@ -410,6 +410,10 @@ class Code(Enum):
     RESPONSE_DIES = (
         "note: no stationary response: λ = {value:.6g} ± {error:.1g} is not positive, so that almost every path comes "
         "to rest"
+    )
+    RESPONSE_UNSTABLE = (
+        "note: no stationary response: Λ(2) = {value:.6g} ± {error:.1g} is not negative, so that mean squares do not "
+        "settle"
     )
     RESPONSE_NO_INDEX = (
         "note: no stationary density by finite elements: there is no δ_p: {reason}; simulate the response instead"

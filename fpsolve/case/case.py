@@ -282,7 +282,7 @@ class CaseWithoutParts(Section):
         """What else there is of this case, where it leaves open what is computed."""
         if self.output.names is not None:
             return ()
-        is_there = {RESPONSE: self.is_nonlinear, EIGENFUNCTIONS: not self.problem.no_picture}
+        is_there = {RESPONSE: self.responds, EIGENFUNCTIONS: not self.problem.no_picture}
         is_there |= dict.fromkeys(BY_JUMP, bool(self.problem.system.jumps))
         if self.problem.is_closed_only:
             is_there |= dict.fromkeys({*QUANTITY_NAMES} - {MOMENT.name, SENSITIVITIES}, False)
@@ -316,17 +316,17 @@ class CaseWithoutParts(Section):
         is_named = self.output.lists_quantities or any(each.of_response for each in self.expect)
         if is_named or (self.output.names is None and RESPONSE in self.model_fields_set):
             return True
-        return self.is_nonlinear and (self.planned <= MOST_DRAWN or self.output.names is not None)
+        return self.responds and (self.planned <= MOST_DRAWN or self.output.names is not None)
 
     @property
     def leaves_out_response(self) -> bool:
         """Whether it is not, as there are too many curves and nobody names it."""
-        return RESPONSE in self.asked and not (self.response.off or self.has_response) and self.is_nonlinear
+        return RESPONSE in self.asked and not (self.response.off or self.has_response) and self.responds
 
     @cached_property
-    def is_nonlinear(self) -> bool:
+    def responds(self) -> bool:
         """Whether some of the first curves are."""
-        return any(self.problem.at(varied).system.is_nonlinear for varied in self.vary.sets(0, MOST_DRAWN))
+        return any(self.problem.at(varied).system.responds for varied in self.vary.sets(0, MOST_DRAWN))
 
     @property
     def differentiated(self) -> FloatArray:

@@ -334,6 +334,7 @@ class System(Parametrised):
             begin: "noise", or, for one that terms call axial, "noise.axial".
         impact_parameter: the name of a parameter that is in ln R of the only jump and nowhere else; empty for none.
         cubic: what is of degree 3 in its rates, on which the stationary response depends alone; None for nothing.
+        forced: it with its terms of degree 0, which multiply a last variable, 1; None without such terms.
         pasts: which variable each of the last columns of the terms stands for, and how long ago; none without a delay.
         second_unit: its second variable over the second coordinate of the terms.
     """
@@ -341,6 +342,7 @@ class System(Parametrised):
     section: ClassVar[str] = "system"
     noise_unit: ClassVar[str] = "unknown"
     cubic: CubicTerms | None = None
+    forced: System | None = None
     pasts: Sequence[tuple[int, float]] = ()
     second_unit: float = 1.0
     epsilon: float
@@ -372,15 +374,14 @@ class System(Parametrised):
         return None
 
     @property
-    def is_nonlinear(self) -> bool:
-        """Whether there is more to it than its terms."""
-        return self.cubic is not None
+    def responds(self) -> bool:
+        """Whether there is more to it than its terms, so that it may have a stationary response."""
+        return self.cubic is not None or self.forced is not None
 
     @property
     def response(self) -> ResponseQuantities:
         """The quantities of its stationary response."""
-        x, v = self.states[:2]
-        return response_quantities(x, v, has_wall=bool(self.jumps))
+        return response_quantities(self.states, has_wall=bool(self.jumps), is_linear=self.forced is not None)
 
     @property
     def aspect(self) -> float:
@@ -427,6 +428,7 @@ class LinearMotion(System):
     epsilon: float
     terms: tuple[CoefficientMatrix, ...]
     jumps: tuple[Jump, ...] = ()
+    pasts: Sequence[tuple[int, float]] = ()
 
 
 class Motion(NamedTuple):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from fpsolve.data import Quantity as Quantity
@@ -205,17 +205,19 @@ OSCILLATOR_RESPONSE = ResponseQuantities(
 """The quantities of the response of the paper's oscillator."""
 
 
-def response_quantities(x: str, v: str, *, has_wall: bool) -> ResponseQuantities:
-    """The quantities of the response of a system with two variables of which only the names are known."""
-    unit = "unknown"
+def response_quantities(states: Sequence[str], *, has_wall: bool, is_linear: bool = False) -> ResponseQuantities:
+    """The quantities of the response of a system of which only the names of variables are known; one of a linear
+    system has mean squares alone.
+    """
+    unit, (x, v) = "unknown", (*states, *states)[:2]
+    squares = [(f"{each}_squared", f"⟨{each}²⟩", f"mean of {each}²", unit) for each in states]
     means = _means(
         (x, f"⟨{x}⟩", f"mean of {x}", unit),
         (v, f"⟨{v}⟩", f"mean of {v}", unit),
         ("amplitude", "⟨A⟩", "mean of the amplitude", unit),
         ("amplitude_squared", "⟨A²⟩", "mean of the squared amplitude", unit),
         ("amplitude_fourth", "⟨A⁴⟩", "mean of the fourth power of the amplitude", unit),
-        (f"{x}_squared", f"⟨{x}²⟩", f"mean of {x}²", unit),
-        (f"{v}_squared", f"⟨{v}²⟩", f"mean of {v}²", unit),
+        *squares,
     )
     return ResponseQuantities(
         Quantity(x, x, x, unit=unit, dims=(x,)),
@@ -223,7 +225,7 @@ def response_quantities(x: str, v: str, *, has_wall: bool) -> ResponseQuantities
         replace(AMPLITUDE, latex="$A$", unit=unit),
         replace(JOINT_DENSITY, latex="", words=f"density of ({x}, {v})", unit=unit, dims=(x, v)),
         replace(AMPLITUDE_DENSITY, unit=unit),
-        means,
+        _means(*squares) if is_linear else means,
         has_wall,
         f"ρ({x}, {v})",
     )

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 
 class NearRest:
-    """What has a `stability_index`, δ_p of the linear system."""
+    """What has a `stability_index`, δ_p of the linear system, or None."""
 
-    stability_index: float
+    stability_index: float | None
 
     @property
     def has_hump(self) -> bool:
         """Whether ρ(a) vanishes at rest: δ_p < −1."""
-        return self.stability_index < -1
+        return self.stability_index is not None and self.stability_index < -1
 
     @property
     def has_crater(self) -> bool:
         """Whether ρ(x, ẋ) vanishes at rest: δ_p < −2."""
-        return self.stability_index < -2
+        return self.stability_index is not None and self.stability_index < -2

@@ -239,7 +239,7 @@ def show_meaning(case: Case, result: CurveResult) -> Iterator[Sentence]:
     path = 0.0 if exponent is None else sign_of(exponent.value, exponent.error_estimate)
     if exponent is not None:
         rest = ""
-        if path > 0 and result.curve.problem.system.is_nonlinear:
+        if path > 0 and result.curve.problem.system.cubic:
             rest = " near rest" + (", and settles into the stationary response" if result.response else "")
         elif path > 0:
             rest = ", and passes every level in the end"

@@ -1,4 +1,6 @@
-"""The stationary response of a curve with terms of degree 3: its numbers, its density, their files and figures."""
+"""The stationary response of a curve with terms of degree 3, or of degree 0 with a delay: its numbers, its density,
+their files and figures.
+"""
 
 from __future__ import annotations
 
@@ -30,6 +32,7 @@ from fpsolve.parts.indices import is_estimate
 from fpsolve.parts.part import Job, Part, Settings
 from fpsolve.results.table import Row, pair
 from fpsolve.results.text import NUMBER_COLUMNS, row_of
+from fpsolve.theory.forced import stationary_moments
 from fpsolve.vtk import field_data, write_between
 
 if TYPE_CHECKING:
@@ -69,7 +72,7 @@ class ResponseGrid(Section):
 
 
 class ResponseSection(Section):
-    """[response]: the stationary response of a system with terms of degree 3, and where its density is written."""
+    """[response]: the stationary response to terms of degree 3, whose density is written, or of degree 0."""
 
     rtol: Annotated[float, parameter("wanted relative error of its means", "rtol = 1e-6", ge=1e-10, le=0.1)] = 1e-6
     off: Annotated[bool, parameter("whether it is left out", "off = true")] = False
@@ -119,7 +122,8 @@ class CurveResponse(NearRest):
     Attributes:
         means: by their names in files.
         impact_rate: impacts in unit time; None without a wall.
-        balance: what noise feeds into ln a less what impacts take, in unit time; 0 but for its error.
+        balance: what noise feeds into ln a less what impacts take, in unit time; 0 but for its error. This and the next
+            three are None where the moments were solved alone.
         stability_index: δ_p of the linear system.
         least: the least density over the largest, negative where it is not resolved.
         unknowns: of the largest system solved.
@@ -127,11 +131,11 @@ class CurveResponse(NearRest):
     """
 
     means: Mapping[str, Estimate]
-    impact_rate: Estimate | None
-    balance: Estimate
-    stability_index: float
-    least: float
-    unknowns: int
+    impact_rate: Estimate | None = None
+    balance: Estimate | None = None
+    stability_index: float | None = None
+    least: float | None = None
+    unknowns: int | None = None
     density: ResponseDensity | None = None
 
     @property
@@ -141,7 +145,12 @@ class CurveResponse(NearRest):
 
 
 def solve_response(problem: Problem, rtol: float, grid: Grid | None, budget: Budget) -> CurveResponse:
-    """The stationary response, with its density if a grid is given. Raises as `stationary_response`."""
+    """The stationary response, with its density if a grid is given, or by moments; raises as what it is found by."""
+    if problem.system.forced:
+        moments = stationary_moments(problem, rtol)
+        squares = zip(np.diag(moments.square).tolist(), np.diag(moments.error).tolist(), strict=True)
+        estimates = [Estimate(value, error, abs(value)) for value, error in squares]
+        return CurveResponse(dict(zip(problem.system.response.means, estimates, strict=True)))
     from fpsolve.nonlinear.response import stationary_response  # which takes a while to import
 
     found = stationary_response(problem, rtol=rtol, budget=budget)
@@ -219,18 +228,23 @@ def _content(case: Case, result: CurveResult) -> Mapping[str, Any]:
     content = {
         "means": means,
         **({} if found.impact_rate is None else pair("impact_rate", found.impact_rate)),
-        "has_hump": found.has_hump,
-        "has_crater": found.has_crater,
-        **pair("balance", found.balance),
-        "least_over_largest_density": found.least,
-        "unknowns": found.unknowns,
     }
+    if found.balance is not None:
+        content |= {
+            "has_hump": found.has_hump,
+            "has_crater": found.has_crater,
+            **pair("balance", found.balance),
+            "least_over_largest_density": found.least,
+            "unknowns": found.unknowns,
+        }
     return {NAME: content}
 
 
 def _is_whole(found: CurveResponse, curve: Curve, settings: Settings) -> bool:
     """Whether the numbers are all there, and the density is one over a grid."""
     about: ResponseQuantities = curve.problem.system.response
+    if found.balance is None or found.stability_index is None or found.least is None:
+        return found.numbers.keys() == about.numbers.keys() and all(map(is_estimate, found.numbers.values()))
     density, numbers = found.density, (found.stability_index, found.least)
     is_whole = (
         found.numbers.keys() <= about.numbers.keys()
@@ -288,7 +302,8 @@ def _show(case: Case, result: CurveResult) -> Iterator[Block]:
     about = case.system.response
     rows = [row_of(about.numbers[name], each, case.units.time) for name, each in result.response.numbers.items()]
     yield filled(f"Stationary response{result.curve.of}", NUMBER_COLUMNS, rows)
-    yield Sentence(shape(result.response, about))
+    if result.response.balance is not None:
+        yield Sentence(shape(result.response, about))
 
 
 def shape(found: CurveResponse, about: ResponseQuantities) -> str:
@@ -352,8 +367,9 @@ def _draw_amplitudes(
     axes.set_title(_at_rest("a hump away from rest", found.stability_index, -1))
 
 
-def _at_rest(words: str, index: float, limit: int) -> str:
+def _at_rest(words: str, index: float | None, limit: int) -> str:
     """What a density does at rest: it vanishes there where δ_p is below a limit, and is infinite where it is above."""
+    assert index is not None  # as there is a density
     below = index < limit
     return rf"{words if below else 'infinite at rest'}: $\delta_p = {index:.3g} {'<' if below else '>'} {limit}$"
 
@@ -373,6 +389,6 @@ PART: Part = Part(
     is_whole=_is_whole,
     section=ResponseSection,
     check=_check,
-    is_usual=lambda case: NAME in case.model_fields_set or case.is_nonlinear,
+    is_usual=lambda case: NAME in case.model_fields_set or case.responds,
     uses_solver=False,
 )

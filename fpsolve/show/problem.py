@@ -22,7 +22,7 @@ def show(case: Case) -> Iterator[Block]:
     """The noises, what the equation leaves out, and the parameters."""
     curve = next(case.curves(0, 1))
     yield from map(Sentence, noises_of(curve.problem))
-    if case.system.is_nonlinear:
+    if case.system.cubic:
         yield Sentence(
             "Terms of degree 3 act on the stationary response only: Λ(p), λ and δ_p are of the linear system."
         )
@@ -44,9 +44,10 @@ def show(case: Case) -> Iterator[Block]:
 def equations_of(problem: Problem) -> list[str]:
     """The motion with its numbers: of the second order where x₂ is a multiple of ẋ₁, else the rates; and its walls."""
     system, named = problem.system, len(problem.system.noise_sections) > 1
-    n = problem.dimension
+    whole = system.forced or system
+    n = whole.dimension
     still, driven = np.zeros((n, n)), dict[str, FloatArray]()
-    for term in system.terms:
+    for term in whole.terms:
         line, size = affine(term.g), system.epsilon**term.order * np.array(term.matrix)
         letter = f"ξ_{term.noise}" if named and term.noise else "ξ"
         offset, slope = (0.0, 1.0) if line is None else line
@@ -59,7 +60,11 @@ def equations_of(problem: Problem) -> list[str]:
     first = [still[0, 0], *cubic[0], *(each for matrix in driven.values() for each in matrix[0])]
     rows: list[tuple[str, FloatArray, FloatArray, dict[str, FloatArray], Sequence[str]]]
     rates = len(system.states) if system.pasts else n
-    names = (*system.states, *(f"{system.states[k]}(t − {delay:.10g})" for k, delay in system.pasts))
+    names = (
+        *system.states,
+        *([""] if system.forced else []),
+        *(f"{system.states[k]}(t − {delay:.10g})" for k, delay in system.pasts),
+    )
     x = names[0].removesuffix("₁")
     if n == 2 and speed != 0 and not any(first) and len(x) == 1:
         scale, names = np.array([speed, 1.0]), (x, _dotted(x, 1))
@@ -94,7 +99,9 @@ def _sum(constant: FloatArray, cubic: FloatArray, by_noise: Mapping[str, FloatAr
     terms = [(float(size), state) for size, state in zip(constant, states, strict=True)]
     terms += [(float(size), product) for size, product in zip(cubic, products, strict=True)]
     terms += [
-        (float(size), f"{name} {s}") for name, row in by_noise.items() for size, s in zip(row, states, strict=True)
+        (float(size), f"{name} {s}".rstrip())
+        for name, row in by_noise.items()
+        for size, s in zip(row, states, strict=True)
     ]
     text = "".join(
         f" {'−' if size < 0 else '+'} {'' if abs(size) == 1 else f'{abs(size):.10g} '}{name}"

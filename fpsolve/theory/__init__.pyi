@@ -1,3 +1,5 @@
+from .forced import StationaryMoments as StationaryMoments
+from .forced import stationary_moments as stationary_moments
 from .frozen import FrozenNoise as FrozenNoise
 from .frozen import frozen_noise as frozen_noise
 from .moments import EvenMoment as EvenMoment

@@ -35,7 +35,7 @@ STEP = 2.0
 """Norm of what moves S over the time from which times are doubled."""
 STRIDE = 0.5
 """Logarithm of the factor between two σ − 2a, a the growth rate of E x."""
-NEAREST = 1e-7
+NEAREST = 1e-6
 """Share of the bounds of Λ to which σ − 2a falls: y stands still without noise at 2a, next to which Z is not known."""
 NEAR = 0.03
 """Share of σ − 2a from which on Newton's method finds Λ."""
@@ -118,9 +118,15 @@ class Delayed:
 
     polynomial = moments
 
+    @property
+    def is_still(self) -> bool:
+        """Whether no noise multiplies the state: then Λ(2) is twice the growth rate of E x."""
+        return not self.loads and not any(each.any() for each in self.squares)
+
     def image(self, generator: Any, masses: Sequence[Any], x: FloatArray, value: float) -> FloatArray:
-        """−Z(Λ)x."""
-        return np.asarray(-self.rates(generator, masses).matrix(value) @ x)
+        """−Z(Λ)x; 2a − Λ in place of −Z(Λ) where Λ is always 2a."""
+        rates = self.rates(generator, masses)
+        return (2 * rates.abscissa - value) * x if self.is_still else np.asarray(-rates.matrix(value) @ x)
 
     def rates(self, generator: Any, masses: Sequence[Any]) -> DelayRates:
         """−Z(σ), from Gᵀ and the Ξᵀ of each load."""
@@ -150,7 +156,7 @@ class DelayRates:
 
     def at(self, sigma: float) -> PowerRates:
         """σ − Z(σ), whose eigenvalue Λ is for σ = Λ."""
-        z = self.matrix(sigma)
+        z = np.eye(self._even.shape[1]) if self.state.is_still else self.matrix(sigma)
         return PowerRates(sigma * np.eye(len(z)) - z, self.state.size)
 
     def matrix(self, sigma: Any) -> Any:
@@ -275,14 +281,19 @@ class DelayRates:
 
     def rightmost(self, x: FloatArray, y: FloatArray) -> Eigenpair:
         """Λ from the right, and its vectors, yᵀZ′x = 1: E‖x‖² ≥ ‖E x‖² bounds it from the left."""
-        low, high = 2 * self._abscissa, self._bound
+        low, high = 2 * self.abscissa, self._bound
+        if self.state.is_still:
+            size = abs(low) + 1 / self.state.last
+            return Eigenpair(low, x, y / (y @ x), 2 * SETTLED * size, size)
         gap, factor = high - low, math.exp(-STRIDE)
         while gap > NEAREST * (abs(low) + high - low) and self._is_right(low + factor * gap, x, y):
             gap *= factor
         if gap <= NEAREST * (abs(low) + high - low):  # the noise does not reach what grows the fastest
-            found, near = self._settled(low + gap), self._near(low + gap)
-            if 0 <= found.value - low <= gap and found.change < gap:
-                return found
+            if abs(self._slowest.imag) * self.state.last <= SETTLED:  # else Z is 0/0 next to there
+                found = self._settled(low + gap)
+                if 0 <= found.value - low <= gap and found.change < gap:
+                    return found
+            near = self._near(low + gap)
             return Eigenpair(low + gap, near.x, near.y, gap, self._size(low + gap, near))
         least = factor * gap
         while gap > (1 + NEAR) * least:
@@ -306,9 +317,14 @@ class DelayRates:
         values = np.linalg.eigvalsh(np.block([[moments[max(i - j, 0)] for j in rows] for i in rows]))  # its lower half
         return bool(values[0] >= -NEGATIVE * values[-1])
 
+    @property
+    def abscissa(self) -> float:
+        """a, the growth rate of E x f."""
+        return self._slowest.real
+
     @cached_property
-    def _abscissa(self) -> float:
-        """The growth rate of E x f: the rightmost s of det(s − A − Σ B_k e^(−skτ)) = 0, by polynomials and by it."""
+    def _slowest(self) -> complex:
+        """The rightmost s of det(s − A − Σ B_k e^(−skτ)) = 0, by polynomials and by it."""
         own, count = self.state, self.state.count
         moving = _outer(
             [(np.eye(len(self.generator)), own.drift), *zip(self.masses, own.loads, strict=True)], np.eye(1)
@@ -316,7 +332,7 @@ class DelayRates:
         relaxed = [expm(_kron(self.generator * own.unit * k, np.eye(own.n))) for k in range(count + 1)]
         moving = [each @ relax for each, relax in zip(moving, relaxed, strict=True)]
         moving[0] = moving[0] + _kron(self.generator, np.eye(own.n))
-        size, last = len(moving[0]), math.nan
+        size, last = len(moving[0]), complex(math.nan)
         degree = FEWEST + SHARE * own.last * float(np.linalg.norm(sum(map(np.abs, moving)), 2))
         while size * degree <= MOST_SIZE:
             nodes = math.ceil(degree)
@@ -331,8 +347,8 @@ class DelayRates:
             degree, last = GROWTH * degree, found
         raise NoHierarchy(f"the largest growth rate without noise is not found for a delay so long; {REMEDY}")
 
-    def _root(self, moving: Sequence[Any], roots: Any) -> float:
-        """The largest real part of those of some numbers that a root is next to."""
+    def _root(self, moving: Sequence[Any], roots: Any) -> complex:
+        """The root on the right of those that some numbers are next to."""
         lags, one = self.state.unit * np.arange(len(moving))[:, None, None], np.eye(len(moving[0]))
         for root in sorted(roots[roots.imag >= 0], key=lambda each: -each.real):
             s, step = root, math.inf
@@ -344,8 +360,8 @@ class DelayRates:
                 if abs(step) <= SETTLED * (abs(s) + 1 / self.state.last):
                     break
             if abs(s - root) * self.state.last < CLOSE and abs(step) * self.state.last < CLOSE**2:
-                return float(s.real)
-        return math.nan
+                return complex(s)
+        return complex(math.nan)
 
     def _settled(self, sigma: float) -> Eigenpair:
         """Λ next to σ, and what finer steps or polynomials change: they are made finer until it is rounding."""
@@ -369,9 +385,12 @@ class DelayRates:
 
     def _size(self, sigma: float, near: _Near) -> float:
         """Σ |terms| of yᵀZx."""
-        x, y = (np.abs(self._even) @ np.abs(each) for each in (near.x, near.y))
-        _, steady, noisy = self._parts(sigma)
-        return float(sum(y @ np.abs(each) @ x for each in [*steady, *noisy]))
+        return float(np.abs(near.y) @ self.sizes(sigma) @ np.abs(near.x))
+
+    def sizes(self, sigma: float) -> FloatArray:
+        """Σ |terms| that Z(σ) is the sum of."""
+        even, (_, steady, noisy) = np.abs(self._even), self._parts(sigma)
+        return np.asarray(even.T @ sum(map(np.abs, [*steady, *noisy])) @ even)
 
 
 def _kron(a: Any, b: Any) -> Any:

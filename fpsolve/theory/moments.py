@@ -85,7 +85,7 @@ def even_moment(
         NoHierarchy: the equations do not close for this problem and this p, or are too many.
     """
     refuse_open_hierarchy(problem, p)
-    equations = _Equations(problem, int(p))
+    equations = Equations(problem, int(p))
     counts, before = [FIRST] * len(equations.noises), cast(EvenMoment | None, None)
     while True:
         try:
@@ -161,7 +161,7 @@ class EvenMoment:
         change: from fewer functions, where that is beyond the errors of both: then `effects` are no errors.
     """
 
-    equations: _Equations
+    equations: Equations
     counts: Sequence[int]
     eigenvalue: float
     effects: Sequence[float]
@@ -218,7 +218,7 @@ class EvenMoment:
     def _with(self, problem: Problem) -> float:
         """⟨y, Hx⟩ of a problem next to it."""
         refuse_open_hierarchy(problem, self.equations.p)
-        near = _Equations(problem, self.equations.p, self.equations)
+        near = Equations(problem, self.equations.p, self.equations)
         return float(self.y @ near.state.image(*near.over_noise(self.counts), self.x, self.eigenvalue))
 
     @cached_property
@@ -246,7 +246,7 @@ def _has_one_sign(values: FloatArray) -> bool:
     return bool(values.min() >= -NEGATIVE * values.max())
 
 
-class _Equations:
+class Equations:
     """H of a problem and an even p, with any number of functions of each noise.
 
     Args:
@@ -258,7 +258,7 @@ class _Equations:
         NoHierarchy: numbers in it are beyond floating-point numbers.
     """
 
-    def __init__(self, problem: Problem, p: int, like: _Equations | None = None) -> None:
+    def __init__(self, problem: Problem, p: int, like: Equations | None = None) -> None:
         self.problem, self.p = problem, p
         named = problem.coloured.parts
         self.noises, names = list(named.values()), list(named)
@@ -298,10 +298,7 @@ class _Equations:
         if self.state.size * size > max(most, self.state.most):
             return None
         h, old = self.state.rates(*self.over_noise(more)), _outer(is_old)
-        mean, law = (
-            _outer([getattr(axis, name)[each] for axis, each in zip(axes, is_old, strict=True)])
-            for name in ("unit", "law")
-        )
+        mean, law = self.means(counts)
         own, (right, left) = h.on(old), self.state.starts
         value, x, y, change, scale = own.rightmost(np.kron(law, right), np.kron(mean, left))
         h = h.at(value)
@@ -319,6 +316,11 @@ class _Equations:
 
     def _axes(self, counts: Sequence[int]) -> list[Functions]:
         return [functions_of(noise, count) for noise, count in zip(self.noises, counts, strict=True)]
+
+    def means(self, counts: Sequence[int]) -> tuple[Any, Any]:
+        """The coefficients of 1 in functions of degrees below these, and their means."""
+        axes = self._axes(counts)
+        return _outer([axis.unit for axis in axes]), _outer([axis.law for axis in axes])
 
     def over_noise(self, counts: Sequence[int]) -> tuple[Any, list[Any]]:
         """Gᵀ, and Ξᵀ of each load, with functions of degrees below these."""

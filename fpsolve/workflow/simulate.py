@@ -55,7 +55,7 @@ def simulation_work(case: Case) -> int:
 
 def simulation_steps(curve: Curve) -> int:
     """How often the simulation of a curve does."""
-    return PROGRESS_STEPS * (3 if curve.problem.system.is_nonlinear else 1)
+    return PROGRESS_STEPS * (3 if curve.problem.system.cubic else 1)
 
 
 def refuse_obstacles(case: Case) -> None:
@@ -97,7 +97,7 @@ def simulate_curve(
         curve.problem, orders, estimator=setting.estimator,
         paths=setting.paths, time=setting.time, step=setting.step, seed=setting.seed, progress=progress,
     )  # fmt: skip
-    if not curve.problem.system.is_nonlinear or result.interrupted:
+    if not curve.problem.system.cubic or result.interrupted:
         return SimulatedCurve(curve, result, None, result.warnings, result.interrupted)
     value, error, noted = result.lyapunov_exponent, result.lyapunov_exponent_error, result.warnings
     try:

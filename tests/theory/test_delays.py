@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 from scipy.linalg import block_diag
-from scipy.special import wrightomega
+from scipy.special import lambertw, wrightomega
 
 from fpsolve import Problem, moment_lyapunov, sensitivities
 from fpsolve.errors import NoHierarchy, NoSuchExponent
@@ -68,11 +68,18 @@ def test_where_stability_of_turning_ends(speed, w):
     assert abs(found.value) <= 5e-11 * abs(found.slope("system.w")[0]) + found.error
 
 
-def test_without_noise_it_is_twice_the_rightmost_root():
-    """ẋ = −x(t − τ): s = −exp(−sτ), whose solution is Lambert's W."""
-    drift = ("-x(t - tau) + 1e-30*xi*x",)
-    found = even_moment(Problem(EquationSystem(("x",), drift, (("tau", 1.0),)), ITO), 2)
-    assert abs(found.value - 2 * -0.3181315052047641) <= found.error <= 1e-6
+@pytest.mark.parametrize(("noise", "allowed"), [("xi", 1e-8), ("1e-20*xi*x", 1e-5)])
+@pytest.mark.parametrize(("a", "b", "tau"), [(0.0, -1.0, 1.0), (-1.0, 0.5, 1.0), (-0.2, -1.0, 1.0), (-0.5, 2.0, 3.0)])
+def test_without_noise_it_is_twice_the_rightmost_root(noise, allowed, a, b, tau):
+    """s = a + b exp(−sτ), whose solution is Lambert's W; it has slopes, too, and hardly any noise changes nothing."""
+    drift = (f"a*x + b*x(t - tau) + {noise}",)
+    found = even_moment(Problem(EquationSystem(("x",), drift, (("a", a), ("b", b), ("tau", tau))), ITO), 2)
+    s = max((a + lambertw(b * tau * math.exp(-a * tau), k) / tau for k in (-1, 0)), key=lambda each: each.real)
+    fall = np.exp(-s * tau)
+    assert abs(found.value - 2 * s.real) <= found.error <= allowed
+    for key, slope in (("a", 1.0), ("b", fall), ("tau", -b * s * fall)):
+        value, error = found.slope(f"system.{key}")
+        assert abs(value - 2 * (slope / (1 + b * tau * fall)).real) <= error
 
 
 def differentiating(size: int) -> np.ndarray:

@@ -33,7 +33,16 @@ from fpsolve.model.expressions import (
 )
 from fpsolve.model.faults import TableError, table_of
 from fpsolve.model.parameters import STRICT, parameter, stated_field, unknown_parameter
-from fpsolve.model.plane import MOST_VARIABLES, CoefficientMatrix, CubicTerms, Jump, System, as_plane, by_epsilon
+from fpsolve.model.plane import (
+    MOST_VARIABLES,
+    CoefficientMatrix,
+    CubicTerms,
+    Jump,
+    LinearMotion,
+    System,
+    as_plane,
+    by_epsilon,
+)
 from fpsolve.model.quantity import AMPLITUDE, JOINT_DENSITY, Quantity
 
 EPSILON = "epsilon"
@@ -374,6 +383,10 @@ class EquationSystem(System):
         degree, names = len(states), ", ".join(self.variables)
         told = f"is of degree {degree} in {names}"
         if degree == 0:
+            if self.pasts and noise:
+                return ""
+            if self.pasts:
+                return f"shifts where {names} rest; leave it out, and measure them from there"
             return f"is not linear in {names}; multiply it by one of these, or leave it out"
         if degree == 1:
             return ""
@@ -387,19 +400,21 @@ class EquationSystem(System):
             f"{told} and has the noise {noise}; a noise may only be in terms of degree 1: leave it out" if noise else ""
         )
 
-    def _terms_of(self, rates: Sequence[Form], at: int) -> tuple[CoefficientMatrix, ...]:
-        """The terms of rates, of their values for `at` = 0, of their derivatives for 1."""
+    def _terms_of(self, rates: Sequence[Form], at: int, last: Sequence[str] = ()) -> tuple[CoefficientMatrix, ...]:
+        """The terms of rates, of their values for `at` = 0, of their derivatives for 1; those of degree 0 with a last
+        variable if it has a name.
+        """
         has_orders = EPSILON in dict(self.named)
         names = {name: section[6:] for name, section in self.noises} if len(self.noises) > 1 else {}
-        columns, matrices = [*self.variables, *self._delays], dict[tuple[int, str], FloatArray]()
-        size = len(self.variables) + len(self.pasts)
+        columns, matrices = [*self.variables, *last, *self._delays], dict[tuple[int, str], FloatArray]()
+        size = len(self.variables) + len(last) + len(self.pasts)
         for i, form in enumerate(rates):
             for (states, noise, power), series in form.parts.items():
-                if len(states) > 1:
+                if len(states) > 1 or not (states or last):
                     continue
                 order = power if has_orders else int(bool(noise))
                 matrix = matrices.setdefault((order, noise), np.zeros(2 * (size,)))
-                matrix[i, columns.index(states[0])] += series[at]
+                matrix[i, columns.index((*states, *last)[0])] += series[at]
         terms = [
             CoefficientMatrix(order, matrix.tolist(), identity if noise else one, names.get(noise, ""))
             for (order, noise), matrix in sorted(matrices.items(), key=lambda item: item[0])
@@ -410,6 +425,16 @@ class EquationSystem(System):
     @cached_property
     def terms(self) -> tuple[CoefficientMatrix, ...]:  # type: ignore[override]
         return self._terms_of(self._rates, 0)
+
+    @cached_property
+    def forced(self) -> System | None:  # type: ignore[override]
+        if not any(not states for form in self._rates for states, _, _ in form.parts):
+            return None
+        return LinearMotion(self.epsilon, self._terms_of(self._rates, 0, [""]), (), self.pasts)
+
+    @property
+    def driven_by(self) -> frozenset[str]:
+        return super().driven_by | (self.forced.driven_by if self.forced else frozenset())
 
     @cached_property
     def cubic(self) -> CubicTerms | None:  # type: ignore[override]
@@ -488,8 +513,8 @@ class EquationSystem(System):
 
     @cached_property
     def inert(self) -> Sequence[str]:  # type: ignore[override]
-        """The parameters that are in terms of degree 3 alone: another value of theirs leaves all others as they are."""
-        if not any(len(states) > 1 for form in self._rates for states, _, _ in form.parts):
+        """The parameters that are in no term of degree 1: another value of theirs leaves all others as they are."""
+        if not any(len(states) != 1 for form in self._rates for states, _, _ in form.parts):
             return ()
         in_walls = frozenset[str]().union(*(names_in(str(wall.restitution)) for wall in self.walls))
         used = frozenset[str]().union(*map(names_in, self.drift)) - in_walls
