@@ -42,8 +42,7 @@ def part_of_page(blocks: Iterable[Block]) -> str:
 
 
 def _filled(template: str, blocks: Iterable[Block], **head: Any) -> str:
-    with tempfile.TemporaryDirectory() as place:
-        pieces = list(_pieces(blocks, Path(place)))
+    pieces = list(_pieces(blocks))
     notes = dict.fromkeys(each for kind, each in pieces if kind == "Note")
     return str(_templates().get_template(template).render(blocks=pieces, notes=notes, **head))
 
@@ -58,25 +57,26 @@ def _templates() -> Any:
     return made
 
 
-def _pieces(blocks: Iterable[Block], place: Path) -> Iterator[tuple[str, Any]]:
+def _pieces(blocks: Iterable[Block]) -> Iterator[tuple[str, Any]]:
     """What the template prints: blocks by the names of their classes, of drawings what was drawn."""
     for number, block in enumerate(blocks):
         if not isinstance(block, Drawing):
             yield type(block).__name__, block
-        elif picture := _picture(block, place / f"{number}.{block.kind}", f"d{number}"):
+        elif picture := _picture(block, f"d{number}"):
             yield "picture", {"title": block.title, **picture}
 
 
-def _picture(drawing: Drawing, path: Path, name: str) -> Mapping[str, str]:
+def _picture(drawing: Drawing, name: str) -> Mapping[str, str]:
     """SVG, or the content of a PNG file in base64, or why there is none; empty where there is nothing to draw."""
     nothing = {"svg": "", "png": "", "missing": ""}
     try:
-        drawing.draw([path], "")
-        if not path.exists():
-            return {}
-        if drawing.kind == "png":
-            return nothing | {"png": b64encode(path.read_bytes()).decode()}
-        return nothing | {"svg": _inlined(path.read_text(encoding="utf-8"), name)}
+        with tempfile.TemporaryDirectory() as place:
+            drawing.draw([path := Path(place, f"{name}.{drawing.kind}")], "")
+            if not path.exists():
+                return {}
+            if drawing.kind == "png":
+                return nothing | {"png": b64encode(path.read_bytes()).decode()}
+            return nothing | {"svg": _inlined(path.read_text(encoding="utf-8"), name)}
     except Exception as failure:  # the numbers shall not be lost for a picture
         reason = str(failure) if isinstance(failure, FpsolveError) else f"{type(failure).__name__}: {failure}"
         return nothing | {"missing": str(Message(Code.NO_PICTURE, reason=reason))}

@@ -53,6 +53,10 @@ class Numerics:
     def of(cls, case: Case) -> Numerics:
         return cls(case.rtol, case.budget, case.cylinder_mesh(), case.output.lists_quantities)
 
+    def solver(self, problem: Problem) -> ExponentSolver:
+        """What solves Λ(p) of a problem."""
+        return ExponentSolver(problem, self.mesh, rtol=self.rtol, budget=self.budget)
+
 
 @dataclass(frozen=True)
 class Reason:
@@ -142,8 +146,7 @@ class Job:
     @cached_property
     def solver(self) -> ExponentSolver:
         """The solver of Λ(p), which all parts share."""
-        own = self.numerics
-        return ExponentSolver(self.curve.problem, own.mesh, rtol=own.rtol, budget=own.budget)
+        return self.numerics.solver(self.curve.problem)
 
     def found(self, name: str) -> Any:
         """What a part found; None where that is nothing."""

@@ -11,7 +11,7 @@ import re
 import threading
 import unicodedata
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import partial
 from itertools import chain
@@ -33,7 +33,8 @@ from fpsolve.case.vary import Vary
 from fpsolve.data import plain_unit
 from fpsolve.errors import FpsolveError
 from fpsolve.explain import UNBOUNDED, explain
-from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, MOMENT
+from fpsolve.exponent.quantities import INDICES, MOMENT
+from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.messages import message_of
 from fpsolve.model.plane import BELOW
 from fpsolve.model.problem import Problem, checked_problem
@@ -52,8 +53,12 @@ from fpsolve.study.solve import everything, solve_curve
 from fpsolve.workflow.reports import COMPLETE, facts_since
 from fpsolve.workflow.views import field_of, listed, map_of, paths_of
 
-MOVING_RTOL = 3e-4
-"""Relative error of Λ(p) while a slider moves, at least."""
+MOVING_RTOL = 1e-6
+"""Relative error of Λ(p) while a slider moves, at least; a larger one takes a second solve of each p to be sure."""
+APART = 1 / 6
+"""Share of the interval of p between those that are solved while a slider moves, at least; 0, 2 and the ends are."""
+NEAR = 0.2
+"""Share of the value of a parameter, by which it is near the last one."""
 FEW = 9
 """A case with fewer p is shown at others, too."""
 USUAL_P = np.linspace(-2.0, 4.0, 13)
@@ -97,7 +102,12 @@ class Explorer:
         changed["moments"] = case.moments.model_copy(update={} if is_same else {"p": tuple(p.tolist())})
         changed["output"] = OutputSection(quantities=quantities)
         self.case = case.model_copy(update={**changed, "system": first.system, "noise": first.noise})
-        self._newest, self._drawing = dict[tuple[str, str], float](), threading.Lock()
+        few = [p[0], p[-1], *p[(p == 0) | (p == 2)]]
+        for each in p:
+            if np.min(np.abs(few - each)) >= APART * np.ptp(p):
+                few.append(each)
+        self._few, self._last, self._drawing = np.unique(few).tolist(), list[ExponentSolver](), threading.Lock()
+        self._newest = dict[tuple[str, str], float]()
         self._answers: dict[str, tuple[str, Callable[[Mapping[str, Any]], Answer]]] = {
             "start": ("start", self._start),
             "move": ("curve", self._move),
@@ -209,21 +219,20 @@ class Explorer:
         return self.case.model_copy(update={"system": problem.system, "noise": problem.noise})
 
     def _solved(self, case: Case, *, is_moving: bool = False) -> CurveResult:
-        """What `run` finds of a case; while a slider moves λ and Λ(p) alone, within a larger error."""
+        """What `run` finds of a case; while a slider moves at fewer p, within a larger error."""
         asked = {name: settings for name, settings in everything(case).items() if name in NUMBERS}
         numerics = Numerics.of(case)
         if is_moving:
-            asked = {MOMENT.name: {**asked[MOMENT.name], "slopes": False}, LYAPUNOV_EXPONENT.name: {}}
-            numerics = replace(numerics, rtol=max(numerics.rtol, MOVING_RTOL))
+            asked[MOMENT.name] = {"p": self._few, "slopes": False}
+            numerics = _Moving(max(numerics.rtol, MOVING_RTOL), numerics.budget, numerics.mesh, last=self._last)
         found = solve_curve(next(case.curves()), asked, numerics).result
         if not found.moments.p.size:
             raise FpsolveError(message_of(found.failures[0].reason))
         return found
 
     def _move(self, question: Mapping[str, Any]) -> Answer:
-        """Λ(p) and λ, as fast as that goes."""
-        case, names = self._at(question), (MOMENT.name, LYAPUNOV_EXPONENT.name)
-        case = case.model_copy(update={"output": OutputSection(quantities=names)})
+        """The numbers as fast as that goes."""
+        case = self._at(question)
         return self._told(case, self._solved(case, is_moving=True))
 
     def _solve(self, question: Mapping[str, Any]) -> Answer:
@@ -309,6 +318,28 @@ def _letters(latex: str) -> str:
     text = re.sub(r"\\([a-z]+)", greek, latex.strip("$"))
     text = re.sub(r"_(\d)", lambda digit: digit[1].translate(BELOW), text)
     return "" if re.search(r"[\\_^{}]", text) else text
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class _Moving(Numerics):
+    """Solving begins with the eigenfunctions of the last position, if that is near.
+
+    Attributes:
+        last: what solved that.
+    """
+
+    last: list[ExponentSolver]
+
+    def solver(self, problem: Problem) -> ExponentSolver:
+        found = super().solver(problem)
+        for before in self.last:
+            keys = [*problem.differentiable, *problem.undifferentiable]
+            old, new = (np.array([each.values[key] for key in keys], dtype=float) for each in (before.problem, problem))
+            is_near = bool(np.all(np.abs(new - old) <= NEAR * np.abs(new)))
+            if is_near and not problem.is_closed_only:
+                found = replace(found, starts=before.whole.known)
+        self.last[:] = [found]
+        return found
 
 
 class Explored:

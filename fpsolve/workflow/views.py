@@ -17,7 +17,6 @@ from fpsolve.case.sections import ChartSection
 from fpsolve.data import plain_unit
 from fpsolve.errors import FpsolveError
 from fpsolve.explain import explain
-from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.page.html import part_of_page
 from fpsolve.page.page import Column, Drawing, Grid, Sentence
 from fpsolve.parts.eigenfunctions import FURTHEST
@@ -77,10 +76,10 @@ def field_of(case: Case, p: object) -> Answer:
     """T and the stationary density over phase and noise, of three and four variables densities of directions."""
     if not isinstance(p, int | float) or not math.isfinite(p):
         raise FpsolveError(f"got p = {p!r}; must be a finite number; write, for example, 2")
-    problem, own = case.problem, Numerics.of(case)
+    problem = case.problem
     if why := problem.no_picture:
         raise FpsolveError(why)
-    solver = ExponentSolver(problem, own.mesh, rtol=own.rtol, budget=own.budget)
+    solver = Numerics.of(case).solver(problem)
     stationary = solver.pair(0.0)
     if problem.dimension > 2:
         found: Any = stationary_density(stationary)
