@@ -30,7 +30,8 @@ async function work(name, show, more = {}) {
   $("stop").disabled = true;
   $("refused").textContent = answer.refused || "";
   document.body.classList.toggle("stale", Boolean(answer.refused));
-  $("state").textContent = answer.refused ? "" : `${name === "move" ? "moving, " : ""}${(1000 * answer.seconds).toFixed(0)} ms`;
+  const time = answer.seconds < 1 ? `${(1000 * answer.seconds).toFixed(0)} ms` : `${answer.seconds?.toFixed(1)} s`;
+  $("state").textContent = answer.refused ? "" : `${name === "move" ? "moving, " : ""}${time}`;
   if (!answer.refused) show(answer);
 }
 
@@ -57,26 +58,27 @@ async function follow() { // the last position wins: what lies between two answe
 
 // the sliders
 
+const valueAt = ([low, high], log, share) => log ? low * (high / low) ** share : low + (high - low) * share;
+const shareOf = ([low, high], log, value) => log ? Math.log(value / low) / Math.log(high / low) : (value - low) / (high - low);
+
 function knobOf(spec) {
-  const {low, high, log} = spec, box = document.createElement("div"), id = `knob-${spec.key}`;
-  const value = share => log ? low * (high / low) ** share : low + (high - low) * share;
-  const share = value => log ? Math.log(value / low) / Math.log(high / low) : (value - low) / (high - low);
+  const {ends, log} = spec, box = document.createElement("div"), id = `knob-${spec.key}`;
   const label = Object.assign(document.createElement("label"), {htmlFor: id});
   const key = Object.assign(document.createElement("span"), {className: "key", textContent: ` ${spec.key}`});
-  label.append([spec.words, spec.symbol, spec.unit && `(${spec.unit})`].filter(Boolean).join(" "), key);
-  const name = spec.words || spec.key;
+  const name = spec.words || spec.key, title = [spec.words, spec.symbol, spec.unit && `(${spec.unit})`].filter(Boolean).join(" ");
+  label.append(title, key);
   const slider = Object.assign(document.createElement("input"), {type: "range", min: 0, max: STEPS, ariaLabel: `${name}, slider`});
   const field = Object.assign(document.createElement("input"), {type: "text", inputMode: "decimal", id, autocomplete: "off"});
   const back = Object.assign(document.createElement("button"), {type: "button", textContent: "↺", ariaLabel: `${name} as the case`, title: "as the case"});
-  const place = () => { slider.value = STEPS * share(Number(field.value)); slider.ariaValueText = field.value; };
+  const place = () => { slider.value = STEPS * shareOf(ends, log, Number(field.value)); slider.ariaValueText = field.value; };
   const set = value => { field.value = value; place(); };
-  slider.oninput = () => { field.value = Number(value(slider.value / STEPS).toPrecision(4)); slider.ariaValueText = field.value; moved(); };
+  slider.oninput = () => { field.value = Number(valueAt(ends, log, slider.value / STEPS).toPrecision(4)); slider.ariaValueText = field.value; moved(); };
   field.onchange = () => { place(); moved(); };
   back.onclick = () => { set(spec.value); moved(); };
   box.className = "knob";
   box.append(label, slider, field, back);
   set(spec.value);
-  return {...spec, box, set, read: () => field.value.trim() === "" || isNaN(field.value) ? field.value : Number(field.value)};
+  return {...spec, title: title || spec.key, box, set, read: () => field.value.trim() === "" || isNaN(field.value) ? field.value : Number(field.value)};
 }
 
 // drawing
@@ -108,9 +110,8 @@ function frame(svg, x, y) {
   const width = svg.clientWidth || 640, height = Math.max(260, Math.min(0.6 * width, 460));
   svg.setAttribute("viewBox", `0 0 ${width} ${height}`);
   const box = {left: 78, right: width - 12, top: 12, bottom: height - 44};
-  const along = (axis, from, to) => value => axis.log ? from + (to - from) * Math.log(value / axis.ends[0]) / Math.log(axis.ends[1] / axis.ends[0])
-    : from + (to - from) * (value - axis.ends[0]) / (axis.ends[1] - axis.ends[0]);
-  const X = along(x, box.left, box.right), Y = along(y, box.bottom, box.top);
+  const X = value => box.left + (box.right - box.left) * shareOf(x.ends, x.log, value);
+  const Y = value => box.bottom + (box.top - box.bottom) * shareOf(y.ends, y.log, value);
   for (const value of x.ticks || ticks(x.ends, x.log, width / 90)) {
     node(svg, "line", {class: value === 0 ? "zero" : "grid", x1: X(value), x2: X(value), y1: box.top, y2: box.bottom});
     node(svg, "text", {x: X(value), y: box.bottom + 17, "text-anchor": "middle"}, x.name ? x.name(value) : brief(value));
@@ -125,8 +126,8 @@ function frame(svg, x, y) {
   node(clip, "rect", {x: box.left, y: box.top, width: box.right - box.left, height: box.bottom - box.top});
   const inside = node(svg, "g", {"clip-path": `url(#clip-${svg.parentNode.id})`});
   node(svg, "rect", {class: "frame", x: box.left, y: box.top, width: box.right - box.left, height: box.bottom - box.top});
-  const back = (axis, from, to, place) => { const s = (place - from) / (to - from); return axis.log ? axis.ends[0] * (axis.ends[1] / axis.ends[0]) ** s : axis.ends[0] + (axis.ends[1] - axis.ends[0]) * s; };
-  return {X, Y, inside, box, at: (u, v) => [back(x, box.left, box.right, u), back(y, box.bottom, box.top, v)]};
+  const at = (u, v) => [valueAt(x.ends, x.log, shareOf([box.left, box.right], false, u)), valueAt(y.ends, y.log, shareOf([box.bottom, box.top], false, v))];
+  return {X, Y, inside, box, at};
 }
 
 const line = ({X, Y}, xs, ys) => xs.map((x, i) => `${i ? "L" : "M"}${X(x).toFixed(2)} ${Y(ys[i]).toFixed(2)}`).join("");
@@ -142,14 +143,9 @@ function smooth({X, Y}, xs, ys, slopes) { // cubic pieces with the slopes that a
   return d;
 }
 
-function sorted([p, ...rest]) {
-  const order = p.map((_, i) => i).sort((a, b) => p[a] - p[b]);
-  return [p, ...rest].map(each => order.map(i => each[i]));
-}
-
 function drawCurve() {
-  if (!shown || $("curve").hidden) return;
-  const curves = [before, shown].filter(Boolean).map(answer => sorted(answer.curve)), [p, value, slope, error] = curves.at(-1);
+  if (!shown || !isSeen("curve")) return;
+  const curves = [before, shown].filter(Boolean).map(answer => answer.curve), [p, value, slope, error] = curves.at(-1);
   const all = curves.flatMap(each => each[1]).concat(0), room = 0.06 * (Math.max(...all) - Math.min(...all)) || 1;
   const ends = [Math.min(...p), Math.max(...p)], low = p.length > 1 ? ends : [Math.min(0, ends[0]), ends[1] + 1];
   const plot = frame($("curve").querySelector("svg"), {ends: low, label: "order of the moment p"},
@@ -191,16 +187,20 @@ function paint(rows) { // numbers, along x first, as a picture; null where there
 
 const drawings = {
   map(answer) {
-    const [x, y] = answer.axes.map(({key, start, stop, scale}) => ({ends: [start, stop], log: scale === "log", label: key}));
-    const svg = $("map").querySelector("svg"), plot = frame(svg, x, y);
-    answer.lines.forEach((each, i) => each.branches.forEach(([u, v], k) => {
-      node(plot.inside, "path", {class: `line ${["one", "two"][i]}`, d: line(plot, u, v)});
-      const m = Math.floor(u.length * (0.35 + 0.3 * i));
-      if (!k) node(plot.inside, "text", {class: "name", x: plot.X(u[m]) + 6, y: plot.Y(v[m]) - 6}, each.name);
-    }));
-    for (const {name, at} of answer.regions) name.split(", ").forEach((part, k) =>
-      node(plot.inside, "text", {class: "name", x: plot.X(at[0]), y: plot.Y(at[1]) + 15 * k, "text-anchor": "middle"}, part));
     const [u, v] = answer.axes.map(({key}) => knobs.find(knob => knob.key === key));
+    const [x, y] = answer.axes.map(({start, stop, scale}, i) => ({ends: [start, stop], log: scale === "log", label: [u, v][i].title}));
+    const svg = $("map").querySelector("svg"), plot = frame(svg, x, y), {left, right} = plot.box;
+    const say = (x, y, text, kind) => { // within the frame
+      const made = node(plot.inside, "text", {class: `name ${kind}`, y, "text-anchor": "middle"}, text), half = made.getComputedTextLength() / 2 + 4;
+      made.setAttribute("x", Math.max(left + half, Math.min(right - half, x)));
+    };
+    const kinds = ["one", "two"], lines = answer.lines.map((each, i) => each.branches.map(([u, v]) => node(plot.inside, "path", {class: `line ${kinds[i]}`, d: line(plot, u, v)})));
+    for (const {name, at} of answer.regions) name.split(", ").forEach((part, k) => say(plot.X(at[0]), plot.Y(at[1]) + 15 * k, part, ""));
+    lines.forEach((paths, i) => {
+      if (!paths.length) return;
+      const {x, y} = paths[0].getPointAtLength((0.3 + 0.4 * i) * paths[0].getTotalLength());
+      say(x, y + 4, answer.lines[i].name, kinds[i]);
+    });
     node(svg, "circle", {class: "dot two", cx: plot.X(u.read()), cy: plot.Y(v.read()), r: 6});
     svg.onclick = event => {
       const place = svg.getBoundingClientRect(), at = plot.at(event.clientX - place.left, event.clientY - place.top);
@@ -243,7 +243,7 @@ function drawViews() {
     const {answer, of} = views[name], moving = name === "map" ? answer.axes.map(axis => axis.key) : [];
     const others = text => JSON.parse(text).filter((_, i) => !moving.includes(knobs[i].key)).join();
     $(name).classList.toggle("stale", others(of) !== others(position()));
-    if (!$(name).hidden) drawings[name](answer);
+    if (isSeen(name)) drawings[name](answer);
   }
 }
 
@@ -251,7 +251,7 @@ function makeViews() {
   const [first, second] = document.querySelectorAll("#map .axis"), axes = knobs.filter(knob => knob.axis);
   for (const select of [first, second]) select.append(...axes.map(knob => new Option([knob.words, knob.key].filter(Boolean).join(", "), knob.key)));
   second.value = (axes.find(knob => knob.key.startsWith("noise.")) || axes.at(-1)).key;
-  const axis = select => { const {key, low, high, log} = axes.find(knob => knob.key === select.value); return {key, start: low, stop: high, scale: log ? "log" : "linear"}; };
+  const axis = select => { const {key, ends: [start, stop], log} = axes.find(knob => knob.key === select.value); return {key, start, stop, scale: log ? "log" : "linear"}; };
   const questions = {map: () => ({axes: [axis(first), axis(second)]}), field: () => ({p: Number($("field").querySelector(".order").value)}), paths: () => ({})};
   for (const name in questions) $(name).querySelector(".go").onclick = () => {
     const of = position();
@@ -263,35 +263,9 @@ function makeViews() {
   };
 }
 
-// tabs, downloads
+// views, downloads
 
-function choose(tab) {
-  for (const each of $("tabs").children) {
-    each.ariaSelected = each === tab;
-    each.tabIndex = each === tab ? 0 : -1;
-    $(each.getAttribute("aria-controls")).hidden = each !== tab;
-  }
-  tab.focus();
-  redraw();
-}
-
-function makeTabs() {
-  for (const panel of document.querySelectorAll("[role=tabpanel]")) {
-    const tab = Object.assign(document.createElement("button"), {type: "button", id: `tab-${panel.id}`, textContent: panel.dataset.name});
-    tab.setAttribute("role", "tab");
-    tab.setAttribute("aria-controls", panel.id);
-    panel.setAttribute("aria-labelledby", tab.id);
-    tab.onclick = () => choose(tab);
-    tab.onkeydown = event => {
-      const other = {ArrowRight: tab.nextSibling, ArrowLeft: tab.previousSibling}[event.key];
-      if (other) choose(other);
-    };
-    $("tabs").append(tab);
-    tab.ariaSelected = panel.id === "curve";
-    tab.tabIndex = panel.id === "curve" ? 0 : -1;
-    panel.hidden = panel.id !== "curve";
-  }
-}
+const isSeen = name => $(name).clientWidth > 0; // the style shows the panel after the button that is chosen
 
 function redraw() {
   drawCurve();
@@ -317,8 +291,8 @@ async function start() {
   knobs = about.knobs.map(knobOf);
   $("knobs").append(...knobs.map(knob => knob.box));
   for (const id of ["save", "report"]) $(id).hidden = !about.file;
-  makeTabs();
   makeViews();
+  $("views").onchange = redraw;
   $("reset").onclick = () => { for (const knob of knobs) knob.set(knob.value); moved(); };
   $("stop").onclick = () => { for (const of of ["curve", "map", "field", "paths", "report"]) ask("stop", {of}); $("state").textContent = "stopped"; $("stop").disabled = true; };
   $("save").onclick = () => work("save", download);

@@ -170,7 +170,7 @@ class Explorer:
             words = "" if about.words == key else about.words
             yield {
                 "key": key, "words": words, "symbol": _letters(about.latex), "unit": unit, "value": value,
-                "low": min(low, value), "high": max(high, value), "log": scale == "log" and min(low, value) > 0,
+                "ends": [min(low, value), max(high, value)], "log": scale == "log" and min(low, value) > 0,
                 "axis": key in self.first.differentiable,
             }  # fmt: skip
 
@@ -243,12 +243,12 @@ class Explorer:
 
     def _told(self, case: Case, result: CurveResult) -> Answer:
         """The curve, the equation, and what a report says of it."""
-        moments = result.moments
+        moments, order = result.moments, np.argsort(result.moments.p)
         names = ("p", "value", "derivative", "error_estimate")
         index, exponent = result.stability_index, result.lyapunov_exponent
         shown = [*THEORY.show(case, result)]
         return {
-            "curve": [listed(getattr(moments, name)) for name in names],
+            "curve": [listed(getattr(moments, name)[order]) for name in names],
             "root": index.value if index else None,
             "exponent": exponent.value if exponent else None,
             "equations": equations_of(case.problem) if case.problem.dimension <= MOST_EQUATIONS else [],
