@@ -49,7 +49,7 @@ def shown(tmp_path_factory):
     folder, out, err = tmp_path_factory.mktemp("shown"), io.StringIO(), io.StringIO()
     (folder / "test.toml").write_text(DRAWN, encoding="utf-8")
     with chdir(folder), redirect_stdout(out), redirect_stderr(err):
-        assert main(["run", "test.toml", "--all"]) == 0
+        assert main(["run", "test.toml", "--all", "--table"]) == 0
     return SimpleNamespace(out=out.getvalue(), err=err.getvalue(), folder=folder / "results/test")
 
 
@@ -77,7 +77,9 @@ def test_what_is_computed_unasked_is_cheap_and_the_rest_is_told_in_one_line(case
         monkeypatch.setattr(place, lambda *_, **__: pytest.fail("nobody has asked for it"))
     monkeypatch.setattr(ExponentSolver, "variance_rate", lambda _: pytest.fail("nobody has asked for it"))
     Path(case).write_text(TEXT.replace("eigenfunctions = [2.0]", ""), encoding="utf-8")
-    assert main(["run", case, "--set", f"oscillator.restitution={wall}", "--set", "moments.p=[-1.0, 1.5]"]) == 0
+    assert (
+        main(["run", case, "--set", f"oscillator.restitution={wall}", "--set", "moments.p=[-1.0, 1.5]", "--table"]) == 0
+    )
     out, err = capsys.readouterr()
     assert all(f"│ {each} │" in out for each in ("     λ", "   δ_p", "     N", "   R_c"))
     told = [line for line in " ".join(err.split()).split("note: ") if "there are also" in line]
@@ -129,16 +131,15 @@ def test_what_is_set_is_told_above_the_results(case, capsys, monkeypatch):
     assert main(["run", case, *(f"--set={text}" for text in sets), *WITH_FIGURE]) == 0
     assert drawn == ["A test\nwith oscillator.omega = 2.0"]  # its values of p are on the axis
     told = " ".join(capsys.readouterr().out.split())
-    assert told.startswith("A test: noise.D0 = 0.1 with oscillator.omega = 2.0 ┏")
+    assert told.startswith("A test with oscillator.omega = 2.0 noise.D0 = 0.1: almost every path ")
     assert main(["run", case, *WITH_FIGURE]) == 0
     assert drawn[1:] == ["A test"]
 
 
 def test_each_index_has_a_row_with_its_error_and_perturbation_theory(shown):
     for symbol in ("λ", "δ_p", "Λ″(0)", "N", "R_c", "r_c"):
-        row = (
-            rf"(?m)^│ \w[\w ]+ │ +{re.escape(symbol)} │ +-?\d+\.\d+(e-\d+)? │ +\de-\d+ │ .* │ +-?\d\S*, Eq\. \(3\d\) │$"
-        )
+        number = r"-?\d+\.\d+(e-\d+)? │ +\de-\d+"
+        row = rf"(?m)^│ \w[\w =]+ │ +{re.escape(symbol)} │ +{number} │ .* │ +-?\d\S*, Eq\. \(3\d\) │$"
         assert len(re.findall(row, shown.out)) == 2
 
 
@@ -561,7 +562,7 @@ def test_mesh_writes_a_file_that_a_case_can_name(case, tmp_path, capsys):
 
 
 def test_exact_noise_says_that_the_theory_is_for_the_reduced_one(case, capsys):
-    assert main(["run", case, "--set", "noise.treatment=exact", *BARE]) == 0
+    assert main(["run", case, "--set", "noise.treatment=exact", "--table", *BARE]) == 0
     out = capsys.readouterr().out
     assert "Eq. (37)*" in out
     assert "* for the noise reduced by Eqs. (12)-(14)" in out
@@ -787,7 +788,7 @@ def test_an_output_in_ascii_has_words_for_greek(case, command, monkeypatch):
     streams = {name: io.TextIOWrapper(io.BytesIO(), encoding="ascii") for name in ("stdout", "stderr")}
     for name, stream in streams.items():
         monkeypatch.setattr(sys, name, stream)
-    assert main([command, case, *BARE]) == 0
+    assert main([command, case, *BARE, *["--table"] * (command == "run")]) == 0
     monkeypatch.undo()
     out, err = (streams[name].buffer.getvalue() for name in ("stdout", "stderr"))
     assert b"?" not in out

@@ -71,6 +71,7 @@ def test_a_saved_case_gives_the_numbers_of_the_page(tmp_path, name, changed):
     result = solve_curve(next(case.curves()), everything(case), Numerics.of(case)).result
     assert found["curve"][1] == result.moments.value.tolist()
     rows = {row[1]: row[2] for row in cells(found["numbers"])[1:] if len(row) > 2}
+    rows.pop("Λ(2)", None)
     assert rows == {index.symbol: index_text(index, result) for index in told_indices(case)}
     comments = re.findall("#.*", (CASES / f"{name}.toml").read_text(encoding="utf-8"))
     assert comments[0] in saved["text"]

@@ -35,7 +35,7 @@ def chart(
             print_blocks(note_on(case.name, each) for each in dict.fromkeys(found.failures))
         else:
             print_blocks(show(case, found))
-        options.print_written(case, traced(found), start)
+        options.print_written(case, traced(found), monotonic() - start)
         if found.failures:
             code = NOT_CONVERGED
     return code

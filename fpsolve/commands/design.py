@@ -69,7 +69,7 @@ def design(
         is_short = options.quiet or json
         print_blocks(each for each in show(case, outcome) if isinstance(each, Note) or not is_short)
         if not json:
-            options.print_written(case, found_of(outcome), begun)
+            options.print_written(case, found_of(outcome), monotonic() - begun)
         if outcome.is_out_of_reach:
             code = max(code, CHECK_FAILED)
         elif outcome.found is None:

@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from shlex import quote
-from time import monotonic
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -114,12 +113,12 @@ class Writing(Options):
                 raise FpsolveError(f'several cases are called "{name}" and would overwrite each other; run them apart')
         return cases
 
-    def print_written(self, case: Case, what: str, start: float, known: str = "") -> None:
+    def print_written(self, case: Case, what: str, seconds: float, known: str = "") -> None:
         """Print where the results of a case are, and how long that took."""
         from fpsolve.page.terminal import print_blocks
         from fpsolve.show.results import last_line
 
-        print_blocks([last_line(self.out / case.name, what, monotonic() - start, known)])
+        print_blocks([last_line(self.out / case.name, what, seconds, known)])
 
 
 @Parameter(name="*")

@@ -72,7 +72,7 @@ def prove(
             print_blocks(show(case, proofs))
         unmet = sum(not each.is_met for each in proofs)
         what = done_of(case, len(proofs), unmet, "not as close as wanted")
-        options.print_written(case, what, start)
+        options.print_written(case, what, monotonic() - start)
         if unmet:
             code = NOT_CONVERGED
     return code

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from time import monotonic
+from dataclasses import replace
 from typing import Annotated, Any
 
 from cyclopts import Parameter
@@ -24,6 +24,9 @@ def run(
     ] = False,
     everything: Annotated[
         bool, Parameter(name="--all", help='Compute everything, as quantities = "all" in [output].', negative="")
+    ] = False,
+    table: Annotated[
+        bool, Parameter(help="Print every number of up to ten curves, also Λ(p) at more than 12 p.", negative="")
     ] = False,
     sample: Annotated[
         Count | None,
@@ -60,7 +63,7 @@ def run(
             refuse_obstacles(case)
     pool = options.pool(() if sample else loaded)
     for case in loaded:
-        start, watch = monotonic(), options.watch(is_json=json)
+        watch = replace(options.watch(is_json=json), is_whole=table)
         how: dict[str, Any] = {"monte_carlo": monte_carlo, "is_fresh": fresh}
         outcome = run_case(case, options.out, pool=pool, watch=watch, **how)
         if outcome.interruption:
@@ -71,7 +74,9 @@ def run(
             print(whole_summary(case, outcome.results, outcome.facts))
         else:
             what = done_of(case, len(outcome.results), outcome.failed)
-            options.print_written(case, what, start, known_of(case, outcome.known, outcome.outdated))
+            options.print_written(
+                case, what, outcome.facts["wall_seconds"], known_of(case, outcome.known, outcome.outdated)
+            )
         if outcome.interruption:
             return INTERRUPTED
         if outcome.failed or (outcome.samples and outcome.samples.failed):

@@ -106,7 +106,7 @@ VARIANCE_RATE = Quantity(
 IMPACT_RATE = Quantity(
     "impact_rate",
     "N",
-    "impact rate",
+    "impacts in unit time",
     r"$N = \partial\lambda/\partial\ln R$",
     "1/time",
     (),
@@ -115,12 +115,20 @@ IMPACT_RATE = Quantity(
     _FINER,
 )
 CRITICAL_IMPACT_FACTOR = Quantity(
-    "critical_impact_factor", "R_c", "critical impact factor", "$R_c$", "1", (), "λ = 0 at R = R_c", "(39)", _RATIO
+    "critical_impact_factor",
+    "R_c",
+    "impact factor where λ = 0",
+    "$R_c$",
+    "1",
+    (),
+    "λ = 0 at R = R_c",
+    "(39)",
+    _RATIO,
 )
 CRITICAL_RESTITUTION = Quantity(
     "critical_restitution",
     "r_c",
-    "critical coefficient of restitution",
+    "coefficient of restitution where λ = 0",
     "$r_c$",
     "1",
     (),
@@ -257,6 +265,9 @@ OVER_P: Mapping[str, Quantity] = {
 def moment_at(p: float) -> Quantity:
     """Λ at one p."""
     return replace(MOMENT, symbol=f"Λ({p:g})", latex=rf"$\Lambda({p:g})$", dims=())
+
+
+MEAN_SQUARE = replace(moment_at(2.0), words="growth of the mean square")
 
 
 def density_unit(noise: Quantity) -> str:

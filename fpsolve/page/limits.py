@@ -1,8 +1,8 @@
 """How much is shown of one, of several and of many curves, on the terminal and in the report.
 
-Up to `EACH` curves are described one by one: a table, sentences, and of the first `PICTURES` pictures. More have a row
-each in one table, up to `ROWS`; of still more the extreme ones and some that failed have one. Where the figure is over
-a parameter, curves have a row each from the first one on.
+Several curves have a row each in one table, up to `ROWS`; of more the extreme ones and some that failed have one. Up
+to `EACH` curves are also described one by one, on a terminal where that is asked for: a table, sentences, and of the
+first `PICTURES` pictures. Where the figure is over a parameter, curves have a row each from the first one on.
 """
 
 EACH = 10
@@ -17,6 +17,8 @@ FAILURES = 20
 """Failed curves among many that have a row."""
 MOMENTS = 3
 """The p whose Λ has a column beside that of other quantities."""
+ROWS_OVER_P = 12
+"""Λ(p) of a single curve that a terminal shows unasked."""
 PROOFS = 4
 """Proven moments of which each is told."""
 NAMED = 3

@@ -8,13 +8,11 @@ from dataclasses import dataclass, replace
 from functools import cache, partial
 from typing import TYPE_CHECKING, Any
 
-from fpsolve.analysis.excursions import SYMBOL
 from fpsolve.data import Quantity
 from fpsolve.errors import NoSuchExponent
 from fpsolve.exponent.error import Absent, Estimate, digits
 from fpsolve.exponent.quantities import (
     BY_JUMP,
-    CRITICAL_IMPACT_FACTOR,
     CRITICAL_RESTITUTION,
     INDICES,
     MOMENT,
@@ -23,11 +21,12 @@ from fpsolve.exponent.quantities import (
     Index,
 )
 from fpsolve.messages import Code, Message, Remedy, message_of
-from fpsolve.page.page import Block, Column, Grid, Sentence, filled
+from fpsolve.model.quantity import MEAN_SQUARE
+from fpsolve.page.page import Block, Column, filled
 from fpsolve.parts.intervals import INTERVAL, spreads_of
 from fpsolve.parts.part import Job, Numerics, Part, Reason, Settings, attempt
 from fpsolve.results.table import Row, pair
-from fpsolve.results.text import DIGITS, NUMBER_COLUMNS, fate, interval, row_of, short, sign_of
+from fpsolve.results.text import NUMBER_COLUMNS, interval, row_of
 
 if TYPE_CHECKING:
     from fpsolve.case.case import Case, Curve
@@ -210,69 +209,28 @@ def index_text(index: Index, result: CurveResult, most: int = 17) -> str:
 
 
 def _show(case: Case, result: CurveResult) -> Iterator[Block]:
-    """The table of all indices, where the figure is not over a parameter; and what they mean."""
-    if any(result.estimates.values()) and case.figure.x == "p":
-        yield index_grid(case, result)
-    yield from show_meaning(case, result)
-
-
-def index_grid(case: Case, result: CurveResult) -> Grid:
-    """λ, δ_p and the other indices that are asked for, those of impacts for each ray that has them."""
-    spreads, problem = spreads_of(case, result).indices, result.curve.problem
-    rows: list[list[str]] = []
+    """λ, δ_p, Λ(2) and what else is asked for, that of impacts for each ray; not where a figure is over a parameter."""
+    if case.figure.x != "p":
+        return
+    found_spreads, problem = spreads_of(case, result), result.curve.problem
+    spreads, of_p, rows = found_spreads.indices, found_spreads.moments, list[list[str]]()
     for index in told_indices(case):
         found, spread = result.estimates[index.name], spreads.get(index.name)
         row, theory = row_of(index, found, case.units.time), index.theory(problem) if found else math.nan
         row[2] = index_text(index, result)
         row.append(f"{theory:.6g}, Eq. {index.closed_form}" if math.isfinite(theory) else "")
         rows.append([*row, interval(spread.low, spread.high) if spread else ""])
+    if square := result.moment(2.0):
+        [closed] = result.moments.perturbation[result.moments.p == 2]
+        told, spread = f"{closed:.6g}, Eq. {MOMENT.closed_form}" * math.isfinite(closed), of_p.get(2.0)
+        row = [*row_of(MEAN_SQUARE, square, case.units.time), told]
+        rows.append([*row, interval(spread.low, spread.high) if spread else ""])
     for ray, of_ray in zip(problem.system.jumps, result.jumps, strict=False):
         for name, found in of_ray.items():
             about = replace(INDICES[name], words=f"{INDICES[name].words} at φ = {ray.phase:.6g}")
             rows += [[*row_of(about, found, case.units.time), "", ""]] if found else []
-    return filled("", [*NUMBER_COLUMNS, Column("perturbation theory", 3), Column(INTERVAL, 1)], rows)
-
-
-def show_meaning(case: Case, result: CurveResult) -> Iterator[Sentence]:
-    """What λ, Λ(2), δ_p and R_c say, each that is there."""
-    exponent, index, unit = result.lyapunov_exponent, result.stability_index, case.units.time
-    path = 0.0 if exponent is None else sign_of(exponent.value, exponent.error_estimate)
-    if exponent is not None:
-        rest = ""
-        if path > 0 and result.curve.problem.system.cubic:
-            rest = " near rest" + (", and settles into the stationary response" if result.response else "")
-        elif path > 0:
-            rest = ", and passes every level in the end"
-        yield Sentence(f"λ = {short(exponent)}{fate('almost every path', exponent.value, path, unit)}{rest}.")
-    found = result.moments
-    for p, value, error in zip(found.p.tolist(), found.value.tolist(), found.error_estimate.tolist(), strict=True):
-        if p == 2:
-            sign = sign_of(value, error)
-            text = f"Λ(2) = {digits(value, error, DIGITS)}{fate('the mean square', value, sign, unit)}"
-            if sign > 0 > path:
-                text += (
-                    ", carried by bursts of rare paths. A design that is judged by the mean square, by energy or by "
-                    "fatigue is unstable, though one record most likely looks calm"
-                )
-            yield Sentence(f"{text}.")
-    power = "" if index is None else digits(abs(index.value), index.error_estimate, 4)
-    if index is not None and index.value > 0:
-        yield Sentence(
-            f"δ_p = {short(index)} > 0: moments of the orders 0 < p < δ_p decay, those of p > δ_p grow. The "
-            f"probability that a path ever exceeds A times its start, {SYMBOL}, falls as A^-{power}."
-        )
-    elif index is not None:
-        yield Sentence(
-            f"δ_p = {short(index)} < 0: moments of the orders δ_p < p < 0 decay, as almost every path grows. The "
-            f"probability that a path ever falls below a small share a of its start goes as a^{power}."
-        )
-    critical = result.estimates[CRITICAL_IMPACT_FACTOR.name]
-    if critical is not None:
-        loss = "more loss" if critical.value < 1 else "any loss"
-        yield Sentence(
-            f"R_c = {short(critical)}: with this factor of the speed at an impact λ would be 0; {loss} makes almost "
-            "every path decay."
-        )
+    if any(result.estimates.values()):
+        yield filled("", [*NUMBER_COLUMNS, Column("perturbation theory", 3), Column(INTERVAL, 1)], rows)
 
 
 THEORY: Part = Part(

@@ -13,10 +13,10 @@ from fpsolve.analysis.spreads import LEVEL, UNCERTAIN, Spread, latin_hypercube, 
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import FpsolveError
 from fpsolve.exponent.error import Estimate
-from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, MOMENT
+from fpsolve.exponent.quantities import INDICES, MOMENT
 from fpsolve.messages import Code, Message
 from fpsolve.model.quantity import Quantity, moment_at
-from fpsolve.page.page import Block, Column, Grid, Sentence
+from fpsolve.page.page import Block, Column, Grid
 from fpsolve.parts.part import Part, Settings
 from fpsolve.results.table import Row
 from fpsolve.results.text import interval, percent
@@ -201,13 +201,8 @@ def _rows(case: Case, result: CurveResult, sampled: Sequence[CurveResult]) -> It
         yield _sampled(INDICES[name], None, values, spread, _linear(spread, slopes.indices[name], result, sets))
     rows = dict(zip(slopes.p.tolist(), slopes.moments, strict=True))
     for p, spread in spreads.moments.items():
-        values = np.array([_moment(each, p) for each in sampled])
+        values = np.array([getattr(each.moment(p), "value", np.nan) for each in sampled])
         yield _sampled(moment_at(p), p, values, spread, _linear(spread, rows[p], result, sets))
-
-
-def _moment(result: CurveResult, p: float) -> float:
-    at = np.flatnonzero(result.moments.p == p)
-    return float(result.moments.value[at[0]]) if at.size else np.nan
 
 
 def _linear(
@@ -293,22 +288,6 @@ def plain_spread(spread: Spread) -> dict[str, float]:
     }
 
 
-def _show(case: Case, result: CurveResult) -> Iterator[Sentence]:
-    """With which probability λ and Λ(2), or else the first Λ(p), have their sign, to first order."""
-    spreads = spreads_of(case, result)
-    exponent = spreads.indices.get(LYAPUNOV_EXPONENT.name)
-    chosen = [(LYAPUNOV_EXPONENT.symbol, exponent)] if exponent else []
-    p = 2.0 if 2.0 in spreads.moments else next(iter(spreads.moments), None)
-    chosen += [(moment_at(p).symbol, spreads.moments[p])] if p is not None else []
-    told = []
-    for symbol, spread in chosen:
-        is_below = spread.below >= 0.5
-        sure = percent(spread.below if is_below else 1 - spread.below)
-        told.append(f"{symbol} {'<' if is_below else '>'} 0 with {sure}")
-    if told:
-        yield Sentence(f"As parameters are uncertain, {', and '.join(told)}.")
-
-
 def show_samples(case: Case, samples: Samples) -> Iterator[Block]:
     """The intervals of the samples, their medians, and the intervals to first order."""
     columns = [Column("quantity"), Column(f"samples, {LEVEL:.0%}"), Column("median", 1), Column("P(< 0)")]
@@ -323,4 +302,4 @@ def show_samples(case: Case, samples: Samples) -> Iterator[Block]:
     yield grid
 
 
-PART: Part = Part("intervals", _settings, columns=_columns, row=_row, content=_content, show=_show, is_quantity=False)
+PART: Part = Part("intervals", _settings, columns=_columns, row=_row, content=_content, is_quantity=False)

@@ -170,12 +170,6 @@ def _reasons(found: Moments) -> Iterator[Message]:
     return (each.reason for each in found.failures)
 
 
-def _show(case: Case, result: CurveResult) -> Iterator[Grid]:
-    """The table; where the figure is over a parameter, all curves share another one."""
-    if result.moments.p.size and case.figure.x == "p":
-        yield moment_grid(case, result)
-
-
 def moment_grid(case: Case, result: CurveResult) -> Grid:
     """Λ(p) at each p, with its error, its interval, and perturbation theory."""
     found, spreads, is_reduced = result.moments, spreads_of(case, result).moments, result.curve.theory_reduces_noise
@@ -205,7 +199,6 @@ PART: Part = Part(
     row=_row,
     reasons=_reasons,
     is_whole=_is_whole,
-    show=_show,
 )
 
 

@@ -12,7 +12,7 @@ from fpsolve.page.page import Column
 DIGITS = 7
 """Digits of a number in a sentence, or in a table of many curves."""
 NUMBER_COLUMNS = (
-    Column("quantity", 5, is_text=True), Column("symbol"), Column("value"), Column("± error"), Column("unit", 4)
+    Column("quantity", is_text=True), Column("symbol"), Column("value"), Column("± error"), Column("unit", 5)
 )  # fmt: skip
 """Those of a table of different quantities."""
 
@@ -73,9 +73,17 @@ def sign_of(value: float, error: float) -> float:
 def fate(what: str, rate: float, sign: float, time_unit: str) -> str:
     """What becomes of something that grows at a rate, and in which time."""
     if not sign:
-        return f" cannot be distinguished from 0 within its error: {what} is at the border of stability, or near it"
-    time = f"in a time of {math.log(2) / abs(rate):.3g}" + ("" if time_unit == "time" else f" {time_unit}")
-    return f" > 0: {what} grows, doubling {time}" if sign > 0 else f" < 0: {what} decays, halving {time}"
+        return f"{what} is at the border of stability, within the error"
+    time = f"in a time of {float(f'{math.log(2) / abs(rate):.3g}'):g}" + (
+        "" if time_unit == "time" else f" {time_unit}"
+    )
+    return f"{what} grows, doubling {time}" if sign > 0 else f"{what} decays, halving {time}"
+
+
+def likely(what: str, below: float) -> str:
+    """What probably becomes of something whose rate is below 0 with a probability."""
+    fate, share = ("decays", below) if below >= 0.5 else ("grows", 1 - below)
+    return f"{what} {fate} with a probability of {percent(share)}"
 
 
 def units_in_words(unit: str, quantities: Iterable[Quantity]) -> str:

@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
+from operator import methodcaller
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,9 +17,9 @@ from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case
 from fpsolve.case.vary import short_names
 from fpsolve.data import written
-from fpsolve.exponent.error import digits
+from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.quantities import LYAPUNOV_EXPONENT, MOMENT, STABILITY_INDEX, Index
-from fpsolve.model.quantity import OSCILLATOR_RESPONSE, STATUS, moment_at
+from fpsolve.model.quantity import MEAN_SQUARE, OSCILLATOR_RESPONSE, STATUS, moment_at
 from fpsolve.page.limits import EACH, EXTREMES, FAILURES, MOMENTS, ROWS
 from fpsolve.page.page import Block, Column, Grid, Sentence
 from fpsolve.parts.excursions import NAME as EXCURSIONS
@@ -57,8 +58,10 @@ def show(case: Case, results: Sequence[CurveResult], table: Table) -> Iterator[B
     if len(results) <= EACH:
         return
     counts = Counter(_status(table))
-    states = ", ".join(f"{counts[each]} {each.word}" for each in sorted(counts, key=lambda each: (each.fails, each)))
-    is_short = len(results) > ROWS and sum(count for each, count in counts.items() if each.fails) > FAILURES
+    failed, whole = sum(count for each, count in counts.items() if each.fails), counts[Status.CONVERGED]
+    kinds = {"converged": whole, "with warnings": counts.total() - whole - failed, "not converged": failed}
+    states = ", ".join(f"{count} {kind}" for kind, count in kinds.items() if count)
+    is_short = len(results) > ROWS and failed > FAILURES
     shown = f"; of those that are not converged the first {FAILURES} are shown" if is_short else ""
     yield Sentence(f"{len(results)} curves: {states}{shown}; all numbers are in curves.csv and results.nc")
 
@@ -73,12 +76,13 @@ def curve_grid(case: Case, results: Sequence[CurveResult], table: Table) -> Grid
     if len(results) > EACH or any(status):
         is_whole = len(results) <= ROWS and not any(status)
         shown.append(Shown(Column("status", 1 if is_whole else 0), lambda result: result.status.word))
-    numbers = told_indices(case) + [MOMENT] * (case.figure.x == "p" and MOMENT.name in case.asked)
-    units = units_in_words(case.units.time, numbers)
     grid = grid_of(case, results, shown, [place for place, each in enumerate(status) if each.fails])
-    theories = [each.heading for each in grid.columns if each.heading.startswith("Eq.")]
-    told = [THEORY] * bool(theories) + [STAR] * any("*" in each for each in theories) + [units] * bool(units)
-    return replace(grid, remark="; ".join(told))
+    headings = [each.heading for each in grid.columns]
+    numbers = [each for each in (*told_indices(case), MEAN_SQUARE) if each.symbol in headings]
+    units, theories = units_in_words(case.units.time, numbers), [each for each in headings if each.startswith("Eq.")]
+    told = [", ".join(f"{each.symbol}: {each.words}" for each in numbers)] + [units] * bool(units)
+    told += [THEORY] * bool(theories) + [STAR] * any("*" in each for each in theories)
+    return replace(grid, title="", remark="; ".join(told))
 
 
 def grid_of(case: Case, found: Sequence[Any], shown: Iterable[Shown], failed: Sequence[int] = ()) -> Grid:
@@ -111,16 +115,30 @@ def _status(table: Table) -> list[Status]:
 
 
 def _quantities(case: Case, table: Table) -> Iterator[Shown]:
-    """What has a column, the most important first: λ, δ_p, the other indices, then Λ at the p of a case if few."""
+    """What has a column, the most important first: λ, δ_p, Λ at 2 or at the p of a case if few, the other indices."""
     known = ~np.isnan(table[STATUS.name].values)
-    over_p, told = case.figure.x == "p", sorted(told_indices(case), key=lambda index: index not in MAIN)
-    for rank, index in enumerate(told if over_p else [each for each in told if each in MAIN]):
-        yield _index(index, rank + 1 if rank > 1 else 0, table[index.name].values[known])
+    over_p, told = case.figure.x == "p", told_indices(case)
+    for index in [each for each in told if each in MAIN]:
+        yield Shown(Column(index.symbol), partial(_index, index), table[index.name].values[known])
+        yield Shown(
+            Column(f"± {index.symbol}", 3 if index == STABILITY_INDEX else 1),
+            partial(_error, partial(_estimate, index)),
+        )
         if case.uncertain and index.name in UNCERTAIN:
             yield Shown(Column(f"{LEVEL:.0%} of {index.symbol}", 1), partial(_interval, case, index.name))
         if not over_p:
             heading = f"Eq. {index.closed_form}{'*' if case.theory_reduces_noise else ''}"
-            yield Shown(Column(heading, 1), partial(_theory, index))
+            yield Shown(Column(heading, 2), partial(_theory, index))
+    p = [float(each) for each in case.p if each] if MOMENT.name in case.asked else []
+    if len(p) > MOMENTS:
+        p = [2.0] if 2.0 in p else [] if told else [p[0], p[-1]]
+    for each in p:
+        of, about, rank = methodcaller("moment", each), moment_at(each), (1 + (each != 2)) * bool(told)
+        values = table[MOMENT.name].values[known][:, np.flatnonzero(case.p == each)[0]]
+        yield Shown(Column(about.symbol, rank), partial(_number, of), values)
+        yield Shown(Column(f"± {about.symbol}", 3), partial(_error, of))
+    for rank, index in enumerate([each for each in told if each not in MAIN and over_p], 4):
+        yield Shown(Column(index.symbol, rank), partial(_index, index), table[index.name].values[known])
     if EXCURSIONS in case.asked:
         level = case.excursions.sentence_level
         yield Shown(
@@ -133,33 +151,23 @@ def _quantities(case: Case, table: Table) -> Iterator[Shown]:
             Column(OSCILLATOR_RESPONSE.means[square].symbol, 1),
             lambda result: short(result.response.means[square]) if result.response else "",
         )
-    p = [float(each) for each in case.p if each] if over_p and MOMENT.name in case.asked else []
-    if len(p) > MOMENTS:
-        p = [] if told else [p[0], p[-1]]
-    for each in p:
-        [place] = np.flatnonzero(case.p == each)
-        yield _moment(each, 2 if told else 0, table[MOMENT.name].values[known, place])
 
 
-def _index(index: Index, rank: int, numbers: FloatArray) -> Shown:
-    def text(result: CurveResult) -> str:
-        is_lost = result.estimates[index.name] is None and result.status.fails
-        return "" if is_lost else index_text(index, result, DIGITS)
-
-    return Shown(Column(index.symbol, rank), text, numbers)
+def _index(index: Index, result: CurveResult) -> str:
+    is_lost = result.estimates[index.name] is None and result.status.fails
+    return "" if is_lost else index_text(index, result, DIGITS)
 
 
-def _moment(p: float, rank: int, numbers: FloatArray) -> Shown:
-    def found(result: CurveResult) -> list[tuple[float, float]]:
-        moments = result.moments
-        rows = zip(moments.p.tolist(), moments.value.tolist(), moments.error_estimate.tolist(), strict=True)
-        return [(value, error) for each, value, error in rows if each == p]
+def _estimate(index: Index, result: CurveResult) -> Estimate | None:
+    return result.estimates[index.name]
 
-    return Shown(
-        Column(moment_at(p).symbol, rank),
-        lambda result: "".join(digits(*each, most=DIGITS) for each in found(result)),
-        numbers,
-    )
+
+def _number(of: Callable[[Any], Estimate | None], result: CurveResult) -> str:
+    return short(found) if (found := of(result)) else ""
+
+
+def _error(of: Callable[[Any], Estimate | None], result: CurveResult) -> str:
+    return f"{found.error_estimate:.0e}" if (found := of(result)) else ""
 
 
 def _interval(case: Case, name: str, result: CurveResult) -> str:

@@ -7,12 +7,14 @@ from pathlib import Path
 
 from fpsolve.case.case import Case
 from fpsolve.output.figures import main_figure, rate_figure
-from fpsolve.page.limits import EACH, PICTURES
+from fpsolve.page.limits import EACH, PICTURES, ROWS_OVER_P
 from fpsolve.page.page import Block, Drawing, Sentence
 from fpsolve.parts.every import PARTS
+from fpsolve.parts.moments import moment_grid
 from fpsolve.results.table import Table
 from fpsolve.results.text import duration, plural
 from fpsolve.show import curves
+from fpsolve.show.verdict import meaning, verdicts
 from fpsolve.study.columns import table_of
 from fpsolve.study.results import CurveResult, SimulatedCurve
 
@@ -23,26 +25,37 @@ def show(
     folder: Path,
     simulated: Sequence[SimulatedCurve] = (),
     table: Table | None = None,
+    *,
+    is_whole: bool = True,
 ) -> Iterator[Block]:
-    """The solved curves, one by one or in one table, beside those that are simulated.
+    """The verdict, the solved curves in one table, and a few one by one, beside those that are simulated.
 
     Args:
         table: the numbers of all curves, if these are known already.
+        is_whole: whether also a few of several curves are told of one by one, and Λ(p) at each of many p.
     """
     table = table_of(case, results) if table is None else table
+    yield from verdicts(case, results, table)
     yield main_figure(case, results, simulated, folder, table)
     yield rate_figure(case, results)
-    is_short, over_p = len(results) <= EACH, case.figure.x == "p"
     samples = {each.curve.number: each for each in simulated}
-    if not (is_short and over_p):
+    if len(results) > 1 or case.figure.x != "p":
         yield from curves.show(case, results, table)
-    for place, result in enumerate(results if is_short else results[:PICTURES]):
-        told = [block for part in PARTS for block in part.show(case, result)] if is_short else []
-        if told:
-            yield Sentence("", case.heading(result.curve) if over_p else result.curve.label)
-        yield from told
+    for place, result in enumerate(results if len(results) <= EACH else results[:PICTURES]):
+        if len(results) == 1 or (is_whole and len(results) <= EACH):
+            yield Sentence("", result.curve.label)
+            yield from told_of(case, result)
+            p, is_told = result.moments.p, any(result.estimates.values())  # which has Λ(2), too
+            if case.figure.x == "p" and (is_whole or p.size <= ROWS_OVER_P) and (p != 2 if is_told else p == p).any():
+                yield moment_grid(case, result)
         if place < PICTURES:
             yield from figures_of(case, result, folder, samples)
+
+
+def told_of(case: Case, result: CurveResult) -> Iterator[Block]:
+    """What is told of one curve, but for its verdict and Λ(p)."""
+    yield from (block for part in PARTS for block in part.show(case, result))
+    yield from meaning(result)
 
 
 def figures_of(

@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from fpsolve.analysis.excursions import Excursion
 from fpsolve.analysis.sensitivity import Sensitivities
 from fpsolve.case.case import Curve
@@ -15,7 +17,7 @@ from fpsolve.exponent.error import Estimate, Failure
 from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, STABILITY_INDEX, VARIANCE_RATE
 from fpsolve.exponent.solver import InvariantClass
 from fpsolve.messages import Code, Message, Severity, message_of
-from fpsolve.model.quantity import MOMENT, OVER_P, P
+from fpsolve.model.quantity import MOMENT, OVER_P, P, moment_at
 from fpsolve.parts import excursions, response, sensitivities
 from fpsolve.parts.moments import MomentColumns
 from fpsolve.parts.part import Entry
@@ -107,6 +109,13 @@ class CurveResult(Result):
     def variance_rate(self) -> Estimate | None:
         """Λ″(0)."""
         return self.estimates[VARIANCE_RATE.name]
+
+    def moment(self, p: float) -> Estimate | None:
+        """Λ at one p; None where it is not known."""
+        for place in np.flatnonzero(self.moments.p == p).tolist():
+            value, error = self.moments.value[place], self.moments.error_estimate[place]
+            return Estimate(float(value), float(error), 0.0, quantity=moment_at(p))
+        return None
 
     @property
     def status(self) -> Status:

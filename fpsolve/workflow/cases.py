@@ -166,7 +166,8 @@ def run_case(
 
         told = saying_if_interrupted(lambda: f"; what was {'done' if simulated else 'solved'} is kept in {folder}")
         with told, shown_at_the_end(show):
-            watch.shown(results.show(case, sweep.results, folder, (), sweep.results.table))
+            table = sweep.results.table
+            watch.shown(results.show(case, sweep.results, folder, (), table, is_whole=watch.is_whole))
             watch.noted(sweep.told.notes)
             if case.uncertain.sample:
                 samples = _sample(case, sweep, folder, pool or serial(), watch, is_fresh=is_fresh)

@@ -40,14 +40,15 @@ from fpsolve.model.plane import BELOW
 from fpsolve.model.problem import Problem, checked_problem
 from fpsolve.page.html import page_of, part_of_page
 from fpsolve.page.local import LocalPage
-from fpsolve.page.page import Grid, Sentence
+from fpsolve.page.page import Sentence
 from fpsolve.parts.indices import THEORY
-from fpsolve.parts.moments import PART as MOMENTS
+from fpsolve.parts.moments import moment_grid
 from fpsolve.parts.part import Numerics, fault
 from fpsolve.show import results
 from fpsolve.show.notes import notes
 from fpsolve.show.problem import equations_of
 from fpsolve.show.problem import show as show_problem
+from fpsolve.show.verdict import meaning, verdict
 from fpsolve.study.results import CurveResult
 from fpsolve.study.solve import everything, solve_curve
 from fpsolve.workflow.reports import COMPLETE, facts_since
@@ -239,21 +240,20 @@ class Explorer:
         """All numbers, as `run` finds them."""
         case = self._at(question)
         found = self._solved(case)
-        return {**self._told(case, found), "table": part_of_page(MOMENTS.show(case, found))}
+        return {**self._told(case, found), "table": part_of_page([moment_grid(case, found)])}
 
     def _told(self, case: Case, result: CurveResult) -> Answer:
         """The curve, the equation, and what a report says of it."""
         moments, order = result.moments, np.argsort(result.moments.p)
         names = ("p", "value", "derivative", "error_estimate")
         index, exponent = result.stability_index, result.lyapunov_exponent
-        shown = [*THEORY.show(case, result)]
         return {
             "curve": [listed(getattr(moments, name)[order]) for name in names],
             "root": index.value if index else None,
             "exponent": exponent.value if exponent else None,
             "equations": equations_of(case.problem) if case.problem.dimension <= MOST_EQUATIONS else [],
-            "verdict": part_of_page(each for each in shown if isinstance(each, Sentence)),
-            "numbers": part_of_page([*filter(lambda each: isinstance(each, Grid), shown), *notes(case, [result], "")]),
+            "verdict": part_of_page([Sentence(verdict(case, result)), *meaning(result)]),
+            "numbers": part_of_page([*THEORY.show(case, result), *notes(case, [result], "")]),
             "table": "",  # which nobody reads while a slider moves
         }
 

@@ -47,7 +47,7 @@ from fpsolve.model import Noise, ParametricOscillator, PlaneSystem, Problem, Vib
 from fpsolve.model.plane import System
 from fpsolve.model.systems.vibro_impact import ImpactLaw
 from fpsolve.page.page import Block, Column, Grid, Sentence
-from fpsolve.results.text import percent, sampled
+from fpsolve.results.text import likely, sampled
 from fpsolve.show.notes import note_on
 from fpsolve.workflow.progress import SILENT, SOLVES, Phase, Watch
 
@@ -537,16 +537,13 @@ def sentences(outcome: NoiseOutcome) -> Iterator[str]:
         if outcome.failure is None:
             yield _missing(outcome)
         return
-    for symbol, each, below, above in (
-        ("λ", outcome.verdict.exponent, "almost every path decays", "almost every path grows"),
-        ("Λ(2)", outcome.verdict.moment, "the mean square decays", "the mean square grows"),
+    for symbol, each, what in (
+        ("λ", outcome.verdict.exponent, "almost every path"),
+        ("Λ(2)", outcome.verdict.moment, "the mean square"),
     ):
-        if each is None:
-            continue
-        number = f"{symbol} = {sampled(each.value, each.deviation)} ± {each.deviation:.1g} 1/s"
-        is_below = each.below >= 0.5
-        sure = percent(each.below if is_below else 1 - each.below)
-        yield f"{number}: {symbol} {'<' if is_below else '>'} 0 with {sure}, {below if is_below else above}."
+        if each is not None:
+            number = f"{symbol} = {sampled(each.value, each.deviation)} ± {each.deviation:.1g} 1/s"
+            yield f"{number}: {likely(what, each.below)}."
     off = f", and that it is {outcome.fit.off:.0%} off where stability depends on it" if outcome.fit.off else ""
     yield f"The probabilities count the standard errors of the fit{off}; see the page From a measurement to a case."
 

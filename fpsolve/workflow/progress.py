@@ -65,6 +65,7 @@ class Watch:
         noted: takes what limits this.
         said: takes notes about files.
         has_report: whether report.html is written, too.
+        is_whole: whether a few of several curves are also shown one by one, with Λ at each p.
     """
 
     bar: Callable[[Phase], AbstractContextManager[Advance]] = lambda _: nullcontext(ignore)
@@ -72,6 +73,7 @@ class Watch:
     noted: Callable[[Iterable[Block]], None] = lambda _: None
     said: Callable[[Iterable[Block]], None] = lambda _: None
     has_report: bool = False
+    is_whole: bool = False
 
 
 SILENT = Watch()

@@ -321,7 +321,7 @@ def show(case: Case, simulated: Sequence[SimulatedCurve], results: Sequence[Curv
         if result is None:
             value, error = found.lyapunov_exponent, found.lyapunov_exponent_error
             meaning = fate("almost every path", value, sign_of(value, SURE * error), unit)
-            yield Sentence(f"λ = {sampled(value, error)} ± {error:.1e}{meaning}.")
+            yield Sentence(f"λ = {sampled(value, error)} ± {error:.1e}: {meaning}.")
         yield Sentence(f"{found.paths} paths over a time of {found.time:.4g} in steps of {found.step:.4g}")
         if each.response and each.curve.number <= PICTURES:
             yield simulated_response_figure(case, each)

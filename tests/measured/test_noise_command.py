@@ -71,7 +71,7 @@ def test_a_spectrum_becomes_a_case_and_a_verdict(capsys):
         rel=1e-5,
     )
     assert 'kind = "ornstein-uhlenbeck"' in printed
-    assert "Λ(2) < 0 with > 99.9 %, the mean square decays" in printed
+    assert "the mean square decays with a probability of > 99.9 %" in printed
     assert {path.name for path in Path("results/spectrum.csv").iterdir()} == {
         f"noise.{ending}" for ending in ("json", "png", "pdf", "toml")
     }

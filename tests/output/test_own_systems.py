@@ -244,7 +244,7 @@ def test_every_ray_has_its_rate_in_the_summary(tmp_path, capsys):
         assert ray["critical_impact_factor"] == pytest.approx(critical_impact_factor(solver, number).value, rel=1e-7)
         assert ray["critical_restitution"] is None
     print_blocks(show(case, results, tmp_path))
-    assert "impact rate at φ = 0 " in "".join(capsys.readouterr())
+    assert "impacts in unit time at φ = 0 " in "".join(capsys.readouterr())
 
 
 @pytest.mark.parametrize("noise", [Telegraph(a=0.5, k=1.0), White(s=0.5), CHAIN], ids=lambda noise: noise.kind)

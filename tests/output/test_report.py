@@ -19,10 +19,11 @@ from fpsolve.model import OrnsteinUhlenbeck, PlaneSystem, Problem, White
 from fpsolve.output.tables import facts_of
 from fpsolve.page.page import Drawing
 from fpsolve.parts.eigenfunctions import surface_from
-from fpsolve.parts.indices import show_meaning
 from fpsolve.parts.surfaces import can_render, picture_of
 from fpsolve.show import claims, problem, results
 from fpsolve.show.problem import equations_of, noises_of
+from fpsolve.show.verdict import meaning, verdicts
+from fpsolve.study.columns import table_of
 from fpsolve.workflow import reports
 from fpsolve.workflow.chart import region_meaning
 from fpsolve.workflow.folders import CHART, PROVEN, SIMULATED, SOLVED, own_folder
@@ -104,8 +105,9 @@ def test_the_page_holds_the_equation_numbers_meanings_and_the_case(solved):
     for text in (
         "ẍ = −x + 0.001 ẋ + 0.1 ξ ẋ",
         "|ẋ|⁺ = 0.9980019987 |ẋ|⁻ at x = 0",
-        "almost every path grows, doubling in a time of 637",
-        "Λ(2) = 0.01416314 > 0: the mean square grows",
+        "Almost every path grows, doubling in a time of 637",
+        "0.01416314365",
+        "the mean square grows",
         "moments of the orders δ_p < p < 0 decay",
         "0.00108397, Eq. (39)",
         "natural frequency",
@@ -236,7 +238,7 @@ def test_proofs_have_a_page(tmp_path):
     words = Page(tmp_path / "proven/report.html").text
     assert "Other commands wrote proof.json there" in words
     assert "Proven: the moment of order 2 grows." in words
-    assert "the mean square grows" in words
+    assert "The mean square grows" in words
 
 
 def _lie(curve):
@@ -385,9 +387,9 @@ def test_rare_paths_that_carry_the_mean_square_are_told_of():
     """λ < 0 < Λ(2), as the theorem's case has them."""
     case = load_case(CASES / "theorem.toml", ["moments.p=[2.0]", "expect=[]", "units.time='s'"])
     [result] = solve_case(case)
-    told = " ".join(each.text for each in show_meaning(case, result))
-    assert "almost every path decays" in told
+    told = " ".join(each.text for each in (*verdicts(case, [result], table_of(case, [result])), *meaning(result)))
+    assert "Almost every path decays" in told
     assert "the mean square grows" in told
-    assert re.search(r"halving in a time of \S+ s\.", told)
-    assert "bursts of rare paths" in told
+    assert re.search(r"halving in a time of \S+ s;", told)
+    assert "rare paths carry it in bursts" in told
     assert "falls as A^-0.3784" in told

@@ -129,8 +129,8 @@ def test_curves_stand_apart(tmp_path, capsys):
     case = case_in(tmp_path, TEXT, ['noise.treatment="exact"', "output={ quantities = ['moment'] }"])
     print_results(case, solve_case(case))
     lines = [line.strip() for line in capsys.readouterr().out.splitlines()]
-    first, second = (i for i, line in enumerate(lines) if line.startswith(case.title))
-    assert (first, lines[second - 1], lines[-1]) == (0, "", "")
+    first, second = (i for i, line in enumerate(lines) if re.fullmatch(r"noise.D0 = [\d.]+", line))
+    assert (lines[0], lines[first - 1], lines[second - 1], lines[-1]) == (case.title, "", "", "")
 
 
 def test_what_is_missing_is_told_before_what_is_only_remarkable(case, solved, capsys, monkeypatch):
@@ -225,7 +225,7 @@ def test_of_more_curves_the_extreme_and_the_failed_ones_have_a_row(tmp_path, cap
     assert [row[0].strip() for row in rows] == [D0[0], D0[7], D0[40], D0[59]]
     assert [row[-1].strip() for row in rows] == ["least λ, largest δ_p", "", "", "largest λ, least δ_p"]
     assert [row[-2].strip() for row in rows] == ["converged", "partly", "partly", "converged"]
-    assert "60 curves: 58 converged, 2 partly; all numbers are in curves.csv and results.nc" in out
+    assert "60 curves: 58 converged, 2 not converged; all numbers are in curves.csv and results.nc" in out
     assert f"not converged: many, noise.D0 = {D0[7]}: Λ(2) did not converge: at 1" in err  # another reason
     assert f"not converged: many, noise.D0 = {D0[40]}: Λ(2) did not converge: at 0" in err
 
@@ -240,8 +240,8 @@ def test_of_many_failed_curves_the_first_are_shown(tmp_path, capsys):
     out = capsys.readouterr().out
     rows = [line.split("│")[1:-1] for line in out.splitlines() if "partly │" in line]
     assert [row[0].strip() for row in rows] == [f"{each.curve.varied['noise.D0']:g}" for each in results[1:40:2]]
-    assert {cell.strip() for row in rows for cell in row[1:7]} == {""}  # not "none", which nobody knows
-    assert "30 converged, 30 partly; of those that are not converged the first 20 are shown" in out
+    assert {cell.strip() for row in rows for cell in (*row[1:5], *row[9:13])} == {""}  # not "none", which nobody knows
+    assert "30 converged, 30 not converged; of those that are not converged the first 20 are shown" in out
 
 
 def test_a_file_has_all_columns_whatever_the_terminal_is(tmp_path, capsys, monkeypatch):
@@ -253,7 +253,7 @@ def test_a_file_has_all_columns_whatever_the_terminal_is(tmp_path, capsys, monke
         texts.append(capsys.readouterr().out)
     assert texts[0] == texts[1]
     assert "no room for" not in texts[0]
-    heading = texts[0].splitlines()[2]
+    heading = next(line for line in texts[0].splitlines() if line.startswith("┃"))
     assert all(
         symbol in heading for symbol in ("D0", "λ", "δ_p", "Λ″(0)", "N", "R_c", "r_c", "Λ(-1)", "Λ(2)", "status")
     )
@@ -332,7 +332,7 @@ def test_the_line_of_states_agrees_with_the_warnings(tmp_path, capsys, count, co
     case, results = many(tmp_path, count, warnings=lambda i: (told,) if i < 5 else ())
     print_results(case, results)
     out, err = capsys.readouterr()
-    assert f"{count} curves: {count - 5} converged, 5 {state}; " in out
+    assert f"{count} curves: {count - 5} converged, 5 with warnings; " in out
     assert f"warning: many: 5 of {count} curves: {said}" in err
     assert len(re.findall(f"│ +{state} │", out)) == (5 if count == 12 else 1)  # of many the extreme ones are shown
 
@@ -429,4 +429,4 @@ y = "stability_index"
     results = [failed(curve, "nothing was solved") for curve in case.curves()]
     found = curve_grid(case, results, table_of(case, results))
     assert not [column.heading for column in found.columns if column.heading.startswith("Eq.")]
-    assert not found.remark
+    assert "Eq." not in found.remark

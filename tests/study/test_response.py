@@ -15,9 +15,9 @@ from fpsolve.errors import CaseError, NotConverged
 from fpsolve.messages import Code, Message
 from fpsolve.model.quantity import OSCILLATOR_RESPONSE
 from fpsolve.parts import response
-from fpsolve.parts.indices import show_meaning
 from fpsolve.parts.intervals import sampled_case
 from fpsolve.parts.response import PART, shape
+from fpsolve.show.verdict import verdict
 from fpsolve.study.results import Status
 from fpsolve.study.solve import Numerics, everything, solve_curve
 from fpsolve.workflow import compare, expected
@@ -265,4 +265,4 @@ def test_a_simulated_mean_stands_beside_that_of_finite_elements(case, result):
 
 
 def test_the_sentence_tells_where_paths_end(result, case):
-    assert next(show_meaning(case, result)).text.endswith("and settles into the stationary response.")
+    assert "and settles into the stationary response" in verdict(case, result)
