@@ -19,7 +19,7 @@ from fpsolve.case.vary import short_names
 from fpsolve.data import written
 from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.quantities import LYAPUNOV_EXPONENT, MOMENT, STABILITY_INDEX, Index
-from fpsolve.model.quantity import MEAN_SQUARE, OSCILLATOR_RESPONSE, STATUS, moment_at
+from fpsolve.model.quantity import MEAN_SQUARE, STATUS, moment_at
 from fpsolve.page.limits import EACH, EXTREMES, FAILURES, MOMENTS, ROWS
 from fpsolve.page.page import Block, Column, Grid, Sentence
 from fpsolve.parts.excursions import NAME as EXCURSIONS
@@ -146,11 +146,9 @@ def _quantities(case: Case, table: Table) -> Iterator[Shown]:
             lambda result: bounds_text(result.excursion, level) if result.excursion else "",
         )
     if case.has_response:
-        square = "amplitude_squared"
-        yield Shown(
-            Column(OSCILLATOR_RESPONSE.means[square].symbol, 1),
-            lambda result: short(result.response.means[square]) if result.response else "",
-        )
+        means = case.system.response.means
+        for name in {"amplitude_squared"} & means.keys() or means:
+            yield Shown(Column(means[name].symbol, 1), partial(_mean, name))
 
 
 def _index(index: Index, result: CurveResult) -> str:
@@ -168,6 +166,10 @@ def _number(of: Callable[[Any], Estimate | None], result: CurveResult) -> str:
 
 def _error(of: Callable[[Any], Estimate | None], result: CurveResult) -> str:
     return f"{found.error_estimate:.0e}" if (found := of(result)) else ""
+
+
+def _mean(name: str, result: CurveResult) -> str:
+    return short(result.response.means[name]) if result.response else ""
 
 
 def _interval(case: Case, name: str, result: CurveResult) -> str:

@@ -430,3 +430,17 @@ y = "stability_index"
     found = curve_grid(case, results, table_of(case, results))
     assert not [column.heading for column in found.columns if column.heading.startswith("Eq.")]
     assert "Eq." not in found.remark
+
+
+@pytest.mark.parametrize(
+    ("count", "text"), [(1, "Almost"), (3, "noise.D0 = 0.25: almost"), (12, "in 0 curves, and grows in 12;")]
+)
+def test_the_verdict_comes_first_and_tables_over_p_where_they_are_asked_for(tmp_path, capsys, count, text):
+    case, results = many(tmp_path, count)
+    for is_whole in (False, True):
+        print_blocks(show_results(case, results, case.path.parent, is_whole=is_whole))
+        out = capsys.readouterr().out
+        assert out.startswith(f"{case.title}\n")
+        assert out.index(text) < out.index("┏")
+        assert ("┃ p ┃" in " ".join(out.split())) == (count == 1 or (is_whole and count == 3))
+        assert out.count("┏") == (2 if count == 1 else 1 + 2 * 3 if is_whole and count == 3 else 1)
