@@ -8,16 +8,13 @@ import inspect
 import re
 import shutil
 from pathlib import Path
-from typing import get_args
 
+from keys import default_of, range_of, row, table
 from sphinx_gallery.scrapers import figure_rst
 
 import fpsolve
-from fpsolve.case import Case
 from fpsolve.data import plain_unit
-from fpsolve.exponent import Budget
-from fpsolve.model.kinds import NOISES, SYSTEMS, noise_kind, system_kind
-from fpsolve.model.parameters import Parametrised, example_of, meaning_of, symbol_of, unit_of
+from fpsolve.model.parameters import Parametrised, unit_of
 from fpsolve.workflow import check_case
 
 ROOT = Path(__file__).parents[1]
@@ -56,7 +53,6 @@ def write_all(folder: Path) -> None:
     folder.mkdir(exist_ok=True)
     write_gallery(folder / "cases")
     write_reference(folder / "reference")
-    _write(folder / "keys.part.md", keys())
     _write(folder / "expected.part.md", expected())
     _write(folder / "oracles.part.md", oracles())
 
@@ -66,14 +62,6 @@ def _write(path: Path, text: str) -> None:
     path.parent.mkdir(exist_ok=True)
     if not path.exists() or path.read_text(encoding="utf-8") != text:
         path.write_text(text, encoding="utf-8")
-
-
-def _row(*cells: object) -> str:
-    return "| " + " | ".join(str(cell).replace("|", "\\|").replace("\n", " ") for cell in cells) + " |\n"
-
-
-def _table(*heads: str) -> str:
-    return "\n" + _row(*heads) + _row(*["---"] * len(heads))
 
 
 # The gallery
@@ -244,7 +232,7 @@ def plain_signature(app, what, name, obj, options, signature, returned):
     if what != "class" or not hasattr(obj, "__pydantic_fields__"):
         return None
     shown = [
-        key if each.is_required() else f"{key}={_shown(each.get_default(call_default_factory=True))}"
+        key if each.is_required() else f"{key}={default_of(each.get_default(call_default_factory=True))}"
         for key, each in obj.__pydantic_fields__.items()
     ]
     return f"({', '.join(shown)})", ""
@@ -264,82 +252,9 @@ def parameter_list(app, what, name, obj, options, lines):
         return
     for key, each in obj.fields().items():
         unit = f", in {plain_unit(unit_of(each))}" if unit_of(each) else ""
-        about = f"{each.description}{unit}; {_range(each)}" if _range(each) else f"{each.description}{unit}"
+        about = f"{each.description}{unit}; {range_of(each)}" if range_of(each) else f"{each.description}{unit}"
         lines += ["", f"* ``{key}``: {_rst(about).replace(chr(92) * 2, chr(92))}"]
     lines.append("")
-
-
-def _shown(value: object) -> str:
-    value = getattr(value, "value", value)
-    return repr(value) if isinstance(value, str | int | float | bool | tuple | None) else "..."
-
-
-# The keys of case files
-
-SIGNS = {"gt": ">", "ge": "≥", "lt": "<", "le": "≤", "min_length": "at least", "max_length": "at most"}
-
-
-LENGTHS = ("min_length", "max_length")
-
-
-def _range(field) -> str:
-    found = []
-    lengths = {name: value for rule in field.metadata for name in LENGTHS if (value := getattr(rule, name, None))}
-    if len(lengths) == 2:
-        return f"{' to '.join(str(lengths[name]) for name in LENGTHS)} entries"
-    for rule in field.metadata:
-        for name, sign in SIGNS.items():
-            if (value := getattr(rule, name, None)) is not None:
-                found.append(f"{sign} {value:g}" if isinstance(value, float | int) else f"{sign} {value}")
-    return ", ".join(found)
-
-
-def _fields(fields) -> str:
-    text = _table("key", "meaning", "range", "if omitted", "example")
-    for name, each in fields.items():
-        default = "" if each.is_required() else each.get_default(call_default_factory=True)
-        default = "" if default in (None, "", ()) or _shown(default) == "..." else f"`{_shown(default)}`"
-        required = "**required**" if each.is_required() else default
-        symbol = symbol_of(each)
-        meaning = f"{symbol}: {meaning_of(each)}" if symbol else meaning_of(each)
-        example = example_of(each)
-        text += _row(f"`{name}`", meaning, _range(each), required, f"`{example}`" if example else "")
-    return text
-
-
-def keys() -> str:
-    """Every key of a case file, from the declarations that check it."""
-    text = "\n## Sections\n" + _fields(Case.model_fields)
-    for name in SYSTEMS:
-        kind = system_kind(name)
-        text += f'\n## `[system]` with `kind = "{name}"`\n\n{_first(kind)}\n'
-        text += _fields({**kind.stated, **kind.fields()})
-    for name in NOISES:
-        usual = noise_kind(name)
-        for kind in (usual, *usual.variants):
-            own = [f"`{key}`" for key in kind.fields() if kind is not usual and key not in usual.fields()]
-            by = f", stated by {' and '.join(own)}" if own else ""
-            text += f'\n## `[noise]` with `kind = "{name}"`{by}\n\n{_first(kind)}\n'
-            text += _fields({**kind.stated, **kind.fields()})
-    for section, field in Case.model_fields.items():
-        made = Budget if section == "budget" else _section_of(field.annotation)
-        if made is not None:
-            brackets = f"[[{section}]]" if section == "expect" else f"[{section}]"
-            text += f"\n## `{brackets}`\n\n{_first(made)}\n" + _fields(getattr(made, "__pydantic_fields__", {}))
-    return text
-
-
-def _section_of(annotation):
-    for each in (annotation, *get_args(annotation)):
-        if inspect.isclass(each) and hasattr(each, "model_fields"):
-            return each
-    return None
-
-
-def _first(item) -> str:
-    first = (inspect.getdoc(item) or "").partition("\n\n")[0].replace("\n", " ").replace("*", "\\*").replace("`[", "[")
-    text = re.sub(r"^\[+\w+\]+: ", "", first)  # the heading names the section
-    return text[:1].upper() + text[1:]
 
 
 # Validation
@@ -347,16 +262,16 @@ def _first(item) -> str:
 
 def oracles() -> str:
     """What each independent code of the tests is, in its own words."""
-    text = _table("code", "what it computes, and how")
+    text = table("code", "what it computes, and how")
     for path in sorted((ROOT / "tests/oracles").glob("*.py")):
         if doc := ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))):
-            text += _row(f"`{path.stem}`", doc.partition("\n\n")[0].replace("*", "\\*").replace("_", "\\_"))
+            text += row(f"`{path.stem}`", doc.partition("\n\n")[0].replace("*", "\\*").replace("_", "\\_"))
     return text
 
 
 def expected() -> str:
     """What every case expects beside what is computed now."""
-    text = _table("case", "quantity, and the source of the expected value", "expected", "computed", "difference")
+    text = table("case", "quantity, and the source of the expected value", "expected", "computed", "difference")
     for path in CASES:
         for each in check_case(fpsolve.load_case(path)).comparisons:
             if not each.met:
@@ -368,5 +283,5 @@ def expected() -> str:
             name = f"{{doc}}`{path.stem} </generated/gallery/plot_{path.stem}>`"
             what = f"{what.replace('_', ' ')}, {where}" if where else what.replace("_", " ")
             cell = f"{what}<br><small>{asked.source}</small>" if asked.source else what
-            text += _row(name, cell, f"{asked.value:.13g}", f"{each.value:.13g}", difference)
+            text += row(name, cell, f"{asked.value:.13g}", f"{each.value:.13g}", difference)
     return text

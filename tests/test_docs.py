@@ -4,6 +4,7 @@ import ast
 import json
 import math
 import re
+import runpy
 import shutil
 from contextlib import chdir, redirect_stdout
 from datetime import UTC, datetime
@@ -86,6 +87,11 @@ def test_blocks_of_toml_are_cases(page, tmp_path):
         path = tmp_path / f"part{number}.toml"
         path.write_text("".join(parts), encoding="utf-8")
         fpsolve.load_case(path)
+
+
+def test_the_page_of_keys_is_what_the_code_says():
+    keys = runpy.run_path(str(ROOT / "docs/keys.py"))
+    assert keys["PAGE"].read_text(encoding="utf-8") == keys["keys"](), "run python docs/keys.py"
 
 
 def test_every_room_has_a_page_of_reference():
