@@ -317,8 +317,7 @@ class Code(Enum):
         "difference is largest at p = {p:.3g}, {rest:.3g}, which is {size:.0%}"
     )
     LOAD_LEFT_OUT = (
-        "note: no perturbation theory, Eq. (37), beside these numbers: it leaves out a harmonic load, as {keys} with "
-        "sigma = 0 is"
+        "note: no perturbation theory, Eq. (37), beside these numbers: it leaves out a harmonic load, as {keys} is"
     )
     NO_SENSITIVITIES = "note: no sensitivities of {p:?Λ({p:g})¦{symbol}}: {reason}"
     UNUSED = "note: {keys}: in no rate and in no restitution, so that no result depends on it"

@@ -46,7 +46,7 @@ def oscillators(problem: Problem) -> dict[int, float]:
     free, driven = np.zeros((n, n)), np.zeros((n, n))
     for term in system.terms:
         size = system.epsilon**term.order * np.array(term.matrix)
-        mean = float(term.g(problem.named_noise(term.noise).mean))
+        mean = problem.named_noise(term.noise).mean_of(term.g)
         free += mean * size
         driven += abs(size) * is_driven(term.g)
     found = {}

@@ -89,7 +89,7 @@ def modal_coordinates(problem: Problem) -> tuple[Coordinates, float, tuple[float
     has a unit in which q = p before, so that y is the same, but for rotations, whatever the coordinates x are.
     """
     free = sum(
-        problem.motion.epsilon**term.order * float(term.g(problem.named_noise(term.noise).mean)) * np.array(term.matrix)
+        problem.motion.epsilon**term.order * problem.named_noise(term.noise).mean_of(term.g) * np.array(term.matrix)
         for term in problem.motion.terms
     )
     values, vectors = np.linalg.eig(free)

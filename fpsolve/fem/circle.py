@@ -21,7 +21,8 @@ class CircleAxis(CountedAxis):
     """The waves 1, √2 cos kθ, √2 sin kθ, k ≤ n, in this order: ½σ²∂² is diagonal, ν∂ couples the two of each k.
 
     Where ξ = μ cos θ, that of ξ has two diagonals on each side. The two of each k are eliminated together: for
-    σ = 0 the pivot of one alone would be as singular as the problem with ξ = 0.
+    σ = 0 the pivot of one alone would be as singular as the problem with ξ = 0. Where coefficients have waves up to m,
+    those up to n m are taken, m to each degree.
 
     Attributes:
         noise: it states ν as `nu`, σ as `sigma`, and ξ(θ) as `of_angle`.
@@ -32,11 +33,15 @@ class CircleAxis(CountedAxis):
 
     @property
     def size(self) -> int:
-        return 2 * self.count + 1
+        return 2 * self.count * self.noise.harmonics + 1
+
+    @cached_property
+    def _waves(self) -> IntArray:
+        return (np.arange(self.size) + 1) // 2
 
     @cached_property
     def modes(self) -> IntArray:
-        return (np.arange(self.size) + 1) // 2
+        return -(-self._waves // self.noise.harmonics)
 
     @cached_property
     def levels(self) -> Sequence[IntArray]:
@@ -44,7 +49,7 @@ class CircleAxis(CountedAxis):
 
     @cached_property
     def rule(self) -> Rule:
-        count = 4 * self.count + MORE_POINTS
+        count = 2 * (self.size - 1) + MORE_POINTS
         theta = np.asarray(np.arange(count) * (2 * np.pi / count), dtype=float)
         return Rule(theta, np.full(count, 1 / count), self.values_at(theta))
 
@@ -54,7 +59,7 @@ class CircleAxis(CountedAxis):
 
     def values_at(self, theta: FloatArray) -> FloatArray:
         """The waves at any θ, shape (len(θ), size)."""
-        waves = np.sqrt(2) * np.exp(1j * np.outer(theta, self.modes))
+        waves = np.sqrt(2) * np.exp(1j * np.outer(theta, self._waves))
         values = np.where(np.arange(self.size) % 2, waves.real, waves.imag)
         values[:, 0] = 1.0
         return values
@@ -87,8 +92,8 @@ class CircleAxis(CountedAxis):
 
     def _turning(self) -> FloatArray:
         """∫ v ∂u."""
-        beside = np.where(np.arange(self.size - 1) % 2, self.modes[1:], 0.0)
+        beside = np.where(np.arange(self.size - 1) % 2, self._waves[1:], 0.0)
         return np.asarray(np.diag(beside, 1) - np.diag(beside, -1))
 
     def _diffusing(self) -> FloatArray:
-        return np.diag(-0.5 * self.noise.sigma**2 * self.modes**2)
+        return np.diag(-0.5 * self.noise.sigma**2 * self._waves**2)

@@ -34,7 +34,7 @@ LARGEST_POWER = 10
 """Largest exponent, and largest power of ε."""
 CONSTANTS = {"pi": math.pi}
 TIME = "t"
-"""The time in x(t - tau), where it is no parameter."""
+"""The time in x(t - tau) and cos(nu*t), where it is no parameter."""
 _OTHERS = re.compile(r"[^A-Za-z0-9_+\-*/().\s]")
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _KNOWN = "write numbers, names, + - * / **, parentheses, pi, exp() and sqrt() only"
@@ -160,10 +160,12 @@ FUNCTIONS: Mapping[str, Callable[[Series], Series]] = {
     "sqrt": partial(_power, power=0.5),
 }
 _INVERSE = partial(_power, power=-1.0)
-RESERVED = (*CONSTANTS, *FUNCTIONS)
+WAVES = "cos", "sin"
+"""The functions of the time."""
+RESERVED = (*CONSTANTS, *FUNCTIONS, *WAVES)
 _WAVE = (
-    'no rate may depend on the time t: state cos(nu*t) as a noise of the kind "bounded" with sigma = 0, and write its '
-    "name; of sin(x) write the first terms of its series, x - x**3/6; of parameters write the value"
+    "of the time t write cos(nu*t) or sin(nu*t) alone; of sin(x) write the first terms of its series, x - x**3/6; of "
+    "parameters write the value"
 )
 _SMALL = "rates are of small amplitudes: sums of terms of degree 1, or of degree 3 in two variables"
 _REMEDIES = {"sin": _WAVE, "cos": _WAVE, "tan": _WAVE, "abs": _SMALL, "sign": _SMALL, "min": _SMALL, "max": _SMALL}
@@ -211,11 +213,14 @@ def names_in(text: str) -> frozenset[str]:
 
 
 def calls_of_time(text: str) -> Mapping[str, tuple[str, str]]:
-    """By what it writes as x(t - tau) the name x and t - tau, of all but known functions. Raises `ExpressionError`."""
+    """By what it writes as x(t - tau) or cos(nu*t) the name and the argument. Raises `ExpressionError`."""
     found = dict[str, tuple[str, str]]()
     for node in ast.walk(_parsed(text)[1]):
         match node:
-            case ast.Call(func=ast.Name(id=name), args=[time], keywords=[]) if name not in {*FUNCTIONS, *_REMEDIES}:
+            case ast.Call(func=ast.Name(id=name), args=[time], keywords=[]) if name not in {
+                *FUNCTIONS,
+                *_REMEDIES,
+            }.difference(WAVES):
                 if any(isinstance(each, ast.Name) and each.id == TIME for each in ast.walk(time)):
                     found[ast.unparse(node)] = name, ast.unparse(time)
     return found

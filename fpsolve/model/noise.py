@@ -103,6 +103,10 @@ class Noise(Parametrised):
         """Stationary mean of ξ."""
         return 0.0
 
+    def mean_of(self, g: Coefficient) -> float:
+        """A coefficient of ξ about its middle."""
+        return float(g(self.mean))
+
     @property
     def has_algebraic_tails(self) -> bool:
         """Whether P_s falls off like a power of ξ: moments far out are infinite, and no Λ(p), p ≠ 0, is computed."""

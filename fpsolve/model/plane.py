@@ -335,6 +335,7 @@ class System(Parametrised):
         impact_parameter: the name of a parameter that is in ln R of the only jump and nowhere else; empty for none.
         cubic: what is of degree 3 in its rates, on which the stationary response depends alone; None for nothing.
         forced: it with its terms of degree 0, which multiply a last variable, 1; None without such terms.
+        clock: what its periodic coefficients are functions of; terms name this noise t.
         pasts: which variable each of the last columns of the terms stands for, and how long ago; none without a delay.
         second_unit: its second variable over the second coordinate of the terms.
     """
@@ -343,6 +344,7 @@ class System(Parametrised):
     noise_unit: ClassVar[str] = "unknown"
     cubic: CubicTerms | None = None
     forced: System | None = None
+    clock: Any = None
     pasts: Sequence[tuple[int, float]] = ()
     second_unit: float = 1.0
     epsilon: float
@@ -363,6 +365,10 @@ class System(Parametrised):
     def driven_by(self) -> frozenset[str]:
         """The names that its terms give the noises that drive it."""
         return frozenset(term.noise for term in self.terms if is_driven(term.g))
+
+    def clock_slope(self, name: str) -> float:
+        """∂ν/∂θ of its clock."""
+        return 0.0
 
     def derivative(self, name: str) -> tuple[tuple[CoefficientMatrix, ...], tuple[float, ...]]:
         """∂/∂θ of the sum of the terms, as terms, and ∂ ln R/∂θ of every jump, nothing where none changes."""
@@ -497,14 +503,19 @@ def as_plane(terms: Sequence[CoefficientMatrix], size: float = 0.0) -> tuple[Coe
 
 def common_delay(pasts: Sequence[tuple[int, float]]) -> tuple[float, int]:
     """τ of which all delays are multiples, and the largest multiple. Raises `ValueError` where there is none."""
-    delays = np.unique([delay for _, delay in pasts])
-    multiples = delays / delays[-1] * np.arange(1, MOST_MULTIPLE + 1)[:, None]
+    return common_unit([delay for _, delay in pasts], "delays")
+
+
+def common_unit(values: Sequence[float], name: str) -> tuple[float, int]:
+    """What positive numbers are multiples of, and the largest multiple. Raises `ValueError` where there is nothing."""
+    numbers = np.unique(values)
+    multiples = numbers / numbers[-1] * np.arange(1, MOST_MULTIPLE + 1)[:, None]
     fits = np.all(np.abs(multiples - np.round(multiples)) <= SAME_DELAY * multiples, axis=1)
     if not fits.any():
-        told = f"got the delays {', '.join(f'{each:g}' for each in delays)}"
+        told = f"got the {name} {', '.join(f'{each:.10g}' for each in numbers)}"
         raise ValueError(f"{told}; must be multiples of one number, the largest at most {MOST_MULTIPLE} times it")
     count = int(np.argmax(fits)) + 1
-    return float(delays[-1]) / count, count
+    return float(numbers[-1]) / count, count
 
 
 def by_epsilon(system: System) -> tuple[CoefficientMatrix, ...]:

@@ -19,6 +19,7 @@ from fpsolve.data import plain_unit, written
 from fpsolve.errors import NoSuchExponent
 from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.checks import refuse_wrong_derivative
+from fpsolve.model.expressions import TIME
 from fpsolve.model.frame import Frame, own_frame
 from fpsolve.model.kinds import source_of, version_of
 from fpsolve.model.noise import Noise, NoiseDerivative
@@ -111,6 +112,8 @@ class Problem:
         for half, kind, needed in ((self.system, "motion", System), (self.noise, "noise", Noise)):
             if not isinstance(half, needed):
                 raise TypeError(f"got {shown(half)} as a {kind}; must be a system and a noise: Problem(system, noise)")
+        if self.system.clock:
+            object.__setattr__(self, "noise", noises_of({**self.noise.parts, TIME: self.system.clock}))
         wanted, given = self.system.noise_sections, self.noise.parts
         if len(wanted) > 1 or len(given) > 1:
             names = self.system.driven_by
@@ -466,7 +469,9 @@ class Problem:
         parts = self.noise.parts
         if len(parts) == 1:
             return {self.system.section: self.system, self.system.noise_sections[0]: self.noise}
-        return {self.system.section: self.system, **{f"noise.{name}": noise for name, noise in parts.items()}}
+        first = self.system.noise_sections[0]
+        noises = {f"noise.{name}" if name else first: noise for name, noise in parts.items()}
+        return {self.system.section: self.system, **noises}
 
     @cached_property
     def values(self) -> Mapping[str, float | str]:
@@ -557,9 +562,12 @@ class Problem:
         section, _, name = key.rpartition(".")
         terms: Sequence[CoefficientMatrix] = ()
         jumps: Sequence[float] = ()
-        noise, part, changed = None, section.removeprefix("noise."), ""
+        noise, changed = None, ""
+        part = dict(zip(self.sections, ["", *self.noise.parts], strict=True))[section]
         if section == self.system.section:
             terms, jumps = self.system.derivative(name)
+            if slope := self.system.clock_slope(name):
+                noise, part = NoiseDerivative(turning=slope), TIME
         else:
             changed = name if len(self.noise.parts) == 1 else f"{part}.{name}"
             if not (own := self.named_noise(part)).is_white:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fpsolve.arrays import ROUNDED, FloatArray
+from fpsolve.model.expressions import TIME
 from fpsolve.model.plane import CoefficientMatrix, Jump, System, as_plane
 from fpsolve.model.quantity import Quantity
 
@@ -55,6 +56,13 @@ class Subsystem(System):
     def terms(self) -> Sequence[CoefficientMatrix]:  # type: ignore[override]
         terms = self.part(self.whole.terms)
         return as_plane(terms, self.size or 1.0) if self.is_scalar else terms
+
+    @property
+    def clock(self) -> Any:
+        return self.whole.clock if TIME in self.driven_by else None
+
+    def clock_slope(self, name: str) -> float:
+        return self.whole.clock_slope(name)
 
     @property
     def jumps(self) -> Sequence[Jump]:  # type: ignore[override]

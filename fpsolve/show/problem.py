@@ -12,6 +12,7 @@ import numpy as np
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case
 from fpsolve.data import plain_unit, written
+from fpsolve.model.noises.clock import Wave
 from fpsolve.model.plane import affine
 from fpsolve.model.problem import Problem
 from fpsolve.page.limits import EACH
@@ -53,7 +54,8 @@ def equations_of(problem: Problem) -> list[str]:
         offset, slope = (0.0, 1.0) if line is None else line
         still += offset * size
         if slope:
-            name = letter if line else f"g({letter})"
+            own = getattr(term.g, "f", None)
+            name = letter if line else own.at(system.clock.nu) if isinstance(own, Wave) else f"g({letter})"
             driven[name] = driven.get(name, np.zeros((n, n))) + slope * size
     speed = float(still[0, 1])
     cubic = np.array(system.cubic.matrix) if system.cubic else np.zeros((n, 4))
@@ -114,7 +116,7 @@ def _sum(constant: FloatArray, cubic: FloatArray, by_noise: Mapping[str, FloatAr
 def noises_of(problem: Problem) -> list[str]:
     """Each noise in a sentence: its kind, and how strong and how slow it is."""
     lines = list[str]()
-    for section, noise in zip(problem.system.noise_sections, problem.noise.parts.values(), strict=True):
+    for section, noise in zip(problem.system.noise_sections, problem.noise.parts.values(), strict=False):
         size, time = noise.standard_deviation, noise.correlation_time
         numbers = [f"standard deviation {size:.6g}"] if 0 < size < math.inf else []
         numbers += [f"correlation time {time:.6g}"] if 0 < time < math.inf else []

@@ -38,6 +38,8 @@ _ONE_WAY = 1e-12
 """The ratio of two entries below which one of them is none but for rounding."""
 _FORGOTTEN, _LONGEST = 6.0, 1000
 """Of a rate, the times that it needs; half-turns in which that of modes which hardly mix is taken to be over."""
+_PARTS = 64
+"""Of a period, in each of which coefficients are held."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +58,7 @@ class Coefficients:
         fluctuation: the standard deviation of what the noise adds to d ln‖x‖/dt; of white noise to ln‖x‖ in a unit of
             time.
         half_turn: π/ω, ω the largest; without rotation π times the time in which the direction of x is forgotten.
-        settling: the time in which it is forgotten how modes shared the motion, 0 in the plane.
+        settling: the time in which it is forgotten how modes shared the motion; 0 where all turn alike.
         rays: the lines of the jumps.
         impulses: the matrices of impulses, shape (n, 2, 2); None without any.
     """
@@ -170,7 +172,7 @@ def split_coefficients(system: System, noise: Noise) -> SplitCoefficients:
             steady += line[0] * system.epsilon**term.order * np.array(term.matrix)
     every = sum((np.abs(system.epsilon**term.order * np.array(term.matrix)) for term in system.terms), zero)
     even = np.eye(len(zero)) if system.pasts else _even_coordinates(matrix_at(moved, 0.0, slice(0, 1)), every)
-    back, intensity, intensities = np.linalg.inv(even), 0.0, list[float]()
+    back, intensity, intensities, loads = np.linalg.inv(even), 0.0, list[float](), list[tuple[FloatArray, Any]]()
     free = even @ matrix_at(moved, 0.0, slice(0, 1)) @ back
     for name, part in noise.parts.items():
         own = [term for term in system.terms if is_driven(term.g) and term.noise == name]
@@ -189,7 +191,9 @@ def split_coefficients(system: System, noise: Noise) -> SplitCoefficients:
             driven.append(total)
             time = min(part.correlation_time, part.period or math.inf)
             intensity += 2 * sizes[-1][0] ** 2 * time
-            intensities.append(2 * part.standard_deviation**2 * time * _exchanged(free, part))
+            exchanged = 0.0 if part.period else _exchanged(free, part)
+            intensities.append(2 * part.standard_deviation**2 * time * exchanged)
+            loads += [(even @ total @ back, part)] if part.period else []
     half_turn = math.pi / _rate(free, intensity)
     if system.pasts:
         kind: Any = partial(DelayedCoefficients, pasts=system.pasts)
@@ -197,7 +201,7 @@ def split_coefficients(system: System, noise: Noise) -> SplitCoefficients:
     else:
         kind = SplitCoefficients
         moves = zip(intensities, even @ np.array(driven) @ back, strict=True)
-        settling = _settling(free, list(moves), half_turn)
+        settling = _settling(free, list(moves), half_turn, loads)
     return kind(
         noise,
         even @ steady @ back,
@@ -294,14 +298,20 @@ def _exchanged(free: FloatArray, noise: Noise) -> float:
     return min(float(np.mean(densities)) / max(noise.spectral_density(0.0), 1e-300), 1.0)
 
 
-def _settling(free: FloatArray, driven: Sequence[tuple[float, FloatArray]], half_turn: float) -> float:
-    """Beyond the plane six times that in which E‖x‖² forgets how the modes shared it; 0 in the plane.
+def _settling(
+    free: FloatArray,
+    driven: Sequence[tuple[float, FloatArray]],
+    half_turn: float,
+    loads: Sequence[tuple[FloatArray, Any]] = (),
+) -> float:
+    """Six times that in which E‖x‖² forgets how the modes shared it; 0 in the plane without harmonic loads.
 
     It is that under white noises, Σ ½ I (B ⊗ 1 + 1 ⊗ B)² for pairs (I, B), on symmetric matrices: where the noise has a
-    memory, about, see `_exchanged`. What turns meanwhile is forgotten sooner, as it averages out.
+    memory, about, see `_exchanged`. What turns meanwhile is forgotten sooner, as it averages out. With harmonic loads
+    it is that from period to period.
     """
     n = len(free)
-    if n == 2:
+    if n == 2 and not loads:
         return 0.0
     pairs = [(i, j) for i in range(n) for j in range(i + 1)]
     even = np.zeros((n * n, len(pairs)))
@@ -313,7 +323,19 @@ def _settling(free: FloatArray, driven: Sequence[tuple[float, FloatArray]], half
     for intensity, matrix in driven:
         both = np.kron(matrix, one) + np.kron(one, matrix)
         rates = rates + 0.5 * intensity * both @ both
-    values = np.linalg.eigvals(even.T @ rates @ even)
+    rates = even.T @ rates @ even
+    if loads:
+        waves = [(even.T @ (np.kron(a, one) + np.kron(one, a)) @ even, load) for a, load in loads]
+        starts = [load.start(1, np.random.default_rng(0))[1] for _, load in waves]
+        turn, h = np.eye(len(rates)), max(load.period for _, load in waves) / _PARTS
+        for t in h * (0.5 + np.arange(_PARTS)):
+            now = [
+                load.amplitude * np.cos(start + load.nu * t) * a for (a, load), start in zip(waves, starts, strict=True)
+            ]
+            turn = expm(h * sum(now, rates)) @ turn
+        values = np.log(np.linalg.eigvals(turn).astype(complex)) / (h * _PARTS)
+    else:
+        values = np.linalg.eigvals(rates)
     first = int(np.argmax(values.real))
     rate = float(np.min(np.abs(np.delete(values, first) - values[first].real)))
     return min(_FORGOTTEN / rate if rate else math.inf, _LONGEST * half_turn)

@@ -11,6 +11,7 @@ import numpy as np
 from fpsolve.arrays import FloatArray, is_whole, real_numbers, shown
 from fpsolve.errors import FpsolveError
 from fpsolve.model.noise import Noise
+from fpsolve.model.noises.clock import waves_apart
 from fpsolve.model.plane import SAME_DELAY, System, affine, common_delay, written_coefficient
 from fpsolve.model.problem import Problem, checked_problem, refuse_infinite
 from fpsolve.simulation.coefficients import SplitCoefficients, coefficients
@@ -20,7 +21,7 @@ SPLIT = 0.06
 """The turn, growth or kick in one step at most where several noises move the state in turn."""
 BATCHES = 32
 """Independent sets of paths, from whose differences the errors are read."""
-PATHS, TRANSIENTS, FEWER = 32_768, 64, 16
+PATHS, TRANSIENTS, FEWER = 32_768, 64, 4
 """Defaults: how many paths, and how many transients long they are, in the plane and beyond it."""
 MAX_PATHS = 10_000_000
 PROGRESS_STEPS = 100
@@ -39,6 +40,8 @@ def simulated_parts(problem: Problem) -> tuple[System, Noise]:
     if not noise.is_simulated:
         need = f"noise that states a step of its paths, but this is a {type(noise).__name__}"
         raise FpsolveError(f"simulation is for {need}; use the finite elements")
+    if system.clock:
+        system, noise = waves_apart(system, noise)
     try:
         _ = common_delay(system.pasts) if system.pasts else None
     except ValueError as failure:

@@ -75,16 +75,18 @@ def _states(noise: Any, count: int) -> Functions:
 
 
 def _waves(noise: Any, count: int) -> Functions:
-    """1, √2 cos kθ, √2 sin kθ of the angle dθ = ν dt + σ dW, k < count."""
-    k = (np.arange(2 * count - 1) + 1) // 2
-    theta = np.arange(4 * count + 4 * MORE_POINTS) * (2 * np.pi / (4 * count + 4 * MORE_POINTS))
+    """1, √2 cos kθ, √2 sin kθ of the angle dθ = ν dt + σ dW; the degree is k over the harmonics of coefficients."""
+    k = (np.arange(2 * (count - 1) * noise.harmonics + 1) + 1) // 2
+    points = 2 * k.size + 4 * MORE_POINTS
+    theta = np.arange(points) * (2 * np.pi / points)
     waves = np.exp(1j * np.outer(theta, k))
     values = np.sqrt(2 - (k == 0)) * np.where(np.arange(k.size) % 2, waves.real, waves.imag)
     values[:, 0] = 1.0
     turn = np.where(np.arange(k.size - 1) % 2, k[1:], 0)  # (sin kθ)′ = k cos kθ
     generator = np.diag(-0.5 * noise.sigma**2 * k**2) + noise.nu * (np.diag(turn, 1) - np.diag(turn, -1))
     xi, start = noise.of_angle(theta), np.eye(1, k.size)[0]
-    return Functions(k, generator, lambda g: values.T @ (g(xi)[:, None] * values) / theta.size, start, start)
+    degrees = -(-k // noise.harmonics)
+    return Functions(degrees, generator, lambda g: values.T @ (g(xi)[:, None] * values) / theta.size, start, start)
 
 
 def _pairs(noise: Any, count: int) -> Functions:

@@ -131,9 +131,10 @@ def second_order(problem: Problem) -> SecondOrder:
 
 
 def harmonic_loads(problem: Problem) -> Sequence[str]:
-    """The sections of a case, such as "noise", of the noises of which only the start is random."""
+    """The noises of which only the start is random, as sentences have them."""
     named = zip([*problem.sections][1:], problem.noise.parts.values(), strict=True)
-    return [section for section, noise in named if not noise.is_random]
+    loads = [(section, noise) for section, noise in named if not noise.is_random]
+    return [f"{section} with sigma = 0" if noise.values else "cos(nu*t)" for section, noise in loads]
 
 
 @cached_by_problem(8)

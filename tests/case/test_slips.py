@@ -60,7 +60,8 @@ def test_numbers_in_rates_are_decimal(number, refused):
     ("call", "remedy"),
     [
         ("sin(x)", "write the first terms of its series, x - x**3/6"),
-        ("cos(2*t)*x", 'state cos(nu*t) as a noise of the kind "bounded" with sigma = 0'),
+        ("cos(x)", "of the time t write cos(nu*t) or sin(nu*t) alone"),
+        ("tan(2*t)*x", "of the time t write cos(nu*t) or sin(nu*t) alone"),
         ("abs(x)", "sums of terms of degree 1, or of degree 3"),
         ("tanh(v)", "sums of terms of degree 1, or of degree 3"),
         ("ln(2)*x", "write its value as a parameter"),

@@ -52,7 +52,8 @@ def test_beside_a_harmonic_load_a_transient_is_whole_periods():
     system, load = beam(GAUSSIAN, White(s=0.3)).system, Bounded(mu=0.4, nu=1.7, sigma=0.0)
     noises, period = Problem(system, {"axial": load, "lateral": White(s=0.3)}).noise, 2 * math.pi / 1.7
     found, h = transient(system, noises), default_step(system, noises)
-    assert found == pytest.approx(period * math.ceil(2 * math.pi / period), rel=1e-14)  # two half-turns
+    assert found / period == pytest.approx(round(found / period), rel=1e-14)
+    assert found >= 2 * math.pi  # two half-turns, and until the phase has come to be that of the load
     assert found / h == pytest.approx(round(found / h), abs=1e-9)
     assert h <= largest_step(system, noises)[0] < 0.1 * math.pi / 1.7
 

@@ -6,10 +6,9 @@ from unittest import mock
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 
 from fpsolve import ExponentSolver, NonGaussianNoise, OrnsteinUhlenbeck, PlaneSystem, Problem
-from fpsolve.arrays import identity, one
+from fpsolve.arrays import identity
 from fpsolve.cli import main
 from fpsolve.commands.options import BAD_INPUT, CHECK_FAILED
 from fpsolve.errors import NoHierarchy
@@ -29,7 +28,7 @@ from fpsolve.theory import even_moment, hierarchy_exponent
 from fpsolve.theory.powers import moment_form
 from tests import random_many
 from tests.kit import chain_of_masses
-from tests.oracles import filtered, kronecker, moment_hierarchy, planar, two_noises
+from tests.oracles import filtered, moment_hierarchy, planar, two_noises
 
 FREE, STIFFNESS = [[0.0, 1.0], [-1.0, -0.1]], [[0.0, 0.0], [-1.0, 0.0]]
 SADDLE = ((-1.0115024817178828, 0.027976596819670015), (3.2543543385618436, -2.1504180261123937))
@@ -353,43 +352,6 @@ def test_the_error_is_what_few_functions_lack():
     given = driven(FREE, STIFFNESS, OrnsteinUhlenbeck(1.0, 1.0))
     exact, found = even_moment(given, 4).value, even_moment(given, 4, 1e-3)
     assert found.error == pytest.approx(abs(found.eigenvalue - exact), rel=0.2)
-
-
-def test_harmonic_loads_with_white_noise(rng):
-    """ẋ = (A + cos(νt) C)x + Bx ∘ dW of 2 to 5 variables: the multipliers of its own moment equations over a period."""
-    for n in np.repeat((2, 3, 4, 5), 5):
-        free, load, shake = rng.standard_normal((3, n, n)) / math.sqrt(n)
-        nu, strength = rng.uniform(0.5, 4.0), rng.uniform(0.1, 0.6)
-        free -= np.eye(n)
-        terms = [(free, one, ""), (load, identity, "load"), (shake, identity, "shake")]
-        system = LinearSystem([CoefficientMatrix(0, a.tolist(), g, name) for a, g, name in terms])
-        problem = Problem(system, {"load": Bounded(1.0, nu, 0.0), "shake": White(s=strength)})
-        steady, moved = kronecker.power(free, 2), strength * kronecker.power(shake, 2)
-        steady, driven = steady + 0.5 * moved @ moved, kronecker.power(load, 2)
-        period, size = 2 * math.pi / nu, len(steady)
-        flow = solve_ivp(
-            lambda t, x, nu=nu, steady=steady, driven=driven, size=size: (
-                (steady + math.cos(nu * t) * driven) @ x.reshape(size, size)
-            ).ravel(),
-            (0.0, period),
-            np.eye(size).ravel(),
-            method="DOP853",
-            rtol=1e-13,
-            atol=1e-14,
-        ).y[:, -1]
-        multiplier = np.max(np.abs(np.linalg.eigvals(flow.reshape(size, size))))
-        assert even_moment(problem, 2).value == pytest.approx(math.log(multiplier) / period, abs=1e-10)
-
-
-def test_mathieu_with_white_noise():
-    """ẍ + 0.2ẋ + (1 + 0.5 cos 2t + ξ)x = 0, s = 0.3."""
-    stiffness = ((0, 0), (-1, 0))
-    terms = [
-        CoefficientMatrix(0, ((0, 1), (-1, -0.2))),
-        *(CoefficientMatrix(0, stiffness, identity, name) for name in ("load", "shake")),
-    ]
-    problem = Problem(LinearSystem(terms), {"load": Bounded(0.5, 2.0, 0.0), "shake": White(s=0.3)})
-    assert even_moment(problem, 2).value == pytest.approx(0.06202216, abs=5e-9)
 
 
 def test_a_start_that_is_the_answer():

@@ -46,6 +46,7 @@ class NoiseOfAngle(Noise):
 
     Its stationary density is 1/(π√(A² − ξ²)). For ν = 0 it obeys dξ = −½σ²ξ dt + σ√(A² − ξ²) dW. For ν > 0 it is no
     Markov process by itself, so that functions of the noise are functions of θ.
+    Coefficients have waves up to `harmonics` θ.
     """
 
     amplitude: float
@@ -53,6 +54,7 @@ class NoiseOfAngle(Noise):
     nu: float
 
     may_tilt: ClassVar[bool] = False
+    harmonics: ClassVar[int] = 1
 
     @property
     def basis(self) -> Literal["polynomials", "waves"]:

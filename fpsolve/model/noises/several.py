@@ -48,7 +48,7 @@ class Noises(Noise):
         pairs = tuple((name, noise) for name, noise in given)
         object.__setattr__(self, "named", pairs)
         for name, noise in pairs:
-            if not (isinstance(name, str) and name and isinstance(noise, Noise) and len(noise.parts) == 1):
+            if not (isinstance(name, str) and isinstance(noise, Noise) and len(noise.parts) == 1):
                 raise TypeError(f"got {shown(noise)} as the noise {shown(name)}; must be one noise with a name")
             if noise.has_algebraic_tails:
                 raise ValueError(

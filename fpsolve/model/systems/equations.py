@@ -20,9 +20,11 @@ from fpsolve.model.expressions import (
     HIGHEST_DEGREE,
     NUMBER,
     TIME,
+    WAVES,
     ExpressionError,
     Form,
     Monomial,
+    Series,
     calls_of_time,
     constant,
     evaluate,
@@ -32,16 +34,19 @@ from fpsolve.model.expressions import (
     summands,
 )
 from fpsolve.model.faults import TableError, table_of
+from fpsolve.model.noises.clock import Clock, Wave
 from fpsolve.model.parameters import STRICT, parameter, stated_field, unknown_parameter
 from fpsolve.model.plane import (
     MOST_VARIABLES,
     CoefficientMatrix,
     CubicTerms,
+    Function,
     Jump,
     LinearMotion,
     System,
     as_plane,
     by_epsilon,
+    common_unit,
 )
 from fpsolve.model.quantity import AMPLITUDE, JOINT_DENSITY, Quantity
 
@@ -330,6 +335,7 @@ class EquationSystem(System):
         names = {
             **{name: Form({((name,), "", 0): (1.0, 0.0)}) for name in (*self.variables, *self._delays)},
             **{name: Form({((), name, 0): (1.0, 0.0)}) for name, _ in self.noises},
+            **self._waves(by),
             **names,
         }
         rates = list[Form]()
@@ -345,22 +351,63 @@ class EquationSystem(System):
             rates.append(total)
         return tuple(rates)
 
+    def _times(self, by: str = "") -> Iterator[tuple[int, str, str, dict[Monomial, Series]]]:
+        """The rate, the text, the name and the argument of each x(t - tau) and cos(nu*t). Raises `TableError`."""
+        calls = [(i, *call) for i, text in enumerate(self.drift) for call in calls_of_time(text).items()]
+        names = {name: constant(value, float(name == by)) for name, value in self.named if calls}
+        names |= {name: Form({((name,), "", 0): (1.0, 0.0)}) for name in (*self.variables, TIME)}
+        names |= {name: Form({((), name, 0): (1.0, 0.0)}) for name, _ in self.noises}
+        for i, written, (name, time) in calls:
+            try:
+                yield i, written, name, dict(evaluate(time, names, f"the time of {written}").parts)
+            except ExpressionError as error:
+                raise TableError(str(error), "drift", i) from None
+
+    def _angles(self, by: str = "") -> Mapping[str, tuple[str, Series, Series]]:
+        """By what is written as cos(nu*t + phi) the name, nu and phi. Raises `TableError`."""
+        found = dict[str, tuple[str, Series, Series]]()
+        for i, written, name, parts in self._times(by):
+            if name in WAVES:
+                phase, speed = parts.pop(NUMBER, (0.0, 0.0)), parts.pop(((TIME,), "", 0), (0.0, 0.0))
+                if parts or not speed[0]:
+                    must = f"write {name}(nu*t), nu not 0, a number or an expression in the parameters"
+                    raise TableError(f"got {written}; {must}", "drift", i)
+                found[written] = name, speed, phase
+        return found
+
+    @cached_property
+    def clock(self) -> Clock | None:
+        frequencies = [abs(speed[0]) for _, speed, _ in self._angles().values()]
+        try:
+            return Clock(*common_unit(frequencies, "frequencies")) if frequencies else None
+        except ValueError as failure:
+            raise TableError(str(failure), "drift") from None
+
+    def clock_slope(self, name: str) -> float:
+        _, speed, _ = next(iter(self._angles(name).values()), ("", (1.0, 0.0), ()))
+        return speed[1] / speed[0] * self.clock.nu if self.clock else 0.0
+
+    def _waves(self, by: str) -> Mapping[str, Form]:
+        """What is written as cos(nu*t + phi), by those of multiples of the angle of the clock."""
+        found = dict[str, Form]()
+        for written, (name, (speed, _), (phase, slope)) in self._angles(by).items():
+            turned = phase if name == "cos" else phase - 0.5 * math.pi
+            c, s = (round(each(turned), 16) for each in (math.cos, math.sin))
+            sign, k = math.copysign(1.0, speed), round(abs(speed) / self.clock.nu)  # type: ignore[union-attr]
+            series = {"cos": (c, -s * slope), "sin": (-sign * s, -sign * c * slope)}
+            found[written] = Form({((), f"{each} {k}", 0): value for each, value in series.items() if any(value)})
+        return found
+
     @cached_property
     def _delays(self) -> Mapping[str, tuple[int, float]]:
         """By what is written as x(t - tau) the number of x, and tau. Raises `TableError`."""
-        calls = [(i, *call) for i, text in enumerate(self.drift) for call in calls_of_time(text).items()]
-        names = {name: constant(value) for name, value in self.named}
-        names |= {name: Form({((name,), "", 0): (1.0,)}) for name in (*self.variables, TIME)}
-        names |= {name: Form({((), name, 0): (1.0,)}) for name, _ in self.noises}
         found = dict[str, tuple[int, float]]()
-        for i, written, (name, time) in calls:
-            try:
-                parts = dict(evaluate(time, names, f"the time of {written}").parts)
-            except ExpressionError as error:
-                raise TableError(str(error), "drift", i) from None
-            delay = -parts.pop(NUMBER, (0.0,))[0]
+        for i, written, name, parts in self._times():
+            if name in WAVES:
+                continue
+            delay = -parts.pop(NUMBER, (0.0, 0.0))[0]
             fault = "" if name in self.variables else f"{name} is none of the variables {', '.join(self.variables)}"
-            if parts != {((TIME,), "", 0): (1.0,)}:
+            if parts != {((TIME,), "", 0): (1.0, 0.0)}:
                 fault = (
                     "a delay may not depend on the state, the noise or the time: write x(t - tau), tau a number or an "
                     "expression in the parameters"
@@ -416,7 +463,7 @@ class EquationSystem(System):
                 matrix = matrices.setdefault((order, noise), np.zeros(2 * (size,)))
                 matrix[i, columns.index((*states, *last)[0])] += series[at]
         terms = [
-            CoefficientMatrix(order, matrix.tolist(), identity if noise else one, names.get(noise, ""))
+            CoefficientMatrix(order, matrix.tolist(), *_coefficient(noise, names))
             for (order, noise), matrix in sorted(matrices.items(), key=lambda item: item[0])
             if at == 0 or matrix.any()
         ]
@@ -533,15 +580,20 @@ class EquationSystem(System):
         return tuple(name for name in self._derivatives if name not in self.inert and self._keeps_ratios(name))
 
     def _keeps_ratios(self, name: str) -> bool:
-        """Whether delays remain in their ratios with another value of a parameter, as their multiples are known."""
-        if len(self.pasts) < 2:
-            return True
+        """Whether delays, and frequencies, remain in their ratios with another value of a parameter."""
         value = float(self.values[name])
         with suppress(ValueError):
+            if max(map(len, self._recurring)) < 2:
+                return True
             other = self.at({name: value + OTHER * 1e-3 * (abs(value) or 1.0)})
-            shares = np.array([b / a for (_, a), (_, b) in zip(self.pasts, other.pasts, strict=True)])
-            return bool(np.ptp(shares) <= ROUNDED * shares[0])
+            shares = [np.divide(*pair) for pair in zip(other._recurring, self._recurring, strict=True) if pair[0]]
+            return all(np.ptp(each) <= ROUNDED * abs(each[0]) for each in shares)
         return False
+
+    @property
+    def _recurring(self) -> tuple[list[float], list[float]]:
+        """The delays, and the frequencies."""
+        return [delay for _, delay in self.pasts], [speed for _, (speed, _), _ in self._angles().values()]
 
     def derivative(self, name: str) -> tuple[tuple[CoefficientMatrix, ...], tuple[float, ...]]:
         """∂/∂θ of the terms and of ln R, exact but for rounding. Raises `ValueError` where it is infinite."""
@@ -597,6 +649,14 @@ class EquationSystem(System):
         if not (name := self._law):
             return super().impact_slope(log_factor)
         return 1 / self._log_factor(0, name, self.impact_value(log_factor))[1]
+
+
+def _coefficient(noise: str, names: Mapping[str, str]) -> tuple[Any, str]:
+    """The coefficient of a noise, or of "cos 2" of the clock, and the name of the noise in terms."""
+    wave, _, multiple = noise.partition(" ")
+    if multiple:
+        return Function(Wave(wave, int(multiple))), TIME
+    return identity if noise else one, names.get(noise, "")
 
 
 def _quantity(name: str, stated: StatedParameter) -> Quantity:

@@ -11,7 +11,7 @@ from pydantic import BeforeValidator, Field
 from pydantic.fields import FieldInfo
 
 from fpsolve.arrays import ROUNDED, FloatArray, shown
-from fpsolve.model.expressions import ExpressionError, constant, evaluate, names_in
+from fpsolve.model.expressions import ExpressionError, calls_of_time, constant, evaluate, names_in
 from fpsolve.model.faults import TableError
 from fpsolve.model.parameters import stated_field
 from fpsolve.model.plane import MOST_VARIABLES
@@ -209,7 +209,6 @@ class _Rates:
         if [len(row) for row in rows] != [self.count for _ in self]:
             size = f"{self.count} row{'s' * (self.count > 1)} of {self.count}, as mass is"
             raise TableError(f"got {shown(given)}; must be {size}", *path)
-        names = {name: constant(value) for name, value in self.parameters.items()}
         for i, row in enumerate(rows):
             for j, entry in enumerate(row):
                 is_number = isinstance(entry, int | float) and not isinstance(entry, bool)
@@ -217,7 +216,7 @@ class _Rates:
                     must = "must be a number, or an expression in the parameters"
                     raise TableError(f"got {shown(entry)}; {must}; write, for example, 1.0", *path, i, j)
                 try:
-                    number = evaluate(repr(float(entry)) if is_number else str(entry), names, "the entry").scalar
+                    number = self._number(repr(float(entry)) if is_number else str(entry), path[0] != "mass")
                 except ExpressionError as error:
                     raise TableError(str(error), *path, i, j) from None
                 if path[0] == "mass" and isinstance(entry, str) and EPSILON in names_in(entry):
@@ -228,9 +227,15 @@ class _Rates:
 
     def _numbers(self, matrix: list[list[Entry]]) -> FloatArray:
         """The entries of a matrix at the values of the parameters."""
-        names = {name: constant(value) for name, value in self.parameters.items()}
-        values = [[evaluate(e, names, "").scalar if isinstance(e, str) else (e,) for e in row] for row in matrix]
+        values = [[self._number(e) if isinstance(e, str) else (e,) for e in row] for row in matrix]
         return np.array([[each[0] if each else 0.0 for each in row] for row in values])
+
+    def _number(self, text: str, may_turn: bool = True) -> tuple[float, ...] | None:
+        """The value of an entry, with 1 for cos(nu*t). Raises `ExpressionError`."""
+        names = {name: constant(value) for name, value in self.parameters.items()}
+        return evaluate(
+            text, names | dict.fromkeys(calls_of_time(text) if may_turn else (), constant(1.0)), "the entry"
+        ).scalar
 
     def _refuse_symmetric(self, matrix: list[list[Entry]], key: str) -> None:
         values = self._numbers(matrix)
