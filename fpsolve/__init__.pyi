@@ -1,5 +1,15 @@
+from . import analysis as analysis
+from . import exponent as exponent
+from . import measured as measured
+from . import model as model
+from . import nonlinear as nonlinear
+from . import output as output
+from . import proofs as proofs
+from . import simulation as simulation
+from . import theory as theory
 from .analysis.density import stationary_density as stationary_density
 from .analysis.density import tilted_density as tilted_density
+from .analysis.inverse import design as design
 from .analysis.sensitivity import sensitivities as sensitivities
 from .analysis.stability import boundary as boundary
 from .case.case import load_case as load_case
@@ -18,6 +28,7 @@ from .model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck as OrnsteinUhlenb
 from .model.problem import Problem as Problem
 from .model.systems.plane_system import PlaneSystem as PlaneSystem
 from .model.systems.vibro_impact import VibroImpactOscillator as VibroImpactOscillator
+from .nonlinear.response import stationary_response as stationary_response
 from .output.datasets import open_results as open_results
 from .proofs.questions import prove as prove
 from .simulation.estimators import simulate as simulate

@@ -7,7 +7,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from html import escape
-from textwrap import fill
+from textwrap import fill, shorten
 from typing import TYPE_CHECKING, Any, Self
 
 from fpsolve import __version__
@@ -19,6 +19,8 @@ if TYPE_CHECKING:  # each takes some tenths of a second to import
     import xarray
     from matplotlib.axes import Axes
 
+LETTERS = 60
+"""Those of a line above a picture."""
 LONGEST = 100
 """Largest number of characters of a `repr`."""
 Parameters = Mapping[str, float | str]
@@ -203,7 +205,10 @@ class Result(ABC):
         with canvas_of(ax) as axes:
             self._draw(found, axes, **line_kwargs)
             if ax is None:
-                axes.set_title(fill(found.attrs["title"], 60), parse_math=False)
+                told = (f"{key} = {written(value)}" for key, value in found.attrs.items() if "." in key)
+                about = shorten(", ".join(told), 3 * LETTERS, placeholder=", …")
+                lines = [fill(each, LETTERS) for each in (found.attrs["title"], about)]
+                axes.set_title("\n".join(filter(None, lines)), parse_math=False)
         return axes
 
     def _draw(self, found: xarray.Dataset, axes: Axes, **kwargs: Any) -> None:

@@ -261,13 +261,15 @@ def draw(found: xarray.Dataset, axes: Axes, **kwargs: Any) -> None:
 
 
 def draw_line(axes: Axes, main: xarray.DataArray, error: xarray.DataArray | None, **kwargs: Any) -> None:
-    """A variable over its coordinate, in a band of ± its error."""
+    """A variable over its coordinate: a few values with bars of ± their errors, many in a band."""
     x = main[main.dims[0]]
     order = np.argsort(x.values, kind="stable")
     places, values = x.values[order], main.values[order]
     marker = {"marker": "o", "markersize": 4} if places.size <= MARKED else {}
     [line] = axes.plot(places, values, **{"linewidth": 1.6, **marker, **coloured(axes, kwargs)})
-    if error is not None:
+    if error is not None and marker:
+        axes.errorbar(places, values, error.values[order], fmt="none", ecolor=line.get_color(), capsize=4)
+    elif error is not None:
         low, high = values - error.values[order], values + error.values[order]
         axes.fill_between(places, low, high, color=line.get_color(), alpha=0.3, linewidth=0)
     label_axes(axes, x.attrs, main.attrs)

@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike
 from scipy.linalg import expm, expm_frechet
 
 from fpsolve.arrays import Coefficient, Constant, FloatArray, Linear, is_whole, one, real_array, real_number, shown
+from fpsolve.model.equation import MOST_EQUATIONS, equations_of, paragraphs
 from fpsolve.model.exact import ExactMotion
 from fpsolve.model.parameters import Parametrised
 from fpsolve.model.quantity import ResponseQuantities, response_quantities
@@ -360,6 +361,14 @@ class System(Parametrised):
     def states(self) -> Sequence[str]:
         """The names of its variables."""
         return tuple(f"x{str(k + 1).translate(BELOW)}" for k in range(self.dimension))
+
+    @property
+    def equations(self) -> list[str]:
+        """The motion with its numbers, a line for each equation and each wall: "ẍ = −x − 0.2 ẋ − ξ x"."""
+        return equations_of(self, [affine(term.g) for term in (self.forced or self).terms])
+
+    def _repr_html_(self) -> str:
+        return paragraphs(self.equations if self.dimension <= MOST_EQUATIONS else [repr(self)])
 
     @property
     def driven_by(self) -> frozenset[str]:

@@ -1,20 +1,12 @@
-"""The problem of a case: the equation with its numbers, its noises, its parameters."""
+"""The problem of a case beside its equation: its noises, its parameters."""
 
 from __future__ import annotations
 
-import math
-import re
-import unicodedata
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 
-import numpy as np
-
-from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case
 from fpsolve.data import plain_unit, written
-from fpsolve.model.noises.clock import Wave
-from fpsolve.model.plane import affine
-from fpsolve.model.problem import Problem
+from fpsolve.model.equation import noise_sentences
 from fpsolve.page.limits import EACH
 from fpsolve.page.page import Block, Column, Sentence, filled
 
@@ -22,7 +14,7 @@ from fpsolve.page.page import Block, Column, Sentence, filled
 def show(case: Case) -> Iterator[Block]:
     """The noises, what the equation leaves out, and the parameters."""
     curve = next(case.curves(0, 1))
-    yield from map(Sentence, noises_of(curve.problem))
+    yield from map(Sentence, noise_sentences(curve.problem))
     if case.system.cubic:
         yield Sentence(
             "Terms of degree 3 act on the stationary response only: Λ(p), λ and δ_p are of the linear system."
@@ -40,87 +32,3 @@ def show(case: Case) -> Iterator[Block]:
         rows.append([key, shown, unit, words])
     headings = "key", "value", "unit", "what it is"
     yield filled("", [Column(each, is_text=each != "value") for each in headings], rows)
-
-
-def equations_of(problem: Problem) -> list[str]:
-    """The motion with its numbers: of the second order where x₂ is a multiple of ẋ₁, else the rates; and its walls."""
-    system, named = problem.system, len(problem.system.noise_sections) > 1
-    whole = system.forced or system
-    n = whole.dimension
-    still, driven = np.zeros((n, n)), dict[str, FloatArray]()
-    for term in whole.terms:
-        line, size = affine(term.g), system.epsilon**term.order * np.array(term.matrix)
-        letter = f"ξ_{term.noise}" if named and term.noise else "ξ"
-        offset, slope = (0.0, 1.0) if line is None else line
-        still += offset * size
-        if slope:
-            own = getattr(term.g, "f", None)
-            name = letter if line else own.at(system.clock.nu) if isinstance(own, Wave) else f"g({letter})"
-            driven[name] = driven.get(name, np.zeros((n, n))) + slope * size
-    speed = float(still[0, 1])
-    cubic = np.array(system.cubic.matrix) if system.cubic else np.zeros((n, 4))
-    first = [still[0, 0], *cubic[0], *(each for matrix in driven.values() for each in matrix[0])]
-    rows: list[tuple[str, FloatArray, FloatArray, dict[str, FloatArray], Sequence[str]]]
-    rates = len(system.states) if system.pasts else n
-    names = (
-        *system.states,
-        *([""] if system.forced else []),
-        *(f"{system.states[k]}(t − {delay:.10g})" for k, delay in system.pasts),
-    )
-    x = names[0].removesuffix("₁")
-    if n == 2 and speed != 0 and not any(first) and len(x) == 1:
-        scale, names = np.array([speed, 1.0]), (x, _dotted(x, 1))
-        bent = cubic[1] * speed ** np.array([1, 0, -1, -2])
-        by_noise = {name: each[1] * scale for name, each in driven.items()}
-        rows = [(_dotted(x, 2), still[1] * scale, bent, by_noise, names)]
-    else:
-        each = [{key: matrix[i] for key, matrix in driven.items()} for i in range(rates)]
-        rows = [(f"d{names[i]}/dt", still[i], cubic[i], each[i], names) for i in range(rates)]
-    lines = [f"{row[0]} = {_sum(*row[1:])}" for row in rows]
-    for jump in system.jumps:
-        factor = f"{math.exp(jump.log_factor):.10g}"
-        at_wall = math.isclose(math.cos(jump.phase), 0.0, abs_tol=1e-12)
-        words = (
-            f"|{names[1]}|⁺ = {factor} |{names[1]}|⁻ at {names[0]} = 0"
-            if at_wall
-            else f"‖x‖⁺ = {factor} ‖x‖⁻ at φ = {jump.phase:.6g} and φ + π"
-        )
-        lines += [words] if jump.log_factor or not at_wall else []
-    return lines
-
-
-def _dotted(letter: str, count: int) -> str:
-    """A derivative by time."""
-    return unicodedata.normalize("NFC", letter + "\u0307\u0308"[count - 1])
-
-
-def _sum(constant: FloatArray, cubic: FloatArray, by_noise: Mapping[str, FloatArray], states: Sequence[str]) -> str:
-    """A sum of multiples of states, the constant ones first: "−x + 0.001 ẋ − 0.2 x² ẋ + 0.1 ξ ẋ"."""
-    x, y = states[:2]
-    products = f"{x}³", f"{x}² {y}", f"{x} {y}²", f"{y}³"
-    terms = [(float(size), state) for size, state in zip(constant, states, strict=True)]
-    terms += [(float(size), product) for size, product in zip(cubic, products, strict=True)]
-    terms += [
-        (float(size), f"{name} {s}".rstrip())
-        for name, row in by_noise.items()
-        for size, s in zip(row, states, strict=True)
-    ]
-    text = "".join(
-        f" {'−' if size < 0 else '+'} {'' if abs(size) == 1 else f'{abs(size):.10g} '}{name}"
-        for size, name in terms
-        if size
-    )
-    return re.sub(r"^ \+ |^ (?=−)", "", text).replace("− ", "−", text.startswith(" −")) or "0"
-
-
-def noises_of(problem: Problem) -> list[str]:
-    """Each noise in a sentence: its kind, and how strong and how slow it is."""
-    lines = list[str]()
-    for section, noise in zip(problem.system.noise_sections, problem.noise.parts.values(), strict=False):
-        size, time = noise.standard_deviation, noise.correlation_time
-        numbers = [f"standard deviation {size:.6g}"] if 0 < size < math.inf else []
-        numbers += [f"correlation time {time:.6g}"] if 0 < time < math.inf else []
-        name = f"ξ of [{section}]" if len(problem.noise.parts) > 1 else "ξ"
-        lines.append(f"{name} is noise of the kind {noise.kind}{', with ' if numbers else ''}{' and '.join(numbers)}.")
-        lines[-1] += f" The equation is meant in {noise.sense} sense." if noise.sense else ""
-    return lines

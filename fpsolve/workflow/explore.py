@@ -36,6 +36,7 @@ from fpsolve.explain import UNBOUNDED, explain
 from fpsolve.exponent.quantities import INDICES, MOMENT
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.messages import message_of
+from fpsolve.model.equation import MOST_EQUATIONS
 from fpsolve.model.plane import BELOW
 from fpsolve.model.problem import Problem, checked_problem
 from fpsolve.page.html import page_of, part_of_page
@@ -46,7 +47,6 @@ from fpsolve.parts.moments import moment_grid
 from fpsolve.parts.part import Numerics, fault
 from fpsolve.show import results
 from fpsolve.show.notes import notes
-from fpsolve.show.problem import equations_of
 from fpsolve.show.problem import show as show_problem
 from fpsolve.show.verdict import meaning, verdict
 from fpsolve.study.results import CurveResult
@@ -74,8 +74,6 @@ NO_BOUND = 1e3
 """A bound from which on it keeps formulas from overflow, and tells nothing of what is usual."""
 NUMBERS = {MOMENT.name, *INDICES, "theory", "jumps", "classes", "discretisation"}
 """The parts that are solved."""
-MOST_EQUATIONS = 4
-"""Variables whose rates are shown; of more they would fill pages."""
 Answer = Mapping[str, Any]
 """What JSON can hold."""
 
@@ -251,7 +249,7 @@ class Explorer:
             "curve": [listed(getattr(moments, name)[order]) for name in names],
             "root": index.value if index else None,
             "exponent": exponent.value if exponent else None,
-            "equations": equations_of(case.problem) if case.problem.dimension <= MOST_EQUATIONS else [],
+            "equations": case.system.equations if case.problem.dimension <= MOST_EQUATIONS else [],
             "verdict": part_of_page([Sentence(verdict(case, result)), *meaning(result)]),
             "numbers": part_of_page([*THEORY.show(case, result), *notes(case, [result], "")]),
             "table": "",  # which nobody reads while a slider moves
@@ -283,7 +281,7 @@ class Explorer:
                 chain(results.show(case, [found], Path()), notes(case, [found], "")),
                 title=case.headline,
                 state=COMPLETE,
-                equations=equations_of(case.problem),
+                equations=case.system.equations,
                 about=list(show_problem(case)),
                 facts={**facts_since(case, started), "case_text": self._text(case) if self.source.text else ""},
                 file=f"{self.source.name}-explored.toml",

@@ -60,7 +60,7 @@ def write_report(
                 blocks,
                 title=case.headline,
                 state=COMPLETE if complete else INCOMPLETE,
-                equations=problem.equations_of(next(case.curves(0, 1)).problem),
+                equations=next(case.curves(0, 1)).problem.system.equations,
                 about=list(problem.show(case)),
                 facts=facts,
                 file=case.path.name,

@@ -16,12 +16,12 @@ from fpsolve.case.case import load_case
 from fpsolve.cli import main
 from fpsolve.errors import OutputError, Remedy
 from fpsolve.model import OrnsteinUhlenbeck, PlaneSystem, Problem, White
+from fpsolve.model.equation import noise_sentences
 from fpsolve.output.tables import facts_of
 from fpsolve.page.page import Drawing
 from fpsolve.parts.eigenfunctions import surface_from
 from fpsolve.parts.surfaces import can_render, picture_of
 from fpsolve.show import claims, problem, results
-from fpsolve.show.problem import equations_of, noises_of
 from fpsolve.show.verdict import meaning, verdicts
 from fpsolve.study.columns import table_of
 from fpsolve.workflow import reports
@@ -206,7 +206,7 @@ def test_a_simulation_has_a_page(tmp_path):
     assert "effective windows" in Page(tmp_path / "test/report.html").text
 
 
-@pytest.mark.parametrize(("module", "name"), [(problem, "equations_of"), (reports, "page_of")])
+@pytest.mark.parametrize(("module", "name"), [(problem, "noise_sentences"), (reports, "page_of")])
 def test_a_fault_in_the_report_costs_nothing_else(tmp_path, monkeypatch, capsys, module, name):
     def fault(*_, **__):
         raise RuntimeError("a fault")
@@ -338,17 +338,17 @@ def test_charts_have_a_page(tmp_path, monkeypatch):
     ],
 )
 def test_equations_have_the_numbers_of_the_case(name, equations):
-    assert equations_of(next(load_case(CASES / f"{name}.toml").curves()).problem) == equations
+    assert next(load_case(CASES / f"{name}.toml").curves()).problem.system.equations == equations
 
 
 def test_equations_have_the_variables_of_the_case():
     problem = Problem(PlaneSystem.of_equations(("q", "v"), ("2*v", "-q - xi*v")), White(s=0.5))
-    assert equations_of(problem) == ["q̈ = −2 q − ξ q̇"]
+    assert problem.system.equations == ["q̈ = −2 q − ξ q̇"]
     rates = "2*v", "-q - xi*v - q**3/4 + q*v**2 - v**3"
     problem = Problem(PlaneSystem.of_equations(("q", "v"), rates), OrnsteinUhlenbeck(alpha=1.0, sigma=1.0))
-    assert equations_of(problem) == ["q̈ = −2 q − 0.5 q³ + 0.5 q q̇² − 0.25 q̇³ − ξ q̇"]
+    assert problem.system.equations == ["q̈ = −2 q − 0.5 q³ + 0.5 q q̇² − 0.25 q̇³ − ξ q̇"]
     problem = Problem(PlaneSystem.of_equations(("q", "v"), ("v - q**3", rates[1])), problem.noise)
-    assert equations_of(problem) == ["dq/dt = v − q³", "dv/dt = −q − 0.25 q³ + q v² − v³ − ξ v"]
+    assert problem.system.equations == ["dq/dt = v − q³", "dv/dt = −q − 0.25 q³ + q v² − v³ − ξ v"]
 
 
 def test_a_region_tells_what_paths_and_moments_do():
@@ -362,7 +362,7 @@ def test_a_region_tells_what_paths_and_moments_do():
 @pytest.mark.parametrize(("sense", "words"), [("ito", "Itô's"), ("stratonovich", "Stratonovich's")])
 def test_white_noise_is_told_with_its_sense(sense, words):
     problem = Problem(PlaneSystem.of_equations(("x", "v"), ("v", "-x - xi*v")), White(s=0.5, interpretation=sense))
-    assert noises_of(problem) == [f"ξ is noise of the kind white. The equation is meant in {words} sense."]
+    assert noise_sentences(problem) == [f"ξ is noise of the kind white. The equation is meant in {words} sense."]
 
 
 @pytest.mark.parametrize("called", ["/somewhere/bin/fpsolve", "/somewhere/fpsolve/__main__.py"])

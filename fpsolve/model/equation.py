@@ -1,0 +1,113 @@
+"""A motion and its noises in words, as the report and notebooks show them: "ẍ = −x − 0.2 ẋ − ξ x"."""
+
+from __future__ import annotations
+
+import math
+import re
+import unicodedata
+from collections.abc import Iterable, Mapping, Sequence
+from html import escape
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fpsolve.arrays import FloatArray
+
+if TYPE_CHECKING:  # which show themselves by these
+    from fpsolve.model.plane import System
+    from fpsolve.model.problem import Problem
+
+MOST_EQUATIONS = 4
+"""Variables whose rates a page shows; of more they would fill it."""
+
+
+def equations_of(system: System, lines: Sequence[tuple[float, float] | None]) -> list[str]:
+    """The motion with its numbers: of the second order where x₂ is a multiple of ẋ₁, else the rates; and its walls.
+
+    Args:
+        lines: a and b of each term whose g(ξ) is a + bξ.
+    """
+    whole, named = system.forced or system, len(system.noise_sections) > 1
+    n = whole.dimension
+    still, driven = np.zeros((n, n)), dict[str, FloatArray]()
+    for term, line in zip(whole.terms, lines, strict=True):
+        size = system.epsilon**term.order * np.array(term.matrix)
+        letter = f"ξ_{term.noise}" if named and term.noise else "ξ"
+        offset, slope = (0.0, 1.0) if line is None else line
+        still += offset * size
+        if slope:
+            wave = getattr(getattr(term.g, "f", None), "at", None) if system.clock else None
+            name = letter if line else wave(system.clock.nu) if wave and system.clock else f"g({letter})"
+            driven[name] = driven.get(name, np.zeros((n, n))) + slope * size
+    speed = float(still[0, 1])
+    cubic = np.array(system.cubic.matrix) if system.cubic else np.zeros((n, 4))
+    first = [still[0, 0], *cubic[0], *(each for matrix in driven.values() for each in matrix[0])]
+    rows: list[tuple[str, FloatArray, FloatArray, dict[str, FloatArray], Sequence[str]]]
+    rates = len(system.states) if system.pasts else n
+    names = (
+        *system.states,
+        *([""] if system.forced else []),
+        *(f"{system.states[k]}(t − {delay:.10g})" for k, delay in system.pasts),
+    )
+    x = names[0].removesuffix("₁")
+    if n == 2 and speed != 0 and not any(first) and len(x) == 1:
+        scale, names = np.array([speed, 1.0]), (x, _dotted(x, 1))
+        bent = cubic[1] * speed ** np.array([1, 0, -1, -2])
+        by_noise = {name: each[1] * scale for name, each in driven.items()}
+        rows = [(_dotted(x, 2), still[1] * scale, bent, by_noise, names)]
+    else:
+        each = [{key: matrix[i] for key, matrix in driven.items()} for i in range(rates)]
+        rows = [(f"d{names[i]}/dt", still[i], cubic[i], each[i], names) for i in range(rates)]
+    told = [f"{row[0]} = {_sum(*row[1:])}" for row in rows]
+    for jump in system.jumps:
+        factor = f"{math.exp(jump.log_factor):.10g}"
+        at_wall = math.isclose(math.cos(jump.phase), 0.0, abs_tol=1e-12)
+        words = (
+            f"|{names[1]}|⁺ = {factor} |{names[1]}|⁻ at {names[0]} = 0"
+            if at_wall
+            else f"‖x‖⁺ = {factor} ‖x‖⁻ at φ = {jump.phase:.6g} and φ + π"
+        )
+        told += [words] if jump.log_factor or not at_wall else []
+    return told
+
+
+def _dotted(letter: str, count: int) -> str:
+    """A derivative by time."""
+    return unicodedata.normalize("NFC", letter + "\u0307\u0308"[count - 1])
+
+
+def _sum(constant: FloatArray, cubic: FloatArray, by_noise: Mapping[str, FloatArray], states: Sequence[str]) -> str:
+    """A sum of multiples of states, the constant ones first: "−x + 0.001 ẋ − 0.2 x² ẋ + 0.1 ξ ẋ"."""
+    x, y = states[:2]
+    products = f"{x}³", f"{x}² {y}", f"{x} {y}²", f"{y}³"
+    terms = [(float(size), state) for size, state in zip(constant, states, strict=True)]
+    terms += [(float(size), product) for size, product in zip(cubic, products, strict=True)]
+    terms += [
+        (float(size), f"{name} {s}".rstrip())
+        for name, row in by_noise.items()
+        for size, s in zip(row, states, strict=True)
+    ]
+    text = "".join(
+        f" {'−' if size < 0 else '+'} {'' if abs(size) == 1 else f'{abs(size):.10g} '}{name}"
+        for size, name in terms
+        if size
+    )
+    return re.sub(r"^ \+ |^ (?=−)", "", text).replace("− ", "−", text.startswith(" −")) or "0"
+
+
+def noise_sentences(problem: Problem) -> list[str]:
+    """Each noise in a sentence: its kind, and how strong and how slow it is."""
+    lines = list[str]()
+    for section, noise in zip(problem.system.noise_sections, problem.noise.parts.values(), strict=False):
+        size, time = noise.standard_deviation, noise.correlation_time
+        numbers = [f"standard deviation {size:.6g}"] if 0 < size < math.inf else []
+        numbers += [f"correlation time {time:.6g}"] if 0 < time < math.inf else []
+        name = f"ξ of [{section}]" if len(problem.noise.parts) > 1 else "ξ"
+        lines.append(f"{name} is noise of the kind {noise.kind}{', with ' if numbers else ''}{' and '.join(numbers)}.")
+        lines[-1] += f" The equation is meant in {noise.sense} sense." if noise.sense else ""
+    return lines
+
+
+def paragraphs(lines: Iterable[str]) -> str:
+    """Lines as HTML, for a notebook."""
+    return "".join(f"<p>{escape(line)}</p>" for line in lines)
