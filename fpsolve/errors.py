@@ -13,6 +13,10 @@ from fpsolve.messages import Remedy as Remedy
 class FpsolveError(Exception):
     """Base of every error that fpsolve raises on purpose; its text says what to do.
 
+    >>> raise FpsolveError("nothing was solved", "state a larger budget")
+    Traceback (most recent call last):
+    fpsolve.errors.FpsolveError: nothing was solved; state a larger budget
+
     Attributes:
         message: the text, as data.
     """
@@ -53,6 +57,10 @@ class WorkersDied(FpsolveError):
 class NotConverged(FpsolveError):
     """The eigenvalue iteration did not settle.
 
+    >>> moment_lyapunov(problem, 60.0, budget=Budget(unknowns=100))
+    Traceback (most recent call last):
+    fpsolve.errors.NotConverged: ...
+
     Attributes:
         reason: what happened, without what to do.
         partial: the best result that was reached, or None where there is none.
@@ -86,7 +94,12 @@ class Fault:
 
 
 class CaseError(FpsolveError):
-    """A case file that cannot be run; the text has one line for each fault of the file, at most `SHOWN` of them."""
+    """A case file that cannot be run; the text has one line for each fault of the file, at most `SHOWN` of them.
+
+    >>> load_case("none.toml")
+    Traceback (most recent call last):
+    fpsolve.errors.CaseError: none.toml: no such file...
+    """
 
     SHOWN = 50
 

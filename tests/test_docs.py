@@ -1,6 +1,8 @@
 """What the pages of the site tell to type into Python runs, page by page, and their case files are read."""
 
 import ast
+import doctest
+import inspect
 import json
 import math
 import re
@@ -18,7 +20,7 @@ import pytest
 
 import fpsolve
 from fpsolve import ExponentSolver
-from fpsolve.exponent import INDICES
+from fpsolve.exponent import INDICES, Budget
 from fpsolve.output.records import entries_of, record_of_set
 from fpsolve.output.tables import facts_of, write_results
 from fpsolve.parts import PARTS, indices
@@ -156,3 +158,17 @@ def test_the_format_and_the_command_of_the_walk_through(tmp_path, capsys):
     assert float(said.rpartition(": ")[2]) == pytest.approx(
         case.problem.at({"noise.D0": 2.0}).noise.standard_deviation ** 2, rel=1e-5
     )
+
+
+def test_every_name_at_the_top_has_an_example_that_runs(tmp_path, monkeypatch):
+    """One after another, as the problem of the first one is that of the others."""
+    monkeypatch.chdir(tmp_path)
+    shutil.copy(ROOT / "cases/minimal.toml", tmp_path)
+    known = {name: getattr(fpsolve, name) for name in fpsolve.__all__} | {"Budget": Budget}
+    runner = doctest.DocTestRunner(optionflags=doctest.ELLIPSIS | doctest.IGNORE_EXCEPTION_DETAIL)
+    for name in sorted(fpsolve.__all__, key=lambda name: (name != "Problem", name == "open_results", name)):
+        text = inspect.getdoc(known[name])
+        examples = doctest.DocTestParser().get_doctest(text, known, name, None, 0)
+        assert examples.examples, name
+        assert runner.run(examples, clear_globs=False).failed == 0, name
+        known |= examples.globs

@@ -104,6 +104,9 @@ class Density(Result):
 def stationary_density(pair: PrincipalPair) -> Density | DirectionDensity:
     """ρ(φ, ξ), solution of the Fokker-Planck equation L*(0)ρ = 0; of more than two variables that of directions.
 
+    >>> stationary_density(ExponentSolver(problem).pair(0.0))
+    Density(stationary density at p = 0, on ... points)
+
     Raises:
         NotConverged: too much of it is negative; `partial` is what was found.
         ValueError: the pair is not the one at p = 0.
@@ -118,6 +121,9 @@ def adjoint_density(pair: PrincipalPair) -> Density | DirectionDensity:
 
 def tilted_density(pair: PrincipalPair) -> Density | DirectionDensity:
     """T T*: how phase and noise, or directions, are distributed along the paths that carry the p-th moment.
+
+    >>> tilted_density(ExponentSolver(problem).pair(2.0))
+    Density(tilted density at p = 2, on ... points)
 
     Raises:
         NotConverged: too much of it is negative; `partial` is what was found.

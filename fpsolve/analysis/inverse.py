@@ -123,6 +123,9 @@ def design(
     changes of the parameters in their units. Where several points serve it is one that Newton's iteration finds from
     the values of the problem.
 
+    >>> design(problem, "moment(2) = -0.008", "oscillator.c1")
+    Design(...)
+
     Args:
         problem: a motion and its noise, where the search starts.
         target: such as "stability_index = 1", "lyapunov_exponent = -0.01" or "moment(2) = 0".

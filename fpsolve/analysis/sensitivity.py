@@ -216,6 +216,9 @@ def sensitivities(
 
     For noise of Eq. (7) with r₀ = 1 ∂/∂r₀ is the derivative from below, as Λ is infinite, or another, above.
 
+    >>> sensitivities(problem, 2.0)
+    Sensitivities(of lyapunov_exponent, stability_index, variance_rate, Λ(2) by 6 parameters)
+
     Args:
         problem: a motion and its noise.
         p: one moment, or an array of shape (n,); none by default.

@@ -342,6 +342,10 @@ def boundary(
 ) -> Boundary:
     """The line λ = 0, Λ(p) = 0 or δ_p = v in a frame of two parameters.
 
+    >>> from fpsolve.analysis import Axis
+    >>> boundary(problem, "lyapunov_exponent", Axis("oscillator.c1", -2.0, 2.0), Axis("noise.sigma", 0.5, 2.0), nodes=5)
+    Boundary(λ = 0: 1 branch over oscillator.c1 and noise.sigma)
+
     Args:
         problem: a motion and its noise, whose other parameters are held.
         zero: "lyapunov_exponent", {"moment": p} or {"stability_index": v}.

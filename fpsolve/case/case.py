@@ -443,6 +443,9 @@ else:
 def load_case(path: str | Path, overrides: Sequence[str] = (), options: Mapping[str, str] | None = None) -> Case:
     """Read and check a case file.
 
+    >>> load_case("minimal.toml", ["noise.D0=2.0"]).problem.values["noise.D0"]
+    2.0
+
     Args:
         path: a TOML file.
         overrides: texts such as "oscillator.omega=2.0", each a key with its sections and a TOML value.

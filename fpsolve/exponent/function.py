@@ -58,6 +58,9 @@ class MomentLyapunovFunction(Result):
     It is solved at few p, with T, T* and their derivatives there, and between these by what they make of L(p), see
     `exponent.basis`: on one space, or one for each sign of p.
 
+    >>> print(f"{MomentLyapunovFunction(problem, (-1.0, 3.0))(2.0):.9f}")
+    -0.007397833
+
     Args:
         problem: a motion and its noise.
         interval: the smallest and the largest p.
@@ -400,6 +403,9 @@ def moment_lyapunov(
     budget: Budget | None = None,
 ) -> MomentLyapunov:
     """The moment Lyapunov exponent Λ(p) = lim (1/t) ln E‖x(t)‖^p, Eq. (1), as the principal eigenvalue of Eq. (19).
+
+    >>> moment_lyapunov(problem, 2.0)  # the `problem` of `Problem`
+    MomentLyapunov(Λ(2) = -0.00739783... ± ...)
 
     Args:
         problem: a motion and its noise.

@@ -173,6 +173,9 @@ def lyapunov_exponent(
 
     For noise with algebraic tails there is no Λ′(0); `meaning` says so.
 
+    >>> lyapunov_exponent(problem)
+    Estimate(λ = -0.00448021... ± ..., in 1/time)
+
     Args:
         problem: a motion and its noise.
         rtol, mesh, budget: as for `moment_lyapunov`.
@@ -188,6 +191,9 @@ def stability_index(
     problem: Problem, *, rtol: float | None = None, mesh: CylinderMesh | None = None, budget: Budget | None = None
 ) -> Estimate | Absent:
     """The stability index δ_p, the non-zero root of Λ(p), or why there is none from -20 to 20.
+
+    >>> stability_index(problem)
+    Estimate(δ_p = 11.46858... ± ...)
 
     Args:
         problem: a motion and its noise.

@@ -171,6 +171,9 @@ class MomentLyapunov(Result):
 class ExponentSolver:
     """Λ(p) of one problem, each solve starting from those at the nearest p.
 
+    >>> ExponentSolver(problem).pair(2.0)
+    PrincipalPair(Λ(2) = -0.0073978..., Λ′(2) = -0.0029176..., ... unknowns)
+
     Args:
         problem: a motion and its noise.
         mesh: a mesh for all p; None chooses a discretisation for each p that meets rtol.

@@ -34,6 +34,9 @@ FORMATS = {".vtu": "vtu", ".msh": "gmsh22"}
 class CylinderMesh:
     """Tensor grid on the circle φ and the truncated noise axis z = ξ/std, with the degrees of its elements.
 
+    >>> CylinderMesh([0.0, 3.141592653589793], [-8.0, 0.0, 8.0], phi_degree=6, xi_degree=6).z_lines
+    array([-8.,  0.,  8.])
+
     Attributes:
         phi_lines: increasing φ, shape (m + 1,); they span π (a half circle, as everything in Eq. (19) is
             π-periodic) or 2π, the first and the last being one line, the seam. Generators need a line at every
@@ -114,6 +117,9 @@ def make_mesh(
     full_circle: bool = False,
 ) -> CylinderMesh:
     """A mesh with equal φ-cells between impacts, and ξ-cells uniform or graded.
+
+    >>> make_mesh(phi_cells=2, xi_cells=4).z_lines
+    array([-8., -4.,  0.,  4.,  8.])
 
     Args:
         phi_cells: cells on the half circle from one impact to the next.

@@ -92,6 +92,11 @@ class ParameterDerivative:
 class Problem:
     """A system and the noise that drives it; its parameters have keys such as "noise.D0".
 
+    >>> oscillator = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=-0.8, epsilon=0.1)
+    >>> problem = Problem(oscillator, OrnsteinUhlenbeck(alpha=2.0, sigma=1.0))
+    >>> problem.at({"noise.sigma": 2.0}).values["noise.sigma"]
+    2.0
+
     Attributes:
         system: `VibroImpactOscillator`, or a `PlaneSystem`.
         noise: `OrnsteinUhlenbeck`, or `NonGaussianNoise` for Eq. (7) as it stands, or a `MarkovChain`; several noises

@@ -209,6 +209,10 @@ class StationaryResponse(Result, NearRest):
 def stationary_response(problem: Problem, *, rtol: float = 1e-6, budget: Budget | None = None) -> StationaryResponse:
     """Solve the Fokker-Planck equation of a system with cubic terms, as of an oscillator with c₂ or c₃ > 0, and λ > 0.
 
+    >>> bent = problem.at({"oscillator.c1": 0.8, "oscillator.c2": 0.5})
+    >>> stationary_response(bent, rtol=1e-2)
+    StationaryResponse(mean amplitude ... ± ..., ... unknowns)
+
     Args:
         problem: the system and its noise.
         rtol: how large the error estimate of every mean may be, relative to the mean, 1e-10 to 0.1.

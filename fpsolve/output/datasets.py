@@ -157,6 +157,9 @@ def open_results(*places: str | Path, errors: Literal["raise", "warn"] = "raise"
     and every parameter, varied or held, are coordinates. What a run has not is NaN, or an empty text; a set of a run
     without moments is one row, whose p is NaN.
 
+    >>> open_results("results/minimal").moment.values.shape
+    (3,)
+
     Args:
         places: folders of cases, their results.nc, or patterns of these such as "results/*".
         errors: "warn" leaves out what is no file of a run, with a warning that names it.

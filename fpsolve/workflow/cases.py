@@ -84,6 +84,9 @@ def run(
     them stay. Each run rewrites all other files, and removes what a simulation of other parameters wrote. summary.json
     says whether all curves are there.
 
+    >>> run("minimal.toml")  # a case of `fpsolve new minimal`
+    (CurveResult(converged, 3 p, λ = -1.4456...e-05 ± ...),)
+
     Args:
         case: a case file, or what `load_case` made of it.
         out: folder for the results.

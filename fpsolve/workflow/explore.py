@@ -369,6 +369,9 @@ def explore(problem: Problem | Case | str | Path) -> Explored:
 
     The page is served by this process to this machine alone, at a free port of 127.0.0.1.
 
+    >>> page = explore(problem)  # the last line of a cell shows it
+    >>> page.close()
+
     Args:
         problem: a motion and its noise; or a case, or its file, whose first curve is shown.
 

@@ -120,6 +120,9 @@ class NonGaussianNoise(TreatedNoise):
 
     r₀ = 1 is the Ornstein-Uhlenbeck process; r₀ < 1 has bounded support, r₀ > 1 algebraic tails.
 
+    >>> print(f"{NonGaussianNoise(D0=1.0, tau0=0.5, r0=0.9).half_width:.4f}")  # bounded, as r₀ < 1
+    6.3246
+
     Args:
         D0: noise intensity D₀, 1e-15 to 1e15, in 1/time.
         tau0: correlation time τ₀, 1e-15 to 1e15.

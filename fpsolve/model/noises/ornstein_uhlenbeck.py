@@ -202,6 +202,9 @@ class OrnsteinUhlenbeck(GaussianNoise):
 
     A case file may state it by other numbers too, see `variants`.
 
+    >>> OrnsteinUhlenbeck(alpha=2.0, sigma=1.0).spectral_density(0.0)
+    0.25
+
     Args:
         alpha: relaxation rate α₀, 1e-32 to 1e32, in 1/time.
         sigma: coefficient of the Wiener process, σ₀, 1e-32 to 1e32, in time^(-3/2).

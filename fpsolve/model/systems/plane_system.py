@@ -80,11 +80,8 @@ class StatedJump(BaseModel):
 class PlaneSystem(System):
     """A linear system in the plane from its parts, see `System`.
 
-    >>> from fpsolve.arrays import identity
-    >>> rotation, stiffness = ((0.0, 1.0), (-1.0, 0.0)), ((0.0, 0.0), (-1.0, 0.0))
-    >>> terms = CoefficientMatrix(0, rotation), CoefficientMatrix(1, stiffness, identity)  # ẍ + (1 + ξ) x = 0
-    >>> PlaneSystem(terms).epsilon
-    1.0
+    >>> PlaneSystem.of_equations(("x", "v"), ("v", "-x - 2*zeta*v - xi*x"), {"zeta": 0.1}).equations
+    ['ẍ = −x − 0.2 ẋ − ξ x']
 
     Args:
         terms: one at least.

@@ -41,6 +41,9 @@ DAMPING = ((0.0, 0.0), (0.0, 1.0))
 class VibroImpactOscillator(System):
     """Rayleigh-Van der Pol oscillator that bounces off a wall at x = 0, Eqs. (3) and (6).
 
+    >>> VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=0.1).equations
+    ['ẍ = −x + 0.001 ẋ + 0.1 ξ ẋ', '|ẋ|⁺ = 0.9980019987 |ẋ|⁻ at x = 0']
+
     Args:
         omega: natural frequency ω, 1e-15 to 1e15, in radians per unit time.
         restitution: coefficient of restitution, 0 < r ≤ 1; 1 is no loss.
