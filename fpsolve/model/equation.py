@@ -7,7 +7,7 @@ import re
 import unicodedata
 from collections.abc import Iterable, Mapping, Sequence
 from html import escape
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -36,8 +36,8 @@ def equations_of(system: System, lines: Sequence[tuple[float, float] | None]) ->
         offset, slope = (0.0, 1.0) if line is None else line
         still += offset * size
         if slope:
-            wave = getattr(getattr(term.g, "f", None), "at", None) if system.clock else None
-            name = letter if line else wave(system.clock.nu) if wave and system.clock else f"g({letter})"
+            own: Any = getattr(term.g, "f", None)  # cos kθ or sin kθ of the clock has k
+            name = letter if line else own.at(system.clock.nu) if hasattr(own, "multiple") else f"g({letter})"
             driven[name] = driven.get(name, np.zeros((n, n))) + slope * size
     speed = float(still[0, 1])
     cubic = np.array(system.cubic.matrix) if system.cubic else np.zeros((n, 4))
