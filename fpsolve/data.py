@@ -64,7 +64,9 @@ class Quantity:
     def attributes(self) -> dict[str, str]:
         """Those of a variable of xarray: long_name, symbol, units, equation and comment; no empty ones."""
         names = {"long_name": "words", "symbol": "latex", "units": "unit", "equation": "equation", "comment": "comment"}
-        return {name: text for name, own in names.items() if (text := getattr(self, own))}
+        found = {name: text for name, own in names.items() if (text := getattr(self, own))}
+        is_key = "." in self.name and self.words == self.name
+        return found | ({"long_name": f"parameter {'' if self.latex else self.shown}".rstrip()} if is_key else {})
 
     @property
     def title(self) -> str:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from functools import cached_property, partial
 from hashlib import sha256
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Self
 
 import numpy as np
 from pydantic import (
@@ -29,12 +29,14 @@ from fpsolve.case.kinds import half_of, kinds_of, parameters_of, sections_of
 from fpsolve.case.read_vary import EXAMPLE, vary_of
 from fpsolve.case.refusals import REFUSALS
 from fpsolve.case.sections import (
+    MOST_NAMED,
     QUANTITY_NAMES,
     ChartSection,
     DesignSection,
     Expectation,
     FigureSection,
     MeshSection,
+    MomentAt,
     Moments,
     MonteCarloSection,
     OutputSection,
@@ -415,6 +417,20 @@ class CaseWithoutParts(Section):
             text = "stands beside [system], but a case has one system; remove one of the two"
             refuse([(("oscillator",), data["oscillator"], text)])
         return data
+
+    @model_validator(mode="after")
+    def _draws_a_map_of_many(self) -> Self:
+        """Over two keys with more curves than a legend names, λ is drawn in place of all Λ(p), or that of one p."""
+        is_stated = bool(self.figure.model_fields_set & {"x", "y", "map", "mark"})
+        if is_stated or self.planned <= MOST_NAMED or self.vary.mode == "zip":
+            return self
+        keys = sorted(self.vary.keys, key=lambda key: -len(self.vary.values(key)))
+        if self.vary.crossing(keys[0]) and self.p.size:
+            has_exponent = LYAPUNOV_EXPONENT.name in self.asked
+            y = LYAPUNOV_EXPONENT.name if has_exponent else MomentAt(moment=float(self.p[np.argmin(abs(self.p - 2))]))
+            over = {"x": keys[0], "y": y, "map": len(self.vary.values(keys[1])) > 2}
+            self.__dict__["figure"] = self.figure.model_copy(update=over)
+        return self
 
     @field_validator(*REFUSALS, check_fields=False)
     @classmethod

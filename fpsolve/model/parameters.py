@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from enum import Enum
@@ -24,6 +25,11 @@ ANY_SIGN = {"ge": -SIZE["le"], "le": SIZE["le"]}
 """The range of a parameter of any sign."""
 DERIVED = {"ge": 1e-32, "le": 1e32}
 """The range of a positive parameter that is made of such parameters."""
+GREEK = (
+    "(alpha|beta|gamma|delta|epsilon|zeta|eta|theta|iota|kappa|lambda|mu|nu|xi|pi|rho|sigma|tau|upsilon|phi|chi|psi|"
+    r"omega|Gamma|Delta|Theta|Lambda|Xi|Pi|Sigma|Phi|Psi|Omega)_?(\d*|(?<=_)[a-zA-Z])"
+)
+"""A name that is a Greek letter, with a number or a letter below it."""
 STRICT: ConfigDict = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
 """The rules of all tables: no unknown keys, no conversions, finite numbers only."""
 
@@ -182,8 +188,10 @@ def quantities_of(kind: type[Parametrised]) -> Mapping[str, Quantity]:
 
 
 def unknown_parameter(key: str) -> Quantity:
-    """A parameter of which no more than its key is known."""
-    return Quantity(key, key, key, "", "unknown")
+    """A parameter of which no more than its key is known; a Greek name such as omega_0 is its symbol."""
+    greek = re.fullmatch(GREEK, key.rpartition(".")[2])
+    latex = rf"$\{greek[1]}{f'_{{{greek[2]}}}' if greek[2] else ''}$" if greek else ""
+    return Quantity(key, key, key, latex, "unknown")
 
 
 def cached_by_problem(most: int) -> Callable[[Callable[P, R]], Callable[P, R]]:

@@ -40,11 +40,13 @@ LINES = (
     ((1, 1, 0), (1, 1, 1)),
 )
 """Of the floor of the box, and of its edges behind the surface, in its edges."""
-RIM = ("0", "pi/2", "pi", "3 pi/2", "2 pi")
-"""Words at the quarters of the rim, in ASCII."""
+RIM = ("0", "π/2", "π", "3π/2", "2π")
+"""Words at the quarters of the rim."""
 RED = "#C8102E"
 NEXT_TO_ZERO = 0.05
 """A least value below this share of the maximum is drawn as 0, which rounding and small errors miss."""
+DECADES = 2
+"""So many powers of ten of T, which is positive, are drawn on a logarithmic scale."""
 Label = tuple[str, FloatArray, str]
 """Words, their place, and on which side of them this is."""
 
@@ -77,7 +79,7 @@ class Surface:
         xi: ξ of the nodes, shape (n,).
         values: shape (blocks · nodes, n).
         about: long_name, symbol and units of the function and of "phi" and "xi", as for xarray.
-        name: of the function, in ASCII.
+        name: of the function, in letters that VTK has.
         title: in which p and Λ(p) are.
         lines: of parameters.
         impacts: the phases at which the function jumps.
@@ -98,24 +100,28 @@ class Surface:
     def limits(self) -> tuple[float, float]:
         """The range of the values; it begins at 0 where the least is next to it, or all are the same."""
         low, high = float(np.nanmin(self.values)), float(np.nanmax(self.values))
-        return (0.0 if abs(low) < NEXT_TO_ZERO * high or high - low < 1e-6 * high else low, high)
+        is_next = abs(low) < NEXT_TO_ZERO * high or high - low < 1e-6 * high
+        return (0.0 if is_next and not self.is_log else low, high)
+
+    @property
+    def is_log(self) -> bool:
+        """Whether the scale of the values is logarithmic."""
+        return self.name == "T" and 0 < 10**DECADES * float(np.nanmin(self.values)) < float(np.nanmax(self.values))
 
     def placed(self, phi: Any, xi: Any, values: Any, *, cylinder: bool) -> FloatArray:
         """Points of space for φ, ξ and values, which broadcast: in a box, or with φ around an axis and ξ along it."""
         low, high = self.limits
-        along, up = (
-            (xi - self.xi[0]) / (self.xi[-1] - self.xi[0]),
-            (np.nan_to_num(values, nan=low) - low) / (high - low),
-        )
+        along, known = (xi - self.xi[0]) / (self.xi[-1] - self.xi[0]), np.nan_to_num(values, nan=low)
+        up = np.log(known / low) / math.log(high / low) if self.is_log else (known - low) / (high - low)
         radius = 1 + SWELL * up
         wrapped = radius * np.cos(phi), radius * np.sin(phi), LENGTH * along
         flat = BOX[0] * phi / (2 * math.pi), BOX[1] * along, BOX[2] * up
         return np.stack(np.broadcast_arrays(*(wrapped if cylinder else flat)), axis=-1)
 
     def label(self, of: str) -> str:
-        """A coordinate or the function, with its unit, in ASCII."""
+        """A coordinate or the function, with its unit."""
         unit = self.about[of]["units"]
-        words = self.name if of == "values" else f"{self.about[of]['long_name']} {of}"
+        words = self.name if of == "values" else f"{self.about[of]['long_name']} {'φ' if of == 'phi' else 'ξ'}"
         return words if unit == "1" else f"{words} ({unit})"
 
 
@@ -153,16 +159,18 @@ def flat_picture(surface: Surface, cmap: str) -> Picture:
 def flat_figure(surface: Surface, cmap: str) -> Figure:
     """The figure of `flat_picture`, which belongs to no window."""
     from matplotlib import rc_context
+    from matplotlib.colors import LogNorm, Normalize
     from matplotlib.figure import Figure
 
     about, (low, high) = surface.about, surface.limits
-    style: dict[str, Any] = {"shading": "gouraud", "cmap": cmap, "vmin": low, "vmax": high}
+    style: dict[str, Any] = {"shading": "gouraud", "cmap": cmap}
     with rc_context(STYLE):
         figure = Figure(figsize=SIZE, layout="constrained")
         axes = figure.add_subplot()
         if surface.is_lines:
             _draw_lines(axes, surface)
         else:
+            style["norm"] = (LogNorm if surface.is_log else Normalize)(low, high)
             draw_colours(axes, surface.phi.ravel(), surface.xi, surface.values.T, about["values"], **style)
         for impact in surface.impacts:
             axes.axvline(impact, color=RED, linewidth=1.2)
@@ -181,13 +189,17 @@ def _draw_lines(axes: Any, surface: Surface) -> None:
         values = np.pad(blocks, ((0, 0), (0, 1)), constant_values=math.nan).ravel()
         axes.plot(phi, values, color=COLOURS[number % len(COLOURS)], linewidth=1.6, label=rf"$\xi$ = {xi:g}")
     axes.set_xlim(0, 2 * math.pi)
-    axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
+    if surface.is_log:
+        axes.set_yscale("log")
+    else:
+        axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
     if 1 < surface.xi.size <= MOST_LINES:
         add_legend(axes)
 
 
 def picture_in_space(surface: Surface, cmap: str, *, cylinder: bool) -> Picture:
     """The function as a surface over the plane or around a cylinder, by pyvista; only where `can_render` says so."""
+    from matplotlib.font_manager import findfont
     from matplotlib.image import imsave
 
     with signals_held():
@@ -208,19 +220,21 @@ def picture_in_space(surface: Surface, cmap: str, *, cylinder: bool) -> Picture:
         bar: dict[str, Any] = {"title": f"{surface.label('values')}\n", "vertical": True, "color": "black"}
         bar |= {"position_x": 0.88, "position_y": 0.25, "height": 0.5, "width": 0.06, "n_labels": 5, "fmt": "%.3g"}
         bar |= {"title_font_size": 20, "label_font_size": 20}
-        plotter.add_mesh(mesh, cmap=cmap, clim=surface.limits, smooth_shading=True, ambient=0.45, scalar_bar_args=bar)
+        look: dict[str, Any] = {"cmap": cmap, "clim": surface.limits, "log_scale": surface.is_log}
+        plotter.add_mesh(mesh, smooth_shading=True, ambient=0.45, scalar_bar_args=bar, **look)
         for row in (row for impact in surface.impacts for row in np.flatnonzero(np.abs(phi - impact) < 1e-9)):
             edge = pyvista.lines_from_points(points[row])
             plotter.add_mesh(edge, color=RED, line_width=4, render_lines_as_tubes=True, lighting=False)
         for edges in () if cylinder else LINES:
             plotter.add_lines(np.multiply(edges, BOX), color="black", width=1, connected=True)
         plain: dict[str, Any] = {"shape": None, "show_points": False, "always_visible": True, "bold": False}
+        letters = {"font_file": findfont("DejaVu Sans"), "color": "black"}  # those of VTK are Latin
         for words, place, side in (_labels_of_cylinder if cylinder else _labels_of_box)(surface):
             style = {"text_color": RED if "impact" in words else "black", "justification_horizontal": side}
+            style |= {"font_file": letters["font_file"]}
             plotter.add_point_labels([place], [words], font_size=22, **plain, **style)
-        title = surface.title.replace("Λ", "Lambda")  # VTK's letters are Latin
-        plotter.add_text(title, position="upper_edge", font_size=12, color="black")
-        plotter.add_text("\n".join(surface.lines), position="lower_edge", font_size=8, color="black")
+        plotter.add_text(surface.title, position="upper_edge", font_size=12, **letters)
+        plotter.add_text("\n".join(surface.lines), position="lower_edge", font_size=8, **letters)
         seen_from = (-1.5, -1.5, 1.3) if cylinder else (-1.2, -2.0, 1.6)
         plotter.camera_position = [seen_from, (0, 0, 0), (0, 0, 1)]
         plotter.reset_camera()
@@ -260,7 +274,7 @@ def _labels_of_cylinder(surface: Surface) -> Iterator[Label]:
         rim = surface.values[np.argmin(np.abs(phi - k * math.pi / 2)), -1] if k < 2 else high
         place = surface.placed(k * math.pi / 2, end, rim, cylinder=True) * (1.1, 1.1, 1)
         text = f"{words}: impact" if k in impacts else words
-        yield surface.label("phi").replace("phi", f"phi = {text}") if k == 0 else text, place, side
+        yield surface.label("phi").replace("φ", f"φ = {text}") if k == 0 else text, place, side
     for xi in (start, end):
-        words = surface.label("xi").replace("xi", f"xi = {xi:.3g}")
+        words = surface.label("xi").replace("ξ", f"ξ = {xi:.3g}")
         yield words, surface.placed(0.75 * math.pi, xi, high, cylinder=True) * (1.1, 1.1, 1), "right"

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import partial
+from itertools import chain, product
 from pathlib import Path
 from string import ascii_lowercase
 from textwrap import wrap
@@ -300,7 +301,7 @@ def _draw(case: Case, chart: Chart, paths: Sequence[Path], heading: str) -> None
         label_axes(axes, *(case.about(key).attributes for key in keys))
         for axis, side in zip((axes.xaxis, axes.yaxis), frame, strict=True):
             scale_axis(axis, side.scale, (side.start, side.stop))
-        small = {} if chart.regions is None else _shade(axes, chart.regions, frame)
+        small = {} if chart.regions is None else _shade(axes, chart.regions, frame, list(chain(*chart.closed_forms)))
         for i, line in enumerate(chart.lines):
             colour, appears = COLOURS[i % len(COLOURS)], _appears(line.zero)
             for branch in line.branches:
@@ -325,8 +326,12 @@ def _draw(case: Case, chart: Chart, paths: Sequence[Path], heading: str) -> None
             axes.plot([], [], " ", label=f"{letter}: {name}")
 
 
-def _shade(axes: Any, regions: Regions, frame: tuple[Axis, Axis]) -> dict[str, str]:
-    """Draw a tint for each region, and its name, or where that has no room a letter; the letters by the names."""
+def _shade(axes: Any, regions: Regions, frame: tuple[Axis, Axis], forms: Sequence[FloatArray]) -> dict[str, str]:
+    """Draw a tint for each region, and its name, off the lines, or where that has no room a letter; these by the names.
+
+    Args:
+        forms: the closed forms, which cross regions, each of shape (n, 2).
+    """
     from matplotlib.colors import ListedColormap
 
     x, y = frame
@@ -335,7 +340,11 @@ def _shade(axes: Any, regions: Regions, frame: tuple[Axis, Axis]) -> dict[str, s
     tints = np.array([*unstable, np.nan])[regions.index]
     style: dict[str, Any] = {"cmap": ListedColormap(TINTS), "vmin": -0.5, "vmax": len(TINTS) - 0.5}
     axes.pcolormesh(x.value(edges), y.value(edges), tints.T, rasterized=True, **style)
-    letters, small = iter(ascii_lowercase), dict[str, str]()
+    letters, small, crossed = iter(ascii_lowercase), dict[str, str](), np.zeros(regions.index.shape, dtype=bool)
+    for line in forms:
+        at = [np.interp(np.linspace(0, 1, 2000), np.linspace(0, 1, len(line)), axis) for axis in line.T]
+        u, v = (np.searchsorted(side.value(edges), each) - 1 for side, each in zip(frame, at, strict=True))
+        crossed[u.clip(0, len(edges) - 2), v.clip(0, len(edges) - 2)] = True
     middle: dict[str, Any] = {"ha": "center", "va": "center", "color": "0.15", "zorder": 4}
     for number, each in enumerate(regions.each):
         tint = TINTS[min(unstable[number], len(TINTS) - 1)]
@@ -343,9 +352,10 @@ def _shade(axes: Any, regions: Regions, frame: tuple[Axis, Axis]) -> dict[str, s
         name = each.name.replace("δ_p", r"$\delta_p$")
         parts = name.split(", ")
         narrow = [line for part in parts for line in ([part] if "$" in part else wrap(part, 14))]
-        for lines in (parts, narrow):
+        inside = regions.index == number
+        for free, lines in product((inside & ~crossed, inside), (parts, narrow)):
             words = axes.text(0, 0, "\n".join(lines), fontsize=9.5, **middle)
-            if place := _room(words, regions.index == number):
+            if place := _room(words, free):
                 words.set_position((x.value(place[0]), y.value(place[1])))
                 break
             words.remove()
@@ -361,7 +371,7 @@ def _room(words: Any, inside: FloatArray) -> tuple[float, float] | None:
     from scipy.ndimage import distance_transform_edt, minimum_filter
 
     box, n, inches = words.get_window_extent(), inside.shape[0], words.figure.dpi
-    shares = 1.15 * box.width / (0.85 * FORM.width * inches), 1.15 * box.height / (FORM.height * inches)
+    shares = 1.05 * box.width / (0.85 * FORM.width * inches), 1.05 * box.height / (FORM.height * inches)
     fits = minimum_filter(inside, [max(1, round(n * share)) for share in shares], mode="constant")
     if not fits.any():
         return None

@@ -106,7 +106,7 @@ def test_symbols_and_words(tmp_path: Path) -> None:
     """They name axes and legends, and leave what is solved alone."""
     case = load_case(write(tmp_path, SYSTEM, MOMENTS))
     assert case.about("system.zeta").title == r"damping ratio $\zeta$"
-    assert legend({"system.zeta": 0.1, "system.omega": 2.0}, case.about) == r"$\zeta$ = 0.1, omega = 2"
+    assert legend({"system.zeta": 0.1, "system.omega": 2.0}, case.about) == r"$\zeta$ = 0.1, $\omega$ = 2"
     assert load_case(write(tmp_path, SYSTEM, MOMENTS), ["system.zeta=0.2"]).about("system.zeta").latex == r"$\zeta$"
     other = load_case(write(tmp_path, SYSTEM.replace("damping ratio", "damping"), MOMENTS))
     keys = {set_key(each.curve({})) for each in (case, other)}

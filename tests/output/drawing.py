@@ -31,12 +31,13 @@ def _result(case, curve, *, has_failed):
     theory = second_order(curve.problem)
     p = case.p[:0] if has_failed else case.p
     value, nothing = theory.moment_exponent(p), np.zeros(p.size)
+    slope = (theory.moment_exponent(p + 1) - theory.moment_exponent(p - 1)) / 2  # of a parabola
     found = {name: getattr(theory, name) for name in ("lyapunov_exponent", "stability_index")}
     known = {name: Estimate(each, 0.0, 1.0) for name, each in found.items() if not has_failed and abs(each) <= 20}
     estimates = {**dict.fromkeys(INDICES), **known}
     failures = (Failure(None, "it was too hard"),) if has_failed else ()
     return CurveResult(
-        curve, MomentColumns(p, value, nothing, nothing, nothing, nothing, value), estimates, failures=failures
+        curve, MomentColumns(p, value, slope, nothing, nothing, nothing, value), estimates, failures=failures
     )
 
 

@@ -152,6 +152,16 @@ def test_a_constant_has_a_picture():
     assert np.all(np.isfinite(surface.placed(surface.phi.ravel()[:, None], surface.xi, surface.values, cylinder=True)))
 
 
+def test_what_spans_decades_is_drawn_by_its_logarithm():
+    problem = Problem(VibroImpactOscillator(omega=1.0, restitution=1.0, c1=0.0, epsilon=1.0), UNIT_NOISE)
+    surface = surface_of(ExponentSolver(problem, rtol=1e-4).pair(2.0), "T")
+    low, high = surface.limits
+    assert 0 < 1e3 * low < high
+    heights = [surface.placed(0.0, 0.0, each, cylinder=False)[2] for each in (low, np.sqrt(low * high), high)]
+    np.testing.assert_allclose(heights, [0, 0.2, 0.4], atol=1e-12)
+    assert flat_figure(surface, "viridis").axes[-1].get_yscale() == "log"
+
+
 def test_what_cannot_be_drawn_is_refused(pair):
     with pytest.raises(ValueError, match="got field = 'density'; must be one of 'T', 'T_adjoint', 'tilted_density'"):
         draw_eigenfunction(pair, "density")

@@ -34,6 +34,7 @@ PLANE = [
     over("oscillator.omega", "{moment=2.0}"),
 ]
 COARSE = [text.replace("num=20", "num=9") for text in PLANE]
+THREE = "vary.oscillator.omega=[1.0, 2.0, 4.0]"
 BOTH = "vary.noise.treatment=['exact', 'ou-reduction']"
 FIGURES = {
     "one": [],
@@ -274,6 +275,35 @@ def test_when_it_is_a_map(drawn, tmp_path, count, more, key):
         main_figure(case, results_of(case), [], tmp_path).write(tmp_path)
         [mesh] = [each for each in drawn[0].axes[0].collections if type(each).__name__ == "QuadMesh"]
         assert mesh.get_array().shape == (count, 3)
+
+
+@pytest.mark.parametrize(
+    ("sets", "x", "y", "is_map"),
+    [
+        ([intensities(9), THREE], "noise.D0", "lyapunov_exponent", True),
+        ([intensities(9), "vary.oscillator.omega=[1.0, 2.0]"], "noise.D0", "lyapunov_exponent", False),
+        ([intensities(4), THREE, "output.quantities=['moment']"], "noise.D0", 2, True),
+        ([intensities(2), THREE], "p", "moment", None),
+        ([intensities(9), THREE, "figure.x='p'"], "p", "moment", None),
+        ([intensities(9), BOTH], "p", "moment", None),
+    ],
+)
+def test_many_curves_over_two_keys_are_a_map_unasked(tmp_path, sets, x, y, is_map):
+    figure = case_of(tmp_path, sets).figure
+    assert (figure.x, figure.moment or figure.y, figure.map) == (x, y, is_map)
+
+
+def test_where_curves_pass_zero_is_enlarged_and_ticks_cover_none(pictures, drawn, tmp_path):
+    case = drawn_case(tmp_path, ["vary.noise.D0=[0.9, 1.0, 1.1]"])
+    [inset] = drawn[0].axes[0].child_axes
+    roots = [second_order(curve.problem).stability_index for curve in case.curves()]
+    assert inset.get_xlim()[0] < min(roots) < 0 < inset.get_xlim()[1]
+    for line, root in zip(inset.lines, roots, strict=False):
+        assert abs(np.interp(root, *line.get_data())) < 1e-3 * np.ptp(line.get_ydata())
+    [ticks] = [each for each in drawn[0].axes[0].collections if len(each.get_offsets()) == 3]
+    assert np.all(np.diff(ticks.get_sizes()) < 0)
+    drawn_case(tmp_path, ["vary.noise.D0=[0.9, 1.0, 1.1]", "moments.p=[-2.0, -1.0, -0.5, 0.1]"])
+    assert not drawn[1].axes[0].child_axes  # it is large anyway
 
 
 @pytest.mark.slow

@@ -155,7 +155,7 @@ def test_powers_in_units_are_typeset(unit, drawn, said):
 
 def test_a_unit_that_is_not_known_is_left_out(tmp_path):
     case = case_in(tmp_path, own("white") + MOMENTS)
-    assert case.about("system.k").title == "system.k"
+    assert case.about("system.k").title == "parameter k"
     assert case.about("noise.axial.s").title == r"intensity of white noise ${s}_{\mathrm{axial}}$"
 
 

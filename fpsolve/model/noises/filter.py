@@ -75,7 +75,7 @@ class Filter(Noise):
 
     omega: Annotated[float, parameter("frequency of the filter", "omega = 2.0", r"$\omega_f$", "rad/time", **SIZE)]
     zeta: Annotated[float, parameter("damping ratio of the filter", "zeta = 0.1", r"$\zeta$", **SIZE)]
-    s: Annotated[float, parameter("intensity of the white noise", "s = 0.5", "$s$", "1/time^(5/2)", **SIZE)]
+    s: Annotated[float, parameter("intensity of the driving white noise", "s = 0.5", "$s$", "1/time^(5/2)", **SIZE)]
     c0: Annotated[float, parameter("coefficient of y", "c0 = 1.0", "$c_0$", **ANY_SIGN)] = 1.0
     c1: Annotated[float, parameter("coefficient of y′", "c1 = 0.0", "$c_1$", "time", **ANY_SIGN)] = 0.0
 

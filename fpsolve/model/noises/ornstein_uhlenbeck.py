@@ -215,7 +215,8 @@ class OrnsteinUhlenbeck(GaussianNoise):
 
     alpha: Annotated[float, parameter("relaxation rate", "alpha = 1.0", r"$\alpha_0$", "1/time", **DERIVED)]
     sigma: Annotated[
-        float, parameter("intensity of its white noise", "sigma = 0.5", r"$\sigma_0$", "1/time^(3/2)", **DERIVED)
+        float,
+        parameter("intensity of the driving white noise", "sigma = 0.5", r"$\sigma_0$", "1/time^(3/2)", **DERIVED),
     ]
 
     kind: ClassVar[str] = "ornstein-uhlenbeck"

@@ -262,8 +262,8 @@ class EquationSystem(System):
         parameters: Mapping[str, StatedParameter] = table.get("parameters", {})
         quantities = tuple((name, _quantity(name, each)) for name, each in parameters.items())
         signs = [quantity.shown.strip("$") for _, quantity in quantities]
-        for (name, quantity), sign in zip(quantities, signs, strict=True):
-            if quantity.latex and signs.count(sign) > 1:
+        for name, sign in zip(parameters, signs, strict=True):
+            if parameters[name].symbol and signs.count(sign) > 1:
                 text = f"got the symbol {sign} of two parameters; all must differ; choose another one"
                 raise TableError(text, "parameters", name, "symbol")
         named = {name: each.value for name, each in parameters.items()}
