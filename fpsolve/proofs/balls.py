@@ -84,6 +84,14 @@ def matrix_product(a: Balls, b: Balls) -> Balls:
     return np.array((left * right).entries(), dtype=object).reshape(a.shape[0], b.shape[1])
 
 
+def inverse(a: Balls) -> Balls:
+    """a⁻¹ of real balls. Raises `ZeroDivisionError` where a may be singular."""
+    from flint import arb_mat
+
+    found = arb_mat(a.shape[0], a.shape[1], a.ravel().tolist()).inv()
+    return np.array(found.entries(), dtype=object).reshape(a.shape)
+
+
 def above(number: arb) -> float:
     """The smallest float, or the one beyond it, that is above a ball."""
     return _beyond(number.upper(), math.inf)

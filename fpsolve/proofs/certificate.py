@@ -16,6 +16,7 @@ from fpsolve.errors import FpsolveError, NoSuchExponent
 from fpsolve.model.exact import BasisKind
 from fpsolve.proofs.balls import ball, precision
 from fpsolve.proofs.basis import OTHERS, Basis, Core
+from fpsolve.proofs.forms import FormCertificate
 from fpsolve.proofs.records import ChainRecord, MotionRecord, Record
 from fpsolve.proofs.statement import Statement, check_decimal, exact_halves
 
@@ -182,7 +183,7 @@ class Enclosure:
 
     lower: float
     upper: float
-    certificate: Certificate | None = None
+    certificate: Certificate | FormCertificate | None = None
     wanted: float = math.inf
 
     @property
@@ -213,20 +214,20 @@ NOTHING = Enclosure(-math.inf, math.inf)
 
 
 @precision()
-def enclosure_of(certificate: Certificate) -> Enclosure:
+def enclosure_of(certificate: Certificate | FormCertificate) -> Enclosure:
     """mu − lower.delta and mu + upper.delta, rounded outward; infinite where there is none."""
     lower, upper = _ends(certificate)
     return Enclosure(_outward(lower, -math.inf), _outward(upper, math.inf), certificate)
 
 
 @precision()
-def follows(lower: Fraction | None, upper: Fraction | None, certificate: Certificate) -> bool:
+def follows(lower: Fraction | None, upper: Fraction | None, certificate: Certificate | FormCertificate) -> bool:
     """Whether bounds hold if the certificate does; None claims nothing."""
     low, high = _ends(certificate)
     return (lower is None or bool(ball(lower) <= low)) and (upper is None or bool(ball(upper) >= high))
 
 
-def _ends(certificate: Certificate) -> tuple[Any, Any]:
+def _ends(certificate: Certificate | FormCertificate) -> tuple[Any, Any]:
     """The bounds of a certificate as balls, infinite where there is none."""
     below, above = (math.inf if side is None else side.delta for side in (certificate.lower, certificate.upper))
     return ball(certificate.mu) - ball(below), ball(certificate.mu) + ball(above)

@@ -12,11 +12,12 @@ from fractions import Fraction
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import Field, ValidationError, model_validator
+from pydantic import Discriminator, Field, Tag, ValidationError, model_validator
 
 from fpsolve.proofs.bounds import LOWER, UPPER
 from fpsolve.proofs.certificate import MOMENT, Certificate, MalformedProof, follows
 from fpsolve.proofs.excursions import excursion_factor
+from fpsolve.proofs.forms import FormCertificate
 from fpsolve.proofs.records import Record
 from fpsolve.proofs.statement import DECIMAL, inert_keys
 from fpsolve.proofs.verify import objection
@@ -36,7 +37,13 @@ class Bound(Record):
 
     lower: Decimal | None
     upper: Decimal | None
-    certificate: Certificate | None
+    certificate: (
+        Annotated[
+            Annotated[Certificate, Tag("phases")] | Annotated[FormCertificate, Tag("form")],
+            Discriminator(lambda data: "form" if isinstance(data, dict) and "factor" in data else "phases"),
+        ]
+        | None
+    )
 
     @property
     def bounds(self) -> Sequence[Bound]:
@@ -124,7 +131,7 @@ class ExcursionClaim(Record):
         yield from self.moment.objections(parameters)
         certificate, is_upper = self.moment.certificate, self.sense == "upper"
         end = self.moment.upper if is_upper else self.moment.lower
-        if end is None or (end > 0 if is_upper else end < 0) or certificate is None:
+        if end is None or (end > 0 if is_upper else end < 0) or not isinstance(certificate, Certificate):
             yield f"Λ(p) {'≤' if is_upper else '≥'} 0 is not proven"
             return
         with np.errstate(all="ignore"):
@@ -158,7 +165,7 @@ class CurveClaims(Record):
         """What does not follow, after the place where it stands."""
         bounds = [each for claim in self.claims.values() for each in claim.bounds]
         stated = [each.certificate.statement for each in bounds if each.certificate is not None]
-        if any((each.motion, each.chain) != (stated[0].motion, stated[0].chain) for each in stated):
+        if any(each.records != stated[0].records for each in stated):
             yield "its certificates are of several systems"
         for place, claim in self.claims.items():
             yield from (f"{place}: {text}" for text in claim.objections(self.parameters))
@@ -299,7 +306,7 @@ def _are_same(stated: Mapping[str, str], parameters: Stated) -> bool:
 def _first_fault(failure: ValidationError) -> str:
     """The first of the faults, with its place."""
     first = failure.errors(include_url=False)[0]
-    place = ".".join(map(str, first["loc"]))
+    place = ".".join(str(each) for each in first["loc"] if each not in ("phases", "form"))
     said = re.sub(r"^Value error, | after validation", "", re.sub(r"^(Input|List|String) should", "must", first["msg"]))
     return f"{place + ': ' if place else ''}{_PLAINLY.get(first['type'], said)}"
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
-from fpsolve.errors import NotConverged
+from fpsolve.errors import NoHierarchy, NotConverged
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.function import nonzero_root
 from fpsolve.exponent.solver import ExponentSolver
@@ -16,6 +16,7 @@ from fpsolve.proofs.balls import precision
 from fpsolve.proofs.bounds import LOWER, UPPER
 from fpsolve.proofs.certificate import NOTHING, Enclosure, around, enclosure_of, trivial
 from fpsolve.proofs.excursions import excursion_factor
+from fpsolve.proofs.forms import form_certificate
 from fpsolve.proofs.search import Timer, enclose, sign_certificate
 from fpsolve.proofs.statement import Statement, cylinder, statement_of
 from fpsolve.theory.perturbation import scale_of
@@ -106,6 +107,8 @@ def prove(
 ) -> Enclosure:
     """Bounds on Λ(p) that hold with certainty, for any system with coefficients a + bξ, and noise with r₀ ≤ 1.
 
+    Of more than two variables they are of Λ(2) under white noise, from a quadratic form, see `fpsolve.proofs.forms`.
+
     They follow from a function T > 0 with λ₋ T ≤ L(p) T ≤ λ₊ T, Eq. (19), which is verified in ball arithmetic; neither
     the finite elements nor the eigenvalue iteration are trusted. See `fpsolve.proofs.verify` for the theorem.
 
@@ -175,7 +178,8 @@ def check_width(width: float | None) -> None:
 def refuse_unprovable(stated: Statement) -> None:
     """Refuse parameters for which no bound can be proven. Raises `NoSuchExponent`, `MissingFlint`."""
     with precision():
-        cylinder(stated)
+        if not stated.linear:
+            cylinder(stated)
 
 
 def prove_bounds(
@@ -193,6 +197,8 @@ def prove_bounds(
         raise ValueError(f"got p = {p}; must be finite")
     check_width(width)
     refuse_unprovable(stated)
+    if stated.linear:
+        return _of_second_moments(problem, stated, order, width)
     if order == 0:
         return trivial(stated)
     for rtol in (1e-8, 1e-3):  # what finite elements find, at a smaller accuracy if need be
@@ -208,6 +214,16 @@ def prove_bounds(
     return replace(found, wanted=wanted)
 
 
+def _of_second_moments(problem: Problem, stated: Statement, p: float, width: float | None) -> Enclosure:
+    """Bounds on Λ(2) of more than two variables; nothing for other p, or where the form is not positive."""
+    wanted = float(scale_of(problem).moment(2.0)) * SHARE if width is None else width
+    certificate = None
+    if p == 2 and stated.linear:
+        with suppress(NoHierarchy):
+            certificate = form_certificate(stated.linear, stated.parameters)
+    return replace(NOTHING if certificate is None else enclosure_of(certificate), wanted=wanted)
+
+
 def prove_index(
     problem: Problem, stated: Statement, budget: Budget, progress: Callable[[], None] = lambda: None
 ) -> IndexEnclosure:
@@ -216,6 +232,8 @@ def prove_index(
     They may take twice the seconds of a budget, as they need bounds at two p.
     """
     refuse_unprovable(stated)
+    if stated.linear:
+        return NO_INDEX
     timer = Timer(2 * budget.seconds)
     solver = ExponentSolver(problem, budget=replace(budget, seconds=2 * GUESS_SHARE * budget.seconds))
     try:
@@ -249,6 +267,8 @@ def prove_excursions(
 ) -> ExcursionEnclosure:
     """Bounds of excursions from p beside δ_p; none where there is no δ_p > 0, or where they are not found."""
     refuse_unprovable(stated)
+    if stated.linear:
+        return NO_EXCURSION
     timer = Timer(budget.seconds)
     try:
         most = replace(budget, seconds=GUESS_SHARE * budget.seconds)

@@ -9,9 +9,22 @@ from typing import Annotated, Any, Literal, Self
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from fpsolve.arrays import FloatArray, identity, one
 from fpsolve.model.exact import Exact, ExactJump, ExactLaw, ExactMotion, chain_law
 from fpsolve.model.noise import Noise
-from fpsolve.model.plane import System, affine, matrix_at, rotating_coordinates, written_coefficient
+from fpsolve.model.noises.several import noises_of
+from fpsolve.model.noises.white import White
+from fpsolve.model.plane import (
+    MOST_VARIABLES,
+    CoefficientMatrix,
+    System,
+    affine,
+    matrix_at,
+    rotating_coordinates,
+    written_coefficient,
+)
+from fpsolve.model.problem import Problem
+from fpsolve.model.systems.plane_system import LinearSystem
 
 MOST_TERMS, MOST_ORDER, MOST_STATES = 200, 40, 400
 KNOWN = "OrnsteinUhlenbeck, NonGaussianNoise, SineWiener, Telegraph, MarkovChain and White"
@@ -20,6 +33,10 @@ NEAR = 1e-12
 """How near a multiple of π/4 a phase is taken as that."""
 Row = Annotated[list[float], Field(min_length=2, max_length=2)]
 Matrix = Annotated[list[Row], Field(min_length=2, max_length=2)]
+SquareMatrix = Annotated[
+    list[Annotated[list[float], Field(min_length=1, max_length=MOST_VARIABLES)]],
+    Field(min_length=1, max_length=MOST_VARIABLES),
+]
 OctantRays = ((1, 0), (1, -1), (0, -1), (-1, -1))
 """Along (cos φ, −sin φ) for φ = 0, π/4, π/2 and 3π/4."""
 
@@ -103,6 +120,47 @@ class MotionRecord(Record):
         )
         jumps = (ExactJump(back @ _fractions(j.ray), Fraction(1), Fraction(j.log_factor)) for j in self.jumps)
         return ExactMotion(still, driven, tuple(jumps))
+
+
+class LinearRecord(Record):
+    """A motion by its matrices.
+
+    Attributes:
+        numbers: "binary": what is proven holds for the exact values of these floats.
+        drift, diffusions: A, and all B_k, in Stratonovich's sense.
+    """
+
+    numbers: Literal["binary"] = "binary"
+    drift: SquareMatrix
+    diffusions: Annotated[list[SquareMatrix], Field(max_length=MOST_TERMS)]
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> Self:
+        if any(np.shape(each) != 2 * (len(self.drift),) for each in (self.drift, *self.diffusions)):
+            raise ValueError("matrices must be square and of one size")
+        return self
+
+    @classmethod
+    def of(cls, problem: Problem) -> LinearRecord:
+        """The matrices of a problem. Raises `TypeError` where its noise is not white."""
+        drift, diffusions, impulses = problem.noise.motion(problem.system)
+        if impulses or not problem.noise.is_white or problem.system.pasts:
+            told = f"got a system of {problem.dimension} variables under other noise than white, or with a delay"
+            raise TypeError(f"{told}; proofs are for two variables under {KNOWN}, and for more under White")
+        steady, *noisy = (
+            sum(
+                (drift.epsilon**each.order * np.array(each.matrix) for each in terms),
+                np.zeros(2 * (problem.dimension,)),
+            )
+            for terms in (drift.terms, *([each] for each in diffusions))
+        )
+        return cls(drift=steady.tolist(), diffusions=[each.tolist() for each in noisy])
+
+    def problem(self, factor: FloatArray) -> Problem:
+        """That of y = G x."""
+        turned = [(factor @ np.array(a) @ np.linalg.inv(factor)).tolist() for a in (self.drift, *self.diffusions)]
+        terms = [CoefficientMatrix(int(k > 0), a, identity if k else one, str(k or "")) for k, a in enumerate(turned)]
+        return Problem(LinearSystem(terms), noises_of({str(k): White(s=1.0) for k in range(1, len(turned))}))
 
 
 class ChainRecord(Record):

@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -31,7 +32,7 @@ from fpsolve.model.parameters import Parametrised
 from fpsolve.model.plane import System
 from fpsolve.model.problem import Problem, checked_problem
 from fpsolve.proofs.balls import Balls, ball, each
-from fpsolve.proofs.records import ChainRecord, MotionRecord
+from fpsolve.proofs.records import ChainRecord, LinearRecord, MotionRecord, Record
 
 if TYPE_CHECKING:
     from flint import arb
@@ -50,15 +51,24 @@ class Statement:
         parameters: of the system if it has no motion here, and of the noise if it has no chain; else they are labels.
         motion: the system by its matrices.
         chain: the noise by its rates.
+        linear: both by their matrices, of more than two variables.
     """
 
     parameters: Parameters
     motion: MotionRecord | None = None
     chain: ChainRecord | None = None
+    linear: LinearRecord | None = None
+
+    @property
+    def records(self) -> tuple[Record | None, ...]:
+        """What tells the problem besides parameters."""
+        return self.motion, self.chain, self.linear
 
     @property
     def labels(self) -> list[str]:
         """The keys of the parameters that are labels."""
+        if self.linear:
+            return [*self.parameters]
         told = [half.section for half, own in ((System, self.motion), (Noise, self.chain)) if own is not None]
         return [key for key in self.parameters if _section(key) in told]
 
@@ -144,7 +154,7 @@ def statement_of(problem: Problem, stated: Parameters | None = None) -> Statemen
         stated = {key: str(value) for key, value in linear_values(problem).items()}
     system, noise = problem.system, problem.noise
     if problem.dimension > 2:
-        raise TypeError(f"got a system of {problem.dimension} variables; proofs are for two, without a delay")
+        return Statement(stated, linear=LinearRecord.of(problem))
     if len(noise.parts) > 1:
         raise TypeError(f"got the noises {' and '.join(noise.parts)} at once; proofs are for one noise")
     is_told = is_ours(system) and system.exact_motion(_named(system, stated)) is not None
@@ -227,7 +237,9 @@ def check_decimal(text: str) -> str:
 
 def inert_keys(stated: Parameters) -> set[str]:
     """The keys of other parameters of such a system and such a noise, on which no exponent depends."""
-    return {f"{half.section}.{name}" for half in _kinds(_plain(stated)) for name in half.inert}
+    with suppress(ValueError):  # of several noises, none of which has such keys
+        return {f"{half.section}.{name}" for half in _kinds(_plain(stated)) for name in half.inert}
+    return set()
 
 
 def _kinds(stated: Parameters) -> tuple[type[System], type[Noise]]:

@@ -84,12 +84,15 @@ import numpy as np
 from fpsolve.proofs.balls import ball, precision
 from fpsolve.proofs.bounds import LOWER, UPPER, Bounder, Bounds, Trial
 from fpsolve.proofs.certificate import MOMENT, Certificate, SideRecord
+from fpsolve.proofs.forms import FormCertificate
 from fpsolve.proofs.statement import Cylinder, cylinder
 
 
 @precision()
-def objection(certificate: Certificate) -> str:
+def objection(certificate: Certificate | FormCertificate) -> str:
     """Why the bounds of a certificate need not hold; empty where they are proven."""
+    if isinstance(certificate, FormCertificate):
+        return certificate.objection()
     sides = [(q, side) for q, side in ((UPPER, certificate.upper), (LOWER, certificate.lower)) if side is not None]
     if certificate.p is not None and Fraction(certificate.p) == 0:  # Λ(0) = 0, as T = 1
         return "" if all(q * Fraction(certificate.mu) + Fraction(side.delta) >= 0 for q, side in sides) else "Λ(0) = 0"

@@ -53,7 +53,7 @@ def _told(claims: CurveClaims | None, problem: Problem) -> list[str]:
         return [f"{says} was not checked here, as that takes long; `fpsolve prove --check {PROOF}` does it."]
     try:
         own = statement_of(problem)
-        is_own = all((each.motion, each.chain) == (own.motion, own.chain) for each in certificates)
+        is_own = all(each.statement.records == own.records for each in certificates)
         objection = next(claims.objections(), "") if is_own else "its certificates are of another system"
     except MissingFlint as missing:
         return [f"{says} was not checked here: {missing}."]

@@ -173,8 +173,12 @@ def test_a_case_of_three_variables(tmp_path: Path, capsys: pytest.CaptureFixture
     assert abs(found["moment"] - expected) <= found["moment_error"] <= 1e-5
     assert curve["discretisation"]["waves"] >= 2
     assert "du/dt = −0.5 v − u" in (tmp_path / "mine/report.html").read_text(encoding="utf-8")
+    assert main(["prove", str(path), "--out", str(tmp_path)]) == 0
+    assert main(["prove", "--check", str(tmp_path / "mine/proof.json")]) == 0
+    white = 'kind = "white"\ns = 0.8'
+    path = write(tmp_path, VOLTAGE.replace(white, 'kind = "ornstein-uhlenbeck"\nalpha = 1.0\nsigma = 0.5'))
     assert main(["prove", str(path), "--out", str(tmp_path)]) == BAD_INPUT
-    assert "proofs are for two, without a delay" in capsys.readouterr().err
+    assert "3 variables under other noise than white, or with a delay" in capsys.readouterr().err
 
 
 def test_a_hundred_thousand_signs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
