@@ -41,7 +41,7 @@ sphinx_gallery_conf = {
     "examples_dirs": ["tutorials", "generated/cases"],
     "gallery_dirs": ["generated/tutorials", "generated/gallery"],
     "filename_pattern": r"\.py",
-    "within_subsection_order": "FileNameSortKey",
+    "within_subsection_order": "made.OneOfEachKindFirst",
     "image_scrapers": ["matplotlib", "made.pictures_of_results"],
     "show_memory": False,
     "min_reported_time": 10_000,

@@ -111,7 +111,9 @@ import fpsolve
 case = fpsolve.load_case("{path.name}", {_listed(sets)})
 results = fpsolve.run(case)
 {"" if few else INDICES}"""
-    return head + shown + run + (CHART.format(name=path.stem) if path.stem in CHARTS else "")
+    if path.stem in CHARTS:
+        return head + shown + CHART.format(file=path.name, name=path.stem)
+    return head + shown + run + KINDS.get(path.stem, "")
 
 
 INDICES = """for result in results[:6]:
@@ -119,16 +121,18 @@ INDICES = """for result in results[:6]:
 """
 CHART = """
 # %%
-# Its chart takes minutes. So these lines draw it from the files that ``fpsolve chart`` wrote, which are in docs/charts
-# of the repository. To draw a chart of your own, write its folder of results instead:
+# Its chart takes up to minutes. So these lines draw it from the files that ``fpsolve chart`` wrote, which are in
+# docs/charts of the repository. To draw a chart of your own, write its folder of results instead:
 
 from pathlib import Path
 
 import matplotlib.pyplot as plt
 
+import fpsolve
 from fpsolve.drawing import label_axes, scale_axis
 from fpsolve.output.figures import read_line
 
+case = fpsolve.load_case("{file}")
 x, y = case.chart.x.axis, case.chart.y.axis
 figure, axes = plt.subplots(layout="constrained")
 for number, zero in enumerate(case.chart.zero):
@@ -141,6 +145,83 @@ scale_axis(axes.yaxis, y.scale, (y.start, y.stop))
 axes.legend()
 plt.show()
 """
+KINDS = {
+    "fig1": "",
+    "chart": "",
+    "strong": """
+# %%
+# The eigenfunction T of p = 2, which spans decades:
+
+from fpsolve import ExponentSolver
+from fpsolve.output import draw_eigenfunction
+
+# sphinx_gallery_thumbnail_number = -1
+pair = ExponentSolver(case.problem, rtol=1e-4).pair(2.0)
+draw_eigenfunction(pair).save("results/strong/eigenfunction.png")
+""",
+    "ornstein_uhlenbeck": """
+# %%
+# The stationary density of phase and noise:
+
+from fpsolve import ExponentSolver
+from fpsolve.analysis import stationary_density
+
+# sphinx_gallery_thumbnail_number = -1
+stationary_density(ExponentSolver(case.problem).pair(0.0)).plot()
+""",
+    "response": "# sphinx_gallery_thumbnail_number = -1\n",
+    "hoisted": """
+# %%
+# The measured spectrum, and that of the noise that was fitted to it:
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+from fpsolve.measured import fit_noise, of_support_acceleration, read_spectrum
+
+# sphinx_gallery_thumbnail_number = -1
+sea = read_spectrum("../../../cases/measured/buoy.csv", of="acceleration", sided="one", column="acceleration")
+sea = sea.scaled(of_support_acceleration())
+natural = np.sqrt(case.problem.values["system.stiffness"])
+fit = fit_noise(sea, "filter", frequency=natural)
+figure, axes = plt.subplots(layout="constrained")
+axes.semilogy(sea.frequencies, sea.density, "o", label="measured")
+omega = np.linspace(*sea.frequencies[[0, -1]], 400)
+axes.semilogy(omega, [fit.spectral_density(each) for each in omega], label="fitted")
+axes.axvline(2 * natural, color="0.6", label="twice the natural frequency")
+axes.set(xlabel="frequency (rad/s)", ylabel="spectral density of the relative stiffness (s)")
+axes.legend()
+plt.show()
+""",
+    "theorem": """
+# %%
+# Between these bounds is, with certainty, the probability that a path ever exceeds A times its start, though almost
+# every path decays:
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+from fpsolve.proofs import prove_excursion
+
+# sphinx_gallery_thumbnail_number = -1
+proof, levels = prove_excursion(case.problem), np.geomspace(1, 1e4, 50)
+figure, axes = plt.subplots(layout="constrained")
+axes.fill_between(levels, *np.transpose([proof.bounds(level) for level in levels]), alpha=0.4)
+axes.set(xscale="log", yscale="log", xlabel="level A", ylabel="probability that a path ever exceeds it")
+plt.show()
+""",
+}
+"""The first cases of the gallery, which show one of each kind, and what they draw beside Λ(p)."""
+
+
+class OneOfEachKindFirst:
+    """The order of the gallery."""
+
+    def __init__(self, folder: str) -> None:
+        self.names = [f"plot_{name}.py" for name in KINDS]
+
+    def __call__(self, name: str) -> tuple[int, str]:
+        return self.names.index(name) if name in self.names else len(self.names), name
 
 
 def _rst(text: str) -> str:
