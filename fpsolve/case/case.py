@@ -340,7 +340,7 @@ class CaseWithoutParts(Section):
         """The p that are simulated: those of [monte_carlo], or else all, or of populations at most nine."""
         if self.monte_carlo.p is not None:
             return np.array(self.monte_carlo.p)
-        return self.p if self.monte_carlo.estimator == "direct" else _spread(self.p)
+        return _spread(self.p) if self.monte_carlo.estimator == "population" else self.p
 
     @property
     def planned(self) -> int:

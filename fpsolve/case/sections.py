@@ -288,7 +288,7 @@ class MonteCarloSection(Section):
     )
     step: Annotated[float | None, parameter("time step", "step = 0.05", gt=0)] = None
     seed: Annotated[int, parameter("seed of the random numbers", "seed = 0", ge=0)] = 0
-    estimator: Annotated[Estimator, parameter("how moments are estimated", 'estimator = "population"')] = "direct"
+    estimator: Annotated[Estimator | None, parameter("how moments are estimated", 'estimator = "population"')] = None
     p: Annotated[NonEmpty | None, parameter("orders of the moments that are simulated", "p = [1.0, 2.0]")] = None
 
 

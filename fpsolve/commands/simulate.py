@@ -27,7 +27,7 @@ def simulate(
     ] = None,
     estimator: Annotated[
         str | None,
-        Parameter(help="direct, or population for strong noise or large |p|; direct if the case does not state it."),
+        Parameter(help="direct, or population for strong noise or large |p|; chosen if the case does not state it."),
     ] = None,
     fresh: Fresh = False,
     options: Reporting = ALL_OPTIONS,

@@ -15,8 +15,9 @@ E Z = E‖x‖^p, and its logarithm is normal for many paths (J. Bérard, P. Del
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import cycle
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -26,7 +27,7 @@ from fpsolve.arrays import FloatArray, real_number
 from fpsolve.data import Result, dataset
 from fpsolve.drawing import draw_dots, finish, label_axes
 from fpsolve.errors import NotConverged
-from fpsolve.messages import Code, Message
+from fpsolve.messages import Code, Message, message_of
 from fpsolve.model.problem import Problem
 from fpsolve.model.quantity import EFFECTIVE_PATHS, IMPACTS, LYAPUNOV_EXPONENT, MOMENT, VARIANCE_RATE, P
 from fpsolve.simulation.batches import PlainBatch, Plan, Population, advance_all, standard_error
@@ -36,6 +37,7 @@ from fpsolve.simulation.setup import (
     BATCHES,
     FEWER,
     PATHS,
+    PROGRESS_STEPS,
     TRANSIENTS,
     Estimator,
     check_settings,
@@ -52,6 +54,8 @@ if TYPE_CHECKING:
 FEW: Mapping[Estimator, int] = {"direct": 5000, "population": 1000}
 """With fewer effective paths there is no estimate. Direct runs that miss the rare large ‖x‖^p have both more effective
 paths and a smaller mean, so that estimates near a lower bound would be too small."""
+MOST_POPULATIONS = 9
+"""Orders whose populations are simulated unasked."""
 DRIFT = 4.0
 """Standard errors by which two parts of the same estimate may differ."""
 _TINY = 1e-9
@@ -129,7 +133,7 @@ class MonteCarlo(Result):
             IMPACTS: self.impacts,
         }
         settings = {name: getattr(self, name) for name in ("paths", "time", "step", "seed")}
-        estimator = self.estimates[0].estimator if self.estimates else ""
+        estimator = ", ".join(dict.fromkeys(each.estimator for each in self.estimates))
         more = {**settings, "estimator": estimator, "interrupted": int(self.interrupted), "warnings": self.warnings}
         return dataset(MOMENT.words, "Monte Carlo", numbers, {P: p}, self.parameters, **more)
 
@@ -149,7 +153,7 @@ def simulate(
     problem: Problem,
     p: float | Sequence[float],
     *,
-    estimator: Estimator = "direct",
+    estimator: Estimator | None = None,
     paths: int = PATHS,
     time: float | None = None,
     step: float | None = None,
@@ -168,7 +172,8 @@ def simulate(
     Args:
         problem: any linear motion, an oscillator without its c₂ and c₃, and its noise.
         p: orders of the moments, one or several.
-        estimator: "direct", cheap and for moderate p; or "population", one simulation for each p.
+        estimator: "direct", cheap and for moderate p; "population", one simulation for each p; None for the former,
+            and for the latter at those p, nine at most, at which too few paths carry the mean.
         paths: how many; a multiple of 32 is used.
         time: length of the paths after the transient; 64 transients if None, and 4 beyond the plane, where
             they are longer. Whole transients are used.
@@ -183,6 +188,44 @@ def simulate(
         NotConverged: the numbers overflowed.
         KeyboardInterrupt: before two transients were done.
     """
+    how: dict[str, Any] = {"paths": paths, "time": time, "step": step, "seed": seed}
+    if estimator is not None:
+        return _simulated(problem, p, estimator, progress=progress, **how)
+    is_counted = cycle((True, False))
+
+    def half() -> None:
+        if next(is_counted):
+            progress()
+
+    found = _simulated(problem, p, "direct", progress=half, **how)
+    few = [each.p for each in found.estimates if each.value is None]
+    if not few or found.interrupted:
+        for _ in range(0 if found.interrupted else PROGRESS_STEPS // 2):
+            progress()
+        return found
+    few = [few[i] for i in dict.fromkeys(np.linspace(0, len(few) - 1, MOST_POPULATIONS).round().astype(int).tolist())]
+    try:
+        more = _simulated(problem, few, "population", progress=half, **how)
+    except KeyboardInterrupt:
+        return replace(found, interrupted=True)
+    known = {each.p: each for each in more.estimates}
+    estimates = tuple(known.get(each.p, each) for each in found.estimates)
+    told = [each for each in (*found.warnings, *more.warnings) if message_of(each).code != Code.FEW_PATHS]
+    return replace(found, estimates=estimates, warnings=(*_missing(estimates), *told), interrupted=more.interrupted)
+
+
+def _simulated(
+    problem: Problem,
+    p: float | Sequence[float],
+    estimator: Estimator,
+    *,
+    paths: int,
+    time: float | None,
+    step: float | None,
+    seed: int,
+    progress: Callable[[], None],
+) -> MonteCarlo:
+    """What one estimator finds, see `simulate`."""
     oscillator, noise = simulated_parts(problem)
     time, step = (None if each is None else real_number(each, name) for name, each in (("time", time), ("step", step)))
     check_settings(problem, p, estimator, paths, seed)
@@ -247,7 +290,7 @@ def simulate(
         step=h,
         seed=seed,
         impacts=sum(batch.impacts for batch in plain),
-        warnings=(*_missing(plan, estimates), *drifts, *stopped),
+        warnings=(*_missing(estimates), *drifts, *stopped),
         interrupted=interrupted,
         parameters=problem.values,
     )
@@ -318,14 +361,13 @@ def _estimate(plan: Plan, p: float, found: tuple[float, float], effective: float
     return MomentEstimate(float(p), None, None, plan.estimator, effective if is_finite else 0.0)
 
 
-def _missing(plan: Plan, estimates: Sequence[MomentEstimate]) -> list[Message]:
-    """Why some p have no estimate, in one warning."""
-    few = [estimate for estimate in estimates if estimate.value is None]
-    if not few:
-        return []
-    low, high = (pick(each.effective_paths for each in few) for pick in (min, max))
-    found = {"p": [each.p for each in few], "low": low, "high": None if low == high else high}
-    return [Message(Code.FEW_PATHS, **found, needed=FEW[plan.estimator], is_direct=plan.estimator == "direct")]
+def _missing(estimates: Sequence[MomentEstimate]) -> Iterator[Message]:
+    """Why some p have no estimate, in one warning for each estimator."""
+    for estimator, needed in FEW.items():
+        if few := [each for each in estimates if each.value is None and each.estimator == estimator]:
+            low, high = (pick(each.effective_paths for each in few) for pick in (min, max))
+            found = {"p": [each.p for each in few], "low": low, "high": None if low == high else high}
+            yield Message(Code.FEW_PATHS, **found, needed=needed, is_direct=estimator == "direct")
 
 
 def _drift(plan: Plan, p: float, change: float, error: float) -> list[Message]:

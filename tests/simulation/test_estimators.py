@@ -170,3 +170,15 @@ def test_the_largest_good_step_is_named_and_good():
 def test_noise_that_is_too_fast_is_refused():
     with pytest.raises(ValueError, match="takes"):
         simulate(Problem(MODERATE, NonGaussianNoise(D0=0.5, tau0=1e-7, r0=0.9)), [1.0])
+
+
+def test_populations_are_taken_where_too_few_paths_carry_the_mean():
+    """As either estimator alone finds it; each p has the one that its estimate names."""
+    problem, calls = Problem(MODERATE, REDUCED), []
+    how = {"paths": 4096, "time": 200.0, "seed": 1}
+    found = simulate(problem, [1.0, 12.0], progress=lambda: calls.append(1), **how)
+    alone = {name: simulate(problem, [1.0, 12.0], estimator=name, **how) for name in ("direct", "population")}
+    assert alone["direct"].estimates[1].value is None
+    assert found.estimates[0] == alone["direct"].estimates[0]
+    assert found.estimates[1].estimator == "population"
+    assert len(calls) == 100

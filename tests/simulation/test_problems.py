@@ -72,7 +72,7 @@ def test_other_problems_are_refused(problem, name):
 @pytest.mark.parametrize(
     ("system", "noise", "words"),
     [
-        (PLANE, NOISE, "in a linear system nothing limits the amplitude"),
+        (PLANE, NOISE, "nothing limits the amplitude"),
         (OSCILLATOR, MarkovChain.telegraph(0.5, 1.0), "no white noise, impulses or chains"),
     ],
 )
