@@ -8,7 +8,8 @@ from collections.abc import Sequence
 
 import numpy as np
 from scipy.linalg import schur
-from scipy.linalg.lapack import dtrsyl
+from scipy.linalg.lapack import ztrsyl
+from scipy.optimize import brentq
 from scipy.sparse.linalg import LinearOperator, gmres
 
 Terms = Sequence[tuple[float, np.ndarray]]
@@ -38,11 +39,9 @@ class Segment:
         free = np.kron(differentiating(size) * 2 / self.tau, np.eye(self.n))
         free[: self.n] = self.row(drift)
         self.rates, self.white = np.array(rates, dtype=float), [self.row(terms) for terms in white]
-        self.moving = []
-        for state in states:
-            own = free.copy()
-            own[: self.n] += state * self.row(load)
-            self.moving.append(own)
+        self.states, self.free, self.load = np.array(states, dtype=float), free, self.row(load)
+        self.decays, self.basis = np.linalg.eig(self.rates.T)
+        self.t, self.z = schur(free, output="complex")
 
     def row(self, terms: Terms) -> np.ndarray:
         """What a sum of them reads of the nodes."""
@@ -56,47 +55,67 @@ class Segment:
 
     def moved(self, p: np.ndarray) -> np.ndarray:
         """The rates of the moments P of each state, shape (states, N, N)."""
-        found = np.einsum("sij,sjk->sik", np.array(self.moving), p)
+        found = self.free @ p
+        found[:, : self.n] += self.states[:, None, None] * (self.load @ p)
         found = found + found.transpose(0, 2, 1) + np.tensordot(self.rates.T, p, 1)
         for row in self.white:
             found[:, : self.n, : self.n] += row @ p @ row.T
         return found
 
+    def alone(self, q: np.ndarray, sigma: float) -> np.ndarray:
+        """(σ − L)⁻¹Q where noise does not multiply the state."""
+        found = []
+        for decay, each in zip(self.decays, np.tensordot(np.linalg.inv(self.basis), q, 1), strict=True):
+            shifted = (sigma - decay) * np.eye(len(self.t)) - self.t
+            y, scale, _ = ztrsyl(shifted, -self.t, self.z.conj().T @ each @ self.z, tranb="C")
+            found.append(self.z @ (y / scale) @ self.z.conj().T)
+        return np.tensordot(self.basis, np.array(found), 1).real
+
     def resolved(self, q: np.ndarray, sigma: float) -> np.ndarray:
-        """(σ − L)⁻¹Q, by steps of Krylov from each state alone."""
-        factors = []
-        for own, rate in zip(self.moving, np.diag(self.rates), strict=True):
-            factors.append(schur(0.5 * (sigma - rate) * np.eye(len(own)) - own))
-
-        def alone(vector):
-            found = []
-            for (t, z), each in zip(factors, vector.reshape(q.shape), strict=True):
-                y, scale, _ = dtrsyl(t, t, z.T @ each @ z, tranb="T")
-                found.append(z @ (y / scale) @ z.T)
-            return np.ravel(found)
-
-        whole = LinearOperator(2 * (q.size,), lambda v: alone(sigma * v - self.moved(v.reshape(q.shape)).ravel()))
-        found, failed = gmres(whole, alone(q.ravel()), rtol=1e-12, restart=80, maxiter=20)
+        """(σ − L)⁻¹Q, by steps of Krylov from that without noise."""
+        shape = q.shape
+        whole = LinearOperator(
+            2 * (q.size,),
+            lambda v: np.ravel(self.alone(sigma * v.reshape(shape) - self.moved(v.reshape(shape)), sigma)),
+        )
+        found, failed = gmres(whole, self.alone(q, sigma).ravel(), rtol=1e-10, restart=100, maxiter=5)
         assert not failed
-        return found.reshape(q.shape)
+        found = found.reshape(shape)
+        return 0.5 * (found + found.transpose(0, 2, 1))  # as L is of symmetric moments alone
+
+    def radius(self, sigma: float) -> float:
+        """ln of the spectral radius of Q → Σ B (σ − L)⁻¹Q Bᵀ under white noise alone, which is 0 at Λ(2)."""
+        images = []
+        pairs = list(zip(*np.triu_indices(self.n), strict=True))
+        for i, j in pairs:
+            q = np.zeros((self.n, self.n))
+            q[i, j] = q[j, i] = 1.0
+            p = self.alone(self.start(q), sigma)[0]
+            image = sum(row @ p @ row.T for row in self.white)
+            images.append([image[pair] for pair in pairs])
+        return float(np.log(np.abs(np.linalg.eigvals(np.array(images))).max()))
 
     def start(self, forced: np.ndarray) -> np.ndarray:
         """A law whose first node is forced, in each state."""
-        found = np.zeros((len(self.moving), *self.moving[0].shape))
+        found = np.zeros((self.states.size, *self.free.shape))
         found[:, : self.n, : self.n] = forced
         return found
 
     def exponent(self, sigma: float) -> float:
         """Λ(2) from a σ on its right."""
+        if self.states.size == 1:
+            low = 2 * float(np.linalg.eigvals(self.free).real.max())
+            gap = brentq(lambda gap: self.radius(low + np.exp(gap)), -25.0, np.log(sigma - low), xtol=1e-12)
+            return low + float(np.exp(gap))
         p, value = self.resolved(self.start(np.eye(self.n)), sigma), np.inf
         for _ in range(60):
             image = self.resolved(p, sigma)
             last, value = value, sigma - float(np.vdot(p, p) / np.vdot(p, image))
             p = image / np.linalg.norm(image)
-            if abs(value - last) <= 1e-11 * abs(sigma - value):
+            if abs(value - last) <= 1e-10 * (1 + abs(value)):
                 break
-            if abs(value - last) <= 1e-3 * abs(sigma - value):  # nearer, still on the right
-                sigma = value + 0.1 * (sigma - value)
+            if abs(value - last) <= 1e-3 * (sigma - value) and sigma - value > 1e-2 * (1 + abs(value)):
+                sigma = value + 0.1 * (sigma - value)  # nearer, still on the right
         return value
 
     def stationary(self, force: np.ndarray, law: np.ndarray) -> np.ndarray:
