@@ -63,8 +63,8 @@ _TINY = 1e-9
 _KEPT = 0.3
 """The share of effective paths that a long window of the direct estimator must leave."""
 _LEVELS = 12
-_SETTLING = 9
-"""Slices in which a population finds its law."""
+_SETTLING, _LONGER = 9, 2
+"""Slices in which a population finds its law, and times that modes have beyond the plane to share the motion."""
 
 
 @dataclass(frozen=True)
@@ -175,7 +175,7 @@ def simulate(
         estimator: "direct", cheap and for moderate p; "population", one simulation for each p; None for the former,
             and for the latter at those p, nine at most, at which too few paths carry the mean.
         paths: how many; a multiple of 32 is used.
-        time: length of the paths after the transient; 64 transients if None, and 4 beyond the plane, where
+        time: length of the paths after the transient; 64 transients if None, and 16 beyond the plane, where
             they are longer. Whole transients are used.
         step: time step; None chooses one.
         seed: ≥ 0.
@@ -246,7 +246,7 @@ def _simulated(
         estimator=estimator,
         paths=math.ceil(paths / BATCHES),
         slice_steps=round(length / h),
-        settling=max(1 if is_direct else _SETTLING, math.ceil(known.settling / length)),
+        settling=max(1 if is_direct else _SETTLING, math.ceil(_LONGER * known.settling / length)),
         wanted=wanted,
         levels=min(_LEVELS, wanted.bit_length()) if is_direct else 0,
     )

@@ -21,7 +21,7 @@ SPLIT = 0.06
 """The turn, growth or kick in one step at most where several noises move the state in turn."""
 BATCHES = 32
 """Independent sets of paths, from whose differences the errors are read."""
-PATHS, TRANSIENTS, FEWER = 32_768, 64, 4
+PATHS, TRANSIENTS, FEWER = 32_768, 64, 16
 """Defaults: how many paths, and how many transients long they are, in the plane and beyond it."""
 MAX_PATHS = 10_000_000
 PROGRESS_STEPS = 100

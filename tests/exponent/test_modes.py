@@ -265,7 +265,7 @@ def test_what_is_refused():
         PlaneSystem(terms)
     with pytest.raises(ValueError, match="the same for all terms"):
         LinearSystem([*terms, CoefficientMatrix(0, [[0.0, 1.0], [-1.0, 0.0]])])
-    with pytest.raises(FpsolveError, match="in a linear system nothing limits the amplitude"):
+    with pytest.raises(FpsolveError, match="in other linear systems nothing limits the amplitude"):
         simulated_response(problem(OU), 0.1, 0.1, paths=32, time=1.0, step=0.1, seed=0)
     heavy = NonGaussianNoise(D0=0.1, tau0=0.5, r0=1.2)
     with pytest.raises(ValueError, match="is for two variables only"):

@@ -22,7 +22,7 @@ def problem(free, driven, noise):
 def test_a_load_on_all_variables_alike():
     """ẋ = (A + ½ξ)x: λ is the largest real part, and Λ(p) = pλ + p²S/8."""
     free, _, _ = chain_of_masses(3, 0.2)
-    found = simulate(problem(free, 0.5 * np.eye(6), White(s=0.2)), [0.5, 1.0], paths=4096, seed=1)
+    found = simulate(problem(free, 0.5 * np.eye(6), White(s=0.2)), [0.5, 1.0], paths=1024, seed=1)
     growth = float(np.linalg.eigvals(free).real.max())
     assert abs(found.lyapunov_exponent - growth) < COVERED * found.lyapunov_exponent_error
     for each in found.estimates:
@@ -33,7 +33,7 @@ def test_the_bounds_of_convexity():
     """λ and Λ(1) by paths are within those by Λ(2), which paths have, too."""
     free, driven, _ = chain_of_masses(3, 0.2)
     chain = problem(free, driven, OrnsteinUhlenbeck(1.0, 0.5))
-    exact, found = moment_lyapunov(chain, 2.0).value[0], simulate(chain, [1.0, 2.0], paths=4096, seed=2)
+    exact, found = moment_lyapunov(chain, 2.0).value[0], simulate(chain, [1.0, 2.0], paths=1024, seed=2)
     assert found.lyapunov_exponent - COVERED * found.lyapunov_exponent_error < exact / 2
     first, second = found.estimates
     assert first.value - COVERED * first.standard_error < exact / 2

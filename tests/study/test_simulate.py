@@ -340,7 +340,7 @@ def test_ctrl_c_keeps_what_is_done(case, out, capsys, monkeypatch):
         return original(curve, orders, setting, counted)
 
     monkeypatch.setattr(simulated, "simulate_curve", interrupted_later)
-    vary = ["--set", 'vary."noise.D0"=[0.1, 0.2, 0.3]', "--time", "200"]
+    vary = ["--set", 'vary."noise.D0"=[0.1, 0.2, 0.3]', "--time", "200", "--estimator", "direct"]
     (out / "quick").mkdir(parents=True)
     (out / "quick/monte_carlo-3.json").write_text("{}", encoding="utf-8")
     assert simulate(case, "--out", out, *vary) == 130
