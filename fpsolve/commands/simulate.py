@@ -19,7 +19,7 @@ def simulate(
     time: Annotated[
         float | None,
         Parameter(
-            help="Length of the paths; if the case does not state it, 64 transients, or 4 for more than two variables."
+            help="Length of the paths; if the case does not state it, 64 transients, or 16 for more than two variables."
         ),
     ] = None,
     seed: Annotated[

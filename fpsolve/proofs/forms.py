@@ -117,7 +117,7 @@ def form_certificate(linear: LinearRecord, parameters: Mapping[str, str]) -> For
         even = even_moment(linear.problem(factor), 2)
         form = moment_form(even.polynomial, len(factor), 2)
         form *= np.sign(np.trace(form))
-        least, *_, most = [*np.linalg.eigvalsh(form)] * 2
+        least, *_, most = np.linalg.eigvalsh(form)
         mu, factor = even.value, cholesky(form + max(RIDGE * most - least, 0.0) * np.eye(len(form))) @ factor
     found = FormCertificate(
         p="2.0", parameters=parameters, linear=linear, mu=mu, factor=factor.tolist(), upper=None, lower=None

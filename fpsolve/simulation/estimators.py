@@ -199,8 +199,10 @@ def simulate(
 
     found = _simulated(problem, p, "direct", progress=half, **how)
     few = [each.p for each in found.estimates if each.value is None]
-    if not few or found.interrupted:
-        for _ in range(0 if found.interrupted else PROGRESS_STEPS // 2):
+    if found.interrupted:
+        return found
+    if not few:
+        for _ in range(PROGRESS_STEPS // 2):
             progress()
         return found
     few = [few[i] for i in dict.fromkeys(np.linspace(0, len(few) - 1, MOST_POPULATIONS).round().astype(int).tolist())]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
@@ -11,7 +12,7 @@ from pydantic import BeforeValidator, Field
 from pydantic.fields import FieldInfo
 
 from fpsolve.arrays import ROUNDED, FloatArray, shown
-from fpsolve.model.expressions import ExpressionError, calls_of_time, constant, evaluate, names_in
+from fpsolve.model.expressions import ExpressionError, Form, calls_of_time, constant, evaluate, names_in
 from fpsolve.model.faults import TableError
 from fpsolve.model.parameters import stated_field
 from fpsolve.model.plane import MOST_VARIABLES
@@ -216,7 +217,8 @@ class _Rates:
                     must = "must be a number, or an expression in the parameters"
                     raise TableError(f"got {shown(entry)}; {must}; write, for example, 1.0", *path, i, j)
                 try:
-                    number = self._number(repr(float(entry)) if is_number else str(entry), path[0] != "mass")
+                    text = repr(float(entry)) if is_number else str(entry)
+                    number = self._number(text, not is_number and path[0] != "mass")
                 except ExpressionError as error:
                     raise TableError(str(error), *path, i, j) from None
                 if path[0] == "mass" and isinstance(entry, str) and EPSILON in names_in(entry):
@@ -232,10 +234,12 @@ class _Rates:
 
     def _number(self, text: str, may_turn: bool = True) -> tuple[float, ...] | None:
         """The value of an entry, with 1 for cos(nu*t). Raises `ExpressionError`."""
-        names = {name: constant(value) for name, value in self.parameters.items()}
-        return evaluate(
-            text, names | dict.fromkeys(calls_of_time(text) if may_turn else (), constant(1.0)), "the entry"
-        ).scalar
+        waves = dict.fromkeys(calls_of_time(text) if may_turn else (), constant(1.0))
+        return evaluate(text, self._constants | waves, "the entry").scalar
+
+    @cached_property
+    def _constants(self) -> dict[str, Form]:
+        return {name: constant(value) for name, value in self.parameters.items()}
 
     def _refuse_symmetric(self, matrix: list[list[Entry]], key: str) -> None:
         values = self._numbers(matrix)
