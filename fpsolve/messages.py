@@ -177,7 +177,8 @@ class Code(Enum):
     )
     NO_FUNCTION = (
         "failure: there is no function Λ(p) from p = {low:g} to p = {high:g}, as no space serves all p, or moments are "
-        "carried at several places, or are of several blocks or of more than two variables; ask for single p"
+        "carried at several places, or are of several blocks or of more than two variables, or two eigenvalues cross; "
+        "ask for single p"
     )
     NO_SURFACE = (
         "failure: there is no surface over {keys}, as functions do not move smoothly with these, no space serves all "

@@ -17,7 +17,7 @@ import numpy as np
 
 from fpsolve.budget import Countdown, OverBudget, counted, half_the_memory, under_way
 from fpsolve.errors import FpsolveError, MeshError, NotConverged, SingularMatrix
-from fpsolve.exponent.eigen import PrincipalPair, principal_pair
+from fpsolve.exponent.eigen import PairDerivatives, PrincipalPair, principal_pair
 from fpsolve.exponent.error import Solution
 from fpsolve.exponent.starts import Question, Start, first_place, other_centers, other_places, refined
 from fpsolve.fem.factors import FEW_UNKNOWNS, one_thread
@@ -50,6 +50,10 @@ WIDER = 4.0
 """Factor by which the interval of noise with algebraic tails is wider where it tells the error of a narrower one."""
 SURELY_SEEN = 1e-6
 """A tolerance down from which cells are small enough for their highest modes to show what is in them."""
+AT_CORNER = 1e-3
+"""Distance from p = −1, where Λ(p) of a saddle with two variables has a corner, or nearly one: two eigenvalues meet."""
+MIXED = 100.0
+"""‖T′‖ over ‖T‖ from which on T is thought to be a mixture of those of two eigenvalues that meet."""
 MOST_HALVED = 20_000
 """Unknowns of a system on halved cells that is solved for that: beyond, cells are many, and it takes long."""
 A_THIRD_MORE = 4 / 3
@@ -337,9 +341,12 @@ class Search:
         """A solution that agrees with that of halved cells of φ within its error, or within what is allowed.
 
         At a coarse tolerance a thin layer of T, as where the phase rests, may lie within a cell that is so large that
-        none of its modes shows it.
+        none of its modes shows it. Where two eigenvalues meet, modes of a mixture of both T tell little.
         """
         chosen = found.pair.generator.chosen
+        if abs(self.p + 1) <= AT_CORNER and self.whole.problem.dimension == 2 and is_mixed(found.pair):
+            change = self.whole.finer_pair(found.pair).value - found.pair.value
+            return replace(found, search=2 * abs(change))
         if self.whole.rtol <= SURELY_SEEN or not isinstance(chosen.phi, PhaseAxis):
             return found
         halved = chosen.with_axis(0, chosen.phi.doubled())
@@ -450,6 +457,11 @@ class Search:
             told = Message(Code.NOTHING_RESOLVED, p=self.p, reason=reason, is_thin=is_thin, last=said)
         remedy = None if reason.code is Code.ROUNDED else Remedy.BUDGET
         raise NotConverged(told, best and best.solution, remedy)
+
+
+def is_mixed(pair: PrincipalPair) -> bool:
+    """Whether another eigenvalue is so near, and of another slope, that T changes all at once."""
+    return bool(np.linalg.norm(PairDerivatives(pair).by_p) > MIXED * np.linalg.norm(pair.right))
 
 
 def widened(generator: Generator) -> Space:

@@ -28,6 +28,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from scipy.linalg import eigvals
 
 from fpsolve.arrays import FloatArray
 from fpsolve.budget import counted
@@ -80,6 +81,8 @@ GOAL = 0.01
 """Share of what is allowed that a finer space is made for, in each direction."""
 NEARLY = 1e-6
 """Share of T′ in the last step of its refinement: T′ need not be more accurate."""
+CORNER = 0.1
+"""Distance of another eigenvalue, over that of both tangents at the nodes around, where they cross."""
 MOST_NODES = 40
 """Number of nodes of a basis."""
 MOST_SPACES = 8
@@ -235,6 +238,7 @@ class Basis:
             for p in dict.fromkeys([*[0.0] * self._has_zero, outer, other]):  # the first vector is 1
                 self._solve(p)
             self.is_converged = self._fill(most)
+            self._refuse_corners()
             self._rounding = self._bound()
         rate = max((node.rate for p, node in self.nodes.items() if not _is_even(p)), default=0.0)
         for p, node in self.nodes.items():
@@ -459,6 +463,20 @@ class Basis:
         x, y = (each[i] * (1 - u) + each[j] * u for each in of_nodes)
         a, g = self._pencils(p)
         return Reduced(*eigenpairs(a, g, value, x, y), a, g)
+
+    def _refuse_corners(self) -> None:
+        """Raise `Unsuited` where two eigenvalues cross between two nodes: the basis may have T of one there only."""
+        pairs = [(self.nodes[low].pair, self.nodes[high].pair) for low, high in pairwise(sorted(self.nodes))]
+        for one, other in pairs:
+            jump = other.derivative - one.derivative
+            p = (one.value - one.derivative * one.p - other.value + other.derivative * other.p) / (jump or math.inf)
+            if not one.p < p < other.p:
+                continue
+            found = self._reduced(np.array([p]))
+            values = eigvals(found.a[0], found.g[0])
+            gaps = np.sort(np.abs(values - found.value[0]))
+            if gaps[1] <= CORNER * jump * min(p - one.p, other.p - p):
+                raise Unsuited
 
     # errors
 

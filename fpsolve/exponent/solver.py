@@ -19,6 +19,7 @@ from fpsolve.budget import counted, one_number
 from fpsolve.data import Result, dataset
 from fpsolve.errors import NoHierarchy, NoSuchExponent, NotConverged
 from fpsolve.exponent.adapt import (
+    AT_CORNER,
     Budget,
     Tolerance,
     WholeProblem,
@@ -489,10 +490,17 @@ class ExponentSolver:
             return float(np.max([each.slope_error(p) for each in self.classes]))
         solution = self.solution(p)
         with one_thread():
+            jump = self._jump() if abs(p + 1) <= AT_CORNER and self.problem.dimension == 2 else 0.0
             if solution.modes_tell:
-                return slope_error(solution.pair)
+                return slope_error(solution.pair) + jump
             finer = self.whole.finer_pair(solution.pair)
-            return 2 * abs(finer.derivative - solution.pair.derivative) + slope_rounding(solution.pair)
+            return 2 * abs(finer.derivative - solution.pair.derivative) + slope_rounding(solution.pair) + jump
+
+    def _jump(self) -> float:
+        """What Λ′ rises at p = −1 if Λ″ on both sides does not explain it: there is any slope between at a corner."""
+        low, high = (self.solution(-1 + side).pair for side in (-2 * AT_CORNER, 2 * AT_CORNER))
+        rise, smooth = high.derivative - low.derivative, second_derivative(low) + second_derivative(high)
+        return rise if rise > 3 * smooth * 2 * AT_CORNER else 0.0
 
     def lyapunov_exponent(self) -> Estimate:
         """λ, Eq. (2), the growth rate of almost every path: Λ′(0) but for algebraic tails. Raises `NotConverged`."""

@@ -9,7 +9,7 @@ from fpsolve import ExponentSolver, MomentLyapunovFunction, PlaneSystem, Problem
 from fpsolve.errors import NotConverged
 from fpsolve.exponent.basis import Basis, Polynomials
 from fpsolve.exponent.eigen import principal_pair
-from fpsolve.model import Bounded, SineWiener
+from fpsolve.model import Bounded, ParametricOscillator, SineWiener, Telegraph, White
 from tests.benchmarks.problem import CASES
 from tests.benchmarks.references import REFERENCES
 from tests.random_problems import RTOL, problems
@@ -103,6 +103,25 @@ def test_near_zero_the_error_is_that_of_the_ratio(strong):
         allowed = strong.error_estimate(p) / abs(p) + curvature + exponent.error_estimate
         assert abs(strong(p) / p - exponent.value) <= 1.01 * allowed
     assert strong(0.0) == strong.error_estimate(0.0) == 0.0
+
+
+@pytest.mark.parametrize("noise", [White(s=0.2), Telegraph(a=0.5, k=1.0)], ids=["layers", "cones"])
+def test_a_saddle_has_a_corner(noise):
+    """Λ(−2 − p) = Λ(p) + 2b(1 + p), as time reversed is v reversed; two eigenvalues meet at p = −1, or nearly do."""
+    damping, p = 0.05, np.linspace(-2.0, 0.0, 12)
+    found = moment_lyapunov(Problem(ParametricOscillator(stiffness=-1.5, damping=damping), noise), p, rtol=1e-6)
+    of_mirror = found.value[::-1] + 2 * damping * (1 + p[::-1])
+    assert np.all(np.abs(found.value - of_mirror) <= found.error_estimate + found.error_estimate[::-1])
+    assert found.value[0] == pytest.approx(2 * damping, abs=found.error_estimate[0] + 1e-15)
+
+
+@pytest.mark.parametrize("rtol", [1e-5, 1e-8])
+def test_at_the_corner(rtol):
+    """Fourier series of 281 functions, eigenvalues of 48 digits."""
+    problem = Problem(ParametricOscillator(stiffness=-1.5, damping=0.05), White(s=0.2))
+    found = moment_lyapunov(problem, -1.0, rtol=rtol)
+    assert abs(found.value[0] + 1.1690259121064) <= found.error_estimate[0]
+    assert found.derivative_error[0] > 2.2  # from −1.22 to 1.12
 
 
 def test_there_is_no_function_of_several_blocks():

@@ -41,9 +41,9 @@ def test_slopes_of_an_oscillator(noise, p):
 def test_slopes_at_even_moments_of_three_variables():
     """Harmonics of degree 2 have Λ(2), and a slope of 0.516."""
     found = moment_lyapunov(THREE, 2.0)
-    slope, rounding = differences(THREE, 2.0, 0.1, 1e-6)
-    assert rounding < 1e-4
-    assert slope == pytest.approx(0.5640, abs=1e-4)
+    slope, rounding = differences(THREE, 2.0, 0.3, 1e-4)
+    assert rounding < 3e-3
+    assert slope == pytest.approx(0.5640, abs=rounding)
     assert found.derivative[0] == pytest.approx(slope, abs=1.5 * found.derivative_error[0] + rounding)
     assert found.derivative_error[0] < 3e-3
 
