@@ -15,7 +15,7 @@ from pydantic_core import ErrorDetails, InitErrorDetails, PydanticCustomError
 
 from fpsolve.messages import is_control
 from fpsolve.model.faults import accepted, choices, entry_of, fields_of, written_path
-from fpsolve.model.parameters import Section, example_of, meaning_of, parameter
+from fpsolve.model.parameters import Section, example_of, meaning_of, parameter, without_unit
 
 _OWN, _RANGE = "own sentence", "range"
 LIST = "<list>"
@@ -202,7 +202,8 @@ def _sentence(
     has_kind = kind.endswith((_RANGE, "_type", "_not_found", "_tag_invalid", "_instance_of")) and not is_number
     has_kind |= kind == "literal_error" and type(value) is not str
     got = shown_with_kind(value) if has_kind else shown(value)
-    return f"got {got}; {must};{nearest(value, _texts(field.annotation))} write, for example, {example}"
+    guess = nearest(value, _texts(field.annotation))
+    return f"got {got}; {must}{without_unit(value) or f';{guess} write, for example, {example}'}"
 
 
 def _texts(annotation: Any) -> list[str]:

@@ -182,9 +182,9 @@ class CaseWithoutParts(Section):
     noise: Annotated[
         InstanceOf[Noise],
         BeforeValidator(partial(half_of, "noise")),
-        parameter("the noise, such as that of Eqs. (7)-(8)", "[noise]"),
+        parameter("the noise, such as that of Eqs. (7)-(8)", '[noise] with kind = "white" and s = 0.5'),
     ]
-    moments: Annotated[Moments, parameter("the orders p of the moments", "[moments]")]
+    moments: Annotated[Moments, parameter("the orders p of the moments", "[moments] with p = [2.0]")]
     budget: Annotated[
         Budget,
         BeforeValidator(lambda value: Budget(**value) if isinstance(value, dict) else value),

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 from fpsolve.errors import CaseError, Fault
 from fpsolve.messages import is_control
+from fpsolve.model.parameters import without_unit
 from fpsolve.reading import Unreadable, Words, read_text
 
 _BLANK = re.compile(r"(?:\s|#[^\n]*)*")
@@ -275,8 +276,8 @@ def _syntax_remedy(line: str) -> str:
         return f"{key} needs plain letters, as in omega = 1.0"
     if re.fullmatch(r"-?\d+,\d+", value):
         return f"write the decimal point as in {key} = {value.replace(',', '.')}"
-    if re.fullmatch(r"-?[\d.]+(e-?\d+)?\s*[A-Za-z/]+.*", value):
-        return f"write the number alone, without a unit: {line}"
+    if re.fullmatch(r"-?[\d.]+(e-?\d+)?\s*[A-Za-z/%]+.*", value):
+        return f"write the number alone, without a unit: {line}{without_unit(value)}"
     if re.fullmatch(r"[A-Za-z][\w./-]*", value):
         return f'write a text in quotes, as in {key} = "{value}"'
     if line and (slip := re.search(r",\s*,", line) or re.search(r"[\]\"'\d]\s*,\s*$", value)):

@@ -143,8 +143,9 @@ def factor_of(of: str, unit: Powers | None, text: str) -> float:
         return 1.0
     found = next((factor for each, factor in signal.units.items() if powers(each) == unit), None)
     if found is None:
+        such = [name for name, each in SIGNALS.items() if unit in map(powers, each.units)]
+        own = f"--of {' or '.join(such or SIGNALS)}"
         raise ValueError(
-            f'has the unit "{text}", but {of} is in one of {", ".join(signal.units)}; convert it, state --unit, or '
-            f"state what else is measured: {', '.join(SIGNALS)}"
+            f'has the unit "{text}", but {of} is in one of {", ".join(signal.units)}; state --unit, or {own}'
         )
     return found

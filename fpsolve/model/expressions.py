@@ -19,6 +19,8 @@ from functools import lru_cache, partial
 from keyword import iskeyword
 from operator import add
 
+from fpsolve.model.parameters import without_unit
+
 Series = tuple[float, ...]
 """Taylor coefficients in one parameter, the value first; all in one calculation have one length, 0 to read alone."""
 Monomial = tuple[tuple[str, ...], str, int]
@@ -185,6 +187,8 @@ def _parsed(text: str) -> tuple[str, ast.expr]:
         raise ExpressionError(
             f"has {len(text)} characters; must be at most {MOST_LETTERS}; use parameters to shorten it"
         )
+    if remedy := without_unit(text):
+        raise ExpressionError(f"has a unit{remedy}")
     if other := _OTHERS.search(text):
         more = "write ** for powers" if other[0] == "^" else _KNOWN
         raise ExpressionError(f"has the character {other[0]!a}, which is no arithmetic; {more}")

@@ -17,7 +17,7 @@ from pydantic.dataclasses import dataclass
 from pydantic.fields import FieldInfo
 
 from fpsolve.arrays import shown
-from fpsolve.model.parameters import STRICT, meaning_of
+from fpsolve.model.parameters import STRICT, meaning_of, without_unit
 
 Kind = TypeVar("Kind")
 _BOUNDS = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
@@ -93,7 +93,7 @@ def _sentence(detail: Mapping[str, Any], fields: Mapping[str, Any]) -> str:
     meaning = meaning_of(fields[name])
     must = f"must be {accepted(fields[name])}" + (f" ({meaning})" if meaning else "")
     found = "missing" if detail["type"] == "missing" else f"got {shown(detail['input'])}"
-    return f"{name}: {found}; {must}"
+    return f"{name}: {found}; {must}{without_unit(detail['input'])}"
 
 
 def accepted(field: FieldInfo) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -30,6 +31,13 @@ GREEK = (
     r"omega|Gamma|Delta|Theta|Lambda|Xi|Pi|Sigma|Phi|Psi|Omega)_?(\d*|(?<=_)[a-zA-Z])"
 )
 """A name that is a Greek letter, with a number or a letter below it."""
+UNITS = {
+    "%": (0.01, ""),
+    "Hz": (2 * math.pi, ", in rad/time"),
+    "rpm": (math.pi / 30, ", in rad/time"),
+    "deg": (math.pi / 180, ", in rad"),
+}
+"""The units that are known in numbers: by which factor to multiply, and what unit that gives."""
 STRICT: ConfigDict = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
 """The rules of all tables: no unknown keys, no conversions, finite numbers only."""
 
@@ -81,6 +89,15 @@ def meaning_of(field: FieldInfo) -> str:
     """What a `parameter` is, with its unit."""
     unit, meaning = unit_of(field), field.description or ""
     return f"{meaning}, in {plain_unit(unit)}" if unit else meaning
+
+
+def without_unit(value: Any) -> str:
+    """What to write for a text such as "1.0 Hz": "; write 6.283185 for 1.0 Hz, in rad/time"; "" for others."""
+    match = re.fullmatch(rf"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*({'|'.join(UNITS)})\s*", str(value))
+    if match is None:
+        return ""
+    factor, into = UNITS[match[2]]
+    return f"; write {float(match[1]) * factor:.7g} for {match[1]} {match[2]}{into}"
 
 
 def _extra(field: FieldInfo) -> Mapping[str, str]:

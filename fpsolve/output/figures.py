@@ -442,7 +442,7 @@ def _mark(axes: Any, series: Sequence[Series], colours: Any) -> None:
         high, wide = (16, 2.2) if is_few else (12, 1.2) if len(series) <= MOST_TALL else (6, 1.2)
         style = {"marker": "|", "zorder": 4, "rasterized": rasterized, "linewidths": points(wide)}
         where, shown = [series[i].root for i in roots], [colours[i] for i in roots]
-        sizes = points(high) * (np.linspace(1.6, 0.5, len(roots)) if is_few else 1.0)  # those behind are seen, too
+        sizes = points(high) * (np.linspace(2.0, 1.0, len(roots)) if is_few else 1.0)  # to see those behind
         axes.scatter(where, np.zeros(len(roots)), s=sizes**2, color=shown, **style)
         words = f"{STABILITY_INDEX.words} {STABILITY_INDEX.latex}"
         tick = {"linestyle": "none", "markersize": points(16), "markeredgewidth": points(2.2)}

@@ -544,7 +544,8 @@ def sentences(outcome: NoiseOutcome) -> Iterator[str]:
         if each is not None:
             number = f"{symbol} = {sampled(each.value, each.deviation)} ± {each.deviation:.1g} 1/s"
             yield f"{number}: {likely(what, each.below)}."
-    off = f", and that it is {outcome.fit.off:.0%} off where stability depends on it" if outcome.fit.off else ""
+    share = outcome.fit.off
+    off = f", and that it is {share:.0%} off where stability depends on it (try another --kind)" if share else ""
     yield f"The probabilities count the standard errors of the fit{off}; see the page From a measurement to a case."
 
 

@@ -74,6 +74,18 @@ def test_functions_that_are_not_known_have_a_remedy_of_their_own(call, remedy, r
     assert ("write * for products" in said) == (call == "2(x)")
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "remedy"),
+    [
+        ("alpha = 1.0", 'alpha = "1.0 Hz"', "write 6.283185 for 1.0 Hz, in rad/time"),
+        ("alpha = 1.0", "alpha = 60 rpm", "without a unit: alpha = 60 rpm; write 6.283185 for 60 rpm, in rad/time"),
+        ("[noise]", 'parameters = { zeta = "2 %" }\n[noise]', "write 0.02 for 2 %"),
+    ],
+)
+def test_numbers_with_a_unit_are_refused_with_the_number_to_write(old, new, remedy, refused):
+    assert refused(old, new).endswith(f"{remedy}\n")
+
+
 def test_too_many_parameters(refused):
     table = "parameters = {" + ", ".join(f"p{i} = 1.0" for i in range(10_000)) + "}\n[noise]"
     assert "system.parameters: got 10000 parameters; must be at most 200" in refused("[noise]", table)

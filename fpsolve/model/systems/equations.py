@@ -35,7 +35,7 @@ from fpsolve.model.expressions import (
 )
 from fpsolve.model.faults import TableError, table_of
 from fpsolve.model.noises.clock import Clock, Wave
-from fpsolve.model.parameters import STRICT, parameter, stated_field, unknown_parameter
+from fpsolve.model.parameters import STRICT, parameter, stated_field, unknown_parameter, without_unit
 from fpsolve.model.plane import (
     MOST_VARIABLES,
     CoefficientMatrix,
@@ -196,7 +196,8 @@ class EquationSystem(System):
             try:
                 real_number(value, name)
             except ValueError:
-                raise TableError(f"got {shown(value)}; must be a finite number", "parameters", name) from None
+                text = f"got {shown(value)}; must be a finite number{without_unit(value)}"
+                raise TableError(text, "parameters", name) from None
             if name == EPSILON and not value > 0:
                 raise TableError(f"got {value:g}; must be > 0; epsilon = 1 is the unscaled system", "parameters", name)
         if len(self.named) > MOST_PARAMETERS:
@@ -271,9 +272,8 @@ class EquationSystem(System):
             try:
                 named[name] = real_number(table[name], name)
             except ValueError:
-                raise TableError(
-                    f"got {shown(table[name])}; must be a finite number; write {name} = 1.0", name
-                ) from None
+                remedy = without_unit(table[name]) or f"; write {name} = 1.0"
+                raise TableError(f"got {shown(table[name])}; must be a finite number{remedy}", name) from None
         return tuple(named.items()), quantities
 
     @classmethod
