@@ -35,6 +35,7 @@ def test_a_pair_of_strong_noise_is_little_more_than_its_vectors(strong_pair):
     assert np.linalg.norm(residual) < 1e-9 * np.linalg.norm(pair.right)
 
 
+@pytest.mark.slow
 def test_assembling_again_keeps_no_memory(strong_pair):
     def assembled(times):
         for _ in range(times):

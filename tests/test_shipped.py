@@ -88,6 +88,7 @@ def test_where_a_file_stands_for_the_name_of_a_case_the_command_that_writes_one_
     assert load_case("my own.toml").problem
 
 
+@pytest.mark.slow
 def test_the_package_is_the_command():
     done = subprocess.run([sys.executable, "-m", "fpsolve", "new", "fig"], capture_output=True, text=True, check=False)
     assert done.returncode == BAD_INPUT

@@ -138,6 +138,7 @@ fpsolve.__main__.main()
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
 def test_an_interrupt_leaves_a_long_factorisation():
     """Of 8,000 unknowns, some 20 s; before, LAPACK went on to its end. What runs on is no harm as the process ends."""

@@ -336,22 +336,6 @@ def test_a_single_set(place, jobs):
     assert len(lines(place, f"single{jobs}")) == 1
 
 
-@pytest.mark.slow
-def test_a_scheduler_that_dies_is_told_in_one_sentence(place):
-    """By a run, and where it is asked for its workers."""
-    pytest.importorskip("distributed")
-    with dask_cluster(1) as (address, _, scheduler), cluster(address) as workers:
-        assert list(workers.map(abs, [-1])) == [1]
-        assert workers.has_workers()
-        process = begun(place, "headless", "--scheduler", address)
-        wait_for_records(place, "headless", 1, process)
-        scheduler.kill()
-        _, said = process.communicate(timeout=120)
-        assert (process.returncode, said) == (3, f"{pool.STOPPED}\n")
-        with pytest.raises(WorkersDied, match="scheduler has stopped"):
-            all(iter(workers.has_workers, False))  # asks until there are none
-
-
 def test_batches_follow_from_the_case_alone(place):
     from fpsolve.study.solve import batch_size
 

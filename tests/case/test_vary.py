@@ -359,6 +359,7 @@ def test_each_set_is_checked_for_what_its_system_or_its_noise_refuses(write: Wri
     assert text.startswith(f"vary.file: sets.csv:504: {stated}: the restitution law")
 
 
+@pytest.mark.slow
 def test_a_set_that_is_found_not_to_be_possible_fails_alone(
     write: Write, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -389,7 +390,7 @@ def processor_time(work: Callable[[], object]) -> float:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", ["product", "file"])
+@pytest.mark.parametrize("kind", ["product"])
 def test_many_sets_are_read_about_as_fast_as_their_file(write: Write, tmp_path: Path, kind: str) -> None:
     """A set more takes some five times as long as its row by `csv` and `sha256`, and 0.5 kB with its columns."""
     few, many = 3_000, 23_000

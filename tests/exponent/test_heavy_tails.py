@@ -23,7 +23,7 @@ from fpsolve.exponent import impact_rate
 from tests.conftest import sampled
 from tests.oracles import asinh_grid
 
-SETS = 4
+SETS = 2
 """Random sets, of a second or two."""
 REASON = "for r0 > 1 the noise has algebraic tails, so that Λ\\(p\\) is infinite for p > 0 and p < -1, and between"
 

@@ -69,6 +69,7 @@ def test_growth_while_noise_swings():
     assert amplitude * problem.noise.standard_deviation == pytest.approx(12 * spectrum / math.pi, rel=1e-2)
 
 
+@pytest.mark.slow
 def test_a_swing_to_both_sides_outdoes_a_steady_value():
     """By moments of orders 2 and 4 Λ(5) is above their chord, and the growth with a steady value of the noise below it.
 

@@ -38,6 +38,7 @@ def pencil(p, cells=4, degree=8, count=11):
     return Pencil(p, space, matrix, [axis.levels for axis in space.axes])
 
 
+@pytest.mark.slow
 def test_two_noises_against_the_moment_hierarchy():
     deviations, alphas = [noise.standard_deviation for noise in NOISES], [noise.alpha for noise in NOISES]
     x = y = pencil(2.0).space.constant

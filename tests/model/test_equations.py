@@ -60,6 +60,7 @@ def test_the_oscillator_of_the_paper(law, epsilon):
         assert mine[same].value == pytest.approx(slope.value, rel=1e-11)
 
 
+@pytest.mark.slow
 def test_equations_take_as_long_as_the_oscillator():
     """At most 1.2 times, parsing included; the least of several times, in turns."""
     seconds = {VibroImpactOscillator: list[float](), EquationSystem: list[float]()}

@@ -135,6 +135,7 @@ def test_derivatives_by_named_parameters():
     assert slope == pytest.approx(-1 / 0.9, rel=1e-11)
 
 
+@pytest.mark.slow
 def test_sensitivities_to_named_parameters_are_differences():
     theta = {"omega": 1.3, "damping": 0.4, "loss": 0.1}
     [found] = sensitivities(Problem(PlaneSystem.of(pendulum, **theta), NOISE), 1.5).moments

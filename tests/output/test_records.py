@@ -75,6 +75,7 @@ def test_there_are_none_without_a_folder(tmp_path):
     assert not Records(tmp_path / "none").look().are_there
 
 
+@pytest.mark.slow
 def test_each_process_has_a_file(tmp_path):
     context = multiprocessing.get_context("spawn")
     worker = context.Process(target=append, args=(tmp_path, "key0", VALUES))

@@ -169,6 +169,7 @@ def test_random_problems(seed):
     assert found.off <= 1
 
 
+@pytest.mark.slow
 def test_a_shift_next_to_an_eigenvalue_ends_the_search():
     """p = 1e-300: the matrix shifted by Λ(p) is singular but for what underflows."""
     found = prove(problem(**FIG1 | {"epsilon": 0.05, "D0": 0.1}, reduced=True), 1e-300, width=1e-30)

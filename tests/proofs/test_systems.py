@@ -95,7 +95,6 @@ def test_values_that_are_known_otherwise(system, noise, p, value):
     sampled(
         Telegraph(0.5, 1.0),
         SineWiener(0.3, 1.0),
-        SineWiener(0.8, 1.0),
         fpsolve.OrnsteinUhlenbeck(1.0, 0.2),
         fpsolve.NonGaussianNoise(0.05, 0.6, 0.8),
         keep=2,

@@ -8,7 +8,7 @@ from tests.conftest import sampled
 
 
 @pytest.mark.parametrize(
-    ("epsilon", "restitution", "noise"), sampled((1.0, 0.8, "reduced"), (0.5, 0.6, "exact"), (0.1, 1.0, "exact"))
+    ("epsilon", "restitution", "noise"), sampled((1.0, 0.8, "reduced"), (0.5, 0.6, "exact"), keep=0)
 )
 def test_agrees_with_finite_elements(epsilon, restitution, noise):
     """Strong noise that is reduced, and weaker noise as it stands; all 18 by `python -m tests.agreement`."""

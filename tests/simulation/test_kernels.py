@@ -6,6 +6,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 import fpsolve
 
 DRAW = """
@@ -19,6 +21,7 @@ print(motions.__file__, end[0])
 """
 
 
+@pytest.mark.slow
 def test_without_a_place_for_a_cache_the_loops_are_compiled_all_the_same(tmp_path):
     """A package, a home and a cache that nobody can write to, as in a container; the noise falls from 3 to 3/e."""
     package, nowhere = tmp_path / "fpsolve", tmp_path / "file"

@@ -19,6 +19,7 @@ def problem(free, driven, noise):
     return Problem(LinearSystem(terms), noise)
 
 
+@pytest.mark.slow
 def test_a_load_on_all_variables_alike():
     """ẋ = (A + ½ξ)x: λ is the largest real part, and Λ(p) = pλ + p²S/8."""
     free, _, _ = chain_of_masses(3, 0.2)

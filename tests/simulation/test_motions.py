@@ -210,6 +210,7 @@ def test_time_is_measured_by_the_system():
     assert steps[0] == pytest.approx(steps[1], rel=1e-12)
 
 
+@pytest.mark.slow
 def test_a_phase_that_noise_hardly_disturbs():
     """It keeps its order; time is counted in half-turns of the mean motion, or the growth goes up and down."""
     steady, driven = np.array([[0.4, 0.95], [-1.2, -0.1]]), np.array([[0.07, 0.09], [0.02, 0.32]])

@@ -10,8 +10,6 @@ from tests.random_simulations import MOST, drawn, outcomes
 SEEDS = {
     3: "ornstein-uhlenbeck",
     225: "bounded",
-    224: "poisson",
-    250: "telegraph and ornstein-uhlenbeck",
 }
 
 

@@ -121,7 +121,6 @@ def outcome(given, p, estimator="population", **settings):
     sampled(
         (Telegraph(a=0.7, k=0.6), 3, 1, 4096),
         (White(s=1.0), 3, 1, 8192),
-        (White(s=1.0), 4, 1, 8192),
         (OrnsteinUhlenbeck(1.5, 0.5), 4, 3, 4096),
         keep=0,
     ),

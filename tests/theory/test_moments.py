@@ -91,6 +91,7 @@ def test_every_noise(noise, p, expected):
     assert error < 1e-11
 
 
+@pytest.mark.slow
 def test_many_functions_of_a_strong_slow_filter():
     """Rounding, 1e-7 of Λ(4) by 44 or 54 of them, does not put the search on the wrong side of it: as by 32."""
     noise = (0.62, 0.71, 0.28, 1.0, 2.3)
@@ -198,6 +199,7 @@ def test_bounds_of_many_variables(rng, count):
     assert growth.min() - 1e-12 < found.value < growth.max() + 1e-12
 
 
+@pytest.mark.slow
 def test_many_variables_under_coloured_noise():
     """A chain of six masses has the same Λ(2) as matrices, and as one vector of 78 numbers for each function."""
     free, matrix, _ = chain_of_masses(6)

@@ -56,6 +56,7 @@ def test_periodic_coefficients_as_text(rng):
 MATHIEU = EquationSystem(("x", "v"), ("v", "-0.2*v - (1 + mu*cos(nu*t) + xi)*x"), (("mu", 0.5), ("nu", 2.0)))
 
 
+@pytest.mark.slow
 def test_mathieu_with_white_noise():
     """ẍ + 0.2ẋ + (1 + 0.5 cos 2t + ξ)x = 0, s = 0.3; and elements, slopes and names."""
     problem = Problem(MATHIEU, White(s=0.3))
