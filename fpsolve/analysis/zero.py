@@ -201,7 +201,7 @@ def ratio_with_slopes(solver: ExponentSolver, p: float, keys: Sequence[str]) -> 
     """
     value, error = solver.ratio_alone(p)
     if solver.problem.dimension > 2 and (known := solver.even(p)):
-        return value, error, np.array([known.slope(key)[0] for key in keys]) / p
+        return value, error, known.gradient(keys) / p
     held, by_key = held_by(solver, p, {key: solver.problem.derivative(key) for key in keys})
     along = [by_key[key] for key in keys]
     around = PairDerivatives(held.whole.solution(p).pair) if abs(p) >= SMALL_P else held.around_zero

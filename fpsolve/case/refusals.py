@@ -18,6 +18,7 @@ import numpy as np
 from pydantic import ValidationError
 from pydantic.fields import FieldInfo
 
+from fpsolve.analysis.target import target_of
 from fpsolve.analysis.zero import axis_faults, said
 from fpsolve.arrays import FloatArray, is_log_spaced
 from fpsolve.case.kinds import parameters_of, problem_of
@@ -55,8 +56,11 @@ _MODERATE = "parameters and p must have moderate sizes; bring the extreme ones n
 
 
 def _of_moments(moments: Moments, valid: Known, context: Known) -> Iterator[Refusal]:
-    is_varied = context.get("varies", False)  # then each curve has those that exist
-    found = _unsolvable({**valid, "moments": moments}, Vary(), with_moments=not is_varied)
+    problem = problem_of(
+        valid
+    )  # where even moments are all, they are so for each curve, which else has those that exist
+    is_told = not context.get("varies", False) or (problem is not None and problem.is_closed_only)
+    found = _unsolvable({**valid, "moments": moments}, Vary(), with_moments=is_told)
     return (((), None, text) for _, text in islice(found, 1))
 
 
@@ -336,6 +340,10 @@ def _of_design(design: DesignSection | None, valid: Known, context: Known) -> It
     problem, parameters = problem_of(valid), parameters_of(valid, context)
     if design is None or problem is None or parameters is None:
         return
+    wanted = target_of(design.target)
+    named = {"lyapunov_exponent": "λ", "stability_index": "δ_p"}.get(wanted.kind) or f"Λ({wanted.p:g})"
+    if (named[0] != "Λ" or wanted.p % 2) and (told := even_only(problem, named)):
+        yield ("target",), design.target, told.words(CASE_WORDS)
     for i, each in enumerate(design.by):
         if each.key in [other.key for other in design.by[:i]]:
             yield ("by", i, "key"), each.key, f'got "{each.key}" twice; parameters must differ; remove one of them'

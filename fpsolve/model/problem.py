@@ -315,8 +315,8 @@ class Problem:
         """Whether Λ(p) is found for even p > 0 alone, from closed equations of moments: directions are too many, or
         impulses move them, or the state is that of a whole delay, with p = 2 alone.
         """
-        is_struck = self.dimension > 2 and bool(self._moved.impulses)
-        return self.dimension > MOST_BY_DIRECTIONS or is_struck or bool(self.system.pasts)
+        is_large = bool(self.system.pasts) or self.dimension > MOST_BY_DIRECTIONS
+        return is_large or (self.dimension > 2 and bool(self._moved.impulses))
 
     @property
     def unit_rate(self) -> float:
@@ -689,7 +689,7 @@ def refuse_infinite(problem: Problem, p: float) -> None:
             not even, and the problem `is_closed_only`.
     """
     if problem.is_closed_only or problem.has_algebraic_tails:
-        symbol = moment_at(p).symbol
+        symbol = moment_at(p).symbol if p else "λ"
         is_closed = p == 2 if problem.system.pasts else p > 0 and p % 2 == 0
         if not is_closed and (told := even_only(problem, symbol)):
             raise NoSuchExponent(told)

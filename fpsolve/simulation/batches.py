@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, wait
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from threading import Event
 from typing import Any
 
@@ -67,6 +67,14 @@ class Plan:
     def length(self) -> float:
         """The time of one slice."""
         return self.slice_steps * self.step
+
+    @property
+    def rougher(self) -> Plan:
+        """The same in rough steps."""
+        known, count = self.known, self.known.together
+        h = count * self.step
+        steps = self.slice_steps // count
+        return replace(self, motion=known.motion(h), noise_step=known.noise_step(h), step=h, slice_steps=steps)
 
     @property
     def slice_seconds(self) -> float:

@@ -30,6 +30,8 @@ _FAR = 5.0
 _UNRESOLVED = 1 / 30
 """Of the coefficient of [A₁, [A₁, A₀]] under white noise, its mean for given ∫dW and ∫W dt, as a share of s²h²."""
 
+ROUGHER = 3
+"""How many steps are one of some batches, which tells the bias of a step, where that is of the order h²."""
 _DELAYS = 8.0
 """Delays after which the start is forgotten, about."""
 _PARALLEL = 100.0
@@ -83,6 +85,11 @@ class Coefficients:
         """n."""
         return self.steady.shape[-1]
 
+    @property
+    def together(self) -> int:
+        """How many steps are a rough one; 1 where the bias of a step is of a higher order, or none."""
+        return ROUGHER if self.noise.is_white and not self.is_exact else 1
+
     def size(self, h: float) -> int:
         """The number of variables of a path that is moved in steps of length h."""
         return self.dimension
@@ -124,9 +131,7 @@ class SplitCoefficients(Coefficients):
 
     sizes: Sequence[tuple[float, bool]] = ()
 
-    @property
-    def is_exact(self) -> bool:
-        return False
+    is_exact, together = False, ROUGHER
 
     def motion(self, h: float) -> SplitMotion | SplitSpace:  # type: ignore[override]
         from fpsolve.simulation.several import SplitMotion

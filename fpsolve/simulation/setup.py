@@ -14,7 +14,7 @@ from fpsolve.model.noise import Noise
 from fpsolve.model.noises.clock import waves_apart
 from fpsolve.model.plane import SAME_DELAY, System, affine, common_delay, written_coefficient
 from fpsolve.model.problem import Problem, checked_problem, refuse_infinite
-from fpsolve.simulation.coefficients import SplitCoefficients, coefficients
+from fpsolve.simulation.coefficients import ROUGHER, SplitCoefficients, coefficients
 
 Estimator = Literal["direct", "population"]
 SPLIT = 0.06
@@ -47,8 +47,9 @@ def simulated_parts(problem: Problem) -> tuple[System, Noise]:
     except ValueError as failure:
         raise FpsolveError(f"simulation is in steps that divide each delay, but {failure}") from failure
     if problem.dimension > 2 and problem.impulses:
-        told = f"simulation under impulses is for two variables, but there are {problem.dimension}"
-        raise FpsolveError(f"{told}; take even p, which need none")
+        found = "the state has delays" if system.pasts else f"there are {problem.dimension}"
+        told = f"simulation under impulses is for two variables, but {found}"
+        raise FpsolveError(f"{told}; take {'p = 2' if system.pasts else 'even p'}, which needs none")
     bent = [term.g for term in system.terms if affine(term.g) is None]
     if bent and (not noise.has_states or len(noise.parts) > 1):
         found = f"but one has g = {written_coefficient(bent[0]).strip()}"
@@ -131,8 +132,8 @@ def transient(oscillator: System, noise: Noise, *, is_mixed: bool = True) -> flo
 
 
 def default_step(oscillator: System, noise: Noise) -> float:
-    """Half the largest step, or less, so that a half-turn π/ω or a period is a whole number of steps."""
-    unit = _repeated(oscillator, noise)
+    """Half the largest step, or less, so that a half-turn π/ω or a period is a whole number of steps, rough or not."""
+    unit = _repeated(oscillator, noise) / coefficients(oscillator, noise).together
     return unit / math.ceil(unit / (0.5 * largest_step(oscillator, noise)[0]))
 
 
@@ -158,8 +159,9 @@ def obstacles(
             f"got {step:g}, too large for {reason}; must be > 0 and <= {largest:.4g}; reduce it, or leave it out"
         )
     elif step is not None and oscillator.pasts and not _divides(step, oscillator):
-        unit, _ = common_delay(oscillator.pasts)
-        found["step"] = f"got {step:.10g}; must be a part of the delay, such as {unit / math.ceil(unit / step):.10g}"
+        unit = common_delay(oscillator.pasts)[0] / ROUGHER
+        near = unit / math.ceil(unit / step)
+        found["step"] = f"got {step:.10g}; must be a third, a sixth, … of the delay, such as {near:.10g}"
     elif step is not None and step < least <= largest:
         found["step"] = (
             f"got {step:g}, too small: a transient, {settling:.3g}, must take at most {_LONGEST:.0e} steps; must be >= "
@@ -180,8 +182,8 @@ def obstacles(
 
 
 def _divides(step: float, system: System) -> bool:
-    """Whether the delays of a system are whole numbers of steps."""
-    parts = common_delay(system.pasts)[0] / step
+    """Whether the delays of a system are whole numbers of rough steps."""
+    parts = common_delay(system.pasts)[0] / (ROUGHER * step)
     return abs(parts - round(parts)) <= SAME_DELAY * parts
 
 

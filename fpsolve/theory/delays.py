@@ -16,6 +16,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import combinations_with_replacement
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -194,10 +195,10 @@ class DelayRates:
         steady += [2 * each @ self._turn @ s for each, s in zip(moving[1:], later[1:], strict=True)]
         for square in own.squares:
             parts = square * fall
-            for k, j in zip(*np.triu_indices(count + 1), strict=True):
-                if parts[k].any() and parts[j].any():
-                    relaxed = _kron(expm(self.generator * own.unit * k), _kron(parts[k], parts[j]))
-                    noisy.append((1 if k == j else 2) * relaxed @ later[j - k])
+            reached = [k for k in range(count + 1) if square[k].any()]
+            for k, j in combinations_with_replacement(reached, 2):
+                relaxed = _kron(expm(self.generator * own.unit * k), _kron(parts[k], parts[j]))
+                noisy.append((1 if k == j else 2) * relaxed @ later[j - k])
         return _Parts(later, steady, noisy)
 
     def _carried(self, moving: Sequence[Any]) -> Any:
@@ -285,10 +286,15 @@ class DelayRates:
         if self.state.is_still:
             size = abs(low) + 1 / self.state.last
             return Eigenpair(low, x, y / (y @ x), 2 * SETTLED * size, size)
-        gap, factor = high - low, math.exp(-STRIDE)
-        while gap > NEAREST * (abs(low) + high - low) and self._is_right(low + factor * gap, x, y):
+        gap, factor, least = high - low, math.exp(-STRIDE), NEAREST * (abs(low) + high - low)
+        if not self.state.loads and self._log_radius(low + least) > 0:
+            ends = math.log(least), math.log(gap)
+            share = float(brentq(lambda log: self._log_radius(low + math.exp(log)), *ends, xtol=NEAR))
+            return self._settled(low + math.exp(share))
+        while self.state.loads and gap > least and self._is_right(low + factor * gap, x, y):
             gap *= factor
-        if gap <= NEAREST * (abs(low) + high - low):  # the noise does not reach what grows the fastest
+        if gap <= least or not self.state.loads:  # the noise does not reach what grows the fastest
+            gap = min(gap, least)
             if abs(self._slowest.imag) * self.state.last <= SETTLED:  # else Z is 0/0 next to there
                 found = self._settled(low + gap)
                 if 0 <= found.value - low <= gap and found.change < gap:
@@ -302,20 +308,24 @@ class DelayRates:
         return self._settled(low + least)
 
     def _is_right(self, sigma: float, x: FloatArray, y: FloatArray) -> bool:
-        """Whether σ > Λ: whether y, driven for ever, stands still with positive moments at times kτ.
-
-        Under white noise alone: whether S without it is driven by less than itself.
-        """
-        later, *parts = self._parts(sigma)
-        steady, noisy = (self._even.T @ sum(each, 0.0 * parts[0][0]) @ self._even for each in parts)
-        if not self.state.loads:
-            return bool(np.max(np.abs(np.linalg.eigvals(np.linalg.solve(-steady, noisy)))) < 1)
+        """Whether σ > Λ: whether y, driven for ever, stands still with positive moments at times kτ."""
+        later, steady, noisy = self._sums(sigma)
         n, mean = self.state.n, y.reshape(len(self.generator), -1)[:, 0]
         driven = self._even @ np.linalg.solve(-steady - noisy, x)
         moments = [np.tensordot(mean, (each @ driven).reshape(-1, n, n), 1) for each in later]
         rows = range(len(moments))
         values = np.linalg.eigvalsh(np.block([[moments[max(i - j, 0)] for j in rows] for i in rows]))  # its lower half
         return bool(values[0] >= -NEGATIVE * values[-1])
+
+    def _log_radius(self, sigma: float) -> float:
+        """ln of how much of S drives S that is without white noise; 0 at Λ, and below it for σ > Λ."""
+        _, steady, noisy = self._sums(sigma)
+        return math.log(np.max(np.abs(np.linalg.eigvals(np.linalg.solve(-steady, noisy)))))
+
+    def _sums(self, sigma: float) -> tuple[list[Any], Any, Any]:
+        """S(kτ) of S(0), and −Z(σ) without white noise and by it."""
+        later, *parts = self._parts(sigma)
+        return later, *(self._even.T @ sum(each, 0.0 * parts[0][0]) @ self._even for each in parts)
 
     @property
     def abscissa(self) -> float:
@@ -348,10 +358,13 @@ class DelayRates:
         raise NoHierarchy(f"the largest growth rate without noise is not found for a delay so long; {REMEDY}")
 
     def _root(self, moving: Sequence[Any], roots: Any) -> complex:
-        """The root on the right of those that some numbers are next to."""
+        """The root on the right of those that some numbers are next to, of several the one that turns the least."""
         lags, one = self.state.unit * np.arange(len(moving))[:, None, None], np.eye(len(moving[0]))
+        found = complex(math.nan)
         for root in sorted(roots[roots.imag >= 0], key=lambda each: -each.real):
-            s, step = root, math.inf
+            if (found.real - root.real) * self.state.last > CLOSE:
+                break
+            s, step = complex(root), math.inf
             for _ in range(MOST_POLISHES):
                 parts = _exp(-s * lags) * moving
                 values = eigvals(s * one - parts.sum(axis=0), one + (lags * parts).sum(axis=0))
@@ -360,19 +373,23 @@ class DelayRates:
                 if abs(step) <= SETTLED * (abs(s) + 1 / self.state.last):
                     break
             if abs(s - root) * self.state.last < CLOSE and abs(step) * self.state.last < CLOSE**2:
-                return complex(s)
-        return complex(math.nan)
+                same = SETTLED * (abs(s) + 1 / self.state.last)  # waves repeat roots beside their multiples of iν
+                is_first = math.isnan(found.real) or s.real > found.real + same
+                if is_first or (s.real > found.real - same and abs(s.imag) < abs(found.imag)):
+                    found = complex(s)
+        return found
 
     def _settled(self, sigma: float) -> Eigenpair:
         """Λ next to σ, and what finer steps or polynomials change: they are made finer until it is rounding."""
         at, last = self, math.inf
         while True:
+            near = at._near(sigma)
+            size = at._size(sigma, near)
             for _ in range(MOST_POLISHES):
-                near = at._near(sigma)
                 sigma -= near.away
-                size = at._size(sigma, near)
                 if abs(near.away) <= ROUNDING * size:
                     break
+                near = at._near(sigma)
             finer = replace(at, finer=at.finer + 1)
             change = abs(float(near.y @ finer.matrix(sigma) @ near.x))
             if -0.5 * sigma * self.state.last > LARGEST:

@@ -161,8 +161,24 @@ def test_simulated_paths(names, drift, noise):
     assert found.standard_error <= 5e-3
 
 
+def test_simulated_paths_lack_the_bias_of_their_step():
+    """Of hardly any noise λ is the root of s = −1 + 0.4 e^(−s): a step alone is off by 3e-5."""
+    problem = Problem(EquationSystem(("x",), ("-x + 0.4*x(t - 1) + 0.0001*xi*x",)), ITO)
+    found = simulate(problem, (), estimator="direct", paths=1024, time=64.0, step=1 / 24)
+    off = found.lyapunov_exponent - (lambertw(0.4 * math.e).real - 1)
+    assert abs(off) <= 4 * found.lyapunov_exponent_error
+    assert found.lyapunov_exponent_error <= 1e-5
+
+
+def test_a_wave_that_forces_leaves_growth_alone():
+    """Its angle repeats each root s of E x as s + iνk."""
+    rates = ["-x - 0.3*v + 0.2*xi*x + 0.1*x(t - 2)" + more for more in ("", " + 0.3*cos(t)")]
+    values = [even_moment(Problem(EquationSystem(("x", "v"), ("v", each)), ITO), 2).value for each in rates]
+    assert values[1] == pytest.approx(values[0], abs=1e-12)
+
+
 def test_steps_of_paths_divide_a_delay():
-    with pytest.raises(ValueError, match="must be a part of the delay, such as"):
+    with pytest.raises(ValueError, match=r"a third, a sixth, … of the delay, such as 0\.0098"):
         simulate(scalar(-2.0, 0.5, 1.0), 2.0, step=0.0101)
 
 
