@@ -106,6 +106,27 @@ def test_while_a_slider_moves_numbers_are_within_their_error():
         assert [row[:2] for row in cells(moving["numbers"])] == [row[:2] for row in cells(settled["numbers"])]
 
 
+def test_a_map_shows_the_rows_of_its_grid_as_they_come_and_is_stopped_between_them(monkeypatch):
+    monkeypatch.setattr("fpsolve.analysis.stability.Boundary.reduced_scan", lambda line: None)
+    explorer, told = explorer_of("systems/telegraph"), []
+    axes = [{"key": key, "start": 0.05, "stop": 1.0} for key in ("system.damping", "noise.a")]
+
+    def look(asked, number):
+        told.append(explorer.answer("listen", {"page": "a", "number": 3}))
+        if len(told) > 30 and any("map" in each for each in told):
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(explorer, "_look", look)
+    assert explorer.answer("map", {**question(explorer), "axes": axes}) == {"stopped": True}
+    assert any("unknowns" in each.get("waits", "") for each in told)
+    grid = next(each["map"]["grid"] for each in told if "map" in each)
+    assert len(grid) == 13
+    problem = explorer.first
+    for k in (0, 6, 12):  # dark below 0
+        there = problem.at({"system.damping": 0.05, "noise.a": 0.05 + k * 0.95 / 12})
+        assert grid[0][k] == np.sign(lyapunov_exponent(there).value)
+
+
 @pytest.mark.parametrize(
     ("name", "changed", "words"),
     [
@@ -394,7 +415,7 @@ def test_a_click_on_the_map_sets_the_sliders_and_paths_grow_with_the_exponent(br
         page.click("[for=see-map]")
         page.select_option("#map select >> nth=0", "oscillator.c1")
         page.click("#map .go")
-        until(page, "views.map !== undefined")
+        until(page, "views.map !== undefined && $('stop').disabled")  # before it is done, it has what there is so far
         [line] = [each for each in page.evaluate("views.map.answer.lines") if each["name"] == "λ = 0"]
         (x, y), *_ = line["branches"]
         problem = load_case(CASES / "fig1.toml").problem

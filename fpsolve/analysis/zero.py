@@ -191,7 +191,7 @@ def line_rtol(problem: Problem, zero: Zero) -> float:
     return RTOL if problem.dimension == 2 or (zero.p > 0 and zero.p % 2 == 0) else RTOL_BEYOND_PLANE
 
 
-@one_number("Λ({0:g})/{0:g} and its slopes")
+@one_number("Λ at p = {:g}, and its slopes")
 def ratio_with_slopes(solver: ExponentSolver, p: float, keys: Sequence[str]) -> tuple[float, float, FloatArray]:
     """Λ(p)/p, at p = 0 λ, with its error, and its derivatives by some parameters.
 

@@ -2,7 +2,7 @@
 const $ = id => document.getElementById(id);
 const page = crypto.randomUUID();
 const SVG = "http://www.w3.org/2000/svg";
-const STEPS = 1000, REST = 300, LISTEN = 2000; // positions of a slider; milliseconds of rest, and between two looks at the server
+const STEPS = 1000, REST = 300, LISTEN = 1000; // positions of a slider; milliseconds of rest, and between two looks at the server
 let about, number = 0, knobs = [], wanted = 0, isMoving = false, isLost = false, rest, shown, before;
 
 // asking
@@ -21,18 +21,27 @@ async function ask(name, more = {}) {
   }
 }
 
+const long = new Set(); // what has taken longer than a moment
 // The answer of a kind is shown if nothing newer was asked; what takes longer than a moment says that it works.
 async function work(name, show, more = {}) {
-  const said = setTimeout(() => { $("state").textContent = "working …"; $("stop").disabled = false; }, 150);
+  const said = setTimeout(() => { $("state").textContent = "working …"; long.add(name); $("stop").disabled = false; }, 150);
   const answer = await ask(name, more);
   clearTimeout(said);
   if (isLost || answer.stopped) return;
-  $("stop").disabled = true;
+  long.delete(name);
+  $("stop").disabled = !long.size;
   $("refused").textContent = answer.refused || "";
   document.body.classList.toggle("stale", Boolean(answer.refused));
   const time = answer.seconds < 1 ? `${(1000 * answer.seconds).toFixed(0)} ms` : `${answer.seconds?.toFixed(1)} s`;
   $("state").textContent = answer.refused ? "" : `${name === "move" ? "moving, " : ""}${time}`;
   if (!answer.refused) show(answer);
+}
+
+async function listen() { // what a question waits for, and what there is of a map so far
+  const {waits, map} = isLost ? {} : await ask("listen");
+  if (isLost || $("stop").disabled) return;
+  if (waits) $("state").textContent = `working … ${waits}`;
+  if (map) see("map", map, asked.map);
 }
 
 function moved() {
@@ -169,7 +178,7 @@ function showCurve(answer) {
 
 // the views beside the curve: what was drawn of another position is grey
 
-const views = {}; // the answers by name, each with the position that it is of
+const views = {}, asked = {}; // the answers by name, each with the position that it is of; the positions of questions
 const position = () => JSON.stringify(knobs.map(knob => knob.read()));
 const palette = [[68, 1, 84], [59, 82, 139], [33, 145, 140], [94, 201, 98], [253, 231, 37]]; // viridis, which the colour-blind see
 
@@ -189,17 +198,31 @@ const drawings = {
   map(answer) {
     const [u, v] = answer.axes.map(({key}) => knobs.find(knob => knob.key === key));
     const [x, y] = answer.axes.map(({start, stop, scale}, i) => ({ends: [start, stop], log: scale === "log", label: [u, v][i].title}));
-    const svg = $("map").querySelector("svg"), plot = frame(svg, x, y), {left, right} = plot.box;
-    const say = (x, y, text, kind) => { // within the frame
-      const made = node(plot.inside, "text", {class: `name ${kind}`, y, "text-anchor": "middle"}, text), half = made.getComputedTextLength() / 2 + 4;
-      made.setAttribute("x", Math.max(left + half, Math.min(right - half, x)));
-    };
+    const svg = $("map").querySelector("svg"), plot = frame(svg, x, y), {left, right, top, bottom} = plot.box;
+    if (answer.grid.length) { // of what is still searched: dark below 0, bright above
+      const {href} = paint(answer.grid), half = 0.5 / (answer.grid.length - 1), w = right - left, h = bottom - top;
+      node(plot.inside, "image", {class: "grid", href, x: left - half * w, y: top - half * h, width: (1 + 2 * half) * w, height: (1 + 2 * half) * h, preserveAspectRatio: "none"});
+    }
     const kinds = ["one", "two"], lines = answer.lines.map((each, i) => each.branches.map(([u, v]) => node(plot.inside, "path", {class: `line ${kinds[i]}`, d: line(plot, u, v)})));
+    const names = [[plot.X(u.read()), plot.Y(v.read()), 6]]; // and the mark of the sliders
+    const say = (x, y, text, kind, turn = 0) => { // within the frame
+      const made = node(plot.inside, "text", {class: `name ${kind}`, "text-anchor": "middle"}, text), half = made.getComputedTextLength() / 2 + 4;
+      const at = turn ? x : Math.max(left + half, Math.min(right - half, x));
+      made.setAttribute("transform", `translate(${at} ${y}) rotate(${turn})`);
+      names.push([at, y, half]);
+    };
     for (const {name, at} of answer.regions) name.split(", ").forEach((part, k) => say(plot.X(at[0]), plot.Y(at[1]) + 15 * k, part, ""));
-    lines.forEach((paths, i) => {
+    lines.forEach((paths, i) => { // along the straightest part of a line, away from other names
       if (!paths.length) return;
-      const {x, y} = paths[0].getPointAtLength((0.3 + 0.4 * i) * paths[0].getTotalLength());
-      say(x, y + 4, answer.lines[i].name, kinds[i]);
+      const name = answer.lines[i].name, size = 8 * name.length, total = paths[0].getTotalLength(), at = s => paths[0].getPointAtLength(s);
+      const places = Array.from({length: 40}, (_, k) => size + (total - 2 * size) * (k + 0.5) / 40).map(s => {
+        const [a, b, c] = [at(s - size / 2), at(s), at(s + size / 2)], bend = Math.hypot(a.x - 2 * b.x + c.x, a.y - 2 * b.y + c.y);
+        const near = Math.min(...names.map(([x, y, half]) => Math.hypot(Math.max(0, Math.abs(b.x - x) - half), b.y - y)), b.x - left, right - b.x, b.y - top, bottom - b.y);
+        const turn = Math.atan((c.y - a.y) / (c.x - a.x)) * 180 / Math.PI;
+        return {b, turn, cost: bend + 0.1 * Math.abs(turn) + Math.max(0, size - near)};
+      });
+      const {b, turn} = places.reduce((best, each) => each.cost < best.cost ? each : best), up = (turn - 90) * Math.PI / 180;
+      say(b.x + 7 * Math.cos(up), b.y + 7 * Math.sin(up), name, kinds[i], turn || 0.01);
     });
     node(svg, "circle", {class: "dot two", cx: plot.X(u.read()), cy: plot.Y(v.read()), r: 6});
     svg.onclick = event => {
@@ -222,7 +245,7 @@ const drawings = {
         if (turn) Object.assign(x, {ticks: [0, 1, 2, 3, 4].map(k => k * Math.PI / 2), name: value => ["0", "π/2", "π", "3π/2", "2π"][Math.round(2 * value / Math.PI)]});
         const plot = frame(svg, x, y), {left, right, top, bottom} = plot.box;
         node(plot.inside, "image", {href, x: left, y: top, width: right - left, height: bottom - top, preserveAspectRatio: "none"});
-        title.textContent = `${each.title}, from ${brief(low)} (dark) to ${brief(high)} (bright)`;
+        title.textContent = `${each.title}, from ${low.toPrecision(3)} (dark) to ${high.toPrecision(3)} (bright)`;
       });
       return box;
     }));
@@ -254,13 +277,15 @@ function makeViews() {
   const axis = select => { const {key, ends: [start, stop], log} = axes.find(knob => knob.key === select.value); return {key, start, stop, scale: log ? "log" : "linear"}; };
   const questions = {map: () => ({axes: [axis(first), axis(second)]}), field: () => ({p: Number($("field").querySelector(".order").value)}), paths: () => ({})};
   for (const name in questions) $(name).querySelector(".go").onclick = () => {
-    const of = position();
-    work(name, answer => {
-      views[name] = {answer, of};
-      $(name).querySelector(".told").innerHTML = answer.told; // escaped by fpsolve
-      drawViews();
-    }, questions[name]());
+    const of = asked[name] = position();
+    work(name, answer => see(name, answer, of), questions[name]());
   };
+}
+
+function see(name, answer, of) {
+  views[name] = {answer, of};
+  $(name).querySelector(".told").innerHTML = answer.told; // escaped by fpsolve
+  drawViews();
 }
 
 // views, downloads
@@ -294,12 +319,12 @@ async function start() {
   makeViews();
   $("views").onchange = redraw;
   $("reset").onclick = () => { for (const knob of knobs) knob.set(knob.value); moved(); };
-  $("stop").onclick = () => { for (const of of ["curve", "map", "field", "paths", "report"]) ask("stop", {of}); $("state").textContent = "stopped"; $("stop").disabled = true; };
+  $("stop").onclick = () => { for (const of of ["curve", "map", "field", "paths", "report"]) ask("stop", {of}); long.clear(); $("state").textContent = "stopped"; $("stop").disabled = true; };
   $("save").onclick = () => work("save", download);
   $("report").onclick = () => work("report", download);
   $("python").onclick = () => work("python", copy);
   addEventListener("resize", redraw);
-  setInterval(() => isLost || ask("listen"), LISTEN);
+  setInterval(listen, LISTEN);
   await work("solve", showCurve);
 }
 

@@ -128,6 +128,7 @@ def solve_chart(
     stepped: Callable[[], None] = lambda: None,
     map: Map = map,
     known: Callable[[Boundary], Boundary | None] = lambda _: None,
+    has_closed_forms: bool = True,
 ) -> Iterator[Chart]:
     """What there is so far, after each scan, branch and line, and in the end the whole chart.
 
@@ -137,12 +138,13 @@ def solve_chart(
         stepped: called once for each point that is traced.
         map: computes the rows of all scans, as the builtin does or in other processes, while branches are traced here.
         known: gives a line that an earlier run has finished.
+        has_closed_forms: whether they are found, too, which takes seconds.
     """
     frame = charted(case)
     x, y = frame.x.axis, frame.y.axis
     curve = case.curve({})
     problem = curve.problem
-    chart = Chart((), _closed_forms(problem, frame.zero, (x, y)))
+    chart = Chart((), _closed_forms(problem, frame.zero, (x, y)) if has_closed_forms else ())
     scan = empty_scan(frame.nodes) if frame.nodes else None
     begun = [Boundary(zero, x, y, problem, scan=scan, budget=case.budget) for zero in frame.zero]
     finished = [known(line) for line in begun]

@@ -9,11 +9,11 @@ from __future__ import annotations
 import math
 import re
 import threading
-import unicodedata
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import partial
+from html import unescape
 from itertools import chain
 from pathlib import Path
 from time import perf_counter
@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
-from fpsolve.budget import watched
+from fpsolve.budget import Countdown, watched
 from fpsolve.case.case import CHEAP, CHEAP_OF_WALLS, Case, load_case
 from fpsolve.case.refusals import obstacle
 from fpsolve.case.remedies import CASE_WORDS
@@ -51,6 +51,7 @@ from fpsolve.show.problem import show as show_problem
 from fpsolve.show.verdict import meaning, verdict
 from fpsolve.study.results import CurveResult
 from fpsolve.study.solve import everything, solve_curve
+from fpsolve.workflow.progress import waiting
 from fpsolve.workflow.reports import COMPLETE, facts_since
 from fpsolve.workflow.views import field_of, listed, map_of, paths_of
 
@@ -106,12 +107,13 @@ class Explorer:
             if np.min(np.abs(few - each)) >= APART * np.ptp(p):
                 few.append(each)
         self._few, self._last, self._drawing = np.unique(few).tolist(), list[ExponentSolver](), threading.Lock()
-        self._newest = dict[tuple[str, str], float]()
+        self._newest, self._so_far = dict[tuple[str, str], float](), dict[str, dict[str, Any]]()
         self._answers: dict[str, tuple[str, Callable[[Mapping[str, Any]], Answer]]] = {
             "start": ("start", self._start),
             "move": ("curve", self._move),
             "solve": ("curve", self._solve),
-            "map": ("map", lambda asked: map_of(self._at(asked), asked.get("axes"))),
+            "map": ("map", self._map),
+            "listen": ("listen", lambda asked: self._so_far.pop(str(asked.get("page")), {})),
             "field": ("field", lambda asked: field_of(self._at(asked), asked.get("p"))),
             "paths": ("paths", self._paths),
             "save": ("save", self._save),
@@ -131,10 +133,9 @@ class Explorer:
         if not isinstance(number, int | float):
             return {"refused": f"got {number!r} as the number of a question; must be a number; load the page again"}
         self._newest[asked] = max(number, self._newest.get(asked, number))
-        look = partial(self._look, asked, number)
         try:
             started = perf_counter()
-            with watched(lambda _: look()):
+            with watched(partial(self._wait, asked, number)):
                 return {**answer(question), "seconds": perf_counter() - started}
         except KeyboardInterrupt:
             return {"stopped": True}
@@ -142,6 +143,11 @@ class Explorer:
             return {"refused": failure.message.words(CASE_WORDS)}
         except Exception as failure:
             return {"refused": str(fault(failure))}
+
+    def _wait(self, asked: tuple[str, str], number: float, countdown: Countdown) -> None:
+        """Let the page know what it waits for, before the next factorisation."""
+        self._look(asked, number)
+        self._so_far.setdefault(asked[0], {})["waits"] = waiting(countdown) if countdown.name else ""
 
     def _look(self, asked: tuple[str, str], number: float) -> None:
         """End what is not wanted any more."""
@@ -255,6 +261,14 @@ class Explorer:
             "table": "",  # which nobody reads while a slider moves
         }
 
+    def _map(self, question: Mapping[str, Any]) -> Answer:
+        """The lines on which stability ends; what there is of them so far, while they are traced."""
+
+        def tell(found: Answer) -> None:
+            self._so_far.setdefault(str(question.get("page")), {})["map"] = found
+
+        return map_of(self._at(question), question.get("axes"), tell)
+
     def _paths(self, question: Mapping[str, Any]) -> Answer:
         """Simulated paths, and the λ that they grow by."""
         case, asked = self._at(question), (str(question.get("page")), "paths")
@@ -306,16 +320,9 @@ class Explorer:
 
 def _letters(latex: str) -> str:
     """A symbol in letters, such as τ₀; empty where it needs more than these."""
-
-    def greek(name: re.Match[str]) -> str:
-        try:
-            return unicodedata.lookup(f"GREEK SMALL LETTER {name[1].upper()}")
-        except KeyError:
-            return name[0]
-
-    text = re.sub(r"\\([a-z]+)", greek, latex.strip("$"))
+    text = unescape(re.sub(r"\\(?:var)?([A-Za-z]+)", r"&\1;", latex.strip("$")))
     text = re.sub(r"_(\d)", lambda digit: digit[1].translate(BELOW), text)
-    return "" if re.search(r"[\\_^{}]", text) else text
+    return "" if re.search(r"[&_^{}]", text) else text
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from pydantic import ValidationError
 
-from fpsolve.analysis.density import stationary_density
+from fpsolve.analysis.density import stationary_density, tilted_density
 from fpsolve.analysis.zero import check_axes, said
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case
@@ -23,7 +23,7 @@ from fpsolve.parts.eigenfunctions import FURTHEST
 from fpsolve.parts.nodes import Nodes
 from fpsolve.parts.part import Numerics
 from fpsolve.results.text import sampled
-from fpsolve.workflow.chart import show, solve_chart
+from fpsolve.workflow.chart import Chart, show, solve_chart
 
 PIXELS = 144, 72
 """Of a picture, each way."""
@@ -36,11 +36,12 @@ NAMED = 0.02
 Answer = Mapping[str, Any]
 
 
-def map_of(case: Case, axes: object) -> Answer:
+def map_of(case: Case, axes: object, tell: Callable[[Answer], None]) -> Answer:
     """The lines λ = 0 and Λ(2) = 0 over two parameters, as `chart` traces them, and the regions between them.
 
     Args:
         axes: two tables such as those of [chart].
+        tell: takes what there is so far, of the grid that is searched for a line its rows.
     """
     zero: list[Any] = [{"moment": 2.0}] if not case.problem.has_algebraic_tails else []
     zero = zero if case.problem.is_closed_only else ["lyapunov_exponent", *zero]
@@ -54,22 +55,37 @@ def map_of(case: Case, axes: object) -> Answer:
         raise FpsolveError("\n".join(told)) from failure
     except ValueError as failure:
         raise FpsolveError(said(failure)) from failure
-    case = case.model_copy(update={"chart": frame})
-    *_, chart = solve_chart(case)
-    regions = chart.regions.each if chart.regions else ()
-    return {
-        "axes": axes,
-        "lines": [
-            {"name": line.zero.equation, "branches": [[*map(listed, each.path)] for each in line.branches]}
-            for line in chart.lines
-        ],
-        "regions": [
-            {"name": each.name, "at": [float(side.value(u)) for side, u in zip(sides, each.at, strict=True)]}
-            for each in regions
-            if each.share >= NAMED
-        ],
-        "told": part_of_page(each for each in show(case, chart) if not isinstance(each, Drawing)),
-    }
+    case, grid = case.model_copy(update={"chart": frame}), list[list[float | None]]()
+
+    def answer(chart: Chart) -> Answer:
+        return {
+            "axes": axes,
+            "grid": [*grid],
+            "lines": [
+                {"name": line.zero.equation, "branches": [[*map(listed, each.path)] for each in line.branches]}
+                for line in chart.lines
+            ],
+            "regions": [
+                {"name": each.name, "at": [float(side.value(u)) for side, u in zip(sides, each.at, strict=True)]}
+                for each in (chart.regions.each if chart.regions else ())
+                if each.share >= NAMED
+            ],
+            "told": part_of_page(each for each in show(case, chart) if not isinstance(each, Drawing)),
+        }
+
+    def rows(scan: Callable[[Any], Any], tasks: Iterable[Any]) -> Iterator[Any]:
+        for row in tasks:
+            grid[:] = grid if row.number else [[None] * row.count] * row.count
+            found = scan(row)
+            grid[row.number] = listed(np.sign(found.values))
+            tell(answer(chart))
+            yield found
+
+    chart = Chart((), ())
+    for chart in solve_chart(case, map=rows, has_closed_forms=False):
+        tell(answer(chart))
+    grid.clear()
+    return answer(chart)
 
 
 def field_of(case: Case, p: object) -> Answer:
@@ -82,13 +98,14 @@ def field_of(case: Case, p: object) -> Answer:
     solver = Numerics.of(case).solver(problem)
     stationary = solver.pair(0.0)
     if problem.dimension > 2:
-        found: Any = stationary_density(stationary)
-        first, second = found.grid.quantities
+        all_of: list[Any] = [stationary_density(stationary), *([tilted_density(solver.pair(float(p)))] if p else [])]
         names = [
-            f"{each.words} ({plain_unit(each.unit)})" if each.unit != "1" else each.words for each in (first, second)
+            f"{each.words} ({plain_unit(each.unit)})" if each.unit != "1" else each.words
+            for each in all_of[0].grid.quantities[:2]
         ]
-        panels = [panel("stationary density of directions", found.grid.first, found.grid.second, found.values, names)]
-        return {"panels": panels, "told": part_of_page([*told_of(panels), Sentence(f"{found._said()}.")])}
+        panels = [panel(each.name, each.grid.first, each.grid.second, each.values, names) for each in all_of]
+        said = [Sentence(each._said()) for each in all_of]
+        return {"panels": panels, "told": part_of_page([*told_of(panels), *said])}
     stationary_density(stationary)  # which refuses one that misleads
     pair = solver.pair(float(p))
     grid, unit = Nodes.of(pair), problem.noise_quantity.unit
