@@ -184,7 +184,7 @@ def test_the_peak_of_memory_is_foreseen(name):
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="sizes of Linux")
-@pytest.mark.parametrize("name", sampled(*LARGE))
+@pytest.mark.parametrize("name", sampled(*LARGE, keep=0))
 def test_what_is_foreseen_above_the_memory_is_refused_before_it_is_allocated(name):
     """Before, 5 GB were reached where 2.4 were promised."""
     largest, foreseen, said = peak(name, memory=0.13)

@@ -522,6 +522,7 @@ def test_a_closed_pipe_ends_a_command_quietly(case, arguments, unbuffered):
     assert (done.returncode, done.stderr) == (CLOSED_PIPE, "")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "code"),
     sampled((["nonsense"], BAD_INPUT), (["run", "test.toml", "--set", LEAN], 0), (["run", "none.toml"], BAD_INPUT)),

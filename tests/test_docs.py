@@ -31,7 +31,7 @@ from fpsolve.study.solve import everything, result_of, solve_curve
 ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")), *sorted((ROOT / "docs").glob("[!g]*/*.md"))]
 PAGES += sorted((ROOT / "docs/guide").glob("*.md"))
-LONG = "guide/response", "guide/charts"
+LONG = "guide/response", "guide/charts", "guide/python"
 
 
 def blocks(page, language):

@@ -61,6 +61,7 @@ def test_the_oscillator_of_the_guide_takes_few_solves():
     assert stability_index(found.problem).value == pytest.approx(1.0, abs=1e-8)
 
 
+@pytest.mark.slow
 def test_what_turns_back_is_found_and_what_it_does_not_reach_is_told():
     """Λ(2) = 2a + 2σ²/α² with a = b² has its least value at b = 0, within the range."""
     system = PlaneSystem.of_equations(("x", "y"), ("b**2*x + y + xi*x", "-x + b**2*y + xi*y"), {"b": 0.9})
@@ -98,6 +99,7 @@ def test_two_parameters_are_the_nearest_point(a):
     assert found.found.value == pytest.approx(1.0, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_units_and_ends_of_ranges_count():
     """As a costs nothing it alone moves, up to the end of its range; then σ does the rest."""
     frame = [Axis("system.a", -0.31, 0.0), Axis("noise.sigma", 0.3, 2.0)]

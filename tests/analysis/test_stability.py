@@ -652,6 +652,7 @@ def test_a_line_ends_with_its_time(monkeypatch, cost):
         assert whole.remark() == Message(Code.LINE_STOPPED, line="Λ(2) = 0", reason=spent)
 
 
+@pytest.mark.slow
 def test_real_lines_end_with_their_time():
     found = line(step=0.02, nodes=7, budget=Budget(line_seconds=0.3))
     assert not found.complete

@@ -163,6 +163,7 @@ STEADY = np.array([[0, 1, 0], [-1, -0.1, 0.5], [0, -0.5, -1]])
 DRIVEN = 0.8 * np.array([[0, 0, 0], [-1, 0, 0], [0, 0, 0]])
 
 
+@pytest.mark.slow
 def test_a_case_of_three_variables(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Its number is that of the second moments; what is for the phase alone is left out or refused in words."""
     path = write(tmp_path, VOLTAGE)

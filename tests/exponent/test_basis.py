@@ -41,6 +41,7 @@ def test_few_solves_in_strong_noise_against_a_fourier_hermite_code(strong):
     assert case.relative_error(strong(case.p), truth) <= case.rtol
 
 
+@pytest.mark.slow
 def test_the_error_falls_with_the_fourth_power_of_the_distance_of_the_nodes():
     case = CASES["strong"]
     problem = Problem(case.oscillator, case.noise)

@@ -134,6 +134,7 @@ def test_blocks_as_one_system(name, p, rtol):
     assert abs(found.pair.value - ExponentSolver(own).solution(p).pair.value) <= found.error < 1e-3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rtol", [1e-2, 1e-3])
 def test_a_driven_block_as_one_system_states_a_true_error(rtol):
     """T* is not smooth where a decaying part drives the fastest block: degrees of waves help as a power only."""

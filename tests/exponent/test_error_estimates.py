@@ -54,6 +54,7 @@ def test_of_slopes(mesh, rtol, errors):
     assert (solver.slope_error(2.0), solver.slope_error(-1.0)) == pytest.approx(errors, rel=0.2)
 
 
+@pytest.mark.slow
 def test_where_effects_fall_unevenly():
     """The two highest modes have 1/600 of the effect of four, but with two degrees more the error falls to 1/400."""
     found = solve(problems(429)[428])

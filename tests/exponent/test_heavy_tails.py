@@ -62,6 +62,7 @@ def check(case, rtol):
         assert open_ < 1e-3 * max(abs(other), estimate.scale)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", sampled(HEAVY, problem(1.0, 0.5, 1.2, 0.1, restitution=0.8, c1=-0.2), keep=1))
 def test_by_finite_differences(case):
     check(case, 1e-7)

@@ -169,6 +169,7 @@ def test_they_are_not_proven():
         prove(of(even()), 2.0)
 
 
+@pytest.mark.slow
 def test_a_simulation_waits_for_rare_impulses():
     """Between them the direction of x comes to rest; elements give λ, below Λ(2)/2 of the equations of the moments."""
     steady = ((0.0, 1.0), (0.0, -0.0056544346676048905))

@@ -62,6 +62,7 @@ def test_equations_have_the_response_of_the_oscillator(bouncing):
     assert closeness(found.impact_rate, bouncing.impact_rate.value) < 1e-9
 
 
+@pytest.mark.slow
 def test_the_order_of_the_variables_is_free(bouncing):
     """With (v, x) the wall is at the second variable, and the phase falls; the functions are the same."""
     found = stationary_response(Problem(written("delta", ("v", "x")), NOISE), rtol=0.1)
@@ -84,6 +85,7 @@ def test_without_a_wall_it_is_that_of_an_elastic_one():
     np.testing.assert_allclose(2 * found.joint_density(x, v), elastic.joint_density(x, v), rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_without_a_wall_both_sides_are_alike(swinging):
     assert swinging.impact_rate is None
     assert (swinging.moment(1, 0).value, swinging.moment(2, 1).value) == (0, 0)

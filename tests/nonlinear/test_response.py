@@ -64,6 +64,7 @@ def test_x_drifts_nowhere(rough):
         assert rough.moment(n, 1).error_estimate <= 1e-2 * rough.moment(n, 1).scale
 
 
+@pytest.mark.slow
 def test_moments_have_errors(rough):
     assert rough.moment(2, 0).value == rough.means["x_squared"].value
     finer = response(BOUNCING, 0.05, 0.5, 1e-3)

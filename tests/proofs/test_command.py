@@ -260,6 +260,7 @@ def test_many_curves_have_a_row_each(case, capsys):
 CODE = "from fpsolve.cli import main; print('begun', flush=True); raise SystemExit(main())"
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
 @pytest.mark.parametrize(("kind", "code"), sampled((signal.SIGINT, 130), (signal.SIGTERM, 143)))
 def test_what_an_interrupted_run_has_proven_is_kept(case, tmp_path, kind, code):

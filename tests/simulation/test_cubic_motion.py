@@ -40,6 +40,7 @@ def test_equations_of_the_oscillator_have_its_motion(variables):
     np.testing.assert_allclose(motion, scales * oscillator, rtol=1e-13)
 
 
+@pytest.mark.slow
 def test_both_forms_move_alike():
     """A force that is damping alone, as one and as the other; bounces are found to rounding."""
     damped, _ = motion_of(VibroImpactOscillator(**NUMBERS, restitution=0.9))
@@ -92,6 +93,7 @@ def sides():
     return [simulated_response(Problem(system, NOISE), **setting) for system in systems]
 
 
+@pytest.mark.slow
 def test_densities_are_over_both_variables(sides):
     """Without a wall on both sides of 0, where it is one in all; the names are those of the variables."""
     for response, names in zip(sides, ("xv", "vx"), strict=True):

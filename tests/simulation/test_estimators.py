@@ -172,6 +172,7 @@ def test_noise_that_is_too_fast_is_refused():
         simulate(Problem(MODERATE, NonGaussianNoise(D0=0.5, tau0=1e-7, r0=0.9)), [1.0])
 
 
+@pytest.mark.slow
 def test_populations_are_taken_where_too_few_paths_carry_the_mean():
     """As either estimator alone finds it; each p has the one that its estimate names."""
     problem, calls = Problem(MODERATE, REDUCED), []

@@ -30,6 +30,7 @@ def test_a_load_on_all_variables_alike():
         assert abs(each.value - (each.p * growth + each.p**2 * 0.04 / 8)) < COVERED * each.standard_error
 
 
+@pytest.mark.slow
 def test_the_bounds_of_convexity():
     """λ and Λ(1) by paths are within those by Λ(2), which paths have, too."""
     free, driven, _ = chain_of_masses(3, 0.2)

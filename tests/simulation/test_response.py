@@ -42,6 +42,7 @@ def test_mean_square_of_the_amplitude(weak):
     assert value == pytest.approx(exponent / kappa, abs=4 * error + oscillator.epsilon**2 * value)
 
 
+@pytest.mark.slow
 def test_density_of_the_amplitude(weak):
     """A² has a Gamma law with the shape λ/s² and the mean λ/κ, up to ε²."""
     oscillator, response = weak

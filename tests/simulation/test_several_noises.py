@@ -18,6 +18,7 @@ GAUSSIAN = OrnsteinUhlenbeck(alpha=1.0, sigma=0.6)
 SLOW = pytest.mark.slow  # each kind is compiled anew
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "noise",
     [

@@ -34,6 +34,7 @@ def along(noise, h, x, means, rises, matrices=(A0, A1)):
     return np.exp(logs) * state
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("start", [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0, -1.0)], ids=["n = 3", "n = 4"])
 def test_the_step_has_order_four(start):
     """ξ = sin 2t: its means over steps are known, and the state by a Runge-Kutta method. The last steps are small."""

@@ -153,6 +153,7 @@ def test_a_simulation_that_ends_early_leaves_nothing_of_an_earlier_one(case, out
     assert capsys.readouterr().err.strip() == "interrupted after 0 of 1 curve; run it again to go on"
 
 
+@pytest.mark.slow
 def test_the_nonlinear_response_is_written(case, out):
     nonlinear = [
         f"--set={setting}"

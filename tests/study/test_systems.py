@@ -9,6 +9,7 @@ from fpsolve.case.case import load_case
 from fpsolve.study.solve import Numerics, solve_curve
 from fpsolve.workflow import compare, expected
 from fpsolve.workflow.chart import solve_chart
+from tests.conftest import sampled
 
 CASES = sorted((Path(__file__).parents[2] / "cases/systems").glob("*.toml"))
 DIGITS = 2e-13
@@ -17,7 +18,7 @@ FEWER = {"delayed_mathieu": 5e-11}
 """Where they are known to fewer: by semi-discretisation."""
 
 
-@pytest.mark.parametrize("path", CASES, ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", sampled(*CASES, keep=4), ids=lambda path: path.stem)
 def test_every_case_meets_its_expectations_within_the_stated_error(path):
     case = load_case(path)
     results = [solve_curve(curve, expected(case, curve.varied), Numerics.of(case)).result for curve in case.curves()]

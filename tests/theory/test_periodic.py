@@ -75,6 +75,7 @@ def test_mathieu_with_white_noise():
     assert lyapunov_exponent(problem).value == pytest.approx(lyapunov_exponent(bounded).value, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_the_exponent_of_waves_in_their_own_fourier_series():
     """λ under cos νt and sin(2νt + φ) with white noise, e^(2ikφ + imθ) without any of the elements."""
     drift = ("v", "-0.2*v - (1 + mu*cos(nu*t) + 0.3*sin(2*nu*t + 0.4) + xi)*x")
