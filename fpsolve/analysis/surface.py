@@ -7,13 +7,15 @@ yᵀW L(0; θ) Vᵀ = 0 and yᵀW M 1 = 1 there is λ = yᵀW L′(0; θ) 1, who
 
 L(p; θ), in the coordinates of one θ, is a sum of products of functions of θ and fixed operators: those at few θ make
 all others. Where it is none, as where a speed changes its sign at a line between cells, there is no such surface.
-What is left is estimated by both residuals and the inverse at a node, as over p, see `exponent.basis`. The principal
-eigenvalue is the largest real one of T > 0 and a small residual: the small pencil has others, of its own and of L.
+What is left is estimated by both residuals and the inverse at a node, as over p, see `exponent.basis`. The small pencil
+has other real eigenvalues, also with T > 0, mostly of larger residuals. On a grid all are looked at, and it is solved
+where it is not clear which one is meant, or where it does not go on beside. Elsewhere pairs are followed from there.
 """
 
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import product
@@ -30,7 +32,7 @@ from fpsolve.data import Result, dataset
 from fpsolve.errors import FpsolveError, NotConverged
 from fpsolve.exponent.adapt import SMALL_P, UNSOLVED, Budget
 from fpsolve.exponent.basis import SAFE, SHARE, Polynomials, eigenpairs, form, orthonormal
-from fpsolve.exponent.eigen import PairDerivatives, PrincipalPair, principal_pair
+from fpsolve.exponent.eigen import MOSTLY, PairDerivatives, PrincipalPair, principal_pair
 from fpsolve.exponent.error import Solution
 from fpsolve.exponent.solver import solver_of
 from fpsolve.exponent.starts import FREE_STAGES, Start, other_centers
@@ -40,7 +42,7 @@ from fpsolve.fem.generator import Generator
 from fpsolve.fem.space import Space
 from fpsolve.messages import Code, Message
 from fpsolve.model.problem import Problem, checked_problem, refuse_infinite
-from fpsolve.model.quantity import LYAPUNOV_EXPONENT, moment_at
+from fpsolve.model.quantity import LYAPUNOV_EXPONENT, Quantity, moment_at
 from fpsolve.theory.perturbation import scale_of
 
 if TYPE_CHECKING:
@@ -68,12 +70,22 @@ MOST_NODES = 60
 """Number of nodes of a surface."""
 MIXED = 48
 """Number of random sums of the entries of a residual."""
+LAGRANGE = -6.0, 2.0, -2.0, 6.0
+"""Products of the distances of each of 0, 1, 2, 3 from the others."""
 LEAST = 100.0
-"""What a residual is at most, over the least of all pairs with T > 0 of the same small pencil."""
+"""What a residual is at most, over those around."""
+ALIKE = 3.0
+"""Residual of a larger real eigenvalue, over the least, up to which either may be the principal one."""
 SEEN = 128
 """Number of points, as likely as the noise is there, at which it is looked whether T > 0."""
 NEGATIVE = 0.05
 """Share of T there that has the other sign, at most."""
+NEXT_TO_NOTHING = 1e-6
+"""A residual, over the distance of the eigenvalue from another one, with which it surely is one of L."""
+SLIGHTLY = 1e-3
+"""By how much that may be more than at the points of the grid around."""
+FOLLOWING = 1e-8
+"""Change of a value, over the small matrix, with which the iteration from these ends: the next is its third power."""
 FEW = 10
 """Number of roundings in an entry of a product with L."""
 BETWEEN = 2.0
@@ -86,30 +98,42 @@ NOTHING = 1e-11
 """Size of a derivative, over that of an eigenfunction, up to which it is rounding."""
 SAME = 1e-9
 """Share of a function that others do not make, up to which it is rounding."""
+SCALES = 5
+"""Number of points along each parameter between which the size of the terms of F is interpolated."""
 AT_ONCE = 512
 """Number of points that are evaluated together."""
-_EPS = float(np.finfo(float).eps)
+_EPS = sys.float_info.epsilon
 
 
 class Node(NamedTuple):
-    """What was solved at a place of the unit square: T and T*, and the error of F by the space."""
+    """What was solved at a place of the unit square: T, T*, the error of F by the space, and this over the allowed."""
 
     at: FloatArray
     pair: PrincipalPair
     error: float
+    share: float
     around: PairDerivatives | None
 
 
 class Values(NamedTuple):
-    """F, its gradient by shares of the axes if that is wanted, shape (n,) and (n, d), and both vectors, (n, size).
+    """F and its gradient by shares of the axes if that is wanted, shape (n,) and (n, d); and the pairs that tell it.
 
-    F is NaN where the small pencil has no eigenvalue of small residual.
+    F is NaN where the pair does not go on from those that it was followed from.
+
+    Attributes:
+        x, y: both vectors, shape (n, size), with T > 0, |x| = 1 and ⟨y, x⟩ = 1.
+        place: where the operators are, shape (n, axes of these).
+        eigenvalue: there, shape (n,).
+        unit: error of the eigenvalue over that of F, shape (n,).
     """
 
     value: FloatArray
     gradient: FloatArray
     x: FloatArray
     y: FloatArray
+    place: FloatArray
+    eigenvalue: FloatArray
+    unit: FloatArray
 
 
 class Products:
@@ -181,23 +205,32 @@ class Surface(Result):
                 raise ValueError(f"got {shown(axis.key)}; the parameters are {known}")
         self._budget, self._nodes, self._refinements = budget or Budget(), list[Node](), 0
         self._frame: Problem | None = None
+        self._operands = len(self.axes)  # of the operators
+        steps = np.linspace(0, 1, FOLLOWED)
+        self._grid = np.array([*product(steps, repeat=len(self.axes))])
+        ways = 1.01 / (FOLLOWED - 1) * np.vstack([np.eye(len(self.axes)), -np.eye(len(self.axes))])
+        self._beside = np.array([[self._number(at + way) for way in ways] for at in self._grid])
+        self._judged: Values | None = None
         if problem.dimension != 2 or problem.classes:
             raise self._none()
         corners = [np.array(each, dtype=float) for each in product((0.0, 1.0), repeat=len(self.axes))]
         places = [np.full(len(self.axes), 0.5), *corners]
-        for at in places:
-            refuse_infinite(self._problem(at), self.p)
-        self._frame = self._problem(places[0])
-        first = solver_of(self._frame, None, self.rtol, self._budget).whole.solution(self.p)
-        self._chosen, self._starts = first.pair.generator.chosen, [first.pair]
-        self._largest = self._budget.unknowns if unknowns is None else max(unknowns, 4 * first.pair.space.size)
+        first = self._first(places)
+        self._chosen, self._starts = first.generator.chosen, [first]
+        self._largest = self._budget.unknowns if unknowns is None else max(unknowns, 4 * first.space.size)
         with one_thread():
-            self._choose(first.pair)
+            self._choose(first)
             self._begin(places)
             self.is_converged = self._fill(most)
         self.nodes = np.array([node.at for node in self._nodes])
-        self.error = BETWEEN * self._left + self._off + max(node.error + node.pair.rounding for node in self._nodes)
+        self.error = BETWEEN * self._left + self._off + max(node.error for node in self._nodes)
+        self._share = BETWEEN * SHARE * self._left_share + max(node.share for node in self._nodes)
         self._nodes = [node._replace(around=None) for node in self._nodes]  # which keep factors
+
+    @property
+    def quantity(self) -> Quantity:
+        """What F is."""
+        return moment_at(self.p) if self.p else LYAPUNOV_EXPONENT
 
     def _none(self) -> NotConverged:
         return NotConverged(Message(Code.NO_SURFACE, keys=[axis.key for axis in self.axes]))
@@ -205,13 +238,45 @@ class Surface(Result):
     def _problem(self, at: FloatArray) -> Problem:
         """The problem at shares of the ranges. Raises `FpsolveError` where there is none."""
         try:
-            found = self.problem.at({axis.key: float(axis.value(u)) for axis, u in zip(self.axes, at, strict=True)})
+            found = self.problem.at({axis.key: float(axis.value(u)) for axis, u in zip(self.axes, at, strict=False)})
             return found.in_frame_of(self._frame) if self._frame else found
         except ValueError as failure:
             raise FpsolveError(Message(Code.NO_PROBLEM, reason=said(failure))) from failure
 
     def _generator(self, at: FloatArray) -> Generator:
         return Generator(self._problem(at), self._chosen)
+
+    # what F is: the eigenvalue for p, or for p = 0 its derivative
+
+    def _first(self, places: Sequence[FloatArray]) -> PrincipalPair:
+        """The pair at the first place, by a solver of its own. Raises `NoSuchExponent` where there is none at one."""
+        for at in places:
+            refuse_infinite(self._problem(at), self.p)
+        self._frame = self._problem(places[0])
+        return solver_of(self._frame, None, self.rtol, self._budget).whole.solution(self.p).pair
+
+    def _order(self, place: FloatArray) -> float:
+        """p of some operators."""
+        return self.p
+
+    def _place(self, at: FloatArray, pair: PrincipalPair) -> FloatArray:
+        """Where the operators of a pair are."""
+        return at
+
+    def _value(self, pair: PrincipalPair) -> float:
+        return pair.value
+
+    def _unit(self, pair: PrincipalPair) -> float:
+        """What the eigenvalue changes with F."""
+        return 1.0
+
+    def _pair(self, generator: Generator, start: Any) -> PrincipalPair | None:
+        """The pair that tells F at a place; None to begin anew."""
+        return principal_pair(generator, self.p, start=start)
+
+    def _directions(self, place: FloatArray, pair: PrincipalPair) -> list[FloatArray]:
+        """What the derivatives of the operators by the shares of the ranges are of all samples."""
+        return [self._rows(place[None], k)[0] for k in range(len(self.axes))]
 
     def _allowed(self, at: FloatArray, value: float) -> float:
         """The largest error allowed of F."""
@@ -233,54 +298,93 @@ class Surface(Result):
 
     def _fill(self, most: int) -> bool:
         """Add nodes where most is left, until that is allowed; what was left with fewer nodes is a bound."""
-        shares = (np.arange(LOOKED_AT) + 0.5) / LOOKED_AT
-        places = [np.array(each) for each in product(shares, repeat=len(self.axes))]
-        fine = np.array([*product(np.linspace(0, 1, FOLLOWED), repeat=len(self.axes))])
-        left, count = np.full((len(places), 2), math.inf), np.zeros(len(places), dtype=int)
+        looked_at = np.flatnonzero(np.all(np.round(self._grid * (FOLLOWED - 1)) % 2 == 1, axis=1)).tolist()
+        left, count = dict.fromkeys(looked_at, (math.inf, math.inf)), dict.fromkeys(looked_at, 0)
         while True:
-            worst = int(np.argmax(left[:, 0]))
-            self._left = float(np.max(left[:, 1]))
-            if left[worst, 0] <= 1:
-                if (lost := self._lost(fine)) is None:
-                    return True
-                places.append(lost)
-                left, count = np.vstack([left, [math.inf, math.inf]]), np.append(count, 0)
+            worst = max(left, key=lambda k: left[k][0])
+            self._left_share, self._left = (max(each) for each in zip(*left.values(), strict=True))
+            if count[worst] < len(self._nodes) and left[worst][0] > 1:
+                left[worst], count[worst] = self._left_at(worst), len(self._nodes)
                 continue
-            if count[worst] < len(self._nodes):
-                left[worst], count[worst] = self._left_at(places[worst]), len(self._nodes)
-            elif len(self._nodes) >= most:
+            if left[worst][0] <= 1:
+                if (lost := self._lost()) is None:
+                    return True
+                worst = lost
+            if len(self._nodes) >= most:
                 return False
-            elif self._add(places[worst]):
-                left[worst] = 0.0
-            else:
-                self._begin([*(node.at for node in self._nodes), places[worst]])
-                left[worst] = 0.0
+            if not self._add(self._grid[worst]):
+                self._begin([*(node.at for node in self._nodes), self._grid[worst]])
+            left[worst], count[worst] = (0.0, 0.0), len(self._nodes)
 
-    def _lost(self, at: FloatArray) -> FloatArray | None:
-        """A place of some where no eigenvalue of the small pencil is the principal one; or None."""
-        lost = np.flatnonzero(np.isnan(self._values(at).value))
-        return np.asarray(at[lost[0]]) if lost.size else None
+    def _judge(self) -> Values:
+        """The principal pairs on the grid, those of nodes as they were solved; NaN where they are not clear."""
+        if self._judged is None:
+            found = self._clear(self._grid)
+            for node in self._nodes:
+                k = self._number(node.at)
+                own = self._follow(node.at[None], *self._of(node), math.inf, has_gradient=True)
+                for each, of in zip(found, own, strict=True):
+                    each[k] = of[0]
+            x = found.x[:, :, None]
+            rest = self._rest(self._rows(found.place), found.eigenvalue[:, None], x)[:, 0]
+            self._judged, self._limits = found, (self._negative(x)[:, 0], rest)
+        return self._judged
+
+    def _clear(self, at: FloatArray) -> Values:
+        """F at some places where it is clear which pair of the small pencil is the principal one; NaN elsewhere."""
+        start = np.array([self._value(self._nearest(each).pair) for each in at])
+        return self._follow(at, start, None, None, has_gradient=True)
+
+    def _number(self, at: FloatArray) -> int:
+        """The number of the point of the grid next to a place."""
+        return int(np.argmin(np.linalg.norm(self._grid - at, axis=1)))
+
+    def _of(self, node: Node) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """F and the pair of a node by the vectors of the basis, of shapes (1,) and (1, size)."""
+        pair = node.pair
+        return np.array([self._value(pair)]), (self._right @ pair.right)[None], (self._dual @ pair.left)[None]
+
+    def _lost(self) -> int | None:
+        """The point of the grid farthest from all nodes of those that are not clear, or do not go on beside; or None.
+
+        A pair goes on that has most of the one beside, or whose value lies between their tangents.
+        """
+        if not self.p:
+            return None
+        found, nodes = self._judge(), [node.at for node in self._nodes]
+        away = np.min(np.linalg.norm(self._grid[:, None] - nodes, axis=2), axis=1)
+        is_lost, g = np.isnan(found.value), self._pencils(self._rows(found.place))[1]
+        for k in self._beside.T:
+            x, y = found.x[k], found.y[k]
+            share = form(found.y, g, x) * form(y, g, found.x) / form(y, g, x)
+            slopes, step = found.gradient, self._grid[k] - self._grid
+            rise = found.value[k] - found.value - 0.5 * np.sum((slopes + slopes[k]) * step, axis=1)
+            between = np.abs(rise) <= 0.5 * np.abs(np.sum((slopes - slopes[k]) * step, axis=1))
+            is_lost |= ~((share > MOSTLY) | between)
+        away = np.where(is_lost, away, 0.0)
+        return int(np.argmax(away)) if away.any() else None
 
     def _add(self, at: FloatArray) -> bool:
         """Solve at a place, and take the eigenfunctions with their derivatives; False for a finer space."""
-        generator, p = self._generator(at), self.p
+        generator = self._generator(at)
         generator.keeps_factors = True
         start = self._lifted(at, generator) if self._nodes else self._starts
-        place, unit = Start(generator.problem, self._chosen), 1.0 if p else SMALL_P  # of λ, the ratio counts
+        place = Start(generator.problem, self._chosen)
         with counted(self._budget.countdown("a node of a surface")):
             try:
-                pair = principal_pair(generator, p, start=start)
+                if (pair := self._pair(generator, start)) is None:
+                    return False
                 around = PairDerivatives(pair)
-                near = pair if p else principal_pair(generator, SMALL_P, start=pair)
+                near = pair if self.p else principal_pair(generator, SMALL_P, start=pair)
             except UNSOLVED as failure:
                 return self._take(place.doubled(failure).space)
-        found = Solution(near)
-        error, allowed = found.error / unit, self._allowed(at, near.value / unit)
+        found, unit = Solution(near), abs(self._unit(near)) if self.p else SMALL_P  # of λ, the ratio counts
+        error, allowed = found.error / unit, self._allowed(at, self._value(near) / (1.0 if self.p else unit))
         if other_centers(near):
             raise self._none()
         if error > allowed:
             return self._take(place.refined(found, SPARE * allowed * unit, FREE_STAGES, self._budget.unknowns).space)
-        right, left = self._vectors(at, pair, around)
+        right, left = self._vectors(self._place(at, pair), pair, around)
         # where one of two derivatives vanishes, as that of T* by R for p = 0, F needs neither
         kept, spans = [], (self._right, self._dual)
         for k in range(len(right)):
@@ -290,7 +394,9 @@ class Surface(Result):
                 spans = orthonormal(spans[0], new[:1]), orthonormal(spans[1], new[1:])
         if kept:
             self._extend([right[k] for k in kept], [left[k] for k in kept])
-        self._nodes.append(Node(at, pair, error, around))
+        error += pair.rounding / (unit if self.p else 1.0)
+        self._nodes.append(Node(at, pair, error, error / allowed, around))
+        self._judged = None
         return True
 
     def _take(self, space: Space) -> bool:
@@ -301,15 +407,14 @@ class Surface(Result):
         return False
 
     def _vectors(
-        self, at: FloatArray, pair: PrincipalPair, around: PairDerivatives
+        self, place: FloatArray, pair: PrincipalPair, around: PairDerivatives
     ) -> tuple[list[FloatArray], list[FloatArray]]:
         """T, for p = 0 T′, and T*, each with its derivatives by the shares of the ranges."""
         weighed, value = pair.space.weighed, pair.eigenvalue
         one = pair.space.constant
         right, left = [pair.right if self.p else around.by_p], [pair.left]
         norm = pair.left @ weighed(pair.right)
-        for k in range(len(self.axes)):
-            row = self._rows(at[None], k)[0]
+        for row in self._directions(place, pair):
             by_theta = self._changes(row, right[0], value), self._changes(row, left[0], value, adjoint=True)
             if self.p:
                 slope = float(left[0] @ by_theta[0] / norm)
@@ -324,12 +429,13 @@ class Surface(Result):
 
     def _lifted(self, at: FloatArray, generator: Generator) -> PrincipalPair:
         """What the basis makes of the pair at a place, to start from."""
-        nearest, found = self._nearest(at), self._values(at[None])
+        nearest = self._nearest(at)
+        found = self._follow(at[None], *self._of(nearest)) if self.p else self._values(at[None])
         if np.isnan(found.value[0]):
             return replace(nearest.pair, generator=generator)
         right = found.x[0] @ self._right if self.p else nearest.pair.right
-        left = found.y[0] @ self._dual
-        return replace(nearest.pair, right=right, left=left, generator=generator)
+        left, p = found.y[0] @ self._dual, self._order(found.place[0])
+        return replace(nearest.pair, p=p, right=right, left=left, generator=generator)
 
     def _nearest(self, at: FloatArray) -> Node:
         return min(self._nodes, key=lambda node: float(np.linalg.norm(node.at - at)))
@@ -342,9 +448,9 @@ class Surface(Result):
         The operators are sums of few products of functions of one parameter each, which polynomials follow; those at
         few of the points of these, that a pivoted QR chooses, make all others. What is left is looked at aside.
         """
-        size = float(np.linalg.norm(pair.right) / abs(pair.left @ pair.space.weighed(pair.right)))
-        mixed = np.random.default_rng(0).standard_normal(pair.left.size)
-        allowed, count = INTERPOLATED * self._allowed(np.full(len(self.axes), 0.5), 0.0) / size, len(self.axes)
+        size = float(np.linalg.norm(pair.right) / abs(pair.left @ pair.space.weighed(pair.right) * self._unit(pair)))
+        mixed, count = np.random.default_rng(0).standard_normal(pair.left.size), self._operands
+        allowed = INTERPOLATED * self._allowed(np.full(count, 0.5), 0.0) / size
         probes = np.random.default_rng(1).random((PROBES, count))
         exact = np.array([self._images_at(at, pair.left) for at in probes])
         rounding = FEW * _EPS * max(each.norm for at in probes for each in self._operators(at))
@@ -363,7 +469,7 @@ class Surface(Result):
 
     def _polynomials_along(self, k: int, vector: FloatArray, allowed: float) -> Polynomials:
         """Those that the operators follow along an axis. Raises `NotConverged` where none do."""
-        middle = np.full(len(self.axes), 0.5)
+        middle = np.full(self._operands, 0.5)
         exact = self._images_at(_on_axis(middle, k, PROBE), vector)
         for degree in DEGREES:
             polynomials = Polynomials(0.0, 1.0, degree)
@@ -377,8 +483,8 @@ class Surface(Result):
     def _products_along(
         self, k: int, polynomials: Polynomials, aside: Sequence[FloatArray], mixed: FloatArray
     ) -> Products:
-        """What the operators are made of along an axis, by lines through some places."""
-        points = polynomials.points.tolist()
+        """What the operators are made of along an axis, by lines through some places; over p all points are kept."""
+        points, aside = polynomials.points.tolist(), aside if k < len(self.axes) else ()
         lines = [[self._images_at(_on_axis(at, k, u), mixed) for at in aside] for u in points]
         return Products(polynomials, np.array(lines).reshape(len(points), -1) if aside else np.eye(len(points)))
 
@@ -400,15 +506,15 @@ class Surface(Result):
 
     def _operators(self, at: FloatArray) -> tuple[KroneckerSum, ...]:
         """L, for p = 0 also L′."""
-        generator = self._generator(at)
-        return (generator.matrix(self.p),) if self.p else (generator.matrix(0.0), generator.matrix(0.0, derivative=1))
+        generator, p = self._generator(at), self._order(at)
+        return (generator.matrix(p),) if self.p else (generator.matrix(0.0), generator.matrix(0.0, derivative=1))
 
     def _images_at(self, at: FloatArray, vector: FloatArray) -> FloatArray:
         """The transposes of these, and M, times a vector, one after the other."""
         return np.concatenate([*(each.T @ vector for each in self._operators(at)), self._space_at(at).weighed(vector)])
 
     def _space_at(self, at: FloatArray) -> Space:
-        return self._chosen.at(self.p, self._problem(at).coloured.parts.values())
+        return self._chosen.at(self._order(at), self._problem(at).coloured.parts.values())
 
     def _rows(self, at: FloatArray, derivative: int | None = None) -> FloatArray:
         """What small matrices at each place, or their derivatives, are of those of all samples, shape (n, samples)."""
@@ -461,20 +567,49 @@ class Surface(Result):
 
     def _values(self, at: FloatArray, has_gradient: bool = False) -> Values:
         """F at some places, shape (n, d), from the small matrices alone."""
+        if self.p:
+            return self._follow(at, *self._around(at), has_gradient=has_gradient)
         rows = self._rows(at)
         small = self._pencils(rows)
         slopes = [self._pencils(self._rows(at, k)) for k in range(len(self.axes))] if has_gradient else []
-        if not self.p:
-            return self._growth(small, slopes)
-        a, g = small
-        value, x, y = self._principal(rows, a, g)
-        y = y / form(y, g, x)[:, None]
-        gradient = (
-            np.array([form(y, by_a, x) - value * form(y, by_g, x) for by_a, by_g in slopes]).reshape(-1, len(at)).T
-        )
-        return Values(value, gradient, x, y)
+        return self._growth(at, small, slopes)
 
-    def _growth(self, small: Sequence[FloatArray], slopes: Sequence[Sequence[FloatArray]]) -> Values:
+    def _follow(
+        self,
+        at: FloatArray,
+        value: FloatArray,
+        x: FloatArray | None,
+        y: FloatArray | None,
+        negative: Any = NEGATIVE,
+        rest: Any = math.inf,
+        has_gradient: bool = False,
+    ) -> Values:
+        """F where pairs go on from those given: in most of them, as positive, of as small a residual; or NaN."""
+        found, share = self._continued(at, value, x, y)
+        rows, of = self._rows(found.place), found.x[:, :, None]
+        goes_on = (share > MOSTLY) & (self._negative(of)[:, 0] <= negative + SLIGHTLY)
+        if np.any(np.isfinite(rest)):
+            goes_on &= self._rest(rows, found.eigenvalue[:, None], of)[:, 0] <= LEAST * rest
+        found.value[~goes_on] = math.nan
+        by_axes = [self._pencils(self._rows(found.place, k)) for k in range(has_gradient * len(self.axes))]
+        changes = [form(found.y, a, found.x) - found.eigenvalue * form(found.y, g, found.x) for a, g in by_axes]
+        return found._replace(gradient=np.reshape(changes, (-1, len(at))).T / found.unit[:, None])
+
+    def _continued(
+        self, at: FloatArray, value: FloatArray, x: FloatArray | None, y: FloatArray | None
+    ) -> tuple[Values, FloatArray]:
+        """Pairs that those given lead to and their shares in these, see `eigenpairs`; of none the principal ones."""
+        rows = self._rows(at)
+        a, g = self._pencils(rows)
+        if x is None or y is None:
+            value, x, y, share = self._principal(rows, a, g)
+        else:
+            value, x, y, share = eigenpairs(a, g, form(y, a, x) / form(y, g, x), x, y, FOLLOWING)
+        x = x * np.sign(np.sum(x @ self._seen.T, axis=1))[:, None]
+        y = y / form(y, g, x)[:, None]
+        return Values(value.copy(), np.zeros((len(at), 0)), x, y, at, value, np.ones(len(at))), share
+
+    def _growth(self, at: FloatArray, small: Sequence[FloatArray], slopes: Sequence[Sequence[FloatArray]]) -> Values:
         """λ: Bᵀy = (1, 0, …) with B = (G 1, A V′) gives T*, and Bz = A′1 gives λ = z₁ and −T′."""
         a, b, g = small
         source, first = b[:, :, 0], np.zeros(a.shape[:2])
@@ -488,23 +623,46 @@ class Surface(Result):
             by_whole = np.concatenate([by_g[:, :, :1], by_a[:, :, 1:]], axis=2)
             gradient.append(np.sum(y * by_b[:, :, 0], axis=1) - form(y, by_whole, z))
         x = np.concatenate([np.zeros((len(z), 1)), -z[:, 1:]], axis=1)
-        return Values(value, np.array(gradient).reshape(-1, len(value)).T, x, y)
+        return Values(value, np.array(gradient).reshape(-1, len(value)).T, x, y, at, value, np.ones(len(value)))
 
-    def _principal(self, rows: FloatArray, a: FloatArray, g: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """The largest real eigenvalue of each small pencil with T > 0 and a small residual, or NaN, with both vectors.
+    def _around(self, at: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+        """F and both vectors by cubics through the points of the grid around, and the most of their limits."""
+        judged, shares = self._judge(), at * (FOLLOWED - 1)
+        low = np.clip(shares.astype(int) - 1, 0, FOLLOWED - 4)
+        away = (shares - low)[:, :, None] - np.arange(4)
+        of_axes = np.stack([np.prod(np.delete(away, k, axis=2), axis=2) / LAGRANGE[k] for k in range(4)], axis=2)
+        between, most = [np.zeros(1)] * 3, [np.zeros(1)] * 2
+        for corner in product(range(4), repeat=at.shape[1]):
+            weight = np.prod([of_axes[:, axis, k] for axis, k in enumerate(corner)], axis=0)
+            index = np.ravel_multi_index(tuple((low + corner).T), (FOLLOWED,) * at.shape[1])
+            of_pairs = judged.value, judged.x, judged.y
+            between = [each + (weight * of[index].T).T for each, of in zip(between, of_pairs, strict=True)]
+            most = [np.maximum(each, of[index]) for each, of in zip(most, self._limits, strict=True)]
+        (value, x, y), (negative, rest) = between, most
+        return value, x, y, negative, rest
 
-        Larger ones may be of the small pencil alone, where T changes its sign or the residual is larger by far.
-        """
-        values, vectors = np.linalg.eig(np.linalg.solve(g, a))
+    def _negative(self, vectors: Any) -> FloatArray:
+        """The lesser share of T of some pairs at each place, shape (n, size, pairs), that has one of both signs."""
         seen = (self._seen @ vectors).real
         negative = np.sum(np.maximum(-seen, 0), axis=1) / np.sum(np.abs(seen), axis=1)
-        may_be = (values.imag == 0) & (np.minimum(negative, 1 - negative) <= NEGATIVE)
-        rest = np.where(may_be, self._rest(rows, values, vectors), math.inf)
-        ranked = np.where(may_be & (rest <= LEAST * rest.min(axis=1)[:, None]), values.real, -math.inf)
-        own, best = np.arange(len(rows)), np.argmax(ranked, axis=1)
+        return np.asarray(np.minimum(negative, 1 - negative))
+
+    def _principal(self, rows: FloatArray, a: FloatArray, g: FloatArray) -> tuple[FloatArray, ...]:
+        """The real eigenvalue of each small pencil with T > 0 and the least residual, both vectors, and 1; or 0 where
+        a larger one has a residual that is hardly larger. If it is next to nothing, that one is the principal one.
+        """
+        values, vectors = np.linalg.eig(np.linalg.solve(g, a))
+        may_be = (values.imag == 0) & (self._negative(vectors) <= NEGATIVE)
+        rest, own = np.where(may_be, self._rest(rows, values, vectors), math.inf), np.arange(len(rows))
+        best = np.argmin(rest, axis=1)
+        above = values.real - values.real[own, best][:, None]
+        sure = np.where(rest <= NEXT_TO_NOTHING * above, above, 0.0)
+        best = np.where(sure.any(axis=1), np.argmax(sure, axis=1), best)
+        above = values.real - values.real[own, best][:, None]
+        is_clear = ~np.any((above > 0) & (rest <= ALIKE * rest[own, best][:, None]), axis=1) & may_be[own, best]
         x = vectors[own, :, best].real
         value, x, y, _ = eigenpairs(a, g, values[own, best].real, x, (g @ x[:, :, None])[:, :, 0])
-        return np.where(np.isfinite(ranked[own, best]), value, math.nan), x, y
+        return value, x, y, np.where(is_clear, 1.0, 0.0)
 
     def _rest(self, rows: FloatArray, values: Any, vectors: Any) -> FloatArray:
         """About ‖(L − ΛM)T‖/‖T‖ of some pairs at each place, by random sums of its entries: shape (n, pairs)."""
@@ -514,14 +672,15 @@ class Surface(Result):
 
     # errors
 
-    def _left_at(self, at: FloatArray) -> tuple[float, float]:
+    def _left_at(self, k: int) -> tuple[float, float]:
         """What is left of F at a place, over its share of what is allowed, and itself."""
+        at = self._grid[k]
         refuse_infinite(self._problem(at), self.p)
-        found = self._values(at[None])
+        found = self._clear(at[None]) if self.p else self._values(at[None])
         if np.isnan(found.value[0]):
             return math.inf, math.inf
-        value, x, y = float(found.value[0]), found.x[0] @ self._right, found.y[0] @ self._dual
-        operators, space = self._operators(at), self._space_at(at)
+        value, x, y = float(found.eigenvalue[0]), found.x[0] @ self._right, found.y[0] @ self._dual
+        operators, space = self._operators(found.place[0]), self._space_at(found.place[0])
         if self.p:
             own = operators[0].shifted(value)
             r, s = own @ x, own.T @ y
@@ -531,19 +690,19 @@ class Surface(Result):
             s = operators[0].T @ y
         around = self._nearest(at).around
         assert around is not None
-        left = SAFE * abs(float(s @ around.solve(r, refinements=2)))
-        return left / (SHARE * self._allowed(at, value)), left
+        left = SAFE * abs(float(s @ around.solve(r, refinements=2)) / float(found.unit[0]))
+        return left / (SHARE * self._allowed(at, float(found.value[0]))), left
 
     # values
 
     def __call__(self, *values: ArrayLike) -> FloatArray:
         """F at values of the parameters, broadcast together. Raises `ValueError` outside the ranges."""
-        shares = self._shares(values)
+        shares = self.shares(*values)
         return self.at_shares(shares.reshape(-1, len(self.axes)), has_gradient=False)[0].reshape(shares.shape[:-1])
 
     def gradient(self, *values: ArrayLike) -> FloatArray:
         """∂F/∂θ, of the shape of the values, one entry for each parameter last."""
-        shares = self._shares(values)
+        shares = self.shares(*values)
         found = self.at_shares(shares.reshape(-1, len(self.axes)))[1].reshape(shares.shape)
         slopes = [np.vectorize(axis.slope)(shares[..., k]) for k, axis in enumerate(self.axes)]
         return np.asarray(found / np.stack(slopes, axis=-1))
@@ -558,15 +717,30 @@ class Surface(Result):
                 values[k], gradients[k] = self._solved(shares[k], has_gradient)
         return values, gradients
 
+    def errors(self, shares: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Estimates of |error of F|, and what rtol is of, shape (n,), by F at shares of the ranges, shape (n, d).
+
+        The errors over those allowed are the largest of all places that were looked at.
+        """
+        from scipy.interpolate import RegularGridInterpolator  # which takes long to import
+
+        grid = [np.linspace(0, 1, SCALES)] * len(self.axes)
+        scales = np.log([max(self._scale(np.array(at)), sys.float_info.min) for at in product(*grid)])
+        scale = RegularGridInterpolator(grid, scales.reshape([SCALES] * len(self.axes)))(shares)
+        of = np.maximum(np.abs(values), np.exp(scale))
+        return self._share * self.rtol * of + self._off, of
+
     def _solved(self, at: FloatArray, has_gradient: bool) -> tuple[float, list[float]]:
         """F and its gradient where the small pencil does not tell it, by the whole one."""
-        pair = principal_pair(self._generator(at), self.p, start=self._nearest(at).pair)
-        norm, count = pair.left @ pair.space.weighed(pair.right), len(self.axes) * has_gradient
-        changes = [self._changes(self._rows(at[None], k)[0], pair.right, pair.eigenvalue) for k in range(count)]
-        return pair.value, [float(pair.left @ each / norm) for each in changes]
+        if (pair := self._pair(self._generator(at), self._nearest(at).pair)) is None:
+            raise self._none()
+        rows = self._directions(self._place(at, pair), pair) if has_gradient else []
+        changes = [float(pair.left @ self._changes(row, pair.right, pair.eigenvalue)) for row in rows]
+        norm = pair.left @ pair.space.weighed(pair.right) * self._unit(pair)
+        return self._value(pair), [float(each / norm) for each in changes]
 
-    def _shares(self, values: Sequence[ArrayLike]) -> FloatArray:
-        """The values as shares of the ranges, one for each parameter last."""
+    def shares(self, *values: ArrayLike) -> FloatArray:
+        """Values of the parameters as shares of the ranges, one for each last. Raises `ValueError` outside of these."""
         if len(values) != len(self.axes):
             raise ValueError(
                 f"got {len(values)} arrays; must be {len(self.axes)}: {', '.join(a.key for a in self.axes)}"
@@ -584,7 +758,7 @@ class Surface(Result):
         sides = [np.asarray(axis.value(np.linspace(0, 1, points))) for axis in self.axes]
         names = [replace(self.problem.parameters[axis.key].quantity, dims=(axis.key,)) for axis in self.axes]
         keys = tuple(axis.key for axis in self.axes)
-        found = replace(moment_at(self.p) if self.p else LYAPUNOV_EXPONENT, dims=keys)
+        found = replace(self.quantity, dims=keys)
         values = self(*np.meshgrid(*sides, indexing="ij"))
         numbers = {found: values, found.error(): np.full(values.shape, self.error)}
         held = {key: value for key, value in self.problem.values.items() if key not in keys}
@@ -593,8 +767,8 @@ class Surface(Result):
         return dataset(found.words, method, numbers, places, held, **more)
 
     def _said(self) -> str:
-        symbol, keys = f"Λ({self.p:g})" if self.p else "λ", " and ".join(axis.key for axis in self.axes)
-        return f"{symbol} over {keys}, {len(self._nodes)} solved, ± {self.error:.0e}"
+        keys = " and ".join(axis.key for axis in self.axes)
+        return f"{self.quantity.symbol} over {keys}, {len(self._nodes)} solved, ± {self.error:.0e}"
 
 
 def _on_axis(at: FloatArray, k: int, share: float) -> FloatArray:

@@ -8,6 +8,7 @@ from fpsolve.analysis import Surface
 from fpsolve.arrays import identity
 from fpsolve.errors import NotConverged
 from fpsolve.model import Bounded, CoefficientMatrix, White
+from tests.random_planar import drawn
 
 OSCILLATOR = Problem(
     VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=0.7), OrnsteinUhlenbeck(alpha=2.0, sigma=1.0)
@@ -162,3 +163,30 @@ def test_a_basis_of_the_whole_space():
     """White noise alone has few functions: what they make already is not taken again."""
     system = PlaneSystem.of_equations(("x", "v"), ("v", "-x - 0.1*v + n*x"), noises={"n": "noise"})
     assert_right(Surface(Problem(system, White(0.3)), {"noise.s": (0.05, 3.0)}, 1.0, rtol=1e-9))
+
+
+@pytest.mark.parametrize(
+    ("seed", "p", "ranges", "shares"),
+    [
+        pytest.param(
+            204,
+            3.0,
+            {"noise.b.nu": (2.946, 23.14), "noise.b.sigma": (2.165, 11.18)},
+            [(0.001, 0.42), (0.701, 0.315)],
+            marks=pytest.mark.slow,
+        ),
+        (
+            212,
+            1.0,
+            {"system.epsilon": (0.511, 1.957), "noise.sigma": (0.0943, 0.5384)},
+            [(0.236, 0.32), (0.049, 0.217), (0.06, 0.277)],
+        ),
+    ],
+)
+def test_larger_real_eigenvalues_of_the_small_pencil_are_left_out(seed, p, ranges, shares):
+    """Also those with T > 0 whose residuals are small."""
+    surface = Surface(drawn(seed).problem, ranges, p, rtol=1e-5)
+    for at in shares:
+        theta = {axis.key: float(axis.value(share)) for axis, share in zip(surface.axes, at, strict=True)}
+        solution = ExponentSolver(surface.problem.at(theta), rtol=1e-7).solution(p)
+        assert abs(surface(*theta.values()) - solution.pair.value) <= surface.error + solution.error
