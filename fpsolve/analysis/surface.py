@@ -62,10 +62,9 @@ SEVERAL = 10.0
 """What is left aside, over what is left along an axis, at most."""
 ROUNDED = 1e-13
 """Size of a further product, over that of the largest, up to which it is rounding."""
-LOOKED_AT = 6
-"""Number of points along each parameter at which it is looked at what is left, half of a gap off the ends."""
 FOLLOWED = 13
-"""Number of points along each parameter, ends included, at which all eigenvalues of the small pencil are judged."""
+"""Number of points along each parameter, ends included, at which all eigenvalues of the small pencil are judged. At
+the ends and at every other one between it is looked at what is left."""
 MOST_NODES = 60
 """Number of nodes of a surface."""
 MIXED = 48
@@ -298,7 +297,9 @@ class Surface(Result):
 
     def _fill(self, most: int) -> bool:
         """Add nodes where most is left, until that is allowed; what was left with fewer nodes is a bound."""
-        looked_at = np.flatnonzero(np.all(np.round(self._grid * (FOLLOWED - 1)) % 2 == 1, axis=1)).tolist()
+        numbers = np.round(self._grid * (FOLLOWED - 1))
+        is_end = (numbers == 0) | (numbers == FOLLOWED - 1)
+        looked_at = np.flatnonzero(np.all((numbers % 2 == 1) | is_end, axis=1) & ~np.all(is_end, axis=1)).tolist()
         left, count = dict.fromkeys(looked_at, (math.inf, math.inf)), dict.fromkeys(looked_at, 0)
         while True:
             worst = max(left, key=lambda k: left[k][0])
@@ -707,13 +708,18 @@ class Surface(Result):
         slopes = [np.vectorize(axis.slope)(shares[..., k]) for k, axis in enumerate(self.axes)]
         return np.asarray(found / np.stack(slopes, axis=-1))
 
-    def at_shares(self, shares: FloatArray, has_gradient: bool = True) -> tuple[FloatArray, FloatArray]:
-        """F, shape (n,), and its gradient by them, shape (n, d), at shares of the ranges, shape (n, d)."""
+    def at_shares(
+        self, shares: FloatArray, has_gradient: bool = True, *, solves: bool = True
+    ) -> tuple[FloatArray, FloatArray]:
+        """F, shape (n,), and its gradient by them, shape (n, d), at shares of the ranges, shape (n, d).
+
+        Where the small pencil does not tell F it is solved, or NaN.
+        """
         values, gradients = np.empty(len(shares)), np.empty(shares.shape if has_gradient else (len(shares), 0))
         for part in np.array_split(np.arange(len(shares)), math.ceil(len(shares) / AT_ONCE) or 1):
             found = self._values(shares[part], has_gradient)
             values[part], gradients[part] = found.value, found.gradient
-            for k in part[np.isnan(found.value)]:
+            for k in part[np.isnan(found.value)] if solves else ():
                 values[k], gradients[k] = self._solved(shares[k], has_gradient)
         return values, gradients
 

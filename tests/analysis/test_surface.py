@@ -8,6 +8,7 @@ from fpsolve.analysis import Surface
 from fpsolve.arrays import identity
 from fpsolve.errors import NotConverged
 from fpsolve.model import Bounded, CoefficientMatrix, White
+from fpsolve.model.noises.non_gaussian import ReducedNoise
 from tests.random_planar import drawn
 
 OSCILLATOR = Problem(
@@ -190,3 +191,13 @@ def test_larger_real_eigenvalues_of_the_small_pencil_are_left_out(seed, p, range
         theta = {axis.key: float(axis.value(share)) for axis, share in zip(surface.axes, at, strict=True)}
         solution = ExponentSolver(surface.problem.at(theta), rtol=1e-7).solution(p)
         assert abs(surface(*theta.values()) - solution.pair.value) <= surface.error + solution.error
+
+
+def test_the_most_is_left_at_an_edge():
+    """Between two corners, more than anywhere inside."""
+    system = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=0.5)
+    problem = Problem(system, ReducedNoise(D0=0.5, tau0=0.5, r0=0.95))
+    ranges = {"noise.D0": (0.1, 1.0, "log"), "oscillator.omega": (0.5, 3.0)}
+    surface = Surface(problem, ranges, 4.0, rtol=5e-7)
+    solution = ExponentSolver(problem.at({"noise.D0": 0.63, "oscillator.omega": 0.5})).solution(4.0)
+    assert abs(surface(0.63, 0.5) - solution.pair.value) <= surface.error + solution.error
