@@ -60,7 +60,7 @@ print(len(results), "sets")
 # Look at it
 # ----------
 # ``results.nc`` has labelled arrays. Reading it does not need fpsolve.
-found = xr.open_dataset(folder / "results/thousand/results.nc")
+found = xr.load_dataset(folder / "results/thousand/results.nc")
 print(found.sizes)
 print(found.moment.attrs["long_name"], "in", found.moment.attrs["units"])
 
