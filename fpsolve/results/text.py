@@ -12,7 +12,7 @@ from fpsolve.page.page import Column
 DIGITS = 7
 """Digits of a number in a sentence, or in a table of many curves."""
 NUMBER_COLUMNS = (
-    Column("quantity", is_text=True), Column("symbol"), Column("value"), Column("± error"), Column("unit", 5)
+    Column("quantity", is_text=True), Column("symbol"), Column("value"), Column("± error"), Column("unit", 2)
 )  # fmt: skip
 """Those of a table of different quantities."""
 

@@ -73,9 +73,8 @@ def curve_grid(case: Case, results: Sequence[CurveResult], table: Table) -> Grid
         table: the numbers of all curves.
     """
     shown, status = list(_quantities(case, table)), _status(table)
-    if len(results) > EACH or any(status):
-        is_whole = len(results) <= ROWS and not any(status)
-        shown.append(Shown(Column("status", 1 if is_whole else 0), lambda result: result.status.word))
+    if any(status):
+        shown.append(Shown(Column("status"), lambda result: result.status.word))
     grid = grid_of(case, results, shown, [place for place, each in enumerate(status) if each.fails])
     headings = [each.heading for each in grid.columns]
     numbers = [each for each in (*told_indices(case), MEAN_SQUARE) if each.symbol in headings]

@@ -388,13 +388,14 @@ def _appears(zero: Zero) -> str | None:
 
 
 def show(case: Case, chart: Chart) -> Iterator[Block]:
-    """The lines with their special points, and the regions from the largest to the smallest."""
+    """The regions from the largest to the smallest, and the lines with their special points."""
+    zeros = [line.zero for line in chart.lines]
+    yield Sentence("", case.headline)
+    for each in () if chart.regions is None else chart.regions.each:
+        yield Sentence(f"{each.share:.1%} of the frame: {each.name}.{region_meaning(each, zeros)}")
     if chart.lines:
         yield chart_figure(case, chart)
     yield chart_grid(case, chart)
-    zeros = [line.zero for line in chart.lines]
-    for each in () if chart.regions is None else chart.regions.each:
-        yield Sentence(f"{each.share:.1%} of the frame: {each.name}.{region_meaning(each, zeros)}")
     yield from (note_on(case.name, each) for each in chart.remarks)
 
 
@@ -403,7 +404,7 @@ def chart_grid(case: Case, chart: Chart) -> Grid:
     keys = charted(case).x.key, charted(case).y.key
     names = short_names(keys)
     columns = [Column("line"), Column("branch", 1), Column("points", 2), *map(Column, names)]
-    grid = Grid(case.headline, [*columns, Column("special point", is_text=True)])
+    grid = Grid("", [*columns, Column("special point", is_text=True)])
     for line in chart.lines:
         for number, branch in enumerate(line.branches, start=1):
             count = f"{branch.x.size}{', closed' if branch.closed else ''}"

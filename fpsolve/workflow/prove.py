@@ -316,7 +316,6 @@ def show(case: Case, proofs: Sequence[CurveProof]) -> Iterator[Block]:
         return
     for proof in proofs:
         yield Sentence("", case.heading(proof.curve))
-        yield proof_grid(proof)
         told = proof.verdicts
         if sum(found is not None and found.sign != 0 for _, found in proof.moments) > PROOFS:
             path = verdicts([], 0 if proof.exponent is None else proof.exponent.sign)
@@ -326,6 +325,7 @@ def show(case: Case, proofs: Sequence[CurveProof]) -> Iterator[Block]:
         if proof.excursion is not None:
             rare = excursion_in_words(proof)
             yield Sentence(f"Proven: {rare}." if rare else f"{SYMBOL} {NOT_PROVEN}")
+        yield proof_grid(proof)
 
 
 def proof_grid(proof: CurveProof) -> Grid:

@@ -314,14 +314,14 @@ def show(case: Case, simulated: Sequence[SimulatedCurve], results: Sequence[Curv
     for each in simulated if is_short else ():
         result = solved.get(each.curve.key)
         yield Sentence("", case.heading(each.curve) if over_p else each.curve.label)
-        if over_p:
-            yield moment_grid(case, each, result)
-        yield number_grid(case, each, result)
         found, unit = each.result, case.units.time
         if result is None:
             value, error = found.lyapunov_exponent, found.lyapunov_exponent_error
             meaning = fate("almost every path", value, sign_of(value, SURE * error), unit)
             yield Sentence(f"λ = {sampled(value, error)} ± {error:.1e}: {meaning}.")
+        if over_p:
+            yield moment_grid(case, each, result)
+        yield number_grid(case, each, result)
         yield Sentence(f"{found.paths} paths over a time of {found.time:.4g} in steps of {found.step:.4g}")
         if each.response and each.curve.number <= PICTURES:
             yield simulated_response_figure(case, each)

@@ -207,7 +207,7 @@ def test_many_curves_have_a_row_each(tmp_path, capsys, count, rows):
     case, results = many(tmp_path, count)
     print_results(case, results)
     out = capsys.readouterr().out
-    assert out.count("│ converged │") == rows
+    assert sum(line.startswith("│") for line in out.splitlines()) == rows
     assert f"{count} curves: {count} converged" in out
     for each in results:
         assert f"{each.lyapunov_exponent.value:#.7g}" in out
@@ -254,9 +254,7 @@ def test_a_file_has_all_columns_whatever_the_terminal_is(tmp_path, capsys, monke
     assert texts[0] == texts[1]
     assert "no room for" not in texts[0]
     heading = next(line for line in texts[0].splitlines() if line.startswith("┃"))
-    assert all(
-        symbol in heading for symbol in ("D0", "λ", "δ_p", "Λ″(0)", "N", "R_c", "r_c", "Λ(-1)", "Λ(2)", "status")
-    )
+    assert all(symbol in heading for symbol in ("D0", "λ", "δ_p", "Λ″(0)", "N", "R_c", "r_c", "Λ(-1)", "Λ(2)"))
 
 
 @pytest.mark.parametrize(
