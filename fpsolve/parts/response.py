@@ -148,7 +148,7 @@ def solve_response(problem: Problem, rtol: float, grid: Grid | None, budget: Bud
     """The stationary response, with its density if a grid is given, or by moments; raises as what it is found by."""
     if problem.system.forced:
         moments = stationary_moments(problem, rtol)
-        squares = zip(np.diag(moments.square).tolist(), np.diag(moments.error).tolist(), strict=True)
+        squares = zip(np.diag(moments.square).tolist(), np.diag(moments.error_estimate).tolist(), strict=True)
         estimates = [Estimate(value, error, abs(value)) for value, error in squares]
         return CurveResponse(dict(zip(problem.system.response.means, estimates, strict=True)))
     from fpsolve.nonlinear.response import stationary_response  # which takes a while to import

@@ -32,12 +32,12 @@ class StationaryMoments:
     Attributes:
         mean: E x, shape (n,): 0 unless a noise both multiplies and forces the state.
         square: E x xᵀ, shape (n, n).
-        error: estimate of |error| of `square`.
+        error_estimate: estimate of |error| of `square`.
     """
 
     mean: FloatArray
     square: FloatArray
-    error: FloatArray
+    error_estimate: FloatArray
 
     @property
     def covariance(self) -> FloatArray:

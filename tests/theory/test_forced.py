@@ -32,8 +32,8 @@ def of_scalar(a: float, b: float, tau: float) -> float:
 )
 def test_one_variable(a, b, tau):
     found = moments(f"{a}*x + {b}*x(t - {tau}) + xi")
-    assert abs(found.square[0, 0] - of_scalar(a, b, tau)) <= found.error[0, 0] + 1e-14
-    assert found.error[0, 0] <= 1e-12
+    assert abs(found.square[0, 0] - of_scalar(a, b, tau)) <= found.error_estimate[0, 0] + 1e-14
+    assert found.error_estimate[0, 0] <= 1e-12
 
 
 @pytest.mark.parametrize("past", ["x", "x(t - 1)"])
