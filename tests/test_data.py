@@ -15,6 +15,7 @@ from matplotlib.colors import to_hex
 import fpsolve
 from fpsolve import ExponentSolver, OrnsteinUhlenbeck, Problem, VibroImpactOscillator
 from fpsolve.analysis import Axis, Surface, design, excursion, growth_law, rate_function, uncertainty
+from fpsolve.analysis.index_surface import IndexSurface
 from fpsolve.case import Curve
 from fpsolve.data import Result
 from fpsolve.errors import FpsolveError
@@ -72,6 +73,7 @@ MAIN = {
     "series": "moment",
     "excursion": "level",
     "line": "lyapunov_exponent",
+    "line of the index": "stability_index",
     "surface": "moment",
 }
 """Results, by their names here, each with its main variable."""
@@ -140,6 +142,7 @@ def results(fig1_solver):
         "series": perturbation_series(Problem(FIG1, REDUCED), [1.0, 2.0], order=4),
         "excursion": excursion(Problem(ParametricOscillator(stiffness=1.0, damping=0.08), Telegraph(a=0.8, k=1.0))),
         "line": Surface(Problem(FIG1, REDUCED), {"oscillator.c1": (0.0, 0.2)}),
+        "line of the index": IndexSurface(Problem(FIG1, REDUCED), {"oscillator.c1": (0.0, 0.05)}),
         "surface": Surface(Problem(FIG1, REDUCED), {"oscillator.c1": (0.0, 0.2), "noise.D0": (0.2, 1.0, "log")}, 2.0),
     }
     assert set(found) == set(MAIN)
