@@ -323,9 +323,10 @@ def _at_no_step(found: Sequence[tuple[Any, Any]], weights: FloatArray) -> tuple[
 
 
 def _joined(found: Sequence[MomentEstimate], weights: FloatArray) -> MomentEstimate:
-    """The same of an estimate."""
+    """The same of an estimate, without a value where too few paths of all batches carry the mean."""
     value, error = _at_no_step([(each.value, each.standard_error) for each in found], weights)
-    effective, is_known = sum(each.effective_paths for each in found), not math.isnan(value)
+    effective = sum(each.effective_paths for each in found)
+    is_known = not math.isnan(value) and (found[0].p == 0 or effective >= FEW[found[0].estimator])
     told = {"value": value, "standard_error": error} if is_known else {"value": None, "standard_error": None}
     return replace(found[0], effective_paths=effective, **told)
 
@@ -348,7 +349,7 @@ def direct_estimates(plan: Plan, batches: Sequence[PlainBatch]) -> tuple[list[Mo
         usable = np.flatnonzero((share[1:, k] >= _KEPT) & (effective[1:, k] >= needed))
         j = int(usable[-1]) if usable.size else 0
         found = _jackknife(slopes[j, k], rests[:, j, k])
-        estimates.append(_estimate(plan, p, found, float(effective[j + 1, k]), needed))
+        estimates.append(_estimate(plan, p, found, float(effective[j + 1, k])))
         if j > 0:
             change, uncertainty = _jackknife(slopes[j, k] - slopes[j - 1, k], rests[:, j, k] - rests[:, j - 1, k])
             warnings += _drift(plan, p, change, uncertainty)
@@ -370,7 +371,6 @@ def population_estimates(plan: Plan, populations: Sequence[Population]) -> tuple
     covariance = (tallies["products"] - mean * neighbours) / (count - 1) + mean**2
     rate = np.maximum(variance + 2 * covariance, 0) / plan.length
     growth = (expected + mean) / plan.length
-    needed = FEW["population"] * len(growth) / BATCHES
     trends = (tallies["numbered"] - (count - 1) / 2 * excess) / count
     estimates, warnings = list[MomentEstimate](), list[Message]()
     for k, p in enumerate(plan.p):
@@ -382,19 +382,18 @@ def population_estimates(plan: Plan, populations: Sequence[Population]) -> tuple
             warnings.append(Message(Code.TWO_PLACES, p=p, gap=abs(gap), size=abs(gap) / gap_error))
         value = float(growth[used, k].mean() + rate[used, k].mean() / 2)
         carrying = float(np.sum(tallies["effective"][used, k] / count[used, k]))
-        estimates.append(_estimate(plan, p, (value, standard_error(growth[used, k])), carrying, needed))
+        estimates.append(_estimate(plan, p, (value, standard_error(growth[used, k])), carrying))
         warnings += _drift(plan, p, float(trends[used, k].mean()), standard_error(trends[used, k]))
     return estimates, warnings
 
 
-def _estimate(plan: Plan, p: float, found: tuple[float, float], effective: float, needed: float) -> MomentEstimate:
-    """An estimate, without a value where less paths than needed carry the mean. Λ(0) = 0 needs none of them."""
+def _estimate(plan: Plan, p: float, found: tuple[float, float], effective: float) -> MomentEstimate:
+    """An estimate by the batches of one step; Λ(0) = 0."""
     if p == 0:
         return MomentEstimate(0.0, 0.0, 0.0, plan.estimator, effective)
-    is_finite = bool(np.all(np.isfinite(found))) and math.isfinite(effective)
-    if is_finite and effective >= needed:
+    if bool(np.all(np.isfinite(found))) and math.isfinite(effective):
         return MomentEstimate(float(p), *found, plan.estimator, effective)
-    return MomentEstimate(float(p), None, None, plan.estimator, effective if is_finite else 0.0)
+    return MomentEstimate(float(p), None, None, plan.estimator, 0.0)
 
 
 def _missing(estimates: Sequence[MomentEstimate]) -> Iterator[Message]:
