@@ -254,15 +254,20 @@ class Basis:
     # nodes
 
     def _fill(self, most: int) -> bool:
-        """Add nodes where most is left, until that is allowed everywhere; what was left with fewer nodes is a bound."""
+        """Add nodes where most is left, until that is allowed everywhere with all of them."""
         while True:
             gaps = [*pairwise(sorted(self.nodes))]
             lefts = [self._lefts.get(gap) for gap in gaps]
             shares = [left.error / left.allowed if left else math.inf for left in lefts]
             low, high = gap = gaps[i := int(np.argmax(shares))]
             left = lefts[i]
-            if left is not None and shares[i] <= 1:
-                return True
+            if left is not None and shares[i] <= 1:  # with more nodes elsewhere more may be left
+                stale = [gap for gap in gaps if self._lefts[gap].nodes < len(self.nodes)]
+                if not stale:
+                    return True
+                for each in stale:
+                    del self._lefts[each]
+                continue
             if left is None or left.nodes < (len(self.nodes) if shares[i] <= HOPELESS else 1):
                 near, far = sorted(gap, key=abs)
                 found = self._left_at(near + WITHIN * (far - near), gap)

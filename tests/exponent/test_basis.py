@@ -5,7 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fpsolve import ExponentSolver, MomentLyapunovFunction, PlaneSystem, Problem, moment_lyapunov
+from fpsolve import (
+    ExponentSolver,
+    MomentLyapunovFunction,
+    OrnsteinUhlenbeck,
+    PlaneSystem,
+    Problem,
+    VibroImpactOscillator,
+    moment_lyapunov,
+)
 from fpsolve.errors import NotConverged
 from fpsolve.exponent.basis import Basis, Polynomials
 from fpsolve.exponent.eigen import principal_pair
@@ -136,3 +144,13 @@ def test_in_the_weakest_noise_each_p_is_solved_as_a_basis_rounds_more():
     found = moment_lyapunov(problem, np.linspace(-2.0, 6.0, 12))
     assert found.function is None
     assert not found.warnings
+
+
+def test_nodes_added_elsewhere_may_leave_more_between_others():
+    """A gap that was resolved with fewer nodes is looked at again."""
+    system = VibroImpactOscillator(omega=1.0, restitution=1.0, c1=-0.14, epsilon=1.0)
+    problem = Problem(system, OrnsteinUhlenbeck(alpha=1.0, sigma=1.0))
+    function = MomentLyapunovFunction(problem, (-2.5, 4.0), rtol=3e-4)
+    for p in (0.25, 1.5):
+        single = ExponentSolver(problem, rtol=1e-7).solution(p)
+        assert abs(function(p) - single.pair.value) <= function.error_estimate(p) + single.error
