@@ -296,7 +296,7 @@ class Surface(Result):
                 return
 
     def _fill(self, most: int) -> bool:
-        """Add nodes where most is left, until that is allowed; what was left with fewer nodes is a bound."""
+        """Add nodes where most is left, until that is allowed; in the end everywhere with all of them."""
         numbers = np.round(self._grid * (FOLLOWED - 1))
         is_end = (numbers == 0) | (numbers == FOLLOWED - 1)
         looked_at = np.flatnonzero(np.all((numbers % 2 == 1) | is_end, axis=1) & ~np.all(is_end, axis=1)).tolist()
@@ -308,6 +308,10 @@ class Surface(Result):
                 left[worst], count[worst] = self._left_at(worst), len(self._nodes)
                 continue
             if left[worst][0] <= 1:
+                if before := [k for k, nodes in count.items() if nodes < len(self._nodes)]:  # nodes elsewhere may harm
+                    left |= {k: self._left_at(k) for k in before}
+                    count |= dict.fromkeys(before, len(self._nodes))
+                    continue
                 if (lost := self._lost()) is None:
                     return True
                 worst = lost
@@ -315,7 +319,7 @@ class Surface(Result):
                 return False
             if not self._add(self._grid[worst]):
                 self._begin([*(node.at for node in self._nodes), self._grid[worst]])
-            left[worst], count[worst] = (0.0, 0.0), len(self._nodes)
+            left[worst], count[worst] = (0.0, 0.0), most
 
     def _judge(self) -> Values:
         """The principal pairs on the grid, those of nodes as they were solved; NaN where they are not clear."""
