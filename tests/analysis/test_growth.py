@@ -26,7 +26,7 @@ from fpsolve.messages import Code, Message
 from fpsolve.model import CoefficientMatrix, Filter, White
 from tests import random_growth
 from tests.conftest import FIG1, FIG1_NOISE, sampled
-from tests.growth_paths import RATES, SHEAR, compared, simulated
+from tests.growth_paths import SHEAR
 from tests.kit import case_in, read_json
 
 TURN = ((0.0, 1.0), (-1.0, 0.0))
@@ -151,14 +151,6 @@ def test_random_oscillators_at_one_to_four_turns(seed):
     """All are in `python -m tests.random_growth`."""
     _, found, error, share, deviation = random_growth.compared(seed, 20_000)
     assert np.all(np.abs(found - share) <= 1.5 * error + 3.5 * deviation)
-
-
-@pytest.mark.slow
-def test_many_simulated_paths_have_this_law():
-    """At three times, where at least a hundred paths are expected on either side of s."""
-    for time, found, error, share, deviation in compared(simulated(200_000, seed=2, step=0.01), RATES[::2]):
-        seen = np.minimum(found, 1 - found) * 200_000 >= 100
-        assert np.all(np.abs(share - found)[seen] <= (4 * deviation + error)[seen]), time
 
 
 @pytest.mark.slow

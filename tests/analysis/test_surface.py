@@ -9,6 +9,7 @@ from fpsolve.arrays import identity
 from fpsolve.errors import NotConverged
 from fpsolve.model import Bounded, CoefficientMatrix, White
 from fpsolve.model.noises.non_gaussian import ReducedNoise
+from tests.conftest import sampled
 from tests.random_planar import drawn
 
 OSCILLATOR = Problem(
@@ -36,8 +37,8 @@ def points(surface, count):
     return [np.asarray(axis.value(rng.uniform(0, 1, count))) for axis in surface.axes]
 
 
-@pytest.mark.parametrize("p", [0.0, 2.0, -0.7])
-@pytest.mark.parametrize("name", [*[*FRAMES][:3], pytest.param("two noises", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("p", sampled(0.0, 2.0, -0.7, keep=2))
+@pytest.mark.parametrize("name", sampled(*FRAMES, keep=2))
 def test_between_the_nodes_against_solves(name, p):
     problem, ranges = FRAMES[name]
     surface = Surface(problem, ranges, p, rtol=1e-5)

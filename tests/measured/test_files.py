@@ -424,7 +424,7 @@ def test_rotten_files_are_read_or_refused_in_one_sentence(tmp_path):
     said = list[str]()
     for name, content in good.items():
         path = tmp_path / f"rotten{name[name.rindex('.') :]}"
-        for _ in range(6):
+        for _ in range(3):
             rotten = bytearray(content)
             place, count = int(rng.integers(len(rotten))), int(rng.integers(1, 40))
             more = bytes(rng.integers(0, 256, count).astype("u1"))
@@ -436,7 +436,7 @@ def test_rotten_files_are_read_or_refused_in_one_sentence(tmp_path):
                 read_spectrum(path, per="Hz", sided="one") if name in LYING else read_record(path, rate=RATE)
             except FpsolveError as error:
                 said.append(str(error))
-    assert len(said) > 50
+    assert len(said) > 25
     assert not [each for each in said if "\n" in each]
 
 

@@ -127,7 +127,7 @@ def path_of(noise, n, step, rng):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("kind", "seconds", "f"), [
-    ("ornstein-uhlenbeck", 20, 0.8), ("ornstein-uhlenbeck", 40, 0.8), ("filter", 60, 0.8),
+    ("ornstein-uhlenbeck", 20, 0.8), ("ornstein-uhlenbeck", 40, 0.8),
     ("ornstein-uhlenbeck", 20, 0.4),  # the whole record by its likelihood
 ])  # fmt: skip
 def test_standard_errors_of_short_records_cover(kind, seconds, f):

@@ -121,7 +121,7 @@ def test_rates_of_change_of_moments_vanish(swinging):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("s", [7.0, 1e25, 1e-25])
+@pytest.mark.parametrize("s", [1e25])
 def test_units_of_the_amplitude(swinging, s):
     """With x = sy terms of degree 3 are multiplied by s², and means divided by powers of s."""
     found = stationary_response(Problem(duffing(**{name: s**2 * DUFFING[name] for name in "kcd"}), NOISE), rtol=0.1)

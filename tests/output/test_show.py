@@ -113,6 +113,7 @@ print(json.dumps(codes))
 """
 
 
+@pytest.mark.slow
 def test_paraview_reads_a_series_a_density_and_a_mesh(paraview, tmp_path):
     solver = ExponentSolver(Problem(HARD, UNIT_NOISE), MESHES["half circle"])
     written(tmp_path, solver)

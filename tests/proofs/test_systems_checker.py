@@ -45,7 +45,7 @@ PROOFS = {
     "bounded noise": (spring(0.1, 2.0, wall(1.1)), fpsolve.NonGaussianNoise(0.02, 0.6, 0.7), 1.0, 1e-6),
 }
 AHEAD = {"ray": [1.0, 0.0], "log_factor": 0.1}
-QUICK = sampled(*PROOFS, keep=3)
+QUICK = sampled(*list(PROOFS)[::2], keep=2)
 
 
 @functools.cache

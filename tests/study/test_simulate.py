@@ -382,7 +382,7 @@ def test_a_folder_that_cannot_be_made(case, tmp_path, capsys):
     assert "choose another --out" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("noise", ['kind = "telegraph"\na = 0.5\nk = 1.0', 'kind = "white"\ns = 0.5'])
+@pytest.mark.parametrize("noise", ['kind = "white"\ns = 0.5'])
 def test_any_system_is_simulated(tmp_path, out, noise):
     """λ by `tests.oracles`; white noise has that of Airy functions."""
     system = '[system]\nkind = "parametric"\nstiffness = 1.0\ndamping = 0.05\n'

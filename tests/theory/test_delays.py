@@ -148,7 +148,6 @@ def test_a_telegraph_signal():
 @pytest.mark.parametrize(
     ("names", "drift", "noise"),
     [
-        (("x", "v"), ("v", "-x - 0.2*v + 0.1*x(t - 2*pi) + 0.1*xi*(x + x(t - 2*pi))"), ITO),
         (("x",), ("-x + 0.4*x(t - 1) + 0.2*xi*(x + x(t - 0.5))",), ITO),
         (("x",), ("-x + 0.2*xi*x + 0.4*x(t - 1)",), OrnsteinUhlenbeck(alpha=1.0, sigma=0.8)),
     ],
