@@ -472,18 +472,22 @@ class Basis:
         return Reduced(*eigenpairs(a, g, value, x, y), a, g)
 
     def _refuse_corners(self) -> None:
-        """Raise `Unsuited` where two eigenvalues cross between two nodes: the basis may have T of one there only."""
-        pairs = [(self.nodes[low].pair, self.nodes[high].pair) for low, high in pairwise(sorted(self.nodes))]
-        for one, other in pairs:
-            jump = other.derivative - one.derivative
-            p = (one.value - one.derivative * one.p - other.value + other.derivative * other.p) / (jump or math.inf)
-            if not one.p < p < other.p:
+        """Raise `Unsuited` where eigenvalues of other T cross between two nodes: the basis may lack one of both."""
+        for one, other in pairwise(self.nodes[p] for p in sorted(self.nodes)):
+            (low, high), jump = (one.pair, other.pair), other.pair.derivative - one.pair.derivative
+            p = (low.value - low.derivative * low.p - high.value + high.derivative * high.p) / (jump or math.inf)
+            if not low.p < p < high.p:
                 continue
             found = self._reduced(np.array([p]))
-            values = eigvals(found.a[0], found.g[0])
-            gaps = np.sort(np.abs(values - found.value[0]))
-            if gaps[1] <= CORNER * jump * min(p - one.p, other.p - p):
-                raise Unsuited
+            a, g = found.a[0], found.g[0]
+            (x, y), (x_other, y_other) = (
+                [np.pad(each, (0, len(g) - each.size)) for each in node[-2:]] for node in (one, other)
+            )
+            share = (y @ g @ x_other) * (y_other @ g @ x) / ((y @ g @ x) * (y_other @ g @ x_other))
+            if share <= MOSTLY:
+                gaps = np.sort(np.abs(eigvals(a, g) - found.value[0]))
+                if gaps[1] <= CORNER * jump * min(p - low.p, high.p - p):
+                    raise Unsuited
 
     # errors
 
