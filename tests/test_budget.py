@@ -143,7 +143,16 @@ LARGE = {
     "chain, two modes": (lambda: modes(chain(30)), 1.0, 1e-4),
 }
 """Problems that take much memory: what makes them, p (None for Λ″(0)), and rtol."""
-LONG = "chain and OU", "slow strong OU", "two OU", "its Λ″(0)", "OU, two modes", "filter, two modes", "white, two modes"
+LONG = (
+    "clock, OU and wall",
+    "chain and OU",
+    "slow strong OU",
+    "two OU",
+    "its Λ″(0)",
+    "OU, two modes",
+    "filter, two modes",
+    "white, two modes",
+)
 """Those that take half a minute each: `pytest tests/benchmarks/test_memory.py`."""
 
 

@@ -15,22 +15,19 @@ from fpsolve.analysis import excursion
 from fpsolve.analysis.excursions import Crossing
 from fpsolve.cli import main
 from fpsolve.commands.options import BAD_INPUT, CHECK_FAILED
-from fpsolve.model import MarkovChain, OrnsteinUhlenbeck, ParametricOscillator, SineWiener, Telegraph, White
+from fpsolve.model import OrnsteinUhlenbeck, ParametricOscillator, Telegraph, White
 from fpsolve.proofs import prove_excursion, prove_lyapunov_exponent
 from fpsolve.proofs.claims import ExcursionClaim
 from tests.kit import read_json
 from tests.oracles import certificate_checker as checker
 from tests.oracles import certificate_excursion
-from tests.proofs.test_systems import driven_velocity, spring, wall
+from tests.proofs.test_systems import driven_velocity, wall
 
-CHAIN = MarkovChain((-0.9, 0.1, 0.7), ((0, 1.0, 0.5), (0.3, 0, 0.7), (0.2, 0.9, 0)))
 SKEW = PlaneSystem.of_equations(("x", "v"), ("0.3*x + v", "-1.5*x - 0.5*v - xi*x"))
 PROBLEMS = {
     "telegraph": Problem(ParametricOscillator(1.0, 0.08, 1.0), Telegraph(0.8, 1.0)),
-    "chain with a wall": Problem(spring(0.02, 1.0, wall(0.95)), CHAIN),
     "other coordinates": Problem(SKEW, Telegraph(0.9, 0.5)),
     "white": Problem(driven_velocity(wall(0.8)), White(0.8, interpretation="ito")),
-    "circle": Problem(ParametricOscillator(1.0, 0.08, 0.95), SineWiener(1.1, 1.0)),
     "bounded": Problem(fpsolve.VibroImpactOscillator(1.0, 0.8, -0.2, 0.7), fpsolve.NonGaussianNoise(0.3, 0.5, 0.9)),
 }
 QUICK = ("telegraph",)

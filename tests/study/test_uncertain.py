@@ -72,7 +72,7 @@ CASES = [UNIFORM.format(uncertain='"system.a" = 0.1, "noise.sigma" = 0.03'), WAL
 CASES += [WALL.replace("c1 = -0.4", "c1 = -0.2").replace('"noise.D0" = 0.05', '"noise.tau0" = 0.1')]
 
 
-@pytest.mark.parametrize("text", sampled(*CASES[::2], keep=0))
+@pytest.mark.parametrize("text", sampled(*CASES[2:], keep=0))
 def test_samples_lie_in_the_intervals_as_stated(text, tmp_path):
     """Of 200 some 95 %: by more than four standard errors of chance, 6 %, they are no others."""
     case = case_of(tmp_path, text, "uncertain.sample=200", "moments.p=[2.0]")
