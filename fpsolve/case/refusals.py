@@ -57,9 +57,8 @@ _MODERATE = "parameters and p must have moderate sizes; bring the extreme ones n
 
 
 def _of_moments(moments: Moments, valid: Known, context: Known) -> Iterator[Refusal]:
-    problem = problem_of(
-        valid
-    )  # where even moments are all, they are so for each curve, which else has those that exist
+    """One of the first curve; where keys are varied each has those that exist, but even ones alone are so for all."""
+    problem = problem_of(valid)
     is_told = not context.get("varies", False) or (problem is not None and problem.is_closed_only)
     found = _unsolvable({**valid, "moments": moments}, Vary(), with_moments=is_told)
     return (((), None, text) for _, text in islice(found, 1))

@@ -344,7 +344,7 @@ class Search:
         none of its modes shows it. Where two eigenvalues meet, modes of a mixture of both T tell little.
         """
         chosen = found.pair.generator.chosen
-        if abs(self.p + 1) <= AT_CORNER and self.whole.problem.dimension == 2 and is_mixed(found.pair):
+        if is_at_corner(self.whole.problem, self.p) and is_mixed(found.pair):
             change = self.whole.finer_pair(found.pair).value - found.pair.value
             return replace(found, search=2 * abs(change))
         if self.whole.rtol <= SURELY_SEEN or not isinstance(chosen.phi, PhaseAxis):
@@ -457,6 +457,11 @@ class Search:
             told = Message(Code.NOTHING_RESOLVED, p=self.p, reason=reason, is_thin=is_thin, last=said)
         remedy = None if reason.code is Code.ROUNDED else Remedy.BUDGET
         raise NotConverged(told, best and best.solution, remedy)
+
+
+def is_at_corner(problem: Problem, p: float) -> bool:
+    """Whether p is where Λ may have a corner."""
+    return problem.dimension == 2 and abs(p + 1) <= AT_CORNER
 
 
 def is_mixed(pair: PrincipalPair) -> bool:

@@ -23,6 +23,7 @@ from fpsolve.exponent.adapt import (
     Budget,
     Tolerance,
     WholeProblem,
+    is_at_corner,
     solved_p,
 )
 from fpsolve.exponent.eigen import PairDerivatives, PrincipalPair, second_derivative, slope_rounding
@@ -490,7 +491,7 @@ class ExponentSolver:
             return float(np.max([each.slope_error(p) for each in self.classes]))
         solution = self.solution(p)
         with one_thread():
-            jump = self._jump() if abs(p + 1) <= AT_CORNER and self.problem.dimension == 2 else 0.0
+            jump = self._jump() if is_at_corner(self.problem, p) else 0.0
             if solution.modes_tell:
                 return slope_error(solution.pair) + jump
             finer = self.whole.finer_pair(solution.pair)
