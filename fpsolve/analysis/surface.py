@@ -208,7 +208,8 @@ class Surface(Result):
         steps = np.linspace(0, 1, FOLLOWED)
         self._grid = np.array([*product(steps, repeat=len(self.axes))])
         ways = 1.01 / (FOLLOWED - 1) * np.vstack([np.eye(len(self.axes)), -np.eye(len(self.axes))])
-        self._beside = np.array([[self._number(at + way) for way in ways] for at in self._grid])
+        around = (self._grid[:, None] + ways)[:, :, None]
+        self._beside = np.argmin(np.linalg.norm(self._grid - around, axis=-1), axis=-1)
         self._judged: Values | None = None
         if problem.dimension != 2 or problem.classes:
             raise self._none()
