@@ -339,6 +339,10 @@ class Code(Enum):
     TOO_LONG = "failure: the line has more than {count} points"
     ROW_SPENT = "failure: a row of the grid has used up its {most:.3g} s of processor time; use a larger {key}"
     LINE_SPENT = "failure: budget.line_seconds = {most:g} of processor time are used up"
+    DEAR_CHART = (
+        "note: {lines} is solved at {nodes} points of a grid, and at some {few} to {many} along each branch, seconds "
+        "each; what is solved is kept, and a smaller chart.nodes or a larger chart.step asks for less"
+    )
     LINE_STOPPED = "note: the line {line} is not traced to its end, and may have more branches: {reason}"
 
     UNREACHED = (

@@ -15,7 +15,7 @@ from fpsolve.errors import FpsolveError
 from fpsolve.messages import Message
 
 TOLERANCE = 1e-10
-"""|F| over its scale up to which it is 0."""
+"""|F| over its scale up to which it is 0, unless more is allowed."""
 FINE = 13
 """Number of points along a cell of a scan at which its interpolation is looked at."""
 
@@ -29,6 +29,7 @@ class Sample(NamedTuple):
         gradient: ∂F/∂(u, v), shape (2,).
         error: estimate of |error of F|.
         scale: the size of the terms of F before they cancel.
+        rtol: |F| over its scale up to which it is 0.
     """
 
     at: FloatArray
@@ -36,11 +37,12 @@ class Sample(NamedTuple):
     gradient: FloatArray
     error: float
     scale: float
+    rtol: float = TOLERANCE
 
     @property
     def nothing(self) -> float:
         """|F| up to which it is 0."""
-        return max(TOLERANCE * self.scale, 0.1 * self.error)
+        return max(self.rtol * self.scale, 0.1 * self.error)
 
     @property
     def is_zero(self) -> bool:

@@ -20,7 +20,7 @@ from fpsolve.analysis.continuation import LONGEST, SHORTEST, Trace, find_branche
 from fpsolve.analysis.scan import Row, Scan, ScannedRow, scan_row, scanned
 from fpsolve.analysis.special_points import Placed, crossings, with_folds, with_points, with_values
 from fpsolve.analysis.surface import Surface
-from fpsolve.analysis.zero import Axis, Zero, ZeroField, check_axes, line_rtol, zero_of
+from fpsolve.analysis.zero import Axis, Known, Zero, ZeroField, check_axes, is_dear, line_rtol, zero_of
 from fpsolve.arrays import FloatArray, is_whole, real_number, shown
 from fpsolve.budget import Countdown
 from fpsolve.data import Result, brief, dataset
@@ -41,10 +41,10 @@ REDUCED_RTOL = 1e-4
 """Error of F by a reduced basis, relative to its scale, on a grid twice as fine."""
 ONE_SPACE = 4000
 """Unknowns of one space for the whole frame beyond which each point of a grid is solved on its own."""
-COARSER = 10.0
-"""Smallest factor from the error of F on the line to that on the grid."""
-NODES = 13
-"""Number of points of a scan, each way."""
+NODES, DEAR_NODES = 13, 7
+"""Number of points of a scan, each way, and where F is dear."""
+DEAR_STEP = 0.05
+"""Longest step between two points of a line, in sides of the frame, where F is dear."""
 LINE_KEY = "budget.line_seconds"
 """The key of a case that limits the time of a line."""
 SCAN_SHARE = 0.5
@@ -103,6 +103,7 @@ class Boundary(Result):
         seconds: of the processor, that the scan and the branches took.
         obstacles: why branches that the scan shows may be missing.
         complete: whether all branches that the scan shows are there.
+        known: points that need not be solved again.
     """
 
     zero: Zero
@@ -116,6 +117,7 @@ class Boundary(Result):
     seconds: float = 0.0
     obstacles: tuple[Message, ...] = ()
     complete: bool = False
+    known: Known | None = None
 
     @property
     def branches(self) -> tuple[Branch, ...]:
@@ -140,14 +142,14 @@ class Boundary(Result):
     @property
     def scan_rtol(self) -> float:
         """The error of F in the scan that is wanted, relative to its scale."""
-        return max(SCAN_RTOL, COARSER * self.rtol)
+        return max(SCAN_RTOL, self.rtol)
 
     @property
     def zero_field(self) -> ZeroField:
         """F over the unit square, with the time that is left for the line."""
-        most = self.budget.line_seconds
-        limit = () if most is None else (None, most - self.seconds, Message(Code.LINE_SPENT, most=most))
-        return ZeroField(self.zero, self.problem, (self.x, self.y), self.budget, *limit)
+        most = math.inf if self.budget.line_seconds is None else self.budget.line_seconds
+        frame, spent = (self.zero, self.problem, (self.x, self.y)), Message(Code.LINE_SPENT, most=most)
+        return ZeroField(*frame, self.budget, None, most - self.seconds, spent, self.known)
 
     def remark(self) -> str:
         """That there is no line, or not all of it, as a `Message`, or an empty text."""
@@ -213,7 +215,7 @@ class Boundary(Result):
         seconds, key = min((self.budget.seconds, "budget.seconds"), (share, LINE_KEY))
         spent = Message(Code.ROW_SPENT, most=seconds, key=key)
         frame = self.zero, self.problem, (self.x, self.y)
-        rough = partial(ZeroField, *frame, self.budget, self.scan_rtol, seconds, spent)
+        rough = partial(ZeroField, *frame, self.budget, self.scan_rtol, seconds, spent, self.known)
         return [Row(rough, count, number) for number in range(count)]
 
     def reduced_scan(self) -> Scan | None:
@@ -335,8 +337,8 @@ def boundary(
     x: Axis,
     y: Axis,
     *,
-    step: float = LONGEST,
-    nodes: int = NODES,
+    step: float | None = None,
+    nodes: int | None = None,
     budget: Budget | None = None,
     progress: Callable[[], None] = lambda: None,
 ) -> Boundary:
@@ -350,8 +352,9 @@ def boundary(
         problem: a motion and its noise, whose other parameters are held.
         zero: "lyapunov_exponent", {"moment": p} or {"stability_index": v}.
         x, y: the frame.
-        step: the longest step between two points, in sides of the frame.
-        nodes: of the grid in which branches are looked for, each way.
+        step: the longest step between two points, in sides of the frame; if omitted 0.02, or 0.05 where F takes
+            elements of three axes or more.
+        nodes: of the grid in which branches are looked for, each way; if omitted 13, or 7.
         budget: for a solve, and for the line: beyond its `line_seconds` what is traced is returned, with `obstacles`.
         progress: called once for each node of the grid, and once for each point of a branch.
 
@@ -360,18 +363,22 @@ def boundary(
             `nodes` is none of these.
     """
     check_axes(problem, x, y)
-    if not is_whole(nodes, 2):
+    if nodes is not None and not is_whole(nodes, 2):
         raise ValueError(f"got nodes = {shown(nodes)}; must be a whole number from 2")
-    line = Boundary(
-        zero_of(zero), x, y, problem, scan=empty_scan(nodes), step=_checked_step(step), budget=budget or Budget()
-    )
+    line = begun(zero_of(zero), x, y, problem, step=step, nodes=nodes, budget=budget or Budget())
     *_, whole = line.solve(progress=progress, stepped=progress, scan=line.reduced_scan())
     return whole
 
 
-def empty_scan(nodes: int) -> Scan:
-    """The grid of a scan, each way with so many nodes, without values."""
-    return Scan(np.linspace(0, 1, nodes), np.zeros((0, 0)), np.zeros((0, 0, 2)))
+def begun(
+    zero: Zero, x: Axis, y: Axis, problem: Problem, *, step: float | None, nodes: int | None, **more: Any
+) -> Boundary:
+    """A line of which nothing is traced, with the usual step and nodes where they are None. Raises `ValueError`."""
+    dear = is_dear(problem, zero)
+    step = _checked_step((DEAR_STEP if dear else LONGEST) if step is None else step)
+    count = nodes or (DEAR_NODES if dear else NODES)
+    scan = Scan(np.linspace(0, 1, count), np.zeros((0, 0)), np.zeros((0, 0, 2)))
+    return Boundary(zero, x, y, problem, scan=scan, step=step, **more)
 
 
 def _checked_step(step: float) -> float:

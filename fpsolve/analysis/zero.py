@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, Protocol
 
 import numpy as np
 from pydantic import ValidationError
@@ -28,8 +28,8 @@ RTOL = 1e-10
 """Error of F that is wanted of two variables, relative to its scale."""
 RTOL_OF_CLOSED = 1e-7
 """Error of F that is wanted where even moments are all, relative to its scale."""
-RTOL_BEYOND_PLANE = 1e-4
-"""Error of F that is wanted of more variables, relative to its scale."""
+RTOL_OF_DEAR = 1e-3
+"""Error of F that is wanted where it is dear, relative to its scale."""
 HALF = 0.5
 """Share of the time that is left for one value."""
 NEAR = 0.1
@@ -185,10 +185,15 @@ def check_axes(problem: Problem, x: Axis, y: Axis) -> None:
 
 
 def line_rtol(problem: Problem, zero: Zero) -> float:
-    """The error of F that is wanted on a line, over its scale: larger beyond the plane, unless moments are closed."""
-    if problem.is_closed_only:
-        return RTOL_OF_CLOSED
-    return RTOL if problem.dimension == 2 or (zero.p > 0 and zero.p % 2 == 0) else RTOL_BEYOND_PLANE
+    """The error of F that is wanted on a line, over its scale."""
+    return RTOL_OF_CLOSED if problem.is_closed_only else RTOL_OF_DEAR if is_dear(problem, zero) else RTOL
+
+
+def is_dear(problem: Problem, zero: Zero) -> bool:
+    """Whether F takes elements of three axes or more, and so seconds for each point."""
+    if problem.dimension > 2:
+        return not (problem.is_closed_only or (zero.p > 0 and zero.p % 2 == 0))
+    return len(problem.coloured.parts) > 1
 
 
 @one_number("Λ at p = {:g}, and its slopes")
@@ -248,6 +253,16 @@ class Ratio:
         return Sample(theta, value, slopes, error, solver.scale(p) / abs(p) if p else solver.scales.linear)
 
 
+class Known(Protocol):
+    """The points of a line that were solved, also by an earlier run."""
+
+    def find(self, rtol: float, at: FloatArray) -> Sample | Message | None:
+        """F at (u, v), or why there is none."""
+
+    def keep(self, rtol: float, at: FloatArray, found: Sample | Message) -> None:
+        """Keep it."""
+
+
 class ZeroField:
     """F over the unit square: λ or Λ(p)/p, with its gradient.
 
@@ -259,6 +274,7 @@ class ZeroField:
         rtol: of F, relative to its scale; `line_rtol` if None.
         seconds: of the processor for all values together; each may take half of what is left.
         spent: what is said where they do not suffice.
+        known: points that need not be solved again.
 
     Attributes:
         spent_seconds: of the processor, so far.
@@ -274,12 +290,13 @@ class ZeroField:
         rtol: float | None = None,
         seconds: float = math.inf,
         spent: Message | None = None,
+        known: Known | None = None,
     ) -> None:
         rtol = line_rtol(problem, zero) if rtol is None else rtol
         self._axes, self._ratio = axes, Ratio(problem, zero.p, [axis.key for axis in axes], budget, rtol)
         self._seconds, self._spent = seconds, spent or Message(Code.LINE_SPENT, most=seconds)
         self.spent_seconds, self.stopped = 0.0, None if seconds > 0 else self._spent
-        self._before = np.full(2, math.inf)
+        self._before, self._rtol, self._known = np.full(2, math.inf), rtol, known
 
     def __call__(self, at: FloatArray) -> Sample:
         """F at (u, v).
@@ -287,6 +304,17 @@ class ZeroField:
         Raises:
             FpsolveError: there is none, or the time does not suffice.
         """
+        found = self._known.find(self._rtol, at) if self._known else None
+        if found is None:
+            found = self._solved(at)
+            if self._known:
+                self._known.keep(self._rtol, at, found)
+        if isinstance(found, Message):
+            raise NotConverged(found)
+        return found
+
+    def _solved(self, at: FloatArray) -> Sample | Message:
+        """F, or why there is none. Raises `NotConverged` where the time does not suffice."""
         left = self._seconds - self.spent_seconds
         if left <= 0:
             raise self._stop()
@@ -298,6 +326,8 @@ class ZeroField:
             if failure.countdown is not share:
                 raise
             raise self._stop() from None
+        except FpsolveError as failure:
+            return failure.message
         finally:
             self.spent_seconds += share.spent
 
@@ -312,4 +342,4 @@ class ZeroField:
         slopes = np.array([axis.slope(share) for axis, share in places])
         found = self._ratio(theta, is_near=bool(np.linalg.norm(at - self._before) <= NEAR))
         self._before = at
-        return found._replace(at=at, gradient=found.gradient * slopes)
+        return found._replace(at=at, gradient=found.gradient * slopes, rtol=self._rtol)

@@ -501,7 +501,20 @@ class ChartSection(Section):
     nodes: Annotated[
         int | None,
         parameter(
-            "points of the grid that is searched for lines, each way; 13 if omitted", "nodes = 25", ge=2, le=MAX_NODES
+            "points of the grid that is searched for lines, each way; if omitted 13, or 7 where a point takes seconds: "
+            "λ and odd p of more than two variables, or two noises that are not white",
+            "nodes = 25",
+            ge=2,
+            le=MAX_NODES,
+        ),
+    ] = None
+    step: Annotated[
+        float | None,
+        parameter(
+            "longest step along a line, in sides of the frame; if omitted 0.02, or 0.05 where a point takes seconds",
+            "step = 0.1",
+            ge=0.001,
+            le=0.1,
         ),
     ] = None
 

@@ -22,7 +22,7 @@ def chart(
     """
     from fpsolve.page.terminal import print_blocks
     from fpsolve.show.notes import note_on
-    from fpsolve.workflow.chart import chart_case, refuse_no_chart, show, traced
+    from fpsolve.workflow.chart import chart_case, dear_lines, refuse_no_chart, show, traced
 
     code, loaded = 0, options.load(cases)
     for case in loaded:
@@ -30,6 +30,8 @@ def chart(
     pool = options.pool()
     for case in loaded:
         start = monotonic()
+        if not options.quiet and (dear := dear_lines(case)):
+            print_blocks([note_on(case.name, dear)])
         found = chart_case(case, options.out, pool=pool, watch=options.watch())
         if options.quiet:
             print_blocks(note_on(case.name, each) for each in dict.fromkeys(found.failures))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import partial
@@ -14,11 +15,10 @@ from typing import Any
 
 import numpy as np
 
-from fpsolve.analysis.continuation import Trace
 from fpsolve.analysis.regions import P_BIFURCATIONS, Region, Regions, regions
-from fpsolve.analysis.scan import Row, Scan, ScannedRow, scan_row
-from fpsolve.analysis.stability import NODES, Boundary, crossed, empty_scan
-from fpsolve.analysis.zero import Axis, Zero
+from fpsolve.analysis.scan import Row, Sample, Scan, ScannedRow, scan_row
+from fpsolve.analysis.stability import Boundary, begun, crossed
+from fpsolve.analysis.zero import Axis, Zero, is_dear
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case
 from fpsolve.case.sections import ChartSection
@@ -41,7 +41,7 @@ from fpsolve.workflow.progress import POINTS, SILENT, Phase, Watch
 from fpsolve.workflow.reports import facts_since, shown_at_the_end, write_report
 
 LINE_RECORDS = "records/charted"
-"""The folder of the records of lines."""
+"""The folder of the records of points of lines."""
 FILES = "chart.csv", "chart.json"
 """The files with all numbers of a chart."""
 Map = Callable[[Callable[[Row], ScannedRow], Iterable[Row]], Iterable[ScannedRow]]
@@ -117,8 +117,23 @@ def refuse_no_chart(case: Case) -> None:
 
 def chart_work(case: Case) -> int:
     """How often `solve_chart` reports progress: once for each node of each scan."""
-    frame = charted(case)
-    return (frame.nodes or NODES) ** 2 * len(frame.zero)
+    return sum(line.nodes**2 for line in begun_lines(case))
+
+
+def dear_lines(case: Case) -> Message | None:
+    """What the lines of a chart cost whose points take seconds; None where there are none."""
+    if not (dear := [line for line in begun_lines(case) if is_dear(line.problem, line.zero)]):
+        return None
+    nodes, few = sum(line.nodes**2 for line in dear), round(1 / dear[0].step)
+    equations = [line.zero.equation for line in dear]
+    return Message(Code.DEAR_CHART, lines=equations, nodes=nodes, few=few, many=3 * few)
+
+
+def begun_lines(case: Case) -> list[Boundary]:
+    """The lines of a chart, of which nothing is traced."""
+    frame, problem = charted(case), case.curve({}).problem
+    own: dict[str, Any] = {"step": frame.step, "nodes": frame.nodes, "budget": case.budget}
+    return [begun(zero, frame.x.axis, frame.y.axis, problem, **own) for zero in frame.zero]
 
 
 def solve_chart(
@@ -127,7 +142,7 @@ def solve_chart(
     progress: Callable[[], None] = lambda: None,
     stepped: Callable[[], None] = lambda: None,
     map: Map = map,
-    known: Callable[[Boundary], Boundary | None] = lambda _: None,
+    known: Callable[[Boundary], Points | None] = lambda _: None,
     has_closed_forms: bool = True,
 ) -> Iterator[Chart]:
     """What there is so far, after each scan, branch and line, and in the end the whole chart.
@@ -137,32 +152,23 @@ def solve_chart(
         progress: called once for each node of each scan, see `chart_work`.
         stepped: called once for each point that is traced.
         map: computes the rows of all scans, as the builtin does or in other processes, while branches are traced here.
-        known: gives a line that an earlier run has finished.
+        known: gives what is recorded of the points of a line.
         has_closed_forms: whether they are found, too, which takes seconds.
     """
-    frame = charted(case)
-    x, y = frame.x.axis, frame.y.axis
-    curve = case.curve({})
-    problem = curve.problem
-    chart = Chart((), _closed_forms(problem, frame.zero, (x, y)) if has_closed_forms else ())
-    scan = empty_scan(frame.nodes) if frame.nodes else None
-    begun = [Boundary(zero, x, y, problem, scan=scan, budget=case.budget) for zero in frame.zero]
-    finished = [known(line) for line in begun]
-    scans = [line.reduced_scan() if earlier is None else None for line, earlier in zip(begun, finished, strict=True)]
-    whole = [*zip(begun, finished, scans, strict=True)]
-    tasks = [row for line, earlier, reduced in whole if earlier is None and reduced is None for row in line.rows()]
+    records = [known(line) for line in begun_lines(case)]
+    lines = [replace(line, known=of) for line, of in zip(begun_lines(case), records, strict=True)]
+    x, y = lines[0].x, lines[0].y
+    chart = Chart((), _closed_forms(lines[0].problem, charted(case).zero, (x, y)) if has_closed_forms else ())
+    scans = [of.scan(line) if of else line.reduced_scan() for line, of in zip(lines, records, strict=True)]
+    tasks = [row for line, reduced in zip(lines, scans, strict=True) if reduced is None for row in line.rows()]
     rows = iter(map(scan_row, tasks))
-    for each, earlier, reduced in whole:
+    for each, reduced in zip(lines, scans, strict=True):
         done = chart.lines
-        if earlier is not None:
-            chart = replace(chart, lines=(*done, earlier))
-            yield chart
-            continue
         for line in each.solve(rows, progress, stepped, reduced):
             chart = replace(chart, lines=(*done, line))
             yield chart
-    lines = tuple(crossed(chart.lines))
-    yield Chart(lines, chart.closed_forms, regions(lines), complete=all(line.complete for line in lines))
+    whole = tuple(crossed(chart.lines))
+    yield Chart(whole, chart.closed_forms, regions(whole), complete=all(line.complete for line in whole))
 
 
 def _closed_forms(
@@ -190,51 +196,66 @@ def _closed_forms(
 
 
 @dataclass(frozen=True, eq=False)
-class Line:
-    """What is recorded of a finished line of a chart, see `Boundary`."""
+class Point:
+    """What is recorded of a point of a line: the wanted error of F over its scale, F, or why there is none."""
 
-    traces: tuple[Trace, ...]
-    scan: Scan
-    seconds: float
-
-
-class Lines:
-    """The lines of a chart, of which an earlier run may have finished some."""
-
-    def __init__(self, case: Case, folder: Path) -> None:
-        self.case, self.records, self._kept = case, Records(folder.resolve() / LINE_RECORDS).look(), set[Zero]()
-
-    def find(self, line: Boundary) -> Boundary | None:
-        """A line as it was finished, if it was; otherwise None."""
-        found = self.records.made(_line_key(self.case, line), lambda record: _line_of(record, line))
-        self._kept |= {line.zero} if found else set()
-        return found
-
-    def keep(self, line: Boundary) -> None:
-        """Keep a line once it is finished."""
-        if line.complete and line.scan is not None and line.zero not in self._kept:
-            record = record_of(Line(line.traces, line.scan, line.seconds))
-            append(self.records.folder, _line_key(self.case, line), record)
-            self._kept.add(line.zero)
+    rtol: float
+    at: FloatArray
+    sample: Sample | None
+    reason: Message | None
 
 
-def _line_key(case: Case, line: Boundary) -> str:
-    """What the record of a line of a chart is found by."""
-    frame = [repr(each) for each in (line.zero, line.x, line.y, line.step, line.budget)]
-    return key_of(Line, case.curve({}), frame=frame, nodes=charted(case).nodes)
+class Points:
+    """The points of a line, recorded one by one as they are solved, and a scan from a reduced basis.
+
+    Args:
+        folder: of the case.
+        case: the case.
+        line: of which nothing is traced.
+    """
+
+    def __init__(self, folder: Path, case: Case, line: Boundary) -> None:
+        frame = [repr(each) for each in (line.zero, *(replace(axis, at=()) for axis in (line.x, line.y)), line.budget)]
+        curve = case.curve({})
+        self._folder = folder.resolve() / LINE_RECORDS
+        self._key = key_of(Point, curve, frame=frame)
+        self._scan_key = key_of(Scan, curve, frame=frame, nodes=line.nodes)
+        self._found: dict[tuple[float, ...], Sample | Message | None] | None = None
+
+    def find(self, rtol: float, at: FloatArray) -> Sample | Message | None:
+        """F at a point, or why there is none; None where it is not known."""
+        if self._found is None:
+            self._found, records = {}, Records(self._folder).look()
+            for place in records.addresses(self._key):
+                with suppress(OSError, ValueError):  # which counts as none
+                    point = Point(**made_of(Point, records.read(place)))
+                    if point.sample is None or point.sample.at.shape == point.sample.gradient.shape == (2,):
+                        self._found[point.rtol, *point.at] = point.sample or point.reason
+        return self._found.get((rtol, *at))
+
+    def keep(self, rtol: float, at: FloatArray, found: Sample | Message) -> None:
+        """Record it, but for what may not fail again."""
+        if isinstance(found, Sample):
+            append(self._folder, self._key, record_of(Point(rtol, at, found, None)))
+        elif not found.tells_of(Code.NO_MEMORY):
+            append(self._folder, self._key, record_of(Point(rtol, at, None, found)))
+
+    def scan(self, line: Boundary) -> Scan | None:
+        """Its reduced scan, from records where it is there."""
+        records = Records(self._folder).look()
+        if (found := records.made(self._scan_key, lambda record: _scan_of(record, 2 * line.nodes - 1))) is not None:
+            return found
+        if (made := line.reduced_scan()) is not None:
+            append(self._folder, self._scan_key, record_of(made))
+        return made
 
 
-def _line_of(record: Record, line: Boundary) -> Boundary:
-    """A finished line from its record, with what it was begun with. Raises `ValueError` where that has another form."""
-    found = Line(**made_of(Line, record))
-    samples = [point.sample for trace in found.traces for point in trace.points]
-    count = found.scan.nodes.size
-    shapes = found.scan.nodes.shape, found.scan.values.shape, found.scan.gradients.shape
-    is_whole = shapes == ((count,), (count, count), (count, count, 2)) and all(trace.points for trace in found.traces)
-    is_whole &= all(each.at.shape == each.gradient.shape == (2,) and np.isfinite(each.at).all() for each in samples)
-    if not is_whole:
-        raise ValueError("this is no record of a line")
-    return replace(line, traces=found.traces, scan=found.scan, seconds=found.seconds, complete=True)
+def _scan_of(record: Record, count: int) -> Scan:
+    """A scan from its record. Raises `ValueError` where that has another form."""
+    found = Scan(**made_of(Scan, record))
+    if (found.nodes.shape, found.values.shape, found.gradients.shape) != ((count,), (count,) * 2, (count, count, 2)):
+        raise ValueError("this is no record of a scan")
+    return found
 
 
 def write_chart(case: Case, chart: Chart, folder: Path) -> None:
@@ -482,9 +503,8 @@ def chart_case(
         writable(folder),
         pool or serial() as workers,
     ):
-        lines = Lines(case, folder)
+        known = partial(Points, folder, case)
         with shown_at_the_end(draw):
-            for chart in solve_chart(case, progress=progress, stepped=stepped, map=workers.map, known=lines.find):
+            for chart in solve_chart(case, progress=progress, stepped=stepped, map=workers.map, known=known):
                 write_chart(case, chart, folder)
-                lines.keep(chart.lines[-1])
     return chart

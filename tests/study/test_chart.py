@@ -1,12 +1,13 @@
 """Charts of stability from a case file: what is written, and what its regions say."""
 
+import math
 from contextlib import nullcontext
 
 import numpy as np
 import pytest
 
 from fpsolve import ExponentSolver, load_case
-from fpsolve.analysis.zero import Zero
+from fpsolve.analysis.zero import Zero, ZeroField
 from fpsolve.cli import main
 from fpsolve.errors import CaseError
 from fpsolve.output.figures import read_line
@@ -37,7 +38,6 @@ def few_nodes():
     """Scans with fewer nodes than usual, which take a fifth of the time."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("fpsolve.analysis.stability.NODES", 7)
-        patch.setattr("fpsolve.workflow.chart.NODES", 7)
         patch.setattr("fpsolve.workflow.chart.CLOSED_FORM_NODES", 31)
         yield
 
@@ -155,28 +155,34 @@ def test_interrupted_it_keeps_what_is_traced(path, tmp_path, capsys):
 
 
 @pytest.mark.slow
-def test_an_interrupted_chart_goes_on_with_the_lines_that_are_finished(path, tmp_path):
-    """To the last bit what is drawn without an interrupt; the first line is not scanned again."""
-    case, scanned = load_case(path, ["chart.zero=['lyapunov_exponent', { moment = 2.0 }]"]), []
+def test_an_interrupted_chart_solves_no_point_twice(path, tmp_path, monkeypatch):
+    """It is interrupted in the scan, and in a branch; a finished one is drawn again without a solve."""
+    case, solved, most = load_case(path, ["chart.zero=['lyapunov_exponent', { moment = 2.0 }]"]), [], [math.inf]
+    solve = ZeroField._solved
+
+    def counting(field, at):
+        if len(solved) == most[0]:
+            raise KeyboardInterrupt
+        solved.append((field._ratio.p, field._rtol, *at))
+        return solve(field, at)
+
+    monkeypatch.setattr(ZeroField, "_solved", counting)
+    whole = chart_case(case, tmp_path / "whole")
+    count = len(solved)
     chart_case(case, tmp_path / "whole")
-    calls = iter(range(10_000))
-
-    def until(most):
-        def progress(count=1, **_):
-            scanned.append(count)
-            if next(calls) == most:
-                raise KeyboardInterrupt
-
-        return Watch(bar=lambda phase: nullcontext(progress if phase.total else lambda: None))
-
-    with pytest.raises(KeyboardInterrupt, match="run it again to go on"):
-        chart_case(case, tmp_path / "out", watch=until(60))
-    scanned.clear()
-    chart = chart_case(case, tmp_path / "out", watch=until(9_000))
-    assert sum(scanned) == chart_work(case) // 2
-    assert chart.complete
-    for name in ("chart.csv", "chart.json"):
-        assert (tmp_path / "out/plane" / name).read_bytes() == (tmp_path / "whole/plane" / name).read_bytes()
+    assert len(solved) == count
+    solved.clear()
+    for most[0] in (30, 125, 170):
+        with pytest.raises(KeyboardInterrupt, match="run it again to go on"):
+            chart_case(case, tmp_path / "out")
+    most[0] = math.inf
+    chart = chart_case(case, tmp_path / "out")
+    assert len(set(solved)) == len(solved) <= count + 10
+    for line, other in zip(chart.lines, whole.lines, strict=True):
+        [branch], [known] = line.branches, other.branches
+        assert abs(branch.x.size - known.x.size) <= 1
+        for x, y in zip(branch.x, branch.y, strict=True):
+            assert np.min(np.hypot(known.x - x, known.y - y)) < 0.05
 
 
 @pytest.mark.slow
