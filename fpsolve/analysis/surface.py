@@ -203,6 +203,7 @@ class Surface(Result):
                 known = ", ".join(problem.differentiable) or "none"
                 raise ValueError(f"got {shown(axis.key)}; the parameters are {known}")
         self._budget, self._nodes, self._refinements = budget or Budget(), list[Node](), 0
+        self._scales = dict[bytes, float]()
         self._frame: Problem | None = None
         self._operands = len(self.axes)  # of the operators
         steps = np.linspace(0, 1, FOLLOWED)
@@ -283,8 +284,11 @@ class Surface(Result):
         return self.rtol * max(abs(value), self._scale(at))
 
     def _scale(self, at: FloatArray) -> float:
-        scales = scale_of(self._problem(at))
-        return float(scales.moment(self.p)) if self.p else scales.linear
+        if (key := at.tobytes()) not in self._scales:
+            refuse_infinite(problem := self._problem(at), self.p)
+            scales = scale_of(problem)
+            self._scales[key] = float(scales.moment(self.p)) if self.p else scales.linear
+        return self._scales[key]
 
     # nodes
 
@@ -301,16 +305,17 @@ class Surface(Result):
         numbers = np.round(self._grid * (FOLLOWED - 1))
         is_end = (numbers == 0) | (numbers == FOLLOWED - 1)
         looked_at = np.flatnonzero(np.all((numbers % 2 == 1) | is_end, axis=1) & ~np.all(is_end, axis=1)).tolist()
-        left, count = dict.fromkeys(looked_at, (math.inf, math.inf)), dict.fromkeys(looked_at, 0)
+        left, count = self._lefts_at(looked_at), dict.fromkeys(looked_at, len(self._nodes))
         while True:
             worst = max(left, key=lambda k: left[k][0])
             self._left_share, self._left = (max(each) for each in zip(*left.values(), strict=True))
             if count[worst] < len(self._nodes) and left[worst][0] > 1:
-                left[worst], count[worst] = self._left_at(worst), len(self._nodes)
+                left |= self._lefts_at([worst])
+                count[worst] = len(self._nodes)
                 continue
             if left[worst][0] <= 1:
                 if before := [k for k, nodes in count.items() if nodes < len(self._nodes)]:  # nodes elsewhere may harm
-                    left |= {k: self._left_at(k) for k in before}
+                    left |= self._lefts_at(before)
                     count |= dict.fromkeys(before, len(self._nodes))
                     continue
                 if (lost := self._lost()) is None:
@@ -531,14 +536,17 @@ class Surface(Result):
         return rows
 
     def _changes(
-        self, row: FloatArray, vector: FloatArray, value: float, adjoint: bool = False, kind: int = 0
+        self, rows: FloatArray, vectors: FloatArray, value: Any, adjoint: bool = False, kind: int = 0
     ) -> FloatArray:
-        """The derivative of L − vM, or of L′ − vM, times a vector, from its share of each sample."""
-        total = np.zeros(vector.size)
-        for share, matrix, space in zip(row.tolist(), self._kinds[kind], self._spaces, strict=True):
-            image = (matrix.T if adjoint else matrix) @ vector
-            total += share * (image - value * space.weighed(vector) if value else image)
-        return total
+        """What L − vM, or L′ − vM, or derivatives of these, make of vectors, shape (…, size), by their rows."""
+        rows, tables = np.atleast_2d(rows), vectors.reshape(-1, *self._chosen.shape)
+        values, total = np.reshape(value, (-1, 1)), np.zeros((len(tables), self._chosen.size))
+        for k, (matrix, space) in enumerate(zip(self._kinds[kind], self._spaces, strict=True)):
+            image = (matrix.T if adjoint else matrix).images(tables).reshape(total.shape)
+            if values.any():
+                image -= values * np.array([space.weighed(each) for each in tables])
+            total += rows[:, k, None] * image
+        return total.reshape(vectors.shape)
 
     def _extend(self, right: Sequence[FloatArray], left: Sequence[FloatArray]) -> None:
         """Add vectors to the basis, and what they make of all samples to the small matrices."""
@@ -678,26 +686,23 @@ class Surface(Result):
 
     # errors
 
-    def _left_at(self, k: int) -> tuple[float, float]:
-        """What is left of F at a place, over its share of what is allowed, and itself."""
-        at = self._grid[k]
-        refuse_infinite(self._problem(at), self.p)
-        found = self._clear(at[None]) if self.p else self._values(at[None])
-        if np.isnan(found.value[0]):
-            return math.inf, math.inf
-        value, x, y = float(found.eigenvalue[0]), found.x[0] @ self._right, found.y[0] @ self._dual
-        operators, space = self._operators(found.place[0]), self._space_at(found.place[0])
+    def _lefts_at(self, places: Sequence[int]) -> dict[int, tuple[float, float]]:
+        """What is left of F at points of the grid, over its share of what is allowed, and itself."""
+        at, lefts = self._grid[places], dict.fromkeys(places, (math.inf, math.inf))
+        found = self._clear(at) if self.p else self._values(at, has_gradient=True)
+        rows, x, y, value = self._rows(found.place), found.x @ self._right, found.y @ self._dual, found.eigenvalue
         if self.p:
-            own = operators[0].shifted(value)
-            r, s = own @ x, own.T @ y
+            r, s = self._changes(rows, x, value), self._changes(rows, y, value, adjoint=True)
         else:
-            one = space.constant
-            r = operators[0] @ x + operators[1] @ one - value * space.weighed(one)
-            s = operators[0].T @ y
-        around = self._nearest(at).around
-        assert around is not None
-        left = SAFE * abs(float(s @ around.solve(r, refinements=2)) / float(found.unit[0]))
-        return left / (SHARE * self._allowed(at, float(found.value[0]))), left
+            ones = np.broadcast_to(self._spaces[0].constant, x.shape)
+            r = self._changes(rows, x, 0.0) + self._changes(rows, ones, value, kind=1)
+            s = self._changes(rows, y, 0.0, adjoint=True)
+        for i in np.flatnonzero(np.isfinite(found.value)).tolist():
+            around = self._nearest(at[i]).around
+            assert around is not None
+            left = SAFE * abs(float(s[i] @ around.solve(r[i], refinements=2)) / float(found.unit[i]))
+            lefts[places[i]] = left / (SHARE * self._allowed(at[i], float(found.value[i]))), left
+        return lefts
 
     # values
 
