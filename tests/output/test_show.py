@@ -154,6 +154,7 @@ def test_show_script_draws_a_field(paraview, results):
     assert {file: file.read_bytes() for file in before} == before
 
 
+@pytest.mark.slow
 def test_show_script_refuses_what_is_not_there(paraview, results, tmp_path):
     """A p, and a folder without a series; one ParaView runs the script three times."""
     alone, script = copy_show_script(tmp_path), tmp_path / "three.py"

@@ -317,6 +317,7 @@ def interrupted(tmp_path_factory):
     return folder, case
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("change", [None, forged, lambda record: record.clear()])
 def test_an_interrupted_run_goes_on_with_the_bounds_that_follow(interrupted, tmp_path, monkeypatch, change):
     """What is proven is not proven again, but verified; δ_p and what was forged are."""

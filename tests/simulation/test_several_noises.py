@@ -59,6 +59,7 @@ def test_beside_a_harmonic_load_a_transient_is_whole_periods():
     assert h <= largest_step(system, noises)[0] < 0.1 * math.pi / 1.7
 
 
+@pytest.mark.slow
 def test_impacts_at_a_wall_are_counted():
     wall = [{"at": "x = 0", "restitution": 0.9}]
     system = PlaneSystem.of_equations(("x", "v"), RATES, {"omega": 1.0, "zeta": 0.0}, noises=NAMES, walls=wall)

@@ -51,6 +51,7 @@ def test_the_step_has_order_four(start):
     assert np.all(np.log2(np.array(errors[1:-1]) / errors[2:]) > 3.5)
 
 
+@pytest.mark.slow
 def test_the_step_under_white_noise_has_strong_order_three_halves():
     """Steps of the same Brownian paths, 4 to 32 of them."""
     rng, paths, fine = np.random.default_rng(5), 200, 2048

@@ -160,6 +160,7 @@ def test_simulated_paths(names, drift, noise):
     assert found.standard_error <= 5e-3
 
 
+@pytest.mark.slow
 def test_simulated_paths_lack_the_bias_of_their_step():
     """Of hardly any noise λ is the root of s = −1 + 0.4 e^(−s): a step alone is off by 3e-5."""
     problem = Problem(EquationSystem(("x",), ("-x + 0.4*x(t - 1) + 0.0001*xi*x",)), ITO)
