@@ -18,6 +18,7 @@ import math
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import product
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -31,7 +32,7 @@ from fpsolve.budget import counted
 from fpsolve.data import Result, dataset
 from fpsolve.errors import FpsolveError, NotConverged
 from fpsolve.exponent.adapt import SMALL_P, UNSOLVED, Budget
-from fpsolve.exponent.basis import SAFE, SHARE, Polynomials, eigenpairs, form, orthonormal
+from fpsolve.exponent.basis import SAFE, SHARE, Polynomials, eigenpairs, form, left_over, orthonormal
 from fpsolve.exponent.eigen import MOSTLY, PairDerivatives, PrincipalPair, principal_pair
 from fpsolve.exponent.error import Solution
 from fpsolve.exponent.solver import solver_of
@@ -700,7 +701,8 @@ class Surface(Result):
         for i in np.flatnonzero(np.isfinite(found.value)).tolist():
             around = self._nearest(at[i]).around
             assert around is not None
-            left = SAFE * abs(float(s[i] @ around.solve(r[i], refinements=2)) / float(found.unit[i]))
+            image = partial(self._changes, rows[i], value=value[i] if self.p else 0.0)
+            left = SAFE * left_over(around, r[i], s[i], image) / abs(float(found.unit[i]))
             lefts[places[i]] = left / (SHARE * self._allowed(at[i], float(found.value[i]))), left
         return lefts
 

@@ -18,6 +18,7 @@ from fpsolve.errors import NotConverged
 from fpsolve.exponent.basis import Basis, Polynomials
 from fpsolve.exponent.eigen import principal_pair
 from fpsolve.model import Bounded, ParametricOscillator, SineWiener, Telegraph, White
+from tests import random_planar
 from tests.benchmarks.problem import CASES
 from tests.benchmarks.references import REFERENCES
 from tests.random_problems import RTOL, problems
@@ -154,3 +155,11 @@ def test_nodes_added_elsewhere_may_leave_more_between_others():
     for p in (0.25, 1.5):
         single = ExponentSolver(problem, rtol=1e-7).solution(p)
         assert abs(function(p) - single.pair.value) <= function.error_estimate(p) + single.error
+
+
+def test_what_is_left_between_nodes_is_told_where_parts_of_it_cancel_at_the_next_node():
+    """There the inverse at this node alone says a twentieth."""
+    problem, p = random_planar.drawn(8).problem, 4.285529766891782
+    function = MomentLyapunovFunction(problem, (-1.3770606280419302, 5.59228139649187), rtol=1e-4)
+    single = ExponentSolver(problem, rtol=1e-8).solution(p)
+    assert abs(function(p) - single.pair.value) <= function.error_estimate(p) + single.error
