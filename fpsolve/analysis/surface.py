@@ -379,7 +379,7 @@ class Surface(Result):
     def _add(self, at: FloatArray) -> bool:
         """Solve at a place, and take the eigenfunctions with their derivatives; False for a finer space."""
         generator = self._generator(at)
-        generator.keeps_factors = True
+        generator.keep_factors()
         start = self._lifted(at, generator) if self._nodes else self._starts
         place = Start(generator.problem, self._chosen)
         with counted(self._budget.countdown("a node of a surface")):

@@ -17,7 +17,7 @@ import numpy as np
 
 from fpsolve.budget import Countdown, OverBudget, counted, half_the_memory, under_way
 from fpsolve.errors import FpsolveError, MeshError, NotConverged, SingularMatrix
-from fpsolve.exponent.eigen import PairDerivatives, PrincipalPair, principal_pair
+from fpsolve.exponent.eigen import PairDerivatives, PrincipalPair, pair_at_zero, principal_pair
 from fpsolve.exponent.error import Solution
 from fpsolve.exponent.starts import Question, Start, first_place, other_centers, other_places, refined
 from fpsolve.fem.factors import FEW_UNKNOWNS, one_thread
@@ -303,7 +303,9 @@ class Search:
                     finer = self.whole.pair_on(fine, self.p, pair)
                     return Solution(pair, measured=(abs(finer.value - pair.value),))
                 if abs(self.p) < SMALL_P:
-                    return self.solve_with(self.whole.near_zero(self.p, self.tolerance).pair.generator)
+                    near = self.whole.near_zero(self.p, self.tolerance).pair
+                    at_zero = pair_at_zero(near) if self.p == 0 else None
+                    return Solution(at_zero) if at_zero else self.solve_with(near.generator)
                 known = None
                 for attempt in (self.try_problem_close_by, self.try_nearest_p):
                     known = attempt() or known

@@ -57,6 +57,8 @@ REFINEMENTS = 3
 """Number of times that T′ is improved by its residual."""
 REFINED = 1e-14
 """Share of T′ of a step that is the last one, where no other one is enough."""
+KNOWN = 1e-11
+"""Share of T* at p = 0 of the last step by factors of another p."""
 MAX_ITERATIONS = 12
 """Number of LU factors in an iteration."""
 MAX_SHIFTS = 12
@@ -475,6 +477,11 @@ class PairDerivatives:
         ]
 
     @property
+    def is_known(self) -> bool:
+        """Whether factors are kept."""
+        return bool(self._kept)
+
+    @property
     def _rate(self) -> float:
         return self.pair.generator.problem.unit_rate
 
@@ -537,6 +544,27 @@ class PairDerivatives:
     def second_derivative(self) -> float:
         """Λ″(p) = ⟨T*, L″T⟩ + 2⟨T*, (L′ − Λ′)T′⟩."""
         return float(self.pair.left @ (self._curved + self._mixed) / self.norm)
+
+
+def pair_at_zero(near: PrincipalPair) -> PrincipalPair | None:
+    """The pair at p = 0, where Λ = 0 and T = 1, from one at a small p by its factors; None where none are kept, or it
+    does not converge.
+
+    T* of that is improved by v from (L_p − Λ_p)ᵀv = −L₀ᵀT*, whose error is about p times the one before.
+    """
+    around, pencil = PairDerivatives(near), near.generator.at(0.0)
+    if not around.is_known:
+        return None
+    y, size, last = near.left, math.inf, math.inf
+    with one_thread():
+        while REFINED * length(y) < size <= 0.5 * last or last == math.inf:
+            step = around.solve(-(pencil.matrix.T @ y), adjoint=True, refinements=1)
+            y, size, last = y + step, length(step), size
+    if not size <= KNOWN * length(y):
+        return None
+    x = pencil.space.constant
+    found = Iterate(0.0, 0.0, x, y, pencil.space.weighed(x), pencil.space.weighed(y))
+    return _pair(near.generator, pencil, found)
 
 
 def second_derivative(pair: PrincipalPair) -> float:

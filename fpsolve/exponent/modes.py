@@ -24,6 +24,7 @@ import scipy.linalg
 
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import NoHierarchy
+from fpsolve.exponent.adapt import SMALL_P
 from fpsolve.exponent.eigen import PrincipalPair, principal_pair
 from fpsolve.exponent.error import Solution, mode_effects
 from fpsolve.exponent.starts import SHARE, Question, Start
@@ -204,7 +205,10 @@ class SphereStart(Start):
     def pair(self, p: float, near: PrincipalPair | None) -> PrincipalPair:
         """The pair, from that of waves of a lower degree, or from p to p since p = 0."""
         generator = self.generator
+        if abs(p) == SMALL_P:  # for that at p = 0
+            generator.keep_factors()
         if near is not None:
+            near.generator.forget()
             return principal_pair(generator, p, start=near)
         known = [pair for pair in self.pairs if pair.generator is generator] or [principal_pair(generator, 0.0)]
         closest = min(known, key=lambda pair: abs(pair.p - p)).p

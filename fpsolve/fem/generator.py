@@ -141,6 +141,15 @@ class Generator:
             self._last = Pencil(p, space, self.matrix(p), levels, self._ring, self.keeps_factors)
         return self._last
 
+    def keep_factors(self) -> None:
+        """Keep those that are made from now on, see `Pencil`."""
+        self.keeps_factors = True
+        self._last = self._last and replace(self._last, keeps_factors=True)
+
+    def forget(self) -> None:
+        """Let go of what is kept of the last p."""
+        self._last = None
+
     @cached_property
     def slowest(self) -> list[float]:
         """For each axis the least share of the effect of its highest modes that two more may leave."""
