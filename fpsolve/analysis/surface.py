@@ -31,7 +31,7 @@ from fpsolve.arrays import FloatArray, real_array, real_number, shown
 from fpsolve.budget import counted
 from fpsolve.data import Result, dataset
 from fpsolve.errors import FpsolveError, NotConverged
-from fpsolve.exponent.adapt import SMALL_P, UNSOLVED, Budget
+from fpsolve.exponent.adapt import UNSOLVED, Budget
 from fpsolve.exponent.basis import SAFE, SHARE, Polynomials, eigenpairs, form, left_over, orthonormal
 from fpsolve.exponent.eigen import MOSTLY, PairDerivatives, PrincipalPair, principal_pair
 from fpsolve.exponent.error import Solution
@@ -39,7 +39,7 @@ from fpsolve.exponent.solver import solver_of
 from fpsolve.exponent.starts import FREE_STAGES, Start, other_centers
 from fpsolve.fem.axis import KroneckerSum
 from fpsolve.fem.factors import one_thread
-from fpsolve.fem.generator import Generator
+from fpsolve.fem.generator import SMALL_P, Generator
 from fpsolve.fem.space import Space
 from fpsolve.messages import Code, Message
 from fpsolve.model.problem import Problem, checked_problem, refuse_infinite
@@ -379,7 +379,7 @@ class Surface(Result):
     def _add(self, at: FloatArray) -> bool:
         """Solve at a place, and take the eigenfunctions with their derivatives; False for a finer space."""
         generator = self._generator(at)
-        generator.keep_factors()
+        generator.keeps_factors = True
         start = self._lifted(at, generator) if self._nodes else self._starts
         place = Start(generator.problem, self._chosen)
         with counted(self._budget.countdown("a node of a surface")):

@@ -21,7 +21,7 @@ from fpsolve.exponent.eigen import PairDerivatives, PrincipalPair, pair_at_zero,
 from fpsolve.exponent.error import Solution
 from fpsolve.exponent.starts import Question, Start, first_place, other_centers, other_places, refined
 from fpsolve.fem.factors import FEW_UNKNOWNS, one_thread
-from fpsolve.fem.generator import Generator
+from fpsolve.fem.generator import SMALL_P, Generator
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.fem.noise_axes import PolynomialAxis
 from fpsolve.fem.phase import PhaseAxis
@@ -40,8 +40,6 @@ MOST_TILT_AWAY = 0.7
 """How far the tilt of a space may be from the best one at another p."""
 TRIM = 0.8
 """A smaller space must have at most this share of the unknowns."""
-SMALL_P = 1e-2
-"""For smaller |p| the discretisation is chosen at this one, as Λ and its error go to zero together."""
 NEGLIGIBLE_P = 1e-30
 """Pairs at smaller |p| are those at p = 0, from which they differ by less than by rounding."""
 NEIGHBOURS = 6

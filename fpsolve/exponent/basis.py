@@ -34,14 +34,14 @@ from scipy.linalg import eigvals
 from fpsolve.arrays import FloatArray
 from fpsolve.budget import counted
 from fpsolve.errors import NotConverged
-from fpsolve.exponent.adapt import SMALL_P, UNSOLVED
+from fpsolve.exponent.adapt import UNSOLVED
 from fpsolve.exponent.eigen import MOSTLY, PairDerivatives, PrincipalPair, principal_pair
 from fpsolve.exponent.error import Solution, effects_on
 from fpsolve.exponent.starts import Start, other_centers
 from fpsolve.fem.axis import KroneckerSum
 from fpsolve.fem.effects import ModeEffects
 from fpsolve.fem.factors import one_thread
-from fpsolve.fem.generator import Generator
+from fpsolve.fem.generator import SMALL_P, Generator
 from fpsolve.fem.space import Space
 from fpsolve.messages import Code, Message
 

@@ -24,7 +24,6 @@ import scipy.linalg
 
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import NoHierarchy
-from fpsolve.exponent.adapt import SMALL_P
 from fpsolve.exponent.eigen import PrincipalPair, principal_pair
 from fpsolve.exponent.error import Solution, mode_effects
 from fpsolve.exponent.starts import SHARE, Question, Start
@@ -205,8 +204,6 @@ class SphereStart(Start):
     def pair(self, p: float, near: PrincipalPair | None) -> PrincipalPair:
         """The pair, from that of waves of a lower degree, or from p to p since p = 0."""
         generator = self.generator
-        if abs(p) == SMALL_P:  # for that at p = 0
-            generator.keep_factors()
         if near is not None:
             near.generator.forget()
             return principal_pair(generator, p, start=near)

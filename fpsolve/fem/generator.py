@@ -24,6 +24,9 @@ from fpsolve.model.problem import ParameterDerivative, Problem
 if TYPE_CHECKING:
     from fpsolve.fem.sphere import SphereTerms
 
+SMALL_P = 1e-2
+"""For smaller |p| the discretisation is chosen at this one, as Λ and its error go to zero together; its factors
+are kept for p = 0."""
 KEPT_SPACES = 40
 """Number of spaces, of the last p, whose matrices are kept."""
 LANCZOS_STEPS = 16
@@ -138,13 +141,9 @@ class Generator:
         if self._last is None or self._last.p != p:
             space = self.space(p)
             levels = [axis.levels for axis in space.axes]
-            self._last = Pencil(p, space, self.matrix(p), levels, self._ring, self.keeps_factors)
+            keeps_factors = self.keeps_factors or abs(p) == SMALL_P
+            self._last = Pencil(p, space, self.matrix(p), levels, self._ring, keeps_factors)
         return self._last
-
-    def keep_factors(self) -> None:
-        """Keep those that are made from now on, see `Pencil`."""
-        self.keeps_factors = True
-        self._last = self._last and replace(self._last, keeps_factors=True)
 
     def forget(self) -> None:
         """Let go of what is kept of the last p."""
