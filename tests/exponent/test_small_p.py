@@ -6,7 +6,9 @@ import pytest
 from fpsolve import ExponentSolver, OrnsteinUhlenbeck, PlaneSystem, Problem, moment_lyapunov, sensitivities, simulate
 from fpsolve.analysis import rate_function
 from fpsolve.arrays import identity
+from fpsolve.exponent.eigen import pair_at_zero, principal_pair
 from fpsolve.exponent.solver import TINY_P
+from fpsolve.fem.generator import SMALL_P
 from fpsolve.model import CoefficientMatrix, White
 from tests.analysis.test_growth import STRONG, uniform
 from tests.exponent.test_modes import problem, random_system
@@ -83,3 +85,14 @@ def test_simulated_moments_next_to_zero():
         assert each.value == each.p * found.lyapunov_exponent
         assert each.standard_error == abs(each.p) * found.lyapunov_exponent_error
     assert not any(message.code.name == "DRIFTING" for message in found.warnings)
+
+
+@pytest.mark.parametrize(
+    "system", [STRONG, problem(White(s=1.0), *random_system(0, 3))], ids=["oscillator", "three variables"]
+)
+def test_the_pair_at_zero_by_factors_of_a_small_p_is_that_of_a_solve(system):
+    near = ExponentSolver(system, rtol=1e-5).whole.solution(SMALL_P).pair
+    found, solved = pair_at_zero(near), principal_pair(near.generator, 0.0, start=near)
+    assert found.derivative == pytest.approx(solved.derivative, abs=1e-12 * system.unit_rate)
+    np.testing.assert_allclose(found.left, solved.left, atol=1e-9 * np.abs(solved.left).max())
+    assert found.residual < 1e-13
