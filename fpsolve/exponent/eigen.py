@@ -407,6 +407,8 @@ def _pair(generator: Generator, pencil: Pencil, found: Iterate) -> PrincipalPair
             value, rounding = float((constant @ (forcing @ x) + of_noise @ x) / total), bound
     if p == 0:  # where Λ = 0
         rounding = max(rounding, abs(value))
+    for each in generator.problem.diffusions:  # of growth ½p²q² − ½pq², which cancels beside p = 1
+        rounding += _EPS * (abs(p) + p * p) * (generator.problem.system.epsilon**each.order * each.fastest[1]) ** 2
     return PrincipalPair(
         p=p,
         eigenvalue=value,

@@ -163,3 +163,11 @@ def test_what_is_left_between_nodes_is_told_where_parts_of_it_cancel_at_the_next
     function = MomentLyapunovFunction(problem, (-1.3770606280419302, 5.59228139649187), rtol=1e-4)
     single = ExponentSolver(problem, rtol=1e-8).solution(p)
     assert abs(function(p) - single.pair.value) <= function.error_estimate(p) + single.error
+
+
+@pytest.mark.parametrize("p", [1.04268799533869, 2.4876484873472053])
+def test_rounding_of_white_growth_is_in_the_error(p):
+    """Λ(p) = ½p(p − 1)s² of v̇ = −v Ẇ, Itô: the parts with p² and with p cancel beside p = 1."""
+    problem = random_planar.drawn(13).problem
+    found = moment_lyapunov(problem, p)
+    assert abs(found.value[0] - 0.5 * p * (p - 1) * problem.noise.s**2) <= found.error_estimate[0] < 2e-15 * 5e3
