@@ -216,6 +216,7 @@ def names_in(text: str) -> frozenset[str]:
     return frozenset(names).union(*of_calls).difference(RESERVED, earlier, {TIME} if earlier else ())
 
 
+@lru_cache(maxsize=1024)
 def calls_of_time(text: str) -> Mapping[str, tuple[str, str]]:
     """By what it writes as x(t - tau) or cos(nu*t) the name and the argument. Raises `ExpressionError`."""
     found = dict[str, tuple[str, str]]()

@@ -85,7 +85,7 @@ def case(name, tmp_path):
     process = begun("noise", "roll.csv", *MEASURED, folder=tmp_path)
     said, _ = process.communicate(timeout=SECONDS)
     assert process.returncode == 0, said
-    return shutil.copy(tmp_path / "results/roll/noise.toml", tmp_path / "roll.toml")
+    return shutil.copy(tmp_path / "results/roll.csv/noise.toml", tmp_path / "roll.toml")
 
 
 def second_moment(folder, name):
