@@ -280,7 +280,7 @@ class Boundary(Result):
         """The boundary after the last of its branches."""
         obstacles = [] if zero_field.stopped is None else [zero_field.stopped]
         for reason in self.scan.reasons if self.scan else ():
-            obstacles += [reason] * (reason.code is Code.ROW_SPENT and reason.data["key"] == LINE_KEY)
+            obstacles += [reason] * is_of_line(reason)
         seconds = self.seconds + zero_field.spent_seconds
         return replace(self, seconds=seconds, obstacles=tuple(obstacles), complete=not obstacles)
 
@@ -379,6 +379,11 @@ def begun(
     count = nodes or (DEAR_NODES if dear else NODES)
     scan = Scan(np.linspace(0, 1, count), np.zeros((0, 0)), np.zeros((0, 0, 2)))
     return Boundary(zero, x, y, problem, scan=scan, step=step, **more)
+
+
+def is_of_line(reason: Message) -> bool:
+    """Whether the time for a line ended a row of its scan."""
+    return reason.code is Code.ROW_SPENT and reason.data["key"] == LINE_KEY
 
 
 def _checked_step(step: float) -> float:

@@ -314,10 +314,10 @@ class ZeroField:
         return found
 
     def _solved(self, at: FloatArray) -> Sample | Message:
-        """F, or why there is none. Raises `NotConverged` where the time does not suffice."""
+        """F, or why there is none."""
         left = self._seconds - self.spent_seconds
         if left <= 0:
-            raise self._stop()
+            return self._stop()
         share = Countdown(HALF * left)
         try:
             with share.running():
@@ -325,15 +325,15 @@ class ZeroField:
         except OverBudget as failure:
             if failure.countdown is not share:
                 raise
-            raise self._stop() from None
+            return self._stop()
         except FpsolveError as failure:
             return failure.message
         finally:
             self.spent_seconds += share.spent
 
-    def _stop(self) -> NotConverged:
+    def _stop(self) -> Message:
         self.stopped = self._spent
-        return NotConverged(self.stopped)
+        return self.stopped
 
     def _at(self, at: FloatArray) -> Sample:
         """F at (u, v), from a solve. Raises `FpsolveError`."""

@@ -216,7 +216,7 @@ class EvenMoment:
         raise ValueError(f"got {key}; Λ(p) has no slope by it")
 
     def gradient(self, keys: Sequence[str]) -> FloatArray:
-        """∂Λ(p)/∂θ of some parameters, as `slope` to a share of some `STEP`² and for half of the work."""
+        """∂Λ(p)/∂θ of some parameters, as `slope` for half of the work, to a share of some ``STEP`` squared."""
         found = list[float]()
         for key in keys:
             at = float(self.equations.problem.values[key])

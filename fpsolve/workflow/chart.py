@@ -17,7 +17,7 @@ import numpy as np
 
 from fpsolve.analysis.regions import P_BIFURCATIONS, Region, Regions, regions
 from fpsolve.analysis.scan import Row, Sample, Scan, ScannedRow, scan_row
-from fpsolve.analysis.stability import Boundary, begun, crossed
+from fpsolve.analysis.stability import Boundary, begun, crossed, is_of_line
 from fpsolve.analysis.zero import Axis, Zero, is_dear
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case
@@ -237,7 +237,7 @@ class Points:
         """Record it, but for what may not fail again."""
         if isinstance(found, Sample):
             append(self._folder, self._key, record_of(Point(rtol, at, found, None)))
-        elif not found.tells_of(Code.NO_MEMORY):
+        elif not found.tells_of(Code.NO_MEMORY) and found.code is not Code.LINE_SPENT and not is_of_line(found):
             append(self._folder, self._key, record_of(Point(rtol, at, None, found)))
 
     def scan(self, line: Boundary) -> Scan | None:
