@@ -23,8 +23,6 @@ CHARTS = {path.name for path in (ROOT / "docs/charts").glob("*")}
 """Cases whose chart takes long; theirs is drawn from what `fpsolve chart` wrote once."""
 TWO_AXES = "filtered", "two_noises", "coupled", "coupled_ou"
 """Cases with a dimension more, which are drawn at fewer p, to four digits."""
-OWN_P = ("stochastic_mathieu",)
-"""Cases of which their own p are drawn, as of those that have no others."""
 ROOMS = {
     "model": "linear systems, and their noises",
     "exponent": "Λ(p), its eigenpairs and what follows from them",
@@ -92,18 +90,18 @@ def script(path: Path) -> str:
     """The script that draws the figure of a case."""
     case, text = fpsolve.load_case(path), path.read_text(encoding="utf-8")
     words = re.match(r"(?:#:.*\n)?((?:#.*\n)*)", text).group(1).replace("# ", "").replace("#", "")
-    own = path.stem in OWN_P or case.problem.is_closed_only or case.problem.has_algebraic_tails
-    few = case.figure.x == "p" and case.moments.values.size < 8 and not case.problem.has_algebraic_tails
+    own = case.problem.is_closed_only or case.problem.has_algebraic_tails  # there are no other p
+    few = case.figure.x == "p" and case.moments.values.size < 8 and not own
     sets = [] if own else ["output={ quantities = ['moment', 'lyapunov_exponent', 'stability_index'] }"]
     if few:
         names = "['moment', 'response']" if case.has_response else "['moment']"
         sets = [f"output={{ quantities = {names} }}", "expect=[]", "figure={}"]
         count, digits = (7, ", rtol = 1e-4") if path.stem in TWO_AXES else (13, "")
-        sets += [f"moments={{ p = {{ start = 0.0, stop = 3.0, num = {count} }}{digits} }}"] * (not own)
+        sets += [f"moments={{ p = {{ start = 0.0, stop = 3.0, num = {count} }}{digits} }}"]
     title = re.sub(r"^(Fig\. \d\S*): (.*)", r"\1: \2", case.title)
     head = f'"""\n{title}\n{"=" * len(title)}\n\n{_rst(words)}\n"""\n\n'
     shown = f"# %%\n# The case file:\n#\n# .. literalinclude:: /generated/cases/{path.name}\n#    :language: toml\n"
-    shown_there = "The figure of the case" if own or not few else "Λ(p) over a range of p"
+    shown_there = "The figure of the case" if not few else "Λ(p) over a range of p"
     shown_there += ", and the stationary response" if case.has_response else ""
     run = f"""
 # %%
@@ -113,7 +111,7 @@ import fpsolve
 
 case = fpsolve.load_case("{path.name}", {_listed(sets)})
 results = fpsolve.run(case)
-{"" if few else INDICES}"""
+{"" if few or case.problem.is_closed_only else INDICES}"""
     if path.stem in CHARTS:
         return head + shown + CHART.format(file=path.name, name=path.stem)
     return head + shown + run + KINDS.get(path.stem, "")
