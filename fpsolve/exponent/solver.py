@@ -159,8 +159,7 @@ class MomentLyapunov(Result):
         failures, values = [each.reason for each in self.failures], self.solver.problem.values
         more = {"warnings": self.warnings, "notes": self.notes, "failures": failures}
         title, places = quantity.MOMENT.words, {quantity.P: self.p}
-        method = "closed equations of moments" if self.solver.problem.is_closed_only else "finite elements"
-        return dataset(title, method, numbers, places, values, rtol=self.solver.rtol, **more)
+        return dataset(title, self.solver.problem.method, numbers, places, values, rtol=self.solver.rtol, **more)
 
     def _said(self) -> str:
         if not self.p.size:

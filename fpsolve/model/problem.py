@@ -319,6 +319,11 @@ class Problem:
         return is_large or (self.dimension > 2 and bool(self._moved.impulses))
 
     @property
+    def method(self) -> str:
+        """What its numbers come from."""
+        return "closed equations of moments" if self.is_closed_only else "finite elements"
+
+    @property
     def unit_rate(self) -> float:
         """Its own unit of rates: ω or the size of the order 0, or of all where there is none."""
         has_own = np.any(matrix_at(self.motion, 0.0, slice(0, 1)))
