@@ -29,6 +29,10 @@ class Remedy(StrEnum):
     CELLS = "use more cells in a given mesh, or a smaller rtol where it is chosen"
     REACH = "use a mesh that reaches there, or let the mesh be chosen"
     BUDGET = "use a larger rtol or a larger budget"
+    MANY = (
+        "use a larger rtol or a larger budget; Λ(2) takes little and bounds it, as Λ(p) <= p Λ(2)/2 for 0 < p < 2 and "
+        "λ <= Λ(2)/2, and `fpsolve.simulation.simulate` gives it with a standard error"
+    )
     SMALLER_RTOL = "use a smaller rtol"
     ROUNDING = "accept this accuracy, which rounding limits"
     BOTH_AXES = "use more cells, in the phase and in the noise"

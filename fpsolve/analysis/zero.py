@@ -18,7 +18,6 @@ from fpsolve.budget import Countdown, OverBudget, one_number
 from fpsolve.errors import FpsolveError, NotConverged
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.eigen import PairDerivatives
-from fpsolve.exponent.error import Solution
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.messages import Code, Message
 from fpsolve.model.faults import strict_dataclass
@@ -231,7 +230,7 @@ class Ratio:
     def __init__(self, problem: Problem, p: float, keys: Sequence[str], budget: Budget, rtol: float) -> None:
         self.problem, self.p, self.keys = problem, p, tuple(keys)
         self._own: Any = {"rtol": rtol, "budget": budget}
-        self._starts: Mapping[float, Solution] = {}
+        self._starts: Mapping[float, Any] = {}
 
     def at(self, theta: FloatArray) -> Problem:
         """The problem at θ. Raises `FpsolveError` where there is none."""
@@ -249,7 +248,7 @@ class Ratio:
         p, solver = self.p, self.solver(theta, is_near=is_near)
         refuse_infinite(solver.problem, p)
         value, error, slopes = ratio_with_slopes(solver, p, self.keys)
-        self._starts = {} if solver.problem.is_closed_only else solver.whole.known
+        self._starts = solver.known
         return Sample(theta, value, slopes, error, solver.scale(p) / abs(p) if p else solver.scales.linear)
 
 

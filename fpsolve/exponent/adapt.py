@@ -164,7 +164,7 @@ class WholeProblem:
     @property
     def remedy(self) -> Remedy:
         """What to do where it is not resolved."""
-        return Remedy.BUDGET if self.mesh is None else Remedy.MESH
+        return spent_remedy(self.problem) if self.mesh is None else Remedy.MESH
 
     def pair_on(self, generator: Generator, p: float, start: PrincipalPair | Sequence[PrincipalPair]) -> PrincipalPair:
         """The principal pair; where it is not found, the failure has the remedy of this place."""
@@ -455,8 +455,13 @@ class Search:
             last, is_thin = self.failure, isinstance(self.failure, NotConverged)
             said = last.message.advising(None) if isinstance(last, FpsolveError) else last and str(last)
             told = Message(Code.NOTHING_RESOLVED, p=self.p, reason=reason, is_thin=is_thin, last=said)
-        remedy = None if reason.code is Code.ROUNDED else Remedy.BUDGET
+        remedy = None if reason.code is Code.ROUNDED else spent_remedy(self.whole.problem)
         raise NotConverged(told, best and best.solution, remedy)
+
+
+def spent_remedy(problem: Problem) -> Remedy:
+    """What to do where a budget does not suffice."""
+    return Remedy.BUDGET if problem.dimension == 2 else Remedy.MANY
 
 
 def is_at_corner(problem: Problem, p: float) -> bool:

@@ -202,14 +202,16 @@ def _has_states(problem: Problem) -> bool:
 def _is_rightmost(pair: PrincipalPair, pencil: Pencil) -> bool:
     """Whether (σ − L)⁻¹1 > 0, as it is for a σ beside Λ if Λ is the rightmost eigenvalue, and also for the adjoint.
 
-    Of another one, by which all else is larger than rounding, it is −1/(Λ′ − σ) of its share.
+    Of another one, by which all else is larger than rounding, it is −1/(Λ′ − σ) of its share. Of three and four
+    variables, where pairs are followed from p = 0, only what is resolved is looked at: under waves T* is not.
     """
-    space, rate = pencil.space, pair.generator.problem.unit_rate
+    space, problem = pencil.space, pair.generator.problem
+    rate, seen = problem.unit_rate, [problem.dimension == 2 or each <= POSITIVE for each in pair.sign_defects]
     source = space.weighed(space.constant)
     for shift in BESIDE_IT:
         factor = pencil.factorised(pair.eigenvalue + shift * rate)
         right, left = -factor.solve(source), -factor.solve(source, transposed=True)
-        if max(_sign_defects(space, right, left)) > SURELY_POSITIVE:
+        if max(np.compress(seen, _sign_defects(space, right, left)), default=0.0) > SURELY_POSITIVE:
             return False
     return True
 

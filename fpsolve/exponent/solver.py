@@ -25,6 +25,7 @@ from fpsolve.exponent.adapt import (
     WholeProblem,
     is_at_corner,
     solved_p,
+    spent_remedy,
 )
 from fpsolve.exponent.eigen import PairDerivatives, PrincipalPair, second_derivative, slope_rounding
 from fpsolve.exponent.error import Estimate, Failure, Moment, Solution, checked, slope_error
@@ -180,7 +181,8 @@ class ExponentSolver:
         mesh: a mesh for all p; None chooses a discretisation for each p that meets rtol.
         rtol: |error| ≤ rtol·max(|Λ|, the terms of Eq. (37) before they cancel).
         budget: what the choice of a discretisation may cost.
-        starts: solutions of a problem with parameters close by, by their p, see `WholeProblem`.
+        starts: solutions of a problem with parameters close by, by their p, see `WholeProblem`; beyond the plane even
+            moments.
 
     Attributes:
         slope_errors: of Λ′(p), by p.
@@ -197,7 +199,7 @@ class ExponentSolver:
     _: KW_ONLY
     rtol: float = 1e-8
     budget: Budget = field(default_factory=Budget)
-    starts: Mapping[float, Solution] = field(default_factory=dict, repr=False)
+    starts: Mapping[float, Any] = field(default_factory=dict, repr=False)
     slope_errors: dict[float, float] = field(init=False, default_factory=dict, repr=False)
     spent: dict[str, Message] = field(init=False, default_factory=dict, repr=False)
     _even: dict[float, EvenMoment | None] = field(init=False, repr=False, default_factory=dict)
@@ -227,6 +229,13 @@ class ExponentSolver:
             return max(self.classes, key=lambda each: each.lyapunov_exponent().value).whole
         starts = {} if self.problem.dimension > 2 else self.starts
         return WholeProblem(self.problem, mesh=self.mesh, starts=starts, **self._own)
+
+    @property
+    def known(self) -> Mapping[float, Any]:
+        """What a problem next to it starts from, see `starts`."""
+        if self.problem.dimension == 2 and not self.problem.is_closed_only:
+            return self.whole.known
+        return {p: each for p, each in self._even.items() if each}
 
     @property
     def refinement(self) -> Remedy:
@@ -310,11 +319,12 @@ class ExponentSolver:
 
     def _solve_even(self, p: float) -> EvenMoment:
         """Λ(p) of an even p by the equations of the moments. Raises `NoHierarchy`, `NotConverged`."""
+        near = self.starts.get(p) if self.problem.dimension > 2 or self.problem.is_closed_only else None
         with one_thread(), counted(self.budget.countdown(f"Λ({p:g})")):
             if self.problem.is_closed_only:  # where Λ has no other scale than that of these equations
-                found = even_moment(self.problem, p, rtol=OF_CLOSED * self.rtol)
+                found = even_moment(self.problem, p, rtol=OF_CLOSED * self.rtol, near=near)
             else:
-                found = even_moment(self.problem, p, 0.1 * self.tolerance(p, 0.0), MOST_EQUATIONS)
+                found = even_moment(self.problem, p, 0.1 * self.tolerance(p, 0.0), MOST_EQUATIONS, near=near)
             checked(Estimate(found.value, found.error, self.scale(p)), self.refinement, p)
         return found
 
@@ -508,9 +518,11 @@ class ExponentSolver:
             with counted(self.budget.countdown("λ")):
                 value, error = self.ratio_alone(0.0)
         except NotConverged as failure:
-            if failure.reason.code is Code.NUMBER_SPENT:
-                self.spent["λ"] = failure.message
-            raise
+            if failure.reason.code is not Code.NUMBER_SPENT:
+                raise
+            spent = NotConverged(failure.reason, failure.partial, spent_remedy(self.problem))
+            self.spent["λ"] = spent.message
+            raise spent from None
         meaning = ALMOST_EVERY if self.problem.has_algebraic_tails else ""
         found = Estimate(value, error, self.scales.linear, meaning, quantity.LYAPUNOV_EXPONENT)
         return checked(found, self.refinement)

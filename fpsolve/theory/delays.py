@@ -280,7 +280,7 @@ class DelayRates:
         share = float(y @ (both.imag / TINY) @ x)
         return _Near(float(values[at].real) * float(y @ x) / share, x, y / share)
 
-    def rightmost(self, x: FloatArray, y: FloatArray) -> Eigenpair:
+    def rightmost(self, x: FloatArray, y: FloatArray, _: float | None) -> Eigenpair:
         """Λ from the right, and its vectors, yᵀZ′x = 1: E‖x‖² ≥ ‖E x‖² bounds it from the left."""
         low, high = 2 * self.abscissa, self._bound
         if self.state.is_still:

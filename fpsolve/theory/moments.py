@@ -8,7 +8,8 @@ linear in A and skew-symmetric for a rotation. For functions f_k of noise, g f_k
 moves E[x^α f_k], for terms g(ξ)A, white noises Bx ∘ dW and impulses exp(C) at the rates ν. Λ(p) is its rightmost
 eigenvalue. The right vector is of moments, the left one of T, a polynomial of the degree p in x. As moments stay
 moments, no eigenvalue is nearer to a real σ > Λ than Λ: the search begins at a bound by the rows of H, from the right.
-The functions of the noise end somewhere; what the next ones change, to first order, is added, and is the error.
+The functions of the noise end somewhere; what the next ones change, with the last two of these to all orders and the
+others to the first, is added, and is the error, with what it is by the last one alone.
 """
 
 from __future__ import annotations
@@ -45,6 +46,10 @@ NEXT = 2
 """Number of degrees more that tell the error."""
 GROWTH = 1.4
 """Factor from one degree to the next."""
+AWAY = 1e-2
+"""Distance of the first σ from Λ beside a known one, over the terms of this, and the largest change from there."""
+GENERAL = 0.1
+"""Share in the first vectors there of those in which all directions are."""
 TOLERANCE = 1e-13
 """Error that is wanted where none is named, over the terms that Λ is the sum of."""
 MEANINGLESS = 1e-3
@@ -70,7 +75,13 @@ def hierarchy_exponent(problem: Problem, p: float) -> tuple[float, float]:
 
 
 def even_moment(
-    problem: Problem, p: float, tolerance: float | None = None, most: int = MOST, *, rtol: float = TOLERANCE
+    problem: Problem,
+    p: float,
+    tolerance: float | None = None,
+    most: int = MOST,
+    *,
+    rtol: float = TOLERANCE,
+    near: EvenMoment | None = None,
 ) -> EvenMoment:
     """Λ(p) of an even p.
 
@@ -80,6 +91,7 @@ def even_moment(
         tolerance: its largest error; None for the smallest that there is, down to rtol.
         most: number of equations, of moments that are no matrices.
         rtol: error over the terms that Λ is the sum of.
+        near: that of a problem of the same kind with other parameters, close by, from which it is sought.
 
     Raises:
         NoHierarchy: the equations do not close for this problem and this p, or are too many.
@@ -87,9 +99,11 @@ def even_moment(
     refuse_open_hierarchy(problem, p)
     equations = Equations(problem, int(p))
     counts, before = [FIRST] * len(equations.noises), cast(EvenMoment | None, None)
+    if near:
+        counts = [max(FIRST, int(count / GROWTH)) for count in near.enough]
     while True:
         try:
-            level = equations.moment(counts, most)
+            level = equations.moment(counts, most, before or near)
         except NoHierarchy:
             if before is None:
                 raise
@@ -102,7 +116,8 @@ def even_moment(
             told = level.error + before.error - before.change if before else 0.0
             level = replace(level, change=level.change + (change if change > told else 0.0))
         if level.is_positive and level.error <= max(allowed, 2 * level.rounding):
-            return level
+            fewer = before.counts if before and sum(map(abs, before.effects)) <= allowed else counts
+            return replace(level, enough=fewer)
         before = level
         worst = max(map(abs, level.effects), default=0.0)
         counts = [
@@ -158,7 +173,9 @@ class EvenMoment:
         x, y: the right and the left vector, yᵀx = 1.
         moments: of √(p!/α!) x^α, |α| = p, the right vector in the mean over the noise.
         polynomial: the coefficients of T at the same, in the mean over the noise.
-        change: from fewer functions, where that is beyond the errors of both: then `effects` are no errors.
+        change: by the last step, from `effects` where only the last functions move with the next ones, and from fewer
+            functions, where that is beyond the errors of both: then `effects` are no errors.
+        enough: degrees that are likely to do for a problem next to it.
     """
 
     equations: Equations
@@ -171,6 +188,7 @@ class EvenMoment:
     moments: FloatArray
     polynomial: FloatArray
     change: float = 0.0
+    enough: Sequence[int] = ()
 
     def __repr__(self) -> str:
         return brief(self, f"Λ({self.equations.p}) = {self.value:.10g} ± {self.error:.0e}, {self.x.size} equations")
@@ -300,8 +318,8 @@ class Equations:
             self.state = form(moving, p, like.state.units if like else None)
         self.dimension = problem.dimension - len(pasts)
 
-    def moment(self, counts: Sequence[int], most: int) -> EvenMoment | None:
-        """Λ(p) with functions of degrees below these; None where they are too many."""
+    def moment(self, counts: Sequence[int], most: int, near: EvenMoment | None = None) -> EvenMoment | None:
+        """Λ(p) with functions of degrees below these, sought from one next to it; None where they are too many."""
         if max(counts) > MOST_DEGREES:
             return None
         more = [count + NEXT for count in counts]
@@ -312,20 +330,45 @@ class Equations:
             return None
         h, old = self.state.rates(*self.over_noise(more)), _outer(is_old)
         mean, law = self.means(counts)
-        own, (right, left) = h.on(old), self.state.starts
-        value, x, y, change, scale = own.rightmost(np.kron(law, right), np.kron(mean, left))
+        own, starts = h.on(old), [np.kron(*each) for each in zip((law, mean), self.state.starts, strict=True)]
+        sigma = self._beside(near, counts, own, starts)
+        value, x, y, change, scale = own.rightmost(starts[0], starts[1], sigma)
         h = h.at(value)
         whole = np.zeros((2, old.size, x.size // size))
         whole[:, old] = x.reshape(size, -1), y.reshape(size, -1)
         images = [each.reshape(old.size, -1) for each in (h @ whole[0].ravel(), h.T @ whole[1].ravel())]
         effects = []
-        for k in range(len(axes)):
+        for k, (axis, count) in enumerate(zip(axes, counts, strict=True)):
             new = _outer([~each if k == j else each for j, each in enumerate(is_old)])
-            right, left = (each[new].ravel() for each in images)
-            effects.append(float(left @ h.on(new).solver(value)(right)) if right.size else 0.0)
+            told = [0.0, 0.0]
+            for last in (1, 2) if new.any() else ():
+                moved = _outer([axis.degrees >= count - last if k == j else each for j, each in enumerate(is_old)])
+                right, left = ((each * new[:, None])[moved].ravel() for each in images)
+                told[last - 1] = float(left @ h.on(moved).solver(value)(right))
+            effects.append(told[1])
+            change += abs(told[1] - told[0])
         moments = self.state.moments(mean @ x.reshape(size, -1))
         polynomial = self.state.polynomial(law @ y.reshape(size, -1))
-        return EvenMoment(self, tuple(counts), value, effects, scale, x, y, moments, polynomial, change)
+        found = EvenMoment(self, tuple(counts), value, effects, scale, x, y, moments, polynomial, change, counts)
+        return found if sigma is None or found.is_positive else self.moment(counts, most)
+
+    def _beside(self, near: EvenMoment | None, counts: Sequence[int], own: Any, starts: list[Any]) -> float | None:
+        """A σ next to Λ, by a pair next to it that becomes part of the starts; None where none is."""
+        if near is None or not near.is_positive or isinstance(self.state, Delayed):
+            return None
+        axes = self._axes([max(each) for each in zip(counts, near.counts, strict=True)])
+        at, there = (_outer([axis.degrees < k for axis, k in zip(axes, c, strict=True)]) for c in (counts, near.counts))
+        units = cast("Products | Powers", near.equations.state).scales / self.state.scales
+        whole = np.zeros((2, there.size, units.size))
+        whole[:, there] = near.x.reshape(-1, units.size) * units, near.y.reshape(-1, units.size) / units
+        x, y = (each[at].ravel() for each in whole)
+        guess = float(y @ (own @ x)) / float(y @ x)
+        if not (change := abs(guess - near.value)) <= AWAY * near.scale:
+            return None
+        for k, (each, sign) in enumerate(((x, starts[1] @ x), (y, starts[0] @ y))):
+            general = GENERAL * np.linalg.norm(each) / np.linalg.norm(starts[k])
+            starts[k] = np.sign(sign) * each + general * starts[k]
+        return max(guess, near.value) + change + AWAY * near.scale
 
     def _axes(self, counts: Sequence[int]) -> list[Functions]:
         return [functions_of(noise, count) for noise, count in zip(self.noises, counts, strict=True)]

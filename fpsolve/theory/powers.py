@@ -165,6 +165,11 @@ class Powers:
         """Whether matrices are no sparse ones, with so many functions of the noise."""
         return self.size * functions <= DENSE
 
+    @property
+    def scales(self) -> FloatArray:
+        """The units of the numbers for each function of the noise."""
+        return self.units
+
     def moments(self, x: FloatArray) -> FloatArray:
         """E √(p!/α!) x^α of a right vector."""
         return x * self.units
@@ -240,9 +245,9 @@ class PowerRates:
     def largest(self) -> float:
         return float(self._absolute.max())
 
-    def rightmost(self, x: FloatArray, y: FloatArray) -> Eigenpair:
-        """Λ, from a positive right and a positive left vector."""
-        value, sigma, _ = rightmost(self, x)
+    def rightmost(self, x: FloatArray, y: FloatArray, near: float | None) -> Eigenpair:
+        """Λ, from a positive right and a positive left vector, and a σ that may be next to it."""
+        value, sigma, _ = rightmost(self, x, near)
         return polished(self, value, sigma, x, y)
 
     def solver(self, sigma: float) -> Solve:

@@ -110,13 +110,18 @@ class Products:
         """Matrices of the noise are sparse."""
         return False
 
+    @property
+    def scales(self) -> FloatArray:
+        """The units of the numbers for each function of the noise."""
+        return np.outer(self.units, self.units).ravel()
+
     def moments(self, x: FloatArray) -> FloatArray:
         """E x_i x_j, times √2 for i ≠ j, i ≤ j, of a right vector."""
-        return upper(x.reshape(self._steady.shape) * np.outer(self.units, self.units))
+        return upper((x * self.scales).reshape(self._steady.shape))
 
     def polynomial(self, y: FloatArray) -> FloatArray:
         """T, as coefficients of these, of a left vector."""
-        return upper(y.reshape(self._steady.shape) / np.outer(self.units, self.units))
+        return upper((y / self.scales).reshape(self._steady.shape))
 
     def rates(self, generator: Any, masses: Sequence[Any]) -> ProductRates:
         """H from Gᵀ and the Ξᵀ of each load."""
@@ -217,10 +222,10 @@ class ProductRates:
     def _own(self) -> Own:
         return Own.of(self)
 
-    def rightmost(self, x: Any, y: Any) -> Eigenpair:
-        """Λ, from a positive right and a positive left vector."""
+    def rightmost(self, x: Any, y: Any, near: float | None) -> Eigenpair:
+        """Λ, from a positive right and a positive left vector, and a σ that may be next to it."""
         own = self._own
-        value, sigma, found = rightmost(own, own.right(x))
+        value, sigma, found = rightmost(own, own.right(x), near)
         back = own.right_back(found)
         return polished(self, value, sigma, (back / back[np.argmax(np.abs(back))]).real, y)
 

@@ -22,6 +22,8 @@ MOST_STEPS = 60
 """Largest number of σ."""
 MOST_POLISHES = 10
 """Largest number of steps that polish Λ from there."""
+ON_RIGHT = 1e-3
+"""Size of 1/(σ − Λ) of an eigenvalue on the right of σ, over that of the nearest on its left, that is none."""
 PASSED = 10.0
 """Factor to the last σ − Λ by which the next Λ is lower where rounding has put σ on the left of it: it is another."""
 ROUGH = 1e-2
@@ -74,12 +76,17 @@ class Eigenpair(NamedTuple):
     size: float
 
 
-def rightmost(h: Rates, x: Any) -> tuple[float, float, Any]:
-    """Roughly the rightmost eigenvalue, σ, and the right vector, from a positive one."""
-    sigma = h.bound + 0.1 * max(1e-3 * h.largest, abs(h.bound), sys.float_info.min)
-    value, away, start = -np.inf, np.inf, x
+def rightmost(h: Rates, x: Any, near: float | None = None) -> tuple[float, float, Any]:
+    """Roughly the rightmost eigenvalue, σ, and the right vector, from a positive one.
+
+    `near` is a σ that may be next to it, from which the search begins if no eigenvalue is seen on its right.
+    """
+    bound = h.bound + 0.1 * max(1e-3 * h.largest, abs(h.bound), sys.float_info.min)
+    value, away, start, sigma = -np.inf, np.inf, x, bound if near is None else min(near, bound)
     for _ in range(MOST_STEPS):
-        last, (share, x) = value, _largest(h.solver(sigma), x, h.krylov)
+        last, (share, least, x) = value, _largest(h.solver(sigma), x, h.krylov)
+        if np.isinf(last) and sigma < bound and least < -ON_RIGHT * share:
+            return rightmost(h, start)
         value = sigma - 1 / share
         if last - value > PASSED * away:
             return last, last + away, start
@@ -117,12 +124,15 @@ def polished(h: Any, value: float, sigma: float, x: Any, y: Any) -> Eigenpair:
     return Eigenpair(value, x, y, change if change > rounding else 0.0, h.sizes(x, y))
 
 
-def _largest(solve: Solve, x: Any, krylov: int) -> tuple[float, Any]:
-    """The eigenvalue of the largest real part of a positive map, roughly, and its vector, from a positive one."""
+def _largest(solve: Solve, x: Any, krylov: int) -> tuple[float, float, Any]:
+    """The largest real part of an eigenvalue of a positive map, roughly, the least one, and the vector of the first.
+
+    They are sought from a positive vector.
+    """
     if x.size <= krylov:
         values, vectors = np.linalg.eig(solve(np.eye(x.size)))
-        at = int(np.argmax(values.real))
-        return float(values[at].real), vectors[:, at] if np.iscomplexobj(x) else vectors[:, at].real
+        at, least = int(np.argmax(values.real)), float(values.real.min())
+        return float(values[at].real), least, vectors[:, at] if np.iscomplexobj(x) else vectors[:, at].real
     known, images = np.empty((MOST_VECTORS + 1, x.size), x.dtype), np.zeros(2 * (MOST_VECTORS + 1,), x.dtype)
     for _ in range(MOST_RESTARTS):  # Arnoldi's method
         known[0], images[:] = x / np.linalg.norm(x), 0.0
@@ -138,7 +148,7 @@ def _largest(solve: Solve, x: Any, krylov: int) -> tuple[float, Any]:
         x = vectors[:, at] @ known[: k + 1]
         x = x if np.iscomplexobj(known) else x.real
         if left <= ROUGH * abs(values[at]):
-            return float(values[at].real), x
+            return float(values[at].real), float(values.real.min()), x
     raise NoHierarchy(f"no rightmost eigenvalue is found among those of {x.size} equations; {REMEDY}")
 
 

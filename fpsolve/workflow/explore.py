@@ -341,8 +341,8 @@ class _Moving(Numerics):
             keys = [*problem.differentiable, *problem.undifferentiable]
             old, new = (np.array([each.values[key] for key in keys], dtype=float) for each in (before.problem, problem))
             is_near = bool(np.all(np.abs(new - old) <= NEAR * np.abs(new)))
-            if is_near and not problem.is_closed_only:
-                found = replace(found, starts=before.whole.known)
+            if is_near:
+                found = replace(found, starts=before.known)
         self.last[:] = [found]
         return found
 

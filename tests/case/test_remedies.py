@@ -22,6 +22,8 @@ WORDS = {
     "CELLS": "use more cells in [mesh], or a smaller rtol where there is none",
     "REACH": "use a [mesh] that reaches there, or no [mesh]",
     "BUDGET": "use a larger rtol or a larger [budget]",
+    "MANY": "use a larger rtol or a larger [budget]; p = 2 takes little and bounds it, as Λ(p) <= p Λ(2)/2 for "
+    "0 < p < 2 and λ <= Λ(2)/2, and `fpsolve simulate` gives it with a standard error",
     "MESH_FILE": "make one with `fpsolve mesh`",
     "REDUCTION": 'or treatment = "ou-reduction"',
     "NO_REDUCTION": 'treatment = "exact" keeps Eq. (7)',

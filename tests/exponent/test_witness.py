@@ -28,7 +28,7 @@ def test_a_lower_eigenvalue_is_seen(node, monkeypatch):
     assert contradiction(node, at, np.array([1.570632172319]), slope + 0.19265, error) is None
     low = contradiction(node, np.array([1.0]), np.array([0.39]), np.array([0.5]), error)  # its tangent is above Λ(2)
     assert low.code is Code.NOT_PRINCIPAL
-    monkeypatch.setattr("fpsolve.exponent.solver.even_moment", lambda *_: SimpleNamespace(value=0.79, error=1e-9))
+    monkeypatch.setattr("fpsolve.exponent.solver.even_moment", lambda *_, **__: SimpleNamespace(value=0.79, error=1e-9))
     with pytest.raises(NotConverged, match="p = 2 is not the principal one: by the equations of the moments"):
         ExponentSolver(node.problem).solution(2.0)
 

@@ -159,6 +159,33 @@ def test_more_variables(rng, n):
     assert hierarchy_exponent(steady, 6)[0] == pytest.approx(6 * np.linalg.eigvals(free).real.max(), abs=1e-11)
 
 
+@pytest.mark.parametrize("most", [4, 10], ids=["as matrices", "as one vector"])
+@pytest.mark.parametrize("moved", [0.02, 0.1, 3.0])
+def test_beside_a_known_one(monkeypatch, most, moved):
+    """The rightmost one, too, where the known one is of a block, and another that it does not move now grows faster."""
+    monkeypatch.setattr("fpsolve.theory.moments.MOST_AS_POWERS", most)
+    rng, noise = np.random.default_rng(3), OrnsteinUhlenbeck(1.0, 0.7)
+    free, load = rng.standard_normal((2, 5, 5))
+    free[:2, 2:] = free[2:, :2] = load[:2, 2:] = load[2:, :2] = 0.0
+    first, second = (even_moment(driven(free[at, at], load[at, at], noise), 2) for at in (slice(0, 2), slice(2, 5)))
+    free[:2, :2] += 0.5 * (second.value + 0.01 - first.value) * np.eye(2)
+    known = even_moment(driven(free, load, noise), 2)
+    assert known.value == pytest.approx(second.value + 0.01, abs=1e-11)
+    free[2:, 2:] += 0.5 * moved * np.eye(3)
+    found = even_moment(driven(free, load, noise), 2, near=known)
+    assert found.value == pytest.approx(second.value + moved, abs=1e-11)
+
+
+def test_the_last_functions_move_with_the_next_ones():
+    """By far more of them: to first order alone the next ones of this filter have the other sign."""
+    problem, _, _ = random_many.drawn(42)
+    equations = even_moment(problem, 2).equations
+    exact = equations.moment([12], 20_000).eigenvalue
+    for count, share in ((4, 0.05), (6, 0.05), (8, 0.3)):
+        level = equations.moment([count], 20_000)
+        assert level.value == pytest.approx(exact, abs=share * abs(level.effects[0]))
+
+
 @pytest.mark.parametrize("seed", [2, 24, 33, 43, 81, 85, 86, pytest.param(161, id="next to skew matrices")])
 def test_random_systems(seed):
     """One for each kind, as one vector or as matrices: `python -m tests.random_many`."""

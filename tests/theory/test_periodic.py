@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 from scipy.sparse import csc_array
 from scipy.sparse.linalg import eigs
 
-from fpsolve import PlaneSystem, Problem, lyapunov_exponent, moment_lyapunov, sensitivities
+from fpsolve import ExponentSolver, PlaneSystem, Problem, lyapunov_exponent, moment_lyapunov, sensitivities
 from fpsolve.model import Bounded, MarkovChain, White
 from fpsolve.model.faults import TableError
 from fpsolve.model.systems.equations import EquationSystem
@@ -51,6 +51,15 @@ def test_periodic_coefficients_as_text(rng):
         multiplier = np.max(np.abs(np.linalg.eigvals(flow.reshape(many, many))))
         problem = Problem(EquationSystem(tuple(names), tuple(rates), (("nu", nu),)), noise)
         assert even_moment(problem, 2).value == pytest.approx(math.log(multiplier) / period, abs=1e-10)
+
+
+@pytest.mark.slow
+def test_three_variables_by_elements():
+    """Λ(2) of a Mathieu oscillator with a lag under white noise, by elements, to which T* is not resolved."""
+    rates = "v", "-0.2*v - (1 + 0.5*cos(2*t) + xi)*x + 0.3*u", "-0.5*u - 0.3*v"
+    solver = ExponentSolver(Problem(EquationSystem(("x", "v", "u"), rates), White(s=0.3)), rtol=1e-2)
+    found = solver.solution(2.0)
+    assert abs(found.pair.value - solver.even(2.0).value) <= found.error
 
 
 MATHIEU = EquationSystem(("x", "v"), ("v", "-0.2*v - (1 + mu*cos(nu*t) + xi)*x"), (("mu", 0.5), ("nu", 2.0)))
