@@ -81,6 +81,10 @@ class Code(Enum):
         "failure: {what} is not computed: with a delay Λ(2) alone is found; as Λ(p) is convex, λ <= Λ(2)/2 and "
         "Λ(p) <= (p/2) Λ(2) for 0 < p < 2; take p = 2, {remedy}"
     )
+    WALL_SIMULATED = (
+        "failure: {what} is not computed: at a wall of more than two variables moments obey no closed equations, and "
+        "there are no elements; leave out the wall, {remedy}"
+    )
     CONVEX_BOUNDS = (
         "note: bounds, as Λ(p) is convex and Λ(0) = 0: λ <= Λ({p:g})/{p:g} <= {bound:.6g}, and "
         "Λ(q) <= (q/{p:g}) Λ({p:g}) for 0 < q < {p:g}{root:?; δ_p is ¦}{root}"

@@ -68,6 +68,13 @@ def equations_of(system: System, lines: Sequence[tuple[float, float] | None]) ->
             else f"‖x‖⁺ = {factor} ‖x‖⁻ at φ = {jump.phase:.6g} and φ + π"
         )
         told += [words] if jump.log_factor or not at_wall else []
+    if (stop := system.stop) is not None:
+        none, moved = np.zeros(4), stop.matrix - np.eye(n)
+        at = _sum(np.array(stop.coordinates[0]), none, {}, names)
+        told += [
+            f"{names[i]}⁺ = {_sum(np.round(stop.matrix[i], 12), none, {}, names)} at {at} = 0"
+            for i in np.flatnonzero(moved.any(axis=1))
+        ]
     return told
 
 

@@ -20,7 +20,18 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.linalg import expm, expm_frechet
 
-from fpsolve.arrays import Coefficient, Constant, FloatArray, Linear, is_whole, one, real_array, real_number, shown
+from fpsolve.arrays import (
+    ROUNDED,
+    Coefficient,
+    Constant,
+    FloatArray,
+    Linear,
+    is_whole,
+    one,
+    real_array,
+    real_number,
+    shown,
+)
 from fpsolve.model.equation import MOST_EQUATIONS, equations_of, paragraphs
 from fpsolve.model.exact import ExactMotion
 from fpsolve.model.parameters import Parametrised
@@ -323,6 +334,58 @@ class Jump:
         return self.log_factor if self.leading is None else self.leading
 
 
+@dataclass(frozen=True)
+class Stop:
+    """A rigid wall at rest for one coordinate q of three or more variables: q ≥ 0, and q̇⁺ = −R q̇⁻ where q = 0.
+
+    In the coordinates y = Sx, y₁ = q and y₂ = q̇, an impact is J = diag(1, −R, 1, …): the others do not jump. With a
+    mass matrix M and q = cᵀr of displacements r they are M-orthogonal to it, as v⁺ = v − (1 + R) M⁻¹c (cᵀv)/(cᵀM⁻¹c).
+    While q = q̇ = 0 and q̈ < 0 it rests at the wall, and the others move alone.
+
+    >>> import numpy as np
+    >>> Stop(np.eye(3), 0.5).matrix  # of (q, q̇, a voltage)
+    array([[ 1. ,  0. ,  0. ],
+           [ 0. , -0.5,  0. ],
+           [ 0. ,  0. ,  1. ]])
+
+    Args:
+        coordinates: S, shape (n, n).
+        restitution: R, 0 < R ≤ 1.
+
+    Raises:
+        ValueError: S has no inverse, or R is out of its range.
+    """
+
+    coordinates: Matrix
+    restitution: float
+
+    def __post_init__(self) -> None:
+        rows = real_array(self.coordinates, "coordinates")
+        if rows.ndim != 2 or len({*rows.shape}) > 1 or not np.linalg.matrix_rank(rows) == len(rows) > 2:
+            raise ValueError(f"got coordinates = {shown(self.coordinates)}; must be a matrix of n ≥ 3 with an inverse")
+        if not 0 < real_number(self.restitution, "restitution") <= 1:
+            raise ValueError(f"got restitution = {self.restitution:g}; must be > 0 and <= 1; a wall gives no energy")
+        object.__setattr__(self, "coordinates", tuple(map(tuple, rows.tolist())))
+
+    @cached_property
+    def _sides(self) -> tuple[FloatArray, FloatArray]:
+        rows = np.array(self.coordinates)
+        return rows, np.linalg.inv(rows)
+
+    @property
+    def matrix(self) -> FloatArray:
+        """J in the coordinates of x, x⁺ = J x⁻."""
+        rows, back = self._sides
+        return np.eye(len(rows)) - (1 + self.restitution) * np.outer(back[:, 1], rows[1])
+
+    def inside(self, matrix: ArrayLike) -> FloatArray:
+        """S A S⁻¹, without what is rounding."""
+        rows, back = self._sides
+        whole = np.asarray(matrix, dtype=float)
+        found = rows @ whole @ back
+        return np.where(np.abs(found) > ROUNDED * (np.abs(rows) @ np.abs(whole) @ np.abs(back)), found, 0.0)
+
+
 class System(Parametrised):
     """What solvers ask of a linear system in the plane.
 
@@ -335,6 +398,7 @@ class System(Parametrised):
             begin: "noise", or, for one that terms call axial, "noise.axial".
         impact_parameter: the name of a parameter that is in ln R of the only jump and nowhere else; empty for none.
         cubic: what is of degree 3 in its rates, on which the stationary response depends alone; None for nothing.
+        stop: the wall of one coordinate of more than two variables; None without one.
         forced: it with its terms of degree 0, which multiply a last variable, 1; None without such terms.
         clock: what its periodic coefficients are functions of; terms name this noise t.
         pasts: which variable each of the last columns of the terms stands for, and how long ago; none without a delay.
@@ -344,6 +408,7 @@ class System(Parametrised):
     section: ClassVar[str] = "system"
     noise_unit: ClassVar[str] = "unknown"
     cubic: CubicTerms | None = None
+    stop: Stop | None = None
     forced: System | None = None
     clock: Any = None
     pasts: Sequence[tuple[int, float]] = ()

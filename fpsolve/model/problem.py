@@ -33,6 +33,7 @@ from fpsolve.model.plane import (
     Impulse,
     Jump,
     Motion,
+    Stop,
     System,
     Xi,
     affine,
@@ -61,6 +62,8 @@ SUPPORT = np.linspace(-12, 12, 2401)
 """Values of ξ at which a coefficient is looked at that is no a + bξ, in standard deviations."""
 OF_ENTRIES = 1e-15
 """Share of the largest speed of a term that is rounding of its entries, as of a matrix that keeps two rays."""
+COLLAPSE = math.exp(-math.pi / math.sqrt(3))
+"""Restitution below which a mass under white noise comes to rest at a wall (J. Bertoin 2007, E. Jacob 2012)."""
 LINE = 90
 """Largest number of letters of a line of parameters."""
 
@@ -132,6 +135,8 @@ class Problem:
             _ = self._moved  # refuses what has no meaning
         for jump in self.system.jumps:
             self._refuse_ray(jump)
+        if self.system.stop is not None:
+            self._refuse_stop(self.system.stop)
         if self.dimension > 2 and self.noise.has_algebraic_tails:
             raise ValueError(
                 f"got {self.noise.kind} noise for {self.dimension} variables; noise with algebraic tails is for two "
@@ -182,6 +187,30 @@ class Problem:
             raise ValueError(
                 f"the phase does not pass {ray}: nothing moves it there, so that no path comes to this wall; remove "
                 "the jump"
+            )
+
+    def _refuse_stop(self, stop: Stop) -> None:
+        """Refuse coordinates that are none of a wall, and one that no law says how to leave. Raises `ValueError`."""
+        n, total, size = self.dimension, 0.0, 0.0
+        if len(stop.coordinates) != n:
+            raise ValueError(f"got a wall with {len(stop.coordinates)} coordinates of {n} variables; must be of all")
+        for term in self.system.terms:
+            row = self.system.epsilon**term.order * stop.inside(term.matrix)[0]
+            if is_driven(term.g) and row.any():
+                raise ValueError(
+                    "a noise moves the coordinate of the wall; let it drive velocities alone, or remove the wall"
+                )
+            total, size = total + float(term.g(0.0)) * row, size + float(np.max(np.abs(row)))
+        if not np.all(np.abs(total - np.eye(n)[1]) <= n * ROUNDED * size):
+            told = f"the rate of the coordinate of the wall is {np.round(total, 6).tolist()} in its coordinates"
+            raise ValueError(f"{told}; must be the second one alone, its velocity; choose other coordinates")
+        rows = [stop.inside(each.matrix)[1, 2:] for each in self._moved.diffusions]
+        if stop.restitution < COLLAPSE and np.any(rows):
+            raise ValueError(
+                f"got restitution = {stop.restitution:g} where white noise drives the coordinate of the wall while "
+                f"it rests there; must be >= exp(-pi/sqrt(3)) = {COLLAPSE:.6g}, as below that infinitely many impacts "
+                "bring it to rest, and the equation does not say how it leaves (J. Bertoin, Ann. Probab. 35, 2007; E. "
+                "Jacob, Stoch. Process. Appl. 122, 2012); increase it, or take noise with a memory"
             )
 
     def wall_speeds(self, motion: System) -> list[float]:
@@ -315,7 +344,7 @@ class Problem:
         """Whether Λ(p) is found for even p > 0 alone, from closed equations of moments: directions are too many, or
         impulses move them, or the state is that of a whole delay, with p = 2 alone.
         """
-        is_large = bool(self.system.pasts) or self.dimension > MOST_BY_DIRECTIONS
+        is_large = bool(self.system.pasts or self.system.stop) or self.dimension > MOST_BY_DIRECTIONS
         return is_large or (self.dimension > 2 and bool(self._moved.impulses))
 
     @property
@@ -679,6 +708,8 @@ def even_only(problem: Problem, what: str) -> Message | None:
     """Why a quantity other than Λ(p) of even p > 0, or p = 2, is not computed where that is all: `is_closed_only`."""
     if not problem.is_closed_only:
         return None
+    if problem.system.stop is not None:
+        return Message(Code.WALL_SIMULATED, what=what, remedy=Remedy.SIMULATION)
     if problem.system.pasts:
         return Message(Code.DELAY_ONLY, what=what, remedy=Remedy.SIMULATION)
     count = problem.dimension
@@ -695,7 +726,7 @@ def refuse_infinite(problem: Problem, p: float) -> None:
     """
     if problem.is_closed_only or problem.has_algebraic_tails:
         symbol = moment_at(p).symbol if p else "λ"
-        is_closed = p == 2 if problem.system.pasts else p > 0 and p % 2 == 0
+        is_closed = p == 2 if problem.system.pasts else p > 0 and p % 2 == 0 and problem.system.stop is None
         if not is_closed and (told := even_only(problem, symbol)):
             raise NoSuchExponent(told)
         if p:

@@ -43,6 +43,7 @@ from fpsolve.model.plane import (
     Function,
     Jump,
     LinearMotion,
+    Stop,
     System,
     as_plane,
     by_epsilon,
@@ -55,6 +56,7 @@ MOST_PARAMETERS = 200
 """Largest number of parameters."""
 _NEWTON = 60
 """Largest number of steps of Newton's method for the coefficient of restitution, which is cheap."""
+_COMBINED = 'a sum of several is for kind = "modes", whose masses tell how these share an impact'
 OTHER = 0.7310585786300049
 """Difference to another value of a parameter that shows what depends on it: no round number."""
 
@@ -122,6 +124,14 @@ class Wall:
     restitution: float | str
 
 
+def walls_of(walls: Any) -> tuple[Wall, ...]:
+    """Walls from mappings with their keys. Raises `TableError`."""
+    for number, wall in enumerate(walls if isinstance(walls, list | tuple) else (walls,)):
+        if not isinstance(wall, Mapping) or set(wall) != {"at", "restitution"}:
+            raise TableError(f"got {shown(wall)}; must have the keys at and restitution alone", "walls", number)
+    return tuple(Wall(**wall) for wall in walls)
+
+
 @dataclass(frozen=True)
 class EquationSystem(System):
     """Rates, each linear in the variables and affine in the noise, as text; see `PlaneSystem.of_equations`.
@@ -135,7 +145,7 @@ class EquationSystem(System):
         drift: their rates.
         named: the values of the parameters by their names.
         noises: what the noise is called in the rates, and the section that states it, one pair.
-        walls: where the state is reflected, in the plane alone.
+        walls: where the state is reflected; of more than two variables one.
         quantities: what parameters are, by their names, as far as that is stated.
 
     Raises:
@@ -224,9 +234,11 @@ class EquationSystem(System):
             if name.startswith(AMPLITUDE.name) or name == JOINT_DENSITY.name:
                 what = "which has another meaning in the stationary response of terms of degree 3; rename it"
                 raise TableError(f"got the name {name}, {what}", "variables", i)
-        if self.walls and (self.pasts or len(self.variables) != 2):
-            why = "a wall is for two variables without a delay only"
-            raise TableError(f"got a wall for {len(self.variables)} variables; {why}; leave walls out", "walls")
+        if self.walls and (self.pasts or len(self.walls) > {1: 0, 2: 2}.get(len(self.variables), 1)):
+            found = f"{len(self.walls)} for {len(self.variables)} variables{' with a delay' * bool(self.pasts)}"
+            why = "must be two at most for two variables, one for more, and none with a delay"
+            raise TableError(f"got {found}; {why}; leave out walls", "walls")
+        _ = self.stop
         jumps = self.jumps
         if len({jump.phase for jump in jumps}) < len(jumps):
             raise TableError("two walls are at the same place; remove one of them", "walls")
@@ -497,8 +509,8 @@ class EquationSystem(System):
     def jumps(self) -> tuple[Jump, ...]:  # type: ignore[override]
         """Where the phase passes the rays of the walls: x = 0 is φ = π/2, v = 0 is φ = 0."""
         found = list[Jump]()
-        for number, wall in enumerate(self.walls):
-            place = self._place(number)
+        for number, wall in enumerate(self.walls if len(self.variables) == 2 else ()):
+            place, _, _ = self._place(number)
             log_factor, leading = self._log_factor(number)[0], None
             if EPSILON in names_in(str(wall.restitution)):
                 try:
@@ -509,25 +521,47 @@ class EquationSystem(System):
             found.append(Jump(math.pi / 2 if place == 0 else 0.0, log_factor, leading))
         return tuple(found)
 
-    def _place(self, number: int) -> int:
-        """Which of the variables is 0 at a wall. Raises `TableError`."""
-        x, v = self.variables
-        at = self.walls[number].at
+    @cached_property
+    def stop(self) -> Stop | None:  # type: ignore[override]
+        """The wall of more than two variables. Raises `TableError`."""
+        if not self.walls or len(self.variables) == 2:
+            return None
+        coordinates, restitution = self._wall_coordinates(), math.exp(self._log_factor(0)[0])
+        if restitution > 1:
+            text = f"got {restitution:g}; must be <= 1 at a wall of more than two variables; reduce it"
+            raise TableError(text, "walls", 0, "restitution")
+        return Stop(coordinates.tolist(), restitution)
+
+    def _wall_coordinates(self) -> FloatArray:
+        """q, q̇ and all others as rows: an impact changes the velocity alone."""
+        i, j, speed = self._place(0)
+        order = [i, j, *(k for k in range(len(self.variables)) if k not in (i, j))]
+        rows = np.eye(len(order))[order]
+        rows[1] *= speed
+        return rows
+
+    def _place(self, number: int) -> tuple[int, int, float]:
+        """Which of the variables is 0 at a wall, which one is its rate, and over what. Raises `TableError`."""
+        at, names = self.walls[number].at, self.variables
         match = re.fullmatch(r"\s*(\w+)\s*=\s*0(?:\.0*)?\s*", str(at))
-        if match is None or match[1] not in self.variables:
-            must = f'must be "{x} = 0" or "{v} = 0"; jumps on other rays are for PlaneSystem in Python'
-            raise TableError(f'got {shown(at)}; {must}; write, for example, at = "{x} = 0"', "walls", number, "at")
-        i = self.variables.index(match[1])
-        variable, other = self.variables[i], self.variables[1 - i]
+        if match is None or match[1] not in names:
+            must = f'must be "{names[0]} = 0" or "{names[1]} = 0"; jumps on other rays are for PlaneSystem in Python'
+            must = must if len(names) == 2 else f'must be one variable, such as "{names[0]} = 0"; {_COMBINED}'
+            raise TableError(
+                f'got {shown(at)}; {must}; write, for example, at = "{names[0]} = 0"', "walls", number, "at"
+            )
+        i = names.index(variable := match[1])
         parts = self._rates[i].parts
         speed = sum(series[0] * self.epsilon**power for (_, _, power), series in parts.items())
-        is_alone = {(states, noise) for states, noise, _ in parts} == {((other,), "")}
+        kinds = {(states, noise) for states, noise, _ in parts}
+        other = next((name for name in names if name != variable and kinds == {((name,), "")}), "")
+        is_alone, other = bool(other), other or (names[1 - i] if len(names) == 2 else "v, another variable,")
         if not (is_alone and speed > 0):
             must = f"there {variable}'s rate must be c*{other} with c > 0 and nothing else"
             told = f"but it is {' '.join(self.drift[i].split())}{f', c = {speed:g}' if is_alone else ''}"
             remedy = "choose variables for which it is, or remove the wall"
             raise TableError(f'got "{variable} = 0"; {must}, {told}; {remedy}', "walls", number, "at")
-        return i
+        return i, names.index(other), speed
 
     def _log_factor(self, number: int, by: str = "", value: float | None = None, order: int = 1) -> tuple[float, ...]:
         """Taylor coefficients of ln R of a wall by a parameter, at a value of it. Raises `TableError`."""
@@ -580,12 +614,14 @@ class EquationSystem(System):
         return tuple(name for name in self._derivatives if name not in self.inert and self._keeps_ratios(name))
 
     def _keeps_ratios(self, name: str) -> bool:
-        """Whether delays, and frequencies, remain in their ratios with another value of a parameter."""
+        """Whether delays, frequencies, and the coordinates of a wall remain with another value of a parameter."""
         value = float(self.values[name])
         with suppress(ValueError):
-            if max(map(len, self._recurring)) < 2:
+            if max(map(len, self._recurring)) < 2 and self.stop is None:
                 return True
             other = self.at({name: value + OTHER * 1e-3 * (abs(value) or 1.0)})
+            if self.stop is not None:
+                return other._wall_coordinates().tolist() == self._wall_coordinates().tolist()
             shares = [np.divide(*pair) for pair in zip(other._recurring, self._recurring, strict=True) if pair[0]]
             return all(np.ptp(each) <= ROUNDED * abs(each[0]) for each in shares)
         return False

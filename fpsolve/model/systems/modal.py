@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -16,7 +17,7 @@ from fpsolve.model.expressions import ExpressionError, Form, calls_of_time, cons
 from fpsolve.model.faults import TableError
 from fpsolve.model.parameters import stated_field
 from fpsolve.model.plane import MOST_VARIABLES
-from fpsolve.model.systems.equations import EPSILON, EquationSystem
+from fpsolve.model.systems.equations import EPSILON, EquationSystem, walls_of
 
 Entry = float | str
 Matrix = Sequence[Sequence[Entry]]
@@ -38,7 +39,12 @@ class ModalSystem(EquationSystem):
     """Modes by their mass, damping and stiffness; noise in stiffness and damping. See `ModalSystem.of`.
 
     It is an `EquationSystem` of the variables q and q̇ of each mode, whose rates follow from the matrices.
+
+    Args:
+        mobility: M⁻¹, by which modes share an impact.
     """
+
+    mobility: tuple[tuple[Entry, ...], ...] = ()
 
     kind: ClassVar[str] = "modes"
     stated: ClassVar[Mapping[str, FieldInfo]] = {
@@ -68,7 +74,7 @@ class ModalSystem(EquationSystem):
             'modes = ["heave", "pitch"]',
             (),
         ),
-        **{key: EquationSystem.stated[key] for key in ("parameters", "noises")},
+        **{key: EquationSystem.stated[key] for key in ("parameters", "noises", "walls")},
     }
 
     @classmethod
@@ -85,6 +91,7 @@ class ModalSystem(EquationSystem):
         modes: Sequence[str] = (),
         parameters: Mapping[str, float] | None = None,
         noises: Mapping[str, str] | None = None,
+        walls: Sequence[Mapping[str, float | str]] = (),
     ) -> ModalSystem:
         """M q̈ + (C + G + ξ C_ξ) q̇ + (K + H + ξ K_ξ) q = 0, with exact derivatives by each of its parameters.
 
@@ -102,6 +109,8 @@ class ModalSystem(EquationSystem):
             parameters: values by the names that entries of matrices may have, which are numbers, or arithmetic as in
                 the rates of `PlaneSystem.of_equations`.
             noises: what noises are called, and which section of keys each has; {"xi": "noise"} if None.
+            walls: where a displacement, or a sum c·q of several, is stopped, one: v⁺ = v − (1 + R) M⁻¹c (c·v)/(c·M⁻¹c)
+                at {"at": "q1 - q2 = 0", "restitution": R}.
 
         Raises:
             TableError: with the matrix, the place in it, and what it must be.
@@ -110,9 +119,18 @@ class ModalSystem(EquationSystem):
         still = _listed({**still, "gyroscopic": gyroscopic, "circulatory": circulatory})
         driven = _listed({"stiffness_noise": stiffness_noise, "damping_noise": damping_noise})
         named, sections = dict(parameters or {}), dict(noises or {"xi": "noise"})
-        variables, drift = _Rates(still, driven, tuple(modes), named, sections).written()
+        rates = _Rates(still, driven, tuple(modes), named, sections)
+        variables, drift = rates.written()
+        mobility = tuple(map(tuple, rates.mobility)) if walls else ()
         try:
-            return cls(variables, drift, tuple(named.items()), tuple(sections.items()))
+            return cls(
+                variables,
+                drift,
+                tuple(named.items()),
+                tuple(sections.items()),
+                walls_of(walls),
+                mobility=mobility,
+            )
         except TableError as error:
             if error.path[:1] == ("variables",):
                 raise TableError(error.text, "modes") from None
@@ -124,7 +142,39 @@ class ModalSystem(EquationSystem):
     def from_table(cls, table: Mapping[str, Any]) -> ModalSystem:
         named, quantities = cls.named_of(table, cls.stated)
         given = {key: each for key, each in table.items() if key in cls.stated}
-        return replace(cls.of(**{**given, "parameters": dict(named)}), quantities=quantities)
+        walls = [each.model_dump() for each in table.get("walls", ())]
+        return replace(cls.of(**{**given, "parameters": dict(named), "walls": walls}), quantities=quantities)
+
+    def _wall_coordinates(self) -> FloatArray:
+        """The displacement of the wall and its rate, then those of the other modes, M-orthogonal to it."""
+        names = {name: constant(value) for name, value in self.named}
+        mass = np.array([[_value(each, names) for each in row] for row in self.mobility])
+        row = self._wall_row(names)
+        shares = mass @ row
+        first = int(np.argmax(np.abs(row * shares)))
+        if not row @ shares > np.abs(row) @ np.abs(shares) / SINGULAR:
+            text = (
+                f"got masses by which an impact there moves {self.walls[0].at} by {row @ shares:g} of its force; must"
+            )
+            raise TableError(f"{text} be > 0, as of a positive definite matrix; change mass", "walls", 0, "at")
+        others = np.delete(np.eye(len(row)) - np.outer(shares / shares[first], np.eye(len(row))[first]), first, axis=0)
+        return np.asarray(np.kron(np.vstack([row, others]), np.eye(2)))
+
+    def _wall_row(self, names: Mapping[str, Form]) -> FloatArray:
+        """The displacement of the wall, a row of those of the modes. Raises `TableError`."""
+        modes, at = self.variables[::2], str(self.walls[0].at)
+        text, _, zero = at.partition("=")
+        try:
+            states = {name: Form({((name,), "", 0): (1.0,)}) for name in modes}
+            parts = evaluate(text, {**names, **states}, "at").parts
+        except ExpressionError as error:
+            raise TableError(str(error), "walls", 0, "at") from None
+        found = {states: series[0] for (states, _, _), series in parts.items()}
+        row = np.array([found.pop((name,), 0.0) for name in modes])
+        if found or not row.any() or zero.strip().rstrip("0") not in ("", "0.") or "=" not in at:
+            must = f'must be a displacement or a sum of several, such as "{modes[0]} - 0.5*{modes[1]} = 0"'
+            raise TableError(f"got {shown(at)}; {must}; the modes are {', '.join(modes)}", "walls", 0, "at")
+        return row
 
 
 @dataclass(frozen=True)
@@ -151,10 +201,10 @@ class _Rates:
         speeds = [f"{name}_dot" for name in modes]
         of = {"damping": speeds, "gyroscopic": speeds, "stiffness": modes, "circulatory": modes}
         of |= {"stiffness_noise": modes, "damping_noise": speeds}
-        matrices = {key: self._entries(each, key) for key, each in self.matrices.items()}
+        matrices = {key: self._entries(each, key) for key, each in self.matrices.items() if key != "mass"}
         for key in ("gyroscopic", "circulatory"):
             self._refuse_symmetric(matrices[key], key)
-        inverse = self._inverse(matrices.pop("mass"))
+        inverse = self.mobility
         parts = [(matrix, of[key]) for key, matrix in matrices.items()]
         driven = [(noise, self._entries(matrix, *path), of[path[0]]) for noise, path, matrix in self._driven()]
         for name in self.noises:
@@ -173,6 +223,11 @@ class _Rates:
             texts += [f"+({number!r})*{state}" for state, number in numbers.items() if number]
             drift += [speed, " ".join(texts) or "0"]
         return tuple(name for pair in zip(modes, speeds, strict=True) for name in pair), tuple(drift)
+
+    @cached_property
+    def mobility(self) -> list[list[Entry]]:
+        """M⁻¹. Raises `TableError`."""
+        return self._inverse(self._entries(self.matrices["mass"], "mass"))
 
     @property
     def count(self) -> int:
@@ -268,6 +323,11 @@ class _Rates:
         det = f"(({a})*({d}) - ({b})*({c}))"
         minus = [[0.0 if each == 0.0 else f"-({each})/{det}" for each in row] for row in mass]
         return [[f"({d})/{det}", minus[0][1]], [minus[1][0], f"({a})/{det}"]]
+
+
+def _value(entry: Entry, names: Mapping[str, Form]) -> float:
+    """The number that an entry of a matrix is at the values of the parameters."""
+    return (evaluate(entry, names, "the entry").scalar or (math.nan,))[0] if isinstance(entry, str) else entry
 
 
 def _listed(given: Any) -> Any:

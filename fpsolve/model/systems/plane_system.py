@@ -15,9 +15,9 @@ from pydantic.fields import FieldInfo
 from fpsolve.arrays import FloatArray, identity, one, real_number, shown
 from fpsolve.model.faults import TableError
 from fpsolve.model.parameters import STRICT, parameter, stated_field, unknown_parameter
-from fpsolve.model.plane import MOST_VARIABLES, CoefficientMatrix, Jump, System, as_plane, by_epsilon, is_driven
+from fpsolve.model.plane import MOST_VARIABLES, CoefficientMatrix, Jump, Stop, System, as_plane, by_epsilon, is_driven
 from fpsolve.model.quantity import Quantity
-from fpsolve.model.systems.equations import EquationSystem, Wall
+from fpsolve.model.systems.equations import EquationSystem, walls_of
 
 Parts = Sequence[CoefficientMatrix] | tuple[Sequence[CoefficientMatrix], Sequence[Jump]]
 """The terms of a system, or these and its jumps."""
@@ -223,7 +223,7 @@ class PlaneSystem(System):
         ((0.0, 1.0), (-4.0, -0.4))
 
         Args:
-            variables: their names, two; more for a system beyond the plane, which has no walls.
+            variables: their names, two; more for a system beyond the plane, which has one wall at most.
             drift: their rates: linear in the variables and affine in the noise, of numbers, names, + - * / **, pi,
                 exp() and sqrt().
             parameters: values by names. One called epsilon is ε, in whose powers all coefficients must be polynomials.
@@ -241,12 +241,8 @@ class PlaneSystem(System):
         for key, given in known.items():
             if not isinstance(given, Mapping):
                 raise TableError(f"got {shown(given)}; must be a mapping from names", key)
-        for number, wall in enumerate(walls if isinstance(walls, list | tuple) else (walls,)):
-            if not isinstance(wall, Mapping) or set(wall) != {"at", "restitution"}:
-                raise TableError(f"got {shown(wall)}; must have the keys at and restitution alone", "walls", number)
         named, noise = (tuple(each.items()) for each in known.values())
-        places = tuple(Wall(**wall) for wall in walls)  # type: ignore[arg-type]
-        return EquationSystem(variables, drift, named, noise, places)  # type: ignore[arg-type]
+        return EquationSystem(variables, drift, named, noise, walls_of(walls))  # type: ignore[arg-type]
 
     @classmethod
     def takes(cls, key: str, table: Mapping[str, Any]) -> bool:
@@ -284,9 +280,11 @@ class PlaneSystem(System):
         if unknown:
             raise ValueError(f"got {unknown[0]}; the parameters are {', '.join(self.values)}")
         new: dict[str, Any] = {**self.values, **values}
+        epsilon = new.pop("epsilon")
         if self.build is None:
-            return replace(self, epsilon=new["epsilon"])
-        return type(self).of(self.build, **new)
+            return replace(self, epsilon=epsilon)
+        terms, jumps = _parts(self.build, new)
+        return replace(self, terms=terms, jumps=jumps, epsilon=epsilon, named=tuple(new.items()))
 
     def derivative(self, name: str) -> tuple[tuple[CoefficientMatrix, ...], tuple[float, ...]]:
         """∂/∂ε, or ∂/∂θ by the derivative of the polynomial through the matrices for `NODES` values of θ around it.
@@ -325,12 +323,15 @@ class LinearSystem(PlaneSystem):
 
     Args:
         terms: one at least, all of the same n.
-        jumps: stretches at rays, for n = 2 alone: a wall of more dimensions holds many directions, not one.
+        jumps: stretches at rays, for n = 2 alone.
         epsilon, build, named: as in `PlaneSystem`.
+        stop: the wall of one coordinate, for n ≥ 3 alone.
 
     Raises:
         ValueError: as `PlaneSystem`, or the matrices differ in their size, or there are jumps beyond the plane.
     """
+
+    stop: Stop | None = None
 
     kind: ClassVar[str] = "linear"
     dimensions: ClassVar[Sequence[int]] = range(1, MOST_VARIABLES + 1)
