@@ -60,6 +60,7 @@ def _of_moments(moments: Moments, valid: Known, context: Known) -> Iterator[Refu
     """One of the first curve; where keys are varied each has those that exist, but even ones alone are so for all."""
     problem = problem_of(valid)
     is_told = not context.get("varies", False) or (problem is not None and problem.is_closed_only)
+    is_told &= problem is None or not problem.is_simulated_only
     found = _unsolvable({**valid, "moments": moments}, Vary(), with_moments=is_told)
     return (((), None, text) for _, text in islice(found, 1))
 

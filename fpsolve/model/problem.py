@@ -353,6 +353,11 @@ class Problem:
         return "closed equations of moments" if self.is_closed_only else "finite elements"
 
     @property
+    def is_simulated_only(self) -> bool:
+        """Whether no Λ(p) is computed at all, as at a wall where there are no elements."""
+        return self.is_closed_only and self.system.stop is not None
+
+    @property
     def unit_rate(self) -> float:
         """Its own unit of rates: ω or the size of the order 0, or of all where there is none."""
         has_own = np.any(matrix_at(self.motion, 0.0, slice(0, 1)))

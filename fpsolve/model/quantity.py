@@ -114,6 +114,14 @@ IMPACT_RATE = Quantity(
     "(39)",
     _FINER,
 )
+OF_STOPS = {
+    name: Quantity(name, symbol, words, unit=unit)
+    for name, symbol, words, unit in (
+        ("fast_impact_rate", "N_f", "impacts faster than 0.001 Σ|others| in unit time", "1/time"),
+        ("rest_share", "r_0", "share of time at rest at the wall", "1"),
+    )
+}
+"""What a simulation counts at a wall of more than two variables, by its name."""
 CRITICAL_IMPACT_FACTOR = Quantity(
     "critical_impact_factor",
     "R_c",

@@ -153,6 +153,8 @@ def statement_of(problem: Problem, stated: Parameters | None = None) -> Statemen
     if stated is None:
         stated = {key: str(value) for key, value in linear_values(problem).items()}
     system, noise = problem.system, problem.noise
+    if system.stop is not None:
+        raise TypeError("got a wall of more than two variables, where moments obey no closed equations; remove it")
     if problem.dimension > 2:
         return Statement(stated, linear=LinearRecord.of(problem))
     if len(noise.parts) > 1:

@@ -132,7 +132,7 @@ class PlainBatch(_Paths):
     Attributes:
         log_sums, log_squares: ln Σ w and ln Σ w² over paths and windows, w = ‖x(end)‖^p/‖x(start)‖^p, of shape
             (levels, p).
-        impacts: how many bounces there were.
+        impacts: how many bounces there were; see `stops` of a wall of several variables.
         growth, variance: mean and variance of ln‖x‖ over the paths at the end of the last slice.
     """
 
@@ -141,7 +141,8 @@ class PlainBatch(_Paths):
         self.starts = np.zeros((plan.levels, plan.paths))
         self.log_sums = np.full((plan.levels, plan.p.size), -math.inf)
         self.log_squares = self.log_sums.copy()
-        self.impacts, self.growth, self.variance = 0, 0.0, 0.0
+        self.impacts: complex = 0
+        self.growth = self.variance = 0.0
 
     def _move(self, steps: int) -> None:
         plan = self.plan

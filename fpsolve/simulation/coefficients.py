@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -24,12 +24,14 @@ if TYPE_CHECKING:
     from fpsolve.simulation.motions import DrivenMotion, StruckMotion, SwitchedMotion
     from fpsolve.simulation.several import SplitMotion
     from fpsolve.simulation.spaces import DrivenSpace, SplitSpace, SwitchedSpace
+    from fpsolve.simulation.stops import DrivenStop, SwitchedStop
 
+FAST = 1e-3
+"""Speed from which on impacts at a wall of several variables count, over the sum of all other variables."""
 _FAR = 5.0
 """Standard deviations at which noise held to one side is compared with noise held to the other."""
 _UNRESOLVED = 1 / 30
 """Of the coefficient of [A₁, [A₁, A₀]] under white noise, its mean for given ∫dW and ∫W dt, as a share of s²h²."""
-
 ROUGHER = 3
 """How many steps are one of some batches, which tells the bias of a step, where that is of the order h²."""
 _DELAYS = 8.0
@@ -90,6 +92,11 @@ class Coefficients:
         """How many steps are a rough one; 1 where the bias of a step is of a higher order, or none."""
         return ROUGHER if self.noise.is_white and not self.is_exact else 1
 
+    @property
+    def order(self) -> int:
+        """The power of h that the bias of a step falls as, where it does not fall faster."""
+        return 2
+
     def size(self, h: float) -> int:
         """The number of variables of a path that is moved in steps of length h."""
         return self.dimension
@@ -119,6 +126,30 @@ class Coefficients:
     def spread(self, h: float) -> float:
         """The standard deviation of what the noise adds to ln‖x‖ in a time h that it takes no note of."""
         return self.fluctuation * (math.sqrt(h) if self.noise.is_white else h)
+
+
+@dataclass(frozen=True)
+class StoppedCoefficients(Coefficients):
+    """A system with a `Stop`, whose coordinates these are, but for their units: q is the first, q̇ the second.
+
+    Under white noise a path in a step comes to the wall at another time than the smooth one that is taken: `order` 1.
+
+    Attributes:
+        restitution: R.
+        fast: how fast an impact must be over each of the |variables| to count, shape (n,).
+    """
+
+    restitution: float = 1.0
+    fast: FloatArray = field(default_factory=lambda: np.zeros(0))
+
+    order = 1
+
+    def motion(self, h: float) -> DrivenStop | SwitchedStop:  # type: ignore[override]
+        from fpsolve.simulation.stops import DrivenStop, SwitchedStop
+
+        if self.steady.ndim == 2:
+            return DrivenStop(np.array([self.steady, self.driven]), self.restitution, self.fast)
+        return SwitchedStop(self.steady, np.linalg.norm(self.steady, 2, axis=(1, 2)), self.restitution, self.fast)
 
 
 @dataclass(frozen=True)
@@ -238,7 +269,14 @@ def coefficients(system: System, noise: Any) -> Coefficients:
     if not free.any():
         free = steady.mean(axis=0) if is_switched else steady
     every = np.abs(steady).max(axis=0) if is_switched else np.abs(steady) + np.abs(driven)
-    even = _even_coordinates(free, every)
+    kind: Any = Coefficients
+    if (stop := system.stop) is not None:
+        rows = np.array(stop.coordinates)
+        scales = _balance(np.abs(rows) @ every @ np.abs(np.linalg.inv(rows)))
+        even = rows / scales[:, None]
+        kind = partial(StoppedCoefficients, restitution=stop.restitution, fast=FAST * scales / scales[1])
+    else:
+        even = _even_coordinates(free, every)
     back = np.linalg.inv(even)
     free, steady, driven = even @ free @ back, even @ steady @ back, even @ driven @ back
     around = steady - np.tensordot(noise.probabilities, steady, 1) if is_switched else steady
@@ -260,7 +298,7 @@ def coefficients(system: System, noise: Any) -> Coefficients:
         moves = [(time * share, each) for share, each in zip(noise.probabilities, around, strict=True)]
     else:
         moves = [(time if noise.is_white else time * noise.standard_deviation**2, driven)]
-    return Coefficients(
+    found: Coefficients = kind(
         noise,
         steady,
         driven,
@@ -271,6 +309,7 @@ def coefficients(system: System, noise: Any) -> Coefficients:
         _settling(free, moves, half_turn),
         impulses,
     )
+    return found
 
 
 def _rate(free: FloatArray, intensity: float) -> float:

@@ -12,7 +12,8 @@ E Z = E‖x‖^p, and its logarithm is normal for many paths (J. Bérard, P. Del
 2014), so that Λ(p) = (E ln Z + ½ Var ln Z)/time.
 
 Where a step h leaves a bias as h², some batches take steps of 3h: 9/8 of what those of h find, less 1/8 of what they
-find, has none of it. The standard error is that of both. A step of the order 4 leaves less than is seen.
+find, has none of it; 3/2 and 1/2 where it is as h, at a wall of several variables under white noise. The standard error
+is that of both. A step of the order 4 leaves less than is seen.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ from fpsolve.drawing import draw_dots, finish, label_axes
 from fpsolve.errors import NotConverged
 from fpsolve.messages import Code, Message, message_of
 from fpsolve.model.problem import Problem
-from fpsolve.model.quantity import EFFECTIVE_PATHS, IMPACTS, LYAPUNOV_EXPONENT, MOMENT, VARIANCE_RATE, P
+from fpsolve.model.quantity import EFFECTIVE_PATHS, IMPACTS, LYAPUNOV_EXPONENT, MOMENT, OF_STOPS, VARIANCE_RATE, P
 from fpsolve.simulation.batches import PlainBatch, Plan, Population, advance_all, standard_error
 from fpsolve.simulation.coefficients import coefficients
 from fpsolve.simulation.kernels import TALLIES
@@ -104,6 +105,8 @@ class MonteCarlo(Result):
         warnings: what limits these numbers, each with its criterion.
         interrupted: whether the simulation was stopped early.
         parameters: of the problem, by keys such as "noise.D0".
+        wall: at a wall of more than two variables the fast impacts in unit time and the share of time at rest, by the
+            names of `OF_STOPS`, with their standard errors; else nothing.
     """
 
     estimates: tuple[MomentEstimate, ...]
@@ -119,6 +122,7 @@ class MonteCarlo(Result):
     warnings: tuple[Message, ...]
     interrupted: bool = False
     parameters: Mapping[str, float | str] = field(default_factory=dict, compare=False)
+    wall: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     def to_xarray(self) -> xarray.Dataset:
         """Λ(p) over p, λ and Λ″(0), with their standard errors; NaN where too few paths carry a moment."""
@@ -137,6 +141,8 @@ class MonteCarlo(Result):
             VARIANCE_RATE.error(kind): self.variance_rate_error,
             IMPACTS: self.impacts,
         }
+        for name, (of, of_error) in self.wall.items():
+            numbers |= {OF_STOPS[name]: of, OF_STOPS[name].error(kind): of_error}
         settings = {name: getattr(self, name) for name in ("paths", "time", "step", "seed")}
         estimator = ", ".join(dict.fromkeys(each.estimator for each in self.estimates))
         more = {**settings, "estimator": estimator, "interrupted": int(self.interrupted), "warnings": self.warnings}
@@ -260,7 +266,7 @@ def _simulated(
     rough = ROUGH if known.together > 1 else ()
     plans = [plan.rougher if i in rough else plan for i in range(BATCHES)]
     groups = [[i for i in range(BATCHES) if i not in rough], *([*rough] for _ in rough[:1])]
-    share = 1 / (known.together**2 - 1) if rough else 0.0
+    share = 1 / (known.together**known.order - 1) if rough else 0.0
     weights = np.array([1 + share, -share])[: len(groups)]
     # each batch has a stream of random numbers of its own
     seeds = [each.spawn(1 + plan.p.size) for each in np.random.SeedSequence(seed).spawn(BATCHES)]
@@ -290,9 +296,10 @@ def _simulated(
         for group in groups
     ]
     estimates = [_joined(each, weights) for each in zip(*(each for each, _ in found), strict=True)]
-    (rate, error), (variance_rate, variance_rate_error) = (
+    at_wall = np.array([batch.impacts for batch in plain]) / (times * plan.paths)
+    (rate, error), (variance_rate, variance_rate_error), *of_wall = (
         _at_no_step([(values[group].mean(), standard_error(values[group])) for group in groups], weights)
-        for values in (exponents, variance_rates)
+        for values in (exponents, variance_rates, at_wall.real, at_wall.imag)
     )
     estimates = [
         replace(each, value=each.p * rate, standard_error=abs(each.p) * error) if 0 < abs(each.p) < _TINY else each
@@ -309,10 +316,11 @@ def _simulated(
         time=float(slices.mean()) * plan.length,
         step=h,
         seed=seed,
-        impacts=sum(batch.impacts for batch in plain),
+        impacts=int(sum(batch.impacts for batch in plain).real),
         warnings=(*_missing(estimates), *found[0][1], *stopped),
         interrupted=interrupted,
         parameters=problem.values,
+        wall=dict(zip(OF_STOPS, of_wall, strict=True)) if problem.system.stop else {},
     )
 
 

@@ -50,6 +50,8 @@ def simulated_parts(problem: Problem) -> tuple[System, Noise]:
         found = "the state has delays" if system.pasts else f"there are {problem.dimension}"
         told = f"simulation under impulses is for two variables, but {found}"
         raise FpsolveError(f"{told}; take {'p = 2' if system.pasts else 'even p'}, which needs none")
+    if system.stop is not None and (len(noise.parts) > 1 or system.clock):
+        raise FpsolveError("simulation of a wall of more than two variables is for one noise, without periodic terms")
     bent = [term.g for term in system.terms if affine(term.g) is None]
     if bent and (not noise.has_states or len(noise.parts) > 1):
         found = f"but one has g = {written_coefficient(bent[0]).strip()}"

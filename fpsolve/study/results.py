@@ -190,9 +190,10 @@ class SimulatedCurve:
 
     @property
     def estimates(self) -> dict[str, tuple[float, float]]:
-        """λ and Λ″(0) by name, each with its standard error; a simulation gives no δ_p."""
+        """λ, Λ″(0) and what is counted at a wall, each with its standard error; a simulation gives no δ_p."""
         found = self.result
         return {
             LYAPUNOV_EXPONENT.name: (found.lyapunov_exponent, found.lyapunov_exponent_error),
             VARIANCE_RATE.name: (found.variance_rate, found.variance_rate_error),
+            **found.wall,
         }

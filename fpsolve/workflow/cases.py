@@ -10,9 +10,11 @@ from pathlib import Path
 from typing import Any
 
 from fpsolve.case.case import Case, load_case
-from fpsolve.errors import NotConverged, WorkersDied
+from fpsolve.case.remedies import CASE_WORDS
+from fpsolve.errors import FpsolveError, NotConverged, WorkersDied
 from fpsolve.files import writable
 from fpsolve.messages import Code, Message
+from fpsolve.model.problem import even_only
 from fpsolve.output.tables import write_samples
 from fpsolve.parts.intervals import Samples, sampled_case, samples_of, show_samples
 from fpsolve.pool import Pool, cluster, parallel, serial
@@ -134,9 +136,11 @@ def run_case(
 
     Raises:
         OutputError: the folder cannot be made or written to, or another run writes into it.
-        FpsolveError: a curve cannot be simulated; nothing is solved.
+        FpsolveError: a curve cannot be simulated, or only that; nothing is solved.
         KeyboardInterrupt: a curve was being solved, or nothing was simulated yet; its text says what is kept.
     """
+    if case.problem.is_simulated_only and (refused := even_only(case.problem, "Λ(p)")):
+        raise FpsolveError(f"{case.path}: {refused.words(CASE_WORDS)}")
     if monte_carlo:
         refuse_obstacles(case)
     simulated: list[SimulatedCurve] = []

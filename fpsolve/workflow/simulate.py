@@ -21,6 +21,7 @@ from fpsolve.errors import FpsolveError
 from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, MOMENT
 from fpsolve.files import writable, write_csv, write_json
 from fpsolve.messages import Code, Message
+from fpsolve.model.quantity import OF_STOPS
 from fpsolve.output.records import Records, append, key_of, made_of, record_of
 from fpsolve.output.tables import head, in_case_words, parameters_of
 from fpsolve.page.limits import EACH, PICTURES
@@ -343,17 +344,17 @@ def moment_grid(case: Case, simulated: SimulatedCurve, result: CurveResult | Non
 
 def number_grid(case: Case, simulated: SimulatedCurve, result: CurveResult | None) -> Grid:
     """λ, Λ″(0) and the means of a response with their standard errors, beside the finite elements."""
-    rows = []
+    rows, known = [], {**INDICES, **OF_STOPS}
     for name, number in simulated.estimates.items():
-        found = result.estimates[name] if result else None
-        rows.append([INDICES[name].words, INDICES[name].symbol, *_cells(*number, found.value if found else None)])
+        found = result.estimates.get(name) if result else None
+        rows.append([known[name].words, known[name].symbol, *_cells(*number, found.value if found else None)])
     if response := simulated.response:
         means = result.response.means if result and result.response else {}
         for name, number in response.means.items():
             about, found = response.about.means[name], means.get(name)
             rows.append([about.words, about.symbol, *_cells(*number, found.value if found else None)])
     columns = [Column("quantity", 3, is_text=True), Column("symbol"), Column("value"), Column("± s.e."), *COMPARED]
-    units = units_in_words(case.units.time, [INDICES[name] for name in simulated.estimates])
+    units = units_in_words(case.units.time, [known[name] for name in simulated.estimates])
     return filled("", columns, rows, units)
 
 

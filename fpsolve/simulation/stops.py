@@ -1,0 +1,180 @@
+"""Linear motions of three or more variables with a wall at rest for one of them, compiled: each impact is found.
+
+In the coordinates of a `Stop` x is q ≥ 0, the first row of u is q̇, and an impact is q̇⁺ = −R q̇⁻ where q = 0. While ξ is
+held q(t) is a power series, and its first zero is found from below: where |g″| ≤ M no zero of g is passed by steps of
+2g/(s + √(s² + 2Mg)), s = max(0, −g′), which are Newton's near a zero. Chattering is over where the geometric series of
+its flights, 2q̇/(|q̈|(1 − R)), is short beside all other times. Then q rests until q̈ > 0, and the others move alone.
+
+Under a chain ξ is held between its jumps: nothing is left out. Under a diffusion it is held over each half of a step,
+at mean ∓ ⅔ rise, which has the mean and the first moment of the line that `motions` takes, and the order 4 (S. Blanes
+and P. C. Moan, Appl. Numer. Math. 56, 2006); q̇ is the rate of q in both.
+
+State: as in `spaces`. A move returns the number of fast impacts and, as its imaginary part, the time at rest of all.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from fpsolve.arrays import FloatArray
+from fpsolve.simulation.compiled import compiled
+from fpsolve.simulation.motions import drawn
+from fpsolve.simulation.spaces import _load, _store, _tamed
+
+_SHORT = 1e-6
+"""‖A‖ times the length of all further flights, at which chattering is over."""
+_MOST_TERMS, _MOST_PARTS, _MOST_STEPS = 24, 10_000, 200
+_LEAST = 1e-17
+"""Share of the state below which further terms of a series are left out."""
+_NEAR = 1e-15
+"""Share of the terms of a series below which its sum is 0; share of its range that is no step."""
+_RELEASED = 1e-4
+"""Share of a part after which a mass that has left the wall may be there again."""
+
+
+class DrivenStop(NamedTuple):
+    """A₀ and A₁, shape (2, n, n), R, and what an impact is compared with, over each of the |variables|."""
+
+    matrices: FloatArray
+    restitution: float
+    fast: FloatArray
+
+    @staticmethod
+    def move(m, noise, h, x, u, xi, log_norm, push, room, rng):  # type: ignore[no-untyped-def]
+        """One step as that of a `DrivenMotion`."""
+        mean, rise = room[0, : x.size], room[1, : x.size]
+        drawn(noise, xi, mean, rise, push, rng)
+        n, total = m.fast.size, 0j
+        matrix, state, series = np.empty((n, n)), np.empty(n), np.empty((_MOST_TERMS + 1, n + 1))
+        for i in range(x.size):
+            _load(x, u, i, state)
+            for side in (-1, 1):
+                value, size = mean[i] + side * rise[i] / 1.5, 0.0
+                for r in range(n):
+                    for c in range(n):
+                        matrix[r, c] = m.matrices[0, r, c] + value * m.matrices[1, r, c]
+                        size += matrix[r, c] ** 2
+                total += _flown(m, matrix, 0.5 * h, math.sqrt(size), state, series)
+            log_norm[i] += _tamed(state)
+            _store(x, u, i, state)
+        return total
+
+
+class SwitchedStop(NamedTuple):
+    """A of each state, shape (states, n, n), their norms, R, and the speeds as in a `DrivenStop`."""
+
+    matrices: FloatArray
+    sizes: FloatArray
+    restitution: float
+    fast: FloatArray
+
+    @staticmethod
+    def move(m, noise, h, x, u, xi, log_norm, push, room, rng):  # type: ignore[no-untyped-def]
+        """One step as that of a `SwitchedMotion`."""
+        n, total = m.fast.size, 0j
+        state, series = np.empty(n), np.empty((_MOST_TERMS + 1, n + 1))
+        for i in range(x.size):
+            k, left = int(xi[i]), h
+            _load(x, u, i, state)
+            while left > 0:
+                stay = rng.standard_exponential() / noise.leaving[k]
+                total += _flown(m, m.matrices[k], min(stay, left), m.sizes[k], state, series)
+                left -= stay
+                if left > 0:
+                    mark, left_behind, k = rng.random(), k, 0
+                    while noise.reached[left_behind, k] < mark:
+                        k += 1
+            log_norm[i] += _tamed(state)
+            _store(x, u, i, state)
+            xi[i] = k
+        return total
+
+
+@compiled
+def _flown(m, matrix, t, size, state, series):  # type: ignore[no-untyped-def]
+    """Move a state by ẏ = A y, ‖A‖ ≤ size, for a time t, in place; fast impacts and, imaginary, the time at rest."""
+    n, count, rest, is_released = state.size, 0, 0.0, False
+    state[0] = abs(state[0])  # the start is on either side
+    if not t * size < _MOST_PARTS:
+        state[:] = math.nan
+    while t > 0 and t * size < _MOST_PARTS:
+        d, is_there = min(t, 1 / size), state[0] == 0
+        is_held = is_there and state[1] == 0 and not is_released and _force(matrix, state) <= 0
+        terms = _expand(matrix, state, d, is_held, series)
+        for k in range(terms):  # the sum that is positive until something happens
+            series[k, n] = -_force(matrix, series[k]) if is_held else series[k + is_there, 0]
+        begin = _RELEASED if is_there and state[1] == 0 and not is_held else 0.0
+        at = _first_zero(series[:, n], terms, begin)
+        for r in range(n):
+            state[r] = 0.0
+            for k in range(terms - 1, -1, -1):
+                state[r] = state[r] * at + series[k, r]
+        is_released = is_held and at < 1
+        if is_held:
+            rest += at * d
+        elif at < 1:
+            least = 0.0
+            for r in range(2, n):
+                least += m.fast[r] * abs(state[r])
+            count += abs(state[1]) > least
+            state[0], state[1] = 0.0, m.restitution * abs(state[1])
+            force = _force(matrix, state)
+            if force < 0 and 2 * state[1] * size <= -_SHORT * force * (1 - m.restitution):
+                state[1] = 0.0
+        t -= at * d
+        state[0] = max(state[0], 0.0)
+    return complex(count, rest)
+
+
+@compiled
+def _force(matrix, state):  # type: ignore[no-untyped-def]
+    """q̈ of a state, or of a term of its series."""
+    total = 0.0
+    for c in range(matrix.shape[0]):
+        total += matrix[1, c] * state[c]
+    return total
+
+
+@compiled
+def _expand(matrix, state, d, is_held, series):  # type: ignore[no-untyped-def]
+    """The terms (A d)ᵏ y/k! of y(d τ), q held or not; returns how many count."""
+    n, least, last, k = state.size, 0.0, math.inf, 0
+    for r in range(n):
+        series[0, r] = state[r]
+        least += _LEAST * abs(state[r])
+    while last > least and k < _MOST_TERMS:
+        k, last = k + 1, 0.0
+        for r in range(2 if is_held else 0, n):
+            total = 0.0
+            for c in range(n):
+                total += matrix[r, c] * series[k - 1, c]
+            series[k, r] = total * (d / k)
+            last += abs(series[k, r])
+        if is_held:
+            series[k, 0] = series[k, 1] = 0.0
+    return k
+
+
+@compiled
+def _first_zero(series, terms, begin):  # type: ignore[no-untyped-def]
+    """The first τ from `begin` on at which a power series is 0, 1 where it is positive up to 1."""
+    bend, size, at = 0.0, 0.0, begin
+    for k in range(terms):
+        bend += k * (k - 1) * abs(series[k])
+        size += abs(series[k])
+    for _ in range(_MOST_STEPS):
+        value, slope = 0.0, 0.0
+        for k in range(terms - 1, -1, -1):
+            slope = slope * at + value
+            value = value * at + series[k]
+        fall = max(0.0, -slope)
+        step = 2 * value / (fall + math.sqrt(fall * fall + 2 * bend * max(value, 0.0)))
+        if not (value > _NEAR * size and step > _NEAR):
+            return at
+        at += step
+        if at >= 1:
+            return 1.0
+    return at
