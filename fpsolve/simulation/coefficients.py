@@ -293,6 +293,9 @@ def coefficients(system: System, noise: Any) -> Coefficients:
         strength *= -1.0 if down > up else 1.0
     time = 1.0 if noise.is_white else 2 * noise.correlation_time
     half_turn = math.pi / _rate(free, fluctuation**2 * time)
+    if stop is not None and (square := -free[0, 1] * free[1, 0]) > 0:  # an impact in each half-turn is like damping
+        half_turn = math.pi / math.sqrt(square)
+        free[1, 1] += 2 * math.log(stop.restitution) / half_turn
     time *= _exchanged(free, noise)
     if is_switched:
         moves = [(time * share, each) for share, each in zip(noise.probabilities, around, strict=True)]
