@@ -122,7 +122,7 @@ class MonteCarlo(Result):
     warnings: tuple[Message, ...]
     interrupted: bool = False
     parameters: Mapping[str, float | str] = field(default_factory=dict, compare=False)
-    wall: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    wall: Mapping[str, tuple[float, float]] = field(default_factory=dict, hash=False)
 
     def to_xarray(self) -> xarray.Dataset:
         """Λ(p) over p, λ and Λ″(0), with their standard errors; NaN where too few paths carry a moment."""
