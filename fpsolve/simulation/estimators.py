@@ -55,8 +55,8 @@ if TYPE_CHECKING:
     import xarray
     from matplotlib.axes import Axes
 
-ROUGH = 14, 15, 30, 31
-"""The batches of rough steps, of populations as many near as far."""
+ROUGH = {1: (6, 7, 14, 15, 22, 23, 30, 31), 2: (14, 15, 30, 31)}
+"""The batches of rough steps by the order of their bias, of populations as many near as far."""
 FEW: Mapping[Estimator, int] = {"direct": 5000, "population": 1000}
 """With fewer effective paths there is no estimate. Direct runs that miss the rare large ‖x‖^p have both more effective
 paths and a smaller mean, so that estimates near a lower bound would be too small."""
@@ -263,7 +263,7 @@ def _simulated(
         wanted=wanted,
         levels=min(_LEVELS, wanted.bit_length()) if is_direct else 0,
     )
-    rough = ROUGH if known.together > 1 else ()
+    rough = ROUGH[known.order] if known.together > 1 else ()
     plans = [plan.rougher if i in rough else plan for i in range(BATCHES)]
     groups = [[i for i in range(BATCHES) if i not in rough], *([*rough] for _ in rough[:1])]
     share = 1 / (known.together**known.order - 1) if rough else 0.0
