@@ -148,7 +148,8 @@ class StoppedCoefficients(Coefficients):
         from fpsolve.simulation.stops import DrivenStop, SwitchedStop
 
         if self.steady.ndim == 2:
-            return DrivenStop(np.array([self.steady, self.driven]), self.restitution, self.fast)
+            matrices = np.array([self.steady, self.driven])
+            return DrivenStop(matrices, self.restitution, self.fast, float(self.noise.is_white))
         return SwitchedStop(self.steady, np.linalg.norm(self.steady, 2, axis=(1, 2)), self.restitution, self.fast)
 
 
