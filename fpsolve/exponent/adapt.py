@@ -245,7 +245,11 @@ class WholeProblem:
 
 def directions(question: Question, found: Sequence[Solution]) -> Iterator[Start]:
     """Directions of three or four variables."""
-    if question.problem.dimension > 2 and not found:
+    if question.problem.system.stop and not found:
+        from fpsolve.exponent.stopped import stop_start
+
+        yield stop_start(question)
+    elif question.problem.dimension > 2 and not found:
         from fpsolve.exponent.modes import sphere_start  # with scikit-fem, which takes long to import
 
         yield sphere_start(question)

@@ -212,6 +212,15 @@ def _is_rightmost(pair: PrincipalPair, pencil: Pencil) -> bool:
         factor = pencil.factorised(pair.eigenvalue + shift * rate)
         right, left = -factor.solve(source), -factor.solve(source, transposed=True)
         if max(np.compress(seen, _sign_defects(space, right, left)), default=0.0) > SURELY_POSITIVE:
+    Of another one, by which all else is larger than rounding, it is −1/(Λ′ − σ) of its share. One of both must do at a
+    stop, where the adjoint is no function: a share of the time the mass is at rest there.
+    """
+    space, problem = pencil.space, pair.generator.problem
+    rate, source, judged = problem.unit_rate, space.weighed(space.constant), min if problem.system.stop else max
+    for shift in BESIDE_IT:
+        factor = pencil.factorised(pair.eigenvalue + shift * rate)
+        right, left = -factor.solve(source), -factor.solve(source, transposed=True)
+        if judged(_sign_defects(space, right, left)) > SURELY_POSITIVE:
             return False
     return True
 

@@ -250,15 +250,20 @@ class SphereStart(Start):
         if sum(of_axes) <= 0.5 * goal:
             enough = self.enough or (solution if solution.error <= goal else None)
             return self._with(2, before=(*self.before, solution), enough=enough)
-        share, (phi, *noises) = SHARE * goal, self.space.axes
-        for k, (axis, effects, error) in enumerate(zip(noises, solution.effects[1:], of_axes[1:], strict=True)):
-            if effects is not None and error > share:
-                noises[k] = axis.enriched() if error < effects.error else axis.refined(effects, share, False)
+        phi, noises = self.space.phi, self._finer_noises(solution, of_axes[1:], SHARE * goal)
         found = Space((phi.finer_elements() if of_axes[0] > 0.1 * goal else phi, *noises))
         found = found if found.size > self.space.size else self.space.enriched()
         self.generators.clear()
         self.pairs.clear()
         return SphereStart(self.problem, found, enough=self.enough)._with(phi.waves - 2 - found.phi.waves)
+
+    def _finer_noises(self, solution: Solution, errors: Sequence[float], share: float) -> list[Any]:
+        """The axes of the noises, finer where these errors of them exceed a share."""
+        noises = list(self.space.noises)
+        for k, (axis, effects, error) in enumerate(zip(noises, solution.effects[1:], errors, strict=True)):
+            if effects is not None and error > share:
+                noises[k] = axis.enriched() if error < effects.error else axis.refined(effects, share, False)
+        return noises
 
     def change(self, pair: PrincipalPair) -> float:
         """What waves of the next degree change in Λ(p), to first order."""

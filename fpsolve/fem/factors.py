@@ -115,9 +115,10 @@ def candidates(operator: KroneckerSum, levels: Levels, is_full: bool, ring: Ring
 
 
 def _ordered(operator: KroneckerSum, levels: Levels, is_full: bool, ring: Ring | None) -> Iterator[Factors]:
-    """What goes cell by cell, or level by level along any axis, of directions in single precision, too.
+    """What goes cell by cell, or level by level along any axis, of directions refined, and in single precision, too.
 
-    Levels of the functions of a filter have pivots that are too small for that.
+    A level of directions that paths cross has pivots that may be small; those of the functions of a filter are too
+    small for single precision.
     """
     if ring is not None and len(operator.shape) == 2 and len(ring.number) > 2:
         yield RefinedFactors(operator, RingFactors(operator, ring))
@@ -125,7 +126,8 @@ def _ordered(operator: KroneckerSum, levels: Levels, is_full: bool, ring: Ring |
         if axis or own is not None:
             groups = neighbours(operator, axis, own)
             for each in (groups, paired(groups)) if len(groups) > 2 else ():
-                yield (by_levels := LevelFactors(operator, each, axis))
+                by_levels = LevelFactors(operator, each, axis)
+                yield RefinedFactors(operator, by_levels) if is_full else by_levels
                 if is_full and by_levels.operations > LONG:
                     yield RefinedFactors(operator, LevelFactors(operator, each, axis, np.float32))
 

@@ -172,6 +172,10 @@ class Generator:
     def _own_terms(self) -> Terms | SphereTerms:
         if self.problem.dimension == 2:
             return Terms(self.problem, self.space(0.0))
+        if self.problem.system.stop:
+            from fpsolve.fem.half_sphere import HalfSphereTerms
+
+            return HalfSphereTerms(self.problem, self.space(0.0))
         from fpsolve.fem.sphere import SphereTerms  # scikit-fem takes a while to import
 
         return SphereTerms(self.problem, self.space(0.0))

@@ -163,14 +163,15 @@ class LineSpace:
     def measure(self) -> FloatArray:
         return self._measure.ravel()
 
-    def at(self, x: FloatArray) -> csr_matrix:
-        """Values at any points, as rows of E with u(x) = E @ coefficients, shape (len(x), size).
+    def at(self, x: FloatArray, derivative: int = 0) -> csr_matrix:
+        """Values, or slopes, at any points, as rows of E with u(x) = E @ coefficients, shape (len(x), size).
 
-        Beyond the ends the values there are taken.
+        Beyond the ends those there are taken.
         """
         cell = np.clip(np.searchsorted(self.lines, x, side="right") - 1, 0, self.lines.size - 2)
         local = np.clip((x - self.lines[cell]) / self._sizes[cell], 0, 1)
-        values = _reference(self.degree, local.tobytes())[0][:, None, :] @ self._transform[cell]
+        table = _reference(self.degree, local.tobytes())[derivative] / self._sizes[cell, None] ** derivative
+        values = table[:, None, :] @ self._transform[cell]
         rows = np.repeat(np.arange(x.size), self.degree + 1)
         return csr_matrix((values.ravel(), (rows, self._dofs[cell].ravel())), shape=(x.size, self.size))
 

@@ -58,6 +58,8 @@ RTOL_OF_SEVERAL = 1e-6
 """Relative error that is wanted of two variables under two noises that are not white."""
 RTOL_BEYOND_PLANE = 1e-5
 """Relative error that is wanted of three and four variables."""
+RTOL_AT_STOP = 1e-4
+"""Relative error that is wanted of four variables with a stop, where T is a root."""
 SUPPORT = np.linspace(-12, 12, 2401)
 """Values of ξ at which a coefficient is looked at that is no a + bξ, in standard deviations."""
 OF_ENTRIES = 1e-15
@@ -227,7 +229,7 @@ class Problem:
     def usual_rtol(self) -> float:
         """The relative error that is wanted where none is named."""
         if self.dimension > 2:
-            return RTOL_BEYOND_PLANE
+            return RTOL_BEYOND_PLANE if self.system.stop is None else RTOL_AT_STOP
         return RTOL_OF_SEVERAL if len(self.coloured.parts) > 1 else RTOL
 
     @property
@@ -344,7 +346,8 @@ class Problem:
         """Whether Λ(p) is found for even p > 0 alone, from closed equations of moments: directions are too many, or
         impulses move them, or the state is that of a whole delay, with p = 2 alone.
         """
-        is_large = bool(self.system.pasts or self.system.stop) or self.dimension > MOST_BY_DIRECTIONS
+        is_large = bool(self.system.pasts) or self.dimension > MOST_BY_DIRECTIONS
+        is_large = is_large or (self.system.stop is not None and self.dimension < MOST_BY_DIRECTIONS)
         return is_large or (self.dimension > 2 and bool(self._moved.impulses))
 
     @property
@@ -419,14 +422,18 @@ class Problem:
         if self.is_closed_only:
             return ()
         if self.dimension > 2:
-            matrices, n = self._by_noise(self.system.terms), self.dimension
-            basis, groups, rounded, names = (
-                np.eye(n),
-                components(np.sum(np.abs(matrices), axis=0)),
-                0.0,
-                self.system.states,
-            )
-            if len(groups) == 1:
+            matrices, n, stop = self._by_noise(self.system.terms), self.dimension, self.system.stop
+            basis, rounded, names, pattern = np.eye(n), 0.0, self.system.states, np.sum(np.abs(matrices), axis=0)
+            if stop is not None:  # in its coordinates, of which the first two are one block
+                rows, rounded = np.array(stop.coordinates), ROUNDED
+                basis, pattern = np.linalg.inv(rows), np.sum([abs(stop.inside(each)) for each in matrices], axis=0)
+                pattern[1, 0] += 1.0
+                alone = [np.flatnonzero(row) for row in rows]
+                names = [
+                    f"y{str(k + 1).translate(BELOW)}" if at.size > 1 else names[at[0]] for k, at in enumerate(alone)
+                ]
+            groups = components(pattern)
+            if len(groups) == 1 and stop is None:
                 basis = basis if self.frame is None else np.array(self.frame.matrix)
                 inverse = np.linalg.inv(basis)
                 own, groups, rounded = hidden_blocks([inverse @ each @ basis for each in matrices])

@@ -6,6 +6,7 @@ Where all matrices of a system are block triangular in coordinates x = Σ V_k y_
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -66,7 +67,9 @@ class Subsystem(System):
 
     @property
     def jumps(self) -> Sequence[Jump]:  # type: ignore[override]
-        return ()
+        """That of a stop of the whole, whose coordinate and its rate are the first two."""
+        stop = self.whole.stop
+        return (Jump(math.pi / 2, math.log(stop.restitution)),) if stop and self.own == (0, 1) else ()
 
     @cached_property
     def _sides(self) -> tuple[FloatArray, FloatArray]:
@@ -118,8 +121,8 @@ class Subsystem(System):
 
     def derivative(self, name: str) -> tuple[tuple[CoefficientMatrix, ...], tuple[float, ...]]:
         """The derivative of the whole system, in the coordinates of this block."""
-        terms, _ = self.whole.derivative(name)
-        return as_plane(self.part(terms)), ()
+        terms, jumps = self.whole.derivative(name)
+        return as_plane(self.part(terms)), jumps if self.jumps else ()
 
 
 def subsystems(

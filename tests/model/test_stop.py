@@ -90,7 +90,10 @@ def test_a_mass_that_white_noise_brings_to_rest_is_refused():
 
 
 def test_what_is_not_computed_is_refused_by_name():
-    solver = ExponentSolver(Problem(equations(), TELEGRAPH))
+    wall = {"at": "q = 0", "restitution": 0.6}
+    rates = "v", "-q - 0.1*v - xi*q - 0.3*y", "-y - 0.3*q"
+    three = PlaneSystem.of_equations(("q", "v", "y"), rates, walls=[wall])
+    solver = ExponentSolver(Problem(three, TELEGRAPH))
     for ask in (solver.lyapunov_exponent, lambda: solver.pair(2.0), lambda: solver.pair(1.0)):
         with pytest.raises(NoSuchExponent, match="at a wall of more than two variables"):
             ask()

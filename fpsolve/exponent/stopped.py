@@ -1,0 +1,125 @@
+"""Λ(p) of four variables with a stop: finer elements and waves on the half sphere, until Λ(p) settles.
+
+The coordinates are those of the stop, each pair in a unit and, the second one, in a rotation of its own, as nothing
+else keeps the impact. Between both pairs the unit is that in which E xxᵀ and Q of `modes` are alike, of the motion
+without the stop but with the damping 2ν ln(1/R), which takes as much in a period 1/ν; where these lie far apart,
+elements are graded.
+
+What two degrees more change to first order, in η, in θ₁ and in θ₂ by themselves, tells where finer functions are
+needed. At the stop T is a root, so that these changes fall as a power of the degree, and not evenly: they correct
+nothing, but the error is about half of their sum, or of the last step of Λ(p), whichever is larger, and twice the sum
+of a single space.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.linalg
+
+from fpsolve.arrays import FloatArray
+from fpsolve.exponent.eigen import PrincipalPair
+from fpsolve.exponent.error import Solution
+from fpsolve.exponent.modes import GRADED_STEP, LEFT, THINNEST, WEAK, SphereStart, first_order_change, second_moments
+from fpsolve.exponent.starts import SHARE, Question
+from fpsolve.fem.generator import Generator
+from fpsolve.fem.half_sphere import HalfSphereAxis
+from fpsolve.fem.space import Space, first_axis
+from fpsolve.model.plane import CoefficientMatrix, LinearMotion, rotating_coordinates
+from fpsolve.model.problem import Problem
+
+FIRST_DEGREE = 4
+"""Degree of the elements of the first space."""
+FIRST_WAVES = 2
+"""Largest degree of its waves."""
+AT_STOP = 0.0, 0.5, 0.8, 1.0
+"""Vertices in η, over ½π: smaller elements where the first mass is at rest at the stop."""
+OF_ONE = 2.0
+"""What is left, over the sum of the changes, of a single space."""
+WORTH = 0.2
+"""Share of the largest change from which on functions in another direction are made finer, too."""
+
+
+def stopped_directions(problem: Problem) -> HalfSphereAxis:
+    """The coarsest functions on the half sphere."""
+    stop, system = problem.system.stop, problem.system
+    assert stop is not None
+    terms = [replace(term, matrix=tuple(map(tuple, stop.inside(term.matrix).tolist()))) for term in system.terms]
+    means = [problem.named_noise(term.noise).mean_of(term.g) for term in terms]
+    parts = [m * system.epsilon**term.order * np.array(term.matrix) for m, term in zip(means, terms, strict=True)]
+    free = np.sum(parts, axis=0)
+    own = scipy.linalg.block_diag(_rotating(free[:2, :2]), _rotating(free[2:, 2:]))
+    damping = np.zeros((4, 4))
+    damping[1, 1] = math.sqrt(abs(free[1, 0])) / math.pi * 2 * math.log(stop.restitution)
+    smooth = LinearMotion(system.epsilon, (*terms, CoefficientMatrix(0, damping.tolist())))
+    _, q, p = second_moments(replace(problem, system=smooth))
+    back = np.linalg.inv(own)
+    forms = [np.diagonal(each).reshape(2, 2).sum(axis=1) for each in (own.T @ q @ own, back @ p @ back.T)]
+    of_q, of_p = (np.maximum(each / np.sum(each), THINNEST**2) for each in forms)
+    place, units = 0.25 * math.log(of_q[0] * of_p[0] / (of_q[1] * of_p[1])), (of_p / of_q) ** 0.25
+    lines = 0.5 * math.pi * np.array(AT_STOP)
+    if (far := abs(place)) > math.log(1 / WEAK):
+        inner = np.linspace(-far - 1, far + 1, max(2, round(2 * (far + 1) / GRADED_STEP)) + 1)
+        lines = np.concatenate([[0.0], np.arctan(np.exp(inner)), lines[-1:]])
+    coordinates = np.linalg.solve(np.array(stop.coordinates), own @ np.diag(np.repeat(units, 2)))
+    in_theta = np.linspace(-0.5, 0.5, 3) * math.pi
+    return HalfSphereAxis(
+        tuple(map(tuple, coordinates.tolist())), lines, FIRST_DEGREE, in_theta, FIRST_DEGREE, FIRST_WAVES
+    )
+
+
+def _rotating(block: FloatArray) -> FloatArray:
+    """Coordinates in which a pair rotates uniformly, but for growth, the first one as it was but for its unit."""
+    if (found := rotating_coordinates(block)) is None:
+        _, found = scipy.linalg.matrix_balance(block, permute=False)
+    lower = np.linalg.qr(found.T)[1].T
+    return np.asarray(lower * np.sign(np.diagonal(lower)))
+
+
+@dataclass(frozen=True, eq=False)
+class StopStart(SphereStart):
+    """Directions of four variables with a stop; `before` holds the solution with coarser functions, if there is one.
+
+    Attributes:
+        changes: what finer functions in η, in θ₁ and in θ₂ change, where that is known.
+    """
+
+    changes: tuple[float, ...] = ()
+
+    def with_error(self, pair: PrincipalPair, allowed: float) -> Solution:
+        _, *of_noises = self._of_axes(pair, allowed)
+        phi, found = self.space.phi, list[float]()
+        for finer in phi.finer:
+            generator = Generator(self.problem, self.space.with_axis(0, finer))
+            found.append(abs(first_order_change(pair, generator, 0, finer.new_in(phi))))
+        pair, left = replace(pair, rounding=pair.rounding + self._rounding(pair)), OF_ONE * sum(found)
+        for each in self.before:
+            left = LEFT * max(sum(found), abs(pair.value - each.pair.value))
+        return Solution(pair, 0.0, (left, *of_noises), replace(self, changes=tuple(found)))
+
+    def is_enough(self, solution: Solution) -> bool:
+        return True
+
+    def doubled(self, failure: Exception | None) -> StopStart:
+        return StopStart(self.problem, self.space.with_axis(0, self.space.phi.enriched()))
+
+    def refined(self, solution: Solution, goal: float, stages: int, most: int) -> StopStart:
+        """Two degrees more where they change most, if they are to, and other functions of the noise."""
+        assert solution.measured is not None
+        phi, changes = self.space.phi, np.array(solution.start.changes)
+        if solution.measured[0] > 0.5 * goal:
+            phi = phi.raised_in(changes >= WORTH * np.max(changes))
+        found = Space((phi, *self._finer_noises(solution, solution.measured[1:], SHARE * goal)))
+        found = found if found.size > self.space.size else self.space.enriched()
+        return StopStart(self.problem, found, before=(solution,))
+
+
+def stop_start(question: Question) -> StopStart:
+    """The coarsest functions, or those before the ones that were enough for the nearest p."""
+    for _, known in sorted(question.known.items(), key=lambda each: abs(each[0] - question.p)):
+        if isinstance(start := known.start, StopStart):
+            return StopStart(question.problem, (*(each.pair.space for each in start.before), start.space)[0])
+    noises = (first_axis(noise, -math.log10(question.rtol)) for noise in question.problem.coloured.parts.values())
+    return StopStart(question.problem, Space((stopped_directions(question.problem), *noises)))
