@@ -484,7 +484,7 @@ class ExponentSolver:
         """Estimate of |error of Λ′(p)|; NaN where none is known.
 
         It is from the highest modes, see `error.slope_error`; where these do not tell, twice what a finer
-        discretisation changes.
+        discretisation changes, or what has changed since a coarser one of the same place.
         """
         if p not in self.slope_errors:
             self.slope_errors[p] = math.nan
@@ -503,8 +503,9 @@ class ExponentSolver:
             jump = self._jump() if is_at_corner(self.problem, p) else 0.0
             if solution.modes_tell:
                 return slope_error(solution.pair) + jump
-            finer = self.whole.finer_pair(solution.pair)
-            return 2 * abs(finer.derivative - solution.pair.derivative) + slope_rounding(solution.pair) + jump
+            coarser = [each.pair for each in getattr(solution.start, "before", ())]
+            other = coarser[-1] if coarser else self.whole.finer_pair(solution.pair)
+            return 2 * abs(other.derivative - solution.pair.derivative) + slope_rounding(solution.pair) + jump
 
     def _jump(self) -> float:
         """What Λ′ rises at p = −1 if Λ″ on both sides does not explain it: there is any slope between at a corner."""

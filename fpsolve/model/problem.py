@@ -237,6 +237,8 @@ class Problem:
         """Why functions of it cannot be drawn; empty where they can, of more than two variables over directions."""
         if self.is_closed_only:
             return "functions of the directions of so many variables are not computed; look at Λ(2)"
+        if self.system.stop is not None:
+            return "functions of the directions on one side of a stop are not drawn; look at Λ(p)"
         if self.dimension > 2:
             return ""
         if len(self.coloured.parts) > 1:
