@@ -70,7 +70,7 @@ class HalfSphereAxis(DirectionAxis):
 
     @property
     def finer(self) -> tuple[HalfSphereAxis, HalfSphereAxis, HalfSphereAxis]:
-        """Two degrees more in η, in θ₁ and in θ₂; the elements of degrees that are too high are halved by `refined`."""
+        """Two degrees more in η, in θ₁ and in θ₂."""
         return (
             replace(self, degree=self.degree + 2),
             replace(self, first_degree=self.first_degree + 2),
@@ -80,10 +80,9 @@ class HalfSphereAxis(DirectionAxis):
     def new_in(self, coarse: HalfSphereAxis) -> Any:
         """Which functions a coarser axis, of lower degrees, does not have, shape (size,)."""
         nodes, firsts, waves = np.unravel_index(self._kept, self._shape)
-        new = (self.line.modes > coarse.degree)[nodes] | (self._second.degrees[self._own] > coarse.waves)[waves]
-        return new | (np.delete(self.first_line.modes, self.first_line.ends[1]) > coarse.first_degree)[firsts - 1] * (
-            firsts > 0
-        )
+        of_first = np.append(0, np.delete(self.first_line.modes, self.first_line.ends[1])) > coarse.first_degree
+        of_second = self._second.degrees[self._own] > coarse.waves
+        return (self.line.modes > coarse.degree)[nodes] | of_first[firsts] | of_second[waves]
 
     def enriched(self) -> HalfSphereAxis:
         """Two degrees more in every direction."""
@@ -221,9 +220,8 @@ class HalfSphereAxis(DirectionAxis):
         values, _, of_first, _ = self._tables
         inner, waves = self.lines[1:-1], identity(self._own.size)
         in_eta = _jumps(self.line, self.degree, np.cos(inner) * np.sin(inner) ** 3)
-        in_theta = (
-            self._first.T @ _jumps(self.first_line, self.first_degree, np.ones(self.first_lines.size - 2)) @ self._first
-        )
+        in_theta = _jumps(self.first_line, self.first_degree, np.ones(self.first_lines.size - 2))
+        in_theta = self._first.T @ in_theta @ self._first
         of_eta = values.T @ ((self.line.measure / np.cos(self.line.points))[:, None] * values)
         of_theta = of_first.T @ (self.first_line.measure[:, None] * of_first)
         return -self._assembled([(in_eta, of_theta, waves), (of_eta, in_theta, waves)])
