@@ -2,12 +2,12 @@
 
 The coordinates are those of the stop, each pair in a unit and, the second one, in a rotation of its own, as nothing
 else keeps the impact. Between both pairs the unit is that in which E xxᵀ and Q of `modes` are alike, of the motion
-without the stop but with the damping 2ν ln(1/R), which takes as much in a period 1/ν; where these lie far apart,
-elements are graded.
+without the stop but with the damping 2ν ln(1/R), which takes as much in a period 1/ν. T is smooth
+there, and the layers of T* are nothing to Λ(p).
 
 What two degrees more change to first order, in η, in θ₁ and in θ₂ by themselves, tells where finer functions are
 needed. At the stop T is a root, so that these changes fall as a power of the degree, and not evenly: they correct
-nothing, but the error is about half of their sum, or of the last step of Λ(p), whichever is larger, and twice the sum
+nothing, but the error is about half of their sum, or of the last step of Λ(p), whichever is larger, and four times the sum
 of a single space.
 """
 
@@ -22,7 +22,7 @@ import scipy.linalg
 from fpsolve.arrays import FloatArray
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.error import Solution
-from fpsolve.exponent.modes import GRADED_STEP, LEFT, THINNEST, WEAK, SphereStart, first_order_change, second_moments
+from fpsolve.exponent.modes import LEFT, THINNEST, SphereStart, first_order_change, second_moments
 from fpsolve.exponent.starts import SHARE, Question
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.half_sphere import HalfSphereAxis
@@ -36,7 +36,7 @@ FIRST_WAVES = 2
 """Largest degree of its waves."""
 AT_STOP = 0.0, 0.5, 0.8, 1.0
 """Vertices in η, over ½π: smaller elements where the first mass is at rest at the stop."""
-OF_ONE = 2.0
+OF_ONE = 4.0
 """What is left, over the sum of the changes, of a single space."""
 WORTH = 0.2
 """Share of the largest change from which on functions in another direction are made finer, too."""
@@ -58,15 +58,16 @@ def stopped_directions(problem: Problem) -> HalfSphereAxis:
     back = np.linalg.inv(own)
     forms = [np.diagonal(each).reshape(2, 2).sum(axis=1) for each in (own.T @ q @ own, back @ p @ back.T)]
     of_q, of_p = (np.maximum(each / np.sum(each), THINNEST**2) for each in forms)
-    place, units = 0.25 * math.log(of_q[0] * of_p[0] / (of_q[1] * of_p[1])), (of_p / of_q) ** 0.25
-    lines = 0.5 * math.pi * np.array(AT_STOP)
-    if (far := abs(place)) > math.log(1 / WEAK):
-        inner = np.linspace(-far - 1, far + 1, max(2, round(2 * (far + 1) / GRADED_STEP)) + 1)
-        lines = np.concatenate([[0.0], np.arctan(np.exp(inner)), lines[-1:]])
+    units = (of_p / of_q) ** 0.25
     coordinates = np.linalg.solve(np.array(stop.coordinates), own @ np.diag(np.repeat(units, 2)))
     in_theta = np.linspace(-0.5, 0.5, 3) * math.pi
     return HalfSphereAxis(
-        tuple(map(tuple, coordinates.tolist())), lines, FIRST_DEGREE, in_theta, FIRST_DEGREE, FIRST_WAVES
+        tuple(map(tuple, coordinates.tolist())),
+        0.5 * math.pi * np.array(AT_STOP),
+        FIRST_DEGREE,
+        in_theta,
+        FIRST_DEGREE,
+        FIRST_WAVES,
     )
 
 

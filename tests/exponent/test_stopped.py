@@ -1,8 +1,9 @@
-"""Λ(p) of four variables with a stop: simulations, systems without one that are alike in law, the oscillator, R."""
+"""Λ(p) of four variables with a stop: simulations, systems without one that are alike in law, the oscillator."""
 
 import pytest
 
 from fpsolve.exponent import ExponentSolver
+from fpsolve.exponent.adapt import Budget, WholeProblem
 from fpsolve.model import PlaneSystem, Problem, Telegraph, White
 
 NAMES = "q1", "v1", "q2", "v2"
@@ -32,16 +33,19 @@ def test_an_elastic_stop_under_white_noise_in_the_coupling_changes_no_law():
     assert abs(found.pair.value - expected.pair.value) <= found.error + expected.error < 1e-5
 
 
-def test_an_uncoupled_mode_leaves_the_oscillator_with_a_wall():
-    whole = coupled(0.8, 0)
-    wall = [{"at": "q = 0", "restitution": 0.8}]
-    rates = "v", "-0.1*v - (1 + xi)*q"
-    alone = Problem(PlaneSystem.of_equations(("q", "v"), rates, walls=wall), TELEGRAPH)
+@pytest.mark.parametrize("noise", [TELEGRAPH, White(s=0.35)])
+def test_a_mode_that_drives_another_has_the_exponents_of_the_oscillator_with_a_wall(noise):
+    """Of the block by itself, and of both together by elements of the half sphere."""
+    walls = [{"at": "q1 = 0", "restitution": 0.63}]
+    rates = "v1", "-q1 - 0.1*v1 - 0.8*xi*q1", "v2", "-3.4*q2 - 0.9*v2 - 0.5*xi*q2 + 0.2*q1"
+    whole = Problem(PlaneSystem.of_equations(NAMES, rates, walls=walls), noise)
+    alone = ExponentSolver(Problem(PlaneSystem.of_equations(NAMES[:2], rates[:2], walls=walls), noise))
+    expected = alone.pair(1.0).value
     assert whole.block_names == ("(q1, v1)", "(q2, v2)")
-    of_blocks = ExponentSolver(whole).classes
-    for p in (1.0, -1.5):
-        expected = ExponentSolver(alone).moments(p).value
-        assert ExponentSolver(of_blocks[0].problem).moments(p).value == pytest.approx(expected, rel=1e-7)
+    assert ExponentSolver(whole.classes[0]).pair(1.0).value == pytest.approx(expected, rel=1e-7)
+    by_elements = WholeProblem(whole, rtol=1e-4, budget=Budget(), tolerance=lambda p, value: 5e-5)
+    found = by_elements.solution(1.0)
+    assert abs(found.pair.value - expected) <= found.error < 5e-5
 
 
 @pytest.mark.slow
