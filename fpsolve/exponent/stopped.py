@@ -7,8 +7,8 @@ there, and the layers of T* are nothing to Λ(p).
 
 What two degrees more change to first order, in η, in θ₁ and in θ₂ by themselves, tells where finer functions are
 needed. At the stop T is a root, so that these changes fall as a power of the degree, and not evenly: they correct
-nothing, but the error is about half of their sum, or of the last step of Λ(p), whichever is larger, and four times the sum
-of a single space.
+nothing, but the error is half of their sum, or of the last step of Λ(p), or a quarter of the sum on the space before,
+whichever is the largest, and four times the sum on a single space.
 """
 
 from __future__ import annotations
@@ -36,6 +36,8 @@ FIRST_WAVES = 2
 """Largest degree of its waves."""
 AT_STOP = 0.0, 0.5, 0.8, 1.0
 """Vertices in η, over ½π: smaller elements where the first mass is at rest at the stop."""
+OF_LAST = 0.25
+"""What is left at least, over the sum of the changes of the space before."""
 OF_ONE = 4.0
 """What is left, over the sum of the changes, of a single space."""
 WORTH = 0.2
@@ -97,7 +99,8 @@ class StopStart(SphereStart):
             found.append(abs(first_order_change(pair, generator, 0, finer.new_in(phi))))
         pair, left = replace(pair, rounding=pair.rounding + self._rounding(pair)), OF_ONE * sum(found)
         for each in self.before:
-            left = LEFT * max(sum(found), abs(pair.value - each.pair.value))
+            step, lacked = abs(pair.value - each.pair.value), sum(each.start.changes)
+            left = max(LEFT * sum(found), LEFT * step, OF_LAST * lacked)
         return Solution(pair, 0.0, (left, *of_noises), replace(self, changes=tuple(found)))
 
     def is_enough(self, solution: Solution) -> bool:
