@@ -203,24 +203,16 @@ def _is_rightmost(pair: PrincipalPair, pencil: Pencil) -> bool:
     """Whether (σ − L)⁻¹1 > 0, as it is for a σ beside Λ if Λ is the rightmost eigenvalue, and also for the adjoint.
 
     Of another one, by which all else is larger than rounding, it is −1/(Λ′ − σ) of its share. Of three and four
-    variables, where pairs are followed from p = 0, only what is resolved is looked at: under waves T* is not.
+    variables, where pairs are followed from p = 0, only what is resolved is looked at: under waves T* is not. One of
+    both must do at a stop, where the adjoint is no function: a share of the time the mass is at rest there.
     """
     space, problem = pencil.space, pair.generator.problem
     rate, seen = problem.unit_rate, [problem.dimension == 2 or each <= POSITIVE for each in pair.sign_defects]
-    source = space.weighed(space.constant)
+    source, judged = space.weighed(space.constant), min if problem.system.stop else max
     for shift in BESIDE_IT:
         factor = pencil.factorised(pair.eigenvalue + shift * rate)
         right, left = -factor.solve(source), -factor.solve(source, transposed=True)
-        if max(np.compress(seen, _sign_defects(space, right, left)), default=0.0) > SURELY_POSITIVE:
-    Of another one, by which all else is larger than rounding, it is −1/(Λ′ − σ) of its share. One of both must do at a
-    stop, where the adjoint is no function: a share of the time the mass is at rest there.
-    """
-    space, problem = pencil.space, pair.generator.problem
-    rate, source, judged = problem.unit_rate, space.weighed(space.constant), min if problem.system.stop else max
-    for shift in BESIDE_IT:
-        factor = pencil.factorised(pair.eigenvalue + shift * rate)
-        right, left = -factor.solve(source), -factor.solve(source, transposed=True)
-        if judged(_sign_defects(space, right, left)) > SURELY_POSITIVE:
+        if judged(np.compress(seen, _sign_defects(space, right, left)), default=0.0) > SURELY_POSITIVE:
             return False
     return True
 
