@@ -350,6 +350,8 @@ def nonzero_root(
     except NoRoot as none:
         if none.missing is None:
             return Absent(Message(Code.NO_ROOT, low=ends[0], high=ends[1], is_bounded=noise.is_bounded))
+        if isinstance(none.missing.__cause__, OverBudget):
+            raise none.missing.__cause__ from None
         low, high = (ends[0], none.last) if none.is_negative else (none.last, ends[1])
         return Absent(Message(Code.NO_ROOT_REACHED, low=low, high=high, reason=_not_resolved(none.missing)))
     ratio, slope, error = solved[p]

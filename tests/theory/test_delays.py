@@ -206,5 +206,5 @@ def test_what_is_refused():
     wall = {"at": "x = 0", "restitution": 0.8}
     from fpsolve.model import PlaneSystem
 
-    with pytest.raises(TableError, match="without a delay only"):
+    with pytest.raises(TableError, match="none with a delay"):
         PlaneSystem.of_equations(("x", "v"), ("v", "-x + xi*x(t - 1)"), walls=[wall])
