@@ -57,15 +57,12 @@ FAR = 0.2
 WITHIN = 0.47
 """Share of a gap between two nodes where its error is looked at, and the next node is put: even p tell too little."""
 BOTH_SIDES = (0.2, 0.8)
-"""Shares of a gap where its error is looked at, too, unless it is hardly anything in the middle."""
+"""Shares of a gap where its error is looked at, too, if the middle has little: it may be 50 times that there, as
+where another eigenvalue of the small pencil passes."""
 LEAST = 0.25
 """What is left there over the most, as it falls to the nodes."""
-HARDLY = 0.25
-"""Share of what is allowed up to which it is that."""
 HOPELESS = 100.0
 """What is left over what is allowed from which on nodes elsewhere are not expected to suffice."""
-ELSEWHERE = 4.0
-"""What may be left elsewhere in a gap, over that in the middle, where it is looked at there only."""
 SAFE = 4.0
 """What is left, over its estimate to first order."""
 SHARE = 0.4
@@ -272,13 +269,10 @@ class Basis:
             if left is None or left.nodes < (len(self.nodes) if shares[i] <= HOPELESS else 1):
                 near, far = sorted(gap, key=abs)
                 found = self._left_at(near + WITHIN * (far - near), gap)
-                if found.error <= HARDLY * found.allowed:
-                    self._lefts[gap] = found._replace(error=ELSEWHERE * found.error)
-                elif found.error > found.allowed:
-                    self._lefts[gap] = found
-                else:
+                if found.error <= found.allowed:
                     others = (self._left_at(low + share * (high - low), gap) for share in BOTH_SIDES)
-                    self._lefts[gap] = max([found, *others], key=lambda each: each.error / each.allowed)
+                    found = max([found, *others], key=lambda each: each.error / each.allowed)
+                self._lefts[gap] = found
             elif len(self.nodes) >= most:
                 return False
             else:

@@ -8,6 +8,7 @@ import pytest
 from fpsolve import (
     ExponentSolver,
     MomentLyapunovFunction,
+    NonGaussianNoise,
     OrnsteinUhlenbeck,
     PlaneSystem,
     Problem,
@@ -171,3 +172,13 @@ def test_rounding_of_white_growth_is_in_the_error(p):
     problem = random_planar.drawn(13).problem
     found = moment_lyapunov(problem, p)
     assert abs(found.value[0] - 0.5 * p * (p - 1) * problem.noise.s**2) <= found.error_estimate[0] < 2e-15 * 5e3
+
+
+@pytest.mark.parametrize("p", [3.75, 3.82])
+def test_what_is_left_aside_of_the_middle_of_a_gap_is_seen(p):
+    """Another eigenvalue of the small pencil passed at 3.82: off by 110 times the error by the middle alone."""
+    system = VibroImpactOscillator(omega=1.0, restitution=1.0, c1=0.0, epsilon=1.0)
+    problem = Problem(system, NonGaussianNoise(D0=0.2505936168136361, tau0=1.0, r0=1.0).ou_reduction())
+    function = MomentLyapunovFunction(problem, (-2.5, 4.0), rtol=3e-4)
+    single = ExponentSolver(problem, rtol=1e-7).solution(p)
+    assert abs(function(p) - single.pair.value) <= function.error_estimate(p) + single.error
