@@ -297,9 +297,10 @@ def _simulated(
     ]
     estimates = [_joined(each, weights) for each in zip(*(each for each, _ in found), strict=True)]
     at_wall = np.array([batch.impacts for batch in plain]) / (times * plan.paths)
-    (rate, error), (variance_rate, variance_rate_error), *of_wall = (
+    of_wall = [_counted([values[group] for group in groups]) for values in (at_wall.real, at_wall.imag)]
+    (rate, error), (variance_rate, variance_rate_error) = (
         _at_no_step([(values[group].mean(), standard_error(values[group])) for group in groups], weights)
-        for values in (exponents, variance_rates, at_wall.real, at_wall.imag)
+        for values in (exponents, variance_rates)
     )
     estimates = [
         replace(each, value=each.p * rate, standard_error=abs(each.p) * error) if 0 < abs(each.p) < _TINY else each
@@ -328,6 +329,12 @@ def _at_no_step(found: Sequence[tuple[Any, Any]], weights: FloatArray) -> tuple[
     """A number and its standard error by the batches of each step, without the bias of the step; NaN if one is None."""
     values, errors = np.array(found, dtype=float).T
     return float(weights @ values), float(np.linalg.norm(weights * errors))
+
+
+def _counted(values: Sequence[FloatArray]) -> tuple[float, float]:
+    """What batches of the usual step count, and its standard error with half of what three times this step changes."""
+    off = np.ptp([each.mean() for each in values]) / 2
+    return float(values[0].mean()), math.hypot(standard_error(values[0]), off)
 
 
 def _joined(found: Sequence[MomentEstimate], weights: FloatArray) -> MomentEstimate:

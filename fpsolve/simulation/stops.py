@@ -8,7 +8,7 @@ its flights, 2q̇/(|q̈|(1 − R)), is short beside all other times. Then q rest
 Under a chain ξ is held between its jumps: nothing is left out. Under a diffusion it is held over each half of a step,
 at mean ∓ ⅔ rise, which has the mean and the first moment of the line that `motions` takes, and the order 4 (S. Blanes
 and P. C. Moan, Appl. Numer. Math. 56, 2006); q̇ is the rate of q in both. Under white noise a part of a step is halved,
-by the law of ΔW and ∫W dt of its halves, until all of its impacts are fast beside what the noise does to q̇ in it.
+by the law of ΔW and ∫W dt of its halves, until it cannot reach the wall, or the noise does little to q̇.
 
 State: as in `spaces`. A move returns the number of fast impacts and, as its imaginary part, the time at rest of all.
 """
@@ -32,9 +32,10 @@ _LEAST = 1e-17
 """Share of the state below which further terms of a series are left out."""
 _NEAR = 1e-15
 """Share of the terms of a series below which its sum is 0; share of its range that is no step."""
-_RESOLVED, _FINEST, _MOST_SPLIT = 100.0, 0.1, 40
-"""Of a part of a step of white noise with an impact: the impact over what the noise does to q̇, that over the speed of a
-fast impact from which on it does no harm, and how often a step is halved at most."""
+_RESOLVED, _FINEST, _WIDE, _MOST_SPLIT = 10.0, 0.1, 4.0, 40
+"""Of a part of a step of white noise that may reach the wall: q̇ over what the noise does to it, that over the speed of
+a fast impact from which on it does no harm, how many times of it are reckoned with, and how often a step is halved at
+most. What is halved follows from the state before it alone: by its impacts those that are missed would stay missed."""
 _RELEASED = 1e-4
 """Share of a part after which a mass that has left the wall may be there again."""
 
@@ -54,36 +55,33 @@ class DrivenStop(NamedTuple):
         drawn(noise, xi, mean, rise, push, rng)
         n, total, parts = m.fast.size, 0j, np.empty((_MOST_SPLIT + 2, 3))
         matrix, state, series = np.empty((n, n)), np.empty(n), np.empty((_MOST_TERMS + 1, n + 1))
-        begun, slowest = np.empty(n), np.empty(1)
         for i in range(x.size):
             _load(x, u, i, state)
             parts[0], top = (h, mean[i] * h, -rise[i] * h / 6), 0
             while top >= 0:
                 s, w, area = parts[top]
-                kick, least, found = 0.0, 0.0, 0j
+                kick, force, least = 0.0, 0.0, 0.0
                 for c in range(n):
-                    begun[c] = state[c]
                     kick += (c > 0) * m.matrices[1, 1, c] * state[c]
+                    force += m.matrices[0, 1, c] * state[c]
                     least += m.fast[c] * abs(state[c])
-                kick, slowest[0] = abs(kick) * math.sqrt(s) * m.is_white, math.inf
+                kick, speed = abs(kick) * math.sqrt(s) * m.is_white, abs(state[1])
+                is_near = abs(state[0]) < s * (speed + abs(force) * s + _WIDE * kick)
+                if is_near and speed < _RESOLVED * kick and kick > _FINEST * least and top < _MOST_SPLIT:
+                    z, more = math.sqrt(s) / 4 * rng.standard_normal(), math.sqrt(s / 12) * rng.standard_normal()
+                    first = 0.5 * s, 0.5 * w + 1.5 * area + z, 0.25 * area - 0.5 * z + 0.5 * more
+                    parts[top] = 0.5 * s, w - first[1], first[2] - more
+                    top += 1
+                    parts[top] = first
+                    continue
+                top -= 1
                 for side in (0.5, -0.5):
                     value, size = (w + 8 * side * area) / s, 0.0
                     for r in range(n):
                         for c in range(n):
                             matrix[r, c] = m.matrices[0, r, c] + value * m.matrices[1, r, c]
                             size += matrix[r, c] ** 2
-                    found += _flown(m, matrix, 0.5 * s, math.sqrt(size), state, series, slowest)
-                if _RESOLVED * kick <= slowest[0] or kick <= _FINEST * least or top >= _MOST_SPLIT:
-                    total += found
-                    top -= 1
-                    continue
-                z, more = math.sqrt(s) / 4 * rng.standard_normal(), math.sqrt(s / 12) * rng.standard_normal()
-                first = 0.5 * s, 0.5 * w + 1.5 * area + z, 0.25 * area - 0.5 * z + 0.5 * more
-                parts[top] = 0.5 * s, w - first[1], first[2] - more
-                top += 1
-                parts[top] = first
-                for c in range(n):
-                    state[c] = begun[c]
+                    total += _flown(m, matrix, 0.5 * s, math.sqrt(size), state, series)
             log_norm[i] += _tamed(state)
             _store(x, u, i, state)
         return total
@@ -101,13 +99,13 @@ class SwitchedStop(NamedTuple):
     def move(m, noise, h, x, u, xi, log_norm, push, room, rng):  # type: ignore[no-untyped-def]
         """One step as that of a `SwitchedMotion`."""
         n, total = m.fast.size, 0j
-        state, series, slowest = np.empty(n), np.empty((_MOST_TERMS + 1, n + 1)), np.empty(1)
+        state, series = np.empty(n), np.empty((_MOST_TERMS + 1, n + 1))
         for i in range(x.size):
             k, left = int(xi[i]), h
             _load(x, u, i, state)
             while left > 0:
                 stay = rng.standard_exponential() / noise.leaving[k]
-                total += _flown(m, m.matrices[k], min(stay, left), m.sizes[k], state, series, slowest)
+                total += _flown(m, m.matrices[k], min(stay, left), m.sizes[k], state, series)
                 left -= stay
                 if left > 0:
                     mark, left_behind, k = rng.random(), k, 0
@@ -120,7 +118,7 @@ class SwitchedStop(NamedTuple):
 
 
 @compiled
-def _flown(m, matrix, t, size, state, series, slowest):  # type: ignore[no-untyped-def]
+def _flown(m, matrix, t, size, state, series):  # type: ignore[no-untyped-def]
     """Move a state by ẏ = A y, ‖A‖ ≤ size, for a time t, in place; fast impacts and, imaginary, the time at rest."""
     n, count, rest, is_released = state.size, 0, 0.0, False
     state[0] = abs(state[0])  # the start is on either side
@@ -140,13 +138,12 @@ def _flown(m, matrix, t, size, state, series, slowest):  # type: ignore[no-untyp
                 state[r] = state[r] * at + series[k, r]
         is_released = is_held and at < 1
         if is_held:
-            rest, slowest[0] = rest + at * d, 0.0
+            rest += at * d
         elif at < 1:
             least = 0.0
             for r in range(2, n):
                 least += m.fast[r] * abs(state[r])
             count += abs(state[1]) > least
-            slowest[0] = min(slowest[0], abs(state[1]))
             state[0], state[1] = 0.0, m.restitution * abs(state[1])
             force = _force(matrix, state)
             if force < 0 and 2 * state[1] * size <= -_SHORT * force * (1 - m.restitution):

@@ -24,7 +24,7 @@ def flown(matrix, state, t, restitution, steps=1):
     matrix, state, n = np.array(matrix, dtype=float), np.array(state, dtype=float), len(state)
     m = SwitchedStop(matrix[None], np.linalg.norm(matrix, 2, (0, 1))[None], restitution, 1e-3 * (np.arange(n) > 1))
     series = np.empty((25, n + 1))
-    return state, sum(_flown(m, matrix, t / steps, m.sizes[0], state, series, np.empty(1)) for _ in range(steps))
+    return state, sum(_flown(m, matrix, t / steps, m.sizes[0], state, series) for _ in range(steps))
 
 
 def test_a_ball_bounces_until_it_rests():
