@@ -316,7 +316,6 @@ figure = false
 def test_charts_have_a_page(tmp_path, monkeypatch):
     for name, nodes in (
         ("analysis.stability.NODES", 7),
-        ("workflow.chart.NODES", 7),
         ("workflow.chart.CLOSED_FORM_NODES", 31),
     ):
         monkeypatch.setattr(f"fpsolve.{name}", nodes)
