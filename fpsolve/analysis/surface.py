@@ -632,7 +632,7 @@ class Surface(Result):
         whole = np.concatenate([g[:, :, :1], a[:, :, 1:]], axis=2)
         y = np.linalg.solve(whole.swapaxes(1, 2), first[:, :, None])[:, :, 0]
         value = np.sum(y * source, axis=1)
-        z = np.linalg.solve(whole, source[:, :, None])[:, :, 0] if slopes or len(value) == 1 else 0.0 * y
+        z = np.linalg.solve(whole, source[:, :, None])[:, :, 0] if slopes else 0.0 * y
         gradient = []
         for by_a, by_b, by_g in slopes:
             by_whole = np.concatenate([by_g[:, :, :1], by_a[:, :, 1:]], axis=2)

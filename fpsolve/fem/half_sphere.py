@@ -26,10 +26,10 @@ from scipy.sparse import csr_matrix, diags, identity, kron
 from scipy.sparse.linalg import LinearOperator
 
 from fpsolve.arrays import FloatArray, IntArray, Matrix, one
-from fpsolve.fem.axis import KroneckerSum, along
+from fpsolve.fem.axis import along
 from fpsolve.fem.line import LineSpace
 from fpsolve.fem.mesh import halved
-from fpsolve.fem.sphere import MOST_DEGREE, PENALTY, DirectionAxis, Group, SphereTerms, group, waves_at
+from fpsolve.fem.sphere import MOST_DEGREE, PENALTY, DirectionAxis, Group, SphereTerms, assembled, group, waves_at
 from fpsolve.fem.terms import OfMoment, Term
 from fpsolve.model.plane import is_driven
 from fpsolve.model.problem import ParameterDerivative
@@ -158,10 +158,7 @@ class HalfSphereAxis(DirectionAxis):
 
     def _assembled(self, terms: Sequence[tuple[Matrix, Matrix, Matrix]]) -> csr_matrix:
         """Σ A_k ⊗ B_k ⊗ C_k, sparse, shape (size, size)."""
-        total = KroneckerSum([tuple(map(csr_matrix, term)) for term in terms]).tocsc()
-        found = total[:, self._kept].tocsr()[self._kept]
-        found.eliminate_zeros()
-        return found
+        return assembled([tuple(map(csr_matrix, term)) for term in terms], self._kept)
 
     @cached_property
     def _tables(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:

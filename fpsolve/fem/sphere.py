@@ -231,6 +231,13 @@ class DirectionAxis(Axis):
         raise NotImplementedError
 
 
+def assembled(terms: Sequence[tuple[Matrix, ...]], kept: IntArray) -> csr_matrix:
+    """Σ A_k ⊗ B_k ⊗ … on the products that are kept, sparse."""
+    found = KroneckerSum(terms).tocsc()[:, kept].tocsr()[kept]
+    found.eliminate_zeros()
+    return found
+
+
 @dataclass(frozen=True, eq=False)
 class SphereAxis(DirectionAxis):
     """Continuous elements in η times waves of the other angles, see the module.
@@ -339,10 +346,7 @@ class SphereAxis(DirectionAxis):
 
     def _assembled(self, of_line: Sequence[FloatArray], of_waves: Sequence[Matrix]) -> csr_matrix:
         """Σ A_k ⊗ B_k of matrices in η and of the waves, sparse, shape (size, size)."""
-        total = KroneckerSum(list(zip(of_line, of_waves, strict=True))).tocsc()
-        found = total[:, self._kept].tocsr()[self._kept]
-        found.eliminate_zeros()
-        return found
+        return assembled(list(zip(of_line, of_waves, strict=True)), self._kept)
 
     @property
     def _slices(self) -> tuple[slice, slice]:

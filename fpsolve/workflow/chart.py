@@ -155,8 +155,9 @@ def solve_chart(
         known: gives what is recorded of the points of a line.
         has_closed_forms: whether they are found, too, which takes seconds.
     """
-    records = [known(line) for line in begun_lines(case)]
-    lines = [replace(line, known=of) for line, of in zip(begun_lines(case), records, strict=True)]
+    lines = begun_lines(case)
+    records = [known(line) for line in lines]
+    lines = [replace(line, known=of) for line, of in zip(lines, records, strict=True)]
     x, y = lines[0].x, lines[0].y
     chart = Chart((), _closed_forms(lines[0].problem, charted(case).zero, (x, y)) if has_closed_forms else ())
     scans = [of.scan(line) if of else line.reduced_scan() for line, of in zip(lines, records, strict=True)]
