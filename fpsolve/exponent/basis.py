@@ -150,6 +150,7 @@ class Node(NamedTuple):
         demand: of the space; nothing where it was solved on a space before.
         around: what solves with L − Λ, while nodes are added.
         right, left: T and T′, T* and T*′.
+        remains: what is left at p itself, where these come from another space.
         x, y: T and T* by the vectors of the basis that there were.
     """
 
@@ -160,6 +161,7 @@ class Node(NamedTuple):
     around: PairDerivatives | None
     right: Vectors
     left: Vectors
+    remains: float = 0.0
     x: FloatArray = NOTHING
     y: FloatArray = NOTHING
 
@@ -247,7 +249,10 @@ class Basis:
                 is_sure = 0 < rate * abs(p) <= SURELY * solver.tolerance(p, node.pair.value)
                 error = max(error, rate * abs(p)) if is_sure else self._error_beside(p)
             rate_of = error / abs(p) if p else node.rate
-            self.nodes[p] = node._replace(error=error, rate=rate_of, around=None, right=(), left=())
+            remains = 0.0 if node.demand or solver.mesh is not None else self._left_by(self._lifted(p)[0])
+            self.nodes[p] = node._replace(error=error, rate=rate_of, remains=remains)
+        for p, node in self.nodes.items():
+            self.nodes[p] = node._replace(around=None, right=(), left=())
 
     # nodes
 
@@ -498,13 +503,7 @@ class Basis:
             allowed = max(allowed, *(self.nodes[q].error for q in gap))
         if not (tangents - slack <= value <= chord + slack and goes_on):
             return Left(p, math.inf, SHARE * allowed, len(self.nodes))
-        matrix = self._generator.matrix(p).shifted(value)
-        image = matrix @ pair.right
-        off = abs(float(pair.left @ image)) / max(self._polynomials.distance(np.array([p]))[0], FAR)
-        self._off = max(self._off, SAFE * off)
-        nearest = self.nodes[min(self.nodes, key=lambda q: abs(q - p))].around
-        assert nearest is not None
-        error = SAFE * left_over(nearest, image, matrix.T @ pair.left, lambda change: matrix @ change)
+        error = self._left_by(pair)
         is_sure = abs(p) * max(node.rate for node in self.nodes.values()) <= SURELY * allowed
         is_known = is_sure or self._solver.mesh is not None or any(low < q < high for q in self._rates)
         if error <= SHARE * allowed and not is_known:
@@ -517,6 +516,16 @@ class Basis:
             if not _is_even(p):
                 self._rates[p] = found.error / abs(p)
         return Left(p, error, SHARE * allowed, len(self.nodes))
+
+    def _left_by(self, pair: PrincipalPair) -> float:
+        """What is left by what the basis makes of a pair."""
+        matrix = self._generator.matrix(pair.p).shifted(pair.eigenvalue)
+        image = matrix @ pair.right
+        off = abs(float(pair.left @ image)) / max(self._polynomials.distance(np.array([pair.p]))[0], FAR)
+        self._off = max(self._off, SAFE * off)
+        nearest = self.nodes[min(self.nodes, key=lambda q: abs(q - pair.p))].around
+        assert nearest is not None
+        return SAFE * left_over(nearest, image, matrix.T @ pair.left, lambda change: matrix @ change)
 
     def _bound(self) -> FloatArray:
         """What rounding may change in an entry of the small matrix of L and by it at the largest |p|, (size, size)."""
@@ -555,17 +564,20 @@ class Basis:
 
         That falls as the fourth power of the distance from each node. One power less is counted, as it may be the most
         elsewhere than where it was looked at. Where another eigenvalue of the small pencil passes, it is as much larger
-        as that is nearer.
+        as that is nearer. What is left at nodes of another space comes to it.
         """
-        gaps = [*pairwise(sorted(self.nodes))]
+        gaps, places = [*pairwise(sorted(self.nodes))], np.array(sorted(self.nodes))
         low, high = np.array(gaps).T
         lefts = [self._lefts.get(gap, Left(math.nan, 0.0, 0.0, 0)) for gap in gaps]
         error, at = (np.array([getattr(left, name) for left in lefts]) for name in ("error", "p"))
         at = np.where(np.isnan(at), 0.5 * (low + high), at)
         most = error / np.maximum((4 * (at - low) * (high - at) / (high - low) ** 2) ** 3, LEAST)
         i = np.clip(np.searchsorted(low, p, side="right") - 1, 0, low.size - 1)
-        most = most[i] * np.maximum(1.0, near / nearness(self._reduced(at))[i])
-        return most, most * (4 * (p - low[i]) * (high[i] - p) / (high[i] - low[i]) ** 2) ** 3
+        known, of_nodes = np.split(nearness(self._reduced(np.concatenate([at, places]))), [at.size])
+        most = most[i] * np.maximum(1.0, near / known[i])
+        remains = np.interp(p, places, [self.nodes[q].remains for q in places.tolist()])
+        remains *= np.maximum(1.0, near / np.interp(p, places, of_nodes))
+        return most + remains, most * (4 * (p - low[i]) * (high[i] - p) / (high[i] - low[i]) ** 2) ** 3 + remains
 
     def _error_beside(self, p: float) -> float:
         """The error of the space at a node of an even p, where T is too simple, by that at a p next to it."""

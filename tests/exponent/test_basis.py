@@ -96,6 +96,17 @@ def test_where_an_eigenvalue_of_the_small_pencil_alone_passes():
         assert abs(function(p) - solution.pair.value) <= function.error_estimate(p) + solution.error
 
 
+def test_beside_a_node_of_another_space_something_is_left():
+    """T at p = 0.884 is carried from a smaller space: what is left does not fall to 0 there."""
+    noise = NonGaussianNoise(D0=0.4767069628987092, tau0=1.8373750078619977, r0=1.0).ou_reduction()
+    oscillator = VibroImpactOscillator(omega=1.0, restitution=0.887332067461866, c1=0.0, epsilon=1.0)
+    problem = Problem(oscillator, noise)
+    function, exact = MomentLyapunovFunction(problem, (-2.5, 4.0), rtol=1e-5), ExponentSolver(problem, rtol=1e-10)
+    for p in (0.875, 0.893, 0.9):
+        solution = exact.solution(p)
+        assert abs(function(p) - solution.pair.value) <= function.error_estimate(p) + solution.error
+
+
 @pytest.mark.parametrize("noise", [Bounded(0.6, 1.3, 0.4), SineWiener(0.6, 1.1)], ids=repr)
 def test_bounded_noise_between_the_nodes(noise):
     system = PlaneSystem.of_equations(("x", "v"), ("v", "-x - 0.2*v - xi*x"), {})
