@@ -11,6 +11,7 @@ from contextvars import ContextVar
 import pytest
 
 from fpsolve.signals import ended_by_signals, is_interrupt, left_at_signals, signals_held
+from fpsolve.workflow.folders import saying_if_interrupted
 from tests.conftest import heed_signals, sampled
 
 SECONDS = 2.0
@@ -113,6 +114,10 @@ def test_an_interrupt_is_known_in_disguise():
         type("Owner", (), {"name": Interrupted()})
     assert is_interrupt(told.value)
     assert not is_interrupt(RuntimeError())
+    with pytest.raises(KeyboardInterrupt, match="after 2"), saying_if_interrupted(lambda: " after 2 curves"):
+        type("Owner", (), {"name": Interrupted()})
+    with pytest.raises(RuntimeError, match="own"), saying_if_interrupted(lambda: " after 2 curves"):
+        raise RuntimeError("its own")
 
 
 LONG = """

@@ -194,7 +194,7 @@ def test_an_interrupt_keeps_what_is_solved(place):
     wait_for_records(place, "interrupted", 4, process)
     process.send_signal(signal.SIGINT)
     _, said = process.communicate(timeout=60)
-    assert process.returncode == 130
+    assert process.returncode == 130, said
     assert "run it again to go on" in said
     assert "Traceback" not in said
     summary = read_json(place / "interrupted/sweep/summary.json")
@@ -223,7 +223,7 @@ def test_what_a_terminal_sends_to_all_ends_a_run_in_one_sentence(place, kind, co
     wait_for_records(place, out, 1, process)
     os.killpg(process.pid, kind)
     _, said = process.communicate(timeout=60)
-    assert process.returncode == code
+    assert process.returncode == code, said
     assert "run it again to go on" in said
     assert len(said.splitlines()) == 1
 

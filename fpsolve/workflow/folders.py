@@ -8,8 +8,9 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from fpsolve.case.case import Case
-from fpsolve.errors import OutputError, Remedy
+from fpsolve.errors import FpsolveError, OutputError, Remedy
 from fpsolve.files import TEMPORARY, alone, parsed_json, plain_text, writable
+from fpsolve.signals import is_interrupt
 from fpsolve.workflow.seal import TABLES, sealed
 
 AGAIN, ANEW = "run it again to go on", "run it again to start over"
@@ -64,10 +65,14 @@ def own_folder(case: Case, out: str | Path, replaced: Sequence[str], *, is_fresh
 
 @contextmanager
 def saying_if_interrupted(what_is_kept: Callable[[], str], again: str = AGAIN) -> Iterator[None]:
-    """An interrupt of the body says what is kept, and how to go on."""
+    """An interrupt of the body, also one that a library has made another exception of, says what is kept."""
     try:
         yield
-    except KeyboardInterrupt:
+    except FpsolveError:
+        raise
+    except BaseException as failure:
+        if not is_interrupt(failure):
+            raise
         raise KeyboardInterrupt(f"interrupted{what_is_kept()}; {again}") from None
 
 
