@@ -61,3 +61,11 @@ def test_where_effects_fall_unevenly():
     assert isinstance(found, Outcome)
     assert found.reference == "polynomials"
     assert 1e-9 < found.error < found.estimate
+
+
+def test_where_the_effect_of_two_modes_is_less_than_that_of_one():
+    """Parts of it cancel: at p = 0 that of one is 8 times as large."""
+    drawn = problems(722)[721]
+    found, exact = (ExponentSolver(drawn.solved, rtol=rtol).lyapunov_exponent() for rtol in (1e-6, 1e-10))
+    assert 1e-8 < abs(found.value - exact.value) < found.error_estimate
+    assert exact.error_estimate < 1e-10
