@@ -102,7 +102,7 @@ class Trace:
 
     def holds(self, sample: Sample, within: float = SAME) -> bool:
         """Whether it runs through a point of a curve, or near to it the same way; F > 0 left of both."""
-        return bool(np.any((self._gaps(sample.at) < within) & (np.diff(self.fine, axis=0) @ sample.tangent >= 0)))
+        return bool(np.any((self._gaps(sample.at) < within) & (self._ways @ sample.tangent >= 0)))
 
     def passes(self, at: FloatArray, within: float) -> bool:
         """Whether it passes a point, one way or the other."""
@@ -111,7 +111,7 @@ class Trace:
     def nearest(self, at: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Its point nearest to another, and the direction there, of length 1 or 0."""
         feet, k = self._feet(at), int(np.argmin(self._gaps(at)))
-        way = self.fine[k + 1] - self.fine[k]
+        way = self._ways[k]
         return feet[k], np.asarray(way / max(float(np.linalg.norm(way)), 1e-300))
 
     def _gaps(self, at: FloatArray) -> FloatArray:
@@ -120,9 +120,14 @@ class Trace:
 
     def _feet(self, at: FloatArray) -> FloatArray:
         """The points of the pieces that are nearest to a point."""
-        start, way = self.fine[:-1], np.diff(self.fine, axis=0)
+        start, way = self.fine[:-1], self._ways
         share = np.clip(np.sum((at - start) * way, axis=1) / np.maximum(np.sum(way**2, axis=1), 1e-300), 0, 1)
         return np.asarray(start + share[:, None] * way)
+
+    @cached_property
+    def _ways(self) -> FloatArray:
+        """From each point of `fine` to the next."""
+        return np.diff(self.fine, axis=0)
 
 
 def cubic(
@@ -146,10 +151,12 @@ def find_branches(
     known: list[Trace] = []
     near = 0.25 / (scan.nodes.size - 1)
     for seed in scan.seeds():
-        rough = find_zero(scan, seed)
+        if any(trace.holds(seed, 0.5 * near) for trace in known):
+            continue
+        rough = find_zero(scan, seed.at)
         if rough is not None and any(trace.holds(rough, near) or _shows(scan, trace, rough, near) for trace in known):
             continue
-        start = find_zero(field, seed if rough is None else rough.at)
+        start = find_zero(field, (rough or seed).at)
         if start is None or any(trace.holds(start) for trace in known):
             continue
         known.append(trace_branch(field, start, longest, stepped))

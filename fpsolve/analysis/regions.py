@@ -59,9 +59,9 @@ def regions(lines: Sequence[Boundary]) -> Regions:
     scans = [line.scan for line in lines if line.scan is not None]
     points, values = FINE * min(scan.nodes.size - 1 for scan in scans), []
     for scan in scans:
-        cells = range(scan.nodes.size - 1)
-        s = (np.arange(points // len(cells)) + 0.5) * len(cells) / points
-        values.append(np.block([[scan.between(i, j, s[:, None], s[None]) for j in cells] for i in cells]))
+        cells = scan.nodes.size - 1
+        inside = scan.fine((np.arange(points // cells) + 0.5) * cells / points)
+        values.append(inside.swapaxes(1, 2).reshape(points, points))
     signs, exists = np.where(np.stack(values) > 0, 1, -1), np.all(np.isfinite(values), axis=0)
     kinds = np.unique(signs[:, exists].T, axis=0)
     insides = [exists & np.all(signs == kind[:, None, None], axis=0) for kind in kinds]

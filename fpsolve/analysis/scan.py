@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -84,46 +85,61 @@ class Scan:
     seconds: float = 0.0
     rtol: float = 0.0
 
-    def between(self, i: int, j: int, s: FloatArray, t: FloatArray) -> FloatArray:
-        """F in the cell of the nodes (i, j) to (i + 1, j + 1), s and t in [0, 1], by bicubic interpolation.
+    def between(self, i: Any, j: Any, s: FloatArray, t: FloatArray) -> FloatArray:
+        """F in the cells of the nodes (i, j) to (i + 1, j + 1), s and t in [0, 1], by bicubic interpolation.
 
-        The mixed derivatives are those by which it is exact for all cubic F (A. Adini, 1960).
+        The mixed derivatives are those by which it is exact for all cubic F (A. Adini, 1960). All four are broadcast.
         """
-        size = self.nodes[i + 1] - self.nodes[i], self.nodes[j + 1] - self.nodes[j]
-        values, slopes = self.values[i : i + 2, j : j + 2], self.gradients[i : i + 2, j : j + 2] * size
+        along, across = self.nodes[i + 1] - self.nodes[i], self.nodes[j + 1] - self.nodes[j]
+        ends = (0, 0), (0, 1), (1, 0), (1, 1)
+        values = {(a, b): self.values[i + a, j + b] for a, b in ends}
+        by_s = {(a, b): along * self.gradients[i + a, j + b, 0] for a, b in ends}
+        by_t = {(a, b): across * self.gradients[i + a, j + b, 1] for a, b in ends}
         flat = values[1, 1] - values[1, 0] - values[0, 1] + values[0, 0]
-        total = np.zeros(np.broadcast_shapes(s.shape, t.shape))
-        for a, b in ((0, 0), (0, 1), (1, 0), (1, 1)):
-            (hold_s, rise_s), (hold_t, rise_t) = _hermite(s, a), _hermite(t, b)
-            twist = slopes[a, 1, 0] - slopes[a, 0, 0] + slopes[1, b, 1] - slopes[0, b, 1] - flat
-            total = total + values[a, b] * hold_s * hold_t + twist * rise_s * rise_t
-            total = total + slopes[a, b, 0] * rise_s * hold_t + slopes[a, b, 1] * hold_s * rise_t
+        in_s, in_t, total = _hermite(s), _hermite(t), np.zeros(1)
+        for a, b in ends:
+            (hold_s, rise_s), (hold_t, rise_t) = in_s[a], in_t[b]
+            twist = by_t[1, b] - by_t[0, b] + by_s[a, 1] - by_s[a, 0] - flat
+            total = total + (values[a, b] * hold_s + by_s[a, b] * rise_s) * hold_t
+            total = total + (twist * rise_s + by_t[a, b] * hold_s) * rise_t
         return total
+
+    def fine(self, shares: FloatArray) -> FloatArray:
+        """F at shares of the sides of every cell, shape (cells, cells, shares, shares), in both u first."""
+        cells = np.arange(self.nodes.size - 1)[:, None, None]
+        return self.between(cells[:, None], cells, shares[:, None], shares)
+
+    def at(self, points: FloatArray) -> Iterator[Sample]:
+        """Interpolated F at some points, shape (n, 2)."""
+        cells = np.clip(np.searchsorted(self.nodes, points, side="right") - 1, 0, self.nodes.size - 2)
+        size, step = self.nodes[cells + 1] - self.nodes[cells], 1e-5
+        shares = ((points - self.nodes[cells]) / size)[:, :, None] + step * np.array([[0, 1, -1, 0, 0], [0, 0, 0, 1, -1]])
+        value, right, left, up, down = self.between(*cells.T[:, :, None], shares[:, 0], shares[:, 1]).T
+        gradients = np.stack([right - left, up - down], axis=1) / (2 * step * size)
+        for point, of, gradient in zip(points, value.tolist(), gradients, strict=True):
+            yield Sample(point, of, gradient, 0.0, self._largest)
+
+    @cached_property
+    def _largest(self) -> float:
+        return float(np.nanmax(np.abs(self.values)))
 
     def __call__(self, at: FloatArray) -> Sample:
         """Interpolated F."""
-        cell = np.clip(np.searchsorted(self.nodes, at, side="right") - 1, 0, self.nodes.size - 2)
-        size, step = self.nodes[cell + 1] - self.nodes[cell], 1e-5
-        s, t = ((at - self.nodes[cell]) / size)[:, None] + step * np.array([[0, 1, -1, 0, 0], [0, 0, 0, 1, -1]])
-        value, right, left, up, down = self.between(int(cell[0]), int(cell[1]), s, t)
-        gradient = np.array([right - left, up - down]) / (2 * step * size)
-        return Sample(at, float(value), gradient, 0.0, float(np.nanmax(np.abs(self.values))))
+        return next(self.at(at[None]))
 
-    def seeds(self) -> Iterator[FloatArray]:
-        """Points near which F changes its sign: inside the cells, or beside missing nodes on their edges."""
-        fine = np.linspace(0, 1, FINE)
-        s, t = fine[:, None], fine[None, :]
-        for i in range(self.nodes.size - 1):
-            for j in range(self.nodes.size - 1):
-                corner, size = self.nodes[[i, j]], self.nodes[[i + 1, j + 1]] - self.nodes[[i, j]]
-                inside, shares, middle = self.between(i, j, s, t), fine, 0.5 * fine[1]
-                if np.isnan(inside).any():
-                    inside, shares, middle = self.values[i : i + 2, j : j + 2], fine[[0, -1]], 0.5
-                signs = np.sign(inside)  # where one is 0, too
-                for k, m in np.argwhere(abs(signs[1:] - signs[:-1]) > 0):
-                    yield corner + size * np.array([shares[k] + middle, shares[m]])
-                for k, m in np.argwhere(abs(signs[:, 1:] - signs[:, :-1]) > 0):
-                    yield corner + size * np.array([shares[k], shares[m] + middle])
+    def seeds(self) -> Iterator[Sample]:
+        """F near where it changes its sign: inside the cells, or beside missing nodes on their edges."""
+        shares, found = np.linspace(0, 1, FINE), list[FloatArray]()
+        inside, whole = self.fine(shares), np.diff(self.nodes)
+        for i, j in np.ndindex(inside.shape[:2]):
+            values, steps = inside[i, j], shares
+            if np.isnan(values).any():
+                values, steps = self.values[i : i + 2, j : j + 2], shares[[0, -1]]
+            signs, middles = np.sign(values), steps[:-1] + 0.5 * steps[1]  # where one is 0, too
+            for axis, places in enumerate(((middles, steps), (steps, middles))):
+                at = np.argwhere(abs(np.diff(signs, axis=axis)) > 0)
+                found += [self.nodes[[i, j]] + whole[[i, j]] * np.stack([p[k] for p, k in zip(places, at.T)], axis=1)]
+        yield from self.at(np.concatenate(found))
 
 
 @dataclass(frozen=True)
@@ -190,8 +206,7 @@ def scanned(rows: Sequence[Row], found: Iterator[ScannedRow], progress: Callable
     return Scan(np.linspace(0, 1, count), values, gradients, tuple(reasons), seconds)
 
 
-def _hermite(x: FloatArray, end: int) -> tuple[FloatArray, FloatArray]:
-    """The cubics on [0, 1] that have the value, or the slope, 1 at one end, and 0 else."""
-    y = 1 - x if end else x
-    hold, rise = (1 + 2 * y) * (1 - y) ** 2, y * (1 - y) ** 2
-    return hold, -rise if end else rise
+def _hermite(x: FloatArray) -> list[tuple[FloatArray, FloatArray]]:
+    """For both ends of [0, 1] the cubics that have the value, or the slope, 1 there, and 0 else."""
+    y = 1 - x
+    return [((1 + 2 * x) * y**2, x * y**2), ((1 + 2 * y) * x**2, -y * x**2)]

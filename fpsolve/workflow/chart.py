@@ -184,7 +184,8 @@ def _closed_forms(
     for i, u in enumerate(shares):
         for j, v in enumerate(shares):
             try:
-                theory = second_order(problem.at({x.key: float(x.value(u)), y.key: float(y.value(v))}))
+                here = problem.at({x.key: float(x.value(u)), y.key: float(y.value(v))})
+                theory = second_order(here.in_frame_of(problem))  # as own coordinates take most of the time
             except (ValueError, NoPerturbationTheory):  # no such problem, or not this form of one
                 continue
             linear[j, i], quadratic[j, i] = theory.lyapunov_exponent, theory.quadratic

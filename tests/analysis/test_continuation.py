@@ -230,7 +230,7 @@ def test_folds_of_a_circle():
     [branch] = lines(of)
     branch = with_folds(of, branch, NAMES)
     for label, expected in (("fold in x", [(0.1, 0.55), (0.7, 0.55)]), ("fold in y", [(0.4, 0.25), (0.4, 0.85)])):
-        assert np.allclose(sorted(map(tuple, labelled(branch, label))), expected, rtol=0, atol=1e-9)
+        assert np.allclose(sorted(np.round(at, 12).tolist() for at in labelled(branch, label)), expected, rtol=0, atol=1e-9)
     check(branch, of)
 
 
@@ -497,7 +497,7 @@ def test_a_branch_is_not_sought_again_where_the_scan_is_off():
     [branch] = find_branches(of, scan)
     assert len(solved) < 2.5 * len(branch.points)
     check(branch, of)
-    rough = [find_zero(scan, seed) for seed in scan.seeds()]
+    rough = [find_zero(scan, seed.at) for seed in scan.seeds()]
     assert sum(each is not None and not branch.holds(each, near) for each in rough) > 50
 
 
