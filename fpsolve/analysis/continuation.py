@@ -148,7 +148,7 @@ def find_branches(
     A closed one is seen for certain if a circle inside it is wider than the diagonal of a cell of the finer grid, 1/100
     of the square for 13 nodes, and its cell misses no node.
     """
-    known: list[Trace] = []
+    known, off = list[Trace](), list[Sample]()  # where the scan is off by more, so that branches are farther
     near = 0.25 / (scan.nodes.size - 1)
     for seed in scan.seeds():
         if any(trace.holds(seed, 0.5 * near) for trace in known):
@@ -156,11 +156,15 @@ def find_branches(
         rough = find_zero(scan, seed.at)
         if rough is not None and any(trace.holds(rough, near) or _shows(scan, trace, rough, near) for trace in known):
             continue
-        start = find_zero(field, (rough or seed).at)
-        if start is None or any(trace.holds(start) for trace in known):
+        guess = rough or seed
+        if any(np.linalg.norm(each.at - guess.at) < near and each.gradient @ guess.gradient > 0 for each in off):
             continue
-        known.append(trace_branch(field, start, longest, stepped))
-        yield known[-1]
+        start = find_zero(field, guess.at)
+        if start is not None and any(trace.holds(start) for trace in known):
+            off.append(guess)
+        elif start is not None:
+            known.append(trace_branch(field, start, longest, stepped))
+            yield known[-1]
 
 
 def with_branch(known: tuple[Trace, ...], trace: Trace) -> tuple[Trace, ...]:

@@ -113,8 +113,10 @@ class Scan:
         """Interpolated F at some points, shape (n, 2)."""
         cells = np.clip(np.searchsorted(self.nodes, points, side="right") - 1, 0, self.nodes.size - 2)
         size, step = self.nodes[cells + 1] - self.nodes[cells], 1e-5
-        shares = ((points - self.nodes[cells]) / size)[:, :, None] + step * np.array([[0, 1, -1, 0, 0], [0, 0, 0, 1, -1]])
-        value, right, left, up, down = self.between(*cells.T[:, :, None], shares[:, 0], shares[:, 1]).T
+        aside = step * np.array([[0, 1, -1, 0, 0], [0, 0, 0, 1, -1]])
+        shares = ((points - self.nodes[cells]) / size)[:, :, None] + aside
+        i, j = cells.T[:, :, None]
+        value, right, left, up, down = self.between(i, j, shares[:, 0], shares[:, 1]).T
         gradients = np.stack([right - left, up - down], axis=1) / (2 * step * size)
         for point, of, gradient in zip(points, value.tolist(), gradients, strict=True):
             yield Sample(point, of, gradient, 0.0, self._largest)
@@ -136,9 +138,9 @@ class Scan:
             if np.isnan(values).any():
                 values, steps = self.values[i : i + 2, j : j + 2], shares[[0, -1]]
             signs, middles = np.sign(values), steps[:-1] + 0.5 * steps[1]  # where one is 0, too
-            for axis, places in enumerate(((middles, steps), (steps, middles))):
-                at = np.argwhere(abs(np.diff(signs, axis=axis)) > 0)
-                found += [self.nodes[[i, j]] + whole[[i, j]] * np.stack([p[k] for p, k in zip(places, at.T)], axis=1)]
+            for axis, (in_u, in_v) in enumerate(((middles, steps), (steps, middles))):
+                u, v = np.nonzero(np.abs(np.diff(signs, axis=axis)) > 0)
+                found.append(self.nodes[[i, j]] + whole[[i, j]] * np.stack([in_u[u], in_v[v]], axis=1))
         yield from self.at(np.concatenate(found))
 
 

@@ -298,8 +298,11 @@ class Surface(Result):
         while True:
             self._sample()
             self._nodes.clear()
-            if all(self._add(at) for at in places):
+            lacking = next((at for at in places if not self._add(at)), None)
+            if lacking is None:
                 return
+            first, *others = places  # a place that lacks most comes early, so that few are solved in vain
+            places = [first, *sorted(others, key=lambda at: at is not lacking)]
 
     def _fill(self, most: int) -> bool:
         """Add nodes where most is left, until that is allowed; in the end everywhere with all of them."""

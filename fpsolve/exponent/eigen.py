@@ -46,6 +46,8 @@ SURELY_POSITIVE = 1e-4
 """The same for a pair with which the search ends at once."""
 BESIDE_IT = 1e-6, 1e-2
 """Distances from an eigenvalue, over a rate of the system, at which it is looked whether others are to its right."""
+LEAST_OF_MOST = 1e-2
+"""Least value of T, over its largest, from which on it is positive beyond what it may be off."""
 MOSTLY = 0.5
 """Share of the principal pair of another p or discretisation beyond which a pair goes on from it."""
 DOUBT = 1e-3
@@ -205,8 +207,14 @@ def _is_rightmost(pair: PrincipalPair, pencil: Pencil) -> bool:
     Of another one, by which all else is larger than rounding, it is −1/(Λ′ − σ) of its share. Of three and four
     variables, where pairs are followed from p = 0, only what is resolved is looked at: under waves T* is not. One of
     both must do at a stop, where the adjoint is no function: a share of the time the mass is at rest there.
+
+    Where T lies between positive bounds, none is: E‖x(t)‖^p ≤ (max T/min T) exp(Λt) from every start.
     """
     space, problem = pencil.space, pair.generator.problem
+    if problem.dimension == 2 and problem.coloured.is_bounded and not pair.generator.chosen.is_tilted:
+        values = space.on_grid(pair.right)
+        if np.min(values) > LEAST_OF_MOST * np.max(values):
+            return True
     rate, seen = problem.unit_rate, [problem.dimension == 2 or each <= POSITIVE for each in pair.sign_defects]
     source, judged = space.weighed(space.constant), min if problem.system.stop else max
     for shift in BESIDE_IT:

@@ -230,7 +230,9 @@ def test_folds_of_a_circle():
     [branch] = lines(of)
     branch = with_folds(of, branch, NAMES)
     for label, expected in (("fold in x", [(0.1, 0.55), (0.7, 0.55)]), ("fold in y", [(0.4, 0.25), (0.4, 0.85)])):
-        assert np.allclose(sorted(np.round(at, 12).tolist() for at in labelled(branch, label)), expected, rtol=0, atol=1e-9)
+        assert np.allclose(
+            sorted(np.round(at, 12).tolist() for at in labelled(branch, label)), expected, rtol=0, atol=1e-9
+        )
     check(branch, of)
 
 
