@@ -373,6 +373,8 @@ class Search:
         if _bases(start.pair.generator.problem) != _bases(problem):
             return None
         coarsened = Start(problem, self.whole.coarsened(start, self.tolerance))
+        if coarsened.space.size > WORTH_A_TRY and not self.whole.tilt_fits(coarsened.space, self.p):
+            return None
         return self.attempt(lambda: Solution(coarsened.pair(self.p, start.pair)))
 
     def try_nearest_p(self) -> Solution | None:
