@@ -6,14 +6,18 @@ for even k its sign does not change.
 
 import math
 
+import numpy as np
 import pytest
 
 from fpsolve import ExponentSolver, OrnsteinUhlenbeck, PlaneSystem, Problem, moment_lyapunov
 from fpsolve.arrays import identity
 from fpsolve.errors import NotConverged
 from fpsolve.exponent import Budget
-from fpsolve.model import CoefficientMatrix, Filter
+from fpsolve.exponent.eigen import LEAST_OF_MOST, principal_pair, spectrum
+from fpsolve.fem.generator import Pencil
+from fpsolve.model import CoefficientMatrix, Filter, MarkovChain
 from fpsolve.theory.frozen import swing
+from tests.conftest import sampled
 from tests.oracles import filtered
 from tests.oracles.moment_hierarchy import gaussian, several_exponent
 
@@ -87,3 +91,20 @@ def test_a_swing_to_both_sides_outdoes_a_steady_value():
     except NotConverged:
         return
     assert found.value[0] + found.error_estimate[0] > chord
+
+
+@pytest.mark.parametrize("seed", sampled(*range(6), keep=2))
+def test_t_between_positive_bounds_takes_no_other_factors(seed, monkeypatch):
+    """No real eigenvalue is to the right of its own."""
+    rng, count = np.random.default_rng(seed), []
+    rates = 10 ** rng.uniform(-2, 1, (2, 2)) * (1 - np.eye(2))
+    drift, driven = np.array([[0, 1], [-1, 0]]) + rng.normal(0, 0.3, (2, 2)), rng.normal(0, 0.6, (2, 2))
+    terms = [CoefficientMatrix(0, drift), CoefficientMatrix(0, driven, identity)]
+    problem = Problem(PlaneSystem(terms), MarkovChain(tuple(np.sort(rng.normal(size=2))), rates))
+    pair, factorised = ExponentSolver(problem).solution(0.02).pair, Pencil.factorised
+    values, all_values = pair.space.on_grid(pair.right), spectrum(pair.generator, 0.02, pair.right.size)
+    assert np.min(values) > LEAST_OF_MOST * np.max(values)
+    assert np.max(all_values.real[all_values.imag == 0]) <= pair.eigenvalue + 1e-9
+    monkeypatch.setattr(Pencil, "factorised", lambda *each: count.append(1) or factorised(*each))
+    principal_pair(pair.generator, 0.02, start=pair)
+    assert len(count) == 1
