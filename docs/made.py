@@ -143,6 +143,7 @@ for number, zero in enumerate(case.chart.zero):
 label_axes(axes, case.about(x.key).attributes, case.about(y.key).attributes)
 scale_axis(axes.xaxis, x.scale, (x.start, x.stop))
 scale_axis(axes.yaxis, y.scale, (y.start, y.stop))
+axes.set_title(case.title)
 axes.legend()
 plt.show()
 """

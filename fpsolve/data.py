@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from html import escape
 from textwrap import fill, shorten
@@ -30,6 +30,13 @@ Parameters = Mapping[str, float | str]
 def written(value: float | str, style: str = "g") -> str:
     """The value of a parameter for the eye: a number in a format, a text as it is."""
     return value if isinstance(value, str) else f"{value:{style}}"
+
+
+def short_names(keys: Iterable[str]) -> list[str]:
+    """Keys without their sections, but for those that would then be alike."""
+    keys = list(keys)
+    last = [key.rpartition(".")[2] for key in keys]
+    return [key if last.count(name) > 1 else name for key, name in zip(keys, last, strict=True)]
 
 
 @dataclass(frozen=True)
@@ -207,8 +214,9 @@ class Result(ABC):
         with canvas_of(ax) as axes:
             self._draw(found, axes, **line_kwargs)
             if ax is None:
-                told = (f"{key} = {written(value)}" for key, value in found.attrs.items() if "." in key)
-                about = shorten(", ".join(told), 3 * LETTERS, placeholder=", …")
+                known = {key: written(value) for key, value in found.attrs.items() if "." in key}
+                told = (f"{name}\xa0=\xa0{known[key]}" for key, name in zip(known, short_names(known), strict=True))
+                about = shorten(", ".join(told), 3 * LETTERS, placeholder=" …")
                 lines = [fill(each, LETTERS) for each in (found.attrs["title"], about)]
                 axes.set_title("\n".join(filter(None, lines)), parse_math=False)
         return axes

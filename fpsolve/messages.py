@@ -33,6 +33,10 @@ class Remedy(StrEnum):
         "use a larger rtol or a larger budget; Λ(2) takes little and bounds it, as Λ(p) <= p Λ(2)/2 for 0 < p < 2 and "
         "λ <= Λ(2)/2, and `fpsolve.simulation.simulate` gives it with a standard error"
     )
+    BESIDE = (
+        "ask for p = -0.99 and p = -1.01 instead, as two eigenvalues may meet at p = -1; Λ(-1) is at most the mean of "
+        "both, as Λ(p) is convex"
+    )
     SMALLER_RTOL = "use a smaller rtol"
     ROUNDING = "accept this accuracy, which rounding limits"
     BOTH_AXES = "use more cells, in the phase and in the noise"

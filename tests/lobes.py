@@ -43,9 +43,10 @@ def draw(file: str) -> None:
             left.plot(*branch.path, color=colour, label=rf"$\Lambda(2) = 0$, $s = {s:g}$")
     for number in range(1, 5):
         left.plot(*lobe(number), "--", color="0.35", label="without noise" if number == 1 else None)
-    left.set(xlim=(0.45, 2.0), ylim=(0.0, 0.7), xlabel="turns in a period of the tool", ylabel="width of the cut $w$")
+    left.set(title="Lobes of a tool: the cut is stable below", xlim=(0.45, 2.0), ylim=(0.0, 0.7))
+    left.set(xlabel="turns in a period of the tool", ylabel="width of the cut $w$")
     left.legend(frameon=False)
-    amplitudes = np.linspace(0.0, 4.0, 9)
+    amplitudes = np.linspace(0.0, 4.0, 33)
     for colour, s in zip(("#0072B2", "#D55E00"), (0.5, 1.0), strict=True):
         noise = White(s=s, interpretation="ito")
         found = [
@@ -56,7 +57,11 @@ def draw(file: str) -> None:
         ]
         right.plot(amplitudes, found, color=colour, label=f"$s = {s:g}$")
     right.axhline(0.0, color="0.7", linewidth=0.8)
-    right.set(xlabel="amplitude $a$ of the load", ylabel=r"$\Lambda(2)$ (1/time)")
+    right.set(
+        title="Growth of a delayed Mathieu equation",
+        xlabel="amplitude $a$ of the load",
+        ylabel=r"$\Lambda(2)$ (1/time)",
+    )
     right.legend(frameon=False)
     figure.savefig(file)
 

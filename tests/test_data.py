@@ -11,6 +11,7 @@ import pytest
 import xarray
 from matplotlib import pyplot
 from matplotlib.colors import to_hex
+from scipy.interpolate import RegularGridInterpolator
 
 import fpsolve
 from fpsolve import ExponentSolver, OrnsteinUhlenbeck, Problem, VibroImpactOscillator
@@ -419,8 +420,11 @@ def test_what_is_drawn(results):
     axes = moments.plot()
     order = np.argsort(moments.p)
     np.testing.assert_array_equal(axes.lines[0].get_xydata(), np.stack([moments.p, moments.value], axis=1)[order])
-    (mesh, *_) = results["tilted"].plot().collections
-    np.testing.assert_array_equal(np.ravel(mesh.get_array()), results["tilted"].values.T.ravel())
+    tilted, axes = results["tilted"], results["tilted"].plot()
+    places, shown = (tilted.phi, tilted.xi), axes.collections[0].get_array()
+    between = RegularGridInterpolator(places, tilted.values.copy(), bounds_error=False, fill_value=None)
+    phi, xi = np.linspace(0, 2 * np.pi, shown.shape[1]), np.linspace(*axes.get_ylim(), shown.shape[0])
+    np.testing.assert_allclose(shown, between(tuple(np.meshgrid(phi, xi))), atol=1e-12)
     x, y = results["boundary"].plot().lines[0].get_data()
     np.testing.assert_array_equal(x, results["boundary"].branches[0].x)
     np.testing.assert_array_equal(y, results["boundary"].branches[0].y)

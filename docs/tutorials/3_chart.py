@@ -40,7 +40,7 @@ for line, name in ((paths, r"$\lambda = 0$"), (square, r"$\Lambda(2) = 0$")):
         axes.plot(each.x, each.y, color="C0" if line is paths else "C1", label=name if number == 0 else None)
 axes.set(xlabel="intensity $s$ of the noise", ylabel="damping $b$", xlim=(0.3, 1.2), ylim=(0.02, 0.3))
 axes.text(0.4, 0.22, "all of it decays")
-axes.text(0.87, 0.22, "almost every path decays,\nthe mean square grows", ha="center", va="center")
+axes.text(1.03, 0.167, "almost every path decays,\nthe mean square grows", ha="center", va="center")
 axes.text(1.08, 0.06, "almost every\npath grows", ha="center")
 axes.legend(loc="lower right")
 

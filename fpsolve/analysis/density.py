@@ -74,9 +74,11 @@ class Density(Result):
             if 1 < self.xi.size <= MOST_LINES:
                 add_legend(axes)
             return
-        draw_plane(axes, found.density, **{"shading": "gouraud", **kwargs})
-        axes.set_xticks(*QUARTERS)
         seen = self.xi[self.xi_marginal() > UNSEEN * self.xi_marginal().max()]
+        even = {"phi": np.linspace(0, 2 * np.pi, 721), "xi": np.linspace(seen.min(), seen.max(), 401)}
+        shown = found.density.interp(even, kwargs={"fill_value": "extrapolate"})
+        draw_plane(axes, shown, **kwargs)
+        axes.set_xticks(*QUARTERS)
         axes.set(xlim=(0, 2 * np.pi), ylim=(seen.min(), seen.max()))
 
     def _said(self) -> str:

@@ -159,13 +159,6 @@ def map_key(figure: FigureSection, vary: Vary) -> str | None:
     return key if is_map else None
 
 
-def short_names(keys: Iterable[str]) -> list[str]:
-    """Keys without their sections, but for those that would then be alike."""
-    keys = list(keys)
-    last = [key.rpartition(".")[2] for key in keys]
-    return [key if last.count(name) > 1 else name for key, name in zip(keys, last, strict=True)]
-
-
 def assignments(varied: Mapping[str, Value], style: str = "") -> str:
     """Keys with their values, these in a format: "noise.D0 = 0.1, noise.r0 = 0.9"."""
     return ", ".join(f"{key} = {written(value, style)}" for key, value in varied.items())

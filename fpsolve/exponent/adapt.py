@@ -171,7 +171,8 @@ class WholeProblem:
         try:
             return principal_pair(generator, p, start=start)
         except NotConverged as failure:
-            raise NotConverged(failure.reason, failure.partial, self.remedy) from failure
+            remedy = Remedy.BESIDE if is_at_corner(self.problem, p) else self.remedy
+            raise NotConverged(failure.reason, failure.partial, remedy) from failure
 
     def finer_pair(self, pair: PrincipalPair) -> PrincipalPair:
         """That at the same p on a finer discretisation, which tells the errors of what the other says.

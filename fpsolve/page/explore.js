@@ -211,7 +211,17 @@ const drawings = {
       made.setAttribute("transform", `translate(${at} ${y}) rotate(${turn})`);
       names.push([at, y, half]);
     };
-    for (const {name, at} of answer.regions) name.split(", ").forEach((part, k) => say(plot.X(at[0]), plot.Y(at[1]) + 15 * k, part, ""));
+    const wide = text => { const made = node(plot.inside, "text", {class: "name"}, text), width = made.getComputedTextLength(); made.remove(); return width; };
+    const passed = lines.flat().flatMap(path => Array.from({length: 300}, (_, k) => path.getPointAtLength(path.getTotalLength() * k / 299)));
+    const letters = []; // of regions whose name has no room where no line passes
+    for (const {name, at} of answer.regions) {
+      const [x, y] = [plot.X(at[0]), plot.Y(at[1])], rows = name.split(", "), w = Math.max(...rows.map(wide)) + 8, h = 15 * rows.length, shifts = [0, -0.25, 0.25, -0.45, 0.45];
+      const free = shifts.flatMap(a => shifts.map(b => [Math.max(left + w / 2, Math.min(right - w / 2, x + a * w)), Math.max(top + h / 2, Math.min(bottom - h / 2, y + b * h))]))
+        .filter(([u, v]) => !passed.some(each => Math.abs(each.x - u) < w / 2 && Math.abs(each.y - v) < h / 2));
+      if (free.length) rows.forEach((row, k) => say(free[0][0], free[0][1] + 15 * (k - rows.length / 2) + 11, row, ""));
+      else { letters.push(`${"abcdefgh"[letters.length]}: ${name}`); say(x, y + 4, letters.at(-1)[0], ""); }
+    }
+    $("map").querySelector(".letters").textContent = letters.join("; ");
     lines.forEach((paths, i) => { // along the straightest part of a line, away from other names
       if (!paths.length) return;
       const name = answer.lines[i].name, size = 8 * name.length, total = paths[0].getTotalLength(), at = s => paths[0].getPointAtLength(s);

@@ -15,8 +15,7 @@ import numpy as np
 from fpsolve.analysis.spreads import LEVEL, UNCERTAIN
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case
-from fpsolve.case.vary import short_names
-from fpsolve.data import written
+from fpsolve.data import short_names, written
 from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.quantities import LYAPUNOV_EXPONENT, MOMENT, STABILITY_INDEX, Index
 from fpsolve.model.quantity import MEAN_SQUARE, STATUS, moment_at

@@ -43,11 +43,15 @@ def show(
         yield from curves.show(case, results, table)
     for place, result in enumerate(results if len(results) <= EACH else results[:PICTURES]):
         if len(results) == 1 or (is_whole and len(results) <= EACH):
-            yield Sentence("", result.curve.label)
-            yield from told_of(case, result)
-            p, is_told = result.moments.p, any(result.estimates.values())  # which has Λ(2), too
-            if case.figure.x == "p" and (is_whole or p.size <= ROWS_OVER_P) and (p != 2 if is_told else p == p).any():
-                yield moment_grid(case, result)
+            told, p = [*told_of(case, result)], result.moments.p
+            has_indices = any(result.estimates.values())  # which has Λ(2), too
+            if (
+                case.figure.x == "p"
+                and (is_whole or p.size <= ROWS_OVER_P)
+                and (p != 2 if has_indices else p == p).any()
+            ):
+                told.append(moment_grid(case, result))
+            yield from [Sentence("", result.curve.label), *told] if told else ()
         if place < PICTURES:
             yield from figures_of(case, result, folder, samples)
 

@@ -22,7 +22,7 @@ from fpsolve.analysis.zero import Axis, Zero, is_dear
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case
 from fpsolve.case.sections import ChartSection
-from fpsolve.case.vary import short_names
+from fpsolve.data import short_names
 from fpsolve.drawing import COLOURS, Format, figure_for, label_axes, scale_axis
 from fpsolve.errors import FpsolveError, NoPerturbationTheory
 from fpsolve.files import writable, write_csv, write_json
@@ -373,7 +373,8 @@ def _shade(axes: Any, regions: Regions, frame: tuple[Axis, Axis], forms: Sequenc
     middle: dict[str, Any] = {"ha": "center", "va": "center", "color": "0.15", "zorder": 4}
     for number, each in enumerate(regions.each):
         tint = TINTS[min(unstable[number], len(TINTS) - 1)]
-        middle["bbox"] = {"facecolor": tint, "edgecolor": "none", "pad": 1.5, "alpha": 0.85}  # over a closed form
+        if forms:  # which may cross the words
+            middle["bbox"] = {"facecolor": tint, "edgecolor": "none", "pad": 1.5, "alpha": 0.85}
         name = each.name.replace("δ_p", r"$\delta_p$")
         parts = name.split(", ")
         narrow = [line for part in parts for line in ([part] if "$" in part else wrap(part, 14))]

@@ -11,8 +11,7 @@ import numpy as np
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case, Curve
 from fpsolve.case.sections import Expectation, Varied
-from fpsolve.case.vary import short_names
-from fpsolve.data import written
+from fpsolve.data import short_names, written
 from fpsolve.errors import FpsolveError, NoHierarchy
 from fpsolve.exponent.error import digits
 from fpsolve.exponent.quantities import INDICES

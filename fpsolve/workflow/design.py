@@ -16,8 +16,7 @@ from fpsolve.case.case import Case
 from fpsolve.case.remedies import CASE_WORDS
 from fpsolve.case.rewrite import rewritten
 from fpsolve.case.sections import DesignSection
-from fpsolve.case.vary import short_names
-from fpsolve.data import plain_unit
+from fpsolve.data import plain_unit, short_names
 from fpsolve.errors import FpsolveError
 from fpsolve.exponent.error import Absent, digits
 from fpsolve.files import writable, write_json, write_text

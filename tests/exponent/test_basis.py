@@ -146,6 +146,12 @@ def test_at_the_corner(rtol):
     assert found.derivative_error[0] > 2.2  # from −1.22 to 1.12
 
 
+def test_what_to_ask_where_the_eigenfunctions_at_the_corner_are_mixed():
+    problem = Problem(ParametricOscillator(stiffness=-1.5, damping=0.05), Telegraph(a=0.5, k=1.0))
+    with pytest.raises(NotConverged, match=r"ask for p = -0\.99 and p = -1\.01 instead"):
+        moment_lyapunov(problem, -1.0)
+
+
 def test_there_is_no_function_of_several_blocks():
     system = PlaneSystem.of_equations(("x", "v"), ("-x + 0.3*xi*x", "v*(-0.5 + xi)"), {})
     with pytest.raises(NotConverged, match=r"there is no function Λ\(p\) from p = 0\.5 to p = 3.*; ask for single p"):

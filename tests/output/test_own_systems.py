@@ -10,8 +10,7 @@ from matplotlib.figure import Figure
 
 from fpsolve import OrnsteinUhlenbeck, PlaneSystem, Problem
 from fpsolve.analysis import stationary_density, tilted_density
-from fpsolve.case.vary import short_names
-from fpsolve.data import plain_unit
+from fpsolve.data import plain_unit, short_names
 from fpsolve.drawing import is_math, plain_numbers, typeset
 from fpsolve.errors import OutputError
 from fpsolve.exponent import ExponentSolver, critical_impact_factor, critical_restitution, impact_rate
