@@ -436,7 +436,7 @@ class Code(Enum):
     )
     RESPONSE_OPEN = (
         "failure: the stationary response did not converge: its means still change by {size:.1e} of them{unknowns:?, "
-        "and the next discretisation has {unknowns} unknowns, more than {most}}; use a larger rtol"
+        "and the next discretisation has {unknowns} unknowns, more than {most}}; use an rtol of the response above that"
     )
     RESPONSE_STOPPED = "warning: the simulation of the response was stopped early, after the time {time:.3g}"
     RESPONSE_NOT_REACHED = "warning: no stationary response: stopped before it was reached"

@@ -23,7 +23,7 @@ from fpsolve.model.systems.vibro_impact import ImpactLaw, VibroImpactOscillator
 from fpsolve.study.solve import everything
 from tests.oracles import perturbation
 
-CASES = Path(__file__).parents[2] / "cases"
+CASES, FIRST = Path(__file__).parents[2] / "cases", Path(__file__).parents[1] / "first"
 FIGURES = ["fig1", "fig2a", "fig2b", "fig2c", "fig3", "fig4", "fig5", "fig6"]
 SMALL = """
 title = "small"
@@ -59,7 +59,9 @@ def test_shipped_case_loads(path: Path) -> None:
     assert case.planned == len(list(case.curves()))
 
 
-@pytest.mark.parametrize("path", sorted(CASES.rglob("*.toml")), ids=lambda path: path.stem)
+@pytest.mark.parametrize(
+    "path", [*sorted(CASES.rglob("*.toml")), *sorted(FIRST.glob("*.toml"))], ids=lambda path: path.stem
+)
 def test_a_curve_knows_its_parameters_without_its_problem(path: Path) -> None:
     """No two curves have one digest, and one that a case states by itself has that of the sweep."""
     case = load_case(path)
