@@ -50,6 +50,8 @@ CLOSED_FORM_NODES = 41
 """Of the grid, each way, on which the closed forms are evaluated."""
 TINTS = ("#FFFFFF", "#F3EFE6", "#E9DFCB", "#DBCBAA", "#C9B388")
 """Of regions, the darker the more of the quantities grow there."""
+UNKNOWN = "#C4C8CE"
+"""Of the rest of a frame."""
 NAMED = 0.01
 """Share of the frame from which on a region has room for a letter; smaller ones are in chart.json only."""
 CLOSED_FORM: dict[str, Any] = {"linestyle": (0, (2, 3)), "linewidth": 1.4, "zorder": 3}
@@ -363,8 +365,14 @@ def _shade(axes: Any, regions: Regions, frame: tuple[Axis, Axis], forms: Sequenc
     edges = np.linspace(0, 1, regions.index.shape[0] + 1)
     unstable = [sum(sign > 0 for sign in each.signs.values()) for each in regions.each]
     tints = np.array([*unstable, np.nan])[regions.index]
-    style: dict[str, Any] = {"cmap": ListedColormap(TINTS), "vmin": -0.5, "vmax": len(TINTS) - 0.5}
+    style: dict[str, Any] = {
+        "cmap": ListedColormap(TINTS).with_extremes(bad=UNKNOWN),
+        "vmin": -0.5,
+        "vmax": len(TINTS) - 0.5,
+    }
     axes.pcolormesh(x.value(edges), y.value(edges), tints.T, rasterized=True, **style)
+    if np.isnan(tints).any():
+        axes.fill([], [], color=UNKNOWN, label="not solved, or not defined")
     letters, small, crossed = iter(ascii_lowercase), dict[str, str](), np.zeros(regions.index.shape, dtype=bool)
     for line in forms:
         at = [np.interp(np.linspace(0, 1, 2000), np.linspace(0, 1, len(line)), axis) for axis in line.T]
