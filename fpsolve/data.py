@@ -7,7 +7,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from html import escape
-from textwrap import fill, shorten
+from textwrap import fill
 from typing import TYPE_CHECKING, Any, Self
 
 from fpsolve import __version__
@@ -216,8 +216,8 @@ class Result(ABC):
             if ax is None:
                 known = {key: written(value) for key, value in found.attrs.items() if "." in key}
                 told = (f"{name}\xa0=\xa0{known[key]}" for key, name in zip(known, short_names(known), strict=True))
-                about = shorten(", ".join(told), 3 * LETTERS, placeholder=" …")
-                lines = [fill(each, LETTERS) for each in (found.attrs["title"], about)]
+                about = fill(", ".join(told), LETTERS, max_lines=3, placeholder=" …")
+                lines = [fill(found.attrs["title"], LETTERS), about]
                 axes.set_title("\n".join(filter(None, lines)), parse_math=False)
         return axes
 
