@@ -298,8 +298,8 @@ def effects_on(
             shares = shares + np.abs(last * images).sum(axis=others) * np.cumsum(masks, axis=0)
         inside = np.flatnonzero(ladder.cells >= 0)
         effects = [np.bincount(ladder.cells[inside], each[inside], ladder.degrees.size) / norm for each in shares]
-        effects = np.maximum.accumulate(effects)  # in those of more modes, parts of these may cancel
-        found.append(ModeEffects(ladder.degrees, effects, pair.generator.slowest[ladder.at]))
+        highest = np.maximum.accumulate(effects)  # in those of more modes, parts of these may cancel
+        found.append(ModeEffects(ladder.degrees, highest, pair.generator.slowest[ladder.at]))
     return tuple(found)
 
 
