@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy.linalg
+from scipy.sparse.linalg import LinearOperator
 
 from fpsolve.arrays import Mask, Matrix, dense, one
 from fpsolve.fem.axis import KroneckerSum, along
@@ -20,6 +21,7 @@ from fpsolve.fem.rings import Ring
 from fpsolve.fem.space import Space
 from fpsolve.fem.terms import ALL_ORDERS, Term, Terms, TermSum, power_of_epsilon
 from fpsolve.model.problem import ParameterDerivative, Problem
+from fpsolve.superlu import sparse_lu
 
 if TYPE_CHECKING:
     from fpsolve.fem.sphere import SphereTerms
@@ -69,8 +71,10 @@ class Pencil:
     def numerical_abscissa(self) -> float:
         """About the largest ω of ½(L + Lᵀ)v = ωMv, rather above it, by some steps of Lanczos from a start of all v."""
         space, rows, betas = self.space, [0.0], [0.0]
-        masses = [axis.matrix(one) for axis in space.noises]
-        inverses = [None if each is None else np.linalg.inv(dense(each)) for each in (space.phi.unit, *masses)]
+        unit, inverses = space.phi.unit, [None, *(np.linalg.inv(dense(axis.matrix(one))) for axis in space.noises)]
+        if unit is not None:
+            solve = sparse_lu(unit.tocsc()).solve
+            inverses[0] = LinearOperator(unit.shape, matvec=solve, matmat=solve, dtype=float)
         rest, old = np.random.default_rng(0).standard_normal(space.size), np.zeros(space.size)
         for _ in range(LANCZOS_STEPS):
             weighed = space.weighed(rest)

@@ -2,6 +2,7 @@
 
 import gc
 import math
+import tracemalloc
 import weakref
 from dataclasses import replace
 from pathlib import Path
@@ -27,7 +28,7 @@ from fpsolve import (
 from fpsolve.analysis import Axis
 from fpsolve.arrays import identity
 from fpsolve.errors import FpsolveError, NoSuchExponent
-from fpsolve.exponent import principal_pair
+from fpsolve.exponent import principal_pair, spectrum
 from fpsolve.exponent.modes import BEYOND, SphereStart, first_directions, left_of, modal_coordinates, second_moments
 from fpsolve.fem.space import Space, first_axis
 from fpsolve.fem.sphere import SphereAxis
@@ -160,6 +161,22 @@ def test_what_finer_waves_change_is_told_to_first_order(noise, driven):
     assert start.refined(solution, 1e-20, 1, 10**6).space.phi.waves == 2
     told = start.change(found[0])
     assert told == pytest.approx(found[1].value - found[0].value, rel=0.1)
+
+
+def test_the_end_of_the_spectrum_takes_no_array_of_all_directions():
+    given = problem(Telegraph(a=0.5, k=0.5))
+    noises = [first_axis(each, 7) for each in given.coloured.parts.values()]
+    lines = [np.linspace(0, math.pi / 2, count) for count in (2, 40)]
+    few, many = (Space((SphereAxis(modal_coordinates(given)[0], each, 6, 2), *noises)) for each in lines)
+    generator = SphereStart(given, few).generator
+    assert generator.at(-1.0).numerical_abscissa >= spectrum(generator, -1.0, 1)[0].real
+    pencil = SphereStart(given, many).generator.at(-1.0)
+    assert math.isfinite(pencil.matrix.norm)  # the matrices are made
+    tracemalloc.start()
+    assert math.isfinite(pencil.numerical_abscissa)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 2 * pencil.space.phi.size**2
 
 
 def test_waves_are_added_until_the_slope_has_settled():
