@@ -50,10 +50,10 @@ def drawn(seed: int) -> tuple[str, Problem]:
         driven[np.ix_((1, 3), (1, 3))] = rng.normal(size=(2, 2)) / 4
     driven *= math.exp(rng.uniform(math.log(0.05), math.log(0.8))) / np.linalg.norm(driven, 2)
     terms = CoefficientMatrix(0, steady.tolist()), CoefficientMatrix(1, driven.tolist(), identity)
-    return f"{kind}, n = {n}", Problem(LinearSystem(terms), _noise(kind, rng))
+    return f"{kind}, n = {n}", Problem(LinearSystem(terms), random_noise(kind, rng))
 
 
-def _noise(kind: str, rng: np.random.Generator) -> Noise:
+def random_noise(kind: str, rng: np.random.Generator) -> Noise:
     """Of a standard deviation of 1 and correlation times from 0.3 to 2, or s = 1."""
     memory = math.exp(rng.uniform(math.log(0.3), math.log(2.0)))
     match kind:
