@@ -54,6 +54,15 @@ WORST_CONDITION = 100.0
 """Of the eigenvectors of the motion without noise, up to which they are the coordinates."""
 BEYOND = (10.0, 1.5, 1.0)
 """What is left after the correction by a change, over this change, by how many spaces agree: one, two, and more."""
+FALLING = 10.0
+"""What is left after one space, over the rest of a geometric series: it was up to 6 times that, in strong noise.
+
+Beside an even p, for which the waves that there are have T, the change falls as the distance from it.
+"""
+HARDLY = 0.01
+"""The least fall from one degree to the next, over what is left of it."""
+LEAST = 0.1
+"""What is left after one space at least, over the change: λ has the correction at `SMALL_P`."""
 SETTLED_SLOPE = 3e-3
 """Share of Λ′ by which it may change from one level to the next."""
 MOST_FOR_SLOPES = 4
@@ -161,8 +170,8 @@ def left_of(degrees: Sequence[int], values: Sequence[float]) -> float:
     return left
 
 
-def first_order_change(pair: PrincipalPair, finer: Generator, axis: int, new: Any) -> float:
-    """What the new functions of an axis of a finer space change in Λ(p), to first order."""
+def first_order_change(pair: PrincipalPair, finer: Generator, axis: int, new: Any) -> tuple[float, float]:
+    """What the new functions of an axis of a finer space change in Λ(p), to first order, and the sum of the sizes."""
     pencil, space, old = finer.at(pair.p), finer.space(pair.p), pair.space
     operator = pencil.matrix.shifted(pair.eigenvalue)
     right, left = (
@@ -170,7 +179,8 @@ def first_order_change(pair: PrincipalPair, finer: Generator, axis: int, new: An
         for image, each in ((operator, pair.right), (operator.T, pair.left))
     )
     factors = pencil.on(axis, new).factorised(pair.eigenvalue)
-    return float(-left @ factors.solve(right) / (pair.left @ old.weighed(pair.right)))
+    parts = -left * factors.solve(right) / (pair.left @ old.weighed(pair.right))
+    return float(np.sum(parts)), float(np.sum(np.abs(parts)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -221,10 +231,14 @@ class SphereStart(Start):
         of_axes, start = self._of_axes(pair, allowed), replace(self, before=(), enough=None)
         if sum(of_axes) > 0.5 * allowed:
             return Solution(pair, math.inf, of_axes, start)
-        change = self.change(pair)
+        change, size = self.change(pair)
         pair = replace(pair, correction=change, rounding=pair.rounding + self._rounding(pair))
         steps = [*(each.pair for each in self.before), pair]
         left = BEYOND[min(len(steps), len(BEYOND)) - 1] * abs(change)
+        if len(steps) == 1 and not (self.problem.diffusions or self.problem.impulses):  # these reach beyond the next
+            apart = min(1.0, *(abs(1 - pair.p / k) for k in range(2, self.space.phi.waves + 1, 2)))
+            fallen = max(apart * self._size_of_highest(pair) - size, HARDLY * size, sys.float_info.min)
+            left = max(LEAST * abs(change), min(FALLING * size * size / fallen, max(left, size)))
         if len(steps) > 1:
             waves = [each.space.phi.waves for each in steps]
             uncorrected = left_of(waves, [each.eigenvalue for each in steps])
@@ -265,10 +279,17 @@ class SphereStart(Start):
                 noises[k] = axis.enriched() if error < effects.error else axis.refined(effects, share, False)
         return noises
 
-    def change(self, pair: PrincipalPair) -> float:
-        """What waves of the next degree change in Λ(p), to first order."""
+    def change(self, pair: PrincipalPair) -> tuple[float, float]:
+        """What waves of the next degree change in Λ(p), to first order, and the sum of the sizes of its parts."""
         finer = self._with(2).generator
         return first_order_change(pair, finer, 0, finer.phi.degrees > pair.space.phi.waves)
+
+    def _size_of_highest(self, pair: PrincipalPair) -> float:
+        """The same sum of what waves of the highest degree have changed."""
+        highest = self.space.phi.degrees > self.space.phi.waves - 2
+        operator = pair.generator.at(pair.p).on(0, highest).matrix.shifted(pair.eigenvalue)
+        right, left = (np.compress(highest, pair.space.table(v), axis=0).ravel() for v in (pair.right, pair.left))
+        return float(np.sum(np.abs(left * (operator @ right))) / abs(pair.left @ pair.space.weighed(pair.right)))
 
     def _rounding(self, pair: PrincipalPair) -> float:
         """Of the rates of growth: an entry of S⁻¹AS is a sum of products twice, which may cancel."""
@@ -294,7 +315,7 @@ class SphereStart(Start):
                 new = np.arange(finer.size) >= axis.size
             else:
                 continue
-            change = first_order_change(pair, Generator(self.problem, self.space.with_axis(k, finer)), k, new)
+            change, _ = first_order_change(pair, Generator(self.problem, self.space.with_axis(k, finer)), k, new)
             errors[k] = min(error, max(MEASURED * abs(change), math.sqrt(error * abs(change))))
         return tuple(errors)
 
