@@ -57,7 +57,8 @@ BEYOND = (10.0, 1.5, 1.0)
 FALLING = 10.0
 """What is left after one space, over the rest of a geometric series: it was up to 6 times that, in strong noise.
 
-Beside an even p, for which the waves that there are have T, the change falls as the distance from it.
+Beside an even p, for which the waves that there are have T, the change falls as the distance from it; T* is for p what
+T is for −n − p.
 """
 HARDLY = 0.01
 """The least fall from one degree to the next, over what is left of it."""
@@ -236,7 +237,8 @@ class SphereStart(Start):
         steps = [*(each.pair for each in self.before), pair]
         left = BEYOND[min(len(steps), len(BEYOND)) - 1] * abs(change)
         if len(steps) == 1 and not (self.problem.diffusions or self.problem.impulses):  # these reach beyond the next
-            apart = min(1.0, *(abs(1 - pair.p / k) for k in range(2, self.space.phi.waves + 1, 2)))
+            even, both = range(2, self.space.phi.waves + 1, 2), (pair.p, -self.problem.dimension - pair.p)
+            apart = min(1.0, *(abs(1 - p / k) for p in both for k in even))
             fallen = max(apart * self._size_of_highest(pair) - size, HARDLY * size, sys.float_info.min)
             left = max(LEAST * abs(change), min(FALLING * size * size / fallen, max(left, size)))
         if len(steps) > 1:
