@@ -10,11 +10,12 @@ from __future__ import annotations
 import math
 import sys
 import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
 
 import numpy as np
 
 from fpsolve import OrnsteinUhlenbeck, Problem, lyapunov_exponent, moment_lyapunov, simulate
-from fpsolve.arrays import FloatArray, identity
+from fpsolve.arrays import identity
 from fpsolve.errors import FpsolveError
 from fpsolve.exponent import Budget
 from fpsolve.messages import Code
@@ -67,38 +68,44 @@ def random_noise(kind: str, rng: np.random.Generator) -> Noise:
     return Filter(omega, zeta, 1 / Filter(omega, zeta, 1.0).standard_deviation)
 
 
-def by_simulation(problem: Problem, *, path_steps: float = PATH_STEPS, seed: int = 1) -> MonteCarlo:
+def by_simulation(
+    problem: Problem, orders: Sequence[float] = ORDERS, *, path_steps: float = PATH_STEPS, seed: int = 1
+) -> MonteCarlo:
     """By populations, some 24 transients long, of 4096 paths or as many as the path-steps allow."""
     parts = problem.system, problem.noise
     length = max(2 * transient(*parts), 24 * transient(*parts, is_mixed=False))
     steps = (length + 2 * coefficients(*parts).settling) / default_step(*parts)
     paths = min(32768, max(4096, 32 * round(path_steps / steps / 32)))
-    return simulate(problem, list(ORDERS), estimator="population", paths=paths, time=length, seed=seed)
+    return simulate(problem, list(orders), estimator="population", paths=paths, time=length, seed=seed)
 
 
-def by_elements(problem: Problem) -> list[tuple[float, float] | str]:
+def by_elements(
+    problem: Problem, orders: Sequence[float] = ORDERS, rtol: float = RTOL
+) -> list[tuple[float, float] | str]:
     """λ and Λ(p) with the errors stated, or why there is none."""
     budget, found = Budget(seconds=SECONDS), list[tuple[float, float] | str]()
     try:
-        rate = lyapunov_exponent(problem, rtol=RTOL, budget=budget)
+        rate = lyapunov_exponent(problem, rtol=rtol, budget=budget)
         found.append((rate.value, rate.error_estimate))
     except FpsolveError as failure:
         found.append(str(failure))
-    for p in ORDERS:
+    for p in orders:
         try:
-            made = moment_lyapunov(problem, p, rtol=RTOL, budget=budget)
+            made = moment_lyapunov(problem, p, rtol=rtol, budget=budget)
             found.append((float(made.value[0]), float(made.error_estimate[0])))
         except FpsolveError as failure:
             found.append(str(failure))
     return found
 
 
-def outcomes(problem: Problem, *, path_steps: float = PATH_STEPS) -> list[Outcome | str]:
+def outcomes(
+    problem: Problem, orders: Sequence[float] = ORDERS, rtol: float = RTOL, *, path_steps: float = PATH_STEPS
+) -> list[Outcome | str]:
     """λ and Λ(p) by both, or why the elements give none. A number that the simulation does not give is NaN.
 
     So is one of which it says that it still drifts, as its standard error then does not tell how far it is.
     """
-    made = by_simulation(problem, path_steps=path_steps)
+    made = by_simulation(problem, orders, path_steps=path_steps)
     drifting = {each.data["p"] for each in made.warnings if each.code is Code.DRIFTING}
     moments = [
         (math.nan, math.nan) if each.p in drifting else (each.value or math.nan, each.standard_error or math.nan)
@@ -107,36 +114,43 @@ def outcomes(problem: Problem, *, path_steps: float = PATH_STEPS) -> list[Outcom
     simulated = [(made.lyapunov_exponent, made.lyapunov_exponent_error), *moments]
     return [
         each if isinstance(each, str) else Outcome(*each, *pair)
-        for each, pair in zip(by_elements(problem), simulated, strict=True)
+        for each, pair in zip(by_elements(problem, orders, rtol), simulated, strict=True)
     ]
 
 
-def main(first: int = 0, last: int = SYSTEMS - 1) -> None:
-    """Print a line for each number, and how many are given, refused and wrong."""
-    given = refused = wrong = unknown = systems = 0
-    sizes: list[FloatArray] = []
-    for seed in range(first, last + 1):
-        kind, problem = drawn(seed)
+def compare(
+    systems: Iterable[tuple[str, Problem]], orders: Sequence[float], both: Callable[[Problem], list[Outcome | str]]
+) -> None:
+    """Print a line for each number, and how many are given, refused and wrong; `both` as `outcomes`."""
+    given = refused = wrong = unknown = complete = count = 0
+    for name, problem in systems:
         started = time.process_time()
-        found = outcomes(problem)
-        print(f"{seed:3d} {kind}, {time.process_time() - started:.1f} s", flush=True)
-        for name, each in zip(("λ", *(f"Λ({p:g})" for p in ORDERS)), found, strict=True):
+        found = both(problem)
+        count += 1
+        print(f"{name}, {time.process_time() - started:.1f} s", flush=True)
+        for symbol, each in zip(("λ", *(f"Λ({p:g})" for p in orders)), found, strict=True):
             if isinstance(each, str):
                 refused += 1
-                print(f"      {name:6s} refused: {' '.join(each.split())[:200]}", flush=True)
+                print(f"      {symbol:6s} refused: {' '.join(each.split())[:200]}", flush=True)
                 continue
             given += 1
             unknown += not math.isfinite(each.deviation)
             wrong += abs(each.deviation) > MOST
-            sizes.append(np.array(abs(each.deviation)))
             sign = " WRONG" if abs(each.deviation) > MOST else ""
-            print(f"      {name:6s} {each}, stated {each.stated:.1e}{sign}", flush=True)
-        systems += not any(isinstance(each, str) for each in found)
+            print(f"      {symbol:6s} {each}, stated {each.stated:.1e}{sign}", flush=True)
+        complete += not any(isinstance(each, str) for each in found)
     print(
-        f"{systems} of {last - first + 1} systems given in full; of the numbers {given} given, {refused} refused, "
+        f"{complete} of {count} systems given in full; of the numbers {given} given, {refused} refused, "
         f"{wrong} wrong, beyond {MOST:g} standard errors, {unknown} without one by simulation"
     )
 
 
+def numbered(draw: Callable[[int], tuple[str, Problem]], first: int, last: int) -> Iterator[tuple[str, Problem]]:
+    """The systems of some numbers, with these before what they are called."""
+    for seed in range(first, last + 1):
+        kind, problem = draw(seed)
+        yield f"{seed:3d} {kind}", problem
+
+
 if __name__ == "__main__":
-    main(*map(int, sys.argv[1:]))
+    compare(numbered(drawn, *map(int, sys.argv[1:] or (0, SYSTEMS - 1))), ORDERS, outcomes)

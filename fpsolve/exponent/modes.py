@@ -75,7 +75,7 @@ MEASURED = 3.0
 
 
 def second_moments(problem: Problem) -> tuple[float, FloatArray, FloatArray]:
-    """Λ(2), Q of E‖x‖² and the second moments E xxᵀ, in the mean over the noise, in the coordinates of the motion.
+    """Λ(2), Q of E‖x‖² and the second moments E xxᵀ, in the mean over the noise.
 
     Both matrices are without a scale, and 1 where noise is too strong or slow for the equations of the moments.
     """
@@ -85,9 +85,6 @@ def second_moments(problem: Problem) -> tuple[float, FloatArray, FloatArray]:
     except NoHierarchy:
         return math.nan, unit, unit
     q, moments = (moment_form(each, problem.dimension, 2) for each in (found.polynomial, found.moments))
-    frame = unit if problem.frame is None else np.array(problem.frame.matrix)
-    inverse = np.linalg.inv(frame)
-    q, moments = frame.T @ q @ frame, inverse @ moments @ inverse.T
     return found.value, q * np.sign(np.trace(q)), moments * np.sign(np.trace(moments))
 
 
@@ -110,6 +107,9 @@ def modal_coordinates(problem: Problem) -> tuple[Coordinates, float, tuple[float
     ]
     own = np.column_stack(modes)
     _, q, p = second_moments(problem)
+    frame = np.eye(len(q)) if problem.frame is None else np.array(problem.frame.matrix)
+    inverse = np.linalg.inv(frame)
+    q, p = frame.T @ q @ frame, inverse @ p @ inverse.T
     if np.linalg.cond(own) < WORST_CONDITION:
         rows = np.split(np.linalg.inv(own), np.cumsum([each.shape[1] for each in modes])[:-1])
         moments = [

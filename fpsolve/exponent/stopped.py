@@ -61,7 +61,8 @@ def stopped_directions(problem: Problem) -> HalfSphereAxis:
     forms = [np.diagonal(each).reshape(2, 2).sum(axis=1) for each in (own.T @ q @ own, back @ p @ back.T)]
     of_q, of_p = (np.maximum(each / np.sum(each), THINNEST**2) for each in forms)
     units = (of_p / of_q) ** 0.25
-    coordinates = np.linalg.solve(np.array(stop.coordinates), own @ np.diag(np.repeat(units, 2)))
+    rows = np.array(stop.coordinates) if problem.frame is None else np.array(stop.coordinates) @ problem.frame.matrix
+    coordinates = np.linalg.solve(rows, own @ np.diag(np.repeat(units, 2)))
     in_theta = np.linspace(-0.5, 0.5, 3) * math.pi
     return HalfSphereAxis(
         tuple(map(tuple, coordinates.tolist())),

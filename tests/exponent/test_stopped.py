@@ -48,6 +48,17 @@ def test_a_mode_that_drives_another_has_the_exponents_of_the_oscillator_with_a_w
     assert abs(found.pair.value - expected) <= found.error < 5e-5
 
 
+def test_units_change_nothing_but_the_rate():
+    """Time in 1/1000, and q₂ in 1/10: in these units the motion is solved in coordinates of its own."""
+    rates = "v1", "-100*v1 - 1e6*(1 + xi)*q1 - 3e4*(1 + xi)*q2", "v2", "-160*v2 - 1e6*(2.56 + xi)*q2 - 3e6*(1 + xi)*q1"
+    walls = [{"at": "q1 = 0", "restitution": 0.8}]
+    scaled = Problem(PlaneSystem.of_equations(NAMES, rates, walls=walls), Telegraph(a=0.5, k=700.0))
+    assert scaled.frame is not None
+    found, expected = (ExponentSolver(each, rtol=1e-3).solution(2.0) for each in (scaled, coupled(0.8)))
+    assert found.pair.value / 1000 == pytest.approx(expected.pair.value, rel=1e-9)
+    assert abs(expected.pair.value + 0.15844) <= expected.error < 1e-3
+
+
 @pytest.mark.slow
 def test_two_codes_simulated_the_same():
     """λ and Λ(1) by paths and by a transfer operator, with three standard errors of these."""
