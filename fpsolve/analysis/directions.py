@@ -30,6 +30,8 @@ SETTLED = 0.02
 """Total variation between two densities in turn from which on the finer one is taken."""
 MOST_DIRECTIONS = 1700
 """Largest number of functions of directions that are made for a density alone: seconds of work."""
+MOST_AT_STOP = 3000
+"""The same at a stop, where fewer are coupled."""
 MOST_UNKNOWNS = 15_000
 """Largest number of unknowns that are made for a density alone."""
 SHARES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
@@ -64,10 +66,11 @@ class SettledDirections:
 def settled_directions(pair: PrincipalPair) -> SettledDirections:
     """Those of a pair of three or four variables, on as fine functions as its T* needs."""
     found = SettledDirections(pair.value, pair, Directions(pair).fields, math.nan)
+    most = MOST_AT_STOP if pair.generator.problem.system.stop else MOST_DIRECTIONS
     while not found.error <= SETTLED:
         generator = found.pair.generator
         finer = generator.chosen.with_axis(0, generator.chosen.phi.enriched())
-        if finer.phi.size > MOST_DIRECTIONS or finer.size > MOST_UNKNOWNS:
+        if finer.phi.size > most or finer.size > MOST_UNKNOWNS:
             return found
         try:
             new = principal_pair(Generator(generator.problem, finer), pair.p, start=found.pair)
@@ -91,7 +94,8 @@ class DirectionDensity(Result):
 
     Of four variables it is of η and θ₁ − θ₂, where (cos η (cos θ₁, sin θ₁), sin η (cos θ₂, sin θ₂)) is the direction of
     the variables, each rate of an oscillator divided by its frequency: sin²η is the share of the second pair in the
-    energy. θ = atan2(q̇/ω, q) falls in time, so that θ₁ − θ₂ > 0 is a lead of the second one. Of three variables it is
+    energy. θ = atan2(q̇/ω, q) falls in time, so that θ₁ − θ₂ > 0 is a lead of the second one; with a stop it is of η and
+    θ₁, on the half sphere that the stop leaves. Of three variables it is
     of longitude and latitude, per unit of the surface of the unit sphere, alike at opposite directions.
 
     Attributes:
@@ -175,7 +179,7 @@ def draw_over(grid: DirectionGrid, axes: Any, values: FloatArray, about: Any, **
     draw_colours(axes, grid.first, grid.second, values.T, about, **{"shading": "gouraud", **kwargs})
     if grid.dimension == 4:
         axes.set_xticks(np.arcsin(np.sqrt(SHARES)), [f"{100 * share:g}" for share in SHARES])
-        axes.set_yticks(*QUARTERS)
+        axes.set_yticks(*(LATITUDES if grid.has_stop else QUARTERS))
         words = f"share of {grid.names[1]} in the {grid.what}, $\\sin^2\\eta$ (%)"
         label_axes(axes, {"long_name": words, "units": "1"}, second.attributes)
     else:

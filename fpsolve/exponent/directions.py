@@ -10,6 +10,8 @@ as ‖y‖ = ρ‖z‖, and the surface of the sphere obeys dσ_y = |det R| ρ^(
 
 Of four variables in two pairs, e = (cos η (cos θ₁, sin θ₁), sin η (cos θ₂, sin θ₂)): sin²η is the share of the second
 pair in ‖z‖². Densities are of η and of θ₁ − θ₂, dσ = cos η sin η dη dθ₁ dθ₂, integrated over θ₂ at a fixed difference.
+With a stop for q₁ ≥ 0, z is of the coordinates of the stop, and densities are of η and of θ₁ from π/2, where an impact
+leaves it, to −π/2, where the next one finds it, integrated over θ₂.
 Of three variables they are of longitude and latitude, per unit of the surface of the sphere, alike at e and −e.
 """
 
@@ -33,7 +35,7 @@ FEWEST_NODES = 48
 MOST_NODES = 192
 """Largest number of nodes of the first coordinate, where the tilted density is not resolved with fewer."""
 PHASES = 16
-"""Half turns of both phases together are looked at from so many."""
+"""Half turns of both phases together are looked at from so many; at a stop turns of the second one."""
 RESOLVED = 1e-3
 """By how much the integral of the tilted density over the nodes may miss 1."""
 CHUNK = 2**23
@@ -42,10 +44,10 @@ CHUNK = 2**23
 
 def oscillators(problem: Problem) -> dict[int, float]:
     """√(k/c) of each oscillator q̇ = cv, v̇ = −kq + …, by the place of q among the variables; pairs begin at 0 and 2."""
-    system, n = problem.system, problem.dimension
+    system, n, stop = problem.system, problem.dimension, problem.system.stop
     free, driven = np.zeros((n, n)), np.zeros((n, n))
     for term in system.terms:
-        size = system.epsilon**term.order * np.array(term.matrix)
+        size = system.epsilon**term.order * (stop.inside(term.matrix) if stop else np.array(term.matrix))
         mean = problem.named_noise(term.noise).mean_of(term.g)
         free += mean * size
         driven += abs(size) * is_driven(term.g)
@@ -60,7 +62,8 @@ def oscillators(problem: Problem) -> dict[int, float]:
 
 def pair_names(problem: Problem) -> tuple[str, str]:
     """What the two pairs of four variables are called: the names of q, or of both variables."""
-    states, own = problem.system.states, oscillators(problem)
+    states, own, stop = problem.system.states, oscillators(problem), problem.system.stop
+    states = stop.names(states) if stop else states
     first, second = (states[k] if k in own else f"({states[k]}, {states[k + 1]})" for k in (0, 2))
     return first, second
 
@@ -76,6 +79,7 @@ class DirectionGrid:
         names: of the pairs of four variables, of the three variables.
         first, second: η and θ₁ − θ₂ on [0, 2π], or longitude on [0, 2π] and latitude, shapes (a,) and (b,).
         first_weights, second_weights: of the same shapes.
+        has_stop: whether `second` is θ₁ on [−π/2, π/2].
     """
 
     dimension: int
@@ -84,6 +88,7 @@ class DirectionGrid:
     second: FloatArray
     first_weights: FloatArray
     second_weights: FloatArray
+    has_stop: bool = False
 
     @classmethod
     def of(cls, problem: Problem, count: int) -> DirectionGrid:
@@ -98,8 +103,9 @@ class DirectionGrid:
         of_around = np.full(around.size, math.pi / count)
         of_around[[0, -1]] /= 2
         if problem.dimension == 4:
-            line = 0.25 * math.pi * (1 + x)
-            return cls(4, pair_names(problem), line, around, 0.25 * math.pi * weights, of_around)
+            line, has_stop = 0.25 * math.pi * (1 + x), problem.system.stop is not None
+            second = (0.5 * math.pi * x, 0.5 * math.pi * weights) if has_stop else (around, of_around)
+            return cls(4, pair_names(problem), line, second[0], 0.25 * math.pi * weights, second[1], has_stop)
         return cls(3, tuple(problem.system.states), around, np.arcsin(x), of_around, weights)
 
     @property
@@ -108,6 +114,10 @@ class DirectionGrid:
         if self.dimension == 4:
             one, two = self.names
             share = Quantity("eta", "η", f"angle whose squared sine is the share of {two}", r"$\eta$", "rad", ("eta",))
+            if self.has_stop:
+                return share, Quantity(
+                    "phase", "θ₁", f"phase of {one} between impacts", r"$\theta_1$", "rad", ("phase",)
+                )
             words = f"phase of {one} less that of {two}"
             signs = "θ₁ − θ₂", r"$\theta_1 - \theta_2$"
             return share, Quantity("phase_difference", signs[0], words, signs[1], "rad", ("phase_difference",))
@@ -135,11 +145,12 @@ class DirectionGrid:
             longitude, latitude = np.meshgrid(self.first, self.second, indexing="ij")
             flat = np.cos(latitude)
             return np.stack([flat * np.cos(longitude), flat * np.sin(longitude), np.sin(latitude)])[..., None]
-        eta, difference, two = np.meshgrid(
-            self.first, self.second, math.pi * np.arange(PHASES) / PHASES, indexing="ij", sparse=True
-        )
+        turns = (1 + self.has_stop) * math.pi * np.arange(PHASES) / PHASES
+        eta, one, two = np.meshgrid(self.first, self.second, turns, indexing="ij", sparse=True)
+        if not self.has_stop:
+            one = two + one
         c, s = np.cos(eta), np.sin(eta)
-        parts = c * np.cos(two + difference), c * np.sin(two + difference), s * np.cos(two), s * np.sin(two)
+        parts = c * np.cos(one), c * np.sin(one), s * np.cos(two), s * np.sin(two)
         return np.stack(np.broadcast_arrays(*parts))
 
     def reduced(self, values: FloatArray) -> FloatArray:
@@ -160,7 +171,7 @@ class DirectionFields:
 
     Attributes:
         grid: the nodes.
-        right: T, of mean 1 over the sphere; of four variables its mean over θ₂.
+        right: T, of mean 1 over the sphere, or its half at a stop; of four variables its mean over θ₂.
         adjoint: T* as a density; at p = 0 the stationary one.
         product: T T*, the tilted density.
         total: ∫ T T* over the nodes, which is 1 where they resolve it.
@@ -187,10 +198,11 @@ class Directions:
     @cached_property
     def _map(self) -> FloatArray:
         """R = S⁻¹D."""
-        coordinates, frame = np.array(self.pair.space.phi.coordinates), self.pair.generator.problem.frame
-        coordinates = coordinates if frame is None else np.array(frame.matrix) @ coordinates
+        coordinates, problem = np.array(self.pair.space.phi.coordinates), self.pair.generator.problem
+        for rows in (problem.frame and problem.frame.matrix, problem.system.stop and problem.system.stop.coordinates):
+            coordinates = coordinates if rows is None else np.array(rows) @ coordinates
         scales = np.ones(len(coordinates))
-        for q, size in oscillators(self.pair.generator.problem).items():
+        for q, size in oscillators(problem).items():
             scales[q + 1] = size
         return np.linalg.inv(coordinates) * scales
 

@@ -378,6 +378,11 @@ class Stop:
         rows, back = self._sides
         return np.eye(len(rows)) - (1 + self.restitution) * np.outer(back[:, 1], rows[1])
 
+    def names(self, states: Sequence[str]) -> list[str]:
+        """What its coordinates are called: as the variables that they are, others y₁, y₂, …"""
+        alone = [np.flatnonzero(row) for row in self._sides[0]]
+        return [f"y{str(k + 1).translate(BELOW)}" if at.size > 1 else states[at[0]] for k, at in enumerate(alone)]
+
     def inside(self, matrix: ArrayLike) -> FloatArray:
         """S A S⁻¹, without what is rounding."""
         rows, back = self._sides

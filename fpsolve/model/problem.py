@@ -237,8 +237,6 @@ class Problem:
         """Why functions of it cannot be drawn; empty where they can, of more than two variables over directions."""
         if self.is_closed_only:
             return "functions of the directions of so many variables are not computed; look at Λ(2)"
-        if self.system.stop is not None:
-            return "functions of the directions on one side of a stop are not drawn; look at Λ(p)"
         if self.dimension > 2:
             return ""
         if len(self.coloured.parts) > 1:
@@ -427,13 +425,9 @@ class Problem:
             matrices, n, stop = self._by_noise(self.system.terms), self.dimension, self.system.stop
             basis, rounded, names, pattern = np.eye(n), 0.0, self.system.states, np.sum(np.abs(matrices), axis=0)
             if stop is not None:  # in its coordinates, of which the first two are one block
-                rows, rounded = np.array(stop.coordinates), ROUNDED
-                basis, pattern = np.linalg.inv(rows), np.sum([abs(stop.inside(each)) for each in matrices], axis=0)
+                basis, rounded, names = np.linalg.inv(stop.coordinates), ROUNDED, stop.names(names)
+                pattern = np.sum([abs(stop.inside(each)) for each in matrices], axis=0)
                 pattern[1, 0] += 1.0
-                alone = [np.flatnonzero(row) for row in rows]
-                names = [
-                    f"y{str(k + 1).translate(BELOW)}" if at.size > 1 else names[at[0]] for k, at in enumerate(alone)
-                ]
             groups = components(pattern)
             if len(groups) == 1 and stop is None:
                 basis = basis if self.frame is None else np.array(self.frame.matrix)

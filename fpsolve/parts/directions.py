@@ -146,7 +146,8 @@ def write_densities(found: Sequence[SettledDirections], curve: Curve, folder: Pa
 def write_directions(found: Sequence[SettledDirections], curve: Curve, folder: Path) -> None:
     """Write densities.nc and, as `write_eigenfunctions`, a series over p; with the first curve the stationary density.
 
-    The files for ParaView show x = η and y = θ₁ − θ₂ of four variables, of three variables the unit sphere. At p = 0
+    The files for ParaView show x = η and y = θ₁ − θ₂ of four variables, with a stop y = θ₁ between two impacts, so that
+    T jumps from one edge to the other, and of three variables the unit sphere. At p = 0
     T = 1 and T* is the stationary density, so that the series leaves it out.
     """
     found = on_one_grid(found)
@@ -192,6 +193,7 @@ def _figures(case: Case, result: CurveResult, folder: Path, simulated: Simulated
     curve, source = result.curve, directions_file(result.curve, folder)
     if case.output.figure and case.problem.dimension > 2 and source.is_file():
         what = "energy share and phase difference" if case.problem.dimension == 4 else "directions"
+        what = "energy share and phase" if case.problem.system.stop else what
         title, job = f"Densities of {what}{curve.of}", partial(_draw, case, curve, source)
         yield Drawing(title, job, f"densities{curve.suffix}", case.headline)
 

@@ -14,7 +14,7 @@ from fpsolve.exponent import principal_pair
 from fpsolve.exponent.directions import DirectionGrid, Directions, oscillators, pair_names
 from fpsolve.fem import Generator
 from fpsolve.fem.harmonics import HarmonicAxis
-from fpsolve.model import CoefficientMatrix, LinearSystem, ModalSystem, White
+from fpsolve.model import CoefficientMatrix, LinearSystem, ModalSystem, Telegraph, White
 from fpsolve.output import draw_eigenfunction
 from tests.exponent.test_modes import COUPLED, FREE, problem
 
@@ -238,3 +238,25 @@ def test_what_densities_say():
         stationary_density(pair)
     with pytest.raises(ValueError, match="two variables"):
         furstenberg_khasminskii(solver.pair(0.0))
+
+
+def test_at_a_stop_directions_are_those_between_impacts():
+    """T(z) = T(Jz), as many paths come back as leave, and ∫T T* = 1, at a sum of displacements, on coarse functions."""
+    system = ModalSystem.of(
+        mass=[[1.0, 0.1], [0.1, 1.0]],
+        stiffness=[[100.0, 10.0], [10.0, 256.0]],
+        damping=[[1.0, 0.0], [0.0, 3.6]],
+        stiffness_noise=[[100.0, 10.0], [10.0, 100.0]],
+        walls=[{"at": "q1 - 0.1*q2 = 0", "restitution": 0.7}],
+    )
+    solver = ExponentSolver(Problem(system, Telegraph(a=0.3, k=7.0)), rtol=1e-3)
+    grid = DirectionGrid.of(solver.problem, 32)
+    eta, theta = np.meshgrid([0.2, 0.7, 1.2], [0.3, 2.0, 4.0])
+    before = np.stack([0 * eta, -np.cos(eta), np.sin(eta) * np.cos(theta), np.sin(eta) * np.sin(theta)]).reshape(4, -1)
+    directions = Directions(solver.pair(2.0))
+    (right, *_), (there, *_) = directions.at(before), directions.at(before * [[1], [-0.7], [1], [1]])
+    np.testing.assert_allclose(right, there, rtol=0.02)
+    assert directions.on(grid).is_resolved
+    stationary = Directions(solver.pair(0.0)).on(grid)
+    leaves, comes = grid.first_weights @ stationary.adjoint[:, [0, -1]]
+    assert leaves == pytest.approx(comes, rel=0.02)
