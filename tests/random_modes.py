@@ -11,6 +11,7 @@ import math
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -30,6 +31,8 @@ RTOL, SECONDS, SYSTEMS, MOST = 1e-5, 60.0, 60, 4.0
 KINDS = ("white", "ornstein-uhlenbeck", "telegraph", "filter")
 PATH_STEPS = 3e7
 """Of one simulation, about: some seconds."""
+FEWEST = 4096
+"""Paths, however long they are."""
 
 
 def drawn(seed: int) -> tuple[str, Problem]:
@@ -69,13 +72,18 @@ def random_noise(kind: str, rng: np.random.Generator) -> Noise:
 
 
 def by_simulation(
-    problem: Problem, orders: Sequence[float] = ORDERS, *, path_steps: float = PATH_STEPS, seed: int = 1
+    problem: Problem,
+    orders: Sequence[float] = ORDERS,
+    *,
+    path_steps: float = PATH_STEPS,
+    fewest: int = FEWEST,
+    seed: int = 1,
 ) -> MonteCarlo:
-    """By populations, some 24 transients long, of 4096 paths or as many as the path-steps allow."""
+    """By populations, some 24 transients long, of `fewest` paths or as many as the path-steps allow."""
     parts = problem.system, problem.noise
     length = max(2 * transient(*parts), 24 * transient(*parts, is_mixed=False))
     steps = (length + 2 * coefficients(*parts).settling) / default_step(*parts)
-    paths = min(32768, max(4096, 32 * round(path_steps / steps / 32)))
+    paths = min(32768, max(fewest, 32 * round(path_steps / steps / 32)))
     return simulate(problem, list(orders), estimator="population", paths=paths, time=length, seed=seed)
 
 
@@ -99,13 +107,13 @@ def by_elements(
 
 
 def outcomes(
-    problem: Problem, orders: Sequence[float] = ORDERS, rtol: float = RTOL, *, path_steps: float = PATH_STEPS
+    problem: Problem, orders: Sequence[float] = ORDERS, rtol: float = RTOL, **size: Any
 ) -> list[Outcome | str]:
     """λ and Λ(p) by both, or why the elements give none. A number that the simulation does not give is NaN.
 
     So is one of which it says that it still drifts, as its standard error then does not tell how far it is.
     """
-    made = by_simulation(problem, orders, path_steps=path_steps)
+    made = by_simulation(problem, orders, **size)
     drifting = {each.data["p"] for each in made.warnings if each.code is Code.DRIFTING}
     moments = [
         (math.nan, math.nan) if each.p in drifting else (each.value or math.nan, each.standard_error or math.nan)

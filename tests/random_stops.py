@@ -21,7 +21,7 @@ from tests.random_modes import by_elements, compare, numbered, outcomes
 from tests.random_simulations import Outcome
 
 ORDERS = (1.0, 2.0)
-RTOL, ELASTIC, SYSTEMS, PATH_STEPS = 1e-3, 20, 30, 1e7
+RTOL, ELASTIC, SYSTEMS, PATH_STEPS = 1e-3, 20, 30, 3e6
 
 
 def drawn(seed: int) -> tuple[str, Problem]:
@@ -62,7 +62,7 @@ def _between(low: float, high: float, rng: np.random.Generator) -> float:
 def both(problem: Problem) -> list[Outcome | str]:
     """λ and Λ(p) by elements, and by the simulation, or elements without a stop that is elastic."""
     if getattr(problem.system.stop, "restitution", 1.0) < 1:
-        return outcomes(problem, ORDERS, RTOL, path_steps=PATH_STEPS)
+        return outcomes(problem, ORDERS, RTOL, path_steps=PATH_STEPS, fewest=1024)
     free = Problem(LinearSystem(problem.system.terms), problem.noise)
     pairs = zip(by_elements(problem, ORDERS, RTOL), by_elements(free, ORDERS, RTOL), strict=True)
     return [

@@ -7,8 +7,8 @@ there, and the layers of T* are nothing to Λ(p).
 
 What two degrees more change to first order, in η, in θ₁ and in θ₂ by themselves, tells where finer functions are
 needed. At the stop T is a root, so that these changes fall as a power of the degree, and not evenly: they correct
-nothing, but the error is half of their sum, or of the last step of Λ(p), or a quarter of the sum on the space before,
-whichever is the largest, and four times the sum on a single space.
+nothing, but the error is the sum of half of each, four times where no step has tried what more of these functions do,
+or half of the last step of Λ(p), or a quarter of the sum on the space before, whichever is the largest.
 """
 
 from __future__ import annotations
@@ -39,9 +39,9 @@ AT_STOP = 0.0, 0.5, 0.8, 1.0
 OF_LAST = 0.25
 """What is left at least, over the sum of the changes of the space before."""
 OF_ONE = 4.0
-"""What is left, over the sum of the changes, of a single space."""
+"""What is left, over a change, in a direction in which the last step made nothing finer, as on a single space."""
 WORTH = 0.2
-"""Share of the largest change from which on functions in another direction are made finer, too."""
+"""Share of what is left of the largest change from which on functions in another direction are made finer, too."""
 
 
 def stopped_directions(problem: Problem) -> HalfSphereAxis:
@@ -98,11 +98,17 @@ class StopStart(SphereStart):
         for finer in phi.finer:
             generator = Generator(self.problem, self.space.with_axis(0, finer))
             found.append(abs(first_order_change(pair, generator, 0, finer.new_in(phi))[0]))
-        pair, left = replace(pair, rounding=pair.rounding + self._rounding(pair)), OF_ONE * sum(found)
+        pair, left = replace(pair, rounding=pair.rounding + self._rounding(pair)), float(self._left @ found)
         for each in self.before:
             step, lacked = abs(pair.value - each.pair.value), sum(each.start.changes)
-            left = max(LEFT * sum(found), LEFT * step, OF_LAST * lacked)
+            left = max(left, LEFT * step, OF_LAST * lacked)
         return Solution(pair, 0.0, (left, *of_noises), replace(self, changes=tuple(found)))
+
+    @property
+    def _left(self) -> FloatArray:
+        """What is left over the change in each direction."""
+        tried = [self.space.phi.differs(each.pair.space.phi) for each in self.before] or [(False,) * 3]
+        return np.where(tried[-1], LEFT, OF_ONE)
 
     def is_enough(self, solution: Solution) -> bool:
         return True
@@ -113,7 +119,7 @@ class StopStart(SphereStart):
     def refined(self, solution: Solution, goal: float, stages: int, most: int) -> StopStart:
         """Two degrees more where they change most, if they are to, and other functions of the noise."""
         assert solution.measured is not None
-        phi, changes = self.space.phi, np.array(solution.start.changes)
+        phi, changes = self.space.phi, self._left * solution.start.changes
         if solution.measured[0] > 0.5 * goal:
             phi = phi.raised_in(changes >= WORTH * np.max(changes))
         found = Space((phi, *self._finer_noises(solution, solution.measured[1:], SHARE * goal)))

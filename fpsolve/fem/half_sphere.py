@@ -77,6 +77,14 @@ class HalfSphereAxis(DirectionAxis):
             replace(self, waves=self.waves + 2),
         )
 
+    def differs(self, other: HalfSphereAxis) -> tuple[bool, bool, bool]:
+        """Whether its functions of η, of θ₁ and of θ₂ are others."""
+        return (
+            (self.lines.size, self.degree) != (other.lines.size, other.degree),
+            (self.first_lines.size, self.first_degree) != (other.first_lines.size, other.first_degree),
+            self.waves != other.waves,
+        )
+
     def new_in(self, coarse: HalfSphereAxis) -> Any:
         """Which functions a coarser axis, of lower degrees, does not have, shape (size,)."""
         nodes, firsts, waves = np.unravel_index(self._kept, self._shape)

@@ -65,7 +65,7 @@ SUPPORT = np.linspace(-12, 12, 2401)
 OF_ENTRIES = 1e-15
 """Share of the largest speed of a term that is rounding of its entries, as of a matrix that keeps two rays."""
 COLLAPSE = math.exp(-math.pi / math.sqrt(3))
-"""Restitution below which a mass under white noise comes to rest at a wall (J. Bertoin 2007, E. Jacob 2012)."""
+"""Restitution below which a mass under white noise comes to rest at a wall (E. Jacob, arXiv:1004.1953)."""
 LINE = 90
 """Largest number of letters of a line of parameters."""
 
@@ -211,8 +211,8 @@ class Problem:
             raise ValueError(
                 f"got restitution = {stop.restitution:g} where white noise drives the coordinate of the wall while "
                 f"it rests there; must be >= exp(-pi/sqrt(3)) = {COLLAPSE:.6g}, as below that infinitely many impacts "
-                "bring it to rest, and the equation does not say how it leaves (J. Bertoin, Ann. Probab. 35, 2007; E. "
-                "Jacob, Stoch. Process. Appl. 122, 2012); increase it, or take noise with a memory"
+                "bring it to rest, and how the noise frees it again is not computed (J. Bertoin, Ann. Probab. 35, "
+                "2007, for 0; E. Jacob, arXiv:1004.1953 and arXiv:1103.2845); increase it, or take noise with a memory"
             )
 
     def wall_speeds(self, motion: System) -> list[float]:
@@ -425,7 +425,7 @@ class Problem:
             matrices, n, stop = self._by_noise(self.system.terms), self.dimension, self.system.stop
             basis, rounded, names, pattern = np.eye(n), 0.0, self.system.states, np.sum(np.abs(matrices), axis=0)
             if stop is not None:  # in its coordinates, of which the first two are one block
-                basis, rounded, names = np.linalg.inv(stop.coordinates), ROUNDED, stop.names(names)
+                basis, rounded, names = np.linalg.inv(np.array(stop.coordinates)), ROUNDED, stop.names(names)
                 pattern = np.sum([abs(stop.inside(each)) for each in matrices], axis=0)
                 pattern[1, 0] += 1.0
             groups = components(pattern)

@@ -81,7 +81,7 @@ def test_what_is_no_wall_is_refused(made, told):
 
 
 def test_a_mass_that_white_noise_brings_to_rest_is_refused():
-    """Below exp(−π/√3) infinitely many impacts bring an integral of white noise to rest (Bertoin 2007, Jacob 2012)."""
+    """Below exp(−π/√3) infinitely many impacts bring an integral of white noise to rest (E. Jacob, arXiv:1004.1953)."""
     with pytest.raises(ValueError, match=r"0\.163034.*Bertoin"):
         Problem(modes(restitution=0.163), White(s=0.1))
     Problem(modes(restitution=0.1631), White(s=0.1))
