@@ -73,6 +73,15 @@ def drawn(step, state, xi_mean, xi_rise, push, rng):  # type: ignore[no-untyped-
         xi[i], xi_rise[i] = xi_rise[i], 0.5 * (xi_rise[i] - xi[i])
 
 
+@inlined
+def picked(reached, rng):  # type: ignore[no-untyped-def]
+    """A random number of a law, whose chances up to each are given."""
+    mark, k = rng.random(), 0
+    while reached[k] < mark:
+        k += 1
+    return k
+
+
 class DrivenMotion(NamedTuple):
     """A₀, A₁, [A₀, A₁] and [A₁, [A₁, A₀]] as rows (t, p, q, r), shape (4, 4)."""
 
@@ -263,9 +272,7 @@ def step_switched(m, chain, h, x, u, states, log_norm, rng):  # type: ignore[no-
             crossed += count
             left -= stay
             if left > 0:
-                mark, left_behind, k = rng.random(), k, 0
-                while chain.reached[left_behind, k] < mark:
-                    k += 1
+                k = picked(chain.reached[k], rng)
         states[i] = k
     return crossed
 
@@ -289,9 +296,7 @@ def step_struck(m, law, h, x, u, log_norm, rng):  # type: ignore[no-untyped-def]
             crossed += count
             left -= stay
             if left > 0:
-                mark, k = rng.random(), 0
-                while law.reached[k] < mark:
-                    k += 1
+                k = picked(law.reached, rng)
                 a, b, c, d = m.impulses[k, 0, 0], m.impulses[k, 0, 1], m.impulses[k, 1, 0], m.impulses[k, 1, 1]
                 x[i], u[i] = a * x[i] + b * u[i], c * x[i] + d * u[i]
             norm = math.sqrt(x[i] * x[i] + u[i] * u[i])

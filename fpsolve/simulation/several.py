@@ -21,7 +21,7 @@ from numba.extending import overload
 from fpsolve.arrays import FloatArray
 from fpsolve.model.noise import Noise
 from fpsolve.simulation.compiled import compiled
-from fpsolve.simulation.motions import drawn, exact_factors, factors, flow_on
+from fpsolve.simulation.motions import drawn, exact_factors, factors, flow_on, picked
 from fpsolve.simulation.rays import Rays
 
 
@@ -144,9 +144,7 @@ def _time_in_states(chain, values, h, states, integral, rng):  # type: ignore[no
             total += values[k] * min(stay, left)
             left -= stay
             if left > 0:
-                mark, left_behind, k = rng.random(), k, 0
-                while chain.reached[left_behind, k] < mark:
-                    k += 1
+                k = picked(chain.reached[k], rng)
         states[i], integral[i] = k, total
 
 
@@ -156,9 +154,7 @@ def _sum_of_sizes(law, sizes, h, integral, rng):  # type: ignore[no-untyped-def]
     for i in range(integral.size):
         left, total = h - rng.standard_exponential() / law.rate, 0.0
         while left > 0:
-            mark, k = rng.random(), 0
-            while law.reached[k] < mark:
-                k += 1
+            k = picked(law.reached, rng)
             total += sizes[k]
             left -= rng.standard_exponential() / law.rate
         integral[i] = total

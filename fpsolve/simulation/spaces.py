@@ -16,7 +16,7 @@ import numpy as np
 
 from fpsolve.arrays import FloatArray
 from fpsolve.simulation.compiled import compiled
-from fpsolve.simulation.motions import drawn
+from fpsolve.simulation.motions import drawn, picked
 from fpsolve.simulation.several import integrate_all
 
 _BLOCK = 128
@@ -302,9 +302,7 @@ def step_switched_space(m, chain, h, x, u, states, log_norm, rng):  # type: igno
                 log_norm[i] += _flow(m.matrices[k], min(stay, left), m.sizes[k], state, other, begun)
             left -= stay
             if left > 0:
-                mark, left_behind, k = rng.random(), k, 0
-                while chain.reached[left_behind, k] < mark:
-                    k += 1
+                k = picked(chain.reached[k], rng)
         log_norm[i] += _tamed(state)
         _store(x, u, i, state)
         states[i] = k

@@ -22,7 +22,7 @@ import numpy as np
 
 from fpsolve.arrays import FloatArray
 from fpsolve.simulation.compiled import compiled
-from fpsolve.simulation.motions import drawn
+from fpsolve.simulation.motions import drawn, picked
 from fpsolve.simulation.spaces import _load, _store, _tamed
 
 _SHORT = 1e-6
@@ -108,9 +108,7 @@ class SwitchedStop(NamedTuple):
                 total += _flown(m, m.matrices[k], min(stay, left), m.sizes[k], state, series)
                 left -= stay
                 if left > 0:
-                    mark, left_behind, k = rng.random(), k, 0
-                    while noise.reached[left_behind, k] < mark:
-                        k += 1
+                    k = picked(noise.reached[k], rng)
             log_norm[i] += _tamed(state)
             _store(x, u, i, state)
             xi[i] = k
