@@ -8,7 +8,8 @@ there, and the layers of T* are nothing to Λ(p).
 What two degrees more change to first order, in η, in θ₁ and in θ₂ by themselves, tells where finer functions are
 needed. At the stop T is a root, so that these changes fall as a power of the degree, and not evenly: they correct
 nothing, but the error is the sum of half of each, four times where no step has tried what more of these functions do,
-or half of the last step of Λ(p), or a quarter of the sum on the space before, whichever is the largest.
+or half of the last step of Λ(p), or a quarter of the sum on the space before, whichever is the largest. On a single
+space this is a guess, so that one step there is at least.
 """
 
 from __future__ import annotations
@@ -111,7 +112,7 @@ class StopStart(SphereStart):
         return np.where(tried[-1], LEFT, OF_ONE)
 
     def is_enough(self, solution: Solution) -> bool:
-        return True
+        return bool(self.before)
 
     def doubled(self, failure: Exception | None) -> StopStart:
         return StopStart(self.problem, self.space.with_axis(0, self.space.phi.enriched()))
@@ -120,7 +121,7 @@ class StopStart(SphereStart):
         """Two degrees more where they change most, if they are to, and other functions of the noise."""
         assert solution.measured is not None
         phi, changes = self.space.phi, self._left * solution.start.changes
-        if solution.measured[0] > 0.5 * goal:
+        if not self.before or solution.measured[0] > 0.5 * goal:
             phi = phi.raised_in(changes >= WORTH * np.max(changes))
         found = Space((phi, *self._finer_noises(solution, solution.measured[1:], SHARE * goal)))
         found = found if found.size > self.space.size else self.space.enriched()

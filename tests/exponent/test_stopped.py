@@ -56,7 +56,7 @@ def test_units_change_nothing_but_the_rate():
     assert scaled.frame is not None
     found, expected = (ExponentSolver(each, rtol=1e-3).solution(2.0) for each in (scaled, coupled(0.8)))
     assert found.pair.value / 1000 == pytest.approx(expected.pair.value, rel=1e-9)
-    assert abs(expected.pair.value + 0.15844) <= expected.error < 1e-3
+    assert abs(expected.pair.value + 0.15844) <= expected.error + 3 * 7e-5 < 1e-3  # by paths, ± 7e-5
 
 
 @pytest.mark.slow
