@@ -8,7 +8,7 @@ there, and the layers of T* are nothing to Λ(p).
 What two degrees more change to first order, in η, in θ₁ and in θ₂ by themselves, tells where finer functions are
 needed. At the stop T is a root, so that these changes fall as a power of the degree, and not evenly: they correct
 nothing, but the error is the sum of half of each, four times where no step has tried what more of these functions do,
-or half of the last step of Λ(p), or a quarter of the sum on the space before, whichever is the largest. On a single
+or half of the last step of Λ(p), or 2.5 times the sum on the space before, whichever is the largest. On a single
 space this is a guess, so that one step there is at least.
 """
 
@@ -37,7 +37,7 @@ FIRST_WAVES = 2
 """Largest degree of its waves."""
 AT_STOP = 0.0, 0.5, 0.8, 1.0
 """Vertices in η, over ½π: smaller elements where the first mass is at rest at the stop."""
-OF_LAST = 0.25
+OF_LAST = 2.5
 """What is left at least, over the sum of the changes of the space before."""
 OF_ONE = 4.0
 """What is left, over a change, in a direction in which the last step made nothing finer, as on a single space."""
