@@ -58,7 +58,7 @@ RTOL_OF_SEVERAL = 1e-6
 """Relative error that is wanted of two variables under two noises that are not white."""
 RTOL_BEYOND_PLANE = 1e-5
 """Relative error that is wanted of three and four variables."""
-RTOL_AT_STOP = 1e-4
+RTOL_AT_STOP = 1e-3
 """Relative error that is wanted of four variables with a stop, where T is a root."""
 SUPPORT = np.linspace(-12, 12, 2401)
 """Values of ξ at which a coefficient is looked at that is no a + bξ, in standard deviations."""
