@@ -242,6 +242,8 @@ class Basis:
             self.is_converged = self._fill(most)
             self._refuse_corners()
             self._rounding = self._bound()
+            carried = [p for p, node in self.nodes.items() if not node.demand and solver.mesh is None]
+            remains = {p: self._left_by(self._lifted(p)[0]) for p in carried}
         rate = max((node.rate for p, node in self.nodes.items() if not _is_even(p)), default=0.0)
         for p, node in self.nodes.items():
             error = node.error
@@ -249,10 +251,8 @@ class Basis:
                 is_sure = 0 < rate * abs(p) <= SURELY * solver.tolerance(p, node.pair.value)
                 error = max(error, rate * abs(p)) if is_sure else self._error_beside(p)
             rate_of = error / abs(p) if p else node.rate
-            remains = 0.0 if node.demand or solver.mesh is not None else self._left_by(self._lifted(p)[0])
-            self.nodes[p] = node._replace(error=error, rate=rate_of, remains=remains)
-        for p, node in self.nodes.items():
-            self.nodes[p] = node._replace(around=None, right=(), left=())
+            left = remains.get(p, 0.0)
+            self.nodes[p] = node._replace(error=error, rate=rate_of, remains=left, around=None, right=(), left=())
 
     # nodes
 

@@ -68,10 +68,8 @@ def saying_if_interrupted(what_is_kept: Callable[[], str], again: str = AGAIN) -
     """An interrupt of the body, also one that a library has made another exception of, says what is kept."""
     try:
         yield
-    except FpsolveError:
-        raise
     except BaseException as failure:
-        if not is_interrupt(failure):
+        if isinstance(failure, FpsolveError) or not is_interrupt(failure):
             raise
         raise KeyboardInterrupt(f"interrupted{what_is_kept()}; {again}") from None
 
