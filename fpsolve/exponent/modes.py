@@ -27,7 +27,7 @@ from fpsolve.errors import NoHierarchy
 from fpsolve.exponent.eigen import PrincipalPair, principal_pair
 from fpsolve.exponent.error import Solution, mode_effects
 from fpsolve.exponent.starts import SHARE, Question, Start
-from fpsolve.fem.generator import Generator
+from fpsolve.fem.generator import SMALL_P, Generator
 from fpsolve.fem.harmonics import HarmonicAxis
 from fpsolve.fem.noise_axes import CountedAxis
 from fpsolve.fem.space import Space, first_axis
@@ -251,7 +251,9 @@ class SphereStart(Start):
         return Solution(pair, left, of_axes, start)
 
     def is_enough(self, solution: Solution) -> bool:
-        """Whether Λ′, which is not corrected, has settled, or as many waves as it may take were added."""
+        """Whether Λ′, which is not corrected, has settled, or as many waves as it may take were added; λ is corrected."""
+        if abs(solution.pair.p) <= SMALL_P:
+            return True
         slopes = [each.pair.derivative for each in (*self.before, solution)][-2:]
         is_settled = len(slopes) > 1 and float(np.ptp(slopes)) <= SETTLED_SLOPE * abs(slopes[-1])
         first = self.enough.pair.space.phi.waves if self.enough else self.space.phi.waves

@@ -30,6 +30,7 @@ from fpsolve.arrays import identity
 from fpsolve.errors import FpsolveError, NoSuchExponent
 from fpsolve.exponent import principal_pair, spectrum
 from fpsolve.exponent.modes import BEYOND, SphereStart, first_directions, left_of, modal_coordinates, second_moments
+from fpsolve.fem.generator import SMALL_P
 from fpsolve.fem.space import Space, first_axis
 from fpsolve.fem.sphere import SphereAxis
 from fpsolve.model import CoefficientMatrix, Jump, LinearSystem, Poisson, Telegraph, White
@@ -198,13 +199,14 @@ def test_waves_are_added_until_the_slope_has_settled():
     noises = [first_axis(each, 7) for each in given.coloured.parts.values()]
     start = SphereStart(given, Space((first_directions(given), *noises)))
 
-    def of(slope):
-        return SimpleNamespace(pair=SimpleNamespace(derivative=slope))
+    def of(slope, p=1.0):
+        return SimpleNamespace(pair=SimpleNamespace(derivative=slope, p=p))
 
     later = replace(start, before=(of(1.0),))
     assert not start.is_enough(of(1.0))
     assert not later.is_enough(of(1.01))
     assert later.is_enough(of(1.001))
+    assert start.is_enough(of(1.0, SMALL_P))
     assert start.doubled(None).space.size > start.space.size
 
 
