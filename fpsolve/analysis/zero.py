@@ -29,6 +29,8 @@ RTOL_OF_CLOSED = 1e-7
 """Error of F that is wanted where even moments are all, relative to its scale."""
 RTOL_OF_DEAR = 1e-3
 """Error of F that is wanted where it is dear, relative to its scale."""
+ITS_SIGN = 0.3
+"""Largest error of a dear F, over F, where its sign is sure."""
 HALF = 0.5
 """Share of the time that is left for one value."""
 NEAR = 0.1
@@ -225,11 +227,14 @@ class Ratio:
         keys: of the parameters.
         budget: for a solve.
         rtol: of Λ(p)/p, relative to its scale.
+        of_value: see `ExponentSolver`.
     """
 
-    def __init__(self, problem: Problem, p: float, keys: Sequence[str], budget: Budget, rtol: float) -> None:
+    def __init__(
+        self, problem: Problem, p: float, keys: Sequence[str], budget: Budget, rtol: float, of_value: float = 0.0
+    ) -> None:
         self.problem, self.p, self.keys = problem, p, tuple(keys)
-        self._own: Any = {"rtol": rtol, "budget": budget}
+        self._own: Any = {"rtol": rtol, "of_value": of_value, "budget": budget}
         self._starts: Mapping[float, Any] = {}
 
     def at(self, theta: FloatArray) -> Problem:
@@ -292,7 +297,8 @@ class ZeroField:
         known: Known | None = None,
     ) -> None:
         rtol = line_rtol(problem, zero) if rtol is None else rtol
-        self._axes, self._ratio = axes, Ratio(problem, zero.p, [axis.key for axis in axes], budget, rtol)
+        keys, of_value = [axis.key for axis in axes], ITS_SIGN * is_dear(problem, zero)
+        self._axes, self._ratio = axes, Ratio(problem, zero.p, keys, budget, rtol, of_value)
         self._seconds, self._spent = seconds, spent or Message(Code.LINE_SPENT, most=seconds)
         self.spent_seconds, self.stopped = 0.0, None if seconds > 0 else self._spent
         self._before, self._rtol, self._known = np.full(2, math.inf), rtol, known

@@ -29,6 +29,7 @@ from fpsolve.fem.axis import KroneckerSum
 from fpsolve.fem.dense import Factors
 from fpsolve.fem.factors import one_thread
 from fpsolve.fem.generator import Generator, Pencil
+from fpsolve.fem.refined import RefinedFactors
 from fpsolve.fem.space import Space
 from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.problem import Problem
@@ -55,8 +56,8 @@ DOUBT = 1e-3
 _EPS = float(np.finfo(float).eps)
 BESIDE = 1e-2
 """Distance of the shift of kept factors from an eigenvalue, over a rate, up to which they serve for its derivatives."""
-REFINEMENTS = 3
-"""Number of times that T′ is improved by its residual."""
+REFINEMENTS = 8
+"""Number of times that T′ is improved by its residual, at most."""
 REFINED = 1e-14
 """Share of T′ of a step that is the last one, where no other one is enough."""
 KNOWN = 1e-11
@@ -500,12 +501,15 @@ class PairDerivatives:
 
     @cached_property
     def _factor(self) -> Factors:
-        return self._kept[0] if self._kept else self._pencil.factorised(self.pair.eigenvalue + 1e-6 * self._rate)
+        found = self._kept[0] if self._kept else self._pencil.factorised(self.pair.eigenvalue + 1e-6 * self._rate)
+        return found.rough if isinstance(found, RefinedFactors) else found  # which would refine the share of T, too
 
     def solve(
         self, source: FloatArray, *, adjoint: bool = False, refinements: int = REFINEMENTS, enough: float = REFINED
     ) -> FloatArray:
-        """v from the load f, in `one_thread`; each refinement leaves 1e-6 of a rate over the gap of the spectrum."""
+        """v from the load f, in `one_thread`; each refinement leaves 1e-6 of a rate over the gap of the spectrum, or
+        what the factors round.
+        """
         own, other = self.pair.right, self.pair.left
         weighed, operator, change = self._weighed[0], self._operator, 0.0 * own
         if adjoint:

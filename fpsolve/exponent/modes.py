@@ -251,7 +251,7 @@ class SphereStart(Start):
         return Solution(pair, left, of_axes, start)
 
     def is_enough(self, solution: Solution) -> bool:
-        """Whether Λ′, which is not corrected, has settled, or as many waves as it may take were added; λ is corrected."""
+        """Whether Λ′, which is not corrected, has settled, or as many waves as may be were added; λ is corrected."""
         if abs(solution.pair.p) <= SMALL_P:
             return True
         slopes = [each.pair.derivative for each in (*self.before, solution)][-2:]

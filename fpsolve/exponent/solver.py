@@ -180,6 +180,7 @@ class ExponentSolver:
         problem: a motion and its noise.
         mesh: a mesh for all p; None chooses a discretisation for each p that meets rtol.
         rtol: |error| ≤ rtol·max(|Λ|, the terms of Eq. (37) before they cancel).
+        of_value: |error| ≤ of_value·|Λ| is enough, too, as for a sign.
         budget: what the choice of a discretisation may cost.
         starts: solutions of a problem with parameters close by, by their p, see `WholeProblem`; beyond the plane even
             moments.
@@ -198,6 +199,7 @@ class ExponentSolver:
     mesh: CylinderMesh | None = None
     _: KW_ONLY
     rtol: float = 1e-8
+    of_value: float = 0.0
     budget: Budget = field(default_factory=Budget)
     starts: Mapping[float, Any] = field(default_factory=dict, repr=False)
     slope_errors: dict[float, float] = field(init=False, default_factory=dict, repr=False)
@@ -388,7 +390,7 @@ class ExponentSolver:
 
     def tolerance(self, p: float, value: float) -> float:
         """The largest error allowed of a value of Λ(p)."""
-        return tolerated(self.rtol, self.scales, p, value)
+        return max(tolerated(self.rtol, self.scales, p, value), self.of_value * abs(value))
 
     @property
     def goes_on(self) -> bool:

@@ -25,16 +25,20 @@ LEAST_SHARE = 1e-8
 
 
 class RefinedFactors:
-    """Factors of a sum, and the sum itself, by which their solutions are corrected."""
+    """Factors of a sum, and the sum itself, by which their solutions are corrected.
+
+    Attributes:
+        rough: the factors.
+    """
 
     def __init__(self, operator: KroneckerSum, factors: Factors) -> None:
-        self._operator, self._factors, self.gigabytes = operator, factors, factors.gigabytes
+        self._operator, self.rough, self.gigabytes = operator, factors, factors.gigabytes
         self.operations = factors.operations + CALL_OPERATIONS + GIGABYTE_OPERATIONS * factors.gigabytes
         self._vectors = dict[bool, FloatArray]()  # right and left, of an eigenvalue close by
 
     def make(self) -> None:
         """Eliminate."""
-        self._factors.make()
+        self.rough.make()
 
     def solve(self, b: FloatArray, *, transposed: bool = False) -> FloatArray:
         """x of A x = b, or of Aᵀx = b, refined until only rounding is left.
@@ -42,7 +46,7 @@ class RefinedFactors:
         Next to an eigenvalue x has its vector so often that errors in it hide all others. Then what is refined is x of
         A x = γ b, such that ⟨v, A x − γ b⟩ = 0, v the left vector, and x/γ is the solution.
         """
-        operator, x = self._operator.T if transposed else self._operator, self._factors.solve(b, transposed=transposed)
+        operator, x = self._operator.T if transposed else self._operator, self.rough.solve(b, transposed=transposed)
         gamma, last, left = 1.0, math.inf, self._vectors.get(not transposed)
         for _ in range(REFINEMENTS):
             image = operator @ x
@@ -53,9 +57,9 @@ class RefinedFactors:
             if error < ROUNDING:
                 break
             if error < LEAST_GAIN * last:
-                x, last = x + self._factors.solve(rest, transposed=transposed), error
+                x, last = x + self.rough.solve(rest, transposed=transposed), error
             elif left is None:
-                left, last = self._factors.solve(b, transposed=not transposed), math.inf
+                left, last = self.rough.solve(b, transposed=not transposed), math.inf
             else:
                 break
         if left is not None:

@@ -29,8 +29,9 @@ from fpsolve.analysis import Axis
 from fpsolve.arrays import identity
 from fpsolve.errors import FpsolveError, NoSuchExponent
 from fpsolve.exponent import principal_pair, spectrum
+from fpsolve.exponent.eigen import PairDerivatives
 from fpsolve.exponent.modes import BEYOND, SphereStart, first_directions, left_of, modal_coordinates, second_moments
-from fpsolve.fem.generator import SMALL_P
+from fpsolve.fem.generator import SMALL_P, Generator
 from fpsolve.fem.space import Space, first_axis
 from fpsolve.fem.sphere import SphereAxis
 from fpsolve.model import CoefficientMatrix, Jump, LinearSystem, Poisson, Telegraph, White
@@ -208,6 +209,17 @@ def test_waves_are_added_until_the_slope_has_settled():
     assert later.is_enough(of(1.001))
     assert start.is_enough(of(1.0, SMALL_P))
     assert start.doubled(None).space.size > start.space.size
+
+
+def test_eigenfunctions_change_as_the_equations_say_where_factors_are_rough():
+    """(L − Λ)T′ = −(L′ − Λ′)T for single-precision factors beside Λ, whose own eigenvalue is elsewhere."""
+    case = load_case(Path(__file__).parents[2] / "cases/systems/flutter.toml")
+    given = case.problem.at({"system.U": 54.0, "noise.standard_deviation": 0.15})
+    directions = replace(first_directions(given), degree=6, waves=4)
+    pair = principal_pair(Generator(given, Space((directions, first_axis(given.noise, 16)))), 0.0)
+    slope = pair.generator.matrix(0.0, derivative=1).shifted(pair.derivative) @ pair.right
+    rest = slope + pair.generator.at(0.0).matrix.shifted(pair.eigenvalue) @ PairDerivatives(pair).by_p
+    assert np.linalg.norm(rest) <= 1e-13 * np.linalg.norm(slope)
 
 
 @pytest.mark.parametrize("seed", [7, 18, 29, 161])
