@@ -34,7 +34,9 @@ SHARE_LEFT = 0.1
 FARTHEST = 0.1
 """Longest way of Newton's method to a first point, in sides of the square."""
 MOST_AWAY = 0.2
-"""Largest distance of a point from where it was predicted, in steps."""
+"""Largest distance of a point from where it was predicted, in steps, beyond what both points may be off."""
+EXTRAPOLATED = 28
+"""How many times a cubic by two points has the error of the first one at twice their distance beyond."""
 MOST_POINTS = 20_000
 """Largest number of points of half a branch."""
 BESIDE = 1e-8
@@ -257,7 +259,7 @@ def _half(
     points, step = [Point(start)], 0.25 * longest
     last, before = start, None
     while len(points) < MOST_POINTS:
-        if before is None:
+        if before is None or EXTRAPOLATED * last.width > MOST_AWAY * step:
             at = last.at + sign * step * last.tangent
         else:
             share = 1 + step / float(np.linalg.norm(last.at - before.at))
@@ -265,7 +267,9 @@ def _half(
         reason = Message(Code.NEWTON_UNSETTLED)
         try:
             sample = correct(field, at, last.tangent, bend=_bend(before, last))
-            if sample is not None and np.linalg.norm(sample.at - at) > MOST_AWAY * np.linalg.norm(at - last.at):
+            if sample is not None and np.linalg.norm(sample.at - at) > (
+                MOST_AWAY * np.linalg.norm(at - last.at) + last.width + sample.width
+            ):
                 sample = None  # perhaps of another curve
             if is_leaving := sample is None and bool(np.any((at < 0) | (at > 1))):
                 sample = _exit(field, last, at)

@@ -610,3 +610,22 @@ def test_a_branch_that_broke_off_goes_where_another_runs_through_it():
     assert with_branch((broken, other), whole) == (other, whole)
     assert with_branch((broken,), other) == (broken, other)
     assert with_branch((other,), whole) == (other, whole)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_points_that_are_off_do_not_lead_astray(seed):
+    """F with errors of 2e-3, as another mesh at each point makes them: a few points, each as near as its width."""
+    rng = np.random.default_rng(seed)
+    calls = []
+
+    def noisy(at):
+        calls.append(at)
+        gap = math.hypot(at[0] - 0.2, at[1] - 0.1) - 0.6
+        slope = (at - np.array([0.2, 0.1])) / (gap + 0.6)
+        return Sample(at, gap + 2e-3 * rng.uniform(-1, 1), slope, 2e-3, 1.0, rtol=2e-3)
+
+    (branch,) = find_branches(noisy, scan_of(noisy, 5))
+    for point in branch.points:
+        assert abs(math.hypot(*(point.sample.at - [0.2, 0.1])) - 0.6) <= point.sample.width
+    assert [point.label for point in branch.points if point.label] == [FRAME, FRAME]
+    assert len(calls) < 150
