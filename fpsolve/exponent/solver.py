@@ -246,7 +246,9 @@ class ExponentSolver:
 
     @property
     def _own(self) -> dict[str, Any]:
-        tolerance = partial(tolerated, self.rtol, self.scales)  # not a method: a cycle would keep matrices for long
+        tolerance = partial(
+            tolerated, self.rtol, self.of_value, self.scales
+        )  # not a method: a cycle would keep matrices for long
         return {"rtol": self.rtol, "budget": self.budget, "tolerance": tolerance}
 
     def pair(self, p: float) -> PrincipalPair:
@@ -264,7 +266,7 @@ class ExponentSolver:
 
     @property
     def _usual(self) -> dict[str, Any]:
-        return {"rtol": self.rtol, "budget": self.budget}
+        return {"rtol": self.rtol, "of_value": self.of_value, "budget": self.budget}
 
     def solution(self, p: float, tolerance: Tolerance | None = None) -> Solution:
         """The principal eigenpair at p and its error, within a tolerance, that of rtol if none is given.
@@ -390,7 +392,7 @@ class ExponentSolver:
 
     def tolerance(self, p: float, value: float) -> float:
         """The largest error allowed of a value of Λ(p)."""
-        return max(tolerated(self.rtol, self.scales, p, value), self.of_value * abs(value))
+        return tolerated(self.rtol, self.of_value, self.scales, p, value)
 
     @property
     def goes_on(self) -> bool:
@@ -608,9 +610,9 @@ def _of_moments(even: EvenMoment) -> Moment:
     return Moment(even.value, math.nan, math.nan, even.error, math.nan)
 
 
-def tolerated(rtol: float, scales: Scale, p: float, value: float) -> float:
-    """rtol of a value of Λ(p), or of the terms of Eq. (37) before they cancel, whichever is larger."""
-    return rtol * max(abs(value), float(scales.moment(p)))
+def tolerated(rtol: float, of_value: float, scales: Scale, p: float, value: float) -> float:
+    """rtol of the terms of Eq. (37) before they cancel, or it or `of_value` of Λ(p), whichever is the largest."""
+    return max(rtol * float(scales.moment(p)), max(rtol, of_value) * abs(value))
 
 
 def best_order(p: FloatArray) -> Any:

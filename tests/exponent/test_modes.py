@@ -194,6 +194,15 @@ def test_the_end_of_the_spectrum_takes_no_array_of_all_directions():
     assert peak < 2 * pencil.space.phi.size**2
 
 
+def test_a_sign_takes_a_smaller_space():
+    """λ within 0.3 of itself, and within its stated error of that at a tighter rtol."""
+    given = load_case(Path(__file__).parents[2] / "cases/systems/coupled_ou.toml").problem
+    tight, rough = (ExponentSolver(given, rtol=1e-4, of_value=share) for share in (0.0, 0.3))
+    (value, error), (found, doubt) = tight.ratio_alone(0.0), rough.ratio_alone(0.0)
+    assert abs(found - value) <= error + doubt <= 0.31 * abs(found)
+    assert rough.around_zero.pair.right.size < tight.around_zero.pair.right.size
+
+
 def test_waves_are_added_until_the_slope_has_settled():
     """And where a space has no principal pair."""
     given = problem(White(s=1.0))
