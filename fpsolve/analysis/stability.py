@@ -219,7 +219,12 @@ class Boundary(Result):
         return [Row(rough, count, number) for number in range(count)]
 
     def reduced_scan(self) -> Scan | None:
-        """F on a grid twice as fine from a reduced basis, see `Surface`; None where there is none."""
+        """F on a grid twice as fine from a reduced basis, see `Surface`; None where there is none, or F is dear.
+
+        The basis of a dear F would take longer than its signs on the grid.
+        """
+        if is_dear(self.problem, self.zero):
+            return None
         most, p = self.budget.line_seconds, self.zero.p
         whole = Countdown(math.inf if most is None else SCAN_SHARE * most)
         ranges = {axis.key: (axis.start, axis.stop, axis.scale) for axis in (self.x, self.y)}
