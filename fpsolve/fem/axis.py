@@ -36,13 +36,14 @@ class Axis:
         is_full: whether every function is coupled to most others.
         slowest: the least share of the effect of the highest modes that two more may leave, see `ModeEffects`.
         ring: its cells, a `Ring`, where only their end values couple them; None for others.
+        is_of_waves: whether it is the first of a sum that `WaveFactors` may take.
         slope: s/p of the factor exp(s z) that moves with p.
     """
 
     __dataclass_fields__: ClassVar[dict[str, Any]]
     lines = NO_LINES
     ring: Any = None
-    is_full = False
+    is_full = is_of_waves = False
     slowest, slope = 0.0, 0.0
 
     def __reduce__(self) -> tuple[Any, ...]:

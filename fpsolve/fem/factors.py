@@ -21,6 +21,7 @@ from fpsolve.fem.dense import ArrayFactors, Factors, dense_operations
 from fpsolve.fem.levels import ENTRY_BYTES, ENTRY_OPERATIONS, LevelFactors, neighbours, paired
 from fpsolve.fem.refined import RefinedFactors
 from fpsolve.fem.rings import Ring, RingFactors
+from fpsolve.fem.wave_factors import WaveFactors
 from fpsolve.signals import left_at_signals
 from fpsolve.superlu import sparse_lu
 
@@ -71,6 +72,7 @@ def factorised(
     levels: Levels = (),
     *,
     is_full: bool = False,
+    is_of_waves: bool = False,
     ring: Ring | None = None,
 ) -> Factors:
     """LU factors of a sum. A pivot that vanishes is made tiny: next to an eigenvalue that is what is wanted.
@@ -79,12 +81,13 @@ def factorised(
         operator: the sum.
         levels: for each axis the functions that are eliminated together, see `Axis`; nothing where none are.
         is_full: whether most functions of the first axis are coupled, so that no order of elimination spares anything.
+        is_of_waves: whether the first axis is of waves of φ.
         ring: the cells of the first axis, where only their end values couple them.
 
     Raises:
         OverBudget: what it takes is more than a number may still cost.
     """
-    *others, last = candidates(operator, levels, is_full, ring)
+    *others, last = candidates(operator, levels, is_full, ring, is_of_waves)
     for kind in others:
         try:
             return _factorise(kind, operator)
@@ -102,11 +105,16 @@ def _factorise(kind: Factors, operator: KroneckerSum) -> Factors:
     return kind
 
 
-def candidates(operator: KroneckerSum, levels: Levels, is_full: bool, ring: Ring | None) -> list[Factors]:
+def candidates(
+    operator: KroneckerSum, levels: Levels, is_full: bool, ring: Ring | None, is_of_waves: bool = False
+) -> list[Factors]:
     """All kinds that there may be, by their operations: of a small matrix one dense array alone."""
     if operator.size <= FEW_UNKNOWNS and not operator.is_sparse:
         return [DenseFactors(operator)]
-    found = sorted(_ordered(operator, levels, is_full, ring), key=lambda each: each.operations)
+    found: list[Factors] = list(_ordered(operator, levels, is_full, ring))
+    if is_of_waves and WaveFactors.may_take(operator):
+        found.append(WaveFactors(operator))
+    found.sort(key=lambda each: each.operations)
     is_of_cells = len(operator.shape) == 2 and (not levels or levels[-1] is None)
     whole = DenseFactors(operator) if is_full else SparseFactors(operator, is_of_cells=is_of_cells)
     if found and found[0].operations < ENTRY_OPERATIONS * operator.entries:  # so many are all that is sure of SuperLU

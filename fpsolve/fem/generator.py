@@ -90,7 +90,9 @@ class Pencil:
     def factorised(self, shift: float) -> Factors:
         """LU factors of L(p) − σM, of the kind that takes the fewest operations."""
         self.kept.clear()
-        found = factorised(self.matrix.shifted(shift), self.levels, is_full=self.space.phi.is_full, ring=self.ring)
+        phi = self.space.phi
+        shifted, kinds = self.matrix.shifted(shift), {"is_full": phi.is_full, "is_of_waves": phi.is_of_waves}
+        found = factorised(shifted, self.levels, ring=self.ring, **kinds)
         if self.keeps_factors:
             self.kept.append((shift, found))
         return found
