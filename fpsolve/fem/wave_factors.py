@@ -66,7 +66,7 @@ class WaveFactors:
         c, low, self._u, self._w = (sum(each) for each in zip(*sums, strict=True))
         self._d = low[: self._count, : self._count]
         symmetric = {"SymmetricMode": True}  # of the elimination tree: else it takes ten times as long
-        self._waves, self._low = (sparse_lu(each, diag_pivot_thresh=0.1, options=symmetric) for each in (c, low))
+        self._waves, self._low = (sparse_lu(each, diag_pivot_thresh=0.01, options=symmetric) for each in (c, low))
 
     def solve(self, b: FloatArray, *, transposed: bool = False) -> FloatArray:
         """x of A x = b, or of Aᵀx = b."""
