@@ -19,12 +19,12 @@ from typing import Any, TypeVar
 from fpsolve.errors import NotConverged
 from fpsolve.messages import Code, Message, Remedy
 
-SECONDS_PER_OPERATION = 5e-11
+SECONDS_PER_OPERATION = 3.5e-11
 """Seconds of a processor that an operation of an elimination in a large array counts for."""
 OVERHEAD_OPERATIONS = 2e7
-"""Operations that take the time of what goes with a factorisation, 1 ms."""
+"""Operations that take the time of what goes with a factorisation, 0.7 ms."""
 SOLVE_OPERATIONS = 4e10
-"""Operations that take the time of some forty solves with factors of one gigabyte, 2 s."""
+"""Operations that take the time of some forty solves with factors of one gigabyte, 1.4 s."""
 SMALL = 0.002
 """Gigabytes that are not worth to ask what the process has already."""
 UNKNOWN_MACHINE = 8.0

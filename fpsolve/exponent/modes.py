@@ -25,7 +25,7 @@ import scipy.linalg
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import NoHierarchy
 from fpsolve.exponent.eigen import PrincipalPair, principal_pair
-from fpsolve.exponent.error import Solution, mode_effects
+from fpsolve.exponent.error import Solution, ladders, mode_effects
 from fpsolve.exponent.starts import SHARE, Question, Start
 from fpsolve.fem.generator import SMALL_P, Generator
 from fpsolve.fem.harmonics import HarmonicAxis
@@ -70,6 +70,8 @@ MOST_FOR_SLOPES = 4
 """Number of levels that may be added for Λ′."""
 LEFT = 0.5
 """What is left, over what two degrees more changed in the corrected value, or will change in the other: `left_of`."""
+MINOR = 0.25, 0.1
+"""Shares of the tolerance that elements, and polynomials of a noise, may lack where others are made finer."""
 MEASURED = 3.0
 """What is left after elements or polynomials of the noise, over what two degrees more of them change."""
 
@@ -171,8 +173,8 @@ def left_of(degrees: Sequence[int], values: Sequence[float]) -> float:
     return left
 
 
-def first_order_change(pair: PrincipalPair, finer: Generator, axis: int, new: Any) -> tuple[float, float]:
-    """What the new functions of an axis of a finer space change in Λ(p), to first order, and the sum of the sizes."""
+def first_order_changes(pair: PrincipalPair, finer: Generator, axis: int, new: Any) -> FloatArray:
+    """What each new function of an axis of a finer space changes in Λ(p), to first order, in a table by all axes."""
     pencil, space, old = finer.at(pair.p), finer.space(pair.p), pair.space
     operator = pencil.matrix.shifted(pair.eigenvalue)
     right, left = (
@@ -180,8 +182,14 @@ def first_order_change(pair: PrincipalPair, finer: Generator, axis: int, new: An
         for image, each in ((operator, pair.right), (operator.T, pair.left))
     )
     factors = pencil.on(axis, new).factorised(pair.eigenvalue)
-    parts = -left * factors.solve(right) / (pair.left @ old.weighed(pair.right))
-    return float(np.sum(parts)), float(np.sum(np.abs(parts)))
+    found = -left * factors.solve(right) / (pair.left @ old.weighed(pair.right))
+    return np.reshape(found, [-1 if k == axis else size for k, size in enumerate(space.shape)])
+
+
+def first_order_change(pair: PrincipalPair, finer: Generator, axis: int, new: Any) -> tuple[float, float]:
+    """The sum of `first_order_changes`, and that of their sizes."""
+    changes = first_order_changes(pair, finer, axis, new)
+    return float(np.sum(changes)), float(np.sum(np.abs(changes)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -268,8 +276,8 @@ class SphereStart(Start):
         if sum(of_axes) <= 0.5 * goal:
             enough = self.enough or (solution if solution.error <= goal else None)
             return self._with(2, before=(*self.before, solution), enough=enough)
-        phi, noises = self.space.phi, self._finer_noises(solution, of_axes[1:], SHARE * goal)
-        found = Space((phi.finer_elements() if of_axes[0] > 0.1 * goal else phi, *noises))
+        phi, noises = self.space.phi, self._finer_noises(solution, of_axes[1:], MINOR[1] * goal)
+        found = Space((phi.finer_elements() if of_axes[0] > MINOR[0] * goal else phi, *noises))
         found = found if found.size > self.space.size else self.space.enriched()
         self.generators.clear()
         self.pairs.clear()
@@ -300,10 +308,11 @@ class SphereStart(Start):
         return 2 * self.problem.dimension * sys.float_info.epsilon * abs(pair.p) * pair.generator.problem.unit_rate
 
     def _of_axes(self, pair: PrincipalPair, allowed: float) -> tuple[float, ...]:
-        """Of the elements and of each noise: the effects of the highest modes, or the geometric mean of these and of
-        what finer functions change, `MEASURED` of it at least.
+        """Of the elements and of each noise: the effects of the highest modes, or `MEASURED` of what two degrees more
+        change, or the geometric mean of that and of the sum over all functions of directions, whichever is larger.
 
-        Effects are too large where T* has layers that T, and so Λ(p), knows nothing of.
+        Effects are too large where T* has layers that T, and so Λ(p), knows nothing of. An odd number of further
+        polynomials in ξ has one about ξ = 0, where T = 1 nearly is an eigenfunction of those alone.
         """
         errors = [each.error if each else 0.0 for each in mode_effects(pair)]
         if sum(errors) <= 0.5 * allowed:
@@ -311,16 +320,15 @@ class SphereStart(Start):
         for k, (axis, error) in enumerate(zip(self.space.axes, errors, strict=True)):
             if error <= SHARE * allowed:
                 continue
-            if k == 0:
-                finer = replace(axis, degree=axis.degree + 2)
-                new = (finer.cells >= 0) & (finer.modes > axis.degree)
-            elif isinstance(axis, CountedAxis):
-                finer = axis.enriched()
-                new = np.arange(finer.size) >= axis.size
-            else:
+            if k and not isinstance(axis, CountedAxis):
                 continue
-            change, _ = first_order_change(pair, Generator(self.problem, self.space.with_axis(k, finer)), k, new)
-            errors[k] = min(error, max(MEASURED * abs(change), math.sqrt(error * abs(change))))
+            finer = self.space.with_axis(k, axis.raised() if k else replace(axis, degree=axis.degree + 2))
+            ladder = list(ladders(finer))[k]
+            assert ladder is not None
+            changes = first_order_changes(pair, Generator(self.problem, finer), k, ladder.highest(2))
+            of_each = changes.reshape(len(changes), -1).sum(axis=1)
+            change, size = abs(float(np.sum(of_each))), float(np.sum(np.abs(of_each)))
+            errors[k] = min(error, max(MEASURED * change, math.sqrt(size * change)))
         return tuple(errors)
 
 

@@ -28,11 +28,11 @@ from fpsolve.superlu import sparse_lu
 FEW_UNKNOWNS = 350
 """Largest number of unknowns of one dense matrix that is taken without counting what others take."""
 LONG = 1e10
-"""Number of operations, half a second, from which on a factorisation runs where it can be left, and may be rough."""
+"""Number of operations, 0.35 s, from which on a factorisation runs where it can be left, and may be rough."""
 FRONT_OPERATIONS = 5.0
-"""Number of operations that take the time of SuperLU for an unknown and the square of the width of a front, 0.25 ns."""
+"""Number of operations that take the time of SuperLU for an unknown and the square of the width of a front, 0.18 ns."""
 CELL_OPERATIONS = 6e3
-"""Number of operations that take the time of SuperLU for an entry of a matrix of cells of φ and ξ, 0.3 µs."""
+"""Number of operations that take the time of SuperLU for an entry of a matrix of cells of φ and ξ, 0.2 µs."""
 CELL_BYTES = 90.0
 """Bytes of SuperLU for such an entry."""
 FRONT_BYTES = 24.0

@@ -25,11 +25,11 @@ LARGEST_GROWTH = 1e3
 DENSE_SHARE = 0.1
 """Share of the entries of all blocks that do not vanish, from which on blocks are arrays."""
 LEVEL_OPERATIONS = 6e5
-"""Number of operations that take the time of the calls for a level of arrays, 30 µs."""
+"""Number of operations that take the time of the calls for a level of arrays, 20 µs."""
 SPARSE_LEVEL_OPERATIONS = 1e7
-"""Number of operations that take the time of the calls for a level of sparse matrices, 0.5 ms."""
+"""Number of operations that take the time of the calls for a level of sparse matrices, 0.35 ms."""
 ENTRY_OPERATIONS = 2000.0
-"""Number of operations that take the time of making an entry of a sparse matrix and sorting it into levels, 0.1 µs."""
+"""Number of operations that take the time of making an entry of a sparse matrix and sorting it into levels, 70 ns."""
 ENTRY_BYTES = 40
 """Bytes of an entry of a sparse matrix, while it is sorted."""
 

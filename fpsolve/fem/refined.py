@@ -17,9 +17,9 @@ ROUNDING = 1e-16
 LEAST_GAIN = 0.1
 """Largest share of the backward error that a refinement may leave, or there are no more of its kind."""
 CALL_OPERATIONS = 1e7
-"""Number of operations that take the time of the calls of four solutions, 0.5 ms."""
+"""Number of operations that take the time of the calls of four solutions, 0.35 ms."""
 GIGABYTE_OPERATIONS = 2e10
-"""Number of operations that take the time of refining four solutions with factors of one gigabyte, 1 s."""
+"""Number of operations that take the time of refining four solutions with factors of one gigabyte, 0.7 s."""
 LEAST_SHARE = 1e-8
 """Least share in a load of the vector of an eigenvalue close by, from which on it is in the solution."""
 

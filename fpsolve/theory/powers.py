@@ -26,7 +26,7 @@ from fpsolve.theory.rightmost import Eigenpair, Solve, polished, rightmost
 DENSE = 200
 """Number of equations up to which matrices are not sparse."""
 ENTRY_OPERATIONS = 8e4
-"""Number of operations that take the time of a factorisation for an entry of a sparse matrix, 4 µs."""
+"""Number of operations that take the time of a factorisation for an entry of a sparse matrix, 2.8 µs."""
 ENTRY_BYTES = 250
 """Memory of its factors, in bytes for each of its entries."""
 MANY_ENTRIES = 1e5

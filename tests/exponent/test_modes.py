@@ -178,6 +178,18 @@ def test_what_is_left_after_one_space(seed, p):
     assert abs(solution.pair.value - better.value) < solution.search
 
 
+@pytest.mark.parametrize(("seed", "count"), [(3, 3), (9, 8)])
+def test_what_polynomials_of_the_noise_lack_is_told(seed, count):
+    """It is more than what many others change, and less than 50 times that: effects of the highest are 100 times."""
+    given = random_modes.drawn(seed)[1]
+    (noise,) = given.coloured.parts.values()
+    few = replace(first_axis(noise, 5), count=count)
+    start, finer = (SphereStart(given, Space((first_directions(given), axis))) for axis in (few, few.enriched()))
+    pair = start.pair(0.5, None)
+    lacking = abs(finer.pair(0.5, pair).eigenvalue - pair.eigenvalue)
+    assert lacking < start.with_error(pair, 1e-12).measured[1] < 50 * lacking
+
+
 def test_the_end_of_the_spectrum_takes_no_array_of_all_directions():
     given = problem(Telegraph(a=0.5, k=0.5))
     noises = [first_axis(each, 7) for each in given.coloured.parts.values()]
