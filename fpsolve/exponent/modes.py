@@ -70,8 +70,8 @@ MOST_FOR_SLOPES = 4
 """Number of levels that may be added for Λ′."""
 LEFT = 0.5
 """What is left, over what two degrees more changed in the corrected value, or will change in the other: `left_of`."""
-MINOR = 0.25, 0.1
-"""Shares of the tolerance that elements, and polynomials of a noise, may lack where others are made finer."""
+MINOR = 0.25
+"""Share of the tolerance that elements, or polynomials of a noise, may lack where others are made finer."""
 MEASURED = 3.0
 """What is left after elements or polynomials of the noise, over what two degrees more of them change."""
 
@@ -276,8 +276,8 @@ class SphereStart(Start):
         if sum(of_axes) <= 0.5 * goal:
             enough = self.enough or (solution if solution.error <= goal else None)
             return self._with(2, before=(*self.before, solution), enough=enough)
-        phi, noises = self.space.phi, self._finer_noises(solution, of_axes[1:], MINOR[1] * goal)
-        found = Space((phi.finer_elements() if of_axes[0] > MINOR[0] * goal else phi, *noises))
+        phi, noises = self.space.phi, self._finer_noises(solution, of_axes[1:], MINOR * goal)
+        found = Space((phi.finer_elements() if of_axes[0] > MINOR * goal else phi, *noises))
         found = found if found.size > self.space.size else self.space.enriched()
         self.generators.clear()
         self.pairs.clear()
