@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.linalg
-from scipy.sparse.linalg import ArpackError, ArpackNoConvergence, LinearOperator, eigs
+from scipy.sparse.linalg import ArpackError, ArpackNoConvergence, LinearOperator, eigs, gmres
 
 from fpsolve.arrays import FloatArray, finite, one
 from fpsolve.budget import charge
@@ -58,6 +58,10 @@ BESIDE = 1e-2
 """Distance of the shift of kept factors from an eigenvalue, over a rate, up to which they serve for its derivatives."""
 REFINEMENTS = 8
 """Number of times that T′ is improved by its residual, at most."""
+RESOLVED = 1e-5
+"""Residual of GMRES: signs count from `SURELY_POSITIVE` on."""
+MOST_STEPS = 20
+"""Number of steps of GMRES that take less than other factors."""
 REFINED = 1e-14
 """Share of T′ of a step that is the last one, where no other one is enough."""
 KNOWN = 1e-11
@@ -185,7 +189,7 @@ def principal_pair(
     pair = None
     if pairs or is_known or not has_others:
         pair = from_a_start()
-    if pair is None or (has_states and not is_known and not _is_rightmost(pair, pencil)):
+    if pair is None or (has_states and not is_known and not _is_rightmost(pair, pencil.space)):
         pair = from_the_right()
         others = [each.value for each in found]
         if has_states and generator.size <= SURVEYED_UNKNOWNS:
@@ -194,6 +198,8 @@ def principal_pair(
         if has_others and rightmost - pair.value > 1e-6 * max(abs(rightmost), generator.problem.unit_rate):
             told = Message(Code.LARGER_EIGENVALUE, p=p, rightmost=rightmost, value=pair.value)
             raise NotConverged(told, pair, Remedy.PHASE)
+    if not pencil.keeps_factors:
+        pencil.kept.clear()
     return pair
 
 
@@ -202,7 +208,7 @@ def _has_states(problem: Problem) -> bool:
     return any(noise.has_states for noise in problem.noise.parts.values())
 
 
-def _is_rightmost(pair: PrincipalPair, pencil: Pencil) -> bool:
+def _is_rightmost(pair: PrincipalPair, space: Space) -> bool:
     """Whether (σ − L)⁻¹1 > 0, as it is for a σ beside Λ if Λ is the rightmost eigenvalue, and also for the adjoint.
 
     Of another one, by which all else is larger than rounding, it is −1/(Λ′ − σ) of its share. Of three and four
@@ -211,19 +217,20 @@ def _is_rightmost(pair: PrincipalPair, pencil: Pencil) -> bool:
 
     Where T lies between positive bounds, none is: E‖x(t)‖^p ≤ (max T/min T) exp(Λt) from every start.
     """
-    space, problem = pencil.space, pair.generator.problem
+    problem = pair.generator.problem
     if problem.dimension == 2 and problem.coloured.is_bounded and not pair.generator.chosen.is_tilted:
         values = space.on_grid(pair.right)
         if np.min(values) > LEAST_OF_MOST * np.max(values):
             return True
-    rate, seen = problem.unit_rate, [problem.dimension == 2 or each <= POSITIVE for each in pair.sign_defects]
-    source, judged = space.weighed(space.constant), min if problem.system.stop else max
-    for shift in BESIDE_IT:
-        factor = pencil.factorised(pair.eigenvalue + shift * rate)
-        right, left = -factor.solve(source), -factor.solve(source, transposed=True)
-        if judged(np.compress(seen, _sign_defects(space, right, left)), default=0.0) > SURELY_POSITIVE:
-            return False
-    return True
+    around, judged = PairDerivatives(pair), any if problem.system.stop else all
+    seen = [side for side in (0, 1) if problem.dimension == 2 or pair.sign_defects[side] <= POSITIVE]
+
+    def is_positive(shift: float, side: int) -> bool:
+        both = [pair.right, pair.left]
+        both[side] = around.resolvent(shift * problem.unit_rate, adjoint=bool(side))
+        return _sign_defects(space, *both)[side] <= SURELY_POSITIVE
+
+    return all(not seen or judged(is_positive(shift, side) for side in seen) for shift in BESIDE_IT)
 
 
 def _has_other_positive(generator: Generator, p: float) -> bool:
@@ -503,6 +510,23 @@ class PairDerivatives:
     def _factor(self) -> Factors:
         found = self._kept[0] if self._kept else self._pencil.factorised(self.pair.eigenvalue + 1e-6 * self._rate)
         return found.rough if isinstance(found, RefinedFactors) else found  # which would refine the share of T, too
+
+    def resolvent(self, shift: float, *, adjoint: bool = False) -> FloatArray:
+        """(Λ + shift − L)⁻¹1 by factors next to Λ: the share of T as it is, the rest by GMRES, of a few steps."""
+        space, (own, other) = self.pair.space, (self.pair.right, self.pair.left)
+        if adjoint:
+            own, other = other, own
+        source = space.weighed(space.constant)
+
+        def carried(load: FloatArray) -> FloatArray:
+            charge(OPERATIONS_OF_SOLVE * load.size)
+            return self.solve(load, adjoint=adjoint, enough=0.1 * RESOLVED)
+
+        moved = LinearOperator(2 * own.shape, lambda v: v - shift * carried(space.weighed(v)), dtype=float)
+        rest, failed = gmres(moved, -carried(source), rtol=RESOLVED, restart=MOST_STEPS, maxiter=1)
+        if failed:
+            return -self._pencil.factorised(self.pair.eigenvalue + shift).solve(source, transposed=adjoint)
+        return float(other @ source) / (self.norm * shift) * own + rest
 
     def solve(
         self, source: FloatArray, *, adjoint: bool = False, refinements: int = REFINEMENTS, enough: float = REFINED

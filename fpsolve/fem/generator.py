@@ -48,7 +48,7 @@ class Pencil:
         matrix: that of L(p), its first term with the matrices of noise that `space.mass` has.
         levels: for each axis, see `Axis`.
         ring: the cells of φ, where only their end values couple them.
-        keeps_factors: whether the last factors are kept, for derivatives of a pair.
+        keeps_factors: whether the last factors are kept when a pair is found, for its derivatives.
         kept: the shift and the factors of the last one.
     """
 
@@ -93,8 +93,7 @@ class Pencil:
         phi = self.space.phi
         shifted, kinds = self.matrix.shifted(shift), {"is_full": phi.is_full, "is_of_waves": phi.is_of_waves}
         found = factorised(shifted, self.levels, ring=self.ring, **kinds)
-        if self.keeps_factors:
-            self.kept.append((shift, found))
+        self.kept.append((shift, found))
         return found
 
 
