@@ -133,7 +133,7 @@ def _ordered(operator: KroneckerSum, levels: Levels, is_full: bool, ring: Ring |
     for axis, own in enumerate(levels or [None] * len(operator.shape)):
         if axis or own is not None:
             groups = neighbours(operator, axis, own)
-            for each in (groups, paired(groups)) if len(groups) > 2 else ():
+            for each in [groups, paired(groups)][: len(groups) - 1]:
                 by_levels = LevelFactors(operator, each, axis)
                 yield RefinedFactors(operator, by_levels) if is_full else by_levels
                 if is_full and by_levels.operations > LONG:

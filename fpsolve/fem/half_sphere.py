@@ -96,11 +96,13 @@ class HalfSphereAxis(DirectionAxis):
         """Two degrees more in every direction."""
         return self.raised_in((True, True, True))
 
-    def raised_in(self, directions: Sequence[bool]) -> HalfSphereAxis:
-        """Two degrees more in some directions; elements of the highest degree are halved."""
+    def raised_in(self, directions: Sequence[bool], is_halved: bool = False) -> HalfSphereAxis:
+        """Two degrees more in some directions; elements of the highest degree are halved, those in η if they are to."""
         found, (eta, theta, second) = self, directions
-        if eta and (found := replace(found, degree=self.degree + 2)).degree > MOST_DEGREE:
-            found = replace(found, lines=halved(self.lines), degree=MOST_DEGREE // 2 + 1)
+        if eta and (is_halved or self.degree + 2 > MOST_DEGREE):
+            found = replace(found, lines=halved(self.lines), degree=MOST_DEGREE // 2 + 1 - 2 * is_halved)
+        elif eta:
+            found = replace(found, degree=self.degree + 2)
         if theta and (found := replace(found, first_degree=self.first_degree + 2)).first_degree > MOST_DEGREE:
             found = replace(found, first_lines=halved(self.first_lines), first_degree=MOST_DEGREE // 2 + 1)
         return replace(found, waves=self.waves + 2 * int(second))
