@@ -7,8 +7,8 @@ there, and the layers of T* are nothing to Λ(p).
 
 What two degrees more change to first order, in η, in θ₁ and in θ₂ by themselves, tells where finer functions are
 needed. At the stop T is a root, so that these changes fall as a power of the degree, and not evenly: they correct
-nothing, but the error is 1.5 times their sum, 4 times what is in a direction that no step has tried, or half of the
-last step of Λ(p), or a quarter of the sum on the space before, ten times that if it was the first one, whichever is the
+nothing, but the error is 1.5 times their sum, 4 times what is in a direction that no step has tried, or the last
+step of Λ(p), or a quarter of the sum on the space before, ten times that if it was the first one, whichever is the
 largest. On a single space this is a guess, so that one step there is at least. Where a step in η changes no less than
 the one before, elements do not see the layer of T from one mode to the other, if there is one: they are halved, and the
 error is 10 times what is in η. With R = 1, where the motion without a stop tells Λ(p), errors were at most 0.7 of what
@@ -27,7 +27,7 @@ import scipy.linalg
 from fpsolve.arrays import FloatArray
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.error import Solution
-from fpsolve.exponent.modes import LEFT, THINNEST, SphereStart, first_order_change, second_moments
+from fpsolve.exponent.modes import THINNEST, SphereStart, first_order_change, second_moments
 from fpsolve.exponent.starts import SHARE, Question
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.half_sphere import HalfSphereAxis
@@ -41,6 +41,8 @@ FIRST_WAVES = 2
 """Largest degree of its waves."""
 AT_STOP = 0.0, 0.8, 1.0
 """Vertices in η, over ½π: a smaller element where the first mass is at rest at the stop."""
+OF_STEP = 1.0
+"""What is left at least, over the last step of Λ(p): it was up to 0.7 where a mode is uncoupled."""
 OF_LAST = 2.5, 0.25
 """What is left at least, over the sum of the changes of the space before: of the first one, and of a later one."""
 OF_ONE = 4.0
@@ -115,7 +117,7 @@ class StopStart(SphereStart):
         pair, left = replace(pair, rounding=pair.rounding + self._rounding(pair)), float(self._left(found) @ found)
         for each in self.before:
             step, lacked = abs(pair.value - each.pair.value), sum(each.start.changes)
-            left = max(left, LEFT * step, OF_LAST[not each.start.is_first] * lacked)
+            left = max(left, OF_STEP * step, OF_LAST[not each.start.is_first] * lacked)
         return Solution(pair, 0.0, (left, *of_noises), replace(self, changes=tuple(found)))
 
     def _left(self, changes: Sequence[float]) -> FloatArray:
