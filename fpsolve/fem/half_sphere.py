@@ -100,7 +100,7 @@ class HalfSphereAxis(DirectionAxis):
         """Two degrees more in some directions; elements of the highest degree are halved, those in η if they are to."""
         found, (eta, theta, second) = self, directions
         if eta and (is_halved or self.degree + 2 > MOST_DEGREE):
-            found = replace(found, lines=halved(self.lines), degree=MOST_DEGREE // 2 + 1 - 2 * is_halved)
+            found = replace(found, lines=halved(self.lines), degree=2 * (self.degree // 4) + 2)
         elif eta:
             found = replace(found, degree=self.degree + 2)
         if theta and (found := replace(found, first_degree=self.first_degree + 2)).first_degree > MOST_DEGREE:
