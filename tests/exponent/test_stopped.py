@@ -1,9 +1,14 @@
 """Λ(p) of four variables with a stop: simulations, systems without one that are alike in law, the oscillator."""
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
 from fpsolve.exponent import ExponentSolver
 from fpsolve.exponent.adapt import Budget, WholeProblem
+from fpsolve.exponent.starts import Question
+from fpsolve.exponent.stopped import StopStart, stop_start
 from fpsolve.model import PlaneSystem, Problem, Telegraph, White
 
 NAMES = "q1", "v1", "q2", "v2"
@@ -66,3 +71,21 @@ def test_two_codes_simulated_the_same():
     found = solver.estimate(1.0, solver.solution(1.0)), solver.lyapunov_exponent()
     for each, (value, error) in zip(found, ((-0.08109, 4e-5), (-0.082631, 2e-5)), strict=True):
         assert abs(each.value - value) <= 3 * error + each.error_estimate < 4e-4
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "degrees", "least"),
+    [("degree", (2, 6, 10), 2.5), ("first_degree", (2, 8, 12), 6), ("waves", (2, 6, 10), 4)],
+)
+def test_orders_of_convergence(name, degrees, least):
+    """Of Λ(1) in η, in θ₁ and in θ₂ alone, against the highest degree, as powers of the degree."""
+    problem = coupled(0.8)
+    first = stop_start(Question(problem, 1.0, 1e-3, {}))
+    coarse = replace(first.space.phi, first_degree=6, waves=2 if name == "degree" else 4)
+    values, near = [], None
+    for degree in degrees:
+        near = StopStart(problem, first.space.with_axis(0, replace(coarse, **{name: degree}))).pair(1.0, near)
+        values.append(near.value)
+    errors = np.abs(np.array(values[:2]) - values[2])
+    assert np.log(errors[0] / errors[1]) / np.log(degrees[1] / degrees[0]) > least
