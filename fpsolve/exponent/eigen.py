@@ -27,7 +27,7 @@ from fpsolve.data import brief
 from fpsolve.errors import NotConverged, NumericalFailure, SingularMatrix
 from fpsolve.fem.axis import KroneckerSum
 from fpsolve.fem.dense import Factors
-from fpsolve.fem.factors import one_thread
+from fpsolve.fem.factors import LONG, one_thread
 from fpsolve.fem.generator import Generator, Pencil
 from fpsolve.fem.refined import RefinedFactors
 from fpsolve.fem.space import Space
@@ -56,7 +56,7 @@ DOUBT = 1e-3
 _EPS = float(np.finfo(float).eps)
 BESIDE = 1e-2
 """Distance of the shift of kept factors from an eigenvalue, over a rate, up to which they serve for its derivatives."""
-REFINEMENTS = 8
+REFINEMENTS = 16
 """Number of times that T′ is improved by its residual, at most."""
 RESOLVED = 1e-5
 """Residual of GMRES: signs count from `SURELY_POSITIVE` on."""
@@ -485,6 +485,7 @@ class PairDerivatives:
     Attributes:
         norm: ⟨T*, T⟩ on the domain.
         size: a bound on ‖L − Λ‖.
+        kept: shifts and factors that serve.
     """
 
     def __init__(self, pair: PrincipalPair) -> None:
@@ -493,14 +494,7 @@ class PairDerivatives:
         self._pencil = pair.generator.at(pair.p)
         self._operator = self._pencil.matrix.shifted(pair.eigenvalue)
         self.size = self._operator.norm
-        self._kept = [
-            found for shift, found in self._pencil.kept if abs(shift - pair.eigenvalue) <= BESIDE * self._rate
-        ]
-
-    @property
-    def is_known(self) -> bool:
-        """Whether factors are kept."""
-        return bool(self._kept)
+        self.kept = [each for each in self._pencil.kept if abs(each[0] - pair.eigenvalue) <= BESIDE * self._rate]
 
     @property
     def _rate(self) -> float:
@@ -508,8 +502,20 @@ class PairDerivatives:
 
     @cached_property
     def _factor(self) -> Factors:
-        found = self._kept[0] if self._kept else self._pencil.factorised(self.pair.eigenvalue + 1e-6 * self._rate)
+        found = self.kept[0][1] if self.kept else self._pencil.factorised(self.pair.eigenvalue + 1e-6 * self._rate)
         return found.rough if isinstance(found, RefinedFactors) else found  # which would refine the share of T, too
+
+    @cached_property
+    def _of_factor(self) -> tuple[tuple[FloatArray, FloatArray], ...]:
+        """w and Mv/⟨w, Mv⟩ of the pair that the factors themselves have next to Λ, and the same of the adjoint.
+
+        Rough factors, or those of another p, have another one than L, so close to the shift that solutions would be
+        full of it.
+        """
+        space, (of_right, of_left) = self.pair.space, self._weighed
+        v, w = self._factor.solve(of_right), self._factor.solve(of_left, transposed=True)
+        images = space.weighed(v), space.weighed(w)
+        return (w, images[0] / (w @ images[0])), (v, images[1] / (v @ images[1]))
 
     def resolvent(self, shift: float, *, adjoint: bool = False) -> FloatArray:
         """(Λ + shift − L)⁻¹1 by factors next to Λ: the share of T as it is, the rest by GMRES, of a few steps."""
@@ -538,10 +544,11 @@ class PairDerivatives:
         weighed, operator, change = self._weighed[0], self._operator, 0.0 * own
         if adjoint:
             own, other, weighed, operator = other, own, self._weighed[1], operator.T
+        dual, image = self._of_factor[adjoint]
         for _ in range(refinements):
             rest = source - operator @ change
             rest -= (other @ rest) / self.norm * weighed
-            step = self._factor.solve(rest, transposed=adjoint)
+            step = self._factor.solve(rest - (dual @ rest) * image, transposed=adjoint)
             change += step
             change -= (other @ self.pair.space.weighed(change)) / self.norm * own
             if length(step) <= enough * length(change):
@@ -594,7 +601,7 @@ def pair_at_zero(near: PrincipalPair) -> PrincipalPair | None:
     T* of that is improved by v from (L_p − Λ_p)ᵀv = −L₀ᵀT*, whose error is about p times the one before.
     """
     around, pencil = PairDerivatives(near), near.generator.at(0.0)
-    if not around.is_known:
+    if not around.kept:
         return None
     y, size, last = near.left, math.inf, math.inf
     with one_thread():
@@ -603,6 +610,7 @@ def pair_at_zero(near: PrincipalPair) -> PrincipalPair | None:
             y, size, last = y + step, length(step), size
     if not size <= KNOWN * length(y):
         return None
+    pencil.kept[:] = (each for each in around.kept if each[1].operations > LONG)
     x = pencil.space.constant
     found = Iterate(0.0, 0.0, x, y, pencil.space.weighed(x), pencil.space.weighed(y))
     return _pair(near.generator, pencil, found)
