@@ -214,20 +214,20 @@ def correct(
         if not _inside(at) or np.linalg.norm(at - start) > FARTHEST:
             return None
         sample = field(np.clip(at, 0, 1)) if first is None or number else first
-        if sample.is_zero:
-            return sample if np.any(sample.gradient) else None
-        number += 1
-        if number >= MOST_CORRECTIONS and abs(sample.value) > SHARE_LEFT * before:
-            return None
-        before = abs(sample.value)
         direction = sample.gradient if along is None else np.array([-along[1], along[0]])
         slope = float(sample.gradient @ direction)
         if slope == 0:
-            return None
+            return sample if sample.is_zero and np.any(sample.gradient) else None
         step = sample.value / slope
         at = sample.at - step * direction
-        left = bend * step**2
-        if left <= SHARE_LEFT * sample.nothing and np.all((at >= 0) & (at <= 1)):
+        is_inside = bool(np.all((at >= 0) & (at <= 1)))
+        if sample.is_zero:  # so near that F is linear
+            return sample._replace(at=at, value=0.0) if is_inside else sample
+        number += 1
+        if number >= MOST_CORRECTIONS and abs(sample.value) > SHARE_LEFT * before:
+            return None
+        before, left = abs(sample.value), bend * step**2
+        if is_inside and left <= SHARE_LEFT * sample.nothing:
             return sample._replace(at=at, value=0.0, error=sample.error + left)
 
 
