@@ -190,6 +190,11 @@ def line_rtol(problem: Problem, zero: Zero) -> float:
     return RTOL_OF_CLOSED if problem.is_closed_only else RTOL_OF_DEAR if is_dear(problem, zero) else RTOL
 
 
+def line_of_value(problem: Problem, zero: Zero) -> float:
+    """The error of F that is enough away from a line, over F."""
+    return ITS_SIGN if is_dear(problem, zero) else 0.0
+
+
 def is_dear(problem: Problem, zero: Zero) -> bool:
     """Whether F takes elements of three axes or more, and so seconds for each point."""
     if problem.dimension > 2:
@@ -297,8 +302,8 @@ class ZeroField:
         known: Known | None = None,
     ) -> None:
         rtol = line_rtol(problem, zero) if rtol is None else rtol
-        keys, of_value = [axis.key for axis in axes], ITS_SIGN * is_dear(problem, zero)
-        self._axes, self._ratio = axes, Ratio(problem, zero.p, keys, budget, rtol, of_value)
+        keys = [axis.key for axis in axes]
+        self._axes, self._ratio = axes, Ratio(problem, zero.p, keys, budget, rtol, line_of_value(problem, zero))
         self._seconds, self._spent = seconds, spent or Message(Code.LINE_SPENT, most=seconds)
         self.spent_seconds, self.stopped = 0.0, None if seconds > 0 else self._spent
         self._before, self._rtol, self._known = np.full(2, math.inf), rtol, known

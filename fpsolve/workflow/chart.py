@@ -18,7 +18,7 @@ import numpy as np
 from fpsolve.analysis.regions import P_BIFURCATIONS, Region, Regions, regions
 from fpsolve.analysis.scan import Row, Sample, Scan, ScannedRow, scan_row
 from fpsolve.analysis.stability import Boundary, begun, crossed, is_of_line
-from fpsolve.analysis.zero import Axis, Zero, is_dear
+from fpsolve.analysis.zero import Axis, Zero, is_dear, line_of_value
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case
 from fpsolve.case.sections import ChartSection
@@ -289,7 +289,13 @@ def write_chart(case: Case, chart: Chart, folder: Path) -> None:
                 "equation": line.zero.equation,
                 "appears": _appears(line.zero),
                 "rtol": line.rtol,
-                "scan": None if line.scan is None else {"nodes": [line.scan.nodes.size] * 2, "rtol": line.scan.rtol},
+                "scan": None
+                if line.scan is None
+                else {
+                    "nodes": [line.scan.nodes.size] * 2,
+                    "rtol": line.scan.rtol,
+                    "of_value": line_of_value(line.problem, line.zero),
+                },
                 "branches": [
                     {"points": branch.x.size, "closed": branch.closed, "obstacles": list(branch.obstacles)}
                     for branch in line.branches
