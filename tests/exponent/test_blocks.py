@@ -63,7 +63,7 @@ def turned(noise, steady, driven):
 
 def as_one(own, p, rtol):
     """The solution without looking for blocks."""
-    tolerance = partial(tolerated, rtol, scale_of(own))
+    tolerance = partial(tolerated, rtol, 0.0, scale_of(own))
     return WholeProblem(own, rtol=rtol, budget=Budget(), tolerance=tolerance).solution(p)
 
 
