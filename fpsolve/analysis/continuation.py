@@ -204,7 +204,7 @@ def correct(
     """The point F = 0 near a point, on the normal to `along`, or without it on the gradient; None where there is none.
 
     `first` is F at the point, where that is known, and `bend` a bound on half of the second derivatives of F: where a
-    step of Newton's method leaves hardly anything by that, F is not evaluated again.
+    step of Newton's method leaves hardly anything by that, or F is 0 to its error, it is the last one.
 
     Raises:
         FpsolveError: F does not exist on the way.

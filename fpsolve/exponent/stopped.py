@@ -9,10 +9,10 @@ What two degrees more change to first order, in η, in θ₁ and in θ₂ by the
 needed. At the stop T is a root, so that these changes fall as a power of the degree, and not evenly: they correct
 nothing, but the error is 1.5 times their sum, 4 times what is in a direction that no step has tried, or the last
 step of Λ(p), or a quarter of the sum on the space before, ten times that if it was the first one, whichever is the
-largest. On a single space this is a guess, so that one step there is at least. Where a step in η changes no less than
-the one before, elements do not see the layer of T from one mode to the other, if there is one: they are halved, and the
-error is 10 times what is in η. With R = 1, where the motion without a stop tells Λ(p), errors were at most 0.7 of what
-is stated in 58 comparisons.
+largest. On a single space this is a guess, so that one step there is at least. Where finer elements leave more than
+half of a change in η, they do not see the layer of T from one mode to the other, if there is one: they are halved, and
+the error is 10 times what is in η. With R = 1, where the motion without a stop tells Λ(p), errors were at most 0.7 of
+what is stated in 58 comparisons.
 """
 
 from __future__ import annotations
@@ -127,7 +127,7 @@ class StopStart(SphereStart):
         return np.append(OF_STALLED if self._stalls(changes) else left[0], left[1:])
 
     def _stalls(self, changes: Sequence[float]) -> bool:
-        """Whether finer functions in η change no less than they did before the last step made them finer."""
+        """Whether the last step made functions in η finer and left more than `STALLED` of what these change."""
         return any(
             self.space.phi.differs(each.pair.space.phi)[0] and changes[0] > STALLED * each.start.changes[0]
             for each in self.before
