@@ -309,22 +309,25 @@ class KroneckerSum:
         return products.reshape(m, m, n, n).transpose(0, 2, 1, 3).reshape(m * n, m * n)
 
     def tocsc(self) -> csc_matrix:
-        """The sparse matrix, with an entry wherever factors of both sides may have one; column by column of φ."""
-        m, n = self.halves
-        (before, befores), (last, lasts) = (_on_one_pattern([pair[side] for pair in self.pairs]) for side in (0, 1))
-        counts, last_counts = np.diff(before.indptr), np.diff(last.indptr)
-        last_columns = np.repeat(np.arange(n), last_counts)
-        orders = {count: np.argsort(np.tile(last_columns, count), kind="stable") for count in set(counts.tolist())}
-        rows, values = [], []
-        for j, count in enumerate(counts.tolist()):
-            entries = slice(before.indptr[j], before.indptr[j + 1])
-            rows.append(np.add.outer(n * before.indices[entries], last.indices).ravel()[orders[count]])
-            values.append((befores[:, entries].T @ lasts).ravel()[orders[count]])
-        starts = np.append(0, np.cumsum(np.outer(counts, last_counts)))
-        return csc_matrix((np.concatenate(values), np.concatenate(rows), starts), shape=(m * n, m * n))
+        """The sparse matrix, with an entry wherever factors of both sides may have one."""
+        (before, befores), (last, lasts) = (on_one_pattern([pair[side] for pair in self.pairs]) for side in (0, 1))
+        order, rows, starts = product_pattern(before, last)
+        return csc_matrix(((befores.T @ lasts).ravel()[order], rows, starts), shape=(self.size, self.size))
 
 
-def _on_one_pattern(matrices: Sequence[Matrix]) -> tuple[csc_matrix, FloatArray]:
+def product_pattern(first: csc_matrix, last: csc_matrix) -> tuple[IntArray, IntArray, IntArray]:
+    """Where first ⊗ last has entries, column by column: the places in the table of all products, rows, and starts."""
+    starts, last_starts = (np.repeat(each.indptr[:-1], np.diff(each.indptr)) for each in (first, last))
+    counts, last_counts = (np.repeat(each, each) for each in map(np.diff, (first.indptr, last.indptr)))
+    at = np.multiply.outer(counts, last_starts) + np.multiply.outer(np.arange(first.nnz) - starts, last_counts)
+    at += np.add.outer(starts * last.nnz, np.arange(last.nnz) - last_starts)
+    order, rows = np.empty(at.size, dtype=np.int64), np.empty(at.size, dtype=np.int64)
+    order[at] = np.arange(at.size).reshape(at.shape)
+    rows[at] = np.add.outer(last.shape[0] * first.indices, last.indices)
+    return order, rows, np.append(0, np.cumsum(np.outer(np.diff(first.indptr), np.diff(last.indptr))))
+
+
+def on_one_pattern(matrices: Sequence[Matrix]) -> tuple[csc_matrix, FloatArray]:
     """Where any of some matrices has an entry, and the entries of each of them there, one row for each."""
     columnwise = [csc_matrix(matrix) for matrix in matrices]
     pattern = csc_matrix(sum(abs(matrix) for matrix in columnwise))

@@ -160,15 +160,11 @@ class HalfSphereAxis(DirectionAxis):
 
     @cached_property
     def identity(self) -> Matrix:
-        return self._form(self._itself, self._itself)
+        return self._forms([[(self._itself, self._itself)]])[0]
 
     @property
     def unit(self) -> Matrix:
         return self.identity
-
-    def _assembled(self, terms: Sequence[tuple[Matrix, Matrix, Matrix]]) -> csr_matrix:
-        """Σ A_k ⊗ B_k ⊗ C_k, sparse, shape (size, size)."""
-        return assembled([tuple(map(csr_matrix, term)) for term in terms], self._kept)
 
     @cached_property
     def _tables(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
@@ -211,11 +207,15 @@ class HalfSphereAxis(DirectionAxis):
         kept = [each for each in parts if np.any(each[1]) and np.any(each[2])] or parts[:1]
         return [(f, g, csr_matrix(w[:, self._own])) for f, g, w in kept]
 
-    def _form(self, left: Parts, right: Parts) -> Matrix:
+    def _forms(self, forms: Sequence[Sequence[tuple[Parts, Parts]]]) -> list[csr_matrix]:
         of_eta, of_theta = self.line.measure[:, None], self.first_line.measure[:, None]
-        pairs = [(a, b) for a in left for b in right]
-        return self._assembled(
-            [(a[0].T @ (of_eta * b[0]), a[1].T @ (of_theta * b[1]), a[2].T @ b[2]) for a, b in pairs]
+        pairs = [[(a, b) for left, right in form for a in left for b in right] for form in forms]
+        return assembled(
+            [
+                [(a[0].T @ (of_eta * b[0]), a[1].T @ (of_theta * b[1]), a[2].T @ b[2]) for a, b in form]
+                for form in pairs
+            ],
+            self._kept,
         )
 
     @property
@@ -231,7 +231,7 @@ class HalfSphereAxis(DirectionAxis):
         in_theta = self._first.T @ in_theta @ self._first
         of_eta = values.T @ ((self.line.measure / np.cos(self.line.points))[:, None] * values)
         of_theta = of_first.T @ (self.first_line.measure[:, None] * of_first)
-        return -self._assembled([(in_eta, of_theta, waves), (of_eta, in_theta, waves)])
+        return -assembled([[(in_eta, of_theta, waves), (of_eta, in_theta, waves)]], self._kept)[0]
 
     def struck(self, log_factor: float, p: float, derivative: int = 0) -> Matrix:
         """∂ᵏ/∂pᵏ of ∫ v (ρ^p u(η′, π/2, θ₂) − u) over θ₁ = −π/2."""
@@ -264,7 +264,8 @@ class HalfSphereAxis(DirectionAxis):
         """∫ v(η, −π/2, θ₂) Σ f u, each u at points of η and an end of θ₁."""
         test, waves = self.line.at(eta).T, identity(self._own.size)
         ends = self.first_line.at(self.first_lines[[0, -1]]) @ self._first
-        return self._assembled([(test @ diags(f) @ u, np.outer(ends[0], ends[end]), waves) for u, f, end in terms])
+        found = [(test @ diags(f) @ u, np.outer(ends[0], ends[end]), waves) for u, f, end in terms]
+        return assembled([found], self._kept)[0]
 
     @property
     def area(self) -> float:

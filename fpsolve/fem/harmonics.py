@@ -17,6 +17,7 @@ Polynomials in e know no coordinates: rotations change nothing. They fail where 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from itertools import combinations, combinations_with_replacement
@@ -181,8 +182,11 @@ class HarmonicAxis(DirectionAxis):
     def _itself(self) -> csr_matrix:
         return identity(self._harmonics.degrees.size, format="csr")[:, self._harmonics.own]
 
-    def _form(self, left: csr_matrix, right: csr_matrix) -> FloatArray:
-        return np.asarray((left.T @ right).toarray())
+    def _sum(self, parts: Sequence[tuple[float, csr_matrix]]) -> csr_matrix:
+        return sum(size * each for size, each in parts)
+
+    def _forms(self, forms: Sequence[Sequence[tuple[csr_matrix, csr_matrix]]]) -> list[FloatArray]:
+        return [sum((left.T @ right).toarray() for left, right in form) for form in forms]
 
     @property
     def area(self) -> float:

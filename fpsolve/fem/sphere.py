@@ -16,19 +16,22 @@ the right: jumps of ∂u/∂η between elements are penalised by γ h² N⁻³ �
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, reduce
+from operator import add
 from typing import Any
 
 import numpy as np
+import scipy.linalg
 import scipy.sparse
 import scipy.sparse.linalg
-from scipy.sparse import csr_matrix, diags
+from scipy.sparse import csc_matrix, csr_matrix, diags
 from scipy.sparse.linalg import LinearOperator
 
 from fpsolve.arrays import Coefficient, FloatArray, IntArray, Matrix, one
-from fpsolve.fem.axis import Axis, KroneckerSum, along
+from fpsolve.fem.axis import Axis, along, on_one_pattern, product_pattern
 from fpsolve.fem.line import LineSpace
 from fpsolve.fem.mesh import halved
 from fpsolve.fem.space import Space
@@ -42,6 +45,8 @@ MOST_DEGREE = 10
 """Highest degree of an element in η: beyond, elements are halved."""
 SIDE = 16
 """Least number of points along each angle at which signs are looked at."""
+INDEPENDENT = 1e-15
+"""Share of a matrix beside others that is none of its own, at most, as rounding leaves so much."""
 Coordinates = tuple[tuple[float, ...], ...]
 Parts = list[tuple[FloatArray, csr_matrix]]
 """Σ f(η) ⊗ g: values at points of η, shape (points, nodes), and waves, shape (all, own)."""
@@ -194,28 +199,26 @@ class DirectionAxis(Axis):
         """u."""
         raise NotImplementedError
 
-    def _form(self, left: Any, right: Any) -> Matrix:
-        """∫ v̂ û of functions of v and of u."""
+    def _sum(self, parts: Sequence[tuple[float, Any]]) -> Any:
+        """Of multiples of what `_moved` gives."""
+        return [(size * first, *others) for size, each in parts for first, *others in each]
+
+    def _forms(self, forms: Sequence[Sequence[tuple[Any, Any]]]) -> Sequence[Matrix]:
+        """For each form ∫ Σ v̂ û of functions of v and of u."""
         raise NotImplementedError
 
     def driven(self, matrix: FloatArray) -> tuple[Matrix, Matrix]:
         """∫ v h·∇u and ∫ v q u."""
         moved, growth = self._moved(matrix)
-        return self._form(self._itself, moved), self._form(self._itself, growth)
+        found, stretched = self._forms([[(self._itself, moved)], [(self._itself, growth)]])
+        return found, stretched
 
     def diffusion(self, a: FloatArray, b: FloatArray) -> tuple[Matrix, Matrix, Matrix]:
         """∫ v D_a D_b u, D = h·∇ + p q of two matrices, D* v = −h·∇v − tr v + (p + n) q v: by p⁰, p¹ and p²."""
-        moved, growth = self._moved(a)
-
-        def by(right: Any) -> tuple[Matrix, Matrix]:
-            stretched = self._form(growth, right)
-            adjoint = (
-                self.n * stretched - self._form(moved, right) - float(np.trace(a)) * self._form(self._itself, right)
-            )
-            return adjoint, stretched
-
-        (free, crossed), (linear, square) = map(by, self._moved(b))
-        return free, linear + crossed, square
+        (moved, growth), (right, grown) = self._moved(a), self._moved(b)
+        adjoint = self._sum([(self.n, growth), (-1.0, moved), (-float(np.trace(a)), self._itself)])
+        free, linear, square = self._forms([[(adjoint, right)], [(growth, right), (adjoint, grown)], [(growth, grown)]])
+        return free, linear, square
 
     def penalty(self) -> Matrix:
         """What is added against pairs that no path has."""
@@ -231,10 +234,28 @@ class DirectionAxis(Axis):
         raise NotImplementedError
 
 
-def assembled(terms: Sequence[tuple[Matrix, ...]], kept: IntArray) -> csr_matrix:
-    """Σ A_k ⊗ B_k ⊗ … on the products that are kept, sparse."""
-    found = KroneckerSum(terms).tocsc()[:, kept].tocsr()[kept]
-    found.eliminate_zeros()
+def assembled(forms: Sequence[Sequence[tuple[Matrix, Matrix, Matrix]]], kept: IntArray) -> list[csr_matrix]:
+    """For each form Σ A_k ⊗ B_k ⊗ C_k on the products that are kept, sparse; of the C few are independent."""
+    factors = zip(*(term for form in forms for term in form), strict=True)
+    (first, firsts), (middle, middles), (last, lasts) = (on_one_pattern([each.T for each in one]) for one in factors)
+    sizes = np.linalg.norm(lasts, axis=1) + sys.float_info.min
+    basis, weights, at = scipy.linalg.qr((lasts / sizes[:, None]).T, mode="economic", pivoting=True)
+    rank = max(1, np.count_nonzero(np.abs(np.diagonal(weights)) > INDEPENDENT))
+    basis, weights = basis[:, :rank].T, weights[:rank, np.argsort(at)] * sizes
+    inner_order, rows, starts = product_pattern(first, middle)
+    size = first.shape[0] * middle.shape[0]
+    order, rows, starts = product_pattern(csc_matrix((np.ones(rows.size), rows, starts), shape=(size, size)), last)
+    place = np.full(starts.size - 1, -1)
+    place[kept] = np.arange(kept.size)
+    is_kept = np.repeat(place >= 0, np.diff(starts)) & (place[rows] >= 0)
+    order, rows, starts = order[is_kept], place[rows[is_kept]], np.append(0, np.cumsum(is_kept))[starts]
+    starts = np.append(starts[:-1][kept], starts[-1])
+    found, ends = list[csr_matrix](), np.cumsum([0, *map(len, forms)])
+    for own in map(slice, ends[:-1], ends[1:]):
+        before = np.stack([((each[:, None] * firsts[own]).T @ middles[own]).ravel() for each in weights[:, own]])
+        data = (before[:, inner_order].T @ basis).ravel()[order]
+        found.append(csr_matrix((data, rows, starts), shape=(kept.size, kept.size)))
+        found[-1].eliminate_zeros()
     return found
 
 
@@ -338,15 +359,11 @@ class SphereAxis(DirectionAxis):
 
     @cached_property
     def identity(self) -> Matrix:
-        return self._form(self._itself, self._itself)
+        return self._forms([[(self._itself, self._itself)]])[0]
 
     @property
     def unit(self) -> Matrix:
         return self.identity
-
-    def _assembled(self, of_line: Sequence[FloatArray], of_waves: Sequence[Matrix]) -> csr_matrix:
-        """Σ A_k ⊗ B_k of matrices in η and of the waves, sparse, shape (size, size)."""
-        return assembled(list(zip(of_line, of_waves, strict=True)), self._kept)
 
     @property
     def _slices(self) -> tuple[slice, slice]:
@@ -411,12 +428,12 @@ class SphereAxis(DirectionAxis):
         growth = [(c * c * values, a[0, 0]), (c * s * values, a[0, 1] + a[1, 0]), (s * s * values, a[1, 1])]
         return [(of_eta, of[:, own]) for of_eta, of in moved], [(of_eta, of[:, own]) for of_eta, of in growth]
 
-    def _form(self, left: Parts, right: Parts) -> Matrix:
-        """∫ v̂ û of functions of v and of u."""
-        measure = self.line.measure[:, None]
-        pairs = [(a, b) for a in left for b in right]
-        of_line = [np.asarray(a[0].T @ (measure * b[0])) for a, b in pairs]
-        return self._assembled(of_line, [a[1].T @ b[1] for a, b in pairs])
+    def _forms(self, forms: Sequence[Sequence[tuple[Parts, Parts]]]) -> list[csr_matrix]:
+        measure, alone = self.line.measure[:, None], np.ones((1, 1))
+        pairs = [[(a, b) for left, right in form for a in left for b in right] for form in forms]
+        return assembled(
+            [[(a[0].T @ (measure * b[0]), alone, a[1].T @ b[1]) for a, b in form] for form in pairs], self._kept
+        )
 
     @property
     def _itself(self) -> Parts:
@@ -431,7 +448,8 @@ class SphereAxis(DirectionAxis):
         weights = PENALTY * (0.5 * (sizes[1:] + sizes[:-1])) ** 2 / degree**3
         weights = weights * np.cos(inner) ** (first + 1) * np.sin(inner) ** (second + 1)
         jump = self.line.jumps_of_slope().toarray()
-        return self._assembled([-(jump.T @ (weights[:, None] * jump))], [np.eye(self._waves.own.size)])
+        of_line = -(jump.T @ (weights[:, None] * jump))
+        return assembled([[(of_line, np.ones((1, 1)), np.eye(self._waves.own.size))]], self._kept)[0]
 
     @property
     def area(self) -> float:
@@ -524,9 +542,9 @@ class SphereTerms(NoiseTerms):
     def _diffused(self, pairs: Sequence[tuple[float, CoefficientMatrix, CoefficientMatrix]]) -> Iterator[Term]:
         """Σ c (h_a·∇ + p q_a)(h_b·∇ + p q_b)."""
         order = min(a.order + b.order for _, a, b in pairs)
-        parts = [(c, self.phi.diffusion(self.matrix(a), self.matrix(b))) for c, a, b in pairs]
-        for power in range(3):
-            total = sum(c * each[power] for c, each in parts)
+        parts = [self.phi.diffusion(c * self.matrix(a), self.matrix(b)) for c, a, b in pairs]
+        for power, of_pairs in enumerate(zip(*parts, strict=True)):
+            total = reduce(add, of_pairs)
             yield self._term(
                 total, one, f"{('', 'p ', 'p² ')[power]}½ (h·∇ + p q)² of white noise", OfMoment(power), order
             )
