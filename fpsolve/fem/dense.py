@@ -36,10 +36,11 @@ class Factors(Protocol):
 
 
 class ArrayFactors:
-    """LAPACK's LU of an array, in the precision of its numbers. A pivot that vanishes is made tiny."""
+    """LAPACK's LU of an array of a `size`, in the precision of its numbers. A pivot that vanishes is made tiny."""
 
     def __init__(self, matrix: FloatArray) -> None:
         factorise, self._solve = (sgetrf, sgetrs) if matrix.dtype == np.float32 else (dgetrf, dgetrs)
+        self.size = len(matrix)
         self._lu, self._pivots, info = factorise(matrix, overwrite_a=1)
         if info > 0:
             pivots = np.einsum("ii->i", self._lu)

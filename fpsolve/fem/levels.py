@@ -4,6 +4,9 @@ With the functions of the axis in levels, each coupled to its neighbours only, t
 with U_k above and L_k below. From the last level on, of the functions that noise damps the most,
 
     P_k = D_k − U_k P_{k+1}⁻¹ L_k.
+
+Of sparse matrices U_k may reach beyond the next level, where impacts take paths: F to the level j adds −F P_j⁻¹ L_{j−1}
+to what leads to the level before it.
 """
 
 from __future__ import annotations
@@ -34,7 +37,7 @@ ENTRY_BYTES = 40
 """Bytes of an entry of a sparse matrix, while it is sorted."""
 
 Blocks = tuple[FloatArray, Matrix, Matrix]
-"""D_k, U_k and L_k; the last two are empty for the last level."""
+"""D_k, U_k and L_k; the last two are empty for the last level. Sparse U_k are to all further levels."""
 
 
 class LevelFactors:
@@ -82,7 +85,13 @@ class LevelFactors:
                 touched = slice(None) if isinstance(down, np.ndarray) else np.unique(down.indices)
                 below: FloatArray = np.asarray(dense(down[:, touched]), dtype=self._precision, order="F")
                 quotient = self._pivots[-1].solve(below)
-                rest.T[touched] -= np.asarray(quotient.T @ up.T)
+                product = np.asarray(quotient.T @ up[:, : len(quotient)].T)
+                if up.shape[1] > len(quotient):
+                    rows, more = self._by_way(up)
+                    product[:, rows] += quotient.T @ more[:, : len(quotient)].T
+                    at = np.ones(rows.size, dtype=more.dtype), (rows, np.arange(rows.size))
+                    up = up + csr_matrix(at, (up.shape[0], rows.size)) @ csr_matrix(more)
+                rest.T[touched] -= product
                 self._up.append(up)
                 self._quotients.append(quotient if self._is_dense else down)
             if not np.abs(rest).max() < most:
@@ -114,8 +123,21 @@ class LevelFactors:
         after = slice(0, 0)
         for part in reversed(self._parts):
             rows = matrix[part]
-            yield rows[:, part].toarray(order="F"), rows[:, after], matrix[after][:, part]
+            yield rows[:, part].toarray(order="F"), rows[:, part.stop :], matrix[after][:, part]
             after = part
+
+    def _by_way(self, up: csr_matrix) -> tuple[IntArray, FloatArray]:
+        """What goes by way of levels beyond the next one: rows of U_k, and what these get, to all further levels."""
+        starts = np.cumsum([0, *(each.size for each in reversed(self._pivots))])
+        rows = np.unique(up[:, starts[1] :].nonzero()[0])
+        old = up[rows].toarray()
+        table = old.copy()
+        for k in range(len(self._pivots) - 1, 0, -1):
+            before, own = slice(starts[k - 1], starts[k]), slice(starts[k], starts[k + 1])
+            if (reached := np.any(table[:, own], axis=1)).any():
+                onto = self._pivots[-1 - k].solve(table[reached, own].T, transposed=True)
+                table[reached, before] -= np.asarray(onto.T @ self._quotients[-k])
+        return rows, table - old
 
     @property
     def _unknowns(self) -> IntArray:
@@ -127,21 +149,28 @@ class LevelFactors:
         """x of A x = b, or of Aᵀx = b; several b are columns."""
         order, axis = np.concatenate(self._groups), self._axis % len(self._shape)
         table = np.moveaxis(b.reshape(*self._shape, *b.shape[1:]), axis, 0)
-        sorted_b = table[order].reshape(b.shape).astype(self._precision)
-        rest = [sorted_b[part] for part in self._parts]
-        for i in range(len(rest) - 1, -1, -1):
+        rest = table[order].reshape(b.shape).astype(self._precision)
+        for i in range(len(self._parts) - 1, -1, -1):
+            own, beyond = self._parts[i], self._beyond(i)
             if not transposed:
-                rest[i] = self._pivots[i].solve(rest[i])
-            if i:
-                rest[i - 1] -= self._quotient(i, rest[i], True) if transposed else self._up[i - 1] @ rest[i]
-        for i, pivot in enumerate(self._pivots):
-            if i:
-                rest[i] -= self._up[i - 1].T @ rest[i - 1] if transposed else self._quotient(i, rest[i - 1], False)
+                rest[own] = self._pivots[i].solve(rest[own] - self._up[i] @ rest[beyond] if beyond else rest[own])
+            elif i:
+                rest[self._parts[i - 1]] -= self._quotient(i, rest[own], True)
+        for i, own in enumerate(self._parts):
             if transposed:
-                rest[i] = pivot.solve(rest[i], transposed=True)
+                rest[own] = self._pivots[i].solve(rest[own], transposed=True)
+                if beyond := self._beyond(i):
+                    rest[beyond] -= self._up[i].T @ rest[own]
+            elif i:
+                rest[own] -= self._quotient(i, rest[self._parts[i - 1]], False)
         found = np.empty(table.shape)
-        found[order] = np.concatenate(rest).reshape(table.shape)
+        found[order] = rest.reshape(table.shape)
         return np.moveaxis(found, 0, axis).reshape(b.shape)
+
+    def _beyond(self, i: int) -> slice | None:
+        """The unknowns to which U_i leads."""
+        start = self._parts[i].stop
+        return slice(start, start + self._up[i].shape[1]) if i < len(self._up) else None
 
     def _quotient(self, i: int, x: FloatArray, transposed: bool) -> FloatArray:
         """P_i⁻¹ L_(i−1) x, or the transpose; of sparse matrices only L is kept."""

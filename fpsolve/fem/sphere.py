@@ -31,6 +31,7 @@ from scipy.sparse import csc_matrix, csr_matrix, diags
 from scipy.sparse.linalg import LinearOperator
 
 from fpsolve.arrays import Coefficient, FloatArray, IntArray, Matrix, one
+from fpsolve.budget import charge
 from fpsolve.fem.axis import Axis, along, on_one_pattern, product_pattern
 from fpsolve.fem.line import LineSpace
 from fpsolve.fem.mesh import halved
@@ -45,6 +46,10 @@ MOST_DEGREE = 10
 """Highest degree of an element in η: beyond, elements are halved."""
 SIDE = 16
 """Least number of points along each angle at which signs are looked at."""
+ENTRY_OPERATIONS = 1500.0
+"""Number of operations that take the time of an entry of a form and of the sums that it is in, 50 ns."""
+ENTRY_BYTES = 60
+"""Bytes of an entry of what forms share, while they are assembled."""
 INDEPENDENT = 1e-15
 """Share of a matrix beside others that is none of its own, at most, as rounding leaves so much."""
 Coordinates = tuple[tuple[float, ...], ...]
@@ -242,6 +247,8 @@ def assembled(forms: Sequence[Sequence[tuple[Matrix, Matrix, Matrix]]], kept: In
     basis, weights, at = scipy.linalg.qr((lasts / sizes[:, None]).T, mode="economic", pivoting=True)
     rank = max(1, np.count_nonzero(np.abs(np.diagonal(weights)) > INDEPENDENT))
     basis, weights = basis[:, :rank].T, weights[:rank, np.argsort(at)] * sizes
+    entries = first.nnz * middle.nnz * last.nnz
+    charge(ENTRY_OPERATIONS * len(forms) * entries, 1e-9 * (ENTRY_BYTES + 12 * len(forms)) * entries)
     inner_order, rows, starts = product_pattern(first, middle)
     size = first.shape[0] * middle.shape[0]
     order, rows, starts = product_pattern(csc_matrix((np.ones(rows.size), rows, starts), shape=(size, size)), last)

@@ -185,9 +185,13 @@ def test_single_precision_is_refined(rng):
             assert np.linalg.norm(expected @ plain - b) > 1e4 * error * np.linalg.norm(expected) * np.linalg.norm(plain)
 
 
-def test_levels_of_the_first_axis(rng):
-    """A thin band of the first axis, each of its functions with all of the noise's."""
+@pytest.mark.parametrize("farthest", [3, 20])
+def test_levels_of_the_first_axis(farthest, rng):
+    """A thin band of the first axis, each of its functions with all of the noise's; impacts lead farther upwards."""
     first = [banded(rng, 90, 3) + 9 * np.eye(90) for _ in range(2)]
+    row, column = np.indices((90, 90))
+    is_hit = (row % 3 == 1) & (column - row > 3) & (column - row <= farthest)
+    first[1] += np.where(is_hit, rng.standard_normal((90, 90)), 0.0)
     noises = [np.eye(6), banded(rng, 6, 1)]
     operator = KroneckerSum([(csr_matrix(phase), noise) for phase, noise in zip(first, noises, strict=True)])
     levels = np.split(np.arange(90), range(3, 90, 3))
