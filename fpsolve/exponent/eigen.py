@@ -86,6 +86,8 @@ LARGEST_NORM = 1e150
 """Of L(p): vectors of this size have lengths."""
 OPERATIONS_OF_SOLVE = 5000.0
 """Operations that take the time of a solution with factors for an unknown, 0.18 µs."""
+OPERATIONS_OF_GIGABYTE = 5e9
+"""The same for a gigabyte of factors, of a solution that is refined, 0.17 s."""
 SURVEYED_UNKNOWNS = 600
 """Up to so many, a chain is checked by all eigenvalues."""
 
@@ -319,23 +321,24 @@ def _from_the_right(pencil: Pencil, generator: Generator) -> tuple[FloatArray, F
             shift = value + SHIFT_RATIO * (shift - value)
         factor: Any = None  # there is room for the next ones
         factor, last = pencil.factorised(shift), value
-        right, value = _nearest(lambda v, lu=factor: -lu.solve(space.weighed(v)), right, shift, pencil.p)
+        right, value = _nearest(lambda v, lu=factor: -_solution(lu, space.weighed(v)), right, shift, pencil.p)
         if abs(value - last) <= NEAR_ENOUGH * (shift - value):
             break
-    left, _ = _nearest(lambda v: -factor.solve(space.weighed(v), transposed=True), left, shift, pencil.p, value)
+    left, _ = _nearest(lambda v: -_solution(factor, space.weighed(v), True), left, shift, pencil.p, value)
     return right, left, value, 0.5 * (shift - value)
+
+
+def _solution(factor: Factors, load: FloatArray, transposed: bool = False) -> FloatArray:
+    """One of many with the same factors, which is counted."""
+    charge(OPERATIONS_OF_SOLVE * load.size + OPERATIONS_OF_GIGABYTE * factor.gigabytes)
+    return factor.solve(load, transposed=transposed)
 
 
 def _nearest(
     resolvent: Any, start: FloatArray, shift: float, p: float, value: float | None = None
 ) -> tuple[FloatArray, float]:
     """The real eigenvalue nearest to a shift, or to a value, and before it its eigenvector, by Arnoldi iteration."""
-
-    def solved(vector: FloatArray) -> FloatArray:
-        charge(OPERATIONS_OF_SOLVE * start.size)
-        return np.asarray(resolvent(vector))
-
-    operator = LinearOperator((start.size, start.size), matvec=solved, dtype=float)
+    operator = LinearOperator((start.size, start.size), matvec=resolvent, dtype=float)
     count = min(NEIGHBOURS, start.size - 2)
     mixed = start + 1e-8 * np.linalg.norm(start) * np.sin(np.arange(start.size))  # beyond spaces that L keeps to itself
     try:
@@ -525,7 +528,7 @@ class PairDerivatives:
         source = space.weighed(space.constant)
 
         def carried(load: FloatArray) -> FloatArray:
-            charge(OPERATIONS_OF_SOLVE * load.size)
+            charge(OPERATIONS_OF_SOLVE * load.size + OPERATIONS_OF_GIGABYTE * self._factor.gigabytes)
             return self.solve(load, adjoint=adjoint, enough=0.1 * RESOLVED)
 
         moved = LinearOperator(2 * own.shape, lambda v: v - shift * carried(space.weighed(v)), dtype=float)

@@ -52,6 +52,8 @@ STALLED, OF_STALLED = 0.5, 10.0
 what is left then, over the change: it was up to 6 in R = 1."""
 OF_TRIED = 1.5
 """What is left, over a change, in a direction in which the last step made it finer: it was up to 1.1 in R = 1."""
+MINOR_NOISE = 0.1
+"""Share of what is left on the half sphere from which on functions of the noise are made finer, too."""
 FALL = 0.2
 """Share of a change that two degrees more leave, about."""
 WORTH = 0.2
@@ -151,7 +153,8 @@ class StopStart(SphereStart):
                     raised &= changes >= changes[at]
                     break
             phi = phi.raised_in(raised, is_halved=self._stalls(solution.start.changes))
-        found = Space((phi, *self._finer_noises(solution, solution.measured[1:], SHARE * goal)))
+        share = max(SHARE * goal, MINOR_NOISE * solution.measured[0])
+        found = Space((phi, *self._finer_noises(solution, solution.measured[1:], share)))
         found = found if found.size > self.space.size else self.space.enriched()
         return StopStart(self.problem, found, before=(solution,), is_first=False)
 
@@ -162,5 +165,5 @@ def stop_start(question: Question) -> StopStart:
         if isinstance(start := known.start, StopStart):
             start = (*(each.start for each in start.before), start)[0]
             return StopStart(question.problem, start.space, is_first=start.is_first)
-    noises = (first_axis(noise, -math.log10(question.rtol)) for noise in question.problem.coloured.parts.values())
+    noises = (first_axis(noise, -math.log10(question.rtol) - 1) for noise in question.problem.coloured.parts.values())
     return StopStart(question.problem, Space((stopped_directions(question.problem), *noises)))

@@ -22,7 +22,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy.sparse import csr_matrix, diags, identity, kron
+from scipy.sparse import csr_matrix, diags, identity
 from scipy.sparse.linalg import LinearOperator
 
 from fpsolve.arrays import FloatArray, IntArray, Matrix, one
@@ -275,23 +275,24 @@ class HalfSphereAxis(DirectionAxis):
     @property
     def inner_values(self) -> LinearOperator:
         values, _, of_first, _ = self._tables
-        factors = values[:: max(1, self.degree // 4)], of_first[::2], self._second.samples[:, self._own]
+        return self._along((values[:: max(1, self.degree // 4)], of_first[::2], self._second.samples[:, self._own]))
+
+    def projection(self, other: HalfSphereAxis) -> LinearOperator:
+        """In η and θ₁ by the inner product, of waves those that both have."""
+        of_eta = _projected(self.line, other.line)
+        of_theta = np.asarray(np.linalg.solve(self._first, _projected(self.first_line, other.first_line) @ other._first))
+        return other._along((of_eta, of_theta, np.eye(self._own.size, other._own.size)), self._kept)
+
+    def _along(self, factors: Sequence[FloatArray], kept: IntArray | slice = slice(None)) -> LinearOperator:
+        """What matrices along η, θ₁ and θ₂ make of functions, as far as it is kept."""
 
         def of_columns(columns: FloatArray) -> FloatArray:
             table = np.zeros((math.prod(self._shape), columns.shape[1]))
             table[self._kept] = columns
-            return along((*factors, None), table.reshape(*self._shape, -1)).reshape(-1, columns.shape[1])
+            return along((*factors, None), table.reshape(*self._shape, -1)).reshape(-1, columns.shape[1])[kept]
 
-        shape = math.prod(len(each) for each in factors), self.size
+        shape = np.arange(math.prod(map(len, factors)))[kept].size, self.size
         return LinearOperator(shape, matvec=lambda v: of_columns(v.reshape(-1, 1)), matmat=of_columns, dtype=float)
-
-    def projection(self, other: HalfSphereAxis) -> Matrix:
-        """In η and θ₁ by the inner product, of waves those that both have."""
-        of_eta = _projected(self.line, other.line)
-        of_theta = np.linalg.solve(self._first, _projected(self.first_line, other.first_line) @ other._first)
-        waves = identity(max(self._own.size, other._own.size), format="csr")[: self._own.size, : other._own.size]
-        whole = kron(csr_matrix(of_eta), kron(csr_matrix(of_theta), waves), format="csr")
-        return whole[self._kept][:, other._kept]
 
     def at(self, points: FloatArray) -> csr_matrix:
         first, second = np.hypot(*points[:2]), np.hypot(*points[2:])
