@@ -279,8 +279,8 @@ class HalfSphereAxis(DirectionAxis):
 
     def projection(self, other: HalfSphereAxis) -> LinearOperator:
         """In η and θ₁ by the inner product, of waves those that both have."""
-        of_eta = _projected(self.line, other.line)
-        of_theta = np.asarray(np.linalg.solve(self._first, _projected(self.first_line, other.first_line) @ other._first))
+        of_eta, of_first = _projected(self.line, other.line), _projected(self.first_line, other.first_line)
+        of_theta = np.asarray(np.linalg.solve(self._first, of_first @ other._first))
         return other._along((of_eta, of_theta, np.eye(self._own.size, other._own.size)), self._kept)
 
     def _along(self, factors: Sequence[FloatArray], kept: IntArray | slice = slice(None)) -> LinearOperator:

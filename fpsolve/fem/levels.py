@@ -15,7 +15,7 @@ from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
 import numpy as np
-from scipy.sparse import csr_matrix, issparse
+from scipy.sparse import csr_matrix, identity, issparse
 from scipy.sparse.csgraph import connected_components, shortest_path
 
 from fpsolve.arrays import FloatArray, IntArray, Matrix, dense
@@ -33,6 +33,10 @@ SPARSE_LEVEL_OPERATIONS = 1e7
 """Number of operations that take the time of the calls for a level of sparse matrices, 0.35 ms."""
 ENTRY_OPERATIONS = 2000.0
 """Number of operations that take the time of making an entry of a sparse matrix and sorting it into levels, 70 ns."""
+SHARE_OF_ELEMENTS = 0.35
+"""Share of what one element is to the next that is no multiple of the rest, about."""
+ALIKE = 1e-11
+"""Largest difference of rows that are multiples of each other, over their size."""
 ENTRY_BYTES = 40
 """Bytes of an entry of a sparse matrix, while it is sorted."""
 
@@ -62,7 +66,8 @@ class LevelFactors:
         is_filled = entries >= DENSE_SHARE * (squares + 2 * beside)
         self._is_dense = is_filled and not any(issparse(term[-1]) for term in self._operator.terms)
         share = 1.0 if precision is float else 0.5
-        operations = sum(map(dense_operations, sizes)) + sum(2 * a * b**2 for a, b in pairwise(sizes))
+        eliminated, between = sum(map(dense_operations, sizes)), sum(2 * a * b**2 for a, b in pairwise(sizes))
+        operations = eliminated + (between if axis or self._is_dense else SHARE_OF_ELEMENTS * between)
         if self._is_dense:
             operations += sum(2 * a**2 * b for a, b in pairwise(sizes))
             self.operations = share * operations + LEVEL_OPERATIONS * len(sizes)
@@ -82,16 +87,11 @@ class LevelFactors:
         self._up, self._quotients = list[Matrix](), list[Matrix]()
         for rest, up, down in self._arrays() if self._is_dense else self._rows():
             if self._pivots:
-                touched = slice(None) if isinstance(down, np.ndarray) else np.unique(down.indices)
-                below: FloatArray = np.asarray(dense(down[:, touched]), dtype=self._precision, order="F")
-                quotient = self._pivots[-1].solve(below)
-                product = np.asarray(quotient.T @ up[:, : len(quotient)].T)
-                if up.shape[1] > len(quotient):
-                    rows, more = self._by_way(up)
-                    product[:, rows] += quotient.T @ more[:, : len(quotient)].T
-                    at = np.ones(rows.size, dtype=more.dtype), (rows, np.arange(rows.size))
-                    up = up + csr_matrix(at, (up.shape[0], rows.size)) @ csr_matrix(more)
-                rest.T[touched] -= product
+                if self._is_dense:
+                    quotient = self._pivots[-1].solve(np.asfortranarray(down))
+                    rest -= up @ quotient
+                else:
+                    up, down = self._fill(rest, up, down)
                 self._up.append(up)
                 self._quotients.append(quotient if self._is_dense else down)
             if not np.abs(rest).max() < most:
@@ -119,12 +119,28 @@ class LevelFactors:
     def _rows(self) -> Iterator[Blocks]:
         """D_k as an array, U_k and L_k sparse, from the last level on."""
         order = self._unknowns
-        matrix = csr_matrix(self._operator.tocsc()[:, order].tocsr()[order], dtype=self._precision)
+        matrix = csr_matrix(self._operator.tocsc()[:, order].tocsr()[order])
         after = slice(0, 0)
         for part in reversed(self._parts):
             rows = matrix[part]
-            yield rows[:, part].toarray(order="F"), rows[:, part.stop :], matrix[after][:, part]
+            own: FloatArray = np.asarray(rows[:, part].toarray(order="F"), dtype=self._precision, order="F")
+            yield own, rows[:, part.stop :], matrix[after][:, part]
             after = part
+
+    def _fill(self, rest: FloatArray, up: csr_matrix, down: csr_matrix) -> tuple[csr_matrix, csr_matrix]:
+        """Take U_k P_{k+1}⁻¹ L_k from an array, and give back U_k, with what goes by way of further levels, and L_k."""
+        size = down.shape[0]
+        (columns, of_columns), (rows, of_rows) = multiples(down.T), multiples(up[:, :size])
+        up, down, of_columns, of_rows = (each.astype(self._precision) for each in (up, down, of_columns, of_rows))
+        quotient = self._pivots[-1].solve(down[:, columns].toarray(order="F"))
+        product = of_rows @ np.asarray(up[rows][:, :size] @ quotient)
+        if up.shape[1] > size:
+            rows, more = self._by_way(up)
+            product[rows] += more[:, :size] @ quotient
+            at = np.ones(rows.size, dtype=more.dtype), (rows, np.arange(rows.size))
+            up = up + csr_matrix(at, (up.shape[0], rows.size)) @ csr_matrix(more)
+        rest.T[:] -= of_columns @ product.T
+        return up, down
 
     def _by_way(self, up: csr_matrix) -> tuple[IntArray, FloatArray]:
         """What goes by way of levels beyond the next one: rows of U_k, and what these get, to all further levels."""
@@ -193,6 +209,24 @@ def neighbours(operator: KroneckerSum, axis: int, levels: Sequence[IntArray] | N
     starts = np.unique(connected_components(pattern)[1], return_index=True)[1]
     distance = np.min(shortest_path(pattern + pattern.T, method="D", unweighted=True, indices=starts), axis=0)
     return [np.flatnonzero(distance == d) for d in range(int(distance.max()) + 1)]
+
+
+def multiples(matrix: csr_matrix) -> tuple[IntArray, csr_matrix]:
+    """Few rows, and S, such that matrix = S @ matrix[rows]: those whose multiples all others are.
+
+    The penalty has such ones, as one jump of slopes couples all functions of two elements.
+    """
+    probes = matrix @ np.random.default_rng(0).standard_normal((matrix.shape[1], 2))
+    filled = np.flatnonzero(np.diff(csr_matrix(matrix).indptr))
+    ratio = probes[filled, 1] / probes[filled, 0]
+    order = np.argsort(ratio)
+    is_new = np.append(True, np.diff(ratio[order]) > ALIKE * np.abs(ratio[order][1:]))[: order.size]
+    rows, group = filled[order[is_new]], np.cumsum(is_new) - 1
+    sizes = probes[filled[order], 0] / probes[rows[group], 0]
+    found = csr_matrix((sizes, (filled[order], group)), shape=(matrix.shape[0], rows.size))
+    if abs(found @ matrix[rows] - matrix).max() <= ALIKE * abs(matrix).max():
+        return rows, found
+    return filled, identity(matrix.shape[0], format="csr")[:, filled]
 
 
 def paired(groups: Sequence[IntArray]) -> list[IntArray]:
