@@ -130,6 +130,11 @@ class LevelFactors:
     def _fill(self, rest: FloatArray, up: csr_matrix, down: csr_matrix) -> tuple[csr_matrix, csr_matrix]:
         """Take U_k P_{k+1}⁻¹ L_k from an array, and give back U_k, with what goes by way of further levels, and L_k."""
         size = down.shape[0]
+        if self._axis:  # no function of a noise is to others a multiple of another one
+            up, down = (each.astype(self._precision) for each in (up[:, :size], down))
+            touched = np.unique(down.indices)
+            rest.T[touched] -= (up @ self._pivots[-1].solve(down[:, touched].toarray(order="F"))).T
+            return up, down
         (columns, of_columns), (rows, of_rows) = multiples(down.T), multiples(up[:, :size])
         up, down, of_columns, of_rows = (each.astype(self._precision) for each in (up, down, of_columns, of_rows))
         quotient = self._pivots[-1].solve(down[:, columns].toarray(order="F"))
