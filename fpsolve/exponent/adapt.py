@@ -58,8 +58,6 @@ A_THIRD_MORE = 4 / 3
 """What a budget may be exceeded by."""
 Tolerance = Callable[[float, float], float]
 """The largest error allowed, from p and a value of Λ(p)."""
-GROWTH = 1.5
-"""A stage costs about this power of the number of unknowns, by the last one."""
 UNSOLVED = MeshError, NotConverged, SingularMatrix, np.linalg.LinAlgError
 """What is raised where a discretisation does not have the principal pair, so that another one is tried."""
 Found = TypeVar("Found")
@@ -446,7 +444,7 @@ class Search:
         size, spent, most = chosen.size, self.countdown.spent, self.whole.budget.unknowns
         if size > most:
             raise Ended(Message(Code.UNKNOWNS_SPENT, unknowns=size, most=most))
-        seconds = spent + (spent - self.last[0]) * (size / max(self.last[1], 1)) ** GROWTH
+        seconds = spent + (spent - self.last[0]) * size / max(self.last[1], 1)  # what it takes at least
         if self.last[1] and seconds > self.countdown.seconds:
             raise OverBudget(self.countdown, Message(Code.SECONDS_SPENT, seconds=seconds, most=self.countdown.seconds))
         if self.stages >= MAX_STAGES:
