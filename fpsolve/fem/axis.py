@@ -317,13 +317,16 @@ class KroneckerSum:
 
 def product_pattern(first: csc_matrix, last: csc_matrix) -> tuple[IntArray, IntArray, IntArray]:
     """Where first ⊗ last has entries, column by column: the places in the table of all products, rows, and starts."""
-    starts, last_starts = (np.repeat(each.indptr[:-1], np.diff(each.indptr)) for each in (first, last))
-    counts, last_counts = (np.repeat(each, each) for each in map(np.diff, (first.indptr, last.indptr)))
-    at = np.multiply.outer(counts, last_starts) + np.multiply.outer(np.arange(first.nnz) - starts, last_counts)
-    at += np.add.outer(starts * last.nnz, np.arange(last.nnz) - last_starts)
-    order, rows = np.empty(at.size, dtype=np.int64), np.empty(at.size, dtype=np.int64)
-    order[at] = np.arange(at.size).reshape(at.shape)
-    rows[at] = np.add.outer(last.shape[0] * first.indices, last.indices)
+    kind = np.int32 if first.nnz * last.nnz < 2**31 else np.int64
+    starts, last_starts = (np.repeat(each.indptr[:-1], np.diff(each.indptr)).astype(kind) for each in (first, last))
+    counts, last_counts = (np.repeat(each, each).astype(kind) for each in map(np.diff, (first.indptr, last.indptr)))
+    own, other = np.arange(first.nnz, dtype=kind), np.arange(last.nnz, dtype=kind)[:, None]
+    at = counts * last_starts[:, None]
+    at += (own - starts) * last_counts[:, None]
+    at += starts * last.nnz + other - last_starts[:, None]
+    order, rows = np.empty(at.size, dtype=kind), np.empty(at.size, dtype=kind)
+    order[at] = own * last.nnz + other
+    rows[at] = first.indices.astype(kind) * last.shape[0] + last.indices[:, None].astype(kind)
     return order, rows, np.append(0, np.cumsum(np.outer(np.diff(first.indptr), np.diff(last.indptr))))
 
 

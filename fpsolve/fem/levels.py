@@ -118,8 +118,9 @@ class LevelFactors:
 
     def _rows(self) -> Iterator[Blocks]:
         """D_k as an array, U_k and L_k sparse, from the last level on."""
-        order = self._unknowns
-        matrix = csr_matrix(self._operator.tocsc()[:, order].tocsr()[order])
+        order = np.concatenate(self._groups)
+        terms = [(own[order][:, order], *others) for *others, own in self._operator.terms]
+        matrix = KroneckerSum(terms).T.tocsc().T
         after = slice(0, 0)
         for part in reversed(self._parts):
             rows = matrix[part]
@@ -159,12 +160,6 @@ class LevelFactors:
                 onto = self._pivots[-1 - k].solve(table[reached, own].T, transposed=True)
                 table[reached, before] -= np.asarray(onto.T @ self._quotients[-k])
         return rows, table - old
-
-    @property
-    def _unknowns(self) -> IntArray:
-        """Of the operator, in the order of the levels, by functions of the axis."""
-        m, n = self._operator.halves
-        return np.add.outer(np.concatenate(self._groups), n * np.arange(m)).ravel()
 
     def solve(self, b: FloatArray, *, transposed: bool = False) -> FloatArray:
         """x of A x = b, or of Aᵀx = b; several b are columns."""

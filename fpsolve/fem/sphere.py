@@ -261,7 +261,7 @@ def assembled(forms: Sequence[Sequence[tuple[Matrix, Matrix, Matrix]]], kept: In
     for own in map(slice, ends[:-1], ends[1:]):
         before = np.stack([((each[:, None] * firsts[own]).T @ middles[own]).ravel() for each in weights[:, own]])
         data = (before[:, inner_order].T @ basis).ravel()[order]
-        found.append(csr_matrix((data, rows, starts), shape=(kept.size, kept.size)))
+        found.append(csr_matrix((data, rows, starts), shape=(kept.size, kept.size), copy=True))
         found[-1].eliminate_zeros()
     return found
 
