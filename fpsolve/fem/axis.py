@@ -317,7 +317,7 @@ class KroneckerSum:
 
 def product_pattern(first: csc_matrix, last: csc_matrix) -> tuple[IntArray, IntArray, IntArray]:
     """Where first ⊗ last has entries, column by column: the places in the table of all products, rows, and starts."""
-    kind = np.int32 if first.nnz * last.nnz < 2**31 else np.int64
+    kind: Any = np.int32 if first.nnz * last.nnz < 2**31 else np.int64
     starts, last_starts = (np.repeat(each.indptr[:-1], np.diff(each.indptr)).astype(kind) for each in (first, last))
     counts, last_counts = (np.repeat(each, each).astype(kind) for each in map(np.diff, (first.indptr, last.indptr)))
     own, other = np.arange(first.nnz, dtype=kind), np.arange(last.nnz, dtype=kind)[:, None]
