@@ -29,6 +29,8 @@ RTOL_OF_CLOSED = 1e-7
 """Error of F that is wanted where even moments are all, relative to its scale."""
 RTOL_OF_DEAR = 1e-3
 """Error of F that is wanted where it is dear, relative to its scale."""
+RTOL_AT_STOP = 3e-3
+"""The same of four variables with a stop, where the error falls slowly."""
 ITS_SIGN = 0.3
 """Largest error of a dear F, over F, where its sign is sure."""
 HALF = 0.5
@@ -187,6 +189,8 @@ def check_axes(problem: Problem, x: Axis, y: Axis) -> None:
 
 def line_rtol(problem: Problem, zero: Zero) -> float:
     """The error of F that is wanted on a line, over its scale."""
+    if problem.dimension > 2 and problem.system.stop:
+        return RTOL_AT_STOP
     return RTOL_OF_CLOSED if problem.is_closed_only else RTOL_OF_DEAR if is_dear(problem, zero) else RTOL
 
 
