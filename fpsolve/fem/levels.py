@@ -212,12 +212,12 @@ def neighbours(operator: KroneckerSum, axis: int, levels: Sequence[IntArray] | N
 
 
 def multiples(matrix: csr_matrix) -> tuple[IntArray, csr_matrix]:
-    """Few rows, and S, such that matrix = S @ matrix[rows]: those whose multiples all others are.
+    """Few rows, and S, such that matrix = S @ matrix[rows]: all others are their multiples, or 0.
 
     The penalty has such ones, as one jump of slopes couples all functions of two elements.
     """
     probes = matrix @ np.random.default_rng(0).standard_normal((matrix.shape[1], 2))
-    filled = np.flatnonzero(np.diff(csr_matrix(matrix).indptr))
+    filled = np.flatnonzero(probes[:, 0])
     ratio = probes[filled, 1] / probes[filled, 0]
     order = np.argsort(ratio)
     is_new = np.append(True, np.diff(ratio[order]) > ALIKE * np.abs(ratio[order][1:]))[: order.size]

@@ -14,7 +14,7 @@ from fpsolve.errors import SingularMatrix
 from fpsolve.fem import Generator
 from fpsolve.fem.axis import KroneckerSum
 from fpsolve.fem.factors import FEW_UNKNOWNS, DenseFactors, SparseFactors, candidates, factorised
-from fpsolve.fem.levels import LevelFactors, neighbours, paired
+from fpsolve.fem.levels import LevelFactors, multiples, neighbours, paired
 from fpsolve.fem.noise_axes import PolynomialAxis, StateAxis
 from fpsolve.fem.phase import PhaseAxis
 from fpsolve.fem.refined import RefinedFactors
@@ -239,3 +239,19 @@ def test_white_noise_couples_more_than_the_ends_of_cells():
     problem = Problem(VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=0.9), White(0.4))
     lines = 0.5 * np.pi + np.pi * np.linspace(0, 1, 4)
     assert Generator(problem, Space((PhaseAxis(lines, np.full(3, 5)), StateAxis(White(0.4))))).at(1.0).ring is None
+
+
+def test_few_rows_tell_all_others(rng):
+    """Of twelve rows three are their own, one is 0, and one has zeros alone."""
+    own, factors = rng.standard_normal((3, 9)), rng.standard_normal((12, 3)) * np.eye(3)[np.arange(12) % 3]
+    table = factors @ own
+    table[4] = table[7] = 0.0
+    matrix = csr_matrix(np.where(np.arange(12)[:, None] == 7, 1.0, table))
+    matrix.data[matrix.indptr[7] : matrix.indptr[8]] = 0.0
+    rows, found = multiples(matrix)
+    assert rows.size == 3
+    np.testing.assert_allclose((found @ matrix[rows]).toarray(), table, atol=1e-13)
+    plain = csr_matrix(rng.standard_normal((5, 4)))
+    rows, found = multiples(plain)
+    assert rows.size == 5
+    np.testing.assert_array_equal((found @ plain[rows]).toarray(), plain.toarray())
