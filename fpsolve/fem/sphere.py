@@ -242,12 +242,14 @@ class DirectionAxis(Axis):
 def assembled(forms: Sequence[Sequence[tuple[Matrix, Matrix, Matrix]]], kept: IntArray) -> list[csr_matrix]:
     """For each form Σ A_k ⊗ B_k ⊗ C_k on the products that are kept, sparse; of the C few are independent."""
     factors = zip(*(term for form in forms for term in form), strict=True)
-    (first, firsts), (middle, middles), (last, lasts) = (on_one_pattern([each.T for each in one]) for one in factors)
+    (first, firsts), (middle, middles), (last, lasts) = (on_one_pattern([each.T for each in own]) for own in factors)
+    entries = first.nnz * middle.nnz * last.nnz
+    if not entries:  # as of what no parameter moves
+        return [csr_matrix((kept.size, kept.size))] * len(forms)
     sizes = np.linalg.norm(lasts, axis=1) + sys.float_info.min
     basis, weights, at = scipy.linalg.qr((lasts / sizes[:, None]).T, mode="economic", pivoting=True)
     rank = max(1, np.count_nonzero(np.abs(np.diagonal(weights)) > INDEPENDENT))
     basis, weights = basis[:, :rank].T, weights[:rank, np.argsort(at)] * sizes
-    entries = first.nnz * middle.nnz * last.nnz
     charge(ENTRY_OPERATIONS * len(forms) * entries, 1e-9 * (ENTRY_BYTES + 12 * len(forms)) * entries)
     inner_order, rows, starts = product_pattern(first, middle)
     size = first.shape[0] * middle.shape[0]

@@ -93,3 +93,9 @@ def test_elimination_from_one_end_to_the_other_where_impacts_lead_past_several_e
     factors.make()
     assert_allclose(factors.solve(b), np.linalg.solve(matrix, b), rtol=1e-9, atol=1e-9)
     assert_allclose(factors.solve(b, transposed=True), np.linalg.solve(matrix.T, b), rtol=1e-9, atol=1e-9)
+
+
+def test_nothing_moves_nothing(axis):
+    for each in (*axis.driven(np.zeros((4, 4))), *axis.diffusion(np.zeros((4, 4)), np.eye(4))):
+        assert each.shape == (axis.size, axis.size)
+        assert abs(each).max() == 0
