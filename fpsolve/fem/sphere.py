@@ -16,7 +16,6 @@ the right: jumps of ∂u/∂η between elements are penalised by γ h² N⁻³ �
 from __future__ import annotations
 
 import math
-import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache, reduce
@@ -24,7 +23,6 @@ from operator import add
 from typing import Any
 
 import numpy as np
-import scipy.linalg
 import scipy.sparse
 import scipy.sparse.linalg
 from scipy.sparse import csc_matrix, csr_matrix, diags
@@ -50,8 +48,6 @@ ENTRY_OPERATIONS = 1500.0
 """Number of operations that take the time of an entry of a form and of the sums that it is in, 50 ns."""
 ENTRY_BYTES = 60
 """Bytes of an entry of what forms share, while they are assembled."""
-INDEPENDENT = 1e-15
-"""Share of a matrix beside others that is none of its own, at most, as rounding leaves so much."""
 Coordinates = tuple[tuple[float, ...], ...]
 Parts = list[tuple[FloatArray, csr_matrix]]
 """Σ f(η) ⊗ g: values at points of η, shape (points, nodes), and waves, shape (all, own)."""
@@ -240,16 +236,12 @@ class DirectionAxis(Axis):
 
 
 def assembled(forms: Sequence[Sequence[tuple[Matrix, Matrix, Matrix]]], kept: IntArray) -> list[csr_matrix]:
-    """For each form Σ A_k ⊗ B_k ⊗ C_k on the products that are kept, sparse; of the C few are independent."""
+    """For each form Σ A_k ⊗ B_k ⊗ C_k on the products that are kept, sparse, on one pattern."""
     factors = zip(*(term for form in forms for term in form), strict=True)
     (first, firsts), (middle, middles), (last, lasts) = (on_one_pattern([each.T for each in own]) for own in factors)
     entries = first.nnz * middle.nnz * last.nnz
     if not entries:  # as of what no parameter moves
         return [csr_matrix((kept.size, kept.size))] * len(forms)
-    sizes = np.linalg.norm(lasts, axis=1) + sys.float_info.min
-    basis, weights, at = scipy.linalg.qr((lasts / sizes[:, None]).T, mode="economic", pivoting=True)
-    rank = max(1, np.count_nonzero(np.abs(np.diagonal(weights)) > INDEPENDENT))
-    basis, weights = basis[:, :rank].T, weights[:rank, np.argsort(at)] * sizes
     charge(ENTRY_OPERATIONS * len(forms) * entries, 1e-9 * (ENTRY_BYTES + 12 * len(forms)) * entries)
     inner_order, rows, starts = product_pattern(first, middle)
     size = first.shape[0] * middle.shape[0]
@@ -261,8 +253,8 @@ def assembled(forms: Sequence[Sequence[tuple[Matrix, Matrix, Matrix]]], kept: In
     starts = np.append(starts[:-1][kept], starts[-1])
     found, ends = list[csr_matrix](), np.cumsum([0, *map(len, forms)])
     for own in map(slice, ends[:-1], ends[1:]):
-        before = np.stack([((each[:, None] * firsts[own]).T @ middles[own]).ravel() for each in weights[:, own]])
-        data = (before[:, inner_order].T @ basis).ravel()[order]
+        before = (firsts[own, :, None] * middles[own, None, :]).reshape(len(firsts[own]), -1)
+        data = (before[:, inner_order].T @ lasts[own]).ravel()[order]
         found.append(csr_matrix((data, rows, starts), shape=(kept.size, kept.size), copy=True))
         found[-1].eliminate_zeros()
     return found
