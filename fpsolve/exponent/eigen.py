@@ -330,8 +330,13 @@ def _from_the_right(pencil: Pencil, generator: Generator) -> tuple[FloatArray, F
 
 def _solution(factor: Factors, load: FloatArray, transposed: bool = False) -> FloatArray:
     """One of many with the same factors, which is counted."""
-    charge(OPERATIONS_OF_SOLVE * load.size + OPERATIONS_OF_GIGABYTE * factor.gigabytes)
+    _count(factor, load.size)
     return factor.solve(load, transposed=transposed)
+
+
+def _count(factor: Factors, unknowns: int) -> None:
+    """Count a solution."""
+    charge(OPERATIONS_OF_SOLVE * unknowns + OPERATIONS_OF_GIGABYTE * factor.gigabytes)
 
 
 def _nearest(
@@ -528,7 +533,7 @@ class PairDerivatives:
         source = space.weighed(space.constant)
 
         def carried(load: FloatArray) -> FloatArray:
-            charge(OPERATIONS_OF_SOLVE * load.size + OPERATIONS_OF_GIGABYTE * self._factor.gigabytes)
+            _count(self._factor, load.size)
             return self.solve(load, adjoint=adjoint, enough=0.1 * RESOLVED)
 
         moved = LinearOperator(2 * own.shape, lambda v: v - shift * carried(space.weighed(v)), dtype=float)

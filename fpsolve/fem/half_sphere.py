@@ -207,16 +207,9 @@ class HalfSphereAxis(DirectionAxis):
         kept = [each for each in parts if np.any(each[1]) and np.any(each[2])] or parts[:1]
         return [(f, g, csr_matrix(w[:, self._own])) for f, g, w in kept]
 
-    def _forms(self, forms: Sequence[Sequence[tuple[Parts, Parts]]]) -> list[csr_matrix]:
+    def _product(self, left: Any, right: Any) -> tuple[Matrix, Matrix, Matrix]:
         of_eta, of_theta = self.line.measure[:, None], self.first_line.measure[:, None]
-        pairs = [[(a, b) for left, right in form for a in left for b in right] for form in forms]
-        return assembled(
-            [
-                [(a[0].T @ (of_eta * b[0]), a[1].T @ (of_theta * b[1]), a[2].T @ b[2]) for a, b in form]
-                for form in pairs
-            ],
-            self._kept,
-        )
+        return left[0].T @ (of_eta * right[0]), left[1].T @ (of_theta * right[1]), left[2].T @ right[2]
 
     @property
     def _itself(self) -> Parts:

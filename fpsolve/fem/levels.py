@@ -88,7 +88,7 @@ class LevelFactors:
         for rest, up, down in self._arrays() if self._is_dense else self._rows():
             if self._pivots:
                 if self._is_dense:
-                    quotient = self._pivots[-1].solve(np.asfortranarray(down))
+                    quotient = self._pivots[-1].solve(down)
                     rest -= up @ quotient
                 else:
                     up, down = self._fill(rest, up, down)

@@ -204,9 +204,19 @@ class DirectionAxis(Axis):
         """Of multiples of what `_moved` gives."""
         return [(size * first, *others) for size, each in parts for first, *others in each]
 
+    def _product(self, left: Any, right: Any) -> tuple[Matrix, Matrix, Matrix]:
+        """Of a part of v and one of u: the matrices in each direction."""
+        raise NotImplementedError
+
+    @property
+    def _kept(self) -> IntArray:
+        """Which products of functions of each direction there are."""
+        raise NotImplementedError
+
     def _forms(self, forms: Sequence[Sequence[tuple[Any, Any]]]) -> Sequence[Matrix]:
         """For each form ∫ Σ v̂ û of functions of v and of u."""
-        raise NotImplementedError
+        pairs = [[(a, b) for left, right in form for a in left for b in right] for form in forms]
+        return assembled([[self._product(a, b) for a, b in form] for form in pairs], self._kept)
 
     def driven(self, matrix: FloatArray) -> tuple[Matrix, Matrix]:
         """∫ v h·∇u and ∫ v q u."""
@@ -429,12 +439,8 @@ class SphereAxis(DirectionAxis):
         growth = [(c * c * values, a[0, 0]), (c * s * values, a[0, 1] + a[1, 0]), (s * s * values, a[1, 1])]
         return [(of_eta, of[:, own]) for of_eta, of in moved], [(of_eta, of[:, own]) for of_eta, of in growth]
 
-    def _forms(self, forms: Sequence[Sequence[tuple[Parts, Parts]]]) -> list[csr_matrix]:
-        measure, alone = self.line.measure[:, None], np.ones((1, 1))
-        pairs = [[(a, b) for left, right in form for a in left for b in right] for form in forms]
-        return assembled(
-            [[(a[0].T @ (measure * b[0]), alone, a[1].T @ b[1]) for a, b in form] for form in pairs], self._kept
-        )
+    def _product(self, left: Any, right: Any) -> tuple[Matrix, Matrix, Matrix]:
+        return left[0].T @ (self.line.measure[:, None] * right[0]), np.ones((1, 1)), left[1].T @ right[1]
 
     @property
     def _itself(self) -> Parts:
