@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from functools import cached_property, partial
 from hashlib import sha256
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Self
+from typing import Annotated, Any, Self
 
 import numpy as np
 from pydantic import (
@@ -19,7 +19,6 @@ from pydantic import (
     PrivateAttr,
     ValidationError,
     ValidationInfo,
-    create_model,
     field_validator,
     model_validator,
 )
@@ -29,10 +28,15 @@ from fpsolve.case.kinds import half_of, kinds_of, parameters_of, sections_of
 from fpsolve.case.read_vary import EXAMPLE, vary_of
 from fpsolve.case.refusals import REFUSALS
 from fpsolve.case.sections import (
+    EIGENFUNCTIONS,
+    EXCURSIONS,
     MOST_NAMED,
     QUANTITY_NAMES,
+    RESPONSE,
+    SENSITIVITIES,
     ChartSection,
     DesignSection,
+    ExcursionSection,
     Expectation,
     FigureSection,
     MeshSection,
@@ -40,6 +44,7 @@ from fpsolve.case.sections import (
     Moments,
     MonteCarloSection,
     OutputSection,
+    ResponseSection,
     Text,
     UnitsSection,
     Value,
@@ -67,12 +72,6 @@ from fpsolve.model.parameters import Parameter, Section, parameter
 from fpsolve.model.plane import System
 from fpsolve.model.problem import Problem
 from fpsolve.model.quantity import Quantity
-from fpsolve.parts.eigenfunctions import NAME as EIGENFUNCTIONS
-from fpsolve.parts.every import PARTS
-from fpsolve.parts.excursions import ExcursionSection
-from fpsolve.parts.response import NAME as RESPONSE
-from fpsolve.parts.response import ResponseSection
-from fpsolve.parts.sensitivities import NAME as SENSITIVITIES
 
 COMPUTED = ("oscillator", "system", "noise", "vary", "mesh")
 """The sections that say of what the numbers are."""
@@ -162,7 +161,7 @@ class Curve:
         return self.noise.approximates_spectrum
 
 
-class CaseWithoutParts(Section):
+class Case(Section):
     """What one case file says; made by `load_case`.
 
     Raises:
@@ -206,9 +205,16 @@ class CaseWithoutParts(Section):
         InstanceOf[Uncertain], BeforeValidator(uncertain_of), parameter("how uncertain parameters are", UNCERTAIN)
     ] = Uncertain()
     expect: Annotated[tuple[Expectation, ...], parameter("values to check", "[[expect]]", strict=False)] = ()
-    if TYPE_CHECKING:  # what parts add at the end
-        excursions: ExcursionSection
-        response: ResponseSection
+    excursions: Annotated[
+        ExcursionSection,
+        parameter("how far ‖x‖ may rise above its start, and what that start is", "[excursions]"),
+    ] = ExcursionSection()
+    response: Annotated[
+        ResponseSection,
+        parameter(
+            "the stationary response to terms of degree 3, whose density is written, or of degree 0", "[response]"
+        ),
+    ] = ResponseSection()
     _path: Path = PrivateAttr(default=Path("case.toml"))
     _overrides: tuple[str, ...] = PrivateAttr(default=())
     _text: str = PrivateAttr(default="")
@@ -281,7 +287,14 @@ class CaseWithoutParts(Section):
         named = {MOMENT.name} if self.problem.is_closed_only else {*CHEAP}
         named |= {*(CHEAP_OF_WALLS if self.problem.system.jumps else ())}
         named |= {RESPONSE if each.of_response else each.quantity for each in self.expect}
-        return tuple(part.name for part in PARTS if part.is_quantity and (part.name in named or part.is_usual(self)))
+        named |= self.model_fields_set & {EXCURSIONS, RESPONSE}
+        usual = {
+            RESPONSE: RESPONSE not in named and self.responds,
+            SENSITIVITIES: self.output.sensitivities,
+            EIGENFUNCTIONS: self.output.asks_for_eigenfunctions
+            or (self.output.eigenfunctions is None and self.problem.dimension == 2),
+        }
+        return tuple(name for name in QUANTITY_NAMES if name in named or usual.get(name))
 
     @property
     def unasked(self) -> tuple[str, ...]:
@@ -436,28 +449,11 @@ class CaseWithoutParts(Section):
             self.__dict__["figure"] = self.figure.model_copy(update=over)
         return self
 
-    @field_validator(*REFUSALS, check_fields=False)
+    @field_validator(*REFUSALS)
     @classmethod
     def _agrees_with_those_before(cls, section: Any, info: ValidationInfo) -> Any:
         refuse(REFUSALS[str(info.field_name)](section, info.data, info.context or {}))
         return section
-
-
-if TYPE_CHECKING:
-    Case = CaseWithoutParts
-else:
-    _SECTIONS = {
-        part.name: (
-            Annotated[part.section, parameter(part.section.__doc__.partition(": ")[2].rstrip("."), f"[{part.name}]")],
-            part.section(),
-        )
-        for part in PARTS
-        if part.section
-    }
-    Case = create_model(
-        "Case", __base__=CaseWithoutParts, __doc__=CaseWithoutParts.__doc__, __module__=__name__, **_SECTIONS
-    )
-"""A case with the sections of all parts."""
 
 
 def load_case(path: str | Path, overrides: Sequence[str] = (), options: Mapping[str, str] | None = None) -> Case:

@@ -18,6 +18,7 @@ import numpy as np
 from pydantic import ValidationError
 from pydantic.fields import FieldInfo
 
+from fpsolve.analysis.excursions import STATIONARY, check_start
 from fpsolve.analysis.target import target_of
 from fpsolve.analysis.zero import axis_faults, said
 from fpsolve.arrays import FloatArray, is_log_spaced
@@ -25,15 +26,19 @@ from fpsolve.case.kinds import parameters_of, problem_of
 from fpsolve.case.read_vary import values_of
 from fpsolve.case.remedies import CASE_WORDS
 from fpsolve.case.sections import (
+    EXCURSIONS,
+    RESPONSE,
     ChartAxis,
     ChartSection,
     DesignSection,
+    ExcursionSection,
     Expectation,
     FigureSection,
     MeshSection,
     Moments,
     MonteCarloSection,
     OutputSection,
+    ResponseSection,
     Varied,
     same,
 )
@@ -44,10 +49,8 @@ from fpsolve.explain import Refusal, faults_in, nearest, quoted, shown
 from fpsolve.exponent.quantities import INDICES
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.fem.space import Space
+from fpsolve.model.parameters import Section
 from fpsolve.model.problem import Problem, even_only, refuse_infinite
-from fpsolve.parts.every import PARTS
-from fpsolve.parts.part import Part
-from fpsolve.parts.response import NAME as RESPONSE
 from fpsolve.simulation.setup import obstacles, simulated_parts
 from fpsolve.theory.perturbation import second_order_or_none
 
@@ -313,33 +316,41 @@ def _of_expect(expect: tuple[Expectation, ...], valid: Known, context: Known) ->
             yield (i, "where", key), value, text
 
 
-def _of_part(part: Part) -> Callable[[Any, Known, Known], Iterator[Refusal]]:
-    """The check of the section of a part."""
-
-    def refusals(section: Any, valid: Known, context: Known) -> Iterator[Refusal]:
-        """A section of what is not computed, and what its part finds wrong with it."""
-        output: OutputSection = valid.get("output", OutputSection())
-        if section.model_fields_set and not getattr(section, "off", False) and output.lacks(part.name):
-            text = f'stands here, but output.quantities has no "{part.name}"; add it there, or remove this section'
-            yield (), None, text
-        if section.model_fields_set and (text := _beyond_reduced([part.name], valid)):
-            yield (), None, text
-        yield from part.check(section, output, _problems(valid))
-
-    return refusals
-
-
-def _problems(valid: Known) -> Iterator[tuple[str, Problem]]:
-    """The problems of the sets that are checked, and how messages name them."""
+def _of_excursions(section: ExcursionSection, valid: Known, context: Known) -> Iterator[Refusal]:
+    """Excursions that are not computed, or a start that the noise of some curve does not have."""
+    yield from _unwanted(EXCURSIONS, section, valid)
     problem, vary = problem_of(valid), valid.get("vary", Vary())
-    if problem is None:
+    if problem is None or section.xi == STATIONARY:
         return
     for varied in vary.sets_at(vary.checked):
         try:
             made = problem.at(varied)
         except ValueError:  # another fault tells why
             continue
-        yield _with(varied), made
+        try:
+            check_start(made, section.phi, section.xi)
+        except ValueError as error:
+            yield ("xi",), section.xi, f"{_with(varied)}{error}"
+            return
+
+
+def _of_response(section: ResponseSection, valid: Known, context: Known) -> Iterator[Refusal]:
+    """A response that is not computed, or one that is left out and asked for."""
+    output: OutputSection = valid.get("output", OutputSection())
+    yield from () if section.off else _unwanted(RESPONSE, section, valid)
+    if section.off and output.lists_quantities and not output.lacks(RESPONSE):
+        text = f'got true, but output.quantities names "{RESPONSE}"; remove one of the two'
+        yield ("off",), True, text
+
+
+def _unwanted(name: str, section: Section, valid: Known) -> Iterator[Refusal]:
+    """The section of a quantity that is not computed."""
+    output: OutputSection = valid.get("output", OutputSection())
+    if section.model_fields_set and output.lacks(name):
+        text = f'stands here, but output.quantities has no "{name}"; add it there, or remove this section'
+        yield (), None, text
+    if section.model_fields_set and (text := _beyond_reduced([name], valid)):
+        yield (), None, text
 
 
 def _of_chart(chart: ChartSection | None, valid: Known, context: Known) -> Iterator[Refusal]:
@@ -445,6 +456,7 @@ REFUSALS: Mapping[str, Callable[[Any, Known, Known], Iterator[Refusal]]] = {
     "design": _of_design,
     "uncertain": _of_uncertain,
     "expect": _of_expect,
-    **{part.name: _of_part(part) for part in PARTS if part.section},
+    EXCURSIONS: _of_excursions,
+    RESPONSE: _of_response,
 }
 """What is wrong with each section."""

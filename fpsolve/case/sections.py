@@ -24,6 +24,7 @@ from pydantic import (
     model_validator,
 )
 
+from fpsolve.analysis.excursions import STATIONARY
 from fpsolve.analysis.inverse import MOST_PARAMETERS
 from fpsolve.analysis.target import start_and_stop, target_of
 from fpsolve.analysis.zero import Axis, Zero, zero_of
@@ -42,16 +43,13 @@ from fpsolve.explain import (
     shown,
     shown_with_kind,
 )
-from fpsolve.exponent.quantities import MOMENT, QUANTITIES, DrawnName, QuantityName
+from fpsolve.exponent.quantities import INDICES, MOMENT, QUANTITIES, DrawnName, QuantityName
 from fpsolve.fem.mesh import MAX_CELLS, MAX_DEGREE, CylinderMesh, make_mesh, read_mesh, vertices_at
 from fpsolve.messages import is_control
 from fpsolve.model.faults import table_of
 from fpsolve.model.parameters import Section, parameter
 from fpsolve.model.problem import RTOL, RTOL_BEYOND_PLANE, RTOL_OF_SEVERAL, Problem
 from fpsolve.model.quantity import RATE_FUNCTION, Quantity, moment_at
-from fpsolve.parts.eigenfunctions import NAME as EIGENFUNCTIONS
-from fpsolve.parts.every import PARTS
-from fpsolve.parts.response import NAME as RESPONSE
 from fpsolve.simulation.setup import BATCHES, MAX_PATHS, PATHS, Estimator
 
 MAX_MOMENTS = 100_000
@@ -59,7 +57,11 @@ MAX_NODES = 1000
 _DIGITS = 12
 SAME = 10.0**-_DIGITS
 """p that differ by no more are one p; values of a varied key, relative to their size."""
-QUANTITY_NAMES = tuple(part.name for part in PARTS if part.is_quantity)
+EXCURSIONS = "excursions"
+RESPONSE = "response"
+SENSITIVITIES = "sensitivities"
+EIGENFUNCTIONS = "eigenfunctions"
+QUANTITY_NAMES = (MOMENT.name, RATE_FUNCTION.name, *INDICES, EXCURSIONS, RESPONSE, SENSITIVITIES, EIGENFUNCTIONS)
 """What may be asked for."""
 EVERYTHING = "all"
 """What stands for all of these."""
@@ -70,6 +72,12 @@ WANTED = (
 )
 _APART = 1e-9
 """How far the ends of an axis are from each other at least, relative to their size."""
+_MOST_LEVELS = 100
+"""Largest number of levels of excursions."""
+_MOST_ALONG = 1000
+"""Largest number of places along an axis of the density of the response."""
+_MOST_PLACES = 4_000_000
+"""Largest number of places at which it is written."""
 MOST_NAMED = 8
 """Curves that a legend can tell apart; of more, and of a map, colours tell the value of a key."""
 _ZERO = 'zero = ["lyapunov_exponent", { moment = 2.0 }]'
@@ -571,6 +579,61 @@ class DesignSection(Section):
             max_length=MOST_PARAMETERS,
         ),
     ]
+
+
+class ExcursionSection(Section):
+    """[excursions]: how far ‖x‖ may rise above its start, and what that start is."""
+
+    levels: Annotated[
+        tuple[Annotated[float, Field(gt=1)], ...],
+        parameter(
+            "A of P(sup ‖x‖ ≥ A), where the start has the length 1",
+            "levels = [2.0, 10.0, 100.0]",
+            strict=False,
+            min_length=1,
+            max_length=_MOST_LEVELS,
+        ),
+    ] = (2.0, 10.0, 100.0)
+    phi: Annotated[
+        Annotated[float, Tag(NUMBER)] | Annotated[Literal["uniform"], Tag(WORD)],
+        BY_KIND,
+        parameter("phase of the start x = (cos φ, −sin φ), in radians", "phi = 0.0"),
+    ] = 0.0
+    xi: Annotated[
+        Annotated[float, Tag(NUMBER)] | Annotated[Literal["stationary"], Tag(WORD)],
+        BY_KIND,
+        parameter("the noise at the start", 'xi = "stationary"'),
+    ] = STATIONARY
+
+    @property
+    def sentence_level(self) -> float:
+        """The level that is nearest to 10."""
+        return min(self.levels, key=lambda level: abs(math.log(level / 10)))
+
+
+class ResponseGrid(Section):
+    """{ amplitude, phi, xi }: at how many places along each axis a density is written."""
+
+    amplitude: Annotated[int, parameter("amplitudes", "amplitude = 80", ge=2, le=_MOST_ALONG)] = 80
+    phi: Annotated[int, parameter("phases from impact to impact", "phi = 49", ge=3, le=_MOST_ALONG)] = 49
+    xi: Annotated[int, parameter("values of the noise", "xi = 25", ge=2, le=_MOST_ALONG)] = 25
+
+    @model_validator(mode="after")
+    def _of_moderate_size(self) -> Self:
+        if (size := self.amplitude * self.phi * self.xi) > _MOST_PLACES:
+            text = f"makes {size} places; must be at most {_MOST_PLACES}; use fewer along some axis"
+            raise ValueError(text)
+        return self
+
+
+class ResponseSection(Section):
+    """[response]: the stationary response to terms of degree 3, whose density is written, or of degree 0."""
+
+    rtol: Annotated[float, parameter("wanted relative error of its means", "rtol = 1e-6", ge=1e-10, le=0.1)] = 1e-6
+    off: Annotated[bool, parameter("whether it is left out", "off = true")] = False
+    grid: Annotated[
+        ResponseGrid, parameter("places of the written density", "grid = { amplitude = 80, phi = 49, xi = 25 }")
+    ] = ResponseGrid()
 
 
 class Expectation(Section):

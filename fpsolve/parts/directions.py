@@ -22,6 +22,7 @@ from fpsolve.analysis.directions import (
 )
 from fpsolve.arrays import FloatArray
 from fpsolve.budget import counted
+from fpsolve.case.case import Case, Curve
 from fpsolve.data import Quantity, dataset
 from fpsolve.drawing import Format, figure_for
 from fpsolve.exponent.directions import DirectionGrid
@@ -40,7 +41,6 @@ from fpsolve.vtk import Facts, collection_of, field_data, name_at, write_between
 if TYPE_CHECKING:
     import xarray
 
-    from fpsolve.case.case import Case, Curve
     from fpsolve.study.results import CurveResult, SimulatedCurve
 
 NAME = "directions"
@@ -243,7 +243,6 @@ PART: Part = Part(
     tuple[Message, ...],
     "density of directions",
     said=said_of_pictures,
-    is_quantity=False,
     draw=write_directions,
     figures=_figures,
 )

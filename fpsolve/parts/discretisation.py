@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from fpsolve.case.case import Case
 from fpsolve.model.quantity import LYAPUNOV_EXPONENT, MOMENT
 from fpsolve.parts.part import Job, Part, Settings, attempt
-
-if TYPE_CHECKING:
-    from fpsolve.case.case import Case
 
 
 def _settings(case: Case, number: int) -> Settings:
@@ -33,4 +31,4 @@ def _solve(job: Job, settings: Settings) -> dict[str, Any]:
     return {**space.phi.facts, **space.xi.facts, "unknowns": space.size}
 
 
-PART: Part = Part("discretisation", _settings, _solve, dict[str, Any], is_quantity=False)
+PART: Part = Part("discretisation", _settings, _solve, dict[str, Any])

@@ -22,6 +22,8 @@ import numpy as np
 
 from fpsolve.analysis.density import negative_share, stationary_density
 from fpsolve.arrays import FloatArray
+from fpsolve.case.case import Case, Curve
+from fpsolve.case.sections import EIGENFUNCTIONS
 from fpsolve.data import plain_unit
 from fpsolve.errors import NotConverged
 from fpsolve.exponent.eigen import PrincipalPair
@@ -37,10 +39,8 @@ from fpsolve.parts.surfaces import Surface, picture_of
 from fpsolve.vtk import Facts, collection_of, field_data, name_at, pyvista_module, write_vtk
 
 if TYPE_CHECKING:
-    from fpsolve.case.case import Case, Curve
     from fpsolve.study.results import CurveResult, SimulatedCurve
 
-NAME = "eigenfunctions"
 CURVES = "curves.pvd"
 """The file of the series over curves."""
 MOST_STATES = 8
@@ -85,7 +85,7 @@ def _settings(case: Case, number: int) -> Settings | None:
 
 def _solve(job: Job, settings: Settings) -> tuple[Message, ...]:
     """The pairs that converge, that at p = 0 if it is to be trusted; what is said of them."""
-    found = [attempt(partial(job.solver.pair, p), NAME) for p in (*without_failed(job, settings["p"]), 0.0)]
+    found = [attempt(partial(job.solver.pair, p), EIGENFUNCTIONS) for p in (*without_failed(job, settings["p"]), 0.0)]
     *pairs, stationary = (None if isinstance(each, Reason) else each for each in found)
     known = tuple(each for each in pairs if each is not None)
     said = list[Message]()
@@ -103,19 +103,13 @@ def _solve(job: Job, settings: Settings) -> tuple[Message, ...]:
         }
         for name, (defect, most) in limits.items():
             said += [Message(Code.UNREADABLE, name=name, p=pair.p, size=defect)] * (defect > most)
-    job.pictures[NAME] = Eigenfunctions(known, stationary, settings["density"])
+    job.pictures[EIGENFUNCTIONS] = Eigenfunctions(known, stationary, settings["density"])
     return tuple(said)
 
 
 def said_of_pictures(found: Any, curve: Curve, numerics: Numerics) -> Sequence[Message]:
     """What was said when they were solved."""
     return tuple(found)
-
-
-def _is_usual(case: Case) -> bool:
-    """One is drawn unasked, of two variables."""
-    is_drawn = case.output.eigenfunctions is None and case.problem.dimension == 2
-    return is_drawn or case.output.asks_for_eigenfunctions
 
 
 def _draw(found: Eigenfunctions, curve: Curve, folder: Path) -> None:
@@ -305,12 +299,11 @@ def surface_from(path: Path) -> Surface:
 
 
 PART: Part = Part(
-    NAME,
+    EIGENFUNCTIONS,
     _settings,
     _solve,
     tuple[Message, ...],
-    NAME,
-    is_usual=_is_usual,
+    EIGENFUNCTIONS,
     said=said_of_pictures,
     draw=_draw,
     figures=_figures,

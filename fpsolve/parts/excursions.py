@@ -4,73 +4,26 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from pydantic import Field, Tag
 
-from fpsolve.analysis.excursions import STATIONARY, SYMBOL, Excursion, check_start, solve_excursion
-from fpsolve.explain import BY_KIND, NUMBER, WORD, Refusal
+from fpsolve.analysis.excursions import SYMBOL, Excursion, solve_excursion
+from fpsolve.case.case import Case, Curve
+from fpsolve.case.sections import EXCURSIONS
 from fpsolve.messages import Message
-from fpsolve.model.parameters import Section, parameter
-from fpsolve.model.problem import Problem
 from fpsolve.page.page import Sentence
 from fpsolve.parts.indices import is_estimate
 from fpsolve.parts.part import Job, Numerics, Part, Settings
 from fpsolve.results.table import pair
 
 if TYPE_CHECKING:
-    from fpsolve.case.case import Case, Curve
     from fpsolve.study.results import CurveResult
-
-NAME = "excursions"
-MOST_LEVELS = 100
-"""Largest number of levels."""
-
-
-class ExcursionSection(Section):
-    """[excursions]: how far ‖x‖ may rise above its start, and what that start is."""
-
-    levels: Annotated[
-        tuple[Annotated[float, Field(gt=1)], ...],
-        parameter(
-            "A of P(sup ‖x‖ ≥ A), where the start has the length 1",
-            "levels = [2.0, 10.0, 100.0]",
-            strict=False,
-            min_length=1,
-            max_length=MOST_LEVELS,
-        ),
-    ] = (2.0, 10.0, 100.0)
-    phi: Annotated[
-        Annotated[float, Tag(NUMBER)] | Annotated[Literal["uniform"], Tag(WORD)],
-        BY_KIND,
-        parameter("phase of the start x = (cos φ, −sin φ), in radians", "phi = 0.0"),
-    ] = 0.0
-    xi: Annotated[
-        Annotated[float, Tag(NUMBER)] | Annotated[Literal["stationary"], Tag(WORD)],
-        BY_KIND,
-        parameter("the noise at the start", 'xi = "stationary"'),
-    ] = STATIONARY
-
-    @property
-    def sentence_level(self) -> float:
-        """The level that is nearest to 10."""
-        return min(self.levels, key=lambda level: abs(math.log(level / 10)))
-
-
-def _check(section: ExcursionSection, output: Any, problems: Iterable[tuple[str, Problem]]) -> Iterator[Refusal]:
-    """A start that the noise of some curve does not have."""
-    for named, problem in () if section.xi == STATIONARY else problems:
-        try:
-            check_start(problem, section.phi, section.xi)
-        except ValueError as error:
-            yield ("xi",), section.xi, f"{named}{error}"
-            return
 
 
 def _settings(case: Case, number: int) -> Settings | None:
     """The start; levels are looked up in what was found."""
-    return {"phi": case.excursions.phi, "xi": case.excursions.xi} if NAME in case.asked else None
+    return {"phi": case.excursions.phi, "xi": case.excursions.xi} if EXCURSIONS in case.asked else None
 
 
 def _solve(job: Job, settings: Settings) -> Excursion:
@@ -83,9 +36,9 @@ def _said(found: Excursion, curve: Curve, numerics: Numerics) -> Iterable[Messag
 
 def _content(case: Case, result: CurveResult) -> Mapping[str, Any]:
     """The start, the bounds and the asymptotic number of upcrossings at all levels, and what these follow from."""
-    found: Excursion | None = result.parts.get(NAME)
-    if NAME not in case.asked or found is None:
-        return {NAME: None} if NAME in case.asked else {}
+    found: Excursion | None = result.parts.get(EXCURSIONS)
+    if EXCURSIONS not in case.asked or found is None:
+        return {EXCURSIONS: None} if EXCURSIONS in case.asked else {}
     levels = np.array(case.excursions.levels)
     rows = zip(levels.tolist(), *(each.tolist() for each in found.bounds(levels)), strict=True)
     many = [None if math.isnan(each) else each for each in found.expected_upcrossings(levels).tolist()]
@@ -101,7 +54,7 @@ def _content(case: Case, result: CurveResult) -> Mapping[str, Any]:
             for (level, low, high), count in zip(rows, many, strict=True)
         ],
     }
-    return {NAME: content}
+    return {EXCURSIONS: content}
 
 
 def _is_whole(found: Excursion, curve: Curve, settings: Settings) -> bool:
@@ -149,14 +102,11 @@ def _rounded(bound: float, side: int) -> str:
 
 
 PART: Part = Part(
-    NAME,
+    EXCURSIONS,
     _settings,
     _solve,
     Excursion,
     SYMBOL,
-    section=ExcursionSection,
-    check=_check,
-    is_usual=lambda case: NAME in case.model_fields_set,
     said=_said,
     content=_content,
     is_whole=_is_whole,

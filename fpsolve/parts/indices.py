@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from functools import cache, partial
 from typing import TYPE_CHECKING, Any
 
+from fpsolve.case.case import Case, Curve
 from fpsolve.data import Quantity
 from fpsolve.errors import NoSuchExponent
 from fpsolve.exponent.error import Absent, Estimate, digits
@@ -29,7 +30,6 @@ from fpsolve.results.table import Row, pair
 from fpsolve.results.text import NUMBER_COLUMNS, interval, row_of
 
 if TYPE_CHECKING:
-    from fpsolve.case.case import Case, Curve
     from fpsolve.study.results import CurveResult
 
 
@@ -159,7 +159,6 @@ JUMPS: Part = Part(
     content=_content_of_jumps,
     reasons=_reasons_of_jumps,
     is_whole=_jumps_are_whole,
-    is_quantity=False,
 )
 """The indices of impacts, of each place of several."""
 
@@ -240,7 +239,6 @@ THEORY: Part = Part(
     dict[str, float],
     row=_row_of_theory,
     show=_show,
-    is_quantity=False,
     uses_solver=False,
 )
 """The indices by perturbation theory, which a record has so that tables need not make the problem of each curve.

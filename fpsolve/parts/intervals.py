@@ -11,6 +11,8 @@ import numpy as np
 
 from fpsolve.analysis.spreads import LEVEL, UNCERTAIN, Spread, latin_hypercube, spread_of
 from fpsolve.arrays import FloatArray
+from fpsolve.case.case import Case
+from fpsolve.case.vary import Vary
 from fpsolve.errors import FpsolveError
 from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.quantities import INDICES, MOMENT
@@ -22,8 +24,6 @@ from fpsolve.results.table import Row
 from fpsolve.results.text import interval, percent
 
 if TYPE_CHECKING:
-    from fpsolve.case.case import Case
-    from fpsolve.case.vary import Vary
     from fpsolve.study.results import CurveResult
 
 SAMPLE = "sample"
@@ -302,4 +302,4 @@ def show_samples(case: Case, samples: Samples) -> Iterator[Block]:
     yield grid
 
 
-PART: Part = Part("intervals", _settings, columns=_columns, row=_row, content=_content, is_quantity=False)
+PART: Part = Part("intervals", _settings, columns=_columns, row=_row, content=_content)

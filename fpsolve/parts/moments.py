@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fpsolve.arrays import FloatArray
+from fpsolve.case.case import Case, Curve
 from fpsolve.data import Quantity
 from fpsolve.errors import NoSuchExponent
 from fpsolve.exponent.error import Failure, Moment, digits
@@ -26,7 +27,6 @@ from fpsolve.results.text import interval, percent, units_in_words
 from fpsolve.theory.perturbation import perturbed_moments, weak_noise_note
 
 if TYPE_CHECKING:
-    from fpsolve.case.case import Case, Curve
     from fpsolve.study.results import CurveResult
 
 
@@ -260,6 +260,5 @@ CLASSES: Part = Part(
     content=_content_of_classes,
     lacks=lambda found, settings: any({*each.p.tolist()} != {*settings["p"]} for each in found),
     is_whole=_classes_are_whole,
-    is_quantity=False,
 )
 """λ and Λ(p) of blocks of variables, or on a ray that the phase never leaves and across it."""

@@ -10,15 +10,14 @@ from pathlib import Path
 from time import monotonic
 from typing import TYPE_CHECKING, Any, Literal
 
+from fpsolve.case.case import Case, Curve
 from fpsolve.data import Quantity
 from fpsolve.errors import FpsolveError
-from fpsolve.explain import Refusal
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.error import Moment
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import Code, Message, Remedy
-from fpsolve.model.parameters import Section
 from fpsolve.model.problem import Problem
 from fpsolve.model.quantity import STABILITY_INDEX
 from fpsolve.page.page import Block, Drawing
@@ -26,7 +25,6 @@ from fpsolve.results.table import Row
 from fpsolve.signals import is_interrupt
 
 if TYPE_CHECKING:  # which stand above
-    from fpsolve.case.case import Case, Curve
     from fpsolve.study.results import CurveResult, SimulatedCurve
 
 Settings = Mapping[str, Any]
@@ -192,11 +190,6 @@ class Part:
             `FpsolveError`.
         kind: the type of what is found, which a record holds.
         symbol: what messages call it; empty where nobody is told why there is none.
-        section: its table in a case file.
-        check: what is wrong with that, beside what its keys say; with [output], and with some problems of the case and
-            how messages name these.
-        is_quantity: whether [output] quantities may name it.
-        is_usual: whether a case that names no quantities asks for it.
         said: the messages about what was found.
         columns: the columns of tables that a case asks for.
         row: the numbers of a curve in these columns.
@@ -216,10 +209,6 @@ class Part:
     solve: Callable[[Job, Settings], Any] | None = None
     kind: Any = None
     symbol: str = ""
-    section: type[Section] | None = None
-    check: Callable[[Any, Any, Iterable[tuple[str, Problem]]], Iterable[Refusal]] = _nothing
-    is_quantity: bool = True
-    is_usual: Callable[[Case], bool] = lambda case: False
     said: Callable[[Any, Curve, Numerics], Iterable[Message]] = _nothing
     columns: Callable[[Case], Sequence[Quantity]] = _nothing
     row: Callable[[Case, CurveResult], Row] = _no_row

@@ -6,13 +6,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from fpsolve.case.case import Case
 from fpsolve.data import Quantity
 from fpsolve.model.quantity import MOMENT, RATE_FUNCTION
 from fpsolve.parts.part import Part, Settings
 from fpsolve.results.table import Row
 
 if TYPE_CHECKING:
-    from fpsolve.case.case import Case
     from fpsolve.study.results import CurveResult
 
 

@@ -5,24 +5,23 @@ their files and figures.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Self
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from pydantic import model_validator
 
 from fpsolve.arrays import FloatArray
+from fpsolve.case.case import Case, Curve
+from fpsolve.case.sections import RESPONSE
 from fpsolve.data import Quantity
 from fpsolve.drawing import COLOURS, Format, draw_colours, draw_dots, figure_for, label_axes, points
-from fpsolve.explain import Refusal
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.error import Estimate
 from fpsolve.files import write_csv
 from fpsolve.model.noise import Noise
-from fpsolve.model.parameters import Section, parameter
 from fpsolve.model.plane import System
 from fpsolve.model.problem import Problem
 from fpsolve.model.quantity import ResponseQuantities
@@ -36,56 +35,16 @@ from fpsolve.theory.forced import stationary_moments
 from fpsolve.vtk import field_data, write_between
 
 if TYPE_CHECKING:
-    from fpsolve.case.case import Case, Curve
     from fpsolve.nonlinear.response import StationaryResponse
     from fpsolve.simulation.response import Response
     from fpsolve.study.results import CurveResult, SimulatedCurve
 
-NAME = "response"
 MOST_GRIDS = 10
 """Largest number of curves of which densities are written."""
 Grid = tuple[int, int, int]
 """How many amplitudes, phases and values of the noise."""
 SPREAD = 4.0
 """Standard deviations of the noise on each side of its mean in which its values lie."""
-
-
-MOST_NODES = 1000
-"""Largest number of places along an axis."""
-MOST_PLACES = 4_000_000
-"""Largest number of places at which a density is written."""
-
-
-class ResponseGrid(Section):
-    """{ amplitude, phi, xi }: at how many places along each axis a density is written."""
-
-    amplitude: Annotated[int, parameter("amplitudes", "amplitude = 80", ge=2, le=MOST_NODES)] = 80
-    phi: Annotated[int, parameter("phases from impact to impact", "phi = 49", ge=3, le=MOST_NODES)] = 49
-    xi: Annotated[int, parameter("values of the noise", "xi = 25", ge=2, le=MOST_NODES)] = 25
-
-    @model_validator(mode="after")
-    def _of_moderate_size(self) -> Self:
-        if (size := self.amplitude * self.phi * self.xi) > MOST_PLACES:
-            text = f"makes {size} places; must be at most {MOST_PLACES}; use fewer along some axis"
-            raise ValueError(text)
-        return self
-
-
-class ResponseSection(Section):
-    """[response]: the stationary response to terms of degree 3, whose density is written, or of degree 0."""
-
-    rtol: Annotated[float, parameter("wanted relative error of its means", "rtol = 1e-6", ge=1e-10, le=0.1)] = 1e-6
-    off: Annotated[bool, parameter("whether it is left out", "off = true")] = False
-    grid: Annotated[
-        ResponseGrid, parameter("places of the written density", "grid = { amplitude = 80, phi = 49, xi = 25 }")
-    ] = ResponseGrid()
-
-
-def _check(section: ResponseSection, output: Any, problems: Iterable[tuple[str, Problem]]) -> Iterator[Refusal]:
-    """A section that leaves out what is asked for."""
-    if section.off and output.lists_quantities and not output.lacks(NAME):
-        text = f'got true, but output.quantities names "{NAME}"; remove one of the two'
-        yield ("off",), True, text
 
 
 @dataclass(frozen=True, eq=False)
@@ -221,7 +180,7 @@ def _row(case: Case, result: CurveResult) -> Row:
 def _content(case: Case, result: CurveResult) -> Mapping[str, Any]:
     """The means and impacts with their errors, what the density does near rest, and how far these are to be trusted."""
     if not case.has_response or (found := result.response) is None:
-        return {NAME: None} if case.has_response else {}
+        return {RESPONSE: None} if case.has_response else {}
     means: dict[str, Any] = {}
     for name, number in found.means.items():
         means |= pair(name, number)
@@ -237,7 +196,7 @@ def _content(case: Case, result: CurveResult) -> Mapping[str, Any]:
             "least_over_largest_density": found.least,
             "unknowns": found.unknowns,
         }
-    return {NAME: content}
+    return {RESPONSE: content}
 
 
 def _is_whole(found: CurveResponse, curve: Curve, settings: Settings) -> bool:
@@ -375,11 +334,11 @@ def _at_rest(words: str, index: float | None, limit: int) -> str:
 
 
 PART: Part = Part(
-    NAME,
+    RESPONSE,
     _settings,
     _solve,
     CurveResponse,
-    NAME,
+    RESPONSE,
     columns=_columns,
     row=_row,
     content=_content,
@@ -387,8 +346,5 @@ PART: Part = Part(
     show=_show,
     figures=_figures,
     is_whole=_is_whole,
-    section=ResponseSection,
-    check=_check,
-    is_usual=lambda case: NAME in case.model_fields_set or case.responds,
     uses_solver=False,
 )

@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fpsolve.analysis.sensitivity import DIFFERENTIATED, Sensitivities, Slopes, solve_sensitivities
+from fpsolve.case.case import Case, Curve
+from fpsolve.case.sections import SENSITIVITIES
 from fpsolve.drawing import draw_bars, figure_for
 from fpsolve.exponent.error import MEANINGLESS, Estimate
 from fpsolve.messages import Message
@@ -21,15 +23,12 @@ from fpsolve.parts.part import Job, Numerics, Part, Settings
 from fpsolve.theory.perturbation import scale_of
 
 if TYPE_CHECKING:
-    from fpsolve.case.case import Case, Curve
     from fpsolve.study.results import CurveResult, SimulatedCurve
-
-NAME = "sensitivities"
 
 
 def _settings(case: Case, number: int) -> Settings | None:
     """At which p, and of which indices; intervals follow from them, too."""
-    if NAME not in case.asked and not case.uncertain:
+    if SENSITIVITIES not in case.asked and not case.uncertain:
         return None
     p = case.differentiated.tolist() if MOMENT.name in case.asked else []
     return {"p": p, "indices": [name for name in DIFFERENTIATED if name in case.asked]}
@@ -48,10 +47,10 @@ def _said(found: Sensitivities, curve: Curve, numerics: Numerics) -> Iterable[Me
 
 def _content(case: Case, result: CurveResult) -> Mapping[str, Any]:
     """∂/∂θ by the key of θ, null where its error leaves it no meaning, and the estimates of these errors alike."""
-    if NAME not in case.asked:
+    if SENSITIVITIES not in case.asked:
         return {}
     if (found := result.sensitivities) is None:
-        return {NAME: None}
+        return {SENSITIVITIES: None}
     known = found
 
     def numbers(of: Callable[[Estimate], float]) -> dict[str, Any]:
@@ -63,7 +62,7 @@ def _content(case: Case, result: CurveResult) -> Mapping[str, Any]:
         return {"moments": [{"p": p, **row(slopes)} for p, slopes in moments], **indices}
 
     errors = numbers(lambda each: each.error_estimate)
-    return {NAME: {**numbers(lambda each: each.value), "errors": errors}}
+    return {SENSITIVITIES: {**numbers(lambda each: each.value), "errors": errors}}
 
 
 def _lacks(found: Sensitivities, settings: Settings) -> bool:
@@ -105,12 +104,11 @@ def _draw(case: Case, curve: Curve, found: Sensitivities, paths: Sequence[Path],
 
 
 PART: Part = Part(
-    NAME,
+    SENSITIVITIES,
     _settings,
     _solve,
     Sensitivities,
-    NAME,
-    is_usual=lambda case: case.output.sensitivities,
+    SENSITIVITIES,
     said=_said,
     content=_content,
     figures=_figures,

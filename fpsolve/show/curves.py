@@ -15,13 +15,13 @@ import numpy as np
 from fpsolve.analysis.spreads import LEVEL, UNCERTAIN
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case
+from fpsolve.case.sections import EXCURSIONS
 from fpsolve.data import short_names, written
 from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.quantities import LYAPUNOV_EXPONENT, MOMENT, STABILITY_INDEX, Index
 from fpsolve.model.quantity import MEAN_SQUARE, STATUS, moment_at
 from fpsolve.page.limits import EACH, EXTREMES, FAILURES, MOMENTS, ROWS
 from fpsolve.page.page import Block, Column, Grid, Sentence
-from fpsolve.parts.excursions import NAME as EXCURSIONS
 from fpsolve.parts.excursions import bounds_text
 from fpsolve.parts.indices import index_text, told_indices
 from fpsolve.parts.intervals import spreads_of

@@ -8,12 +8,12 @@ from typing import Any
 
 from fpsolve.case.case import MOST_DRAWN, Case, Curve
 from fpsolve.case.remedies import CASE_WORDS
+from fpsolve.case.sections import RESPONSE
 from fpsolve.case.vary import map_key
 from fpsolve.exponent.quantities import STABILITY_INDEX
 from fpsolve.messages import Code, Message, Severity, message_of
 from fpsolve.page.limits import EACH, NAMED, NOTES
 from fpsolve.page.page import WORDS, Note
-from fpsolve.parts.response import NAME as RESPONSE
 from fpsolve.study.results import CurveResult, SimulatedCurve
 
 SUMMARY = "summary.json"

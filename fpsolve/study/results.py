@@ -12,13 +12,13 @@ import numpy as np
 from fpsolve.analysis.excursions import Excursion
 from fpsolve.analysis.sensitivity import Sensitivities
 from fpsolve.case.case import Curve
+from fpsolve.case.sections import EXCURSIONS, RESPONSE, SENSITIVITIES
 from fpsolve.data import Quantity, Result, dataset
 from fpsolve.exponent.error import Estimate, Failure
 from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, STABILITY_INDEX, VARIANCE_RATE
 from fpsolve.exponent.solver import InvariantClass
 from fpsolve.messages import Code, Message, Severity, message_of
 from fpsolve.model.quantity import MOMENT, OVER_P, P, moment_at
-from fpsolve.parts import excursions, response, sensitivities
 from fpsolve.parts.moments import MomentColumns
 from fpsolve.parts.part import Entry
 from fpsolve.parts.response import CurveResponse
@@ -83,17 +83,17 @@ class CurveResult(Result):
     @property
     def excursion(self) -> Excursion | None:
         """The probability that ‖x‖ ever exceeds a level."""
-        return self.parts.get(excursions.NAME)
+        return self.parts.get(EXCURSIONS)
 
     @property
     def response(self) -> CurveResponse | None:
         """The stationary response of a system with terms of degree 3."""
-        return self.parts.get(response.NAME)
+        return self.parts.get(RESPONSE)
 
     @property
     def sensitivities(self) -> Sensitivities | None:
         """The derivatives of these numbers by the parameters."""
-        return self.parts.get(sensitivities.NAME)
+        return self.parts.get(SENSITIVITIES)
 
     @property
     def lyapunov_exponent(self) -> Estimate | None:

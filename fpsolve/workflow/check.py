@@ -10,7 +10,7 @@ import numpy as np
 
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case, Curve
-from fpsolve.case.sections import Expectation, Varied
+from fpsolve.case.sections import RESPONSE, Expectation, Varied
 from fpsolve.data import short_names, written
 from fpsolve.errors import FpsolveError, NoHierarchy
 from fpsolve.exponent.error import digits
@@ -21,7 +21,6 @@ from fpsolve.page.limits import EACH, ROWS
 from fpsolve.page.page import Block, Column, Grid, Sentence
 from fpsolve.parts.moments import PART as MOMENTS
 from fpsolve.parts.part import Numerics, Settings
-from fpsolve.parts.response import NAME as RESPONSE
 from fpsolve.pool import Pool, serial
 from fpsolve.study.results import CurveResult, Solved
 from fpsolve.study.solve import Asked, Order, batches, solve_batch

@@ -24,6 +24,7 @@ from pydantic import TypeAdapter
 from fpsolve import __version__
 from fpsolve.analysis.excursions import SYMBOL
 from fpsolve.case.case import Case, Curve
+from fpsolve.case.sections import EXCURSIONS
 from fpsolve.errors import FpsolveError, NoSuchExponent
 from fpsolve.exponent.quantities import LYAPUNOV_EXPONENT, STABILITY_INDEX
 from fpsolve.files import writable, write_text
@@ -31,7 +32,6 @@ from fpsolve.messages import Code, Message
 from fpsolve.output.records import Records, append
 from fpsolve.page.limits import EACH, PROOFS, ROWS
 from fpsolve.page.page import Block, Column, Grid, Sentence
-from fpsolve.parts.excursions import NAME as EXCURSIONS
 from fpsolve.pool import Pool, serial
 from fpsolve.proofs.certificate import NOTHING, Enclosure, MalformedProof, enclosure_of
 from fpsolve.proofs.claims import Claims, claims_from, plain, verdicts
