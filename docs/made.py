@@ -35,7 +35,7 @@ ROOMS = {
     "theory": "what is known in closed form",
     "fem": "meshes and the matrices of the generator",
     "case": "case files",
-    "results": "the numbers of many curves as one table",
+    "results": "what is found for curves, and the numbers of many as one table",
     "parts": "what a case may ask for of each curve",
     "study": "cases become results",
     "output": "results become tables, records and figures",

@@ -14,9 +14,8 @@ from fpsolve import load_case
 from fpsolve.case import Case
 from fpsolve.output.records import entries_of, record_of_set
 from fpsolve.parts.part import Numerics
-from fpsolve.study import CurveResult, solve_curve
-from fpsolve.study.results import SimulatedCurve, Solved
-from fpsolve.study.solve import everything, result_of
+from fpsolve.results import CurveResult, SimulatedCurve
+from fpsolve.study.solve import Solved, everything, result_of, solve_curve
 from fpsolve.workflow.simulate import simulate_curve
 
 ALL = 'output.quantities="all"'

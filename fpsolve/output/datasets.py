@@ -22,9 +22,9 @@ from fpsolve.errors import FpsolveError
 from fpsolve.exponent.quantities import MOMENT
 from fpsolve.files import atomic
 from fpsolve.model.quantity import STATUS, P
+from fpsolve.results.curve import Status
 from fpsolve.results.table import Table
 from fpsolve.study.columns import table_of
-from fpsolve.study.results import Status
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -48,9 +48,9 @@ from fpsolve.model.quantity import (
     P,
 )
 from fpsolve.page.page import Drawing
+from fpsolve.results.curve import CurveResult, SimulatedCurve, Status
 from fpsolve.results.table import Table
 from fpsolve.study.columns import table_of
-from fpsolve.study.results import CurveResult, SimulatedCurve, Status
 from fpsolve.theory import perturbation
 from fpsolve.theory.perturbation import perturbed_moments
 

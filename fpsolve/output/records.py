@@ -46,10 +46,10 @@ from fpsolve.parts.every import BY_NAME
 from fpsolve.parts.moments import PART as MOMENTS
 from fpsolve.parts.moments import Moments, begun_of, unfinished
 from fpsolve.parts.part import Entry, Job, Numerics, Part, Reason, Settings
+from fpsolve.results.curve import CurveResult, SimulatedCurve, Status
 from fpsolve.results.table import Table
 from fpsolve.study.columns import row_of, table_of
 from fpsolve.study.reduced import OfSets, Wanted, result_at, seconds_of
-from fpsolve.study.results import CurveResult, SimulatedCurve, Status
 from fpsolve.study.solve import Asked, everything, result_of
 
 SOLVED_RECORDS = "records/solved"

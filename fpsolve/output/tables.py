@@ -30,9 +30,9 @@ from fpsolve.model.kinds import version_of
 from fpsolve.model.quantity import MOMENT, STATUS, Quantity
 from fpsolve.parts.every import PARTS
 from fpsolve.parts.intervals import SAMPLE, Samples, plain_spread
+from fpsolve.results.curve import CurveResult, Status
 from fpsolve.results.table import Column, Row, Table, plain, rows_over_p
 from fpsolve.study.columns import COUNTS, columns_of, row_of, table_of
-from fpsolve.study.results import CurveResult, Status
 
 MOST_INDENTED = 100
 """Curves of a summary that is made for eyes, too."""

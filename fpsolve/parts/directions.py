@@ -36,12 +36,12 @@ from fpsolve.page.page import Drawing
 from fpsolve.parts.eigenfunctions import said_of_pictures, shown_of, without_failed
 from fpsolve.parts.nodes import FIELDS
 from fpsolve.parts.part import Job, Part, Reason, Settings, attempt
+from fpsolve.results.curve import CurveResult, SimulatedCurve
 from fpsolve.vtk import Facts, collection_of, field_data, name_at, write_between
 
 if TYPE_CHECKING:
     import xarray
 
-    from fpsolve.study.results import CurveResult, SimulatedCurve
 
 NAME = "directions"
 ROUGH = 0.05

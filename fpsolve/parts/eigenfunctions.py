@@ -16,7 +16,7 @@ from functools import partial
 from importlib.resources import files
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -36,10 +36,8 @@ from fpsolve.page.page import Drawing
 from fpsolve.parts.nodes import Nodes
 from fpsolve.parts.part import Job, Numerics, Part, Reason, Settings, attempt
 from fpsolve.parts.surfaces import Surface, picture_of
+from fpsolve.results.curve import CurveResult, SimulatedCurve
 from fpsolve.vtk import Facts, collection_of, field_data, name_at, pyvista_module, write_vtk
-
-if TYPE_CHECKING:
-    from fpsolve.study.results import CurveResult, SimulatedCurve
 
 CURVES = "curves.pvd"
 """The file of the series over curves."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -15,10 +15,8 @@ from fpsolve.messages import Message
 from fpsolve.page.page import Sentence
 from fpsolve.parts.indices import is_estimate
 from fpsolve.parts.part import Job, Numerics, Part, Settings
+from fpsolve.results.curve import CurveResult
 from fpsolve.results.table import pair
-
-if TYPE_CHECKING:
-    from fpsolve.study.results import CurveResult
 
 
 def _settings(case: Case, number: int) -> Settings | None:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from fpsolve.case.case import Case, Curve
 from fpsolve.data import Quantity
@@ -26,11 +26,9 @@ from fpsolve.model.quantity import MEAN_SQUARE
 from fpsolve.page.page import Block, Column, filled
 from fpsolve.parts.intervals import INTERVAL, spreads_of
 from fpsolve.parts.part import Job, Numerics, Part, Reason, Settings, attempt
+from fpsolve.results.curve import CurveResult
 from fpsolve.results.table import Row, pair
 from fpsolve.results.text import NUMBER_COLUMNS, interval, row_of
-
-if TYPE_CHECKING:
-    from fpsolve.study.results import CurveResult
 
 
 def index_of(found: Estimate | Absent, name: str, symbol: str, place: str = "") -> Estimate | Reason:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -20,11 +20,9 @@ from fpsolve.messages import Code, Message
 from fpsolve.model.quantity import Quantity, moment_at
 from fpsolve.page.page import Block, Column, Grid
 from fpsolve.parts.part import Part, Settings
+from fpsolve.results.curve import CurveResult
 from fpsolve.results.table import Row
 from fpsolve.results.text import interval, percent
-
-if TYPE_CHECKING:
-    from fpsolve.study.results import CurveResult
 
 SAMPLE = "sample"
 """The name of the folder of the samples of a case, and of the file of their quantiles."""

@@ -5,11 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case, Curve
 from fpsolve.data import Quantity
 from fpsolve.errors import NoSuchExponent
@@ -22,44 +21,13 @@ from fpsolve.model.quantity import LYAPUNOV_EXPONENT, MOMENT, OVER_P
 from fpsolve.page.page import Column, Grid
 from fpsolve.parts.intervals import INTERVAL, spreads_of
 from fpsolve.parts.part import Job, Numerics, Part, Settings
+from fpsolve.results.curve import CurveResult, MomentColumns
 from fpsolve.results.table import Row, pair
 from fpsolve.results.text import interval, percent, units_in_words
 from fpsolve.theory.perturbation import perturbed_moments, weak_noise_note
 
-if TYPE_CHECKING:
-    from fpsolve.study.results import CurveResult
-
-
 STAR = "* for the noise reduced by Eqs. (12)-(14)"
 """The remark on perturbation theory of another noise than that which is solved."""
-
-
-@dataclass(frozen=True, eq=False)
-class MomentColumns:
-    """Λ(p) at those p of a curve that did not fail, in the order of the case; all of shape (n,).
-
-    Attributes:
-        p: the moments.
-        value, derivative, error_estimate, derivative_error, residual: as in `MomentLyapunov`.
-        perturbation: Eq. (37) at the same p.
-    """
-
-    p: FloatArray
-    value: FloatArray
-    derivative: FloatArray
-    error_estimate: FloatArray
-    derivative_error: FloatArray
-    residual: FloatArray
-    perturbation: FloatArray
-
-    @property
-    def rate_function(self) -> FloatArray:
-        """I(s) = ps − Λ(p) at s = Λ′(p), shape (n,); its error is, to first order, that of Λ(p)."""
-        return np.asarray(self.p * self.derivative - self.value) + 0.0
-
-
-NO_MOMENTS = MomentColumns(*[np.zeros(0)] * 7)
-"""Λ(p) at no p."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from time import monotonic
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 from fpsolve.case.case import Case, Curve
 from fpsolve.data import Quantity
@@ -21,11 +21,9 @@ from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.problem import Problem
 from fpsolve.model.quantity import STABILITY_INDEX
 from fpsolve.page.page import Block, Drawing
+from fpsolve.results.curve import CurveResult, SimulatedCurve
 from fpsolve.results.table import Row
 from fpsolve.signals import is_interrupt
-
-if TYPE_CHECKING:  # which stand above
-    from fpsolve.study.results import CurveResult, SimulatedCurve
 
 Settings = Mapping[str, Any]
 """What is asked of a part, as JSON can hold it: with the curve and the `Numerics` it decides its numbers."""

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from fpsolve.case.case import Case
 from fpsolve.data import Quantity
 from fpsolve.model.quantity import MOMENT, RATE_FUNCTION
 from fpsolve.parts.part import Part, Settings
+from fpsolve.results.curve import CurveResult
 from fpsolve.results.table import Row
-
-if TYPE_CHECKING:
-    from fpsolve.study.results import CurveResult
 
 
 def _settings(case: Case, number: int) -> Settings | None:

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -25,10 +24,10 @@ from fpsolve.model.noise import Noise
 from fpsolve.model.plane import System
 from fpsolve.model.problem import Problem
 from fpsolve.model.quantity import ResponseQuantities
-from fpsolve.nonlinear.rest import NearRest
 from fpsolve.page.page import Block, Drawing, Sentence, filled
 from fpsolve.parts.indices import is_estimate
 from fpsolve.parts.part import Job, Part, Settings
+from fpsolve.results.curve import CurveResponse, CurveResult, ResponseDensity, SimulatedCurve
 from fpsolve.results.table import Row, pair
 from fpsolve.results.text import NUMBER_COLUMNS, row_of
 from fpsolve.theory.forced import stationary_moments
@@ -37,7 +36,6 @@ from fpsolve.vtk import field_data, write_between
 if TYPE_CHECKING:
     from fpsolve.nonlinear.response import StationaryResponse
     from fpsolve.simulation.response import Response
-    from fpsolve.study.results import CurveResult, SimulatedCurve
 
 MOST_GRIDS = 10
 """Largest number of curves of which densities are written."""
@@ -45,62 +43,6 @@ Grid = tuple[int, int, int]
 """How many amplitudes, phases and values of the noise."""
 SPREAD = 4.0
 """Standard deviations of the noise on each side of its mean in which its values lie."""
-
-
-@dataclass(frozen=True, eq=False)
-class ResponseDensity:
-    """The stationary density on a grid; of the phase both ends are there, of the others the middles of cells.
-
-    Attributes:
-        amplitude, phi, xi: the places, shapes (n,), (m,) and (k,).
-        of_amplitude: ρ(a), shape (n,).
-        of_plane: that of both variables at x₁ = a cos φ, x₂ = −s a sin φ, see `System.aspect`, shape (n, m).
-        whole: ρ(a, φ, ξ), shape (n, m, k), to the seven digits of a number of four bytes, which are what records and
-            files hold of it.
-    """
-
-    amplitude: FloatArray
-    phi: FloatArray
-    xi: FloatArray
-    of_amplitude: FloatArray
-    of_plane: FloatArray
-    whole: FloatArray
-
-    def plane(self, has_wall: bool) -> tuple[FloatArray, FloatArray]:
-        """φ and the density of both variables over the half-turn; without a wall over a turn, its halves alike."""
-        if has_wall:
-            return self.phi, self.of_plane
-        beyond = self.phi[1:] + math.pi
-        return np.concatenate([self.phi, beyond]), np.concatenate([self.of_plane, self.of_plane[:, 1:]], axis=1)
-
-
-@dataclass(frozen=True, eq=False)
-class CurveResponse(NearRest):
-    """The stationary response of one parameter set.
-
-    Attributes:
-        means: by their names in files.
-        impact_rate: impacts in unit time; None without a wall.
-        balance: what noise feeds into ln a less what impacts take, in unit time; 0 but for its error. This and the next
-            three are None where the moments were solved alone.
-        stability_index: δ_p of the linear system.
-        least: the least density over the largest, negative where it is not resolved.
-        unknowns: of the largest system solved.
-        density: on a grid; None where it is not wanted.
-    """
-
-    means: Mapping[str, Estimate]
-    impact_rate: Estimate | None = None
-    balance: Estimate | None = None
-    stability_index: float | None = None
-    least: float | None = None
-    unknowns: int | None = None
-    density: ResponseDensity | None = None
-
-    @property
-    def numbers(self) -> dict[str, Estimate]:
-        """The means and the impact rate, if there is one, by their names."""
-        return {**self.means, **({} if self.impact_rate is None else {"impact_rate": self.impact_rate})}
 
 
 def solve_response(problem: Problem, rtol: float, grid: Grid | None, budget: Budget) -> CurveResponse:

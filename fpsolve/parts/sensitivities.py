@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -20,10 +20,8 @@ from fpsolve.model.quantity import MOMENT
 from fpsolve.page.page import Drawing
 from fpsolve.parts.indices import is_estimate
 from fpsolve.parts.part import Job, Numerics, Part, Settings
+from fpsolve.results.curve import CurveResult, SimulatedCurve
 from fpsolve.theory.perturbation import scale_of
-
-if TYPE_CHECKING:
-    from fpsolve.study.results import CurveResult, SimulatedCurve
 
 
 def _settings(case: Case, number: int) -> Settings | None:

@@ -1,4 +1,4 @@
-"""The numbers of many curves as one table."""
+"""What is found for curves, and the numbers of many as one table."""
 
 import lazy_loader
 

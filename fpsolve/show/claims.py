@@ -15,7 +15,7 @@ from fpsolve.proofs.balls import MissingFlint
 from fpsolve.proofs.certificate import MalformedProof
 from fpsolve.proofs.claims import CurveClaims, claims_from
 from fpsolve.proofs.statement import statement_of
-from fpsolve.study.results import CurveResult
+from fpsolve.results.curve import CurveResult
 
 PROOF = "proof.json"
 """The file of proven bounds."""

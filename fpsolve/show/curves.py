@@ -26,9 +26,9 @@ from fpsolve.parts.excursions import bounds_text
 from fpsolve.parts.indices import index_text, told_indices
 from fpsolve.parts.intervals import spreads_of
 from fpsolve.parts.moments import STAR
+from fpsolve.results.curve import CurveResult, Status
 from fpsolve.results.table import Table
 from fpsolve.results.text import DIGITS, interval, short, units_in_words
-from fpsolve.study.results import CurveResult, Status
 
 MAIN = LYAPUNOV_EXPONENT, STABILITY_INDEX
 """The indices that come first, and that have a column over a parameter."""

@@ -14,7 +14,7 @@ from fpsolve.exponent.quantities import STABILITY_INDEX
 from fpsolve.messages import Code, Message, Severity, message_of
 from fpsolve.page.limits import EACH, NAMED, NOTES
 from fpsolve.page.page import WORDS, Note
-from fpsolve.study.results import CurveResult, SimulatedCurve
+from fpsolve.results.curve import CurveResult, SimulatedCurve
 
 SUMMARY = "summary.json"
 """The file of all messages of a run."""

@@ -11,12 +11,12 @@ from fpsolve.page.limits import EACH, PICTURES, ROWS_OVER_P
 from fpsolve.page.page import Block, Drawing, Sentence
 from fpsolve.parts.every import PARTS
 from fpsolve.parts.moments import moment_grid
+from fpsolve.results.curve import CurveResult, SimulatedCurve
 from fpsolve.results.table import Table
 from fpsolve.results.text import duration, plural
 from fpsolve.show import curves
 from fpsolve.show.verdict import meaning, verdicts
 from fpsolve.study.columns import table_of
-from fpsolve.study.results import CurveResult, SimulatedCurve
 
 
 def show(

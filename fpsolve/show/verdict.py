@@ -14,9 +14,9 @@ from fpsolve.exponent.quantities import CRITICAL_IMPACT_FACTOR, LYAPUNOV_EXPONEN
 from fpsolve.page.limits import EACH
 from fpsolve.page.page import Sentence
 from fpsolve.parts.intervals import spreads_of
+from fpsolve.results.curve import CurveResult
 from fpsolve.results.table import Table
 from fpsolve.results.text import fate, likely, short, sign_of
-from fpsolve.study.results import CurveResult
 
 PATH, SQUARE = "almost every path", "the mean square"
 """What λ and Λ(2) tell of."""

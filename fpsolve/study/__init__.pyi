@@ -1,5 +1,3 @@
 from .columns import columns_of as columns_of
 from .columns import row_of as row_of
-from .results import CurveResult as CurveResult
-from .results import SimulatedCurve as SimulatedCurve
 from .solve import solve_curve as solve_curve

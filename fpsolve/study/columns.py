@@ -7,8 +7,8 @@ from collections.abc import Iterable
 from fpsolve.case.case import Case
 from fpsolve.model.quantity import MOMENT, SECONDS, STATUS, Quantity
 from fpsolve.parts.every import PARTS
+from fpsolve.results.curve import CurveResult
 from fpsolve.results.table import NO_P, Row, Table
-from fpsolve.study.results import CurveResult
 
 COUNTS = (
     Quantity("p_solved", "p solved", "number of p that are solved"),

@@ -23,8 +23,7 @@ from fpsolve.errors import FpsolveError
 from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.quantities import INDICES
 from fpsolve.model.quantity import MOMENT, STABILITY_INDEX
-from fpsolve.parts.moments import NO_MOMENTS, MomentColumns
-from fpsolve.study.results import CurveResult
+from fpsolve.results.curve import NO_MOMENTS, CurveResult, MomentColumns
 
 OF_ERROR = 0.5
 """Share of rtol that a surface is made for: what is left and the space have one each at most."""

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from itertools import pairwise
 from time import process_time
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -24,10 +24,10 @@ from fpsolve.messages import Code, Message, Severity, message_of
 from fpsolve.model.problem import Problem
 from fpsolve.parts.every import BY_NAME, PARTS
 from fpsolve.parts.indices import JUMPS
-from fpsolve.parts.moments import CLASSES, NO_MOMENTS, Moments, unfinished
+from fpsolve.parts.moments import CLASSES, Moments, unfinished
 from fpsolve.parts.moments import PART as MOMENTS
 from fpsolve.parts.part import Entry, Job, Numerics, Part, Reason, Settings, attempt
-from fpsolve.study.results import CurveResult, Solved
+from fpsolve.results.curve import NO_MOMENTS, CurveResult
 
 Kept = TypeVar("Kept")
 Asked = Mapping[str, Settings]
@@ -36,6 +36,21 @@ BATCHES = 256
 """About so many batches has a case."""
 MOST_SETS = 64
 """Largest number of sets of a batch."""
+
+
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """A parameter set once it is solved.
+
+    Attributes:
+        result: the numbers and messages.
+        entries: what became of the parts that were solved now, by their names.
+        pictures: what is drawn of it, by the names of parts.
+    """
+
+    result: CurveResult
+    entries: Mapping[str, Entry]
+    pictures: Mapping[str, Any]
 
 
 def everything(case: Case, number: int = 1) -> Asked:

@@ -18,10 +18,10 @@ from fpsolve.model.problem import even_only
 from fpsolve.output.tables import write_samples
 from fpsolve.parts.intervals import Samples, sampled_case, samples_of, show_samples
 from fpsolve.pool import Pool, cluster, parallel, serial
+from fpsolve.results.curve import CurveResult, SimulatedCurve
 from fpsolve.show import results
 from fpsolve.show.notes import MONTE_CARLO, note_on, notes
 from fpsolve.signals import signals_held
-from fpsolve.study.results import CurveResult, SimulatedCurve
 from fpsolve.workflow.folders import (
     SIMULATED,
     SOLVED,

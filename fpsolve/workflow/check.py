@@ -22,8 +22,8 @@ from fpsolve.page.page import Block, Column, Grid, Sentence
 from fpsolve.parts.moments import PART as MOMENTS
 from fpsolve.parts.part import Numerics, Settings
 from fpsolve.pool import Pool, serial
-from fpsolve.study.results import CurveResult, Solved
-from fpsolve.study.solve import Asked, Order, batches, solve_batch
+from fpsolve.results.curve import CurveResult
+from fpsolve.study.solve import Asked, Order, Solved, batches, solve_batch
 from fpsolve.testing import check_noise
 from fpsolve.theory.moments import hierarchy_exponent, refuse_open_hierarchy
 from fpsolve.workflow.folders import ANEW, kept, of_curves, saying_if_interrupted

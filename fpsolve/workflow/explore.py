@@ -45,11 +45,11 @@ from fpsolve.page.page import Sentence
 from fpsolve.parts.indices import THEORY
 from fpsolve.parts.moments import moment_grid
 from fpsolve.parts.part import Numerics, fault
+from fpsolve.results.curve import CurveResult
 from fpsolve.show import results
 from fpsolve.show.notes import notes
 from fpsolve.show.problem import show as show_problem
 from fpsolve.show.verdict import meaning, verdict
-from fpsolve.study.results import CurveResult
 from fpsolve.study.solve import everything, solve_curve
 from fpsolve.workflow.progress import waiting
 from fpsolve.workflow.reports import COMPLETE, facts_since

@@ -37,11 +37,11 @@ from fpsolve.parts.every import BY_NAME, PARTS
 from fpsolve.parts.moments import PART as OF_P
 from fpsolve.parts.part import Job, Numerics
 from fpsolve.pool import Pool, serial
+from fpsolve.results.curve import CurveResult, Status
 from fpsolve.results.table import Table
 from fpsolve.show.notes import notes
 from fpsolve.study.reduced import OfSets, Wanted, solved_sets, stated, wanted
-from fpsolve.study.results import CurveResult, Solved, Status
-from fpsolve.study.solve import Order, batches, result_of, solve_batch
+from fpsolve.study.solve import Order, Solved, batches, result_of, solve_batch
 from fpsolve.workflow.progress import MOMENTS, SETS, Advance, Phase
 from fpsolve.workflow.seal import SEAL, Told, seal, sealed
 

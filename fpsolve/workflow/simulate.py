@@ -27,11 +27,11 @@ from fpsolve.output.tables import head, in_case_words, parameters_of
 from fpsolve.page.limits import EACH, PICTURES
 from fpsolve.page.page import Block, Column, Drawing, Grid, Sentence, filled
 from fpsolve.pool import Pool, processors
+from fpsolve.results.curve import CurveResult, SimulatedCurve
 from fpsolve.results.text import fate, sampled, sign_of, units_in_words
 from fpsolve.show.curves import Shown, grid_of
 from fpsolve.show.notes import MONTE_CARLO, notes
 from fpsolve.simulation.setup import PROGRESS_STEPS, obstacles, simulated_parts
-from fpsolve.study.results import CurveResult, SimulatedCurve
 from fpsolve.vtk import field_data, pyvista_module, write_vtk
 from fpsolve.workflow.folders import AGAIN, SIMULATED, kept, of_curves, own_folder, saying_if_interrupted
 from fpsolve.workflow.progress import PERCENT, SILENT, Advance, Phase, Watch

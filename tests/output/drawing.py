@@ -10,7 +10,7 @@ import numpy as np
 from fpsolve.exponent.error import Estimate, Failure
 from fpsolve.exponent.quantities import INDICES
 from fpsolve.output.figures import main_figure
-from fpsolve.study.results import CurveResult, MomentColumns
+from fpsolve.results.curve import CurveResult, MomentColumns
 from fpsolve.theory.perturbation import second_order
 from tests.kit import case_in, case_text
 

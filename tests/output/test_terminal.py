@@ -16,12 +16,12 @@ from fpsolve.model.quantity import OSCILLATOR_RESPONSE
 from fpsolve.page.letters import encodable
 from fpsolve.page.page import Column, Grid, Note
 from fpsolve.page.terminal import print_blocks
+from fpsolve.results.curve import CurveResult, MomentColumns
 from fpsolve.results.text import duration
 from fpsolve.show.curves import curve_grid
 from fpsolve.show.notes import notes
 from fpsolve.show.results import show as show_results
 from fpsolve.study.columns import table_of
-from fpsolve.study.results import CurveResult, MomentColumns
 from fpsolve.study.solve import failed
 from fpsolve.workflow import simulate as simulation
 from fpsolve.workflow.check import Comparison

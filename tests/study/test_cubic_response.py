@@ -9,7 +9,7 @@ import pyvista
 import fpsolve
 from fpsolve.cli import main
 from fpsolve.messages import Code
-from fpsolve.study.results import Status
+from fpsolve.results.curve import Status
 from fpsolve.study.solve import Numerics, everything, solve_curve
 from fpsolve.workflow import simulate_case
 from tests.kit import case_in, read_csv, read_json

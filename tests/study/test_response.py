@@ -17,8 +17,8 @@ from fpsolve.model.quantity import OSCILLATOR_RESPONSE
 from fpsolve.parts import response
 from fpsolve.parts.intervals import sampled_case
 from fpsolve.parts.response import PART, shape
+from fpsolve.results.curve import Status
 from fpsolve.show.verdict import verdict
-from fpsolve.study.results import Status
 from fpsolve.study.solve import Numerics, everything, solve_curve
 from fpsolve.workflow import compare, expected
 from fpsolve.workflow.simulate import number_grid

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from fpsolve.output.records import record_of
+from fpsolve.results.curve import SimulatedCurve
 from fpsolve.simulation.estimators import MomentEstimate, MonteCarlo
 from fpsolve.simulation.response import BINS, Response
-from fpsolve.study.results import SimulatedCurve
 from fpsolve.workflow.simulate import simulate_curve, simulated_of, simulation_fits
 from tests.kit import case_in, case_text, simulate_curves
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
@@ -11,6 +12,7 @@ import numpy as np
 
 from fpsolve.analysis.excursions import Excursion
 from fpsolve.analysis.sensitivity import Sensitivities
+from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Curve
 from fpsolve.case.sections import EXCURSIONS, RESPONSE, SENSITIVITIES
 from fpsolve.data import Quantity, Result, dataset
@@ -19,9 +21,7 @@ from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, STABILITY_IN
 from fpsolve.exponent.solver import InvariantClass
 from fpsolve.messages import Code, Message, Severity, message_of
 from fpsolve.model.quantity import MOMENT, OVER_P, P, moment_at
-from fpsolve.parts.moments import MomentColumns
-from fpsolve.parts.part import Entry
-from fpsolve.parts.response import CurveResponse
+from fpsolve.nonlinear.rest import NearRest
 
 if TYPE_CHECKING:  # which take half a second to import
     import xarray
@@ -47,6 +47,90 @@ class Status(IntEnum):
     @property
     def fails(self) -> bool:
         return self in (Status.PARTLY, Status.FAILED)
+
+
+@dataclass(frozen=True, eq=False)
+class MomentColumns:
+    """Λ(p) at those p of a curve that did not fail, in the order of the case; all of shape (n,).
+
+    Attributes:
+        p: the moments.
+        value, derivative, error_estimate, derivative_error, residual: as in `MomentLyapunov`.
+        perturbation: Eq. (37) at the same p.
+    """
+
+    p: FloatArray
+    value: FloatArray
+    derivative: FloatArray
+    error_estimate: FloatArray
+    derivative_error: FloatArray
+    residual: FloatArray
+    perturbation: FloatArray
+
+    @property
+    def rate_function(self) -> FloatArray:
+        """I(s) = ps − Λ(p) at s = Λ′(p), shape (n,); its error is, to first order, that of Λ(p)."""
+        return np.asarray(self.p * self.derivative - self.value) + 0.0
+
+
+NO_MOMENTS = MomentColumns(*[np.zeros(0)] * 7)
+"""Λ(p) at no p."""
+
+
+@dataclass(frozen=True, eq=False)
+class ResponseDensity:
+    """The stationary density on a grid; of the phase both ends are there, of the others the middles of cells.
+
+    Attributes:
+        amplitude, phi, xi: the places, shapes (n,), (m,) and (k,).
+        of_amplitude: ρ(a), shape (n,).
+        of_plane: that of both variables at x₁ = a cos φ, x₂ = −s a sin φ, see `System.aspect`, shape (n, m).
+        whole: ρ(a, φ, ξ), shape (n, m, k), to the seven digits of a number of four bytes, which are what records and
+            files hold of it.
+    """
+
+    amplitude: FloatArray
+    phi: FloatArray
+    xi: FloatArray
+    of_amplitude: FloatArray
+    of_plane: FloatArray
+    whole: FloatArray
+
+    def plane(self, has_wall: bool) -> tuple[FloatArray, FloatArray]:
+        """φ and the density of both variables over the half-turn; without a wall over a turn, its halves alike."""
+        if has_wall:
+            return self.phi, self.of_plane
+        beyond = self.phi[1:] + math.pi
+        return np.concatenate([self.phi, beyond]), np.concatenate([self.of_plane, self.of_plane[:, 1:]], axis=1)
+
+
+@dataclass(frozen=True, eq=False)
+class CurveResponse(NearRest):
+    """The stationary response of one parameter set.
+
+    Attributes:
+        means: by their names in files.
+        impact_rate: impacts in unit time; None without a wall.
+        balance: what noise feeds into ln a less what impacts take, in unit time; 0 but for its error. This and the next
+            three are None where the moments were solved alone.
+        stability_index: δ_p of the linear system.
+        least: the least density over the largest, negative where it is not resolved.
+        unknowns: of the largest system solved.
+        density: on a grid; None where it is not wanted.
+    """
+
+    means: Mapping[str, Estimate]
+    impact_rate: Estimate | None = None
+    balance: Estimate | None = None
+    stability_index: float | None = None
+    least: float | None = None
+    unknowns: int | None = None
+    density: ResponseDensity | None = None
+
+    @property
+    def numbers(self) -> dict[str, Estimate]:
+        """The means and the impact rate, if there is one, by their names."""
+        return {**self.means, **({} if self.impact_rate is None else {"impact_rate": self.impact_rate})}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -148,21 +232,6 @@ class CurveResult(Result):
         found, exponent = self.moments, self.lyapunov_exponent
         parts = [self.curve.label, self.status.word, f"{found.p.size} p", f"λ = {exponent}" if exponent else ""]
         return ", ".join(filter(None, parts))
-
-
-@dataclass(frozen=True, eq=False)
-class Solved:
-    """A parameter set once it is solved.
-
-    Attributes:
-        result: the numbers and messages.
-        entries: what became of the parts that were solved now, by their names.
-        pictures: what is drawn of it, by the names of parts.
-    """
-
-    result: CurveResult
-    entries: Mapping[str, Entry]
-    pictures: Mapping[str, Any]
 
 
 @dataclass(frozen=True, eq=False)
