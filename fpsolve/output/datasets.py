@@ -24,7 +24,6 @@ from fpsolve.files import atomic
 from fpsolve.model.quantity import STATUS, P
 from fpsolve.results.curve import Status
 from fpsolve.results.table import Table
-from fpsolve.study.columns import table_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -86,17 +85,6 @@ def write_dataset(case: Case, table: Table, folder: Path, facts: Mapping[str, An
         file.attrs.update({**_origin(case, facts), "complete": int(is_whole)})
     with atomic(folder / RESULTS) as draft:
         draft.write_bytes(content.getvalue())
-
-
-def read_table(case: Case, folder: Path) -> Table:
-    """The numbers of all curves of a case that are in its results.nc, if this is of that case."""
-    import h5py
-
-    table = table_of(case)
-    with h5py.File(folder / RESULTS) as file:
-        for name, column in table.items():
-            column.values[...] = file[name][...].reshape(column.values.shape)
-    return table
 
 
 def _variables(case: Case, table: Table) -> dict[str, Variable]:

@@ -204,10 +204,6 @@ class Results(Sequence[CurveResult]):
         self._kept.pop(number, None)
         self._unread.add(number)
 
-    def add_all(self, table: Table) -> None:
-        """Count all curves among those that are known, each with the records that are found when it is looked at."""
-        self._table, self._order = table, list(range(1, self._case.planned + 1))
-
     def is_told(self, number: int) -> bool:
         """Whether a surface tells the curve with a number."""
         return bool(self._are_told[number - 1])
@@ -244,11 +240,6 @@ class Results(Sequence[CurveResult]):
         self._table.put(number - 1, row_of(self._case, result))
         self.says[number - 1] = says_more(self._case, result)
         self._unread.discard(number)
-
-    @property
-    def are_kept(self) -> bool:
-        """Whether all that is known is in records, where a further run finds it."""
-        return not self._given
 
     def find(self, curve: Curve) -> bool:
         """Look for the records of a curve; whether they have all that is asked of it, which can be read."""

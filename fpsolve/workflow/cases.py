@@ -32,8 +32,7 @@ from fpsolve.workflow.folders import (
 )
 from fpsolve.workflow.progress import SILENT, Phase, Watch, ignore
 from fpsolve.workflow.reports import shown_at_the_end, write_report
-from fpsolve.workflow.seal import TABLES
-from fpsolve.workflow.sets import Sweep
+from fpsolve.workflow.sets import TABLES, Sweep
 from fpsolve.workflow.simulate import SIMULATION, Simulations, refuse_obstacles
 from fpsolve.workflow.simulate import show as show_simulated
 
@@ -82,9 +81,8 @@ def run(
 ) -> tuple[CurveResult, ...]:
     """Solve a case, write `out`/<name of the case>/, and return the results, one for each curve.
 
-    Sets that an earlier run finished there, also one that was killed, are not solved again, and tables that have all of
-    them stay. Each run rewrites all other files, and removes what a simulation of other parameters wrote. summary.json
-    says whether all curves are there.
+    Sets that an earlier run finished there, also one that was killed, are not solved again. Each run rewrites all
+    files, and removes what a simulation of other parameters wrote. summary.json says whether all curves are there.
 
     >>> run("minimal.toml")  # a case of `fpsolve new minimal`
     (CurveResult(converged, 3 p, λ = -1.4456...e-05 ± ...),)
@@ -148,7 +146,7 @@ def run_case(
     interruption = ""
     simulators = pool if pool and pool.is_elsewhere else None
     replaced = (SOLVED, SIMULATED) if monte_carlo else (SOLVED,)
-    with own_folder(case, out, replaced, is_fresh=is_fresh) as folder:
+    with own_folder(case, out, replaced) as folder:
         sweep = _solve(case, folder, pool or serial(), watch, is_fresh=is_fresh)
 
         def show() -> None:
@@ -163,7 +161,7 @@ def run_case(
                     show_claims(sweep.results, folder),
                     show_samples(case, samples) if samples else (),
                     show_simulated(case, simulated, sweep.results) if simulated else (),
-                    sweep.told.notes,
+                    sweep.notes,
                     notes(case, simulated, MONTE_CARLO),
                     (note_on(case.name, each) for each in (samples.remarks if samples else ())),
                 )
@@ -175,7 +173,7 @@ def run_case(
         with told, shown_at_the_end(show):
             table = sweep.results.table
             watch.shown(results.show(case, sweep.results, folder, (), table, is_whole=watch.is_whole))
-            watch.noted(sweep.told.notes)
+            watch.noted(sweep.notes)
             if case.uncertain.sample:
                 samples = _sample(case, sweep, folder, pool or serial(), watch, is_fresh=is_fresh)
             if monte_carlo:
@@ -188,8 +186,8 @@ def run_case(
         interruption,
         facts=sweep.facts,
         known=sweep.known,
-        outdated=sweep.told.outdated,
-        failed=sweep.told.failed,
+        outdated=sweep.records.outdated,
+        failed=sweep.failed,
         samples=samples,
     )
 

@@ -11,7 +11,6 @@ from fpsolve.case.case import Case
 from fpsolve.errors import FpsolveError, OutputError, Remedy
 from fpsolve.files import TEMPORARY, alone, parsed_json, plain_text, writable
 from fpsolve.signals import is_interrupt
-from fpsolve.workflow.seal import TABLES, sealed
 
 AGAIN, ANEW = "run it again to go on", "run it again to start over"
 SOLVED = (
@@ -34,10 +33,8 @@ _TABLES |= {PROVEN: PROVEN, DESIGNED: r"design\.json"}
 
 
 @contextmanager
-def own_folder(case: Case, out: str | Path, replaced: Sequence[str], *, is_fresh: bool = False) -> Iterator[Path]:
+def own_folder(case: Case, out: str | Path, replaced: Sequence[str]) -> Iterator[Path]:
     """The folder of a case for one run alone. Files that match `replaced`, or are of other parameters, are removed.
-
-    Tables that are sealed stay, unless all is done again.
 
     Raises:
         OutputError: the folder cannot be made or written to, another run writes into it, or something in it has the
@@ -53,10 +50,9 @@ def own_folder(case: Case, out: str | Path, replaced: Sequence[str], *, is_fresh
                     raise OutputError(f"{path} cannot be written to: it is no folder, or a link to one", Remedy.FOLDER)
                 if re.fullmatch("|".join([*replaced, REPORT]), name) and is_folder:
                     raise OutputError(f"{path} cannot be written: Is a directory", Remedy.FOLDER)
-            staying = TABLES if not is_fresh and sealed(case, folder) else ()
-            names = "|".join([*replaced, REPORT, *_stale(case, there, staying), _UNFINISHED])
+            names = "|".join([*replaced, REPORT, *_stale(case, there), _UNFINISHED])
             for name, path in there.items():
-                if name not in staying and re.fullmatch(names, name) and (path.is_symlink() or not path.is_dir()):
+                if re.fullmatch(names, name) and (path.is_symlink() or not path.is_dir()):
                     path.unlink()
                     if path.parent != folder and not any(path.parent.iterdir()):
                         path.parent.rmdir()
@@ -93,7 +89,7 @@ def _entries(folder: Path) -> Iterator[Path]:
                 yield from sorted(path.iterdir())
 
 
-def _stale(case: Case, there: Mapping[str, Path], sealed: Sequence[str]) -> list[str]:
+def _stale(case: Case, there: Mapping[str, Path]) -> list[str]:
     """Which kinds of files in a folder are not of the parameters of a case.
 
     A kind whose tables state complete parameters that the case has is. One without a table is as the others are, but a
@@ -106,8 +102,6 @@ def _stale(case: Case, there: Mapping[str, Path], sealed: Sequence[str]) -> list
 
     def agrees(path: Path) -> bool:
         try:
-            if path.name in sealed:
-                return True
             content = parsed_json(plain_text(path))
             if path.name == "chart.json":
                 stated, axes = content["parameters"], {content["x"]["key"], content["y"]["key"]}

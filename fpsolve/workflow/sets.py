@@ -16,7 +16,7 @@ from fpsolve.case.case import Case, Curve
 from fpsolve.case.sections import Varied
 from fpsolve.messages import Severity
 from fpsolve.model.quantity import MOMENT, STATUS
-from fpsolve.output.datasets import read_table, write_dataset
+from fpsolve.output.datasets import write_dataset
 from fpsolve.output.records import (
     SOLVED_RECORDS,
     Address,
@@ -43,11 +43,12 @@ from fpsolve.show.notes import notes
 from fpsolve.study.reduced import OfSets, Wanted, solved_sets, stated, wanted
 from fpsolve.study.solve import Order, Solved, batches, result_of, solve_batch
 from fpsolve.workflow.progress import MOMENTS, SETS, Advance, Phase
-from fpsolve.workflow.seal import SEAL, Told, seal, sealed
 
 Found = tuple[int, Address | CurveResult | None, bool]
 """The number of a curve, its numbers where they are new, and whether some of these are missing."""
 SIMULATED_RECORDS = "records/simulated"
+TABLES = "summary.json", "curves.csv", "moments.csv", "results.nc"
+"""The files with all numbers of a run."""
 REST = 50
 """Tables are rewritten when so many times as long has gone by as the last time took, so that all of it costs little."""
 
@@ -83,9 +84,14 @@ class Sweep:
         case: whose sets these are.
         folder: where they are kept.
         is_fresh: whether to solve all of them again.
+
+    Attributes:
+        failed: how many sets have failed, also in part, once the tables are written.
+        notes: what is said of all sets, then.
     """
 
-    told: Told
+    failed = 0
+    notes: tuple[Note, ...] = ()
     _solves = 0
 
     def __init__(self, case: Case, folder: Path, *, is_fresh: bool = False) -> None:
@@ -100,14 +106,7 @@ class Sweep:
         self._are_drawn = [any(BY_NAME[name].is_drawn for name in self.results.asked(number)) for number in (1, 2)]
         self._steps_each = max(case.p.size if MOMENT.name in case.asked else 0, 1) if case.planned == 1 else 1
         self._settled = self._tell(solves=False)
-        self.sealed = None if is_fresh else sealed(case, self.folder)
-        if self.sealed:
-            self.told, self.facts = self.sealed, facts_of(case, self.started, monotonic() - self._clock)
-            self.results.add_all(read_table(case, self.folder))
-            self._settled = case.planned - self._are_drawn[0] - (case.planned - 1) * self._are_drawn[1]
-        else:
-            (self.folder / SEAL).unlink(missing_ok=True)
-            self.find()
+        self.find()
         self.known = len(self.results)
 
     @property
@@ -142,7 +141,7 @@ class Sweep:
 
     def find(self) -> None:
         """Look for the records of all sets, also those that a worker has finished without reporting them."""
-        for curve in self.case.curves() if not self.sealed and self.records.look().are_there else ():
+        for curve in self.case.curves() if self.records.look().are_there else ():
             if not self.results.is_told(curve.number) and self.results.find(curve):
                 self._unfinished.discard(curve.number)
                 self._settled += not self._is_drawn(curve.number)
@@ -171,8 +170,6 @@ class Sweep:
         is_alone = self.case.planned == 1 and not pool.is_elsewhere
         if self._settled:
             progress(self._settled * self._steps_each, known=True)
-        if self.sealed and not any(self._are_drawn):
-            return
         if self.case.vary.reduced and not self._solves:
             progress(self._tell(solves=True))
         kept = partial(keep, self.folder, self.numerics)
@@ -203,25 +200,22 @@ class Sweep:
         return table
 
     def write_all(self) -> None:
-        """Write the tables, results.nc, the series over the curves, and the files of parts; sealed tables stay."""
-        table = None if self.sealed else self.write_tables()
+        """Write the tables, results.nc, the series over the curves, and the files of parts."""
+        table = self.write_tables()
         write_curves(self.case, self.folder)
         writers = [part.files for part in PARTS if part.files and part.name in self.results.asked(1)]
         for result in self.results if writers else ():
             for write in writers:
                 write(result, self.folder)
-        if table is not None:
-            write_dataset(self.case, table, self.folder, self.facts)
-            failed = int(np.isin(table[STATUS.name].values, [each for each in Status if each.fails]).sum())
-            said = notes(self.case, self.results.telling, count=len(self.results))
-            if self.case.vary.reduced:
-                told = sum(map(self.results.is_told, range(1, self.case.planned + 1)))
-                whole = "" if told == self.case.planned else f", each of the other {self.case.planned - told} its own"
-                text = f"{self.case.name}: {self._solves} solves tell {told} curves{whole}"
-                said = chain([Note(Severity.NOTE, text)], said)
-            self.told = Told(failed, self.records.outdated, tuple(said))
-            if self.done == self.case.planned and self.results.are_kept:
-                seal(self.case, self.folder, self.told)
+        write_dataset(self.case, table, self.folder, self.facts)
+        self.failed = int(np.isin(table[STATUS.name].values, [each for each in Status if each.fails]).sum())
+        said = notes(self.case, self.results.telling, count=len(self.results))
+        if self.case.vary.reduced:
+            told = sum(map(self.results.is_told, range(1, self.case.planned + 1)))
+            whole = "" if told == self.case.planned else f", each of the other {self.case.planned - told} its own"
+            text = f"{self.case.name}: {self._solves} solves tell {told} curves{whole}"
+            said = chain([Note(Severity.NOTE, text)], said)
+        self.notes = tuple(said)
 
     def _is_drawn(self, number: int) -> bool:
         """Whether pictures of a set are wanted, which are drawn in each run."""
