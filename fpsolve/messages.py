@@ -205,18 +205,6 @@ class Code(Enum):
         "Λ({other:g}) is {expected:.10g}, and Λ is convex"
     )
     NOT_INCREASING = "failure: Λ(p)/p does not increase at p = {p:g}, while it must, as Λ is convex"
-    GROWTH_BEYOND = (
-        "failure: the growth rate s = {s:.6g} is not reached: Λ′ is {slope:.6g} at p = {p:g}, {reason:?and beyond it "
-        "Λ(p) is not solved: {reason}¦the end of the interval}; choose s on this side of {slope:.6g}{reason:?¦, or a "
-        "wider interval}"
-    )
-    NO_RATE_FUNCTION = (
-        "failure: there is no rate function to compute: Λ(p) may have a kink, as the parts of the motion {parts} do "
-        "not all drive each other; take Λ(p) itself"
-    )
-    NO_PREFACTOR = (
-        "failure: the law of growth in finite time is for two variables, and not for filtered noise; take rate_function"
-    )
     NEGATIVE_DENSITY = "failure: the {name} at p = {p:g} is not resolved: {size:.0%} of it is negative"
     SIMULATION_OVERFLOWED = "failure: the simulation overflowed: some ξ is too large for this step; use a smaller step"
 

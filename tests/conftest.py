@@ -94,7 +94,6 @@ def keeping(first, second, sizes=(0.7, -0.6)):
 LONGEST = (
     "simulation/test_spaces.py",
     "test_sweeps.py",
-    "analysis/test_growth.py",
     "test_docs.py",
     "nonlinear/test_response.py",
     "exponent/test_slopes.py",

@@ -13,7 +13,6 @@ import pytest
 
 from fpsolve import ExponentSolver, OrnsteinUhlenbeck, PlaneSystem, Problem
 from fpsolve.analysis.excursions import solve_excursion
-from fpsolve.analysis.growth import Slopes
 from fpsolve.analysis.sensitivity import Gradient
 from fpsolve.budget import SECONDS_PER_OPERATION, Countdown, charge, counted, under_way, watched
 from fpsolve.errors import NotConverged
@@ -34,7 +33,6 @@ NUMBERS = {
     "r_c": lambda solver: critical_restitution(solver).value,
     "∂Λ(2)/∂θ": lambda solver: Gradient(solver, {"D0": PROBLEM.derivative("noise.D0")}).moment(2.0)["D0"].value,
     "∂Λ″(0)/∂θ": lambda solver: Gradient(solver, {"D0": PROBLEM.derivative("noise.D0")}).variance_rate()["D0"].value,
-    "Λ″(1.5)": lambda solver: Slopes(solver, (-3.0, 3.0)).at(1.5).curvature,
     "the bounds of P(sup ‖x‖ ≥ A)": lambda solver: solve_excursion(solver).upper.value,
 }
 """By the names that messages have for them."""

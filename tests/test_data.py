@@ -15,12 +15,12 @@ from scipy.interpolate import RegularGridInterpolator
 
 import fpsolve
 from fpsolve import ExponentSolver, OrnsteinUhlenbeck, Problem, VibroImpactOscillator
-from fpsolve.analysis import Axis, Surface, design, excursion, growth_law, rate_function, uncertainty
+from fpsolve.analysis import Axis, Surface, design, excursion, uncertainty
 from fpsolve.analysis.index_surface import IndexSurface
 from fpsolve.case import Curve
 from fpsolve.data import Result
 from fpsolve.errors import FpsolveError
-from fpsolve.exponent import INDICES, Budget, Estimate, Failure, perturbation_series
+from fpsolve.exponent import INDICES, Budget, Estimate, Failure
 from fpsolve.exponent.error import Absent
 from fpsolve.model import CoefficientMatrix, LinearSystem, ParametricOscillator, Telegraph, White
 from fpsolve.model.quantity import MOMENT
@@ -69,9 +69,6 @@ MAIN = {
     "directions": "density",
     "design": "oscillator.c1",
     "uncertainty": "moment",
-    "rate function": "rate_function",
-    "growth law": "density",
-    "series": "moment",
     "excursion": "level",
     "line": "lyapunov_exponent",
     "line of the index": "stability_index",
@@ -138,9 +135,6 @@ def results(fig1_solver):
         "directions": fpsolve.tilted_density(ExponentSolver(TURNING, rtol=1e-3).pair(1.0)),
         "design": design(Problem(FIG1, REDUCED), "moment(2) = 0.02", Axis("oscillator.c1", -2.0, 2.0)),
         "uncertainty": uncertainty(Problem(FIG1, REDUCED), {"noise.D0": 0.05}, [1.0, 2.0]),
-        "rate function": rate_function(Problem(FIG1, REDUCED), [0.01, 0.02]),
-        "growth law": growth_law(Problem(FIG1, REDUCED), [50.0, 100.0], [0.01, 0.02]),
-        "series": perturbation_series(Problem(FIG1, REDUCED), [1.0, 2.0], order=4),
         "excursion": excursion(Problem(ParametricOscillator(stiffness=1.0, damping=0.08), Telegraph(a=0.8, k=1.0))),
         "line": Surface(Problem(FIG1, REDUCED), {"oscillator.c1": (0.0, 0.2)}),
         "line of the index": IndexSurface(Problem(FIG1, REDUCED), {"oscillator.c1": (0.0, 0.05)}),

@@ -6,10 +6,6 @@ from .density import tilted_density as tilted_density
 from .directions import DirectionDensity as DirectionDensity
 from .excursions import Excursion as Excursion
 from .excursions import excursion as excursion
-from .growth import GrowthLaw as GrowthLaw
-from .growth import RateFunction as RateFunction
-from .growth import growth_law as growth_law
-from .growth import rate_function as rate_function
 from .inverse import Design as Design
 from .inverse import design as design
 from .sensitivity import Sensitivities as Sensitivities

@@ -106,10 +106,6 @@ class Trace:
         """Whether it runs through a point of a curve, or near to it the same way; F > 0 left of both."""
         return bool(np.any((self._gaps(sample.at) < within) & (self._ways @ sample.tangent >= 0)))
 
-    def passes(self, at: FloatArray, within: float) -> bool:
-        """Whether it passes a point, one way or the other."""
-        return bool(np.any(self._gaps(at) < within))
-
     def nearest(self, at: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Its point nearest to another, and the direction there, of length 1 or 0."""
         feet, k = self._feet(at), int(np.argmin(self._gaps(at)))

@@ -42,7 +42,6 @@ from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.function import nonzero_root
 from fpsolve.exponent.solver import ExponentSolver, solver_of
 from fpsolve.fem.generator import Generator
-from fpsolve.fem.space import Space
 from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.plane import Harmonics, growth_rate
 from fpsolve.model.problem import Problem, refuse_tails
@@ -340,7 +339,7 @@ class Grid(NamedTuple):
         at_phi = space.phi.at(self.psi.ravel(), self.inside.ravel())
         reached = [axis.everywhere(count) for axis, count in zip(space.noises, self.counts, strict=True)]
         table = space.evaluate(pair.right, at_phi, *(values for _, values in reached))
-        phi, stretch = own_phase(pair.generator, pair.p, self.psi.ravel())
+        phi, stretch = _own_phase(pair.generator, pair.p, self.psi.ravel())
         columns = (-1, *[1] * len(reached))
         rate = growth_rate(problem.drift, problem.at_values([xi for xi, _ in reached]))(phi.reshape(columns))
         shape = (*self.psi.shape, *table.shape[1:])
@@ -351,7 +350,7 @@ class Grid(NamedTuple):
         return (1, *[2 + k for k, axis in enumerate(pair.space.noises) if axis.cells.max() >= 0])
 
 
-def own_phase(generator: Generator, p: float, psi: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _own_phase(generator: Generator, p: float, psi: FloatArray) -> tuple[FloatArray, FloatArray]:
     """φ in the coordinates of the system, and ρ^p there."""
     frame = generator.problem.frame
     if frame is None:
@@ -360,18 +359,12 @@ def own_phase(generator: Generator, p: float, psi: FloatArray) -> tuple[FloatArr
     return phi, frame.length(phi) ** p
 
 
-def fine_phases(generator: Generator, space: Space) -> tuple[FloatArray, FloatArray]:
-    """Points and weights of a rule in the coordinates of the solve, as fine as the frame needs."""
-    frame = generator.problem.frame
-    return space.phi.finer_rule(1 if frame is None else frame.parts)
-
-
-def start_functional(generator: Generator, p: float, phi: Start, xi: StartOfNoise = STATIONARY) -> FloatArray:
-    """The mean over the start of every function of a space, in the coordinates of the system, shape (size,)."""
-    space, frame = generator.space(p), generator.problem.frame
+def _at_start(pair: PrincipalPair, *, phi: Start, xi: StartOfNoise) -> float:
+    """T₀, the mean of T over the start, in the coordinates of the system."""
+    space, frame = pair.space, pair.generator.problem.frame
     if phi == UNIFORM:
-        psi, weights = fine_phases(generator, space)
-        own, stretch = own_phase(generator, p, psi)
+        psi, weights = space.phi.finer_rule(1 if frame is None else frame.parts)
+        own, stretch = _own_phase(pair.generator, pair.p, psi)
         weights = weights * stretch / (space.phi.span * (1.0 if frame is None else frame.density(own)))
         at_phi = weights @ space.phi.at(psi)
     else:
@@ -379,11 +372,13 @@ def start_functional(generator: Generator, p: float, phi: Start, xi: StartOfNois
         psi = place if frame is None else frame.phase(place)
         first, span = space.phi.lines[0], space.phi.span
         psi, after = (first + np.mod(each - first, span) for each in (psi, psi + 1e-9))
-        at_phi = dense(space.phi.at(psi, after))[0] * (1.0 if frame is None else float(frame.length(place)[0]) ** p)
-    return space.product([at_phi, *(mean_functions(axis, xi) for axis in space.noises)])
+        length = 1.0 if frame is None else float(frame.length(place)[0])
+        at_phi = dense(space.phi.at(psi, after))[0] * length**pair.p
+    means = space.product([at_phi, *(_mean_functions(axis, xi) for axis in space.noises)])
+    return float(means @ pair.right)
 
 
-def mean_functions(axis: Any, xi: StartOfNoise = STATIONARY) -> FloatArray:
+def _mean_functions(axis: Any, xi: StartOfNoise) -> FloatArray:
     """The means of the functions of a noise over its start, shape (size,)."""
     if xi == STATIONARY:
         at = axis.samples()
@@ -393,11 +388,6 @@ def mean_functions(axis: Any, xi: StartOfNoise = STATIONARY) -> FloatArray:
         return np.asarray(chosen / chosen.sum())
     at = axis.at(np.array([float(xi)]) / axis.unit)
     return np.asarray(at.values[0] * at.factor[0])
-
-
-def _at_start(pair: PrincipalPair, *, phi: Start, xi: StartOfNoise) -> float:
-    """T₀, the mean of T over the start."""
-    return float(start_functional(pair.generator, pair.p, phi, xi) @ pair.right)
 
 
 def _prefactors(
@@ -503,7 +493,7 @@ def _flux(pair: PrincipalPair, parts: int) -> float:
     """⟨T*, q⁺⟩, with ⟨T*, T⟩ = 1 on the full circle."""
     space, problem = pair.space, pair.generator.problem
     psi, weights = space.phi.finer_rule(parts)
-    phi, stretch = own_phase(pair.generator, pair.p, psi)
+    phi, stretch = _own_phase(pair.generator, pair.p, psi)
     most = (MOST_POINTS / psi.size) ** (1 / len(space.noises))
     each = [axis.finer_samples(round(min(most, POINTS * parts / PARTS))) for axis in space.noises]
     left = space.evaluate(pair.left, space.phi.at(psi), *(at.values for at in each))

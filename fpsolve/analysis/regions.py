@@ -56,7 +56,7 @@ def regions(lines: Sequence[Boundary]) -> Regions:
     """The regions of lines that were all sought in the frame, on a grid `FINE` times as fine as the coarsest scan."""
     from scipy.ndimage import distance_transform_edt
 
-    scans = [line.scan for line in lines if line.scan is not None]
+    scans = [line.scan for line in lines]
     points, values = FINE * min(scan.nodes.size - 1 for scan in scans), []
     for scan in scans:
         cells = scan.nodes.size - 1

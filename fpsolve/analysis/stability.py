@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import combinations, product
@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fpsolve.analysis.continuation import LONGEST, SHORTEST, Trace, find_branches, find_zero, trace_branch, with_branch
+from fpsolve.analysis.continuation import LONGEST, SHORTEST, Trace, find_branches, with_branch
 from fpsolve.analysis.scan import Row, Scan, ScannedRow, scan_row, scanned
 from fpsolve.analysis.special_points import Placed, crossings, with_folds, with_points, with_values
 from fpsolve.analysis.surface import Surface
@@ -51,11 +51,6 @@ SCAN_SHARE = 0.5
 """Share of this time for the scan."""
 LARGEST = 0.1
 """Step that may be asked for, in sides of the frame."""
-ON_IT = 1e-4
-"""Distance, in sides of the frame, in which a point of a line is one of a branch."""
-
-_ANEW: dict[str, Any] = {"traces": (), "seconds": 0.0, "obstacles": (), "complete": False}
-"""A line of which nothing is traced."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -96,8 +91,8 @@ class Boundary(Result):
         zero: what F is.
         x, y: the frame.
         problem: with the values of the other parameters.
+        scan: F on the grid in which its branches are looked for.
         traces: its branches, in shares of the sides of the frame.
-        scan: F on the grid in which they were looked for; None where they were started from points.
         step: the longest step between two points, in sides of the frame.
         budget: for a solve, and for the line.
         seconds: of the processor, that the scan and the branches took.
@@ -110,8 +105,8 @@ class Boundary(Result):
     x: Axis
     y: Axis
     problem: Problem
+    scan: Scan
     traces: tuple[Trace, ...] = ()
-    scan: Scan | None = None
     step: float = LONGEST
     budget: Budget = field(default_factory=Budget)
     seconds: float = 0.0
@@ -155,7 +150,7 @@ class Boundary(Result):
         """That there is no line, or not all of it, as a `Message`, or an empty text."""
         if self.obstacles:
             return Message(Code.LINE_STOPPED, line=self.zero.equation, reason=self.obstacles[0])
-        if self.traces or self.scan is None:
+        if self.traces:
             return ""
         exists = np.isfinite(self.scan.values)
         values = self.scan.values[exists]
@@ -165,48 +160,10 @@ class Boundary(Result):
             return Message(Code.NO_LINE, line=self.zero.equation, symbol=self.zero.symbol)
         return Message(Code.ONE_SIGN, side=self.zero.side(float(values[0])), is_whole=bool(exists.all()))
 
-    def refined(self, step: float) -> Boundary:
-        """The boundary with shorter steps, in sides of the frame. Raises `ValueError`."""
-        middles = (trace.points[len(trace.points) // 2].sample.at for trace in self.traces)
-        return replace(self, step=_checked_step(step), **_ANEW)._from(middles)
-
-    def extended(self, x: Axis | None = None, y: Axis | None = None) -> Boundary:
-        """Its branches in another, such as a wider, frame of the same parameters; branches elsewhere are not sought.
-
-        Raises:
-            ValueError: an axis is not of the same parameter, or out of its range.
-        """
-        other = replace(self, x=x or self.x, y=y or self.y, scan=None, **_ANEW)
-        if (other.x.key, other.y.key) != (self.x.key, self.y.key):
-            raise ValueError(f"got a frame of {other.x.key}, {other.y.key}; use `started_from` for other parameters")
-        check_axes(self.problem, other.x, other.y)
-        seeds = (
-            np.array([other.x.share(x), other.y.share(y)])
-            for branch in self.branches
-            for x, y in zip(branch.x, branch.y, strict=True)
-        )
-        return other._from(seeds)
-
-    def started_from(self, branch: int, point: int, x: Axis, y: Axis) -> Boundary:
-        """The branch through one of its points in another pair of parameters; all others are held as they are there.
-
-        Raises:
-            ValueError: an axis is no parameter of the problem, or the point is not in the frame.
-        """
-        chosen = self.branches[branch]
-        problem = self.problem.at({self.x.key: float(chosen.x[point]), self.y.key: float(chosen.y[point])})
-        check_axes(problem, x, y)
-        theta = {axis.key: float(problem.values[axis.key]) for axis in (x, y)}
-        start = np.array([axis.share(theta[axis.key]) for axis in (x, y)])
-        if np.any((start < 0) | (start > 1)):
-            point_there = ", ".join(f"{key} = {value:g}" for key, value in theta.items())
-            raise ValueError(f"the point has {point_there}, which is not in the frame; choose a wider one")
-        return replace(self, x=x, y=y, problem=problem, scan=None, **_ANEW)._from([start])
-
     @property
     def nodes(self) -> int:
         """The number of points of a scan, each way."""
-        return NODES if self.scan is None else self.scan.nodes.size
+        return self.scan.nodes.size
 
     def rows(self) -> list[Row]:
         """The rows of its scan, tasks for `scan_row`, each of which begins anew; they pickle small."""
@@ -262,32 +219,17 @@ class Boundary(Result):
         else:
             for _ in range(self.nodes**2):
                 progress()
-        now = replace(self, scan=scan, **{**_ANEW, "seconds": scan.seconds})
+        now = replace(self, scan=scan, traces=(), seconds=scan.seconds, obstacles=(), complete=False)
         yield now
         zero_field = now.zero_field
         for trace in find_branches(zero_field, scan, self.step, stepped):
             now = replace(now, traces=with_branch(now.traces, self._special(zero_field, trace)))
             yield now
-        yield now._ended(zero_field)
-
-    def _from(self, seeds: Iterable[FloatArray]) -> Boundary:
-        """The boundary with the branches through some points of the lines."""
-        zero_field, traces = self.zero_field, list[Trace]()
-        for seed in seeds:
-            if np.any((seed < 0) | (seed > 1)) or any(trace.passes(seed, ON_IT) for trace in traces):
-                continue
-            start = find_zero(zero_field, seed)
-            if start is not None and not any(trace.holds(start) for trace in traces):
-                traces.append(self._special(zero_field, trace_branch(zero_field, start, self.step)))
-        return replace(self, traces=tuple(traces))._ended(zero_field)
-
-    def _ended(self, zero_field: ZeroField) -> Boundary:
-        """The boundary after the last of its branches."""
         obstacles = [] if zero_field.stopped is None else [zero_field.stopped]
-        for reason in self.scan.reasons if self.scan else ():
+        for reason in scan.reasons:
             obstacles += [reason] * is_of_line(reason)
-        seconds = self.seconds + zero_field.spent_seconds
-        return replace(self, seconds=seconds, obstacles=tuple(obstacles), complete=not obstacles)
+        seconds = now.seconds + zero_field.spent_seconds
+        yield replace(now, seconds=seconds, obstacles=tuple(obstacles), complete=not obstacles)
 
     def _special(self, zero_field: ZeroField, trace: Trace) -> Trace:
         """A branch with its folds, and the points that the axes ask for."""
@@ -376,26 +318,21 @@ def boundary(
 
 
 def begun(
-    zero: Zero, x: Axis, y: Axis, problem: Problem, *, step: float | None, nodes: int | None, **more: Any
+    zero: Zero, x: Axis, y: Axis, problem: Problem, *, step: float | None = None, nodes: int | None = None, **more: Any
 ) -> Boundary:
     """A line of which nothing is traced, with the usual step and nodes where they are None. Raises `ValueError`."""
     dear = is_dear(problem, zero)
-    step = _checked_step((DEAR_STEP if dear else LONGEST) if step is None else step)
+    step = (DEAR_STEP if dear else LONGEST) if step is None else step
+    if not SHORTEST < real_number(step, "step") <= LARGEST:
+        raise ValueError(f"got step = {step:g}; must be above {SHORTEST:g} and up to {LARGEST:g} sides of the frame")
     count = nodes or (DEAR_NODES if dear else NODES)
     scan = Scan(np.linspace(0, 1, count), np.zeros((0, 0)), np.zeros((0, 0, 2)))
-    return Boundary(zero, x, y, problem, scan=scan, step=step, **more)
+    return Boundary(zero, x, y, problem, scan, step=float(step), **more)
 
 
 def is_of_line(reason: Message) -> bool:
     """Whether the time for a line ended a row of its scan."""
     return reason.code is Code.ROW_SPENT and reason.data["key"] == LINE_KEY
-
-
-def _checked_step(step: float) -> float:
-    """A longest step. Raises `ValueError`."""
-    if not SHORTEST < real_number(step, "step") <= LARGEST:
-        raise ValueError(f"got step = {step:g}; must be above {SHORTEST:g} and up to {LARGEST:g} sides of the frame")
-    return float(step)
 
 
 def crossed(lines: Sequence[Boundary]) -> list[Boundary]:

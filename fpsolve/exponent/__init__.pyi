@@ -17,7 +17,5 @@ from .quantities import critical_restitution as critical_restitution
 from .quantities import impact_rate as impact_rate
 from .quantities import lyapunov_exponent as lyapunov_exponent
 from .quantities import stability_index as stability_index
-from .series import PerturbationSeries as PerturbationSeries
-from .series import perturbation_series as perturbation_series
 from .solver import ExponentSolver as ExponentSolver
 from .solver import MomentLyapunov as MomentLyapunov

@@ -499,12 +499,6 @@ class System(Parametrised):
         """Its derivative by ln R at a given ln R."""
         return self.impact_value(log_factor)
 
-    def log_factors_by_order(self, most: int) -> FloatArray:
-        """The sum of all ln R in powers of ε, up to one of them, shape (most + 1,): here all of it is of order ε²."""
-        found = np.zeros(most + 1)
-        found[2:3] = sum(jump.second_order for jump in self.jumps) / self.epsilon**2
-        return found
-
 
 @dataclass(frozen=True)
 class LinearMotion(System):

@@ -36,57 +36,17 @@ SECOND_DERIVATIVE = replace(
     words="curvature of the moment Lyapunov exponent",
     latex=r"$\Lambda''(p)$",
 )
-ORDER = Quantity("order", "n", "order of ε", "$n$", dims=("order",))
-COEFFICIENT = Quantity(
-    "coefficient",
-    "Λₙ(p)",
-    "coefficient of the perturbation series",
-    r"$\Lambda_n(p)$",
-    "1/time",
-    ("order", "p"),
-    "(20)-(23)",
-    error_source="the difference from the adjoint recursion with more functions of the noise, rounding",
-)
-GROWTH = Quantity("growth_rate", "s", "growth rate of a path", r"$s = \ln\|x(t)\|/t$", "1/time", ("growth_rate",))
-TIME = Quantity("time", "t", "time", "$t$", "time", ("time",))
+GROWTH = Quantity("growth_rate", "s", "growth rate of a path", r"$s = \ln\|x(t)\|/t$", "1/time")
 RATE_FUNCTION = Quantity(
     "rate_function",
     "I(s)",
     "rate function of the growth rate",
     "$I(s)$",
     "1/time",
-    ("growth_rate",),
+    ("p",),
     "I(s) = p s − Λ(p), s = Λ′(p)",
-    error_source="that of Λ(p)",
+    comment="at s = Λ′(p); its error is moment_error",
 )
-SADDLE = Quantity("p", "p(s)", "order of the moment with this growth rate", "$p(s)$", dims=("growth_rate",))
-PREFACTOR = Quantity(
-    "prefactor",
-    "C",
-    "prefactor of the moment of order p(s)",
-    "$C$",
-    dims=("growth_rate",),
-    equation="E‖x(t)‖^p ~ C e^(Λ(p)t)",
-    error_source="the difference from a finer discretisation",
-)
-PROBABILITY = Quantity(
-    "probability",
-    "P(s_t ≥ s)",
-    "probability to grow as fast or faster",
-    r"$P(s_t \geq s)$",
-    dims=("time", "growth_rate"),
-)
-BELOW = replace(
-    PROBABILITY,
-    name="probability_below",
-    symbol="P(s_t ≤ s)",
-    words="probability to grow as fast or slower",
-    latex=r"$P(s_t \leq s)$",
-)
-GROWTH_DENSITY = Quantity(
-    "density", "f(s)", "density of the growth rate", "$f(s)$", "time", dims=("time", "growth_rate")
-)
-WIDTH = Quantity("width", "√(Λ″(0)/t)", "standard deviation of the growth rate", "", "1/time", ("time",))
 RESIDUAL = Quantity("residual", "residual", "backward error of the eigenpair", dims=("p",))
 EFFECTIVE_PATHS = Quantity(
     "effective_paths", "effective paths", "effective number of paths that carry the mean", dims=("p",)

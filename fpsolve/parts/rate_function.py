@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 from fpsolve.case.case import Case
 from fpsolve.data import Quantity
@@ -18,8 +17,7 @@ def _settings(case: Case, number: int) -> Settings | None:
 
 
 def _columns(case: Case) -> Sequence[Quantity]:
-    about = replace(RATE_FUNCTION, dims=MOMENT.dims, comment="at s = Λ′(p); its error is moment_error")
-    return () if _settings(case, 1) is None else (about,)
+    return () if _settings(case, 1) is None else (RATE_FUNCTION,)
 
 
 def _row(case: Case, result: CurveResult) -> Row:

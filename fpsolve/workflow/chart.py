@@ -92,7 +92,7 @@ class Chart:
         for line in self.lines:
             reasons = (text for trace in line.traces for text in trace.obstacles)
             ends = dict.fromkeys(each for each in reasons if each not in line.obstacles)
-            holes = [each for each in line.scan.reasons if each not in line.obstacles] if line.scan else []
+            holes = [each for each in line.scan.reasons if each not in line.obstacles]
             found += [Message(Code.LINE_ENDS, line=line.zero.equation, reason=each) for each in ends]
             found += [Message(Code.HOLES, symbol=line.zero.symbol, reason=each) for each in holes]
         return tuple(message_of(each) for each in found if each)
@@ -289,9 +289,7 @@ def write_chart(case: Case, chart: Chart, folder: Path) -> None:
                 "equation": line.zero.equation,
                 "appears": _appears(line.zero),
                 "rtol": line.rtol,
-                "scan": None
-                if line.scan is None
-                else {
+                "scan": {
                     "nodes": [line.scan.nodes.size] * 2,
                     "rtol": line.scan.rtol,
                     "of_value": line_of_value(line.problem, line.zero),

@@ -23,8 +23,8 @@ from fpsolve import (
 )
 from fpsolve.analysis import Axis, Boundary
 from fpsolve.analysis.continuation import FRAME
-from fpsolve.analysis.scan import Sample, Scan, scan_row
-from fpsolve.analysis.stability import crossed
+from fpsolve.analysis.scan import Sample, scan_row
+from fpsolve.analysis.stability import begun, crossed
 from fpsolve.analysis.zero import ZeroField, zero_of
 from fpsolve.budget import charge
 from fpsolve.errors import FpsolveError
@@ -161,36 +161,7 @@ def shares(found):
 
 def held(found, at):
     """Whether points, in shares of its sides, are on the branches of a line."""
-    return all(any(trace.passes(each, 1e-4) for trace in found.traces) for each in at)
-
-
-@pytest.mark.slow
-def test_a_refined_line_is_the_same_with_shorter_steps(weak):
-    finer = weak.refined(0.02)
-    assert len(shares(finer)) > 2 * len(shares(weak))
-    assert max(np.linalg.norm(np.diff(finer.traces[0].at, axis=0), axis=1)) < 0.025
-    assert held(finer, shares(weak))
-    assert held(weak, shares(finer))
-    assert finer.scan is weak.scan
-
-
-@pytest.mark.slow
-def test_two_branches_close_to_each_other_are_both_refined():
-    """δ_p = −6 without much damping of impacts bends back, so that the frame cuts it into two arms near its top."""
-    found = bent()
-    assert len(found.traces) == 2
-    ends = [trace.at[[0, -1]] for trace in found.traces]
-    assert np.min(np.linalg.norm(ends[0][:, None] - ends[1], axis=2)) < found.step
-    again = found.refined(0.05)
-    assert len(again.traces) == 2
-    assert held(again, shares(found))
-
-
-def bent():
-    """Arms of the line of `test_a_fold` in a frame whose side passes just beside its fold."""
-    fold = folded_by_theory()[1]
-    y = Axis("oscillator.c1", fold + 0.0004, fold + 0.5)
-    return line({"moment": -6.0}, Axis("oscillator.omega", 0.3, 4.0), y, restitution=0.95, nodes=7)
+    return all(any(np.linalg.norm(trace.nearest(each)[0] - each) < 1e-4 for trace in found.traces) for each in at)
 
 
 def folded_by_theory(p=-6.0, restitution=0.95):
@@ -240,41 +211,6 @@ def test_a_fold_of_strong_noise():
     weak = line(zero, x, y, epsilon=0.1, **values)
     assert not wanted(weak, "fold in y")
     assert len(weak.traces) == 1
-
-
-@pytest.mark.slow
-def test_an_extended_line_holds_the_old_points(weak):
-    wider = weak.extended(Axis("oscillator.omega", 0.2, 6.0), Axis("oscillator.c1", -2.0, 2.0))
-    [new], [old] = wider.branches, weak.branches
-    points = [[wider.x.share(x), wider.y.share(y)] for x, y in zip(old.x, old.y, strict=True)]
-    assert held(wider, np.array(points))
-    assert new.x[[0, -1]] == pytest.approx([0.2, 6.0]) or new.x[[0, -1]] == pytest.approx([6.0, 0.2])
-    assert wider.scan is None
-    narrow = wider.extended(y=Axis("oscillator.c1", 0.0, 0.1))
-    assert sorted(narrow.branches[0].y[[0, -1]]) == [0, 0.1]
-    logarithmic = weak.extended(y=Axis("oscillator.c1", 0.01, 0.4, "log"))
-    assert sorted(logarithmic.branches[0].y[[0, -1]]) == pytest.approx([0.01, 0.4])
-    assert weak.extended(y=Axis("oscillator.c1", 5.0, 6.0)).traces == ()
-    with pytest.raises(ValueError, match="use `started_from` for other parameters"):
-        weak.extended(Axis("noise.D0", 0.1, 1.0))
-
-
-def test_a_line_started_from_another(weak):
-    x, y = Axis("noise.D0", 0.05, 5.0, "log"), Axis("oscillator.restitution", 0.5, 1.0)
-    other = weak.started_from(0, 3, x, y)
-    omega, c1 = float(weak.branches[0].x[3]), float(weak.branches[0].y[3])
-    assert (other.problem.system.omega, other.problem.system.c1) == (omega, c1)
-    start = np.array([x.share(NOISE.D0), y.share(0.8)])
-    assert held(other, [start])
-    value, error, scale = growth(other, start)
-    assert abs(value) < 1e-9 * scale + error
-    for point in other.traces[0].points[::5]:
-        value, _, scale = growth(other, point.sample.at)
-        assert abs(value) < 1e-9 * scale
-    with pytest.raises(ValueError, match=r"noise\.D0 = 0\.5, .* not in the frame; choose a wider one"):
-        weak.started_from(0, 3, Axis("noise.D0", 1.0, 2.0), y)
-    with pytest.raises(ValueError, match=r"got noise\.sigma as an axis; the parameters are oscillator\.omega"):
-        weak.started_from(0, 3, Axis("noise.sigma", 1.0, 2.0), y)
 
 
 def test_a_line_pickles(weak):
@@ -493,7 +429,7 @@ def test_an_island_that_a_coarse_grid_misses():
     system = PlaneSystem.of_equations(("x", "v"), ("v", equation), {"b": 0.03}, noises=names)
     problem = Problem(system, {"load": Bounded(0.4, 2.0, 0.0), "shake": White(0.1)})
     x, y = Axis("noise.load.nu", 0.6, 1.4), Axis("noise.load.mu", 0.2, 0.8)
-    scan = Boundary(zero_of(SECOND), x, y, problem).reduced_scan()
+    scan = begun(zero_of(SECOND), x, y, problem).reduced_scan()
     is_tongue = scan.values[x.value(scan.nodes) < 0.75] > 0
     assert is_tongue.any()
     assert not is_tongue[::2, ::2].any()
@@ -547,9 +483,8 @@ def test_an_axis_is_invertible(scale):
 def test_rows_are_the_same_in_other_processes():
     """Bit for bit; tasks and what they bring are small."""
     problem = Problem(oscillator(0.5), NOISE.ou_reduction())
-    nowhere = Scan(np.linspace(0, 1, 4), np.zeros((0, 0)), np.zeros((0, 0, 2)))
     c1 = Axis("oscillator.c1", -1.2, 0.8)
-    of = Boundary(zero_of(SECOND), Axis("noise.r0", 0.5, 1.2), c1, problem, scan=nowhere)
+    of = begun(zero_of(SECOND), Axis("noise.r0", 0.5, 1.2), c1, problem, nodes=4)
     here = next(of.solve()).scan
     with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
         there = next(of.solve(pool.map(scan_row, of.rows()))).scan
@@ -560,7 +495,7 @@ def test_rows_are_the_same_in_other_processes():
 
 
 def test_a_row_does_not_depend_on_others():
-    of = Boundary(zero_of(SECOND), OMEGA, C1, Problem(oscillator(), NOISE.ou_reduction()))
+    of = begun(zero_of(SECOND), OMEGA, C1, Problem(oscillator(), NOISE.ou_reduction()))
     rows = of.rows()
     forth, back = [scan_row(row) for row in rows[:2]], [scan_row(row) for row in rows[1::-1]]
     for one, other in zip(forth, reversed(back), strict=True):
@@ -619,7 +554,7 @@ class Worked:
 def test_the_nodes_of_a_row_share_its_time(monkeypatch, most, key):
     """Nodes that cannot be solved, here three of each row, leave time for the others: 60 s, or 78 s · ½ / 13 = 3 s."""
     work = Worked(monkeypatch, lambda at: 1e9 if 0.1 < at[1] < 0.3 else 0.02)
-    of = Boundary(zero_of(SECOND), OMEGA, C1, Problem(oscillator(), NOISE), budget=Budget(line_seconds=most))
+    of = begun(zero_of(SECOND), OMEGA, C1, Problem(oscillator(), NOISE), budget=Budget(line_seconds=most))
     share = 3.0 if most else 60.0
     for row in of.rows():
         started = work.now
@@ -633,7 +568,7 @@ def test_the_nodes_of_a_row_share_its_time(monkeypatch, most, key):
 def test_a_line_ends_with_its_time(monkeypatch, cost):
     """What is traced is kept, and said to be not all; before, a line took any time."""
     work = Worked(monkeypatch, lambda _: 0.5)
-    of = Boundary(zero_of(SECOND), OMEGA, C1, Problem(oscillator(), NOISE), budget=Budget(line_seconds=600.0))
+    of = begun(zero_of(SECOND), OMEGA, C1, Problem(oscillator(), NOISE), budget=Budget(line_seconds=600.0))
     lines = of.solve()
     assert not next(lines).complete
     work.cost = lambda _: cost

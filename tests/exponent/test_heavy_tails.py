@@ -17,7 +17,7 @@ from fpsolve import (
     simulate,
     stability_index,
 )
-from fpsolve.analysis import excursion, growth_law, rate_function
+from fpsolve.analysis import excursion
 from fpsolve.errors import NoSuchExponent
 from fpsolve.exponent import impact_rate
 from tests.conftest import sampled
@@ -111,8 +111,6 @@ def test_the_exponent_is_that_of_almost_every_path():
         (r"Λ\(-0.9\)", lambda: MomentLyapunovFunction(FALLING, (-0.9, -0.1))),
         (r"Λ\(-0.4\)", lambda: simulate(FALLING, [-0.4])),
         ("Λ″\\(0\\)", lambda: ExponentSolver(FALLING).variance_rate()),
-        ("the law of growth", lambda: rate_function(FALLING, [-0.01])),
-        ("the law of growth", lambda: growth_law(FALLING, 100.0, [-0.01])),
         ("P\\(sup ‖x‖ ≥ A\\)", lambda: excursion(FALLING)),
     ],
 )

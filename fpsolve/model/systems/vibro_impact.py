@@ -183,14 +183,6 @@ class VibroImpactOscillator(System):
         """dr/d ln R of this law at a given ln R."""
         return (1.0 if self.impact == ImpactLaw.DELTA else math.exp(log_factor)) / self.epsilon**2
 
-    def log_factors_by_order(self, most: int) -> FloatArray:
-        """−ε²(1 − r) of the delta law; the powers of ln(1 − ε²(1 − r)) of that of restitution."""
-        if self.impact == ImpactLaw.DELTA:
-            return super().log_factors_by_order(most)
-        found, powers = np.zeros(most + 1), np.arange(1, most // 2 + 1)
-        found[2::2] = -((1 - self.restitution) ** powers) / powers
-        return found
-
     def h2(self, phi: ArrayLike) -> FloatArray:
         """h₂(φ) = c₁ h₁(φ); the impact adds nothing, as sin 2φ vanishes where it acts."""
         return self.terms[2].h(phi)
