@@ -195,23 +195,6 @@ axes.set(xlabel="frequency (rad/s)", ylabel="spectral density of the relative st
 axes.legend()
 plt.show()
 """,
-    "theorem": """
-# %%
-# Between these bounds is, with certainty, the probability that a path ever exceeds A times its start, though almost
-# every path decays:
-
-import matplotlib.pyplot as plt
-import numpy as np
-
-from fpsolve.proofs import prove_excursion
-
-# sphinx_gallery_thumbnail_number = -1
-proof, levels = prove_excursion(case.problem), np.geomspace(1, 1e4, 50)
-figure, axes = plt.subplots(layout="constrained")
-axes.fill_between(levels, *np.transpose([proof.bounds(level) for level in levels]), alpha=0.4)
-axes.set(xscale="log", yscale="log", xlabel="level A", ylabel="probability that a path ever exceeds it")
-plt.show()
-""",
 }
 """The first cases of the gallery, which show one of each kind, and what they draw beside Λ(p)."""
 

@@ -102,7 +102,6 @@ LONGEST = (
     "exponent/test_solver.py",
     "output/test_many_curves.py",
     "study/test_uncertain.py",
-    "proofs/test_excursions.py",
     "study/test_chart.py",
     "exponent/test_blocks.py",
     "test_kills.py",

@@ -1,10 +1,7 @@
 from .certificate import Certificate as Certificate
 from .certificate import Enclosure as Enclosure
-from .questions import ExcursionBound as ExcursionBound
-from .questions import ExcursionEnclosure as ExcursionEnclosure
 from .questions import IndexEnclosure as IndexEnclosure
 from .questions import prove as prove
-from .questions import prove_excursion as prove_excursion
 from .questions import prove_lyapunov_exponent as prove_lyapunov_exponent
 from .questions import prove_stability_index as prove_stability_index
 from .verify import objection as objection

@@ -276,17 +276,6 @@ class Bounder:
         inward = np.array(drift) - bend[::-1]
         return Bounds(mismatch, (inward[0] - slack[0], inward[1] + slack[1]))
 
-    def function(self, low: FloatArray, high: FloatArray) -> Range:
-        """Around u on cells [low, high], shape (cells of φ, cells of z)."""
-        return self._phases.bounds(Cells(self.trial.basis, low, high).modes(self.trial.values))
-
-    def function_at(self, turn: Any, low: FloatArray, high: FloatArray) -> Range:
-        """Around u at one φ, e^{2iφ} = turn, on cells [low, high], shape (cells of z,)."""
-        waves = len(self.trial.values) // 2
-        row = sum(turn ** int(k) * mode for k, mode in zip(range(-waves, waves + 1), self.trial.values, strict=True))
-        least, most = self._phases.bounds(Cells(self.trial.basis, low, high).modes(row[None]))
-        return least[0], most[0]
-
     def held(self, z: FloatArray, sign: int) -> list[HeldBounds]:
         """Where u may be held, on the right or, with sign −1, on the left."""
         trial, cells, at = self.trial, Cells(self.trial.basis, z, z, self._rest), balls(z)

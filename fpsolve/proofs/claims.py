@@ -9,14 +9,12 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from decimal import Decimal, InvalidOperation
 from fractions import Fraction
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Self
 
 import numpy as np
 from pydantic import Discriminator, Field, Tag, ValidationError, model_validator
 
-from fpsolve.proofs.bounds import LOWER, UPPER
 from fpsolve.proofs.certificate import MOMENT, Certificate, MalformedProof, follows
-from fpsolve.proofs.excursions import excursion_factor
 from fpsolve.proofs.forms import FormCertificate
 from fpsolve.proofs.records import Record
 from fpsolve.proofs.statement import DECIMAL, inert_keys
@@ -109,40 +107,6 @@ class IndexBound(Record):
             yield "the bounds of δ_p are closer than the two p"
 
 
-class ExcursionClaim(Record):
-    """P(sup ‖x‖ ≥ A) ≤ factor · A^−p for every A > 1, or ≥, from the sign of Λ(p), see `excursions`."""
-
-    sense: Literal["upper", "lower"]
-    factor: Decimal
-    moment: MomentBound
-
-    @property
-    def bounds(self) -> Sequence[Bound]:
-        """That from which it follows."""
-        return [self.moment]
-
-    @property
-    def lower(self) -> Decimal:
-        """What is claimed; for the count of numbers that are bounded."""
-        return self.factor
-
-    def objections(self, parameters: Stated) -> Iterator[str]:
-        """Why the bound need not hold."""
-        yield from self.moment.objections(parameters)
-        certificate, is_upper = self.moment.certificate, self.sense == "upper"
-        end = self.moment.upper if is_upper else self.moment.lower
-        if end is None or (end > 0 if is_upper else end < 0) or not isinstance(certificate, Certificate):
-            yield f"Λ(p) {'≤' if is_upper else '≥'} 0 is not proven"
-            return
-        with np.errstate(all="ignore"):
-            least = excursion_factor(certificate, UPPER if is_upper else LOWER)
-        read = Fraction(self.factor), Fraction(float(self.factor))
-        if math.isnan(least) or not all(
-            each >= Fraction(least) if is_upper else each <= Fraction(least) for each in read
-        ):
-            yield "the factor does not follow"
-
-
 class CurveClaims(Record):
     """What is claimed for one parameter set."""
 
@@ -151,14 +115,12 @@ class CurveClaims(Record):
     lyapunov_exponent: Bound | None
     stability_index: IndexBound | None
     verdicts: list[str]
-    excursions: Annotated[list[ExcursionClaim], Field(default_factory=list)]
 
     @property
-    def claims(self) -> Mapping[str, Bound | IndexBound | ExcursionClaim]:
+    def claims(self) -> Mapping[str, Bound | IndexBound]:
         """All bounds, by the places where they stand."""
         found: dict[str, Any] = {f"moments.{i}": each for i, each in enumerate(self.moments)}
         found |= {"lyapunov_exponent": self.lyapunov_exponent, "stability_index": self.stability_index}
-        found |= {f"excursions.{i}": each for i, each in enumerate(self.excursions)}
         return {place: each for place, each in found.items() if each is not None}
 
     def objections(self) -> Iterator[str]:
@@ -171,8 +133,6 @@ class CurveClaims(Record):
             yield from (f"{place}: {text}" for text in claim.objections(self.parameters))
         signs = [(str(each.p), each.sign) for each in self.moments]
         path = 0 if self.lyapunov_exponent is None else self.lyapunov_exponent.sign
-        if path >= 0 and any(each.sense == "lower" for each in self.excursions):
-            yield "excursions: a lower bound needs λ < 0, which is not claimed"
         proven = verdicts(signs, path)
         yield from (f"verdicts: {text!r} does not follow" for text in self.verdicts if text not in proven)
 

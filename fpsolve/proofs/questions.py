@@ -13,11 +13,9 @@ from fpsolve.exponent.function import nonzero_root
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.model.problem import Problem
 from fpsolve.proofs.balls import precision
-from fpsolve.proofs.bounds import LOWER, UPPER
 from fpsolve.proofs.certificate import NOTHING, Enclosure, around, enclosure_of, trivial
-from fpsolve.proofs.excursions import excursion_factor
 from fpsolve.proofs.forms import form_certificate
-from fpsolve.proofs.search import Timer, enclose, sign_certificate
+from fpsolve.proofs.search import Timer, enclose
 from fpsolve.proofs.statement import Statement, cylinder, statement_of
 from fpsolve.theory.perturbation import scale_of
 
@@ -27,11 +25,6 @@ GUESS_SHARE = 0.25
 """Of the time of a bound, for one of the two guesses of the number."""
 INDEX_WIDTH, WIDENINGS = 1e-6, 4
 """The width sought for δ_p, and how often it is tried again with one ten times as large."""
-NEARBY = (1e-4, 1e-3, 1e-2)
-"""How far beside δ_p the sign of Λ(p) is proven for excursions, relative; the first that is found."""
-
-LOOSE = 1e-9
-"""By which c is given away, relative, so that another machine's rounding does not matter."""
 
 
 @dataclass(frozen=True)
@@ -56,45 +49,6 @@ class IndexEnclosure:
 
 
 NO_INDEX = IndexEnclosure(-math.inf, math.inf)
-
-
-@dataclass(frozen=True)
-class ExcursionBound:
-    """P(sup ‖x‖ ≥ A) ≤ c A^−p, or ≥, for every A > 1, from the sign of Λ(p).
-
-    Attributes:
-        p: as a decimal.
-        factor: c.
-        moment: bounds on Λ(p), one of which has the sign.
-    """
-
-    p: str
-    factor: float
-    moment: Enclosure
-
-
-@dataclass(frozen=True)
-class ExcursionEnclosure:
-    """Both bounds; None where one is not proven. The lower one holds if λ < 0, which is to be proven as well.
-
-    They hold for x(0) = (1, 0) in the variables of the system, and every law of the noise at the start.
-    """
-
-    lower: ExcursionBound | None
-    upper: ExcursionBound | None
-
-    @property
-    def is_proven(self) -> bool:
-        """Whether there is a bound."""
-        return self.lower is not None or self.upper is not None
-
-    def bounds(self, level: float) -> tuple[float, float]:
-        """The bounds of P(sup ‖x‖ ≥ A) in floats, about; 0 and 1 where none is proven."""
-        low = 0.0 if self.lower is None else self.lower.factor * level ** -float(self.lower.p)
-        return low, 1.0 if self.upper is None else min(self.upper.factor * level ** -float(self.upper.p), 1.0)
-
-
-NO_EXCURSION = ExcursionEnclosure(None, None)
 
 
 def prove(
@@ -157,16 +111,6 @@ def prove_stability_index(
 ) -> IndexEnclosure:
     """Bounds on the stability index δ_p, from the signs of Λ beside it; as `prove`, but they may take twice as long."""
     return prove_index(problem, statement_of(problem), budget or Budget(), progress)
-
-
-def prove_excursion(
-    problem: Problem, *, budget: Budget | None = None, progress: Callable[[], None] = lambda: None
-) -> ExcursionEnclosure:
-    """Bounds of P(sup ‖x‖ ≥ A) for noise that is bounded or white, see `fpsolve.proofs.excursions`; as `prove`.
-
-    The lower one needs λ < 0, which `prove_lyapunov_exponent` proves.
-    """
-    return prove_excursions(problem, statement_of(problem), budget or Budget(), progress)
 
 
 def check_width(width: float | None) -> None:
@@ -260,32 +204,3 @@ def prove_index(
                 return IndexEnclosure(*around(*sides), tuple(moments))
         half *= 10
     return NO_INDEX
-
-
-def prove_excursions(
-    problem: Problem, stated: Statement, budget: Budget, progress: Callable[[], None] = lambda: None
-) -> ExcursionEnclosure:
-    """Bounds of excursions from p beside δ_p; none where there is no δ_p > 0, or where they are not found."""
-    refuse_unprovable(stated)
-    if stated.linear:
-        return NO_EXCURSION
-    timer = Timer(budget.seconds)
-    try:
-        most = replace(budget, seconds=GUESS_SHARE * budget.seconds)
-        found = nonzero_root(ExponentSolver(problem, budget=most))
-    except NotConverged:
-        return NO_EXCURSION
-    if not found or found.value <= 0:
-        return NO_EXCURSION
-    bounds: list[ExcursionBound | None] = []
-    for sense, share in ((LOWER, 0.5), (UPPER, 1.0)):
-        bounds.append(None)
-        for away in NEARBY:
-            p = repr(float(f"{found.value * (1 - sense * away):.7g}"))
-            seconds = share * (timer.seconds - timer.elapsed) / len(NEARBY)
-            certificate = sign_certificate(stated, p, sense, Timer(seconds), progress)
-            factor = math.nan if certificate is None else excursion_factor(certificate, sense)
-            if certificate is not None and factor > 0:
-                bounds[-1] = ExcursionBound(p, factor * (1 + sense * LOOSE), enclosure_of(certificate))
-                break
-    return ExcursionEnclosure(*bounds)

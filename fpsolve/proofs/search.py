@@ -13,7 +13,6 @@ import math
 import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -42,8 +41,6 @@ such trials are passed over."""
 WHOLE_BELOW = 6.0
 """End exponents a below which the ends of the support carry too much weight to be cut off."""
 CELLS, REACH, HELD_FROM, CANDIDATES = 480, 10.0, 3.5, 24
-FINE = 512
-"""Cells of φ at least where the extremes of u matter."""
 REST = 1e-8
 """What Taylor's formula may leave over; verification leaves less, so that it finds all that is found here."""
 SLACK = 1e-6
@@ -107,17 +104,11 @@ class Pair:
 
 
 class Galerkin:
-    """The eigenproblem with modes up to `waves` and polynomials below `degrees`.
+    """The eigenproblem with modes up to `waves` and polynomials below `degrees`."""
 
-    Args:
-        evenly: whether all noise counts alike, and not by how often it is there, so that u serves without W.
-    """
-
-    def __init__(
-        self, noise: Cylinder, basis: Basis, p: float | None, waves: int, degrees: int, *, evenly: bool = False
-    ) -> None:
+    def __init__(self, noise: Cylinder, basis: Basis, p: float | None, waves: int, degrees: int) -> None:
         self.noise, self.waves, self.degrees = noise, waves, degrees
-        mass, position, wandering = (_even_axis if evenly else _axis)(noise, basis, degrees)
+        mass, position, wandering = _axis(noise, basis, degrees)
         modes = sp.identity(2 * waves + 1)
         still, driven = (self._turning(i, 0.0 if p is None else p) for i in (0, 1))
         self.mass = sp.kron(modes, mass, format="csc")
@@ -181,19 +172,6 @@ def _axis(noise: Cylinder, basis: Basis, degrees: int) -> tuple[FloatArray, Floa
     full = slopes + basis.gauge * values
     diffusion = float(noise.nu) / 2 * (full * weight) @ full.T
     return (values * weight) @ values.T, (values * weight * z) @ values.T, -diffusion
-
-
-def _even_axis(noise: Cylinder, basis: Basis, degrees: int) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """The same on the whole support with the weight of Chebyshev polynomials."""
-    if (known := basis.products(noise, degrees)) is not None:
-        return known
-    count, unit = 2 * degrees + 40, balls(np.eye(degrees))
-    z = np.cos(np.pi * (np.arange(count) + 0.5) / count)
-    values, wandering = (
-        np.polynomial.chebyshev.chebval(z, part.astype(float).T)
-        for part in (basis.values(unit), basis.diffused(unit, noise))
-    )
-    return values @ values.T / count, values * z @ values.T / count, values @ wandering.T / count
 
 
 def _quadrature(basis: Basis, noise: Cylinder, degrees: int) -> tuple[FloatArray, FloatArray]:
@@ -320,60 +298,6 @@ def _enlarged(
         progress()
         if certificate is not None:
             yield certificate, waves, degrees
-
-
-@precision()
-def sign_certificate(
-    stated: Statement,
-    p: str,
-    sense: int,
-    timer: Timer,
-    progress: Callable[[], None] = lambda: None,
-) -> Certificate | None:
-    """That Λ(p) ≤ 0 (sense 1), or Λ(p) ≥ 0 (−1), by a trial function without W; None where that is not found.
-
-    Args:
-        stated, p, timer, progress: as for `enclose`.
-    """
-    noise = cylinder(stated)
-    if (kind := noise.bases[-1]) not in OTHERS:
-        return None
-    basis, (waves, degrees) = OTHERS[kind], SMALLEST
-    if noise.states is not None:
-        degrees = len(noise.states)
-    cost = 0.0
-    while (2 * waves + 1) * degrees <= MOST_UNKNOWNS and (begun := timer.elapsed) + cost <= timer.seconds:
-        try:
-            pair = Galerkin(noise, basis, float(p), waves, degrees, evenly=True).pair(0.0)
-        except ArithmeticError:
-            return None
-        found = _flat(stated, noise, basis, p, pair, sense) if math.isfinite(pair.value) else None
-        progress()
-        if found is not None and not objection(found):
-            return found
-        cost = (timer.elapsed - begun) * GROWTH**3
-        waves = math.ceil(GROWTH * waves) + 1
-        if noise.states is None:
-            degrees = math.ceil(GROWTH * degrees) + 1
-        if max(waves + 1, degrees) > min(MOST["rows"], MOST["columns"]):
-            return None
-    return None
-
-
-def _flat(stated: Statement, noise: Cylinder, basis: Basis, p: str, pair: Pair, sense: int) -> Certificate | None:
-    """A certificate without W that proves this sign; None where it does not."""
-    trial = Trial(noise, ball(p), pair.value, basis, pair.cosine, pair.sine)
-    phases, nodes = max(FINE, 16 * len(pair.cosine)), np.zeros(0)
-    if (cells := basis.cover(pair.cosine.shape[1])) is None:
-        nodes = _nodes(trial)
-        cells = nodes[:-1], nodes[1:]
-    bounds = Bounder(trial, phases).bounds(*cells)
-    upper, lower = (max(float(np.max(bounds.above(q))), 1e-18) * (1 + SLACK) for q in (UPPER, LOWER))
-    if not np.all(bounds.is_positive) or not sense * pair.value + (upper if sense == UPPER else lower) < 0:
-        return None
-    flat: dict[str, Any] = {"nodes": nodes.tolist(), "values": np.zeros(nodes.size).tolist(), "tails": None}
-    sides = (SideRecord(delta=delta, **flat) for delta in (upper, lower))
-    return _certificate(stated, basis, p, pair, phases, *sides)
 
 
 def _apart(certificate: Certificate) -> float:

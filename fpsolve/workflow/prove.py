@@ -22,7 +22,6 @@ from typing import Any, TypeAlias, cast
 from pydantic import TypeAdapter
 
 from fpsolve import __version__
-from fpsolve.analysis.excursions import SYMBOL
 from fpsolve.case.case import Case, Curve
 from fpsolve.case.sections import EXCURSIONS
 from fpsolve.errors import FpsolveError, NoSuchExponent
@@ -36,12 +35,9 @@ from fpsolve.pool import Pool, serial
 from fpsolve.proofs.certificate import NOTHING, Enclosure, MalformedProof, enclosure_of
 from fpsolve.proofs.claims import Claims, claims_from, plain, verdicts
 from fpsolve.proofs.questions import (
-    ExcursionBound,
-    ExcursionEnclosure,
     IndexEnclosure,
     check_width,
     prove_bounds,
-    prove_excursions,
     prove_index,
     refuse_unprovable,
 )
@@ -58,7 +54,7 @@ ORDERS = "moments.p"
 """The key of the p of a case."""
 Literals = Mapping[float, str]
 """Decimals by their floats."""
-Answer: TypeAlias = Enclosure | IndexEnclosure | ExcursionEnclosure
+Answer: TypeAlias = Enclosure | IndexEnclosure
 """Bounds that were found."""
 Question = partial[Any]
 """A function that finds bounds, with its arguments."""
@@ -86,7 +82,7 @@ class CurveProof:
         stated: what is proven of.
         moments: p as a decimal, and bounds on Λ(p) or None where that was not tried.
         exponent: bounds on λ; None where they are not asked for, or were not tried.
-        index, excursion: bounds on δ_p, and of P(sup ‖x‖ ≥ A), or None as for λ.
+        index: bounds on δ_p, or None as for λ.
     """
 
     curve: Curve
@@ -94,20 +90,6 @@ class CurveProof:
     moments: tuple[tuple[str, Enclosure | None], ...]
     exponent: Enclosure | None = None
     index: IndexEnclosure | None = None
-    excursion: ExcursionEnclosure | None = None
-
-    @property
-    def excursions(self) -> Mapping[str, ExcursionBound]:
-        """The bounds of P(sup ‖x‖ ≥ A) that hold: "lower", for which λ < 0 is proven too, and "upper"."""
-        found: dict[str, ExcursionBound] = {}
-        if self.excursion is None:
-            return found
-        decays = self.exponent is not None and self.exponent.sign < 0
-        if self.excursion.lower is not None and decays:
-            found["lower"] = self.excursion.lower
-        if self.excursion.upper is not None:
-            found["upper"] = self.excursion.upper
-        return found
 
     @property
     def is_met(self) -> bool:
@@ -123,7 +105,7 @@ class CurveProof:
 
 @dataclass(frozen=True)
 class Plan:
-    """What is to be proven of a case, the same of every curve: Λ at all p; λ, δ_p, excursions if [output] names them.
+    """What is to be proven of a case, the same of every curve: Λ at all p; λ and δ_p if [output] names them.
 
     Attributes:
         case: whose curves.
@@ -135,9 +117,8 @@ class Plan:
 
     @property
     def indices(self) -> list[str]:
-        """Those of λ, δ_p and excursions that are asked for."""
-        known = (LYAPUNOV_EXPONENT.name, STABILITY_INDEX.name, EXCURSIONS)
-        return [name for name in known if name in self.case.asked]
+        """Those of λ and δ_p that are asked for."""
+        return [name for name in (LYAPUNOV_EXPONENT.name, STABILITY_INDEX.name) if name in self.case.asked]
 
     @property
     def each(self) -> int:
@@ -175,8 +156,6 @@ class Plan:
                 yield partial(prove_bounds, problem, stated, None, self.width, budget=budget)
             if STABILITY_INDEX.name in self.indices:
                 yield partial(prove_index, problem, stated, budget=budget)
-            if EXCURSIONS in self.indices:
-                yield partial(prove_excursions, problem, stated, budget=budget)
 
     def gathered(self, answers: Sequence[Answer]) -> list[CurveProof]:
         """What is proven of each curve, from the first answers, in the order of the questions."""
@@ -184,7 +163,7 @@ class Plan:
         for curve in self.case.curves(stop=-(-len(answers) // self.each)):
             moments = tuple((p, cast("Enclosure | None", next(rest, None))) for p in self._orders)
             indices: dict[str, Any] = {name: next(rest, None) for name in self.indices}
-            names = (LYAPUNOV_EXPONENT.name, STABILITY_INDEX.name, EXCURSIONS)
+            names = (LYAPUNOV_EXPONENT.name, STABILITY_INDEX.name)
             found.append(CurveProof(curve, self.stated(curve), moments, *map(indices.get, names)))
         return found
 
@@ -272,9 +251,6 @@ def write_proof(case: Case, proofs: Sequence[CurveProof], folder: Path, *, is_wh
             "stability_index": "null" if proof.index is None else _index(proof.index),
             "verdicts": _line(proof.verdicts),
         }
-        if proof.excursions:
-            rare = ", ".join(_excursion(sense, each) for sense, each in proof.excursions.items())
-            parts["excursions"] = f"[{rare}]"
         text = ",\n".join(f"   {json.dumps(key)}: {value}" for key, value in parts.items())
         curves.append(f"  {{\n{text}\n  }}")
     write_text(folder / PROOF, "\n".join(["{", f'{lines},\n "curves": [', ",\n".join(curves), " ]", "}", ""]))
@@ -300,11 +276,6 @@ def _index(found: IndexEnclosure) -> str:
     return f'{{"lower": {_line(ends[0])}, "upper": {_line(ends[1])}, "moments": [{moments}]}}'
 
 
-def _excursion(sense: str, found: ExcursionBound) -> str:
-    """A bound of excursions, and the bounds on Λ(p) from which it follows."""
-    return f'{{"sense": "{sense}", "factor": {_line(found.factor)}, "moment": {_moment(found.p, found.moment)}}}'
-
-
 def _line(data: Any) -> str:
     return json.dumps(data, allow_nan=False, ensure_ascii=False)
 
@@ -322,9 +293,6 @@ def show(case: Case, proofs: Sequence[CurveProof]) -> Iterator[Block]:
             told = [*path, f"of {len(proof.moments)} moments {_counted(proof)}"]
         if told:
             yield Sentence(f"Proven: {'; '.join(told)}.")
-        if proof.excursion is not None:
-            rare = excursion_in_words(proof)
-            yield Sentence(f"Proven: {rare}." if rare else f"{SYMBOL} {NOT_PROVEN}")
         yield proof_grid(proof)
 
 
@@ -408,25 +376,6 @@ def bounds_text(found: Enclosure | IndexEnclosure) -> tuple[str, str]:
     return low, high
 
 
-def excursion_in_words(proof: CurveProof) -> str:
-    """What is proven of excursions: "0.757 A^-0.3784 ≤ P(sup ‖x‖ ≥ A) ≤ 1.34 A^-0.3783 for every A > 1"."""
-    found, text = proof.excursions, SYMBOL
-    if not found:
-        return ""
-    if "lower" in found:
-        text = f"{_power(found['lower'], ROUND_FLOOR)} ≤ {text}"
-    if "upper" in found:
-        text = f"{text} ≤ {_power(found['upper'], ROUND_CEILING)}"
-    return f"{text} for every A > 1, a start (1, 0) and any noise at the start"
-
-
-def _power(found: ExcursionBound, rounding: str) -> str:
-    """c A^−p with the digits of c rounded outward."""
-    factor = Decimal(repr(found.factor))
-    step = Decimal(1).scaleb(factor.adjusted() - 3)
-    return f"{factor.quantize(step, rounding)} A^-{found.p}"
-
-
 class Kept:
     """Bounds on Λ(p) and λ that an earlier run has proven, each verified anew from its certificate.
 
@@ -490,7 +439,7 @@ def prove_case(
     pool: Pool | None = None,
     watch: Watch = SILENT,
 ) -> list[CurveProof]:
-    """Prove bounds on Λ at every p of every curve, and on λ, δ_p and excursions; write proof.json into `out`/<case>/.
+    """Prove bounds on Λ at every p of every curve, and on λ and δ_p; write proof.json into `out`/<case>/.
 
     Args:
         width: wanted upper − lower; 1e-7 of the scale of each number if None.

@@ -48,8 +48,6 @@ class Model(NamedTuple):
     moment: bool
     p: Fraction
     mu: float
-    jumps: tuple = ()  # of each jump its ray, ln R, and whether it is passed forward (1) or backward (−1)
-    coordinates: tuple = ((1, 0), (0, 1))  # P
 
     @property
     def nu(self):
@@ -140,11 +138,10 @@ def model_of(certificate):
         still, driven, jumps = (_parametric if "system.stiffness" in given else _oscillator)(given)
     if noise.ito:
         still = [[still[i][j] - noise.square * _times(driven, driven)[i][j] / 2 for j in (0, 1)] for i in (0, 1)]
-    kappa, passed = cs.exact(0), []
+    kappa = cs.exact(0)
     for ray, log_factor in jumps:
         speeds = [ray[1] * x - ray[0] * y for x, y in (_moved(a, ray) for a in (still, driven))]
-        passed.append((ray, log_factor, _direction(*speeds, noise)))
-        kappa = kappa + log_factor * passed[-1][-1]
+        kappa = kappa + log_factor * _direction(*speeds, noise)
     unit = cs.IV.sqrt(cs.exact(noise.square))
     return Model(
         still=_polar(still, cs.exact(1)),
@@ -154,10 +151,6 @@ def model_of(certificate):
         moment=quantity == "moment",
         p=decimal(certificate["p"]) if quantity == "moment" else Fraction(0),
         mu=float(binary(certificate["mu"])),
-        jumps=tuple(passed),
-        coordinates=((1, 0), (0, 1))
-        if motion is None
-        else tuple(map(tuple, _fractions(motion["coordinates"], (2, 2)))),
     )
 
 
