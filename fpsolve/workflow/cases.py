@@ -153,12 +153,9 @@ def run_case(
             with watch.bar(Phase(case.name, "figures")), writable(folder):
                 results.write_figures(case, sweep.results, simulated, folder, sweep.results.table)
             if watch.has_report:
-                from fpsolve.show.claims import show_claims  # which takes a tenth of a second
-
                 is_whole = not interruption and len(simulated) == case.planned * monte_carlo
                 blocks = chain(
                     results.show(case, sweep.results, folder, simulated, sweep.results.table),
-                    show_claims(sweep.results, folder),
                     show_samples(case, samples) if samples else (),
                     show_simulated(case, simulated, sweep.results) if simulated else (),
                     sweep.notes,

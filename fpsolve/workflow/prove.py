@@ -44,12 +44,13 @@ from fpsolve.proofs.questions import (
 from fpsolve.proofs.statement import DECIMAL, Statement, linear_values, statement_of
 from fpsolve.proofs.verify import objection
 from fpsolve.reading import Unreadable, Words, read_text
-from fpsolve.show.claims import PROOF
 from fpsolve.show.curves import Shown, grid_of
 from fpsolve.workflow.folders import PROVEN, kept, own_folder, saying_if_interrupted
 from fpsolve.workflow.progress import BOUNDS, SILENT, Phase, Watch
 from fpsolve.workflow.reports import facts_since, shown_at_the_end, write_report
 
+PROOF = "proof.json"
+"""The file of proven bounds."""
 ORDERS = "moments.p"
 """The key of the p of a case."""
 Literals = Mapping[float, str]

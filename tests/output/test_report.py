@@ -1,6 +1,5 @@
 """report.html: what stands on the page, that it is one file, that texts are texts, and that it never costs a result."""
 
-import json
 import re
 from datetime import UTC, datetime
 from html.parser import HTMLParser
@@ -21,7 +20,7 @@ from fpsolve.output.tables import facts_of
 from fpsolve.page.page import Drawing
 from fpsolve.parts.eigenfunctions import surface_from
 from fpsolve.parts.surfaces import can_render, picture_of
-from fpsolve.show import claims, problem, results
+from fpsolve.show import problem, results
 from fpsolve.show.verdict import meaning, verdicts
 from fpsolve.study.columns import table_of
 from fpsolve.workflow import reports
@@ -237,78 +236,7 @@ def test_proofs_have_a_page(tmp_path):
     assert run(tmp_path, text, "--report", name="proven.toml") == 0  # which keeps the proof, as of its parameters
     words = Page(tmp_path / "proven/report.html").text
     assert "Other commands wrote proof.json there" in words
-    assert "Proven: the moment of order 2 grows." in words
     assert "The mean square grows" in words
-
-
-def _lie(curve):
-    curve["verdicts"] = ["the moment of order 2 decays"]
-
-
-def _narrow(curve):
-    curve["moments"][1]["lower"] = curve["moments"][1]["upper"]
-
-
-def _other(curve):
-    curve["moments"][1]["certificate"]["parameters"]["noise.D0"] = "0.5"
-
-
-@pytest.mark.parametrize(
-    ("alter", "why"),
-    [
-        (_lie, "verdicts: 'the moment of order 2 decays' does not follow"),
-        (_narrow, "moments.1: the bounds are closer than those of the certificate"),
-        (_other, "moments.1: the certificate is of other parameters"),
-    ],
-)
-def test_a_proof_that_was_altered_is_not_called_proven(alter, why, tmp_path):
-    pytest.importorskip("flint")
-    text = f'{PROVABLE}[output]\nquantities = ["moment"]\nfigure = false\n'
-    assert run(tmp_path, text, "--width", "0.01", command="prove", name="proven.toml") == 0
-    path = tmp_path / "proven/proof.json"
-    content = json.loads(path.read_text(encoding="utf-8"))
-    alter(content["curves"][0])
-    path.write_text(json.dumps(content), encoding="utf-8")
-    assert run(tmp_path, text, "--report", name="proven.toml") == 0
-    words = Page(tmp_path / "proven/report.html").text
-    assert "Proven" not in words
-    assert f"This does not follow: {why}" in words
-
-
-def test_a_proof_that_would_take_long_to_check_is_said_not_to_be_checked(tmp_path, monkeypatch):
-    pytest.importorskip("flint")
-    monkeypatch.setattr(claims, "MOST_CHECKED", 0)
-    text = f'{PROVABLE}[output]\nquantities = ["moment"]\nfigure = false\n'
-    assert run(tmp_path, text, "--width", "0.01", command="prove", name="proven.toml") == 0
-    assert run(tmp_path, text, "--report", name="proven.toml") == 0
-    words = Page(tmp_path / "proven/report.html").text
-    assert "Proven" not in words
-    assert "proof.json says: the moment of order 2 grows. This was not checked here" in words
-
-
-def test_a_proof_of_another_system_with_the_same_parameters_is_none(tmp_path):
-    pytest.importorskip("flint")
-    own = """title = "Own"
-[system]
-kind = "equations"
-variables = ["x", "v"]
-drift = ["v", "-x - 0.1*v - xi*x"]
-[noise]
-kind = "telegraph"
-a = 0.5
-k = 1.0
-[moments]
-p = [2.0]
-[output]
-quantities = ["moment"]
-figure = false
-"""
-    assert run(tmp_path, own, "--width", "0.01", command="prove", name="own.toml") == 0
-    for text, is_proven in ((own, True), (own.replace("0.1*v", "0.3*v"), False)):
-        assert run(tmp_path, text, "--report", name="own.toml") == 0
-        words = Page(tmp_path / "own/report.html").text
-        assert ("Proven: the moment" in words) == is_proven
-        assert ("its certificates are of another system" in words) != is_proven
 
 
 @pytest.mark.slow
