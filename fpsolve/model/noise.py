@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fpsolve.arrays import Coefficient, FloatArray, nothing
-from fpsolve.model.exact import ExactLaw
 from fpsolve.model.parameters import Parametrised
 from fpsolve.model.plane import CoefficientMatrix, Motion, MotionDerivative, System
 
@@ -270,15 +269,6 @@ class Noise(Parametrised):
     def derivative(self, name: str) -> NoiseDerivative:
         """The derivative of the noise by one of its `differentiable` parameters."""
         raise NotImplementedError(f"{type(self).__name__} states no derivative by {name}")
-
-    @classmethod
-    def exact_law(cls, decimals: Mapping[str, str]) -> ExactLaw | None:
-        """The law of the noise in exact numbers, from its parameters as decimals by name; None if no proof exists.
-
-        Raises:
-            NoSuchExponent: no bound can be proven for these parameters.
-        """
-        return None
 
 
 class Memoryless(Noise):

@@ -33,7 +33,6 @@ from fpsolve.arrays import (
     shown,
 )
 from fpsolve.model.equation import MOST_EQUATIONS, equations_of, paragraphs
-from fpsolve.model.exact import ExactMotion
 from fpsolve.model.parameters import Parametrised
 from fpsolve.model.quantity import ResponseQuantities, response_quantities
 
@@ -452,11 +451,6 @@ class System(Parametrised):
     def derivative(self, name: str) -> tuple[tuple[CoefficientMatrix, ...], tuple[float, ...]]:
         """∂/∂θ of the sum of the terms, as terms, and ∂ ln R/∂θ of every jump, nothing where none changes."""
         raise NotImplementedError(f"{type(self).__name__} states no derivative by {name}")
-
-    @classmethod
-    def exact_motion(cls, decimals: Mapping[str, str]) -> ExactMotion | None:
-        """The motion in exact numbers, for parameters as decimals by name; None where no proof is known."""
-        return None
 
     @property
     def responds(self) -> bool:

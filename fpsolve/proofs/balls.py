@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -48,14 +47,11 @@ def precision() -> Iterator[None]:
         yield
 
 
-def ball(number: str | float | Fraction | int) -> arb:
-    """What encloses a number: a decimal as text, a fraction, or a float as it stands."""
+def ball(number: float) -> arb:
+    """A float as it stands."""
     import flint  # not from flint: that would take as long as the rest, a hundred thousand times
 
-    if isinstance(number, float | int) or not isinstance(number, str | Fraction):
-        return flint.arb(number)
-    exact = Fraction(number)
-    return flint.arb(flint.fmpq(exact.numerator, exact.denominator))
+    return flint.arb(number)
 
 
 def each(function: Callable[[Any], Any], numbers: Any) -> Balls:

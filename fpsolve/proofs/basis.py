@@ -21,9 +21,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from fpsolve.arrays import FloatArray
-from fpsolve.model.exact import BasisKind
 from fpsolve.proofs.balls import Balls, ball, balls, each, magnitudes, matrix_product, raised, roots
-from fpsolve.proofs.statement import Cylinder
+from fpsolve.proofs.statement import BasisKind, Cylinder
 
 ORDER = 8
 """Of Taylor's formula, at most."""

@@ -3,41 +3,28 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from fractions import Fraction
 from itertools import pairwise
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Self
 
 import numpy as np
-from pydantic import AfterValidator, Field, SerializerFunctionWrapHandler, model_serializer, model_validator
+from pydantic import Field, model_validator
 
-from fpsolve.errors import FpsolveError, NoSuchExponent
-from fpsolve.model.exact import BasisKind
-from fpsolve.proofs.balls import ball, precision
+from fpsolve.errors import FpsolveError
+from fpsolve.proofs.balls import above, ball, below, precision
 from fpsolve.proofs.basis import OTHERS, Basis, Core
 from fpsolve.proofs.forms import FormCertificate
-from fpsolve.proofs.records import ChainRecord, MotionRecord, Record
-from fpsolve.proofs.statement import Statement, check_decimal, exact_halves
+from fpsolve.proofs.statement import BasisKind, Record, Statement
 
-MOMENT = "moment"
 MOST = {"rows": 400, "columns": 400, "cells": 20_000, "phases": 8192, "values": 2**23, "work": 2 * 10**8}
 """Of what a certificate may hold, so that a file cannot ask for more memory than a machine has, nor for minutes."""
-
-
-OWNERS: Mapping[BasisKind, str] = {
-    "core": "only Gaussian noise and that of Eq. (7) have a core",
-    "whole": "only bounded noise has a whole support",
-    "circle": "only sine-Wiener noise has a circle",
-    "states": "only a chain has states",
-}
 
 
 class MalformedProof(FpsolveError):
     """A file that is no proof of this program."""
 
 
-Decimal = Annotated[str, AfterValidator(check_decimal)]
 Table = Annotated[list[Annotated[list[float], Field(min_length=1, max_length=MOST["columns"])]], Field(min_length=1)]
 
 
@@ -80,21 +67,15 @@ class Certificate(Record):
     """That mu − lower.delta ≤ Λ(p) ≤ mu + upper.delta, or the same of λ.
 
     Attributes:
-        quantity: "moment" or "lyapunov_exponent".
-        p: the moment as a decimal.
-        parameters: as decimals, and two words, by the keys of a case file.
-        motion, chain: the system by its matrices, the noise by its rates, where the parameters do not tell them; then
-            those are mere labels, and not all that tell another one. Absent elsewhere.
+        p: the moment; None for λ.
+        stated: of what.
         cosine, sine: the trial function, as `bounds.Trial` has it.
         upper, lower: the two bounds; None where one is not proven.
         phases: how many cells of φ suffice.
     """
 
-    quantity: Literal["moment", "lyapunov_exponent"]
-    p: Decimal | None = None
-    parameters: Mapping[str, str]
-    motion: MotionRecord | None = None
-    chain: ChainRecord | None = None
+    p: float | None
+    stated: Statement
     mu: float
     basis: BasisRecord
     cosine: Annotated[Table, Field(max_length=MOST["rows"])]
@@ -112,10 +93,8 @@ class Certificate(Record):
         basis = self.basis.basis
         if not sides:
             raise ValueError("neither bound is there")
-        if (self.quantity == MOMENT) == (self.p is None) or any(
-            (each.tails is None) == basis.is_core for each in sides
-        ):
-            raise ValueError("a moment has its p, and a core its tails; nothing else has")
+        if any((each.tails is None) == basis.is_core for each in sides):
+            raise ValueError("a core has tails; nothing else has")
         is_covered = basis.cover(1) is not None
         if any(bool(each.nodes) == is_covered or len(each.nodes) == 1 for each in sides):
             raise ValueError("a core and a whole support have two nodes at least; nothing else has any")
@@ -147,34 +126,19 @@ class Certificate(Record):
         rows, columns = len(self.cosine), len(self.cosine[0])
         return len(cells) * (750 + 12 * rows * (columns + 12) + self.phases * (110 + rows) // 40)
 
-    @property
-    def statement(self) -> Statement:
-        """What it is about."""
-        return Statement(self.parameters, self.motion, self.chain)
-
     @model_validator(mode="after")
     def _is_of_a_known_system(self) -> Self:
-        try:
-            _, law, _ = exact_halves(self.statement)
-        except NoSuchExponent as failure:
-            raise ValueError(str(failure)) from None
-        if self.basis.kind not in law.bases:
-            raise ValueError(OWNERS[self.basis.kind])
-        if law.states is not None and len(law.states) != len(self.cosine[0]):
+        _ = self.stated.directions
+        if self.basis.kind not in self.stated.noise.bases:
+            raise ValueError(f"the basis {self.basis.kind} is of other noise")
+        if self.stated.noise.states and len(self.stated.noise.states) != len(self.cosine[0]):
             raise ValueError("a chain has a column of coefficients for each state")
         return self
-
-    @model_serializer(mode="wrap")
-    def _without_absent_parts(self, written: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        found: dict[str, Any] = written(self)
-        return {name: part for name, part in found.items() if part is not None or name not in ("motion", "chain")}
 
 
 @dataclass(frozen=True)
 class Enclosure:
     """What is proven of a number: lower ≤ it ≤ upper.
-
-    The bounds hold for the floats, and for the decimals that they are printed as.
 
     Attributes:
         certificate: from which they follow; None where nothing is proven. A bound that is not proven is infinite.
@@ -217,11 +181,11 @@ NOTHING = Enclosure(-math.inf, math.inf)
 def enclosure_of(certificate: Certificate | FormCertificate) -> Enclosure:
     """mu − lower.delta and mu + upper.delta, rounded outward; infinite where there is none."""
     lower, upper = _ends(certificate)
-    return Enclosure(_outward(lower, -math.inf), _outward(upper, math.inf), certificate)
+    return Enclosure(below(lower), above(upper), certificate)
 
 
 @precision()
-def follows(lower: Fraction | None, upper: Fraction | None, certificate: Certificate | FormCertificate) -> bool:
+def follows(lower: float | None, upper: float | None, certificate: Certificate | FormCertificate) -> bool:
     """Whether bounds hold if the certificate does; None claims nothing."""
     low, high = _ends(certificate)
     return (lower is None or bool(ball(lower) <= low)) and (upper is None or bool(ball(upper) >= high))
@@ -229,34 +193,20 @@ def follows(lower: Fraction | None, upper: Fraction | None, certificate: Certifi
 
 def _ends(certificate: Certificate | FormCertificate) -> tuple[Any, Any]:
     """The bounds of a certificate as balls, infinite where there is none."""
-    below, above = (math.inf if side is None else side.delta for side in (certificate.lower, certificate.upper))
-    return ball(certificate.mu) - ball(below), ball(certificate.mu) + ball(above)
-
-
-def _outward(bound: Any, direction: float) -> float:
-    """A float beyond a ball, and so is the decimal that it is printed as."""
-    if not bound.is_finite():
-        return direction
-    found = float(bound)
-    while not all((each >= bound) if direction > 0 else (each <= bound) for each in (ball(found), ball(repr(found)))):
-        found = math.nextafter(found, direction)
-    return found
+    low, high = (math.inf if side is None else side.delta for side in (certificate.lower, certificate.upper))
+    return ball(certificate.mu) - ball(low), ball(certificate.mu) + ball(high)
 
 
 def trivial(stated: Statement) -> Enclosure:
     """Λ(0) = 0, as T = 1."""
-    _, law, _ = exact_halves(stated)
-    kind, columns = law.bases[0], 1 if law.states is None else len(law.states)
+    kind, columns = stated.noise.bases[0], max(len(stated.noise.states), 1)
     if kind == "core":
         side = SideRecord(delta=0.0, nodes=[-0.5, 0.5], values=[0.0, 0.0], tails=[0.0, 0.0])
     else:
         side = SideRecord(delta=0.0, nodes=[], values=[], tails=None)
     unit = Certificate(
-        quantity="moment",
-        p="0.0",
-        parameters=dict(stated.parameters),
-        motion=stated.motion,
-        chain=stated.chain,
+        p=0.0,
+        stated=stated,
         mu=0.0,
         basis=BasisRecord(kind=kind),
         cosine=[[1.0] * columns],
@@ -266,9 +216,3 @@ def trivial(stated: Statement) -> Enclosure:
         phases=4,
     )
     return enclosure_of(unit)
-
-
-@precision()
-def around(low: str, high: str) -> tuple[float, float]:
-    """Two decimals as floats, rounded outward."""
-    return _outward(ball(low), -math.inf), _outward(ball(high), math.inf)

@@ -11,16 +11,14 @@ matrix is positive where all of its pivots are, in balls.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Annotated, Literal, Self
+from typing import Annotated, ClassVar, Self
 
 import numpy as np
 from pydantic import Field, model_validator
 from scipy.linalg import cholesky
 
 from fpsolve.proofs.balls import Balls, ball, balls, inverse, matrix_product, precision, rounded
-from fpsolve.proofs.records import LinearRecord, Record, SquareMatrix
-from fpsolve.proofs.statement import Statement
+from fpsolve.proofs.statement import LinearRecord, Record, SquareMatrix
 from fpsolve.theory.moments import even_moment
 from fpsolve.theory.powers import moment_form
 
@@ -42,15 +40,12 @@ class FormCertificate(Record):
     """That mu − lower.delta ≤ Λ(2) ≤ mu + upper.delta.
 
     Attributes:
-        parameters: labels, by the keys of a case file.
-        linear: of what.
+        stated: of what.
         factor: G of H = GᵀG.
     """
 
-    quantity: Literal["moment"] = "moment"
-    p: Literal["2", "2.0"]
-    parameters: Mapping[str, str]
-    linear: LinearRecord
+    p: ClassVar[float] = 2.0
+    stated: LinearRecord
     mu: float
     factor: SquareMatrix
     upper: FormDistance | None
@@ -58,26 +53,21 @@ class FormCertificate(Record):
 
     @model_validator(mode="after")
     def _fits_together(self) -> Self:
-        if np.shape(self.factor) != np.shape(self.linear.drift):
+        if np.shape(self.factor) != np.shape(self.stated.drift):
             raise ValueError("factor must be a matrix of the size of the motion")
         return self
 
     @property
-    def statement(self) -> Statement:
-        """What it is about."""
-        return Statement(self.parameters, linear=self.linear)
-
-    @property
     def work(self) -> int:
         """About how many operations it takes to verify."""
-        return 20 * (1 + len(self.linear.diffusions)) * len(self.factor) ** 3
+        return 20 * (1 + len(self.stated.diffusions)) * len(self.factor) ** 3
 
     @property
     def rest(self) -> Balls:
         """L*H − μH in the coordinates Gx, in which H is 1. Raises `ZeroDivisionError` where G may be singular."""
         factor = balls(self.factor)
         back, rest = inverse(factor), -ball(self.mu) * np.eye(len(factor), dtype=int)
-        for k, each in enumerate((self.linear.drift, *self.linear.diffusions)):
+        for k, each in enumerate((self.stated.drift, *self.stated.diffusions)):
             turned = matrix_product(matrix_product(factor, balls(each)), back)
             drift = matrix_product(turned, turned) / 2 if k else turned
             rest = rest + drift + drift.T + (matrix_product(turned.T, turned) if k else 0)
@@ -110,20 +100,18 @@ def _is_positive(matrix: Balls) -> bool:
 
 
 @precision()
-def form_certificate(linear: LinearRecord, parameters: Mapping[str, str]) -> FormCertificate | None:
+def form_certificate(stated: LinearRecord) -> FormCertificate | None:
     """The certificate with the least distances; None where no form is found to be positive. Raises `NoHierarchy`."""
-    factor, mu = np.eye(len(linear.drift)), 0.0
+    factor, mu = np.eye(len(stated.drift)), 0.0
     for _ in range(SEARCHES):
-        even = even_moment(linear.problem(factor), 2)
+        even = even_moment(stated.problem(factor), 2)
         form = moment_form(even.polynomial, len(factor), 2)
         form *= np.sign(np.trace(form))
         least, *_, most = np.linalg.eigvalsh(form)
         mu, factor = even.value, cholesky(form + max(RIDGE * most - least, 0.0) * np.eye(len(form))) @ factor
-    found = FormCertificate(
-        p="2.0", parameters=parameters, linear=linear, mu=mu, factor=factor.tolist(), upper=None, lower=None
-    )
+    found = FormCertificate(stated=stated, mu=mu, factor=factor.tolist(), upper=None, lower=None)
     sides = dict[str, FormDistance]()
-    distances, least = np.linalg.eigvalsh(rounded(found.rest)[0]), LEAST * float(np.linalg.norm(linear.drift))
+    distances, least = np.linalg.eigvalsh(rounded(found.rest)[0]), LEAST * float(np.linalg.norm(stated.drift))
     for name, distance in (("upper", distances[-1]), ("lower", -distances[0])):
         for delta in max(1.001 * float(distance), least) * WIDENED ** np.arange(MOST_WIDENINGS):
             side = {name: FormDistance(delta=float(delta))}

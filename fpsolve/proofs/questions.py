@@ -12,11 +12,10 @@ from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.function import nonzero_root
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.model.problem import Problem
-from fpsolve.proofs.balls import precision
-from fpsolve.proofs.certificate import NOTHING, Enclosure, around, enclosure_of, trivial
+from fpsolve.proofs.certificate import NOTHING, Enclosure, enclosure_of, trivial
 from fpsolve.proofs.forms import form_certificate
 from fpsolve.proofs.search import Timer, enclose
-from fpsolve.proofs.statement import Statement, cylinder, statement_of
+from fpsolve.proofs.statement import LinearRecord, Statement, statement_of
 from fpsolve.theory.perturbation import scale_of
 
 SHARE = 1e-7
@@ -35,12 +34,12 @@ class IndexEnclosure:
 
     Attributes:
         lower, upper: around δ_p; infinite where nothing is proven.
-        moments: the decimals of the two p, and Λ of each.
+        moments: the two p, and Λ of each.
     """
 
     lower: float
     upper: float
-    moments: tuple[tuple[str, Enclosure], ...] = ()
+    moments: tuple[tuple[float, Enclosure], ...] = ()
 
     @property
     def is_proven(self) -> bool:
@@ -73,12 +72,10 @@ def prove(
     True
 
     Args:
-        problem: a motion and its noise. Bounds
-            hold for the decimals that parameters are printed as; for systems besides `VibroImpactOscillator` and
-            `ParametricOscillator`, and for a `MarkovChain`, for the exact binary values of matrices, ln R, states and
-            rates, and for a phase of a jump within 1e-12 of a multiple of π/4 for that multiple. A coefficient that is
-            a function counts as the a + bξ that its values show, which the certificate states.
-        p: order of the moment, in the same sense.
+        problem: a motion and its noise. Bounds hold for the exact values of the floats that the certificate states, the
+            matrices, ln R and the law of the noise, and for a phase of a jump within 1e-12 of a multiple of π/4 for
+            that multiple. A coefficient that is a function counts as the a + bξ that its values show.
+        p: order of the moment, as it stands.
         width: wanted upper − lower, in 1/time; 1e-7 of the scale of Λ(p) if None.
         budget: its `seconds` of the processor are for the bounds, all in all; they may take a third more.
         progress: called after each trial function.
@@ -92,7 +89,7 @@ def prove(
         ValueError: p is not finite, the width not positive, or the speed at a jump has no one sign.
         MissingFlint: python-flint is not installed.
     """
-    return prove_bounds(problem, statement_of(problem), repr(float(p)), width, budget or Budget(), progress)
+    return prove_bounds(problem, statement_of(problem), float(p), width, budget or Budget(), progress)
 
 
 def prove_lyapunov_exponent(
@@ -119,64 +116,54 @@ def check_width(width: float | None) -> None:
         raise ValueError(f"got width = {width}; must be a positive number, such as 1e-9")
 
 
-def refuse_unprovable(stated: Statement) -> None:
-    """Refuse parameters for which no bound can be proven. Raises `NoSuchExponent`, `MissingFlint`."""
-    with precision():
-        if not stated.linear:
-            cylinder(stated)
-
-
 def prove_bounds(
     problem: Problem,
-    stated: Statement,
-    p: str | None,
+    stated: Statement | LinearRecord,
+    p: float | None,
     width: float | None,
     budget: Budget,
     progress: Callable[[], None] = lambda: None,
 ) -> Enclosure:
-    """Bounds on Λ(p), or on λ where p is None, with p as a decimal, within the seconds of a budget."""
+    """Bounds on Λ(p), or on λ where p is None, within the seconds of a budget."""
     timer, guess = Timer(budget.seconds), None
-    order = math.nan if p is None else float(p)
-    if p is not None and not math.isfinite(order):
+    if p is not None and not math.isfinite(p):
         raise ValueError(f"got p = {p}; must be finite")
     check_width(width)
-    refuse_unprovable(stated)
-    if stated.linear:
-        return _of_second_moments(problem, stated, order, width)
-    if order == 0:
+    if isinstance(stated, LinearRecord):
+        return _of_second_moments(problem, stated, p, width)
+    if p == 0:
         return trivial(stated)
     for rtol in (1e-8, 1e-3):  # what finite elements find, at a smaller accuracy if need be
         solver = ExponentSolver(problem, rtol=rtol, budget=replace(budget, seconds=GUESS_SHARE * budget.seconds))
         with suppress(NotConverged):
-            guess = solver.lyapunov_exponent().value if p is None else solver.solution(order).pair.value
+            guess = solver.lyapunov_exponent().value if p is None else solver.solution(p).pair.value
             break
     theory = scale_of(problem)
-    scale = max(abs(guess or 0.0), float(theory.linear if p is None else theory.moment(order)))
+    scale = max(abs(guess or 0.0), float(theory.linear if p is None else theory.moment(p)))
     wanted = SHARE * scale if width is None else width
     is_hopeless = p is not None and guess is None
     found = NOTHING if is_hopeless else enclose(stated, p, wanted, guess or 0.0, timer, progress)
     return replace(found, wanted=wanted)
 
 
-def _of_second_moments(problem: Problem, stated: Statement, p: float, width: float | None) -> Enclosure:
+def _of_second_moments(problem: Problem, stated: LinearRecord, p: float | None, width: float | None) -> Enclosure:
     """Bounds on Λ(2) of more than two variables; nothing for other p, or where the form is not positive."""
     wanted = float(scale_of(problem).moment(2.0)) * SHARE if width is None else width
     certificate = None
-    if p == 2 and stated.linear:
+    if p == 2:
         with suppress(NoHierarchy):
-            certificate = form_certificate(stated.linear, stated.parameters)
+            certificate = form_certificate(stated)
     return replace(NOTHING if certificate is None else enclosure_of(certificate), wanted=wanted)
 
 
 def prove_index(
-    problem: Problem, stated: Statement, budget: Budget, progress: Callable[[], None] = lambda: None
+    problem: Problem, stated: Statement | LinearRecord, budget: Budget, progress: Callable[[], None] = lambda: None
 ) -> IndexEnclosure:
     """Bounds on δ_p; none where there is none, or where it is not found.
 
     They may take twice the seconds of a budget, as they need bounds at two p.
     """
-    refuse_unprovable(stated)
-    if stated.linear:
+    if isinstance(stated, LinearRecord):
         return NO_INDEX
     timer = Timer(2 * budget.seconds)
     solver = ExponentSolver(problem, budget=replace(budget, seconds=2 * GUESS_SHARE * budget.seconds))
@@ -190,9 +177,9 @@ def prove_index(
     half = max(INDEX_WIDTH * max(1.0, abs(found.value)) / 2, 2 * found.error_estimate)
     for _ in range(WIDENINGS):
         if half < abs(found.value):
-            sides = [repr(float(f"{found.value + sign * half:.12g}")) for sign in (-1, 1)]
+            low, high = (float(f"{found.value + sign * half:.12g}") for sign in (-1, 1))
             moments = []
-            for left, p in zip((2, 1), sides, strict=True):  # for the first half of what is left
+            for left, p in ((2, low), (1, high)):  # for the first half of what is left
                 seconds = (timer.seconds - timer.elapsed) / left
                 if seconds <= 0:
                     return NO_INDEX
@@ -201,6 +188,6 @@ def prove_index(
                 if not moments[-1][1].sign:  # the time is for wider ones
                     break
             if len(moments) == 2 and moments[0][1].sign * moments[1][1].sign < 0:
-                return IndexEnclosure(*around(*sides), tuple(moments))
+                return IndexEnclosure(low, high, tuple(moments))
         half *= 10
     return NO_INDEX

@@ -206,7 +206,7 @@ def _tabulated(basis: Basis, z: FloatArray, degrees: int) -> tuple[FloatArray, F
 @precision()
 def enclose(
     stated: Statement,
-    p: str | None,
+    p: float | None,
     width: float,
     guess: float = 0.0,
     timer: Timer | None = None,
@@ -215,17 +215,14 @@ def enclose(
     """Bounds on Λ(p), or on λ where p is None, that are at most `width` apart, if that can be done.
 
     Args:
-        stated: parameters as decimals.
-        p: the moment as a decimal.
+        stated: of what.
+        p: the moment.
         guess: Λ(p), about.
         timer: of the time for it; the next trial is foreseen from the last one, so that it may take a third more.
         progress: called after each trial function.
 
     Returns:
         The closest bounds that were found.
-
-    Raises:
-        NoSuchExponent: the noise has algebraic tails, r₀ > 1.
     """
     noise, size, left = cylinder(stated), SMALLEST, timer or Timer(Budget().seconds)
     if noise.states is not None:
@@ -246,7 +243,7 @@ def _enlarged(
     stated: Statement,
     noise: Cylinder,
     basis: Basis,
-    p: str | None,
+    p: float | None,
     guess: float,
     width: float,
     size: tuple[int, int],
@@ -305,17 +302,17 @@ def _apart(certificate: Certificate) -> float:
     return sum(ABSENT if side is None else side.delta for side in (certificate.upper, certificate.lower))
 
 
-def bases(noise: Cylinder, p: str | None) -> Iterator[Basis]:
+def bases(noise: Cylinder, p: float | None) -> Iterator[Basis]:
     """What is worth trying, in this order: the whole support, or a core about where the noise is in the moment."""
     slope = float(noise.slope)
-    if noise.bases[0] in OTHERS:
-        yield OTHERS[noise.bases[0]]
+    if (kind := noise.noise.bases[0]) in OTHERS:
+        yield OTHERS[kind]
         return
     if noise.is_bounded and slope < WHOLE_BELOW:
         yield Whole()
         return
     driven = float(noise.growth(1)[1].real)
-    gauge = 0.0 if p is None else float(p) * driven / (float(noise.nu) * slope)  # by perturbation theory
+    gauge = 0.0 if p is None else p * driven / (float(noise.nu) * slope)  # by perturbation theory
     # z with b(z) = β
     yield _core(noise, 2 * gauge / (slope + math.hypot(slope, 2 * gauge)) if noise.is_bounded else gauge / slope)
     if noise.is_bounded and slope < 2 * WHOLE_BELOW:
@@ -330,18 +327,20 @@ def _core(noise: Cylinder, centre: float) -> Core:
     return Core(centre, 1 / math.sqrt(2 * slope + 3), slope * centre / (1 - centre**2))
 
 
-def _solved(noise: Cylinder, basis: Basis, p: str | None, guess: float, waves: int, degrees: int) -> tuple[Pair, Basis]:
+def _solved(
+    noise: Cylinder, basis: Basis, p: float | None, guess: float, waves: int, degrees: int
+) -> tuple[Pair, Basis]:
     """A trial, about the place where the noise is in the moment."""
     if p is None:
         return Galerkin(noise, basis, None, waves, degrees).drift(), basis
-    pair = Galerkin(noise, basis, float(p), waves, degrees).pair(guess)
+    pair = Galerkin(noise, basis, p, waves, degrees).pair(guess)
     if basis.is_core and 0.3 * basis.scale < abs(pair.centre - basis.centre) < 3 * basis.scale:
         basis = _core(noise, pair.centre)
-        pair = Galerkin(noise, basis, float(p), waves, degrees).pair(guess)
+        pair = Galerkin(noise, basis, p, waves, degrees).pair(guess)
     return pair, basis
 
 
-def certificate_of(stated: Statement, noise: Cylinder, basis: Basis, p: str | None, pair: Pair) -> Certificate | None:
+def certificate_of(stated: Statement, noise: Cylinder, basis: Basis, p: float | None, pair: Pair) -> Certificate | None:
     """The closest bounds that a trial gives, before they are verified; None where there are none."""
     trial = Trial(noise, None if p is None else ball(p), pair.value, basis, pair.cosine, pair.sine)
     phases = max(128, 16 * len(pair.cosine))
@@ -354,18 +353,15 @@ def certificate_of(stated: Statement, noise: Cylinder, basis: Basis, p: str | No
 def _certificate(
     stated: Statement,
     basis: Basis,
-    p: str | None,
+    p: float | None,
     pair: Pair,
     phases: int,
     upper: SideRecord | None,
     lower: SideRecord | None,
 ) -> Certificate:
     return Certificate(
-        quantity="lyapunov_exponent" if p is None else "moment",
         p=p,
-        parameters=dict(stated.parameters),
-        motion=stated.motion,
-        chain=stated.chain,
+        stated=stated,
         mu=pair.value,
         basis=BasisRecord(kind=basis.kind, centre=basis.centre, scale=basis.scale, gauge=basis.gauge),
         cosine=pair.cosine.tolist(),

@@ -1,4 +1,4 @@
-"""What a proof is about: a system and its noise, by their decimals or by their matrices and rates, and L(p) in balls.
+"""What a proof is about: a system and its noise in floats that are taken as exact, and L(p) in balls.
 
 The motion ẋ = (A₀ + ξ A₁) x has in x = ‖x‖ (cos φ, −sin φ) the phase speed h₀ + ξ h₁, h = e′ᵀA e, and the growth rate
 q₀ + ξ q₁, q = eᵀA e, of ln ‖x‖. At a ray the speed has one sign σ for all ξ, and x⁺ = R x⁻. The phase is gauged:
@@ -17,60 +17,291 @@ its rates, u a component for each state. White noise has L = F₀ + ½ F₁² in
 
 from __future__ import annotations
 
-import re
+import math
 from collections.abc import Mapping
-from contextlib import suppress
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from fractions import Fraction
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from fpsolve.model.exact import BasisKind, ExactLaw, ExactMotion
-from fpsolve.model.kinds import is_ours, kind_classes
+from fpsolve.arrays import FloatArray, identity, one
+from fpsolve.errors import NoSuchExponent
+from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.noise import Noise
-from fpsolve.model.parameters import Parametrised
-from fpsolve.model.plane import System
+from fpsolve.model.noises.bounded import SineWiener
+from fpsolve.model.noises.non_gaussian import NonGaussianNoise
+from fpsolve.model.noises.ornstein_uhlenbeck import GaussianNoise
+from fpsolve.model.noises.several import noises_of
+from fpsolve.model.noises.white import Interpretation, White
+from fpsolve.model.plane import (
+    CoefficientMatrix,
+    System,
+    affine,
+    matrix_at,
+    rotating_coordinates,
+    written_coefficient,
+)
 from fpsolve.model.problem import Problem, checked_problem
-from fpsolve.proofs.balls import Balls, ball, each
-from fpsolve.proofs.records import ChainRecord, LinearRecord, MotionRecord, Record
+from fpsolve.model.systems.plane_system import LinearSystem
+from fpsolve.proofs.balls import Balls, ball, balls
 
 if TYPE_CHECKING:
     from flint import arb
 
-DECIMAL = re.compile(r"-?(\d{1,400}(\.\d{0,1100})?|\.\d{1,1100})([eE][-+]?\d{1,3})?", re.ASCII)
-"""A number; words such as "exact" are none."""
-Parameters = Mapping[str, str]
-"""Numbers as decimals, and words, by the keys of a case file."""
+MOST_STATES = 400
+KNOWN = "OrnsteinUhlenbeck, NonGaussianNoise, SineWiener, Telegraph, MarkovChain and White"
+"""Noises for which a proof is known."""
+NEAR = 1e-12
+"""How near a multiple of π/4 a phase is taken as that."""
+Row = Annotated[list[float], Field(min_length=2, max_length=2)]
+Matrix = Annotated[list[Row], Field(min_length=2, max_length=2)]
+SquareMatrix = Annotated[list[list[float]], Field(min_length=1)]
+OctantRays = ((1, 0), (1, -1), (0, -1), (-1, -1))
+"""Along (cos φ, −sin φ) for φ = 0, π/4, π/2 and 3π/4."""
+BasisKind = Literal["core", "whole", "circle", "states"]
+"""Kinds of functions that a function of the noise in a proof may be made of, see `fpsolve.proofs.basis`."""
+BASES: Mapping[str, tuple[BasisKind, ...]] = {
+    "gaussian": ("core",),
+    "bounded": ("core", "whole"),
+    "circle": ("circle",),
+    "chain": ("states",),
+    "white": ("states",),
+}
+"""Those that functions of each kind of noise may be made of."""
 
 
-@dataclass(frozen=True)
-class Statement:
-    """A system and a noise.
+class Record(BaseModel):
+    """A part of a proof; numbers are floats that are taken as exact."""
+
+    model_config = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False, frozen=True)
+
+
+class JumpRecord(Record):
+    """x⁺ = e^{log_factor} x⁻ where x passes the line through the ray."""
+
+    ray: Row
+    log_factor: float
+
+
+class NoiseRecord(Record):
+    """The law of z = ξ/unit.
 
     Attributes:
-        parameters: of the system if it has no motion here, and of the noise if it has no chain; else they are labels.
-        motion: the system by its matrices.
-        chain: the noise by its rates.
-        linear: both by their matrices, of more than two variables.
+        kind: "gaussian" and "bounded" of dz = −ν b(z) dt + √ν dW, where b = slope z, and b = slope z/(1 − z²) with
+            |z| < 1; "circle" of z = cos θ with dθ = √ν dW; "chain"; "white" of z dt = dW in Stratonovich's sense, which
+            is a chain that rests in one state.
+        states, rates: of a chain, from each state to each; what stands on the diagonal does not count.
     """
 
-    parameters: Parameters
-    motion: MotionRecord | None = None
-    chain: ChainRecord | None = None
-    linear: LinearRecord | None = None
+    kind: Literal["gaussian", "bounded", "circle", "chain", "white"]
+    unit: Annotated[float, Field(gt=0)] = 1.0
+    nu: Annotated[float, Field(ge=0)] = 0.0
+    slope: Annotated[float, Field(ge=0)] = 0.0
+    states: list[float] = []
+    rates: list[list[float]] = []
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> Self:
+        size = len(self.states)
+        if [*map(len, self.rates)] != size * [size]:
+            raise ValueError("rates must be from each state to each")
+        if any(rate < 0 for i, row in enumerate(self.rates) for j, rate in enumerate(row) if i != j):
+            raise ValueError("rates from one state to another must be >= 0")
+        if bool(size) != (self.kind in ("chain", "white")):
+            raise ValueError("a chain has states; nothing else has")
+        if self.kind in ("gaussian", "bounded") and not min(self.nu, self.slope) > 0:
+            raise ValueError("nu and slope must be positive")
+        return self
+
+    @classmethod
+    def of(cls, noise: Noise) -> NoiseRecord:
+        """The law of a noise.
+
+        Raises:
+            NoSuchExponent: no bound can be proven for these parameters.
+            TypeError: no proof is known for such a noise, or a chain has too many states.
+        """
+        if type(noise) is NonGaussianNoise:
+            if noise.has_algebraic_tails:
+                key = f"{noise.section}.r0"
+                raise NoSuchExponent(Message(Code.NO_BOUND, key=key, value=noise.r0, remedy=Remedy.REDUCTION))
+            if noise.r0 < 1:
+                slope = noise.end_exponent
+                return cls(kind="bounded", unit=noise.half_width, nu=(1 - noise.r0) / noise.tau0, slope=slope)
+            noise = noise.ou_reduction()
+        if isinstance(noise, GaussianNoise):
+            return cls(kind="gaussian", unit=noise.standard_deviation, nu=2 * noise.alpha, slope=0.5)
+        if type(noise) is SineWiener:
+            return cls(kind="circle", unit=noise.amplitude, nu=noise.sigma**2)
+        if type(noise) is White:
+            return cls(kind="white", unit=noise.s, states=[0.0], rates=[[0.0]])
+        if not noise.has_states or noise.is_white:
+            raise TypeError(f"got {type(noise).__name__}; proofs are for {KNOWN}")
+        states = np.asarray(noise.states)  # type: ignore[attr-defined]
+        if len(states) > MOST_STATES:
+            raise TypeError(f"got a chain of {len(states)} states; proofs are for {MOST_STATES} at most")
+        return cls(kind="chain", states=states.tolist(), rates=np.asarray(noise.rates).tolist())  # type: ignore[attr-defined]
 
     @property
-    def records(self) -> tuple[Record | None, ...]:
-        """What tells the problem besides parameters."""
-        return self.motion, self.chain, self.linear
+    def bases(self) -> tuple[BasisKind, ...]:
+        """What functions of the noise may be made of."""
+        return BASES[self.kind]
+
+    def passing(self, still: Fraction, driven: Fraction) -> int:
+        """The sign of still + ξ driven for all ξ of the noise; 0 where it has none."""
+        driven *= Fraction(self.unit)
+        if self.kind == "chain":
+            signs = {_sign(still + driven * Fraction(state)) for state in self.states}
+            return signs.pop() if len(signs) == 1 else 0
+        is_one = abs(driven) < abs(still) if self.kind in ("bounded", "circle") else not driven
+        return _sign(still) if is_one else 0
+
+
+class Statement(Record):
+    """ẋ = (A₀ + ξ A₁) x in the sense of Stratonovich, with jumps, and its noise.
+
+    Attributes:
+        still, driven: A₀ and A₁.
+        coordinates: P of x = P y; the phase and the size of which a proof speaks are those of y. Λ is the same.
+    """
+
+    still: Matrix
+    driven: Matrix
+    jumps: list[JumpRecord]
+    coordinates: Matrix
+    noise: NoiseRecord
+
+    @classmethod
+    def of(cls, problem: Problem) -> Statement:
+        """Those of a problem.
+
+        Raises:
+            NoSuchExponent: no bound can be proven for these parameters.
+            TypeError: a coefficient is not a + bξ, or no proof is known for such a noise.
+            ValueError: the speed of the phase at the ray of a jump has no one sign.
+        """
+        system, noise = problem.system, problem.noise
+        parts = np.zeros((2, 2, 2))
+        for term in system.terms:
+            line = affine(term.g)
+            if line is None:
+                told = written_coefficient(term.g).strip()
+                raise TypeError(f"got the coefficient {told}; proofs are for coefficients a + b ξ")
+            parts += np.multiply.outer(line, system.epsilon**term.order * np.array(term.matrix))
+        still, driven = parts
+        if type(noise) is White and noise.interpretation == Interpretation.ITO:
+            still = still - noise.s**2 / 2 * driven @ driven
+        found = cls(
+            still=still.tolist(),
+            driven=driven.tolist(),
+            jumps=[JumpRecord(ray=ray_of(jump.phase), log_factor=float(jump.log_factor)) for jump in system.jumps],
+            coordinates=_rotating(system),
+            noise=NoiseRecord.of(noise),
+        )
+        _ = found.directions
+        return found
 
     @property
-    def labels(self) -> list[str]:
-        """The keys of the parameters that are labels."""
-        if self.linear:
-            return [*self.parameters]
-        told = [half.section for half, own in ((System, self.motion), (Noise, self.chain)) if own is not None]
-        return [key for key in self.parameters if _section(key) in told]
+    def directions(self) -> list[int]:
+        """σ of each jump. Raises `ValueError` where the speed of the phase at a ray has no one sign."""
+        change, still, driven = map(_fractions, (self.coordinates, self.still, self.driven))
+        turn = _sign(change[0, 0] * change[1, 1] - change[0, 1] * change[1, 0])
+        found = []
+        for jump in self.jumps:
+            x, y = _fractions(jump.ray)
+            speeds = (y * first - x * second for first, second in (still @ (x, y), driven @ (x, y)))
+            found.append(turn * self.noise.passing(*speeds))
+            if not found[-1]:
+                ray = ", ".join(f"{each:g}" for each in jump.ray)
+                raise ValueError(
+                    f"got a jump at the ray of ({ray}), where the speed of the phase has no one sign; proofs are for "
+                    "jumps at rays over which no noise moves the phase"
+                )
+        return found
+
+
+class LinearRecord(Record):
+    """A motion of more than two variables under white noise.
+
+    Attributes:
+        drift, diffusions: A, and all B_k, in Stratonovich's sense.
+    """
+
+    drift: SquareMatrix
+    diffusions: list[SquareMatrix]
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> Self:
+        if any(np.shape(each) != 2 * (len(self.drift),) for each in (self.drift, *self.diffusions)):
+            raise ValueError("matrices must be square and of one size")
+        return self
+
+    @classmethod
+    def of(cls, problem: Problem) -> LinearRecord:
+        """The matrices of a problem. Raises `TypeError` where its noise is not white."""
+        drift, diffusions, impulses = problem.noise.motion(problem.system)
+        if impulses or not problem.noise.is_white or problem.system.pasts:
+            told = f"got a system of {problem.dimension} variables under other noise than white, or with a delay"
+            raise TypeError(f"{told}; proofs are for two variables under {KNOWN}, and for more under White")
+        steady, *noisy = (
+            sum(
+                (drift.epsilon**each.order * np.array(each.matrix) for each in terms),
+                np.zeros(2 * (problem.dimension,)),
+            )
+            for terms in (drift.terms, *([each] for each in diffusions))
+        )
+        return cls(drift=steady.tolist(), diffusions=[each.tolist() for each in noisy])
+
+    def problem(self, factor: FloatArray) -> Problem:
+        """That of y = G x."""
+        turned = [(factor @ np.array(a) @ np.linalg.inv(factor)).tolist() for a in (self.drift, *self.diffusions)]
+        terms = [CoefficientMatrix(int(k > 0), a, identity if k else one, str(k or "")) for k, a in enumerate(turned)]
+        return Problem(LinearSystem(terms), noises_of({str(k): White(s=1.0) for k in range(1, len(turned))}))
+
+
+def statement_of(problem: Problem) -> Statement | LinearRecord:
+    """A problem by its matrices and rates, as floats.
+
+    Raises:
+        NoSuchExponent: no bound can be proven for these parameters.
+        TypeError: no proof is known for such a system with such a noise.
+        ValueError: the speed of the phase at the ray of a jump has no one sign.
+    """
+    checked_problem(problem)
+    if problem.system.stop is not None:
+        raise TypeError("got a wall of more than two variables, where moments obey no closed equations; remove it")
+    if problem.dimension > 2:
+        return LinearRecord.of(problem)
+    if len(problem.noise.parts) > 1:
+        raise TypeError(f"got the noises {' and '.join(problem.noise.parts)} at once; proofs are for one noise")
+    return Statement.of(problem)
+
+
+def ray_of(phase: float) -> list[float]:
+    """A direction with a phase: whole numbers near a multiple of π/4, else cos φ and −sin φ as floats."""
+    octants = phase / (math.pi / 4)
+    if abs(octants - round(octants)) <= NEAR:
+        return [float(each) for each in OctantRays[round(octants) % 4]]
+    return [math.cos(phase), -math.sin(phase)]
+
+
+def _rotating(system: System) -> list[list[float]]:
+    """P for which P⁻¹A₀P is growth and a rotation, or the identity where the order 0 does not rotate."""
+    found = rotating_coordinates(matrix_at(system, 0.0, slice(0, 1)))
+    return (np.eye(2) if found is None else found).tolist()
+
+
+def _fractions(numbers: Any) -> NDArray[Any]:
+    """The exact values of floats."""
+    found: NDArray[Any] = np.vectorize(Fraction, otypes=[object])(numbers)
+    return found
+
+
+def _sign(number: Fraction) -> int:
+    return (number > 0) - (number < 0)
 
 
 @dataclass(frozen=True)
@@ -78,30 +309,31 @@ class Cylinder:
     """L(p) between jumps, gauged, in balls.
 
     Attributes:
+        noise: its law.
         h, q: phase speed and growth rate, h₀ and h₁, q₀ and q₁, each by its coefficients of e^{2idφ}, d = −1, 0, 1.
         kappa: κ.
         nu, slope: ν and b′(0).
-        unit: of ξ, so that ξ = unit · z.
-        bases: what functions of z may be made of.
         states, rates: of a chain, shapes (n,) and (n, n); None of other noise.
-        is_white: whether the noise is white, L = F₀ + ½ F₁².
     """
 
+    noise: NoiseRecord
     h: tuple[Balls, Balls]
     q: tuple[Balls, Balls]
     kappa: arb
     nu: arb
     slope: arb
-    unit: arb
-    bases: tuple[BasisKind, ...]
-    states: Balls | None = None
-    rates: Balls | None = None
-    is_white: bool = False
+    states: Balls | None
+    rates: Balls | None
 
     @property
     def is_bounded(self) -> bool:
         """Whether b = b′(0) z/(1 − z²), |z| < 1."""
-        return "whole" in self.bases
+        return self.noise.kind == "bounded"
+
+    @property
+    def is_white(self) -> bool:
+        """Whether L = F₀ + ½ F₁²."""
+        return self.noise.kind == "white"
 
     def drift(self, z: Any) -> Any:
         """b(z)."""
@@ -123,182 +355,28 @@ class Cylinder:
         return self.q[i] + self.kappa * self.h[i]
 
 
-def _wave(mean: arb, cosine: arb, sine: arb) -> Balls:
-    """Coefficients of mean + cosine cos 2φ + sine sin 2φ."""
-    from flint import acb
-
-    return np.array([acb(cosine / 2, sine / 2), acb(mean), acb(cosine / 2, -sine / 2)], dtype=object)
-
-
-def linear_values(problem: Problem) -> Mapping[str, float | str]:
-    """The values of the parameters on which the linear problem depends, by their keys."""
-    inert = {f"{section}.{name}" for section, half in problem.sections.items() for name in half.inert}
-    return {key: value for key, value in problem.values.items() if key not in inert}
-
-
-def statement_of(problem: Problem, stated: Parameters | None = None) -> Statement:
-    """A problem by its decimals, else by its matrices and rates as floats.
-
-    Those of a derived class are not told by its parameters, as it may make something else of them.
-
-    Args:
-        stated: its parameters as decimals; None for the shortest that are read as its numbers.
-
-    Raises:
-        NoSuchExponent: no bound can be proven for these parameters.
-        TypeError: no proof is known for such a system with such a noise.
-        ValueError: the speed of the phase at the ray of a jump has no one sign.
-    """
-    checked_problem(problem)
-    if stated is None:
-        stated = {key: str(value) for key, value in linear_values(problem).items()}
-    system, noise = problem.system, problem.noise
-    if system.stop is not None:
-        raise TypeError("got a wall of more than two variables, where moments obey no closed equations; remove it")
-    if problem.dimension > 2:
-        return Statement(stated, linear=LinearRecord.of(problem))
-    if len(noise.parts) > 1:
-        raise TypeError(f"got the noises {' and '.join(noise.parts)} at once; proofs are for one noise")
-    is_told = is_ours(system) and system.exact_motion(_named(system, stated)) is not None
-    is_law_told = is_ours(noise) and noise.exact_law(_named(noise, stated)) is not None
-    motion, chain = None if is_told else MotionRecord.of(system), None if is_law_told else ChainRecord.of(noise)
-    found = Statement(stated, motion, chain)
-    exact_halves(found)
-    return found
-
-
-def exact_halves(stated: Statement) -> tuple[ExactMotion, ExactLaw, list[int]]:
-    """What is stated, in exact numbers and in the sense of Stratonovich, with σ of each jump.
-
-    Raises:
-        NoSuchExponent: no bound can be proven for these parameters.
-        ValueError: these are no parameters of a system and a noise for which a proof is known, or out of range; or the
-            speed of the phase at the ray of a jump has no one sign.
-    """
-    parameters = _plain(stated.parameters)
-    system, noise = _kinds(parameters)
-    expected = set[str]()
-    for half, record in ((system, stated.motion), (noise, stated.chain)):
-        section = System.section if half is system else Noise.section
-        labels, told = ({key for key in parameters if _section(key) == each} for each in (section, half.section))
-        if record is not None and told and told == _keys(half):
-            names = ", ".join(sorted(told))
-            raise ValueError(f"parameters {names} tell a {half.__name__}, but another {section} is stated; rename one")
-        expected |= _keys(half) if record is None else labels
-    if set(parameters) != expected:
-        raise ValueError(f"parameters must be {', '.join(sorted(expected))}")
-    motion = _exact_motion(system, parameters) if stated.motion is None else stated.motion.exact
-    law = _exact_law(noise, parameters) if stated.chain is None else stated.chain.exact
-    motion = law.in_stratonovich(motion)
-    directions = [law.passing(*motion.speeds(jump)) for jump in motion.jumps]
-    for jump, direction in zip(motion.jumps, directions, strict=True):
-        if not direction:
-            ray = ", ".join(f"{float(each):g}" for each in jump.ray)
-            raise ValueError(
-                f"got a jump at the ray of ({ray}), where the speed of the phase has no one sign; proofs are for jumps "
-                "at rays over which no noise moves the phase"
-            )
-    return motion, law, directions
-
-
-def _exact_motion(system: type[System], stated: Parameters) -> ExactMotion:
-    named = _checked(system, stated)
-    motion = system.exact_motion(named)
-    if motion is None:
-        raise ValueError(f"no proof is known for {system.__name__} by its parameters")
-    return motion
-
-
-def _exact_law(noise: type[Noise], stated: Parameters) -> ExactLaw:
-    for name, word in noise.words.items():
-        found = stated[f"{noise.section}.{name}"]
-        if found != word:
-            words = [each.words[name] for each in kind_classes("noises") if _keys(each) == _keys(noise)]
-            raise ValueError(f"got {noise.section}.{name} = {found[:40]!r}; must be {' or '.join(map(repr, words))}")
-    law = noise.exact_law(_checked(noise, stated))
-    if law is None:
-        raise ValueError(f"no proof is known for {noise.__name__} by its parameters")
-    return law
-
-
-def _checked(half: type[Parametrised], stated: Parameters) -> Parameters:
-    """What is stated for a system or a noise, if its numbers are in range."""
-    named = _named(half, stated)
-    decimals = {name: text for name, text in named.items() if name not in half.words}
-    numbers = [name for name in decimals if half.fields()[name].annotation is float]
-    half(**decimals | {name: float(check_decimal(decimals[name])) for name in numbers})
-    return named
-
-
-def check_decimal(text: str) -> str:
-    """The text, if it is a decimal number. Raises `ValueError`."""
-    if not DECIMAL.fullmatch(text):
-        raise ValueError(f"got {text[:40]!r}; must be a decimal number such as '0.95'")
-    return text
-
-
-def inert_keys(stated: Parameters) -> set[str]:
-    """The keys of other parameters of such a system and such a noise, on which no exponent depends."""
-    with suppress(ValueError):  # of several noises, none of which has such keys
-        return {f"{half.section}.{name}" for half in _kinds(_plain(stated)) for name in half.inert}
-    return set()
-
-
-def _kinds(stated: Parameters) -> tuple[type[System], type[Noise]]:
-    """The first system and noise that have most of these keys and fewest others, and whose words are stated."""
-
-    def fit(kind: type[Parametrised]) -> tuple[int, int, int]:
-        words = [stated.get(f"{kind.section}.{name}") == word for name, word in kind.words.items()]
-        keys, known = _keys(kind), len(_keys(kind) & set(stated))
-        return known, known and known - len(keys), sum(words)
-
-    return max(kind_classes("systems"), key=fit), max(kind_classes("noises"), key=fit)
-
-
-def _keys(kind: type[Parametrised]) -> set[str]:
-    """The keys of the parameters on which the linear problem depends."""
-    return {f"{kind.section}.{name}" for name in (*kind.fields(), *kind.words) if name not in kind.inert}
-
-
-def _section(key: str) -> str:
-    return key.partition(".")[0]
-
-
-def _named(half: Parametrised | type[Parametrised], stated: Parameters) -> Mapping[str, str]:
-    """What is stated for a system or a noise, by names without their section."""
-    return {key.rpartition(".")[2]: text for key, text in stated.items() if _section(key) == half.section}
-
-
-def _plain(stated: Parameters) -> Parameters:
-    """The same without the name of a noise, as of "noise.axial.alpha". Raises `ValueError` where there are two."""
-    found = {f"{_section(key)}.{key.rpartition('.')[2]}": text for key, text in stated.items()}
-    if len(found) < len(stated):
-        raise ValueError(f"parameters {', '.join(sorted(stated))} are of several noises")
-    return found
-
-
 def cylinder(stated: Statement) -> Cylinder:
-    """L(p) for a statement.
-
-    Raises:
-        NoSuchExponent: no bound can be proven for these parameters.
-    """
-    motion, law, directions = exact_halves(stated)
-    unit, kappa = ball(law.squared_unit).sqrt(), ball(0)
-    for jump, direction in zip(motion.jumps, directions, strict=True):
-        kappa += direction * (ball(jump.log_factor) + ball(jump.factor).log()) / kappa.pi()
-    still, driven = _polar(each(ball, motion.still)), _polar(each(ball, motion.driven) * unit)
+    """L(p) for a statement."""
+    noise, kappa = stated.noise, ball(0)
+    for jump, direction in zip(stated.jumps, stated.directions, strict=True):
+        kappa += direction * ball(jump.log_factor) / kappa.pi()
+    change = balls(stated.coordinates)
+    (a, b), (c, d) = change
+    back = np.array([[d, -b], [-c, a]]) / (a * d - b * c)
+    still, driven = (_polar(back @ balls(matrix) @ change) for matrix in (stated.still, stated.driven))
+    states, rates = balls(noise.states), balls(noise.rates)
+    if noise.states:
+        rates = rates - np.diag(np.diagonal(rates))
+        rates = rates - np.diag(rates.sum(axis=1))
     return Cylinder(
-        h=(still[0], driven[0]),
-        q=(still[1], driven[1]),
+        noise=noise,
+        h=(still[0], driven[0] * ball(noise.unit)),
+        q=(still[1], driven[1] * ball(noise.unit)),
         kappa=kappa,
-        nu=ball(law.nu),
-        slope=ball(law.slope),
-        unit=unit,
-        bases=law.bases,
-        states=None if law.states is None else each(ball, law.states),
-        is_white=bool(law.white),
-        rates=None if law.rates is None else each(ball, law.rates),
+        nu=ball(noise.nu),
+        slope=ball(noise.slope),
+        states=states if noise.states else None,
+        rates=rates if noise.states else None,
     )
 
 
@@ -307,3 +385,10 @@ def _polar(a: Balls) -> tuple[Balls, Balls]:
     (first, second), (third, fourth) = a / 2
     turning = _wave(second - third, -second - third, fourth - first)
     return turning, _wave(first + fourth, first - fourth, -second - third)
+
+
+def _wave(mean: arb, cosine: arb, sine: arb) -> Balls:
+    """Coefficients of mean + cosine cos 2φ + sine sin 2φ."""
+    from flint import acb
+
+    return np.array([acb(cosine / 2, sine / 2), acb(mean), acb(cosine / 2, -sine / 2)], dtype=object)

@@ -76,14 +76,13 @@ Coefficients are in balls; floats are rounded outward.
 
 from __future__ import annotations
 
-from fractions import Fraction
 from itertools import pairwise
 
 import numpy as np
 
 from fpsolve.proofs.balls import ball, precision
 from fpsolve.proofs.bounds import LOWER, UPPER, Bounder, Bounds, Trial
-from fpsolve.proofs.certificate import MOMENT, Certificate, SideRecord
+from fpsolve.proofs.certificate import Certificate, SideRecord
 from fpsolve.proofs.forms import FormCertificate
 from fpsolve.proofs.statement import Cylinder, cylinder
 
@@ -94,10 +93,10 @@ def objection(certificate: Certificate | FormCertificate) -> str:
     if isinstance(certificate, FormCertificate):
         return certificate.objection()
     sides = [(q, side) for q, side in ((UPPER, certificate.upper), (LOWER, certificate.lower)) if side is not None]
-    if certificate.p is not None and Fraction(certificate.p) == 0:  # Λ(0) = 0, as T = 1
-        return "" if all(q * Fraction(certificate.mu) + Fraction(side.delta) >= 0 for q, side in sides) else "Λ(0) = 0"
+    if certificate.p == 0:  # Λ(0) = 0, as T = 1
+        return "" if all(q * certificate.mu >= -side.delta for q, side in sides) else "Λ(0) = 0"
     trial = Trial(
-        noise=cylinder(certificate.statement),
+        noise=cylinder(certificate.stated),
         p=None if certificate.p is None else ball(certificate.p),
         mu=certificate.mu,
         basis=certificate.basis.basis,
@@ -140,7 +139,7 @@ def _misplaced(certificate: Certificate, noise: Cylinder, side: SideRecord) -> s
         return "" if side.values[0] <= 0 <= side.values[-1] else "W points outward at an end of the support"
     if noise.is_bounded and not -1 < first <= 0 <= last < 1:
         return "the core must hold 0, and not reach the ends of the support"
-    if certificate.quantity != MOMENT and certificate.basis.gauge != 0:
+    if certificate.p is None and certificate.basis.gauge != 0:
         return "the drift has no gauge"
     return ""
 

@@ -1,19 +1,13 @@
-"""Proofs of bounds on Λ(p), λ and δ_p of the curves of a case, their file, and the check of one.
-
-Of the numbers of a case the decimals count that it states.
-"""
+"""Proofs of bounds on Λ(p), λ and δ_p of the curves of a case, their file, and the check of one."""
 
 from __future__ import annotations
 
-import json
 import math
-import tomllib
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from decimal import ROUND_CEILING, ROUND_FLOOR, Decimal
-from functools import cached_property, partial
+from functools import partial
 from hashlib import sha256
 from pathlib import Path
 from time import monotonic
@@ -32,16 +26,16 @@ from fpsolve.output.records import Records, append
 from fpsolve.page.limits import EACH, PROOFS, ROWS
 from fpsolve.page.page import Block, Column, Grid, Sentence
 from fpsolve.pool import Pool, serial
+from fpsolve.proofs.balls import precision
 from fpsolve.proofs.certificate import NOTHING, Enclosure, MalformedProof, enclosure_of
-from fpsolve.proofs.claims import Claims, claims_from, plain, verdicts
+from fpsolve.proofs.claims import Claims, CurveClaims, IndexBound, bound_of, claims_from, moment_of, plain, verdicts
 from fpsolve.proofs.questions import (
     IndexEnclosure,
     check_width,
     prove_bounds,
     prove_index,
-    refuse_unprovable,
 )
-from fpsolve.proofs.statement import DECIMAL, Statement, linear_values, statement_of
+from fpsolve.proofs.statement import statement_of
 from fpsolve.proofs.verify import objection
 from fpsolve.reading import Unreadable, Words, read_text
 from fpsolve.show.curves import Shown, grid_of
@@ -51,10 +45,6 @@ from fpsolve.workflow.reports import facts_since, shown_at_the_end, write_report
 
 PROOF = "proof.json"
 """The file of proven bounds."""
-ORDERS = "moments.p"
-"""The key of the p of a case."""
-Literals = Mapping[float, str]
-"""Decimals by their floats."""
 Answer: TypeAlias = Enclosure | IndexEnclosure
 """Bounds that were found."""
 Question = partial[Any]
@@ -80,15 +70,13 @@ class CurveProof:
     """What is proven of one parameter set.
 
     Attributes:
-        stated: what is proven of.
-        moments: p as a decimal, and bounds on Λ(p) or None where that was not tried.
+        moments: p, and bounds on Λ(p) or None where that was not tried.
         exponent: bounds on λ; None where they are not asked for, or were not tried.
         index: bounds on δ_p, or None as for λ.
     """
 
     curve: Curve
-    stated: Statement
-    moments: tuple[tuple[str, Enclosure | None], ...]
+    moments: tuple[tuple[float, Enclosure | None], ...]
     exponent: Enclosure | None = None
     index: IndexEnclosure | None = None
 
@@ -129,30 +117,13 @@ class Plan:
     def total(self) -> int:
         return self.each * self.case.planned
 
-    @cached_property
-    def _literals(self) -> Mapping[str, Literals]:
-        keys = (key for curve in self.case.curves(stop=1) for key in linear_values(curve.problem))
-        return literals_of(self.case, (*keys, ORDERS))
-
-    @cached_property
-    def _orders(self) -> list[str]:
-        """All p as decimals: as the case states them, or of a range the floats as they stand."""
-        if self.case.moments.is_range:
-            return [str(Decimal(p)) for p in self.case.p.tolist()]
-        return [decimal_of(p, self._literals[ORDERS]) for p in self.case.p.tolist()]
-
-    def stated(self, curve: Curve) -> Statement:
-        """The linear motion with its parameters as the decimals that the case states. Raises as `statement_of`."""
-        decimals = {
-            key: value if isinstance(value, str) else decimal_of(value, self._literals[key])
-            for key, value in linear_values(curve.problem).items()
-        }
-        return statement_of(curve.problem, decimals)
-
     def questions(self) -> Iterator[Question]:
         for curve in self.case.curves():
-            problem, stated, budget = curve.problem, self.stated(curve), self.case.budget
-            yield from (partial(prove_bounds, problem, stated, p, self.width, budget=budget) for p in self._orders)
+            problem, budget = curve.problem, self.case.budget
+            stated = statement_of(problem)
+            yield from (
+                partial(prove_bounds, problem, stated, p, self.width, budget=budget) for p in self.case.p.tolist()
+            )
             if LYAPUNOV_EXPONENT.name in self.indices:
                 yield partial(prove_bounds, problem, stated, None, self.width, budget=budget)
             if STABILITY_INDEX.name in self.indices:
@@ -162,10 +133,10 @@ class Plan:
         """What is proven of each curve, from the first answers, in the order of the questions."""
         found, rest = [], iter(answers)
         for curve in self.case.curves(stop=-(-len(answers) // self.each)):
-            moments = tuple((p, cast("Enclosure | None", next(rest, None))) for p in self._orders)
+            moments = tuple((p, cast("Enclosure | None", next(rest, None))) for p in self.case.p.tolist())
             indices: dict[str, Any] = {name: next(rest, None) for name in self.indices}
             names = (LYAPUNOV_EXPONENT.name, STABILITY_INDEX.name)
-            found.append(CurveProof(curve, self.stated(curve), moments, *map(indices.get, names)))
+            found.append(CurveProof(curve, moments, *map(indices.get, names)))
         return found
 
 
@@ -179,11 +150,11 @@ def refuse_unprovable_case(case: Case, width: float | None) -> None:
         check_width(width)
     except ValueError as failure:
         raise FpsolveError(f"--width: {failure}") from None
-    plan = Plan(case, width)
     for curve in case.curves():
         place = f"{case.path}: with {curve.label}" if curve.varied else str(case.path)
         try:
-            refuse_unprovable(plan.stated(curve))
+            with precision():  # which raises `MissingFlint` before anything is written
+                statement_of(curve.problem)
         except (TypeError, ValueError) as failure:
             raise FpsolveError(f"{place}: {failure}") from None
         except NoSuchExponent as failure:
@@ -195,90 +166,26 @@ def answer(question: Question) -> Answer:
     return question()
 
 
-def literals_of(case: Case, keys: Iterable[str]) -> Mapping[str, Literals]:
-    """The decimals that the file and the command line state for dotted keys; those of [vary] for a varied one."""
-    found = list(_leaves(tomllib.loads(case.text, parse_float=Decimal)))
-    for override in case.overrides:
-        with suppress(ValueError):  # a bare word
-            new = list(_leaves(tomllib.loads(override, parse_float=Decimal)))
-            ((replaced, _),) = _leaves(tomllib.loads(f"{override.partition('=')[0]} = 0"))
-            found = [each for each in found if not _is_in(each[0], replaced)] + new
-    places = {key: f"vary.{key}" if key in case.vary.keys else key for key in keys}
-    return {
-        key: {float(number) + 0.0: f"{number}" for path, number in found if _is_in(path, place)}
-        for key, place in places.items()
-    }
-
-
-def decimal_of(value: float, literals: Literals) -> str:
-    """A number as the decimal that is stated, or else, as for those of a range, the shortest that is read as it."""
-    shortest = repr(float(value))
-    text = literals.get(value, shortest) if value else shortest
-    return text if DECIMAL.fullmatch(text) and Decimal(text) != Decimal(shortest) else shortest
-
-
-def _leaves(data: Any, path: str = "") -> Iterator[tuple[str, Decimal | int]]:
-    """The finite numbers in tables and lists, each after the dotted keys of the tables in which it stands."""
-    if isinstance(data, dict):
-        for name, inner in data.items():
-            yield from _leaves(inner, f"{path}.{name}" if path else name)
-    elif isinstance(data, list):
-        for inner in data:
-            yield from _leaves(inner, path)
-    elif isinstance(data, Decimal | int) and not isinstance(data, bool) and Decimal(data).is_finite():
-        yield path, data
-
-
-def _is_in(path: str, place: str) -> bool:
-    return f"{path}.".startswith(f"{place}.")
-
-
 def write_proof(case: Case, proofs: Sequence[CurveProof], folder: Path, *, is_whole: bool) -> None:
-    """proof.json: for each curve its parameters, and every bound with the certificate from which it follows.
-
-    A bound has a line. Numbers among the parameters are written as the decimals of which the bounds hold.
-    """
-    head = {"fpsolve": __version__, "case": case.name, "complete": is_whole}
-    lines = ",\n".join(f" {json.dumps(key)}: {json.dumps(value)}" for key, value in head.items())
-    curves = []
-    for proof in proofs:
-        written = {key: _line(value) for key, value in proof.curve.parameters.items()}
-        written |= {key: text for key, text in proof.stated.parameters.items() if DECIMAL.fullmatch(text)}
-        moments = ",\n".join(f"    {_moment(p, found)}" for p, found in proof.moments)
-        parts = {
-            "parameters": f"{{{', '.join(f'{json.dumps(key)}: {text}' for key, text in written.items())}}}",
-            "moments": f"[\n{moments}\n   ]",
-            "lyapunov_exponent": "null" if proof.exponent is None else _line(_bound(proof.exponent)),
-            "stability_index": "null" if proof.index is None else _index(proof.index),
-            "verdicts": _line(proof.verdicts),
-        }
-        text = ",\n".join(f"   {json.dumps(key)}: {value}" for key, value in parts.items())
-        curves.append(f"  {{\n{text}\n  }}")
-    write_text(folder / PROOF, "\n".join(["{", f'{lines},\n "curves": [', ",\n".join(curves), " ]", "}", ""]))
+    """proof.json: for each curve its parameters, and every bound with the certificate from which it follows."""
+    curves = [
+        CurveClaims(
+            parameters=dict(proof.curve.parameters),
+            moments=[moment_of(p, found) for p, found in proof.moments],
+            lyapunov_exponent=None if proof.exponent is None else bound_of(proof.exponent),
+            stability_index=None if proof.index is None else _index(proof.index),
+            verdicts=proof.verdicts,
+        )
+        for proof in proofs
+    ]
+    claims = Claims(fpsolve=__version__, case=case.name, complete=is_whole, curves=curves)
+    write_text(folder / PROOF, claims.model_dump_json(indent=1) + "\n")
 
 
-def _bound(found: Enclosure | None) -> dict[str, Any]:
-    """lower, upper and the certificate; null where nothing is proven."""
-    if found is None or found.certificate is None:
-        return {"lower": None, "upper": None, "certificate": None}
-    ends = (end if math.isfinite(end) else None for end in (found.lower, found.upper))
-    return dict(zip(("lower", "upper"), ends, strict=True)) | {"certificate": found.certificate.model_dump(mode="json")}
-
-
-def _moment(p: str, found: Enclosure | None) -> str:
-    """The bounds on Λ(p); p as the decimal of which they hold."""
-    return f'{{"p": {p}, {_line(_bound(found))[1:]}'
-
-
-def _index(found: IndexEnclosure) -> str:
+def _index(found: IndexEnclosure) -> IndexBound:
     """Bounds on δ_p, and Λ at two p beside it."""
-    ends = (found.lower, found.upper) if found.is_proven else (None, None)
-    moments = ", ".join(_moment(p, each) for p, each in found.moments)
-    return f'{{"lower": {_line(ends[0])}, "upper": {_line(ends[1])}, "moments": [{moments}]}}'
-
-
-def _line(data: Any) -> str:
-    return json.dumps(data, allow_nan=False, ensure_ascii=False)
+    lower, upper = (found.lower, found.upper) if found.is_proven else (None, None)
+    return IndexBound(lower=lower, upper=upper, moments=[moment_of(p, each) for p, each in found.moments])
 
 
 def show(case: Case, proofs: Sequence[CurveProof]) -> Iterator[Block]:
@@ -339,15 +246,15 @@ def proofs_grid(case: Case, proofs: Sequence[CurveProof]) -> Grid:
     )
 
 
-def _fate(p: str, found: Enclosure | None) -> str:
+def _fate(p: float, found: Enclosure | None) -> str:
     if found is None or not found.is_proven:
         return "not tried" if found is None else NOT_PROVEN
-    return FATES[found.sign] if float(p) else "is constant"
+    return FATES[found.sign] if p else "is constant"
 
 
-def _order(p: str) -> str:
+def _order(p: float) -> str:
     """p for the eye."""
-    return text if len(text := plain(p)) <= LONGEST else f"{float(p):.10g}"
+    return text if len(text := plain(p)) <= LONGEST else f"{p:.10g}"
 
 
 def _counted(proof: CurveProof) -> str:

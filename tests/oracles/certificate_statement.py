@@ -1,12 +1,10 @@
 """What a certificate states: a system and its noise, and the series that a proof is about.
 
-Parameters are exact decimals, all other numbers are floats taken as they are, so every coefficient of the
-series follows in intervals. A system is ẋ = (A₀ + ξA₁)x, that of the paper by its parameters, others as sums of terms
-ε^order (offset + slope ξ) A. Where coordinates P are stated, phase and size are those of P⁻¹x. At a phase φ of x =
-‖x‖ (cos φ, −sin φ) a matrix A turns it by h = e′ᵀAe and stretches it by q = eᵀAe, waves in 2φ.
+Numbers are floats taken as they are, so every coefficient of the series follows in intervals. A system is ẋ = (A₀ +
+ξA₁)x in the sense of Stratonovich; phase and size are those of P⁻¹x. At a phase φ of x = ‖x‖ (cos φ, −sin φ) a matrix
+A turns it by h = e′ᵀAe and stretches it by q = eᵀAe, waves in 2φ.
 """
 
-from decimal import Decimal
 from fractions import Fraction
 from typing import NamedTuple
 
@@ -27,15 +25,14 @@ class Polar(NamedTuple):
 
 
 class Noise(NamedTuple):
-    """A noise in units of its own: of what kind, ν, b′(0) (b = slope·z, over 1 − z² if bounded), the unit squared."""
+    """A noise in a unit of its own: of what kind, ν, b′(0) (b = slope·z, over 1 − z² if bounded), the unit."""
 
-    kind: str  # "line", "bounded", "circle" for z = cos θ with ½ν∂θθ, "chain", "white"
+    kind: str  # "gaussian", "bounded", "circle" for z = cos θ with ½ν∂θθ, "chain", "white"
     nu: Fraction = Fraction(1)
     slope: Fraction = Fraction(0)
-    square: Fraction = Fraction(1)
+    unit: Fraction = Fraction(1)
     states: tuple = ()
     rates: tuple = ()
-    ito: bool = False
 
 
 class Model(NamedTuple):
@@ -95,73 +92,42 @@ def require(condition, reason):
         raise Refused(reason)
 
 
-def decimal(value):
-    """The exact value of a decimal as written; of a float, of the decimal that Python writes for it."""
-    require(isinstance(value, str | int | float | Decimal) and not isinstance(value, bool), f"{value!r} is no number.")
-    number = Decimal(repr(value) if isinstance(value, float) else value)
-    require(number.is_finite() and abs(number.adjusted()) < 400, f"{value} is out of range.")
-    return Fraction(number)
+def number(value):
+    """The exact value of a float."""
+    return Fraction(float(binary(value)))
 
 
 def binary(values):
     """Floats from numbers of JSON, all finite."""
     array = np.array(values, dtype=object)
-    good = [isinstance(v, int | float | Decimal) and not isinstance(v, bool) for v in array.flat]
+    good = [isinstance(v, int | float) and not isinstance(v, bool) for v in array.flat]
     require(all(good), "A number of the certificate is missing.")
     array = np.array([float(v) for v in array.flat]).reshape(array.shape)
     require(np.isfinite(array).all(), "A number of the certificate is not finite.")
     return array
 
 
-SYSTEM_NAMES = ({"stiffness", "damping", "restitution"},)
-NOISE_NAMES = (
-    *({"a", "k"}, {"s", "interpretation"}, {"amplitude", "sigma"}, {"alpha", "standard_deviation"}),
-    *({"alpha", "sigma"}, {"D0", "tau0"}, {"D0", "tau0", "r0", "treatment"}),
-)
-WORDS = ("oscillator.impact", "noise.treatment", "noise.interpretation")
-
-
 def model_of(certificate):
     """The constants of a certificate."""
-    quantity = certificate["quantity"]
-    require(quantity in ("moment", "lyapunov_exponent"), f"No quantity is called {quantity!r}.")
-    given = _given(certificate["parameters"])
-    for part, told in (("motion", SYSTEM_NAMES), ("chain", NOISE_NAMES)):
-        section = "system" if part == "motion" else "noise"
-        names = {name.partition(".")[2] for name in given if name.startswith(f"{section}.")}
-        require(certificate.get(part) is None or names not in told, f"Its labels tell another {section}.")
-    noise = _noise(given) if certificate.get("chain") is None else _chain(certificate["chain"])
-    require(Fraction(1, 10**80) < noise.nu < 10**80, "The rate of the noise is out of range.")
-    if (motion := certificate.get("motion")) is not None:
-        still, driven, jumps = _motion(motion)
-    else:
-        still, driven, jumps = (_parametric if "system.stiffness" in given else _oscillator)(given)
-    if noise.ito:
-        still = [[still[i][j] - noise.square * _times(driven, driven)[i][j] / 2 for j in (0, 1)] for i in (0, 1)]
+    stated = certificate["stated"]
+    require(set(stated) == {"still", "driven", "jumps", "coordinates", "noise"}, "A statement has other keys.")
+    noise = _noise(stated["noise"])
+    still, driven, jumps = _motion(stated)
     kappa = cs.exact(0)
     for ray, log_factor in jumps:
         speeds = [ray[1] * x - ray[0] * y for x, y in (_moved(a, ray) for a in (still, driven))]
         kappa = kappa + log_factor * _direction(*speeds, noise)
-    unit = cs.IV.sqrt(cs.exact(noise.square))
+    unit = cs.exact(noise.unit)
+    moment = certificate["p"] is not None
     return Model(
         still=_polar(still, cs.exact(1)),
         driven=_polar(driven, unit),
         kappa=kappa / cs.IV.pi,
         noise=noise,
-        moment=quantity == "moment",
-        p=decimal(certificate["p"]) if quantity == "moment" else Fraction(0),
+        moment=moment,
+        p=number(certificate["p"]) if moment else Fraction(0),
         mu=float(binary(certificate["mu"])),
     )
-
-
-def _given(parameters):
-    """Parameters by their keys, without the name of the noise; words, and exact decimals."""
-    found = {}
-    for key, value in parameters.items():
-        plain = f"{key.partition('.')[0]}.{key.rpartition('.')[2]}"
-        require(plain not in found, "Two parameters have one name.")
-        found[plain] = value if plain in WORDS else decimal(value)
-    return found
 
 
 def _polar(a, size):
@@ -182,116 +148,57 @@ def _times(a, b):
 
 def _direction(still, driven, noise):
     """Whether the phase passes a ray forward (1) or backward (−1), where its speed is still + driven ξ."""
-    if noise.kind in ("line", "white"):
+    if noise.kind in ("gaussian", "white"):
         speeds = [still] if driven == 0 else [Fraction(0)]
     elif noise.kind == "chain":
-        speeds = [still + driven * x for x in noise.states]
+        speeds = [still + driven * noise.unit * x for x in noise.states]
     else:
-        speeds = [still] if driven**2 * noise.square < still**2 else [Fraction(0)]
+        speeds = [still] if driven**2 * noise.unit**2 < still**2 else [Fraction(0)]
     require(all(x > 0 for x in speeds) or all(x < 0 for x in speeds), "The phase must cross each jump one way.")
     return 1 if speeds[0] > 0 else -1
 
 
-def _oscillator(given):
-    """A₀, A₁ and the jump of the paper's oscillator in (x, v/ω)."""
-    omega, eps = given["oscillator.omega"], given["oscillator.epsilon"]
-    require(omega > 0, "omega must be positive: the phase must cross each impact forward.")
-    loss = eps**2 * (1 - given["oscillator.restitution"])
-    still, driven = [[Fraction(0), omega], [-omega, eps**2 * given["oscillator.c1"]]], [[Fraction(0)] * 2, [0, eps]]
-    return still, driven, [((Fraction(0), Fraction(1)), _log_factor(given["oscillator.impact"], loss))]
-
-
-def _parametric(given):
-    """The same of ẍ + 2·damping·ẋ + (stiffness + ξ)x = 0 in (x, ẋ)."""
-    names = {name.partition(".")[2] for name in given if name.startswith("system.")}
-    require(names in SYSTEM_NAMES, "Other parameters.")
-    require(given["system.restitution"] > 0, "The wall leaves no positive factor.")
-    still = [[Fraction(0), Fraction(1)], [-given["system.stiffness"], -2 * given["system.damping"]]]
-    wall = (Fraction(0), Fraction(1)), cs.IV.log(cs.exact(given["system.restitution"]))
-    return still, [[Fraction(0)] * 2, [Fraction(-1), Fraction(0)]], [wall]
-
-
 def _motion(stated):
-    """A₀, A₁ and the jumps of a system that is stated by floats."""
-    require(stated["numbers"] == "binary", "The numbers of a system are binary.")
-    require(set(stated) == {"numbers", "epsilon", "terms", "jumps", "coordinates"}, "A system has other keys.")
-    eps, sums = Fraction(float(binary(stated["epsilon"]))), [[[Fraction(0)] * 2 for _ in (0, 1)] for _ in (0, 1)]
-    require(eps > 0, "epsilon must be positive.")
-    for term in stated["terms"]:
-        order, a = term["order"], _fractions(term["matrix"], (2, 2))
-        require(isinstance(order, int) and not isinstance(order, bool) and 0 <= order < 100, "An order is none.")
-        for total, part in zip(sums, ("offset", "slope"), strict=True):
-            for i, j in np.ndindex(2, 2):
-                total[i][j] += eps**order * Fraction(float(binary(term[part]))) * a[i][j]
+    """A₀, A₁ and the jumps of y, x = P y."""
     (a, b), (c, d) = change = _fractions(stated["coordinates"], (2, 2))
     require(a * d != b * c, "The coordinates have no inverse.")
     back = [[x / (a * d - b * c) for x in row] for row in ([d, -b], [-c, a])]
     jumps = []
     for jump in stated["jumps"]:
+        require(set(jump) == {"ray", "log_factor"}, "A jump has other keys.")
         ray = _fractions(jump["ray"], (2,))
         require(any(ray), "A ray has no direction.")
         jumps.append((_moved(back, ray), cs.exact(float(binary(jump["log_factor"])))))
-    return *(_times(_times(back, total), change) for total in sums), jumps
+    matrices = (_fractions(stated[name], (2, 2)) for name in ("still", "driven"))
+    return *(_times(_times(back, a), change) for a in matrices), jumps
 
 
 def _fractions(numbers, shape):
     """Floats as they stand."""
     floats = binary(numbers)
     require(floats.shape == shape, "A matrix or a ray has another shape.")
-    return np.vectorize(Fraction, otypes=[object])(floats).tolist()
+    return np.vectorize(Fraction, otypes=[object])(floats).reshape(shape).tolist()
 
 
-def _log_factor(impact, loss):
-    """ln R of an impact."""
-    require(impact in ("delta", "restitution"), f"No impact is called {impact!r}.")
-    require(impact == "delta" or loss < 1, "The impact leaves no positive factor.")
-    return cs.exact(-loss) if impact == "delta" else cs.IV.log(cs.exact(1 - loss))
-
-
-def _chain(stated):
-    """A chain that is stated by floats; its diagonal follows from the rates."""
-    require(stated["numbers"] == "binary", "The numbers of a chain are binary.")
-    require(set(stated) == {"numbers", "states", "rates"}, "A chain has other keys.")
-    n = len(stated["states"])
-    return _chain_of(_fractions(stated["states"], (n,)), _fractions(stated["rates"], (n, n)))
-
-
-def _chain_of(states, rates):
-    rows = []
-    for i, row in enumerate(rates):
-        others = [0 if i == j else rate for j, rate in enumerate(row)]
+def _noise(stated):
+    """The noise; the diagonal of rates follows from the others."""
+    require(set(stated) == {"kind", "unit", "nu", "slope", "states", "rates"}, "A noise has other keys.")
+    kind, (unit, nu, slope) = stated["kind"], (number(stated[name]) for name in ("unit", "nu", "slope"))
+    require(kind in ("gaussian", "bounded", "circle", "chain", "white"), f"No noise is called {kind!r}.")
+    require(unit > 0 and nu >= 0 and slope >= 0, "A number of the noise is negative.")
+    if kind not in ("chain", "white"):
+        require(stated["states"] == [] and stated["rates"] == [], "Only a chain has states.")
+        require(nu > 0 and (slope > 0 or kind == "circle"), "A rate of the noise is not positive.")
+        require(Fraction(1, 10**80) < nu < 10**80, "The rate of the noise is out of range.")
+        return Noise(kind, nu, slope, unit)
+    n, rows = len(stated["states"]), []
+    for i, row in enumerate(_fractions(stated["rates"], (n, n))):
+        others = [Fraction(0) if i == j else rate for j, rate in enumerate(row)]
         require(min(others) >= 0, "A rate is negative.")
         rows.append(tuple(rate if i != j else -sum(others) for j, rate in enumerate(others)))
-    return Noise("chain", states=tuple(states), rates=tuple(rows))
-
-
-def _noise(given):
-    """The noise by its parameters."""
-    names = {name.partition(".")[2] for name in given if name.startswith("noise.")}
-    value = {name: given[f"noise.{name}"] for name in names}
-    require(all(x > 0 for name, x in value.items() if f"noise.{name}" not in WORDS and name != "r0"), "All are > 0.")
-    if names == {"a", "k"}:
-        return _chain_of((-value["a"], value["a"]), ((0, value["k"]), (value["k"], 0)))
-    if names == {"s", "interpretation"}:
-        require(value["interpretation"] in ("ito", "stratonovich"), "No such interpretation.")
-        ito, nothing = value["interpretation"] == "ito", (Fraction(0),)
-        return Noise("white", square=value["s"] ** 2, states=nothing, rates=(nothing,), ito=ito)
-    if names == {"amplitude", "sigma"}:
-        return Noise("circle", value["sigma"] ** 2, Fraction(0), value["amplitude"] ** 2)
-    if names == {"alpha", "standard_deviation"}:
-        return Noise("line", 2 * value["alpha"], Fraction(1, 2), value["standard_deviation"] ** 2)
-    if names == {"alpha", "sigma"}:
-        alpha = value["alpha"]
-        return Noise("line", 2 * alpha, Fraction(1, 2), value["sigma"] ** 2 / (2 * alpha))
-    if names == {"D0", "tau0"}:
-        return Noise("line", 2 / value["tau0"], Fraction(1, 2), value["D0"] / value["tau0"])
-    d0, tau, r0, treatment = (value[name] for name in ("D0", "tau0", "r0", "treatment"))
-    if treatment == "exact" and r0 < 1:
-        return Noise("bounded", (1 - r0) / tau, 1 / (1 - r0), 2 * d0 / (tau * (1 - r0)))
-    require(treatment == "ou-reduction" or (treatment == "exact" and r0 == 1), f"No {treatment} noise with r0 {r0}.")
-    require(r0 < Fraction(5, 3), "The reduction to OU noise needs r0 < 5/3.")
-    tau1 = 2 * (2 - r0) / (5 - 3 * r0) * tau
-    return Noise("line", 2 / tau1, Fraction(1, 2), d0 * tau1 / tau**2)
+    states = tuple(_fractions(stated["states"], (n,)))
+    require(kind == "chain" or (states, rows) == ((0,), [(0,)]), "White noise rests in one state.")
+    return Noise(kind, unit=unit, states=states, rates=tuple(rows))
 
 
 def deltas(certificate):
@@ -301,7 +208,7 @@ def deltas(certificate):
     return found
 
 
-BASES = {"line": ("core",), "bounded": ("core", "whole"), "circle": ("circle",)}
+BASES = {"gaussian": ("core",), "bounded": ("core", "whole"), "circle": ("circle",)}
 
 
 def read_trial(model, certificate):

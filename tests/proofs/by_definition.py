@@ -7,15 +7,33 @@ import mpmath
 import numpy as np
 from numpy.polynomial import chebyshev, hermite_e
 
+
+def law(kind, unit, nu, slope):
+    """A noise as a certificate states it."""
+    return {"kind": kind, "unit": unit, "nu": nu, "slope": slope, "states": [], "rates": []}
+
+
+def bounded(d0, tau, r0):
+    """That of Eq. (7)."""
+    return law("bounded", math.sqrt(2 * d0 / (tau * (1 - r0))), (1 - r0) / tau, 1 / (1 - r0))
+
+
+def gaussian(alpha, sigma):
+    """That of Eq. (15)."""
+    return law("gaussian", sigma / math.sqrt(2 * alpha), 2 * alpha, 0.5)
+
+
 OSCILLATOR = {
-    "oscillator.omega": "1.3",
-    "oscillator.restitution": "0.75",
-    "oscillator.c1": "-0.1",
-    "oscillator.epsilon": "0.5",
-    "oscillator.impact": "restitution",
+    "still": [[0.0, 1.3], [-1.3, 0.5**2 * -0.1]],
+    "driven": [[0.0, 0.0], [0.0, 0.5]],
+    "jumps": [{"ray": [0.0, -1.0], "log_factor": math.log(1 - 0.5**2 * (1 - 0.75))}],
+    "coordinates": [[1.0, 0.0], [0.0, 1.0]],
 }
-EXACT = {**OSCILLATOR, "noise.D0": "0.4", "noise.tau0": "0.6", "noise.r0": "0.7", "noise.treatment": "exact"}
-PLAIN = {**OSCILLATOR, "noise.alpha": "1.7", "noise.sigma": "0.9"}
+"""That of Eq. (3) with ω = 1.3, r = 0.75, c₁ = −0.1 and ε = 0.5."""
+EXACT = {**OSCILLATOR, "noise": bounded(0.4, 0.6, 0.7)}
+REDUCED = {**OSCILLATOR, "noise": gaussian((5 - 3 * 0.7) / (2 * (2 - 0.7) * 0.6), math.sqrt(2 * 0.4) / 0.6)}
+REACHED = {**OSCILLATOR, "noise": bounded(0.4, 0.6, -1.5)}
+PLAIN = {**OSCILLATOR, "noise": gaussian(1.7, 0.9)}
 
 
 def polynomial(powers, z):
@@ -53,42 +71,29 @@ def trial(certificate, phi, z):
     return total
 
 
-def noise_of(v):
-    """(drift, σ², unit) of z = ξ/unit, from Eqs. (7) and (12)-(15)."""
-    if "noise.alpha" in v:
-        alpha, sigma = v["noise.alpha"], v["noise.sigma"]
-    else:
-        d0, tau, r0 = v["noise.D0"], v["noise.tau0"], v["noise.r0"]
-        sigma = mpmath.sqrt(2 * d0) / tau
-        if v["noise.treatment"] == "exact":
-            unit = mpmath.sqrt(2 * d0 / (tau * (1 - r0)))
-            return lambda z: -z / tau / (1 + tau / d0 * (r0 - 1) * (z * unit) ** 2 / 2), (sigma / unit) ** 2, unit
-        alpha = 1 / (2 * (2 - r0) / (5 - 3 * r0) * tau)
-    unit = sigma / mpmath.sqrt(2 * alpha)
-    return lambda z: -alpha * z, (sigma / unit) ** 2, unit
-
-
 def applied(certificate, phi, z, function=trial, extra=lambda y: 0):
     """(L(p)T − μT)/(R^{ps}e^{βz}) of T = R^{ps}e^{βz + ψ}u, or for λ: the drift of ρ + s ln R + f + ψ less μ.
 
-    From Eqs. (17)-(18).  `function` is u or f, `extra` is ψ, which must vanish at z.
+    From ẋ = (A₀ + unit z A₁) x, x = ‖x‖ (cos φ, −sin φ), with a wall that the phase passes forward.  `function` is u
+    or f, `extra` is ψ, which must vanish at z.
     """
-    words = ("oscillator.impact", "noise.treatment")
-    v = {k: x if k in words else mpmath.mpf(x) for k, x in certificate["parameters"].items()}
-    eps, c1, beta = v["oscillator.epsilon"], v["oscillator.c1"], mpmath.mpf(certificate["basis"].get("gauge", 0))
-    loss = eps**2 * (1 - v["oscillator.restitution"])
-    log_r = -loss if v["oscillator.impact"] == "delta" else mpmath.log(1 - loss)
-    drift, diffusion, unit = noise_of(v)
-    p, push = certificate["p"] and mpmath.mpf(certificate["p"]), eps * z * unit + eps**2 * c1
+    stated, beta = certificate["stated"], mpmath.mpf(certificate["basis"].get("gauge", 0))
+    noise = {name: mpmath.mpf(stated["noise"][name]) for name in ("unit", "nu", "slope")}
+    log_r = sum(mpmath.mpf(jump["log_factor"]) for jump in stated["jumps"])
+    drift = -noise["nu"] * noise["slope"] * z / (1 - z**2 if stated["noise"]["kind"] == "bounded" else 1)
+    p = None if certificate["p"] is None else mpmath.mpf(certificate["p"])
+    a = mpmath.matrix(stated["still"]) + z * noise["unit"] * mpmath.matrix(stated["driven"])
+    e, turned = mpmath.matrix([mpmath.cos(phi), -mpmath.sin(phi)]), mpmath.matrix([-mpmath.sin(phi), -mpmath.cos(phi)])
+    speed, rate = ((side.T * a * e)[0] for side in (turned, e))
 
     def whole(x, y):
         if p is None:
             return x / mpmath.pi * log_r + function(certificate, x, y) + extra(y)
         return mpmath.exp(p * log_r * x / mpmath.pi + beta * y + extra(y)) * function(certificate, x, y)
 
-    value = diffusion / 2 * mpmath.diff(whole, (phi, z), (0, 2)) + drift(z) * mpmath.diff(whole, (phi, z), (0, 1))
-    value += (v["oscillator.omega"] + push * mpmath.sin(2 * phi) / 2) * mpmath.diff(whole, (phi, z), (1, 0))
-    rate, mu = push * (1 - mpmath.cos(2 * phi)) / 2, mpmath.mpf(certificate["mu"])
+    value = noise["nu"] / 2 * mpmath.diff(whole, (phi, z), (0, 2)) + drift * mpmath.diff(whole, (phi, z), (0, 1))
+    value += speed * mpmath.diff(whole, (phi, z), (1, 0))
+    mu = mpmath.mpf(certificate["mu"])
     if p is None:
         return value + rate - mu
     return (value + (p * rate - mu) * whole(phi, z)) * mpmath.exp(-p * log_r * phi / mpmath.pi - beta * z)

@@ -6,7 +6,6 @@ A change may leave a proof: each mutation says whether the claim may still follo
 import copy
 import math
 from collections.abc import Callable, Iterator
-from decimal import Decimal
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -15,8 +14,7 @@ from numpy.polynomial import chebyshev, hermite_e
 
 from tests.oracles.certificate_statement import model_of
 
-Truth = Callable[[dict[str, str], float | None], float]
-WORDS = ("oscillator.impact", "noise.treatment")
+Truth = Callable[[dict[str, Any], float | None], float]
 SIDES = {"upper": 1, "lower": -1}
 
 
@@ -29,10 +27,10 @@ class Mutation(NamedTuple):
 
 
 def mutations(entry: dict[str, Any], truth: Truth, tolerance: float = 1e-11) -> Iterator[Mutation]:
-    """All mutations of an entry; `truth` gives Λ(p), or λ for p = None, of parameters, to within the tolerance."""
+    """All mutations of an entry; `truth` gives Λ(p), or λ for p = None, of what is stated, to within the tolerance."""
     yield from changed_coefficients(entry)
     yield from changed_sides(entry)
-    yield from changed_parameters(entry, truth, tolerance)
+    yield from changed_statements(entry, truth, tolerance)
     yield from moved_bounds(entry, truth, tolerance)
 
 
@@ -56,7 +54,7 @@ def changed_sides(entry: dict[str, Any]) -> Iterator[Mutation]:
     certificate = new["certificate"]
     certificate["upper"], certificate["lower"] = certificate["lower"], certificate["upper"]
     new["lower"], new["upper"] = (
-        Decimal(certificate["mu"]) + s * 2 * Decimal(certificate[n]["delta"]) for s, n in ((-1, "lower"), (1, "upper"))
+        certificate["mu"] + s * 2 * certificate[n]["delta"] for s, n in ((-1, "lower"), (1, "upper"))
     )
     yield Mutation("sides exchanged", new, partial(_may_hold, new))
     for name, sign in SIDES.items():
@@ -79,24 +77,31 @@ def changed_sides(entry: dict[str, Any]) -> Iterator[Mutation]:
                 yield Mutation(f"{name} tail {last} by {change}", new, partial(_may_hold, new))
 
 
-def changed_parameters(entry: dict[str, Any], truth: Truth, tolerance: float = 1e-11) -> Iterator[Mutation]:
-    """Each parameter, and p, changed by 1e-4 and 1e-2 of itself."""
-    names = [name for name in entry["certificate"]["parameters"] if name not in WORDS]
-    for name in names if entry["p"] is None else [*names, "p"]:
-        for factor in (Decimal("0.9999"), Decimal("1.01")):
+PLACES = (("still", 0, 1), ("still", 1, 0), ("still", 1, 1), ("driven", 1, 1), ("jumps", 0, "log_factor"))
+"""What is changed of an oscillator."""
+
+
+def changed_statements(entry: dict[str, Any], truth: Truth, tolerance: float = 1e-11) -> Iterator[Mutation]:
+    """Each number that is stated, and p, changed by 1e-4 and 1e-2 of itself."""
+    places: list[tuple[Any, ...]] = [("stated", *place) for place in PLACES]
+    places += [("stated", "noise", name) for name in ("unit", "nu")] + [("p",)] * (entry["p"] is not None)
+    for *above, last in places:
+        for factor in (0.9999, 1.01):
             new = copy.deepcopy(entry)
-            where = new["certificate"] if name == "p" else new["certificate"]["parameters"]
-            where[name] = str(Decimal(where[name]) * factor)
-            if name == "p":
-                new["p"] = Decimal(where[name])
-            yield Mutation(f"{name} = {where[name]}", new, partial(_is_true, new, truth, tolerance))
+            where = new["certificate"]
+            for place in above:
+                where = where[place]
+            where[last] *= factor
+            if last == "p":
+                new["p"] = where[last]
+            yield Mutation(f"{above} {last} = {where[last]}", new, partial(_is_true, new, truth, tolerance))
 
 
 def moved_bounds(entry: dict[str, Any], truth: Truth, tolerance: float = 1e-11) -> Iterator[Mutation]:
     """A bound, or both of them with μ, past the true value."""
     certificate = entry["certificate"]
-    value = truth(certificate["parameters"], _order(certificate))
-    lower, upper = float(entry["lower"]), float(entry["upper"])
+    value = truth(certificate["stated"], certificate["p"])
+    lower, upper = entry["lower"], entry["upper"]
     delta = sum(float(certificate[name]["delta"]) for name in SIDES) / 2
     for new_lower, new_upper, shift in (
         (value + 0.1 * (upper - value), upper, 0.0),
@@ -109,18 +114,14 @@ def moved_bounds(entry: dict[str, Any], truth: Truth, tolerance: float = 1e-11) 
         yield Mutation(f"[{new_lower}, {new_upper}]", new, partial(_is_true, new, truth, tolerance))
 
 
-def _order(certificate: dict[str, Any]) -> float | None:
-    return None if certificate["quantity"] == "lyapunov_exponent" else float(certificate["p"])
-
-
 def _may_hold(entry: dict[str, Any]) -> bool:
     return not violated(entry["certificate"])
 
 
 def _is_true(entry: dict[str, Any], truth: Truth, tolerance: float) -> bool:
     """Whether the bounds hold, or might within the tolerance of the true value."""
-    value = truth(entry["certificate"]["parameters"], _order(entry["certificate"]))
-    return float(entry["lower"]) - tolerance <= value <= float(entry["upper"]) + tolerance
+    value = truth(entry["certificate"]["stated"], entry["certificate"]["p"])
+    return entry["lower"] - tolerance <= value <= entry["upper"] + tolerance
 
 
 def violated(certificate: dict[str, Any]) -> bool:
@@ -137,7 +138,7 @@ def _violated_tail(certificate: dict[str, Any], side: dict[str, Any], sign: int)
         return False
     nodes, values, tails = (np.array([float(side[name][i]) for i in (0, -1)]) for name in ("nodes", "values", "tails"))
     u, steep, _, _ = samples(certificate, nodes)
-    rise = sign * (steep / u if certificate["quantity"] == "moment" else steep)
+    rise = sign * (steep if certificate["p"] is None else steep / u)
     toward, gauge = np.array([-1, 1]), float(certificate["basis"].get("gauge", 0))
     jump = (toward * (values - tails + rise)).min(axis=0)
     return bool((jump < -1e-6).any() or (toward * (tails + sign * gauge) < -1e-6).any())
@@ -149,7 +150,7 @@ def _violated_side(certificate: dict[str, Any], side: dict[str, Any], sign: int)
     z, w = (nodes[1:] + nodes[:-1]) / 2, (values[1:] + values[:-1]) / 2
     slope, delta = np.diff(values) / np.diff(nodes), float(side["delta"])
     u, steep, mismatch, noise_drift = samples(certificate, z)
-    moment = certificate["quantity"] == "moment"
+    moment = certificate["p"] is not None
     gauge = float(certificate["basis"].get("gauge", 0))
     inward = noise_drift - (gauge + steep / u if moment else 0)
     excess = (delta - sign * (mismatch / u if moment else mismatch)) / float(model_of(certificate).nu)

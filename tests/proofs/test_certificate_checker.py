@@ -8,7 +8,6 @@ import functools
 import json
 import math
 import os
-from decimal import Decimal, localcontext
 from fractions import Fraction
 from itertools import islice
 
@@ -18,19 +17,20 @@ import pytest
 
 import fpsolve
 from fpsolve import prove
+from fpsolve.arrays import identity
+from fpsolve.model import CoefficientMatrix, Jump
 from fpsolve.proofs import prove_lyapunov_exponent
 from fpsolve.proofs.balls import precision
-from fpsolve.proofs.claims import Bound, MomentBound
+from fpsolve.proofs.claims import Bound
 from fpsolve.proofs.search import Galerkin, bases, certificate_of
 from fpsolve.proofs.statement import Statement, cylinder
 from tests.conftest import sampled
 from tests.oracles import certificate_checker as checker
 from tests.oracles import certificate_condition as condition
 from tests.oracles import certificate_statement as statement
-from tests.proofs.by_definition import EXACT, PLAIN, applied, trial
-from tests.proofs.mutations import WORDS, mutations, violated
+from tests.proofs.by_definition import EXACT, PLAIN, REACHED, applied, bounded, gaussian, trial
+from tests.proofs.mutations import mutations, violated
 
-REACHED = {**EXACT, "noise.r0": "-1.5"}
 CORE = {"kind": "core", "centre": 0.0, "scale": 1.0, "gauge": 0.0}
 WEAK = {"omega": 1.0, "restitution": 0.8, "c1": 0.1, "epsilon": 0.1}
 MIDDLE = {"omega": 1.3, "restitution": 0.75, "c1": -0.1, "epsilon": 0.5, "impact": "restitution"}
@@ -47,20 +47,27 @@ STEP = 1 if "FPSOLVE_ALL_MUTATIONS" in os.environ else 16
 """Of the slow tests through all mutations of a proof."""
 
 
-def problem_of(parameters):
-    """A problem from the decimals of a certificate."""
-    is_plain = "noise.alpha" in parameters
-    noise = fpsolve.OrnsteinUhlenbeck(1.0, 1.0) if is_plain else fpsolve.NonGaussianNoise(1.0, 1.0, 0.9)
-    values = {name: text if name in WORDS else float(text) for name, text in parameters.items()}
-    return fpsolve.Problem(fpsolve.VibroImpactOscillator(**WEAK), noise).at(values)
+def problem_of(stated):
+    """A problem from what a certificate states."""
+    noise = stated["noise"]
+    sigma = noise["unit"] * math.sqrt(noise["nu"])
+    if noise["kind"] == "gaussian":
+        made = fpsolve.OrnsteinUhlenbeck(noise["nu"] / 2, sigma)
+    else:
+        share = 1 / noise["slope"]
+        tau = share / noise["nu"]
+        made = fpsolve.NonGaussianNoise((sigma * tau) ** 2 / 2, tau, 1 - share)
+    terms = CoefficientMatrix(0, stated["still"]), CoefficientMatrix(1, stated["driven"], identity)
+    jumps = [Jump(math.pi / 2, jump["log_factor"]) for jump in stated["jumps"]]
+    return fpsolve.Problem(fpsolve.PlaneSystem(terms, jumps), made)
 
 
-def truth(parameters, p):
+def truth(stated, p):
     """Λ(p), or λ, by finite elements."""
-    problem = problem_of(parameters)
+    problem = problem_of(stated)
     if p is None:
-        return fpsolve.lyapunov_exponent(problem, rtol=1e-11).value
-    return float(fpsolve.moment_lyapunov(problem, [float(p)], rtol=1e-11).value[0])
+        return fpsolve.lyapunov_exponent(problem, rtol=1e-10).value
+    return float(fpsolve.moment_lyapunov(problem, [p], rtol=1e-10).value[0])
 
 
 @functools.cache
@@ -78,12 +85,7 @@ def proven(name):
 
 def objections(entry):
     """What fpsolve's own check says of an entry."""
-    certificate = json.loads(json.dumps(entry["certificate"], default=float))
-    bounds = {name: Decimal(entry[name]) for name in ("lower", "upper")} | {"certificate": certificate}
-    parameters = {name: text if name in WORDS else Decimal(text) for name, text in certificate["parameters"].items()}
-    is_path = entry["p"] is None
-    bound = Bound(**bounds) if is_path else MomentBound(**bounds, p=Decimal(entry["p"]))
-    return list(bound.objections(parameters))
+    return list(Bound(**entry).objections())
 
 
 def entry_of(name):
@@ -107,7 +109,7 @@ def test_both_checkers_take_a_proof(name):
     assert not objections(entry)
     assert checker.check(entry) == ""
     assert not violated(entry["certificate"])
-    value = truth(entry["certificate"]["parameters"], entry["p"])
+    value = truth(entry["certificate"]["stated"], entry["p"])
     assert Fraction(entry["lower"]) < Fraction(value) < Fraction(entry["upper"])
 
 
@@ -121,17 +123,17 @@ def test_both_checkers_refuse_mutations_that_do_not_follow(name, step):
     assert [each.change for each in broken if checker.check(each.entry) == ""] == []
 
 
-@pytest.mark.parametrize("p", sampled("2.0", "-1.0"))
+@pytest.mark.parametrize("p", sampled(2.0, -1.0))
 def test_w_levels_a_rough_trial_function(p, rng):
     """Few harmonics and degrees: |Lu/u − μ| is far greater than either δ; and neither W serves the other bound."""
     with precision():
-        stated = Statement(PLAIN)
+        stated = Statement(**PLAIN)
         noise = cylinder(stated)
         basis = next(bases(noise, p))
-        pair = Galerkin(noise, basis, float(p), 2, 3).pair(truth(PLAIN, float(p)))
+        pair = Galerkin(noise, basis, p, 2, 3).pair(truth(PLAIN, p))
         rough = certificate_of(stated, noise, basis, p, pair)
     certificate = rough.model_dump(mode="json")
-    entry = {"p": float(p), "lower": -1, "upper": 1, "certificate": certificate}
+    entry = {"p": p, "lower": -1, "upper": 1, "certificate": certificate}
     assert checker.check(entry) == ""
     points = zip(rng.uniform(0, math.pi, 60), rng.uniform(-4, 4, 60), strict=True)
     worst = max(abs(applied(certificate, phi, z) / trial(certificate, phi, z)) for phi, z in points)
@@ -174,13 +176,13 @@ def test_what_a_proof_says_of_the_generator(of, name, sign, rng):
         assert sign * value <= side["delta"]
 
 
-@pytest.mark.parametrize("parameters", [PLAIN, EXACT, REACHED])
+@pytest.mark.parametrize("stated", [PLAIN, EXACT, REACHED])
 @pytest.mark.parametrize(("toward", "end"), sampled((1, 0.6), (-1, 0.5), (-1, -0.6), (1, -0.5), keep=2))
 @pytest.mark.parametrize(("sign", "kappa"), [(1, 1.2), (-1, 1.2), (1, -0.3)])
-def test_tails_of_any_sign(parameters, toward, end, sign, kappa, rng):
+def test_tails_of_any_sign(stated, toward, end, sign, kappa, rng):
     """A tail may begin beyond the middle of the noise, and be flatter than u: the least δ taken bounds it all."""
     certificate = {
-        **{"quantity": "moment", "p": "0.5", "parameters": parameters, "mu": 0.3},
+        **{"p": 0.5, "stated": stated, "mu": 0.3},
         "basis": CORE | {"scale": 0.5, "gauge": 0.7 * toward},
         "cosine": [[1.0, 0.02], [0.01, 0.01]],
         "sine": [[0.0, 0.0], [0.03, -0.01]],
@@ -200,7 +202,7 @@ def test_tails_of_any_sign(parameters, toward, end, sign, kappa, rng):
     assert taken(high)
     while high - low > 1e-3 and high > 1e-6:
         low, high = (low, (low + high) / 2) if taken((low + high) / 2) else ((low + high) / 2, high)
-    far = 1 if parameters is not PLAIN else 20
+    far = 1 if stated is not PLAIN else 20
     for z in end + (toward * far - end) * np.array([1e-12, 0.02, 0.1, 0.4, 0.7, 0.95]):
         for phi in rng.uniform(0, math.pi, size=3):
             value = applied(
@@ -217,7 +219,7 @@ def test_tails_of_any_sign(parameters, toward, end, sign, kappa, rng):
 def test_the_slope_at_an_end_of_the_core(toward, sign):
     """q times the slope of ln T falls there: W may jump to κ by the least, over the phase, of q u_z/u and no more."""
     certificate = {
-        **{"quantity": "moment", "p": "0.5", "parameters": PLAIN, "mu": 0.0},
+        **{"p": 0.5, "stated": PLAIN, "mu": 0.0},
         "basis": CORE,
         **{"cosine": [[1.0, 0.02], [0.0, 0.01]], "sine": [[0.0, 0.0], [0.0, 0.01]]},
     }
@@ -235,13 +237,19 @@ def test_the_slope_at_an_end_of_the_core(toward, sign):
             checker._check_tail(model, found, side, toward)
 
 
-def constant(parameters, kind):
+def at_rest(stated):
+    """The same without what ε multiplies."""
+    wall = {"ray": [0.0, -1.0], "log_factor": 0.0}
+    return stated | {"still": [[0.0, 1.3], [-1.3, 0.0]], "driven": [[0.0, 0.0], [0.0, 0.0]], "jumps": [wall]}
+
+
+def constant(stated, kind):
     """Λ(p) = 0 of an oscillator without damping, noise and loss, ε = 0, with u = 1 and W next to 0."""
     whole = kind == "whole"
     certificate = {
-        **{"quantity": "moment", "p": "1.5", "mu": 0.0, "phases": 8},
+        **{"p": 1.5, "mu": 0.0, "phases": 8},
         "basis": {"kind": "whole"} if whole else CORE,
-        "parameters": {**parameters, "oscillator.epsilon": "0"},
+        "stated": at_rest(stated),
         **{"cosine": [[1.0, 0.0]], "sine": [[0.0, 0.0]]},
     }
     for name in ("upper", "lower"):
@@ -257,10 +265,10 @@ def constant(parameters, kind):
 CONSTANTS = [(PLAIN, "core"), (EXACT, "core"), (EXACT, "whole"), (REACHED, "whole"), (REACHED, "core")]
 
 
-@pytest.mark.parametrize(("parameters", "kind"), CONSTANTS)
-def test_a_system_at_rest(parameters, kind):
+@pytest.mark.parametrize(("stated", "kind"), CONSTANTS)
+def test_a_system_at_rest(stated, kind):
     """Λ = 0; and nothing else."""
-    entry = constant(parameters, kind)
+    entry = constant(stated, kind)
     assert checker.check(entry) == ""
     for mu, name in ((1e-10, "lower"), (-1e-10, "upper")):
         reason = checker.check(altered(entry, {"mu": mu}))
@@ -270,8 +278,8 @@ def test_a_system_at_rest(parameters, kind):
 
 def test_the_moment_of_order_zero(entry):
     """Λ(0) = 0 needs no trial function."""
-    zero = {"p": "0", "mu": 1e-9, "upper": {"delta": 0.0}, "lower": {"delta": 1e-9}, "cosine": []}
-    new = altered(entry, {"quantity": "moment", **zero}) | {"p": 0.0, "lower": 0, "upper": 1.1e-9}
+    zero = {"p": 0.0, "mu": 1e-9, "upper": {"delta": 0.0}, "lower": {"delta": 1e-9}, "cosine": []}
+    new = altered(entry, zero) | {"p": 0.0, "lower": 0, "upper": 1.1e-9}
     assert checker.check(new) == ""
     assert "order 0" in checker.check(altered(new, {"mu": 1.1e-9}))
     assert "order 0" in checker.check(altered(new, {"mu": -1e-11}) | {"lower": -2e-9})
@@ -296,7 +304,7 @@ def test_the_square_of_w(name, sign):
     """W = W₀ all over counts −½qW² and bW against it at z = 0: δ = ½νW₀² for the upper bound, −δ for the lower."""
     w, nu = 0.5, 0.3 / 0.6
     certificate = {
-        **{"quantity": "moment", "p": "1.5", "mu": 0.0, "parameters": {**EXACT, "oscillator.epsilon": "0"}},
+        **{"p": 1.5, "mu": 0.0, "stated": at_rest(EXACT)},
         "basis": CORE,
         **{"cosine": [[1.0, 0.0]], "sine": [[0.0, 0.0]]},
     }
@@ -313,7 +321,7 @@ def test_the_square_of_w(name, sign):
 
 
 def altered(entry, changes):
-    """An entry with other members of its certificate, of a side of it ("upper.delta") or of its parameters."""
+    """An entry with other members of its certificate, of a side of it ("upper.delta") or of what it states."""
     new = copy.deepcopy(entry)
     for name, value in changes.items():
         head, _, tail = name.partition(".")
@@ -321,26 +329,25 @@ def altered(entry, changes):
         if head in ("upper", "lower") and tail:
             certificate[head][tail] = value(certificate[head][tail]) if callable(value) else value
         else:
-            (certificate["parameters"] if tail else certificate)[name] = value
+            (certificate["stated"] if tail else certificate)[tail or name] = value
     return new
 
 
 @pytest.mark.parametrize(
     ("changes", "reason"),
     [
-        ({"quantity": "else"}, "quantity"),
+        ({"stated.noise": {"kind": "else", "unit": 1.0, "nu": 1.0, "slope": 1.0, "states": [], "rates": []}}, "called"),
+        ({"stated.noise": bounded(0.4, 0.6, 0.7) | {"slope": 0.0}}, "rate of the noise"),
+        ({"stated.noise": gaussian(1.7, 0.9) | {"nu": 1e300}}, "range"),
+        ({"stated.noise": gaussian(1.7, 0.9) | {"unit": -1.0}}, "negative"),
+        ({"stated.noise": gaussian(1.7, 0.9) | {"states": [0.0]}}, "states"),
         ({"mu": math.nan}, "finite"),
         ({"upper.delta": -1e-9}, "delta"),
         ({"lower.delta": -1e-9}, "delta"),
         ({"lower": None}, "read"),
         ({"mu": "0.1"}, "number"),
-        ({"p": "2.5"}, "another p"),
-        ({"oscillator.omega": "-1"}, "forward"),
-        ({"oscillator.epsilon": "3", "oscillator.impact": "restitution"}, "positive factor"),
-        ({"oscillator.impact": "none"}, "impact"),
-        ({"noise.treatment": "exact", "noise.r0": "1.2", "noise.D0": "1", "noise.tau0": "1"}, "r0"),
-        ({"noise.treatment": "ou-reduction", "noise.r0": "1.7", "noise.D0": "1", "noise.tau0": "1"}, "5/3"),
-        ({"noise.sigma": "1e999999999"}, "range"),
+        ({"p": 2.5}, "another p"),
+        ({"stated.driven": [[0.0, 0.1], [0.0, 0.1]]}, "one way"),
         ({"basis": {"kind": "whole"}}, "bounded noise"),
         ({"upper.tails": None}, "tails"),
         ({"lower.tails": [1.0]}, "tails"),
@@ -367,12 +374,10 @@ def test_gauge_needs_a_moment_and_steep_tails(plain):
 
 
 def test_a_claim_is_compared_exactly(entry):
-    """The decimals of a file count, not the floats they are rounded to."""
+    """Not with what floats make of mu − delta."""
     certificate = entry["certificate"]
-    mu, delta = (Decimal(x) for x in (certificate["mu"], certificate["lower"]["delta"]))
-    with localcontext(prec=200):
-        below, above = (mu - delta + s * Decimal("1e-30") for s in (-1, 1))
-    assert float(below) == float(above)
+    exact = Fraction(certificate["mu"]) - Fraction(certificate["lower"]["delta"])
+    near = float(exact)
+    below, above = (near, math.nextafter(near, 1)) if near <= exact else (math.nextafter(near, -1), near)
     assert checker.check({**entry, "lower": below}) == ""
     assert "lower" in checker.check({**entry, "lower": above})
-    assert checker.read('{"lower": 0.1}') == {"lower": Decimal("0.1")}

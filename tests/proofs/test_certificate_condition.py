@@ -8,7 +8,7 @@ from tests.oracles import certificate_condition as condition
 from tests.oracles import certificate_series as cs
 from tests.oracles import certificate_statement as statement
 from tests.proofs.by_definition import EXACT, applied, trial
-from tests.proofs.test_certificate_series import CASES, WHOLE, at_phase, stated
+from tests.proofs.test_certificate_series import CASES, WHOLE, at_phase, drawn
 
 
 def proof(basis, sign):
@@ -26,7 +26,7 @@ def pieces_of(trial_function):
 def by_definition(certificate, model, side, part, phi, z):
     """u times what (*) asks to be ≥ 0, from derivatives of T itself."""
     w = part.value + part.slope * (z - mpmath.mpf(part.foot))
-    moment = certificate["quantity"] == "moment"
+    moment = certificate["p"] is not None
     value = applied(certificate, phi, z, extra=lambda y: side.sign * (w * (y - z) + part.slope * (y - z) ** 2 / 2))
     nu = mpmath.mpf(model.nu.numerator) / model.nu.denominator
     return (side.delta * (trial(certificate, phi, z) if moment else 1) - side.sign * value) / nu
@@ -42,10 +42,10 @@ def summed(waves, degree, cell, phi, t):
 
 
 @pytest.mark.parametrize("sign", [1, -1])
-@pytest.mark.parametrize(("parameters", "basis", "p"), CASES)
-def test_the_condition_in_cells(parameters, basis, p, sign, rng):
+@pytest.mark.parametrize(("stated", "basis", "p"), CASES)
+def test_the_condition_in_cells(stated, basis, p, sign, rng):
     """At random phases, at the ends of parts of cells and within them."""
-    certificate = stated(parameters, basis, p, rng)
+    certificate = drawn(stated, basis, p, rng)
     model = statement.model_of(certificate)
     found, side = statement.read_trial(model, certificate), proof(basis, sign)
     parts = condition.divided(side.nodes, side.values, np.array([1]), 16)
@@ -65,12 +65,12 @@ def test_the_condition_in_cells(parameters, basis, p, sign, rng):
             assert loose < 1e-4
 
 
-@pytest.mark.parametrize("p", ["1.5", None])
+@pytest.mark.parametrize("p", [1.5, None])
 @pytest.mark.parametrize("sign", [1, -1])
 @pytest.mark.parametrize("cell", [0, 2])
 def test_the_ends_of_the_whole_interval(p, sign, cell, rng):
     """Near ±1 the condition is bounded from below; by itself at the inner end of the cell."""
-    certificate = stated(EXACT, WHOLE, p, rng)
+    certificate = drawn(EXACT, WHOLE, p, rng)
     certificate["cosine"][0][0] = 30.0  # u > 0
     model = statement.model_of(certificate)
     found, side = statement.read_trial(model, certificate), proof(WHOLE, sign)

@@ -9,9 +9,6 @@ import signal
 import sys
 import time
 from dataclasses import replace
-from fractions import Fraction
-from itertools import islice
-from pathlib import Path
 
 import pytest
 
@@ -120,7 +117,7 @@ def test_bad_input_is_refused_before_anything_is_written(case, tmp_path, capsys,
 
 
 @pytest.mark.usefixtures("no_proving")
-@pytest.mark.parametrize("r0", ["1.5", "1.00000000000000000000001"])
+@pytest.mark.parametrize("r0", ["1.5", "1.0000000001"])
 def test_algebraic_tails_are_refused_also_where_the_moments_are_finite(case, tmp_path, capsys, r0):
     tails = [f"--set=noise.r0={r0}", "--set=noise.treatment=exact", "--set=moments.p=[-0.5]"]
     assert main(["prove", case, *tails]) == BAD_INPUT
@@ -168,8 +165,7 @@ def test_without_flint_the_package_to_install_is_named(case, tmp_path, monkeypat
 def test_a_folder_holds_proofs_of_its_parameters_only(case, tmp_path):
     proof = tmp_path / "results/proven/proof.json"
     shorter = ["--quiet", "--set", "moments.p=[1.0]"]
-    long_decimal = ["--set", "noise.D0=1.00000000000000000000001"]
-    assert main(["prove", case, *LOOSE, "--quiet", *long_decimal]) == 0
+    assert main(["prove", case, *LOOSE, "--quiet"]) == 0
     before = proof.read_bytes()
     assert main(["run", case, *shorter]) == 0
     assert proof.read_bytes() == before
@@ -180,49 +176,9 @@ def test_a_folder_holds_proofs_of_its_parameters_only(case, tmp_path):
     assert read(tmp_path)["curves"][0]["parameters"]["noise.D0"] == 1.0
 
 
-def stated(case, *overrides):
-    """The decimals of all p and of D0 and ω of the first curve."""
-    plan = Plan(load_case(case, overrides), None)
-    asked = [each.args for each in islice(plan.questions(), plan.each)]
-    parameters = asked[0][1].parameters
-    numbers = [each[2] for each in asked if len(each) == 4 and each[2] is not None]
-    return numbers, *(parameters[key] for key in ("noise.D0", "oscillator.omega"))
-
-
-LONG, LONGER = "1.00000000000000000000001", "0.1000000000000000000000000000000002"
-
-
-def test_numbers_are_the_decimals_that_a_case_states(case):
-    assert stated(case) == (["0.0", "2.0"], "1.0", "1.2")
-    assert stated(case, f"noise.D0={LONG}", "oscillator.omega=1.0") == (["0.0", "2.0"], LONG, "1.0")
-    assert stated(case, f"moments.p=[{LONGER}, {LONG}]") == ([LONGER, LONG], "1.0", "1.2")
-    assert stated(case, f"moments.p=[{LONG}]", "moments.p=[1.0]")[0] == ["1.0"]
-    assert stated(case, f"moments={{p=[{LONG}, 3]}}")[0] == [LONG, "3.0"]
-    assert stated(case, "moments.p=[1e-400, 1_0.000_000_000_000_000_000_01]")[0] == ["0.0", "10.00000000000000000001"]
-
-
-def test_numbers_of_vary_take_the_place_of_those_of_the_section(case):
-    varied = 'vary."noise.D0"=[1.0, 2.0]'
-    Path(case).write_text(MOMENTS.replace("D0 = 1.0", f"D0 = {LONG}"), encoding="utf-8")
-    assert stated(case)[1] == LONG
-    assert stated(case, varied)[1] == "1.0"
-    assert stated(case, f"vary.noise.D0=[{LONG}]")[1] == LONG
-    assert stated(case, varied, "vary={}")[1] == LONG
-
-
 def test_p_of_a_range_is_the_float_as_it_stands(case):
-    found = stated(case, "moments.p={start=-0.1, stop=0.5, num=4}")[0]
-    assert [float(p) for p in found] == [-0.1, 0.1, 0.3, 0.5]
-    assert [Fraction(p) for p in found] == [Fraction(p) for p in (-0.1, 0.1, 0.3, 0.5)]
-
-
-def test_long_decimals_stand_in_the_entry_as_in_its_certificate(case, tmp_path):
-    overrides = [f"--set=moments.p=[{LONGER}]", f"--set=noise.D0={LONG}", "--quiet"]
-    assert main(["prove", case, *LOOSE, *overrides]) == 0
-    text = (tmp_path / "results/proven/proof.json").read_text(encoding="utf-8")
-    for name, number in (("p", LONGER), ("noise.D0", LONG)):
-        assert text.count(f'"{name}": {number}') == text.count(f'"{name}": "{number}"') == 1
-    assert main(["prove", "--check", "results/proven/proof.json"]) == 0
+    plan = Plan(load_case(case, ["moments.p={start=-0.1, stop=0.5, num=4}"]), None)
+    assert [each.args[2] for each in plan.questions()] == plan.case.p.tolist()
 
 
 def enclosure(lower, upper, p):
@@ -233,14 +189,14 @@ def enclosure(lower, upper, p):
 def proofs(case, count, orders):
     """Of several curves, the moment of order p being bounded by p ± 1/4, and λ by ± 1/8."""
     loaded = load_case(case, [f'vary."noise.D0"={json.dumps([1.0 + i for i in range(count)])}'])
-    moments = tuple((p, enclosure(float(p) - 0.25, float(p) + 0.25, p)) for p in orders)
+    moments = tuple((p, enclosure(p - 0.25, p + 0.25, p)) for p in orders)
     return loaded, [
-        CurveProof(replace(each, number=1), {}, moments, enclosure(-0.125, 0.125, None)) for each in loaded.curves()
+        CurveProof(replace(each, number=1), moments, enclosure(-0.125, 0.125, None)) for each in loaded.curves()
     ]
 
 
 def test_the_sentence_tells_few_moments_and_counts_many(case, capsys):
-    few, many = ["-1.0", "2.0000001"], [f"{n}.0" for n in range(-1, 30)]
+    few, many = [-1.0, 2.0000001], [float(n) for n in range(-1, 30)]
     print_blocks(show(*proofs(case, 1, few)))
     out = capsys.readouterr().out
     assert "Proven: the moment of order -1 decays; the moment of order 2.0000001 grows.\n" in out
@@ -250,7 +206,7 @@ def test_the_sentence_tells_few_moments_and_counts_many(case, capsys):
 
 
 def test_many_curves_have_a_row_each(case, capsys):
-    print_blocks(show(*proofs(case, 11, ["-1.0", "2.5"])))
+    print_blocks(show(*proofs(case, 11, [-1.0, 2.5])))
     out = capsys.readouterr().out
     heading = next(line for line in out.splitlines() if "proven" in line)
     assert re.sub(r"[┃ ]+", " ", heading).split() == ["D0", "proven", "λ", "paths", "p", "=", "-1", "p", "=", "2.5"]
@@ -313,7 +269,7 @@ def interrupted(tmp_path_factory):
         patch.setattr(command, "prove_bounds", noting(asked, 2))
         with pytest.raises(KeyboardInterrupt, match="run it again to go on"):
             prove_case(case, folder, width=1e-2)
-    assert asked == ["0.0", "1.0"]
+    assert asked == [0.0, 1.0]
     return folder, case
 
 
@@ -332,7 +288,7 @@ def test_an_interrupted_run_goes_on_with_the_bounds_that_follow(interrupted, tmp
             append(path.parent, key, record)
     monkeypatch.setattr(command, "prove_bounds", noting(asked))
     [proof] = prove_case(case, tmp_path, width=1e-2)
-    assert asked == (["2.0", None] if change is None else ["0.0", "1.0", "2.0", None])
+    assert asked == ([2.0, None] if change is None else [0.0, 1.0, 2.0, None])
     assert all(found.is_proven for _, found in proof.moments)
     assert proof.exponent.is_proven
     assert not check_proof(tmp_path / "proven/proof.json").objections

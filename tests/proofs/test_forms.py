@@ -53,9 +53,9 @@ def test_bounds_hold_in_fractions(n, rng):
     assert not objection(certificate)
     free, first, second = (np.array(each.matrix) for each in problem.system.terms)
     assert found.lower - 1e-13 <= moved(free, first, second) <= found.upper + 1e-13
-    factor, drift = exact(certificate.factor), exact(certificate.linear.drift)
+    factor, drift = exact(certificate.factor), exact(certificate.stated.drift)
     form = factor.T @ factor
-    noisy = [exact(each) for each in certificate.linear.diffusions]
+    noisy = [exact(each) for each in certificate.stated.diffusions]
     drift = drift + sum(each @ each for each in noisy) / 2
     image = drift.T @ form + form @ drift + sum(each.T @ form @ each for each in noisy)
     low, high = (

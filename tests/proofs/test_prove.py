@@ -129,7 +129,7 @@ def test_a_bound_takes_no_longer_than_stated(monkeypatch):
     seconds, told, motion = itertools.count(), [], problem(**FIG1 | {"reduced": True})
     monkeypatch.setattr(search.time, "process_time", lambda: next(seconds))
     timer = search.Timer(8.0)
-    found = search.enclose(statement_of(motion), "1.0", 1e-30, 0.014, timer, lambda: told.append(next(seconds)))
+    found = search.enclose(statement_of(motion), 1.0, 1e-30, 0.014, timer, lambda: told.append(next(seconds)))
     assert found.is_proven
     assert len(told) > 1
     assert 8 <= next(seconds) <= 11

@@ -51,31 +51,23 @@ def test_equations(text, tmp_path):
 
 
 def test_certificates_of_a_curve_are_of_one_system(tmp_path):
-    """Their parameters are labels, which others may have, too; and one curve has one system."""
+    """A curve has one."""
     data, _ = proof_of(CHAIN, tmp_path)
     (curve,) = data["curves"]
-    other = json.loads(json.dumps(data).replace("[-1.0, -0.1]", "[-1.0, -0.2]"))["curves"][0]
+    other = json.loads(json.dumps(data).replace("-0.1]", "-0.2]"))["curves"][0]
     curve["moments"][0] = other["moments"][0]
     assert list(claims_from(json.dumps(data)).objections()) == ["curves.0.its certificates are of several systems"]
 
 
-@pytest.mark.parametrize(
-    ("text", "labels"),
-    [(TELEGRAPH, "system.omega, system.zeta"), (CHAIN, "system.omega, system.zeta")],
-    ids=["telegraph", "chain"],
-)
-def test_the_check_names_the_labels(text, labels, tmp_path, capsys):
+def test_the_check_says_that_parameters_are_labels(tmp_path, capsys):
     """Another ω changes no bound, as certificates state matrices."""
-    data, path = proof_of(text, tmp_path)
-    altered = json.dumps(data).replace('"system.omega": 1.0', '"system.omega": 2.0')
-    altered = altered.replace('"system.omega": "1.0"', '"system.omega": "2.0"')
-    for each in (json.dumps(data), altered):
-        path.write_text(each, encoding="utf-8")
-        capsys.readouterr()
-        assert main(["prove", "--check", str(path)]) == 0
-        said = capsys.readouterr().out
-        assert "accepted: " in said
-        assert f"note: {labels} were not verified: they are labels" in said
+    data, path = proof_of(TELEGRAPH, tmp_path)
+    path.write_text(json.dumps(data).replace('"system.omega": 1.0', '"system.omega": 2.0'), encoding="utf-8")
+    capsys.readouterr()
+    assert main(["prove", "--check", str(path)]) == 0
+    said = capsys.readouterr().out
+    assert "accepted: " in said
+    assert "note: parameters are labels; the bounds are of the matrices and rates" in said
 
 
 TURNED = """

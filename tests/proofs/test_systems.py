@@ -12,6 +12,7 @@ from fpsolve.arrays import identity
 from fpsolve.errors import NoSuchExponent
 from fpsolve.model import CoefficientMatrix, Jump, MarkovChain, ParametricOscillator, SineWiener, Telegraph, White
 from fpsolve.proofs import Certificate, objection, prove_lyapunov_exponent, search
+from fpsolve.proofs.statement import statement_of
 from tests import random_proofs
 from tests.conftest import sampled
 from tests.oracles.harmonics import moment_exponent
@@ -123,7 +124,7 @@ def test_gaussian_noise_in_the_stiffness(stiffness, deviation, width):
 
 @pytest.mark.parametrize("noise", sampled(fpsolve.OrnsteinUhlenbeck(1.7, 0.9), fpsolve.NonGaussianNoise(0.4, 0.6, 0.7)))
 def test_the_papers_oscillator_by_its_matrices(noise):
-    """In (x, ẋ), where its phase is uneven, and by its decimals."""
+    """In (x, ẋ), where its phase is uneven, and in (x, ẋ/ω)."""
     omega, epsilon = 1.3, 0.2
     terms = [
         CoefficientMatrix(0, ((0.0, 1.0), (-(omega**2), 0.0))),
@@ -158,23 +159,6 @@ def cubic(xi):
 class Mystery(SineWiener):
     """A noise of which no proof is known."""
 
-    @classmethod
-    def exact_law(cls, decimals):
-        return None
-
-
-class Pushed(ParametricOscillator):
-    """With other matrices than its parameters tell of the class that it is derived from."""
-
-    @property
-    def terms(self):
-        free = ((0.0, 1.0), (-self.stiffness, 2 * self.damping))
-        return CoefficientMatrix(0, free), CoefficientMatrix(1, STIFFNESS, identity)
-
-
-class Leaning(fpsolve.VibroImpactOscillator):
-    """Another derived class."""
-
 
 class Lopsided(Telegraph):
     """With other states."""
@@ -184,19 +168,10 @@ class Lopsided(Telegraph):
         return 0.0, 3 * self.a
 
 
-class Labelled(Lopsided):
-    """With one parameter more."""
-
-    @property
-    def values(self):
-        return {**super().values, "ratio": 3.0}
-
-
 def test_a_derived_class_is_proven_by_its_own_rates():
-    noise, chain = Labelled(0.5, 1.0), MarkovChain((0.0, 1.5), ((0.0, 1.0), (1.0, 0.0)))
+    noise, chain = Lopsided(0.5, 1.0), MarkovChain((0.0, 1.5), ((0.0, 1.0), (1.0, 0.0)))
     found, other = (bounds(spring(), each, 2.0) for each in (noise, chain))
-    assert found.certificate.chain == other.certificate.chain
-    assert found.certificate.parameters["noise.ratio"] == "3.0"
+    assert found.certificate.stated == other.certificate.stated
 
 
 ALONG = Jump(math.pi / 2, math.log(0.8))
@@ -211,9 +186,6 @@ ALONG = Jump(math.pi / 2, math.log(0.8))
             TypeError,
             "got the coefficient cubic(ξ); proofs are for coefficients a + b ξ",
         ),
-        (Pushed(1.0, 0.1), White(0.5), ValueError, "tell a ParametricOscillator, but another system is stated"),
-        (Leaning(1.0, 0.8, 0.1, 0.1), White(0.5), ValueError, "tell a VibroImpactOscillator, but another system is"),
-        (spring(), Lopsided(0.5, 1.0), ValueError, "noise.a, noise.k tell a Telegraph, but another noise is stated"),
         (spring(), Mystery(1.0, 1.0), TypeError, "got Mystery; proofs are for OrnsteinUhlenbeck, NonGaussianNoise"),
         (plane(((0.0, 1.0), (-1.0, 0.0)), TURN, ALONG), Telegraph(1.5, 1.0), ValueError, "across the ray of a jump"),
         (plane(((0.0, 1.0), (-1.0, 0.0)), TURN, ALONG), White(0.1), ValueError, "across the ray of a jump"),
@@ -240,22 +212,42 @@ def test_nothing_moves_at_p_zero(noise):
     assert (found.lower, found.upper) == (0.0, 0.0)
 
 
-def test_a_certificate_states_the_exact_values_of_floats():
-    """Which are those of the system, and of the chain; a noise of decimals has these."""
-    noises = MarkovChain.telegraph(0.5, 1.0), SineWiener(0.3, 1.0)
-    chain, sine = (bounds(spring(0.1, 3.0, wall(0.8)), noise, 2.0) for noise in noises)
-    stated = chain.certificate.model_dump(mode="json")
-    assert stated["motion"]["numbers"] == stated["chain"]["numbers"] == "binary"
-    free = {"order": 0, "matrix": [[0.0, 1.0], [-3.0, -0.2]], "offset": 1.0, "slope": 0.0}
-    assert stated["motion"]["terms"][0] == free
-    assert stated["motion"]["jumps"] == [{"ray": [0.0, -1.0], "log_factor": math.log(0.8)}]
-    assert stated["chain"]["states"] == [-0.5, 0.5]
-    assert stated["parameters"] == {"system.epsilon": "1.0"}
-    assert sine.certificate.chain is None
-    assert sine.certificate.parameters["noise.sigma"] == "1.0"
-    assert Certificate.model_validate(stated) == chain.certificate
-    old = prove(Problem(fpsolve.VibroImpactOscillator(1.0, 0.8, 0.1, 0.1), Telegraph(0.5, 1.0)), 2.0).certificate
-    assert not {"motion", "chain"} & old.model_dump(mode="json").keys()
+def test_a_certificate_states_floats():
+    """Those of the system, with the powers of ε, and of the noise."""
+    found = bounds(spring(0.1, 3.0, wall(0.8)), MarkovChain.telegraph(0.5, 1.0), 2.0).certificate
+    written = found.model_dump(mode="json")
+    stated = written["stated"]
+    assert (stated["still"], stated["driven"]) == ([[0.0, 1.0], [-3.0, -0.2]], [[0.0, 0.0], [-1.0, 0.0]])
+    assert stated["jumps"] == [{"ray": [0.0, -1.0], "log_factor": math.log(0.8)}]
+    assert stated["noise"]["states"] == [-0.5, 0.5]
+    assert stated["noise"]["rates"] == [[-1.0, 1.0], [1.0, -1.0]]
+    assert Certificate.model_validate(written) == found
+
+
+@pytest.mark.parametrize(
+    ("noise", "law"),
+    [
+        (fpsolve.OrnsteinUhlenbeck(1.5, 0.6), ("gaussian", 0.6 / math.sqrt(3), 3.0, 0.5)),
+        (fpsolve.NonGaussianNoise(0.4, 0.5, 1.0), ("gaussian", math.sqrt(0.8), 4.0, 0.5)),
+        (fpsolve.NonGaussianNoise(0.4, 0.5, 0.75), ("bounded", math.sqrt(6.4), 0.5, 4.0)),
+        (SineWiener(0.3, 2.0), ("circle", 0.3, 4.0, 0.0)),
+        (White(0.5), ("white", 0.5, 0.0, 0.0)),
+    ],
+)
+def test_the_papers_oscillator_and_its_noise_are_stated(noise, law):
+    """Eqs. (3), (7) and (15), in (x, ẋ/ω)."""
+    stated = statement_of(Problem(fpsolve.VibroImpactOscillator(1.5, 0.75, 0.2, 0.5), noise))
+    assert (stated.still, stated.driven) == ([[0.0, 1.5], [-1.5, 0.05]], [[0.0, 0.0], [0.0, 0.5]])
+    assert [(jump.ray, jump.log_factor) for jump in stated.jumps] == [([0.0, -1.0], -0.0625)]
+    assert stated.coordinates == [[1.0, 0.0], [0.0, 1.0]]
+    found = stated.noise
+    assert found.kind == law[0]
+    assert (found.unit, found.nu, found.slope) == pytest.approx(law[1:], rel=1e-15)
+
+
+def test_noise_in_the_sense_of_ito_moves_the_drift():
+    stated = statement_of(Problem(driven_velocity(), White(0.5, interpretation="ito")))
+    assert stated.still == [[0.0, 1.0], [-1.0, 0.1 - 0.125]]
 
 
 @pytest.mark.parametrize("seed", sampled(0, 1, 4, 2, 8, keep=3))

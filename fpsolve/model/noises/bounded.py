@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from fractions import Fraction
+from collections.abc import Sequence
 from typing import Annotated, ClassVar, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from fpsolve.arrays import FloatArray
-from fpsolve.model.exact import ExactLaw
 from fpsolve.model.faults import strict_dataclass
 from fpsolve.model.noise import Noise, NoiseDerivative
 from fpsolve.model.parameters import SIZE, parameter
@@ -166,10 +164,6 @@ class SineWiener(NoiseOfAngle):
     kind: ClassVar[str] = "sine-wiener"
     nu: ClassVar[float] = 0.0  # type: ignore[misc]
     of_xi: ClassVar[Sequence[str]] = ("amplitude",)
-
-    @classmethod
-    def exact_law(cls, decimals: Mapping[str, str]) -> ExactLaw:
-        return ExactLaw(("circle",), Fraction(decimals["amplitude"]) ** 2, Fraction(decimals["sigma"]) ** 2)
 
     def derivative(self, name: str) -> NoiseDerivative:
         """∂/∂A stretches ξ, and ∂/∂σ is that of σ alone."""

@@ -6,7 +6,6 @@ import math
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from fractions import Fraction
 from typing import Annotated, ClassVar, NamedTuple
 
 import numpy as np
@@ -14,7 +13,6 @@ from pydantic import Field
 from pydantic.fields import FieldInfo
 
 from fpsolve.arrays import ROUNDED, FloatArray, real_array, real_number, shown
-from fpsolve.model.exact import ExactLaw, chain_law
 from fpsolve.model.faults import strict_dataclass
 from fpsolve.model.noise import Noise, NoiseDerivative
 from fpsolve.model.parameters import SIZE, parameter, stated_field
@@ -208,11 +206,6 @@ class Telegraph(Chain):
     @property
     def probabilities(self) -> FloatArray:
         return np.array([0.5, 0.5])
-
-    @classmethod
-    def exact_law(cls, decimals: Mapping[str, str]) -> ExactLaw:
-        a, k = Fraction(decimals["a"]), Fraction(decimals["k"])
-        return chain_law(np.array([-a, a]), np.array([[-k, k], [k, -k]]))
 
     def derivative(self, name: str) -> NoiseDerivative:
         return NoiseDerivative(states=(-1.0, 1.0)) if name == "a" else NoiseDerivative(rates=FLIP)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from fractions import Fraction
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
@@ -13,9 +12,7 @@ from pydantic import Field
 from pydantic.fields import FieldInfo
 
 from fpsolve.arrays import FloatArray
-from fpsolve.errors import NoSuchExponent
 from fpsolve.messages import Code, Message, Remedy
-from fpsolve.model.exact import ExactLaw, bounded_law, gaussian_law
 from fpsolve.model.faults import strict_dataclass
 from fpsolve.model.noise import Noise, NoiseDerivative
 from fpsolve.model.noises.ornstein_uhlenbeck import GaussianNoise, LinearStep, linear_step
@@ -291,17 +288,6 @@ class NonGaussianNoise(TreatedNoise):
         end_exponent = 1 / (1 - self.r0) ** 2 if math.isfinite(self.half_width) else 0.0
         return NoiseDerivative(0.0, lambda xi: u(xi) ** 2 * _curvature_of_log((self.r0 - 1) * u(xi)), end_exponent)
 
-    @classmethod
-    def exact_law(cls, decimals: Mapping[str, str]) -> ExactLaw:
-        """The law in units of the end of the support for r₀ < 1, of the standard deviation for r₀ = 1."""
-        D0, tau0, r0 = (Fraction(decimals[name]) for name in ("D0", "tau0", "r0"))
-        if r0 > 1:
-            key = f"{cls.section}.r0"
-            raise NoSuchExponent(Message(Code.NO_BOUND, key=key, value=decimals["r0"], remedy=Remedy.REDUCTION))
-        if r0 == 1:
-            return ReducedNoise.exact_law(decimals)
-        return bounded_law((1 - r0) / tau0, 1 / (1 - r0), 2 * D0 / (tau0 * (1 - r0)))
-
 
 @strict_dataclass
 class ReducedNoise(TreatedNoise, GaussianNoise):
@@ -335,11 +321,6 @@ class ReducedNoise(TreatedNoise, GaussianNoise):
     def replaces(self) -> NonGaussianNoise:
         """The noise of Eq. (7)."""
         return NonGaussianNoise(D0=self.D0, tau0=self.tau0, r0=self.r0)
-
-    @classmethod
-    def exact_law(cls, decimals: Mapping[str, str]) -> ExactLaw:
-        D0, tau0, r0 = (Fraction(decimals[name]) for name in ("D0", "tau0", "r0"))
-        return gaussian_law((5 - 3 * r0) / (2 * (2 - r0) * tau0), 2 * D0 / tau0**2)
 
     @property
     def remarks(self) -> Sequence[Message]:

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from fractions import Fraction
+from collections.abc import Sequence
 from typing import Annotated, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from fpsolve.arrays import FloatArray
-from fpsolve.model.exact import ExactLaw, gaussian_law
 from fpsolve.model.faults import strict_dataclass
 from fpsolve.model.noise import Noise, NoiseDerivative
 from fpsolve.model.parameters import DERIVED, SIZE, parameter
@@ -147,11 +145,6 @@ class OrnsteinUhlenbeckByIntensity(GaussianNoise):
     def sigma(self) -> float:  # type: ignore[override]
         return math.sqrt(2 * self.D0) / self.tau0
 
-    @classmethod
-    def exact_law(cls, decimals: Mapping[str, str]) -> ExactLaw:
-        D0, tau0 = (Fraction(decimals[name]) for name in ("D0", "tau0"))
-        return gaussian_law(1 / tau0, 2 * D0 / tau0**2)
-
     def derivative(self, name: str) -> NoiseDerivative:
         return self.by_logarithms(0.5 / self.D0, 0.0) if name == "D0" else self.by_logarithms(*2 * (-1 / self.tau0,))
 
@@ -183,11 +176,6 @@ class OrnsteinUhlenbeckByDeviation(GaussianNoise):
     @property
     def sigma(self) -> float:  # type: ignore[override]
         return self.standard_deviation * math.sqrt(2 * self.alpha)
-
-    @classmethod
-    def exact_law(cls, decimals: Mapping[str, str]) -> ExactLaw:
-        alpha, deviation = (Fraction(decimals[name]) for name in ("alpha", "standard_deviation"))
-        return gaussian_law(alpha, 2 * alpha * deviation**2)
 
     def derivative(self, name: str) -> NoiseDerivative:
         """σ₀ ~ s√α."""
@@ -221,10 +209,6 @@ class OrnsteinUhlenbeck(GaussianNoise):
 
     kind: ClassVar[str] = "ornstein-uhlenbeck"
     variants: ClassVar[Sequence[type[Noise]]] = (OrnsteinUhlenbeckByIntensity, OrnsteinUhlenbeckByDeviation)
-
-    @classmethod
-    def exact_law(cls, decimals: Mapping[str, str]) -> ExactLaw:
-        return gaussian_law(Fraction(decimals["alpha"]), Fraction(decimals["sigma"]) ** 2)
 
     def derivative(self, name: str) -> NoiseDerivative:
         return self.by_logarithms(1 / self.sigma, 0.0) if name == "sigma" else self.by_logarithms(0.0, 1 / self.alpha)

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from enum import StrEnum
-from fractions import Fraction
 from typing import Annotated, ClassVar, NamedTuple
 
 from fpsolve.arrays import FloatArray
-from fpsolve.model.exact import ExactLaw, white_law
 from fpsolve.model.faults import strict_dataclass
 from fpsolve.model.noise import Memoryless
 from fpsolve.model.parameters import SIZE, parameter
@@ -107,10 +105,6 @@ class White(Memoryless):
         if self.interpretation == Interpretation.ITO and diffusions:
             drift.append(_term(system, -0.5 * self.s**2 * driven @ driven, 2 * _order(system)))
         return Motion(LinearMotion(system.epsilon, tuple(drift), tuple(system.jumps)), diffusions)
-
-    @classmethod
-    def exact_law(cls, decimals: Mapping[str, str]) -> ExactLaw:
-        return white_law(Fraction(decimals["s"]) ** 2, decimals["interpretation"])
 
     def changed_motion(self, system: System, terms: Sequence[CoefficientMatrix], name: str = "") -> MotionDerivative:
         _, driven = split_by_noise(system, system.terms)

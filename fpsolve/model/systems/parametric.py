@@ -3,14 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from fractions import Fraction
+from collections.abc import Sequence
 from typing import Annotated, ClassVar
 
-import numpy as np
-
 from fpsolve.arrays import identity
-from fpsolve.model.exact import ExactJump, ExactMotion
 from fpsolve.model.faults import strict_dataclass
 from fpsolve.model.parameters import ANY_SIGN, parameter
 from fpsolve.model.plane import CoefficientMatrix, Jump, System
@@ -71,9 +67,3 @@ class ParametricOscillator(System):
             case "damping":
                 return (CoefficientMatrix(0, ((0.0, 0.0), (0.0, -2.0))),), ()
         return (), (1 / self.restitution,)
-
-    @classmethod
-    def exact_motion(cls, decimals: Mapping[str, str]) -> ExactMotion:
-        stiffness, damping, factor = (Fraction(decimals[name]) for name in ("stiffness", "damping", "restitution"))
-        still, driven = np.array([[[0, 1], [-stiffness, -2 * damping]], [[0, 0], [-1, 0]]], dtype=object)
-        return ExactMotion(still, driven, (ExactJump(np.array([0, -1], dtype=object), factor, Fraction(0)),))

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from enum import StrEnum
-from fractions import Fraction
 from functools import cached_property
 from typing import Annotated, ClassVar, Self
 
@@ -15,7 +14,6 @@ from pydantic import model_validator
 
 from fpsolve.arrays import FloatArray, identity
 from fpsolve.messages import Code, Message
-from fpsolve.model.exact import ExactJump, ExactMotion
 from fpsolve.model.faults import strict_dataclass
 from fpsolve.model.parameters import ANY_SIGN, SIZE, parameter
 from fpsolve.model.plane import CoefficientMatrix, CubicTerms, Jump, System, by_epsilon
@@ -156,18 +154,6 @@ class VibroImpactOscillator(System):
                 return (), (self.epsilon**2 * bounce,)
             case _:
                 return by_epsilon(self), (-2 * self.epsilon * (1 - self.restitution) * bounce,)
-
-    @classmethod
-    def exact_motion(cls, decimals: Mapping[str, str]) -> ExactMotion:
-        omega, restitution, c1, epsilon = (
-            Fraction(decimals[name]) for name in ("omega", "restitution", "c1", "epsilon")
-        )
-        loss, square = epsilon**2 * (1 - restitution), epsilon**2
-        is_delta = decimals["impact"] == ImpactLaw.DELTA
-        factor, log_factor = (Fraction(1), -loss) if is_delta else (1 - loss, Fraction(0))
-        jump = ExactJump(np.array([0, -1], dtype=object), factor, log_factor)
-        still, driven = np.array([[[0, omega], [-omega, square * c1]], [[0, 0], [0, epsilon]]], dtype=object)
-        return ExactMotion(still, driven, (jump,))
 
     @property
     def impact_symbol(self) -> str:
