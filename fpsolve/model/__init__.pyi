@@ -1,3 +1,4 @@
+from .equation import equations_of as equations_of
 from .kinds import noise_kind as noise_kind
 from .kinds import system_kind as system_kind
 from .noise import Noise as Noise

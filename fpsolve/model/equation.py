@@ -1,39 +1,35 @@
-"""A motion and its noises in words, as the report and notebooks show them: "ẍ = −x − 0.2 ẋ − ξ x"."""
+"""A motion and its noises in words, as reports show them: "ẍ = −x − 0.2 ẋ − ξ x"."""
 
 from __future__ import annotations
 
 import math
 import re
 import unicodedata
-from collections.abc import Iterable, Mapping, Sequence
-from html import escape
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
 from fpsolve.arrays import FloatArray
-
-if TYPE_CHECKING:  # which show themselves by these
-    from fpsolve.model.plane import System
-    from fpsolve.model.problem import Problem
-
-MOST_EQUATIONS = 4
-"""Variables whose rates a page shows; of more they would fill it."""
+from fpsolve.model.plane import System, affine
+from fpsolve.model.problem import Problem
 
 
-def equations_of(system: System, lines: Sequence[tuple[float, float] | None]) -> list[str]:
+def equations_of(system: System) -> list[str]:
     """The motion with its numbers: of the second order where x₂ is a multiple of ẋ₁, else the rates; and its walls.
 
-    Args:
-        lines: a and b of each term whose g(ξ) is a + bξ.
+    >>> from fpsolve import VibroImpactOscillator
+    >>> equations_of(VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=0.1))
+    ['ẍ = −x + 0.001 ẋ + 0.1 ξ ẋ', '|ẋ|⁺ = 0.9980019987 |ẋ|⁻ at x = 0']
     """
     whole, named = system.forced or system, len(system.noise_sections) > 1
     n = whole.dimension
     still, driven = np.zeros((n, n)), dict[str, FloatArray]()
-    for term, line in zip(whole.terms, lines, strict=True):
+    for term in whole.terms:
         size = system.epsilon**term.order * np.array(term.matrix)
         letter = f"ξ_{term.noise}" if named and term.noise else "ξ"
-        offset, slope = (0.0, 1.0) if line is None else line
+        line = affine(term.g)
+        offset, slope = line or (0.0, 1.0)
         still += offset * size
         if slope:
             own: Any = getattr(term.g, "f", None)  # cos kθ or sin kθ of the clock has k
@@ -113,8 +109,3 @@ def noise_sentences(problem: Problem) -> list[str]:
         lines.append(f"{name} is noise of the kind {noise.kind}{', with ' if numbers else ''}{' and '.join(numbers)}.")
         lines[-1] += f" The equation is meant in {noise.sense} sense." if noise.sense else ""
     return lines
-
-
-def paragraphs(lines: Iterable[str]) -> str:
-    """Lines as HTML, for a notebook."""
-    return "".join(f"<p>{escape(line)}</p>" for line in lines)

@@ -32,7 +32,6 @@ from fpsolve.arrays import (
     real_number,
     shown,
 )
-from fpsolve.model.equation import MOST_EQUATIONS, equations_of, paragraphs
 from fpsolve.model.parameters import Parametrised
 from fpsolve.model.quantity import ResponseQuantities, response_quantities
 
@@ -430,14 +429,6 @@ class System(Parametrised):
     def states(self) -> Sequence[str]:
         """The names of its variables."""
         return tuple(f"x{str(k + 1).translate(BELOW)}" for k in range(self.dimension))
-
-    @property
-    def equations(self) -> list[str]:
-        """The motion with its numbers, a line for each equation and each wall: "ẍ = −x − 0.2 ẋ − ξ x"."""
-        return equations_of(self, [affine(term.g) for term in (self.forced or self).terms])
-
-    def _repr_html_(self) -> str:
-        return paragraphs(self.equations if self.dimension <= MOST_EQUATIONS else [repr(self)])
 
     @property
     def driven_by(self) -> frozenset[str]:

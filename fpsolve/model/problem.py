@@ -19,7 +19,6 @@ from fpsolve.data import plain_unit, written
 from fpsolve.errors import NoSuchExponent
 from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.checks import refuse_wrong_derivative
-from fpsolve.model.equation import noise_sentences, paragraphs
 from fpsolve.model.expressions import TIME
 from fpsolve.model.frame import Frame, own_frame
 from fpsolve.model.kinds import source_of, version_of
@@ -150,9 +149,6 @@ class Problem:
                 "real part of the Floquet exponents: compute these from the equation over one period, or add a random "
                 "noise"
             )
-
-    def _repr_html_(self) -> str:
-        return self.system._repr_html_() + paragraphs(noise_sentences(self))
 
     def _refuse_ray(self, jump: Jump) -> None:
         """Refuse a jump at a ray over which a noise moves the phase, or nothing does. Raises `ValueError`."""

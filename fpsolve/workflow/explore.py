@@ -36,7 +36,7 @@ from fpsolve.explain import UNBOUNDED, explain
 from fpsolve.exponent.quantities import INDICES, MOMENT
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.messages import message_of
-from fpsolve.model.equation import MOST_EQUATIONS
+from fpsolve.model.equation import equations_of
 from fpsolve.model.plane import BELOW
 from fpsolve.model.problem import Problem, checked_problem
 from fpsolve.page.html import page_of, part_of_page
@@ -71,6 +71,8 @@ FACTOR = 10.0
 """From a positive value to the ends of its slider, where nothing says how far it may go."""
 BEYOND = 3.0
 """The same of a value of any sign."""
+MOST_EQUATIONS = 4
+"""Variables whose rates the page shows; of more they would fill it."""
 NO_BOUND = 1e3
 """A bound from which on it keeps formulas from overflow, and tells nothing of what is usual."""
 NUMBERS = {MOMENT.name, *INDICES, "theory", "jumps", "classes", "discretisation"}
@@ -255,7 +257,7 @@ class Explorer:
             "curve": [listed(getattr(moments, name)[order]) for name in names],
             "root": index.value if index else None,
             "exponent": exponent.value if exponent else None,
-            "equations": case.system.equations if case.problem.dimension <= MOST_EQUATIONS else [],
+            "equations": equations_of(case.system) if case.problem.dimension <= MOST_EQUATIONS else [],
             "verdict": part_of_page([Sentence(verdict(case, result)), *meaning(result)]),
             "numbers": part_of_page([*THEORY.show(case, result), *notes(case, [result], "")]),
             "table": "",  # which nobody reads while a slider moves
@@ -295,7 +297,7 @@ class Explorer:
                 chain(results.show(case, [found], Path()), notes(case, [found], "")),
                 title=case.headline,
                 state=COMPLETE,
-                equations=case.system.equations,
+                equations=equations_of(case.system),
                 about=list(show_problem(case)),
                 facts={**facts_since(case, started), "case_text": self._text(case) if self.source.text else ""},
                 file=f"{self.source.name}-explored.toml",

@@ -12,6 +12,7 @@ from fpsolve.case.case import Case
 from fpsolve.errors import FpsolveError
 from fpsolve.files import writable, write_text
 from fpsolve.messages import Code, Message
+from fpsolve.model.equation import equations_of
 from fpsolve.output.tables import facts_of
 from fpsolve.page.html import page_of
 from fpsolve.page.page import Block
@@ -60,7 +61,7 @@ def write_report(
                 blocks,
                 title=case.headline,
                 state=COMPLETE if complete else INCOMPLETE,
-                equations=next(case.curves(0, 1)).problem.system.equations,
+                equations=equations_of(next(case.curves(0, 1)).problem.system),
                 about=list(problem.show(case)),
                 facts=facts,
                 file=case.path.name,

@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 
 from fpsolve.errors import NoSuchExponent
 from fpsolve.exponent import ExponentSolver
-from fpsolve.model import LinearSystem, ModalSystem, PlaneSystem, Problem, Telegraph, White
+from fpsolve.model import LinearSystem, ModalSystem, PlaneSystem, Problem, Telegraph, White, equations_of
 from fpsolve.model.plane import Stop
 
 RATES = "v", "-q - 0.1*v - xi*q - 0.3*y", "w", "-2*y - 0.2*w - 0.3*q"
@@ -48,8 +48,8 @@ def test_a_parameter_that_moves_the_coordinates_has_no_derivative():
 
 
 def test_equations_print_the_impact():
-    assert equations().equations[-1] == "v⁺ = −0.6 v at q = 0"
-    assert modes().equations[-1].endswith("at q1 − 0.5 q2 = 0")
+    assert equations_of(equations())[-1] == "v⁺ = −0.6 v at q = 0"
+    assert equations_of(modes())[-1].endswith("at q1 − 0.5 q2 = 0")
 
 
 @pytest.mark.parametrize(

@@ -80,8 +80,9 @@ class StatedJump(BaseModel):
 class PlaneSystem(System):
     """A linear system in the plane from its parts, see `System`.
 
-    >>> PlaneSystem.of_equations(("x", "v"), ("v", "-x - 2*zeta*v - xi*x"), {"zeta": 0.1}).equations
-    ['ẍ = −x − 0.2 ẋ − ξ x']
+    >>> from fpsolve.model import CoefficientMatrix
+    >>> PlaneSystem([CoefficientMatrix(0, ((0.0, 1.0), (-1.0, -0.2)))]).dimension
+    2
 
     Args:
         terms: one at least.
