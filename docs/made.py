@@ -27,7 +27,6 @@ ROOMS = {
     "model": "linear systems, and their noises",
     "exponent": "Λ(p), its eigenpairs and what follows from them",
     "analysis": "densities, sensitivities, where stability ends",
-    "testing": "for authors of a noise",
     "nonlinear": "the stationary response of the nonlinear oscillator",
     "measured": "from measured spectra and records to noises",
     "simulation": "Monte Carlo, independent of the finite elements",

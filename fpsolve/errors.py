@@ -30,10 +30,6 @@ class NoSuchExponent(FpsolveError):
     """Λ(p) does not exist for this noise and this p: it is infinite."""
 
 
-class NoDerivative(FpsolveError):
-    """What a noise states as its derivative by a parameter is not that of its law."""
-
-
 class NoPerturbationTheory(FpsolveError):
     """Second-order perturbation theory does not apply to this motion or this noise."""
 

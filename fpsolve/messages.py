@@ -360,15 +360,6 @@ class Code(Enum):
         "failure: {target} was not found{count:?, and Λ could not be solved at {count} of the values tried}: {reason}"
     )
 
-    NOISE_DIFFERS = (
-        "failure: {member}{xi:? at xi = {xi:.4g}} is {value:.6g}, but {source} gives {must:.6g}; correct one of the two"
-    )
-    NOISE_SIZE = "failure: {member}{xi:? at xi = {xi:.4g}} is {value:.6g}; it must be a finite number > 0"
-    NOISE_FAILS = "failure: {member}: {reason}"
-    NOISE_REFUSED = (
-        "warning: no sensitivities under {kind} noise: {reason}; correct its class until `check_noise` finds no fault"
-    )
-
     FEW_PATHS = (
         "warning: no estimate of Λ(p) at p = {p:g}: too few effective {is_direct:?windows¦paths} carry the mean, "
         '{low:.0f}{high:? to {high:.0f}} where {needed} are needed; use {is_direct:?estimator = "population", or more '

@@ -76,8 +76,6 @@ def test_blocks_of_toml_are_cases(page, tmp_path):
     """A whole case is read; what is less is a part of one, with the matrices of a shipped case beside it."""
     shutil.copytree(ROOT / "cases/systems/beam", tmp_path / "beam")
     for number, block in enumerate(blocks(page, "toml")):
-        if "entry-points" in block:
-            continue
         parts = [block]
         for section, text in (
             ("title", 'title = "T"\n'),
@@ -100,7 +98,7 @@ def test_every_room_has_a_page_of_reference():
     """The pages list the public names of the rooms; that each has a docstring is a test of the architecture."""
     tree = ast.parse((ROOT / "docs/made.py").read_text(encoding="utf-8"))
     values = {each.targets[0].id: each.value for each in tree.body if isinstance(each, ast.Assign)}
-    rooms = {path.parent.name for path in (ROOT / "fpsolve").glob("*/__init__.pyi")} | {"testing"}
+    rooms = {path.parent.name for path in (ROOT / "fpsolve").glob("*/__init__.pyi")}
     assert set(ast.literal_eval(values["ROOMS"])) == rooms
     index = (ROOT / "docs/reference/index.md").read_text(encoding="utf-8")
     assert all(f"/generated/reference/{room}\n" in index for room in rooms)

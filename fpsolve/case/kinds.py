@@ -19,7 +19,7 @@ from pydantic_core import InitErrorDetails
 from fpsolve.case.matrices import with_matrices
 from fpsolve.explain import UNBOUNDED, Refusal, details_of, nearest, refuse, shown_with_kind
 from fpsolve.model.faults import TableError, fields_of, table_of
-from fpsolve.model.kinds import is_kind, kind_names, noise_kind, system_kind
+from fpsolve.model.kinds import NOISES, SYSTEMS, noise_kind, system_kind
 from fpsolve.model.noises.several import noises_of
 from fpsolve.model.parameters import STRICT, Parametrised
 from fpsolve.model.problem import Problem
@@ -118,16 +118,11 @@ def _kind(half: Half, table: Mapping[str, Any]) -> type[Parametrised]:
     name = table.get("kind")
     if name is None and half == "system" and any(key in table for key in STATING):
         name = EQUATIONS
-    room: Literal["systems", "noises"] = "systems" if half == "system" else "noises"
-    if name is not None and not is_kind(name, room):
-        names = kind_names(room)
+    names = [*(SYSTEMS if half == "system" else NOISES)]
+    if name is not None and name not in names:
         text = f"got {shown_with_kind(name, but=str)}; must be one of {', '.join(names)};{nearest(name, names)}"
         refuse([(("kind",), name, f'{text} write, for example, kind = "{names[0]}"')])
-    try:
-        kind = (system_kind if half == "system" else noise_kind)(name or USUAL[half])
-    except ValueError as error:
-        refuse([(("kind",), name, f"{error}; correct its package, or write another kind")])
-        raise
+    kind = (system_kind if half == "system" else noise_kind)(name or USUAL[half])
     return max((kind, *kind.variants), key=lambda each: len(table.keys() & fields_of(each).keys()))
 
 

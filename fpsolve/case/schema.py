@@ -22,7 +22,7 @@ from fpsolve.case.sections import NonEmpty, Sweep, Text
 from fpsolve.case.uncertain import Count, Seed
 from fpsolve.data import plain_unit
 from fpsolve.model.faults import fields_of
-from fpsolve.model.kinds import kind_names, noise_kind, system_kind
+from fpsolve.model.kinds import NOISES, SYSTEMS, noise_kind, system_kind
 from fpsolve.model.parameters import STRICT, Parametrised
 
 SCHEMA = "fpsolve.schema.json"
@@ -91,7 +91,7 @@ class _Generator(GenerateJsonSchema):
 
 
 def schema() -> dict[str, Any]:
-    """The JSON Schema, draft 2020-12, of all kinds that are installed; `symbol` and `unit` beside descriptions."""
+    """The JSON Schema, draft 2020-12, of all kinds; `symbol` and `unit` beside descriptions."""
     system, noise = _union("system"), _union("noise")
     named: Any = Annotated[dict[str, noise], Field(min_length=1)]  # type: ignore[valid-type]
     fields = dict[str, Any]()
@@ -126,12 +126,8 @@ def _union(half: Half) -> Any:
     """The type of a table of any kind, told by the key that names it, or by being without one."""
     find: Callable[[str], type[Parametrised]] = system_kind if half == "system" else noise_kind
     models = list[type[BaseModel]]()
-    for name in kind_names("systems" if half == "system" else "noises"):
-        try:
-            kind = find(name)
-        except ValueError:  # of a package that cannot be loaded, which says so when it is used
-            continue
-        variants = (kind, *kind.variants)
+    for name in SYSTEMS if half == "system" else NOISES:
+        variants = ((kind := find(name)), *kind.variants)
         models += (_table(half, each, i) for i, each in enumerate(variants))
         if name in (USUAL[half], EQUATIONS):
             models.append(_table(half, kind, is_named=False))

@@ -25,12 +25,10 @@ def check(
 ) -> int:
     """Solve case files and compare the results with the values that they expect; write nothing.
 
-    If another package registers the noise, each member of its class is compared with what follows from the others.
-
     Example: fpsolve check cases/fig1.toml cases/minimal.toml
     """
     from fpsolve.page.terminal import print_blocks
-    from fpsolve.show.notes import note_on, notes
+    from fpsolve.show.notes import notes
     from fpsolve.workflow.check import agreement, check_case, refuse_no_hierarchy, show
 
     code, loaded = 0, options.load(cases)
@@ -44,9 +42,8 @@ def check(
         else:
             print_blocks(show(case, outcome.comparisons))
         print_blocks(notes(case, outcome.results, ""), [Severity.FAILURE] if options.quiet else list(Severity))
-        print_blocks(note_on(case.name, fault) for fault in outcome.faults)
         if outcome.failures:
             code = NOT_CONVERGED
-        elif outcome.faults or not all(comparison.met for comparison in outcome.comparisons):
+        elif not all(comparison.met for comparison in outcome.comparisons):
             code = max(code, CHECK_FAILED)
     return code

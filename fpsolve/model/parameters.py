@@ -134,7 +134,7 @@ class Parametrised:
     """A system or a noise, a kind with named parameters; here those of a pydantic dataclass.
 
     Attributes:
-        kind: the name by which case files and the registry know it.
+        kind: the name by which case files know it.
         section: the first part of the keys of its parameters, such as "noise".
         words: parameters that the class itself decides, by their names.
         stated: what case files say of it besides its `fields`, such as the `words`, by its names.

@@ -18,10 +18,8 @@ from fpsolve.arrays import ROUNDED, FloatArray, real_numbers, shown
 from fpsolve.data import plain_unit, written
 from fpsolve.errors import NoSuchExponent
 from fpsolve.messages import Code, Message, Remedy
-from fpsolve.model.checks import refuse_wrong_derivative
 from fpsolve.model.expressions import TIME
 from fpsolve.model.frame import Frame, own_frame
-from fpsolve.model.kinds import source_of, version_of
 from fpsolve.model.noise import Noise, NoiseDerivative
 from fpsolve.model.noises.several import noises_of
 from fpsolve.model.parameters import Parameter, Parametrised, cached_by_problem
@@ -531,8 +529,7 @@ class Problem:
     def form(self) -> str:
         """All that it is but for the values of its parameters, as text.
 
-        A kind of another package is named with its version and a digest of its files. The class of one that has words
-        follows from these, which are among the values.
+        The class of a kind that has words follows from these, which are among the values.
         """
         kinds = list[Any]()
         for section, half in self.sections.items():
@@ -543,7 +540,7 @@ class Problem:
                 names = [each.name for each in fields(kind) if each.repr and each.name not in half.values]
                 others = {each: repr(getattr(half, each)) for each in names}
                 stated = {each: other for each, other in others.items() if other != values}
-            kinds.append((section, name, version_of(kind), source_of(kind), stated))
+            kinds.append((section, name, stated))
         return repr(kinds)
 
     @property
@@ -618,7 +615,6 @@ class Problem:
         else:
             changed = name if len(self.noise.parts) == 1 else f"{part}.{name}"
             if not (own := self.named_noise(part)).is_white:
-                refuse_wrong_derivative(own, name)
                 noise = own.derivative(name)
         terms, diffusions, impulses = self.noise.changed_motion(self.system, terms, changed)
         if self.frame is not None:

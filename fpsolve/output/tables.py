@@ -26,7 +26,6 @@ from fpsolve.case.remedies import CASE_WORDS
 from fpsolve.case.vary import BLOCK
 from fpsolve.files import draft, write_json
 from fpsolve.messages import message_of
-from fpsolve.model.kinds import version_of
 from fpsolve.model.quantity import MOMENT, STATUS, Quantity
 from fpsolve.parts.every import PARTS
 from fpsolve.parts.intervals import SAMPLE, Samples, plain_spread
@@ -44,10 +43,8 @@ _END = "\n ]\n}\n"
 def facts_of(case: Case, started: datetime, seconds: float) -> dict[str, Any]:
     """Of a run: versions, the command, the machine, when it began and how long it takes, and the case as written."""
     name, *rest = sys.argv or [""]  # empty where Python is embedded
-    kinds = filter(None, (version_of(type(half)) for half in case.problem.sections.values()))  # type: ignore[arg-type]
-    packages = _packages() | dict(each.rsplit(" ", 1) for each in kinds)
     return {
-        "versions": {"fpsolve": __version__, "python": platform.python_version(), **packages},
+        "versions": {"fpsolve": __version__, "python": platform.python_version(), **_packages()},
         "command": shlex.join(
             ["python", "-m", "fpsolve", *rest] if name.endswith("__main__.py") else [Path(name).name, *rest]
         ),

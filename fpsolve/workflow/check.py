@@ -16,7 +16,6 @@ from fpsolve.errors import FpsolveError, NoHierarchy
 from fpsolve.exponent.error import digits
 from fpsolve.exponent.quantities import INDICES
 from fpsolve.messages import Message
-from fpsolve.model.kinds import is_ours
 from fpsolve.page.limits import EACH, ROWS
 from fpsolve.page.page import Block, Column, Grid, Sentence
 from fpsolve.parts.moments import PART as MOMENTS
@@ -24,7 +23,6 @@ from fpsolve.parts.part import Numerics, Settings
 from fpsolve.pool import Pool, serial
 from fpsolve.results.curve import CurveResult
 from fpsolve.study.solve import Asked, Order, Solved, batches, solve_batch
-from fpsolve.testing import check_noise
 from fpsolve.theory.moments import hierarchy_exponent, refuse_open_hierarchy
 from fpsolve.workflow.folders import ANEW, kept, of_curves, saying_if_interrupted
 from fpsolve.workflow.progress import SETS, SILENT, Phase, Watch
@@ -65,12 +63,10 @@ class Checked:
     Attributes:
         results: the curves, with what was compared alone; what did not converge is in their `failures`.
         comparisons: what was expected beside what was computed.
-        faults: of a noise that is no kind of fpsolve, see `check_noise`.
     """
 
     results: Sequence[CurveResult]
     comparisons: Sequence[Comparison]
-    faults: Sequence[Message]
 
     @property
     def failures(self) -> tuple[Message, ...]:
@@ -133,8 +129,6 @@ def _result_alone(order: Order, curve: Curve, solved: Solved) -> CurveResult:
 def check_case(case: Case, *, by_hierarchy: bool = False, pool: Pool | None = None, watch: Watch = SILENT) -> Checked:
     """Solve what a case expects, and compare; nothing is written.
 
-    A noise of a kind that fpsolve does not know itself is checked, too.
-
     With `by_hierarchy` Λ of its even p is compared with the moment hierarchy.
     """
     found: list[CurveResult] = []
@@ -156,8 +150,7 @@ def check_case(case: Case, *, by_hierarchy: bool = False, pool: Pool | None = No
                 progress(failed=result.status.fails)
     found.sort(key=lambda result: result.curve.number)
     comparisons = compare_with_hierarchy(case, found) if by_hierarchy else compare(case, found)
-    faults = [fault for each in case.problem.noise.parts.values() if not is_ours(each) for fault in check_noise(each)]
-    return Checked(found, comparisons, faults)
+    return Checked(found, comparisons)
 
 
 def show(case: Case, comparisons: Sequence[Comparison]) -> Iterator[Block]:

@@ -1,11 +1,9 @@
-"""Cases of systems and noises of any kind: plane systems, chains, and a noise that another package registers."""
+"""Cases of systems and noises of any kind: plane systems, chains."""
 
 from __future__ import annotations
 
-import importlib
 import json
 from collections.abc import Mapping
-from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
@@ -14,14 +12,10 @@ from fpsolve.case.case import load_case
 from fpsolve.case.vary import legend
 from fpsolve.cli import main
 from fpsolve.errors import CaseError
-from fpsolve.model.kinds import noise_kind, source_of, version_of
 from fpsolve.model.noises.markov_chain import MarkovChain, Telegraph
 from fpsolve.model.noises.non_gaussian import NonGaussianNoise, ReducedNoise
-from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
 from fpsolve.model.problem import Problem
 from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
-from fpsolve.output.records import set_key
-from fpsolve.output.tables import facts_of
 from fpsolve.simulation.setup import simulated_parts
 from fpsolve.workflow.prove import refuse_unprovable_case
 
@@ -46,57 +40,7 @@ terms = [
 """
 MOMENTS = "[moments]\np = [2.0]\n"
 ONLY = '[output]\nquantities = ["moment", "lyapunov_exponent"]\n'
-MODULE = """\
-from typing import Annotated, ClassVar
-import math
-from pydantic.dataclasses import dataclass
-from fpsolve.model.noise import Noise
-from fpsolve.model.noises.ornstein_uhlenbeck import GaussianNoise
-from fpsolve.model.parameters import SIZE, STRICT, parameter
-
-@dataclass(frozen=True, config=STRICT)
-class Wind(GaussianNoise):
-    gust: Annotated[float, parameter("size of the gusts", "gust = 0.5", "$g$", "1/time", **SIZE)]
-    memory: Annotated[float, parameter("duration of the gusts", "memory = 2.0", "$m$", "time", **SIZE)]
-
-    kind: ClassVar[str] = "wind"
-
-    @property
-    def alpha(self):
-        return 1 / self.memory
-
-    @property
-    def sigma(self):
-        return self.gust * math.sqrt(2 / self.memory)
-
-    def derivative(self, name):
-        return self.by_logarithms(1 / self.gust, 0.0) if name == "gust" else self.by_logarithms(
-            -0.5 / self.memory, -1 / self.memory
-        )
-
-class NoNoise:
-    kind = "no-noise"
-"""
-ENTRIES = (
-    "[fpsolve.noises]\nwind = windy:Wind\nno-noise = windy:NoNoise\nlost = nowhere:Lost\nou-reduction = windy:Wind\n"
-)
-
-
-@pytest.fixture
-def windy(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A package that registers a noise."""
-    folder = tmp_path_factory.mktemp("site")
-    (folder / "windy.py").write_text(MODULE, encoding="utf-8")
-    about = folder / "windy-1.5.dist-info"
-    about.mkdir()
-    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: windy\nVersion: 1.5\n", encoding="utf-8")
-    (about / "entry_points.txt").write_text(ENTRIES, encoding="utf-8")
-    monkeypatch.syspath_prepend(str(folder))
-
-
 REDUCED = "[noise]\nD0 = 1.0\ntau0 = 0.5\nr0 = 0.95\n"
-WIND = '[noise]\nkind = "wind"\ngust = 0.5\nmemory = 2.0\n'
-UHLENBECK = '[noise]\nkind = "ornstein-uhlenbeck"\nalpha = 0.5\nsigma = 0.5\n'
 SINE = '[noise]\nkind = "sine-wiener"\namplitude = 1.0\nsigma = 1.0\n'
 
 
@@ -136,17 +80,15 @@ def test_the_system_has_two_names(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("noise", "words"),
     [
-        ('kind = "wond"', '8: noise.kind: got "wond"; must be one of non-gaussian, '),
-        ('kind = "wond"', '; did you mean "wind"? write, for example, kind = "non-gaussian"'),
+        ('kind = "whit"', '8: noise.kind: got "whit"; must be one of non-gaussian, '),
+        ('kind = "whit"', '; did you mean "white"? write, for example, kind = "non-gaussian"'),
         ("kind = 3", "8: noise.kind: got 3 (a number); must be one of "),
-        ('kind = "no-noise"', "must be a subclass of Noise with kind"),
-        ('kind = "lost"', 'kind = "lost" of windy cannot be loaded (ModuleNotFoundError'),
+        ('kind = "telegraph"\na = 1.0', "7: noise.k: missing; must be a finite number >= 1e-15 and <= 1e15 (rate"),
         (
-            'kind = "wind"\ngust = 1.0',
-            "7: noise.memory: missing; must be a finite number >= 1e-15 and <= 1e15 (duration",
+            'kind = "sine-wiener"\nsigma = 1.0\namplitud = 1.0',
+            '10: noise.amplitud: unknown key; did you mean "amplitude"?',
         ),
-        ('kind = "wind"\ngust = 1.0\nmemry = 1.0', '10: noise.memry: unknown key; did you mean "memory"? known keys: '),
-        ('kind = "wind"\ngust = 1.0\nmemory = -1.0', "10: noise.memory: got -1.0; must be a finite number >= 1e-15"),
+        ('kind = "telegraph"\na = 1.0\nk = -1.0', "10: noise.k: got -1.0; must be a finite number >= 1e-15"),
         ('kind = "ou-reduction"\nD0 = 1.0\ntau0 = 1.0\nr0 = 1.0\ntreatment = "exact"', "12: noise.treatment: unknown"),
         ('kind = "markov-chain"\nstates = [1.0]\nrates = [[1.0]]', "got (1,) states and (1, 1) rates; must be"),
         (
@@ -156,67 +98,10 @@ def test_the_system_has_two_names(tmp_path: Path) -> None:
         ('kind = "markov-chain"\nstates = [1.0]', "7: noise.rates: missing; must be a list of lists of finite numbers"),
     ],
 )
-def test_one_message_for_what_is_wrong_with_a_kind(windy: None, tmp_path: Path, noise: str, words: str) -> None:
-    [text] = said(tmp_path, OSCILLATOR, f"[noise]\n{noise}\n", MOMENTS, '[vary]\n"noise.x" = [1.0]\n' * ("wo" in noise))
+def test_one_message_for_what_is_wrong_with_a_kind(tmp_path: Path, noise: str, words: str) -> None:
+    rest = '[vary]\n"noise.x" = [1.0]\n' * ("whit" in noise)
+    [text] = said(tmp_path, OSCILLATOR, f"[noise]\n{noise}\n", MOMENTS, rest)
     assert words in text
-
-
-def test_a_noise_of_another_package(windy: None, tmp_path: Path) -> None:
-    """Its keys may be varied, drawn over, and be the axes of a chart; its numbers are those of the same law."""
-    rest = '[vary]\n"noise.gust" = [0.5, 1.0]\n[figure]\nx = "noise.gust"\ny = { moment = 2.0 }\n'
-    frame = '[chart]\nzero = ["lyapunov_exponent"]\nx = { key = "noise.gust", start = 0.1, stop = 2.0 }\n'
-    frame += 'y = { key = "noise.memory", start = 0.1, stop = 9.0 }\n'
-    case = load_case(write(tmp_path, OSCILLATOR, WIND, MOMENTS, ONLY, rest, frame))
-    kind = type(case.noise)
-    assert (kind, version_of(kind)) == (noise_kind("wind"), "windy 1.5")  # type: ignore[arg-type]
-    assert case.parameters["noise.gust"].quantity.unit == "1/time"
-    values = solved(write(tmp_path, OSCILLATOR, WIND, MOMENTS, ONLY, rest), tmp_path / "out")
-    same = write(tmp_path, OSCILLATOR, UHLENBECK, MOMENTS, ONLY, "figure = false\n")
-    assert load_case(same).noise == OrnsteinUhlenbeck(alpha=0.5, sigma=0.5)
-    [expected] = solved(same, tmp_path / "out2").values()
-    assert next(iter(values.values())) == pytest.approx(expected, rel=1e-10)
-    text = said(tmp_path, OSCILLATOR, WIND, MOMENTS, rest.replace("noise.gust", "noise.D0"))[0]
-    assert text.startswith('14: vary."noise.D0": cannot be varied; ')
-    assert "noise.gust, noise.memory" in text
-    text = said(tmp_path, OSCILLATOR, WIND, MOMENTS, frame.replace("noise.gust", "noise.D0"))[0]
-    assert text.startswith('15: chart.x.key: got "noise.D0"; did you mean "noise.gust"? must be one of ')
-
-
-def test_records_depend_on_the_kind_and_its_version(
-    windy: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    keys = set()
-    for version in ("windy 1.5", "windy 1.6"):
-        monkeypatch.setattr("fpsolve.model.problem.version_of", lambda _, version=version: version)
-        case = load_case(write(tmp_path, OSCILLATOR, WIND, MOMENTS))
-        keys.add(set_key(case.curve({})))
-    assert len(keys) == 2
-
-
-def test_records_depend_on_the_file_of_a_kind(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A noise that is corrected without a new version, itself or its base, is solved anew."""
-    monkeypatch.syspath_prepend(tmp_path)
-    base, own = tmp_path / "breeze.py", tmp_path / "squall.py"
-    base.write_text("from fpsolve import OrnsteinUhlenbeck\n\nclass Breeze(OrnsteinUhlenbeck):\n    pass\n")
-    own.write_text("from breeze import Breeze\n\nclass Squall(Breeze):\n    pass\n")
-    kind = importlib.import_module("squall").Squall
-    found = [source_of(kind)]
-    for file in (own, base):
-        file.write_text(file.read_text() + "    half = 0.5\n")
-        found.append(source_of(kind))
-    assert len({"", *found}) == 4
-    assert source_of(kind) == found[-1]
-    assert source_of(OrnsteinUhlenbeck) == ""  # type: ignore[arg-type]
-
-
-def test_records_of_a_changed_kind_are_others(windy: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    keys = set()
-    for source in ("a", "b"):
-        monkeypatch.setattr("fpsolve.model.problem.source_of", lambda _, source=source: source)
-        case = load_case(write(tmp_path, OSCILLATOR, WIND, MOMENTS))
-        keys.add(set_key(case.curve({})))
-    assert len(keys) == 2
-    assert facts_of(case, datetime.now(UTC), 0.0)["versions"]["windy"] == "1.5"
 
 
 def test_figures_speak_of_the_parameters_of_the_case(tmp_path: Path) -> None:
@@ -226,29 +111,6 @@ def test_figures_speak_of_the_parameters_of_the_case(tmp_path: Path) -> None:
     assert case.about("noise.sigma").latex == quantities["noise.sigma"].latex == r"$\sigma$"
     assert "time" not in case.about("noise.amplitude").unit
     assert legend({"noise.amplitude": 2.0}, case.about) == "$A$ = 2/s"
-
-
-def test_check_tells_the_faults_of_a_kind_of_others(
-    windy: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """A run keeps Λ, and has no sensitivities where the derivative is wrong."""
-    path = write(tmp_path, OSCILLATOR, WIND, MOMENTS, '[output]\nquantities = ["moment", "sensitivities"]\n')
-    assert main(["check", str(path)]) == 0
-    kind = noise_kind("wind")
-    right = kind.derivative
-    monkeypatch.setattr(kind, "derivative", lambda self, name: right(self, "gust"))
-    capsys.readouterr()
-    assert main(["check", str(path)]) == 1
-    said = capsys.readouterr().err
-    assert 'kinds: derivative("memory").log_diffusion at xi = -' in said
-    assert solved(path, tmp_path / "out")
-    [curve] = json.loads((tmp_path / "out/kinds/summary.json").read_text(encoding="utf-8"))["curves"]
-    assert any(each.startswith("no sensitivities under wind noise: derivative") for each in curve["warnings"])
-
-
-def test_ours_cannot_be_replaced(windy: None) -> None:
-    assert noise_kind("ou-reduction") is ReducedNoise
-    assert version_of(ReducedNoise) == ""  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(("order", "has_theory"), [("order = 1", True), ("order = 0", False)])

@@ -95,13 +95,3 @@ def test_kinds_keys_ranges_and_units_are_those_declared():
     )
     assert omega["description"] == "natural frequency, in rad/time"
     assert "null" not in json.dumps(found)
-
-
-def test_another_packages_kind_is_in_it(monkeypatch):
-    """As `kind_names` tells of it; one that cannot be loaded is left out, as its own error is the better one."""
-    monkeypatch.setattr(
-        "fpsolve.case.schema.kind_names", lambda room: ("white", "no-such-kind") if room == "noises" else ("plane",)
-    )
-    found = schema()["$defs"]
-    assert "noise_white" in found
-    assert not any("no-such" in name for name in found)
