@@ -122,3 +122,19 @@ def test_what_is_refused(said, changed):
     with pytest.raises(TableError) as caught:
         ModalSystem.of(**{**good, "stiffness_noise": [[1.0, 0.0], [0.0, 1.0]], **changed})
     assert str(caught.value).startswith(said)
+
+
+def test_names_in_the_masses_of_three_modes():
+    """Against differences of inverse matrices."""
+
+    def mobility(m):
+        return np.linalg.inv([[1.0, m, 0.0], [m, 2.0, 0.1], [0.0, 0.1, 1.5]])
+
+    mass, stiffness = [[1.0, "m", 0.0], ["m", 2.0, 0.1], [0.0, 0.1, 1.5]], np.diag([1.0, 2.0, 3.0])
+    system = ModalSystem.of(mass, stiffness, stiffness_noise=np.eye(3), parameters={"m": 0.2})
+    still, driven = (np.array(term.matrix) for term in system.terms)
+    np.testing.assert_allclose(still[1::2, ::2], -mobility(0.2) @ stiffness, atol=1e-14)
+    np.testing.assert_allclose(driven[1::2, ::2], -mobility(0.2), atol=1e-14)
+    slope, _ = (np.array(term.matrix) for term in system.derivative("m")[0])
+    by_difference = (mobility(0.2 + 1e-5) - mobility(0.2 - 1e-5)) / 2e-5
+    np.testing.assert_allclose(slope[1::2, ::2], -by_difference @ stiffness, atol=1e-9)

@@ -76,6 +76,8 @@ def _symbol(text: str) -> str:
     return symbol
 
 
+Place = tuple[str | int, ...]
+"""Keys and numbers, by which what is wrong is found in a case file."""
 Line = Annotated[str, Field(min_length=1, max_length=80), AfterValidator(_printed)]
 
 
@@ -189,6 +191,10 @@ class EquationSystem(System):
             raise TableError(
                 f"got {counts}; must be one rate for each variable, in their order; add or leave out some", "drift"
             )
+        self._refuse_faults()
+
+    def _refuse_faults(self) -> None:
+        """Refuse names, values, noises and walls that are not what they must be. Raises `TableError`."""
         for name, path in self._given_names():
             fault = name_fault(name) if isinstance(name, str) else "must be a text"
             if not fault and (name in self.stated or name == "kind"):
@@ -223,11 +229,8 @@ class EquationSystem(System):
             if not re.fullmatch(r"noise(\.[A-Za-z0-9_-]+)?", str(section)):
                 must = 'must be the name of a section, "noise" or, for example, "noise.axial"'
                 raise TableError(f"got {shown(section)}; {must}; rename it", "noises", name)
-            used = frozenset[str]().union(*map(names_in, self._texts()))
-            if name not in used:
-                others = sorted(used.difference(self.variables, dict(self.named), dict(self.noises)))
-                named = f', or name the noise, noises = {{ {others[0]} = "{section}" }}' if others else ", or remove it"
-                raise TableError(f"{name} is in no rate; write it into drift{named}", "noises", name)
+            if fault := self._unused(name, section):
+                raise TableError(fault, "noises", name)
         if not self.terms:
             raise TableError("no rate has a term; write terms with the variables", "drift")
         for i, name in enumerate(self.variables if self.cubic is not None else ()):
@@ -243,20 +246,34 @@ class EquationSystem(System):
         if len({jump.phase for jump in jumps}) < len(jumps):
             raise TableError("two walls are at the same place; remove one of them", "walls")
 
-    def _given_names(self) -> Iterator[tuple[Any, tuple[str | int, ...]]]:
+    def _given_names(self) -> Iterator[tuple[Any, Place]]:
         """All names with their places."""
         yield from ((name, ("variables", i)) for i, name in enumerate(self.variables))
         yield from ((name, ("parameters", str(name))) for name, _ in self.named)
         yield from ((name, ("noises", str(name))) for name, _ in self.noises)
 
-    def _texts(self) -> Iterator[str]:
-        """The rates, each of which can be read. Raises `TableError`."""
-        for i, text in enumerate(self.drift):
+    def _unused(self, name: str, section: str) -> str:
+        """What is wrong where a noise drives nothing."""
+        if name in self._used:
+            return ""
+        others = sorted(self._used.difference(self.variables, dict(self.named), dict(self.noises)))
+        named = f', or name the noise, noises = {{ {others[0]} = "{section}" }}' if others else ", or remove it"
+        return f"{name} is in no rate; write it into drift{named}"
+
+    def _texts(self) -> Iterator[tuple[str, Place]]:
+        """What the rates are written in, with their places."""
+        yield from ((text, ("drift", i)) for i, text in enumerate(self.drift))
+
+    @cached_property
+    def _used(self) -> frozenset[str]:
+        """The names in these. Raises `TableError`."""
+        found = frozenset[str]()
+        for text, place in self._texts():
             try:
-                names_in(text)
+                found |= names_in(text)
             except ExpressionError as error:
-                raise TableError(str(error), "drift", i) from None
-            yield text
+                raise TableError(str(error), *place) from None
+        return found
 
     @classmethod
     def takes(cls, key: str, table: Mapping[str, Any]) -> bool:
@@ -308,7 +325,7 @@ class EquationSystem(System):
     @property
     def remarks(self) -> Sequence[Message]:
         """Which parameters are in no rate and in no restitution."""
-        used = frozenset[str]().union(*map(names_in, [*self.drift, *(str(wall.restitution) for wall in self.walls)]))
+        used = self._used.union(*(names_in(str(wall.restitution)) for wall in self.walls))
         unused = tuple(f"{self.section}.{name}" for name, _ in self.named if name not in used)
         return [Message(Code.UNUSED, keys=unused)] if unused else []
 
@@ -341,14 +358,10 @@ class EquationSystem(System):
 
     def _rates_by(self, by: str) -> tuple[Form, ...]:
         """The rates, with their derivatives by a parameter. Raises `TableError`."""
-        names = {name: constant(value, float(name == by)) for name, value in self.named}
-        if EPSILON in names:
-            names[EPSILON] = Form({((), "", 1): (1.0, 0.0)})
         names = {
             **{name: Form({((name,), "", 0): (1.0, 0.0)}) for name in (*self.variables, *self._delays)},
             **{name: Form({((), name, 0): (1.0, 0.0)}) for name, _ in self.noises},
-            **self._waves(by),
-            **names,
+            **self._names(by),
         }
         rates = list[Form]()
         for i, (variable, text) in enumerate(zip(self.variables, self.drift, strict=True)):
@@ -363,27 +376,34 @@ class EquationSystem(System):
             rates.append(total)
         return tuple(rates)
 
-    def _times(self, by: str = "") -> Iterator[tuple[int, str, str, dict[Monomial, Series]]]:
-        """The rate, the text, the name and the argument of each x(t - tau) and cos(nu*t). Raises `TableError`."""
-        calls = [(i, *call) for i, text in enumerate(self.drift) for call in calls_of_time(text).items()]
+    def _names(self, by: str) -> dict[str, Form]:
+        """What waves and parameters are, with their derivatives by a parameter."""
+        names = {name: constant(value, float(name == by)) for name, value in self.named}
+        if EPSILON in names:
+            names[EPSILON] = Form({((), "", 1): (1.0, 0.0)})
+        return {**self._waves(by), **names}
+
+    def _times(self, by: str = "") -> Iterator[tuple[Place, str, str, dict[Monomial, Series]]]:
+        """The place, the text, the name and the argument of each x(t - tau) and cos(nu*t). Raises `TableError`."""
+        calls = [(place, *call) for text, place in self._texts() for call in calls_of_time(text).items()]
         names = {name: constant(value, float(name == by)) for name, value in self.named if calls}
         names |= {name: Form({((name,), "", 0): (1.0, 0.0)}) for name in (*self.variables, TIME)}
         names |= {name: Form({((), name, 0): (1.0, 0.0)}) for name, _ in self.noises}
-        for i, written, (name, time) in calls:
+        for place, written, (name, time) in calls:
             try:
-                yield i, written, name, dict(evaluate(time, names, f"the time of {written}").parts)
+                yield place, written, name, dict(evaluate(time, names, f"the time of {written}").parts)
             except ExpressionError as error:
-                raise TableError(str(error), "drift", i) from None
+                raise TableError(str(error), *place) from None
 
     def _angles(self, by: str = "") -> Mapping[str, tuple[str, Series, Series]]:
         """By what is written as cos(nu*t + phi) the name, nu and phi. Raises `TableError`."""
         found = dict[str, tuple[str, Series, Series]]()
-        for i, written, name, parts in self._times(by):
+        for place, written, name, parts in self._times(by):
             if name in WAVES:
                 phase, speed = parts.pop(NUMBER, (0.0, 0.0)), parts.pop(((TIME,), "", 0), (0.0, 0.0))
                 if parts or not speed[0]:
                     must = f"write {name}(nu*t), nu not 0, a number or an expression in the parameters"
-                    raise TableError(f"got {written}; {must}", "drift", i)
+                    raise TableError(f"got {written}; {must}", *place)
                 found[written] = name, speed, phase
         return found
 
@@ -393,7 +413,7 @@ class EquationSystem(System):
         try:
             return Clock(*common_unit(frequencies, "frequencies")) if frequencies else None
         except ValueError as failure:
-            raise TableError(str(failure), "drift") from None
+            raise TableError(str(failure), "drift" if self.drift else "stiffness") from None
 
     def clock_slope(self, name: str) -> float:
         _, speed, _ = next(iter(self._angles(name).values()), ("", (1.0, 0.0), ()))
@@ -414,7 +434,7 @@ class EquationSystem(System):
     def _delays(self) -> Mapping[str, tuple[int, float]]:
         """By what is written as x(t - tau) the number of x, and tau. Raises `TableError`."""
         found = dict[str, tuple[int, float]]()
-        for i, written, name, parts in self._times():
+        for place, written, name, parts in self._times():
             if name in WAVES:
                 continue
             delay = -parts.pop(NUMBER, (0.0, 0.0))[0]
@@ -427,7 +447,7 @@ class EquationSystem(System):
             elif not fault and not delay > 0:
                 fault = f"the delay is {delay:g}; must be > 0; change it, or write {name}"
             if fault:
-                raise TableError(f"got {written}; {fault}", "drift", i)
+                raise TableError(f"got {written}; {fault}", *place)
             found[written] = self.variables.index(name), delay
         return found
 
@@ -598,8 +618,9 @@ class EquationSystem(System):
         if not any(len(states) != 1 for form in self._rates for states, _, _ in form.parts):
             return ()
         in_walls = frozenset[str]().union(*(names_in(str(wall.restitution)) for wall in self.walls))
-        used = frozenset[str]().union(*map(names_in, self.drift)) - in_walls
-        return tuple(name for name, value in self.named if name in used and self._is_linear_same(name, value))
+        return tuple(
+            name for name, value in self.named if name in self._used - in_walls and self._is_linear_same(name, value)
+        )
 
     def _is_linear_same(self, name: str, value: float) -> bool:
         if name == EPSILON:
@@ -642,8 +663,7 @@ class EquationSystem(System):
         if len(self.walls) != 1:
             return ""
         own = names_in(str(self.walls[0].restitution)) - {EPSILON}
-        others = frozenset[str]().union(*map(names_in, self.drift))
-        return next(iter(own)) if len(own) == 1 and not own & others else ""
+        return next(iter(own)) if len(own) == 1 and not own & self._used else ""
 
     @property
     def _law(self) -> str:

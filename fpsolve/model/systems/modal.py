@@ -2,26 +2,26 @@
 
 from __future__ import annotations
 
-import math
+from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import dataclass, field, replace
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from pydantic import BeforeValidator, Field
 from pydantic.fields import FieldInfo
 
-from fpsolve.arrays import ROUNDED, FloatArray, shown
-from fpsolve.model.expressions import ExpressionError, Form, calls_of_time, constant, evaluate, names_in
+from fpsolve.arrays import ROUNDED, FloatArray, real_number, shown
+from fpsolve.model.expressions import ExpressionError, Form, Monomial, Series, constant, evaluate
 from fpsolve.model.faults import TableError
 from fpsolve.model.parameters import stated_field
 from fpsolve.model.plane import MOST_VARIABLES
-from fpsolve.model.systems.equations import EPSILON, EquationSystem, walls_of
+from fpsolve.model.systems.equations import EPSILON, EquationSystem, Place, walls_of
 
 Entry = float | str
 Matrix = Sequence[Sequence[Entry]]
 NoiseMatrix = Matrix | Mapping[str, Matrix]
+Rows = tuple[tuple[Entry, ...], ...]
 MOST_MODES = MOST_VARIABLES // 2
 """Largest number of modes."""
 _Row = Annotated[tuple[Entry, ...], Field(strict=False, min_length=1, max_length=MOST_MODES)]
@@ -32,6 +32,10 @@ SINGULAR = 1e12
 """Condition of a mass matrix, its rows and columns of the size 1, from which on it counts as singular."""
 SMALLEST = 1e-300
 """Size of the smallest mass that has an inverse."""
+OF_SPEEDS = "damping", "gyroscopic", "damping_noise"
+"""The matrices that multiply q̇."""
+SKEW = {"gyroscopic": "damping", "circulatory": "stiffness"}
+"""The matrices that are skew-symmetric, and where what is not belongs."""
 
 
 @dataclass(frozen=True)
@@ -41,10 +45,11 @@ class ModalSystem(EquationSystem):
     It is an `EquationSystem` of the variables q and q̇ of each mode, whose rates follow from the matrices.
 
     Args:
-        mobility: M⁻¹, by which modes share an impact.
+        matrices: each with its place in a case file and the noise that multiplies it, "" for none; M is the first.
     """
 
-    mobility: tuple[tuple[Entry, ...], ...] = ()
+    drift: tuple[str, ...] = field(default=(), init=False, repr=False)
+    matrices: tuple[tuple[Place, str, Rows], ...] = ()
 
     kind: ClassVar[str] = "modes"
     stated: ClassVar[Mapping[str, FieldInfo]] = {
@@ -101,7 +106,7 @@ class ModalSystem(EquationSystem):
         ((0.0, 1.0), (-1.0, -0.05))
 
         Args:
-            mass: M, with an inverse; of more than two rows names may stand on its diagonal alone.
+            mass: M, with an inverse.
             stiffness, damping: K and C.
             gyroscopic, circulatory: G and H, skew-symmetric.
             stiffness_noise, damping_noise: K_ξ and C_ξ; of several noises mappings from their names in `noises`.
@@ -115,28 +120,24 @@ class ModalSystem(EquationSystem):
         Raises:
             TableError: with the matrix, the place in it, and what it must be.
         """
-        still = {"mass": mass, "stiffness": stiffness, "damping": damping}
-        still = _listed({**still, "gyroscopic": gyroscopic, "circulatory": circulatory})
-        driven = _listed({"stiffness_noise": stiffness_noise, "damping_noise": damping_noise})
-        named, sections = dict(parameters or {}), dict(noises or {"xi": "noise"})
-        rates = _Rates(still, driven, tuple(modes), named, sections)
-        variables, drift = rates.written()
-        mobility = tuple(map(tuple, rates.mobility)) if walls else ()
-        try:
-            return cls(
-                variables,
-                drift,
-                tuple(named.items()),
-                tuple(sections.items()),
-                walls_of(walls),
-                mobility=mobility,
-            )
-        except TableError as error:
-            if error.path[:1] == ("variables",):
-                raise TableError(error.text, "modes") from None
-            if error.path[:1] == ("drift",):
-                raise TableError(f"with the other matrices: {error.text}", "stiffness") from None
-            raise
+        given: dict[str, NoiseMatrix] = {"mass": mass, "stiffness": stiffness, "damping": damping}
+        given |= {"gyroscopic": gyroscopic, "circulatory": circulatory}
+        given |= {"stiffness_noise": stiffness_noise, "damping_noise": damping_noise}
+        matrices, named, count = list[tuple[Place, str, Rows]](), noises or {"xi": "noise"}, 0
+        for key, each in given.items():
+            for place, noise, matrix in _by_noise(key, _listed(each), named):
+                count = count or _count(matrix)
+                matrices.append((place, noise, _rows(matrix, count, place)))
+        modes = modes or [f"q{k + 1}" for k in range(count)]
+        if len(modes) != count:
+            raise TableError(f"got {len(modes)} names of {count} modes; must be one for each", "modes")
+        return cls(
+            tuple(each for name in modes for each in (name, f"{name}_dot")),
+            tuple((parameters or {}).items()),
+            tuple(named.items()),
+            walls_of(walls),
+            matrices=tuple(matrices),
+        )
 
     @classmethod
     def from_table(cls, table: Mapping[str, Any]) -> ModalSystem:
@@ -145,12 +146,62 @@ class ModalSystem(EquationSystem):
         walls = [each.model_dump() for each in table.get("walls", ())]
         return replace(cls.of(**{**given, "parameters": dict(named), "walls": walls}), quantities=quantities)
 
+    def __post_init__(self) -> None:
+        self._refuse_faults()
+
+    def _given_names(self) -> Iterator[tuple[Any, Place]]:
+        yield from ((name, ("modes",) if path[0] == "variables" else path) for name, path in super()._given_names())
+
+    def _texts(self) -> Iterator[tuple[str, Place]]:
+        for place, _, rows in self.matrices:
+            for (i, j), entry in np.ndenumerate(np.array(rows, dtype=object)):
+                if isinstance(entry, str):
+                    yield entry, (*place, i, j)
+
+    def _unused(self, name: str, section: str) -> str:
+        is_used = any(noise == name and any(map(any, rows)) for _, noise, rows in self.matrices)
+        return "" if is_used else f"{name} is in no matrix; write stiffness_noise or damping_noise"
+
+    def _rates_by(self, by: str) -> tuple[Form, ...]:
+        (mobility, change), n = self._mobility(by), len(self.variables) // 2
+        forces = _zeros(n, 2 * n)
+        for place, noise, rows in self.matrices[1:]:
+            for (wave, power), matrix in _series(place, rows, self._names(by)).items():
+                if noise and wave:
+                    raise TableError(f"has {wave}t; a noise may only be multiplied by numbers and parameters", *place)
+                off = np.abs(matrix[0] + matrix[0].T) > ROUNDED * np.max(np.abs(matrix[0]))
+                if place[0] in SKEW and off.any():
+                    must = "must be skew-symmetric, each entry minus the one across the diagonal"
+                    raise TableError(
+                        f"got {shown(matrix[0].tolist())}; {must}; write the rest into {SKEW[place[0]]}", *place
+                    )
+                forces[noise or wave, power][:, :, int(place[0] in OF_SPEEDS) :: 2] += matrix
+        found = [dict[Monomial, Series]() for _ in range(n)]
+        for (noise, power), (force, slope) in forces.items():
+            rates, slopes = -mobility @ force, -(change @ force + mobility @ slope)
+            for parts, *pairs in zip(found, rates.tolist(), slopes.tolist(), strict=True):
+                for name, *pair in zip(self.variables, *pairs, strict=True):
+                    parts[(name,), noise, power] = tuple(pair)
+        speeds = [Form({((name,), "", 0): (1.0, 0.0)}) for name in self.variables[1::2]]
+        return tuple(each for pair in zip(speeds, map(Form, found), strict=True) for each in pair)
+
+    def _mobility(self, by: str = "") -> FloatArray:
+        """M⁻¹, by which modes share an impact, and its derivative by a parameter. Raises `TableError`."""
+        place, _, rows = self.matrices[0]
+        names = {name: constant(value, float(name == by)) for name, value in self.named if name != EPSILON}
+        mass, slope = _series(place, rows, names)["", 0]
+        scaled = mass / np.maximum(np.max(np.abs(mass), axis=1, keepdims=True), SMALLEST)
+        scaled = scaled / np.maximum(np.max(np.abs(scaled), axis=0), SMALLEST)  # whatever the units of the modes
+        if not (np.linalg.cond(scaled) < SINGULAR and np.all(np.max(np.abs(mass), axis=1) > SMALLEST)):
+            must = f"must have an inverse, and an entry beyond ±{SMALLEST:g} in each row"
+            raise TableError(f"got {shown(mass.tolist())}; {must}; change its entries", *place)
+        inverse = np.linalg.inv(mass)
+        return np.array([inverse, -inverse @ slope @ inverse])
+
     def _wall_coordinates(self) -> FloatArray:
         """The displacement of the wall and its rate, then those of the other modes, M-orthogonal to it."""
-        names = {name: constant(value) for name, value in self.named}
-        mass = np.array([[_value(each, names) for each in row] for row in self.mobility])
-        row = self._wall_row(names)
-        shares = mass @ row
+        row = self._wall_row(0)
+        shares = self._mobility()[0] @ row
         first = int(np.argmax(np.abs(row * shares)))
         if not row @ shares > np.abs(row) @ np.abs(shares) / SINGULAR:
             text = (
@@ -160,174 +211,92 @@ class ModalSystem(EquationSystem):
         others = np.delete(np.eye(len(row)) - np.outer(shares / shares[first], np.eye(len(row))[first]), first, axis=0)
         return np.asarray(np.kron(np.vstack([row, others]), np.eye(2)))
 
-    def _wall_row(self, names: Mapping[str, Form]) -> FloatArray:
-        """The displacement of the wall, a row of those of the modes. Raises `TableError`."""
-        modes, at = self.variables[::2], str(self.walls[0].at)
+    def _place(self, number: int) -> tuple[int, int, float]:
+        """That of the wall of one mode."""
+        self._wall_row(number)
+        return 0, 1, 1.0
+
+    def _wall_row(self, number: int) -> FloatArray:
+        """The displacement of a wall, a row of those of the modes. Raises `TableError`."""
+        modes, at = self.variables[::2], str(self.walls[number].at)
         text, _, zero = at.partition("=")
         try:
+            names = {name: constant(value) for name, value in self.named}
             states = {name: Form({((name,), "", 0): (1.0,)}) for name in modes}
             parts = evaluate(text, {**names, **states}, "at").parts
         except ExpressionError as error:
-            raise TableError(str(error), "walls", 0, "at") from None
+            raise TableError(str(error), "walls", number, "at") from None
         found = {states: series[0] for (states, _, _), series in parts.items()}
         row = np.array([found.pop((name,), 0.0) for name in modes])
         if found or not row.any() or zero.strip().rstrip("0") not in ("", "0.") or "=" not in at:
-            must = f'must be a displacement or a sum of several, such as "{modes[0]} - 0.5*{modes[1]} = 0"'
-            raise TableError(f"got {shown(at)}; {must}; the modes are {', '.join(modes)}", "walls", 0, "at")
+            must = f'must be a displacement or a sum of several, such as "{modes[0]} - 0.5*{modes[-1]} = 0"'
+            raise TableError(f"got {shown(at)}; {must}; the modes are {', '.join(modes)}", "walls", number, "at")
         return row
 
 
-@dataclass(frozen=True)
-class _Rates:
-    """The rates of q and q̇ as text.
-
-    Args:
-        matrices: without noise, by their keys.
-        driven: what noises multiply.
-        modes, parameters, noises: as in `ModalSystem.of`.
-    """
-
-    matrices: Mapping[str, Matrix]
-    driven: Mapping[str, NoiseMatrix]
-    modes: tuple[str, ...]
-    parameters: Mapping[str, float]
-    noises: Mapping[str, str]
-
-    def written(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
-        """The names of q and q̇ of each mode in turn, and their rates. Raises `TableError`."""
-        modes = self.modes or tuple(f"q{k + 1}" for k in self)
-        if len(modes) != self.count:
-            raise TableError(f"got {len(modes)} names of {self.count} modes; must be one for each", "modes")
-        speeds = [f"{name}_dot" for name in modes]
-        of = {"damping": speeds, "gyroscopic": speeds, "stiffness": modes, "circulatory": modes}
-        of |= {"stiffness_noise": modes, "damping_noise": speeds}
-        matrices = {key: self._entries(each, key) for key, each in self.matrices.items() if key != "mass"}
-        for key in ("gyroscopic", "circulatory"):
-            self._refuse_symmetric(matrices[key], key)
-        inverse = self.mobility
-        parts = [(matrix, of[key]) for key, matrix in matrices.items()]
-        driven = [(noise, self._entries(matrix, *path), of[path[0]]) for noise, path, matrix in self._driven()]
-        for name in self.noises:
-            if all(noise != name or not any(map(any, matrix)) for noise, matrix, _ in driven):  # a name may be 0
-                raise TableError(f"{name} is in no matrix; write stiffness_noise or damping_noise", "noises", name)
-        parts += [(matrix, [f"{noise}*{state}" for state in states]) for noise, matrix, states in driven]
-        forces = [[each for matrix, states in parts for each in zip(matrix[j], states, strict=True)] for j in self]
-        drift = list[str]()
-        for i, speed in enumerate(speeds):
-            texts, numbers = list[str](), dict[str, float]()
-            for factor, entry, state in ((inverse[i][j], *each) for j in self for each in forces[j]):
-                if isinstance(factor, str) or isinstance(entry, str):
-                    texts += [f"-{_product(factor, entry)}*{state}"] if factor != 0.0 and entry != 0.0 else []
-                else:
-                    numbers[state] = numbers.get(state, 0.0) - factor * entry
-            texts += [f"+({number!r})*{state}" for state, number in numbers.items() if number]
-            drift += [speed, " ".join(texts) or "0"]
-        return tuple(name for pair in zip(modes, speeds, strict=True) for name in pair), tuple(drift)
-
-    @cached_property
-    def mobility(self) -> list[list[Entry]]:
-        """M⁻¹. Raises `TableError`."""
-        return self._inverse(self._entries(self.matrices["mass"], "mass"))
-
-    @property
-    def count(self) -> int:
-        """The number of modes."""
-        mass = self.matrices["mass"]
-        if not isinstance(mass, list | tuple) or not 1 <= len(mass) <= MOST_MODES:
-            must = f"must be a matrix of 1 to {MOST_MODES} rows, one for each mode"
-            raise TableError(f"got {shown(mass)}; {must}", "mass")
-        return len(mass)
-
-    def __iter__(self) -> Iterator[int]:
-        return iter(range(self.count))
-
-    def _driven(self) -> Iterator[tuple[str, tuple[str, ...], Matrix]]:
-        """What each noise multiplies: its name, where that stands, and the matrix. Raises `TableError`."""
-        for key, given in self.driven.items():
-            if isinstance(given, Mapping):
-                for name, matrix in given.items():
-                    if name not in self.noises:
-                        known = ", ".join(self.noises)
-                        raise TableError(f"is none of the noises, which are {known}; rename it", key, name)
-                    yield name, (key, name), matrix
-            elif given and len(self.noises) > 1:
-                names = " and ".join(self.noises)
-                raise TableError(f"is one matrix for the noises {names}; write a table with one for each", key)
-            elif given:
-                yield from ((name, (key,), given) for name in self.noises)
-
-    def _entries(self, given: Matrix, *path: str) -> list[list[Entry]]:
-        """The entries of a matrix, numbers where they are; zeros of none. Raises `TableError`."""
-        if isinstance(given, list | tuple) and not given and path[0] not in ("mass", "stiffness"):
-            return [[0.0 for _ in self] for _ in self]
-        stated = given if isinstance(given, list | tuple) else ()
-        rows = [list(row) if isinstance(row, list | tuple) else [] for row in stated]
-        if [len(row) for row in rows] != [self.count for _ in self]:
-            size = f"{self.count} row{'s' * (self.count > 1)} of {self.count}, as mass is"
-            raise TableError(f"got {shown(given)}; must be {size}", *path)
-        for i, row in enumerate(rows):
-            for j, entry in enumerate(row):
-                is_number = isinstance(entry, int | float) and not isinstance(entry, bool)
-                if not (is_number or isinstance(entry, str)):
-                    must = "must be a number, or an expression in the parameters"
-                    raise TableError(f"got {shown(entry)}; {must}; write, for example, 1.0", *path, i, j)
-                try:
-                    text = repr(float(entry)) if is_number else str(entry)
-                    number = self._number(text, not is_number and path[0] != "mass")
-                except ExpressionError as error:
-                    raise TableError(str(error), *path, i, j) from None
-                if path[0] == "mass" and isinstance(entry, str) and EPSILON in names_in(entry):
-                    raise TableError(f"has {EPSILON}, which a mass may not contain; give it another name", *path, i, j)
-                is_free = is_number or not names_in(str(entry))
-                rows[i][j] = number[0] if is_free and number is not None else str(entry)
-        return rows
-
-    def _numbers(self, matrix: list[list[Entry]]) -> FloatArray:
-        """The entries of a matrix at the values of the parameters."""
-        values = [[self._number(e) if isinstance(e, str) else (e,) for e in row] for row in matrix]
-        return np.array([[each[0] if each else 0.0 for each in row] for row in values])
-
-    def _number(self, text: str, may_turn: bool = True) -> tuple[float, ...] | None:
-        """The value of an entry, with 1 for cos(nu*t). Raises `ExpressionError`."""
-        waves = dict.fromkeys(calls_of_time(text) if may_turn else (), constant(1.0))
-        return evaluate(text, self._constants | waves, "the entry").scalar
-
-    @cached_property
-    def _constants(self) -> dict[str, Form]:
-        return {name: constant(value) for name, value in self.parameters.items()}
-
-    def _refuse_symmetric(self, matrix: list[list[Entry]], key: str) -> None:
-        values = self._numbers(matrix)
-        if np.max(np.abs(values + values.T)) > ROUNDED * np.max(np.abs(values)):
-            other = "damping" if key == "gyroscopic" else "stiffness"
-            must = "must be skew-symmetric, each entry minus the one across the diagonal"
-            raise TableError(f"got {shown(values.tolist())}; {must}; write the rest into {other}", key)
-
-    def _inverse(self, mass: list[list[Entry]]) -> list[list[Entry]]:
-        """The inverse of the masses, as text where they have names."""
-        values = self._numbers(mass)
-        scaled = values / np.maximum(np.max(np.abs(values), axis=1, keepdims=True), SMALLEST)
-        scaled = scaled / np.maximum(np.max(np.abs(scaled), axis=0), SMALLEST)  # whatever the units of the modes
-        if not (np.linalg.cond(scaled) < SINGULAR and np.all(np.max(np.abs(values), axis=1) > SMALLEST)):
-            must = f"must have an inverse, and an entry beyond ±{SMALLEST:g} in each row"
-            raise TableError(f"got {shown(values.tolist())}; {must}; change its entries", "mass")
-        if not any(isinstance(entry, str) for row in mass for entry in row):
-            found: list[list[Entry]] = np.linalg.inv(values).tolist()
-            return found
-        if not any(entry != 0.0 for i, row in enumerate(mass) for j, entry in enumerate(row) if i != j):
-            return [[f"1/({mass[i][i]})" if i == j else 0.0 for j in self] for i in self]
-        if self.count > 2:
-            must = "of more than two modes must be numbers, or have names on a diagonal and zeros beside it"
-            raise TableError(f"got {shown(mass)}; {must}; write numbers", "mass")
-        (a, b), (c, d) = mass
-        det = f"(({a})*({d}) - ({b})*({c}))"
-        minus = [[0.0 if each == 0.0 else f"-({each})/{det}" for each in row] for row in mass]
-        return [[f"({d})/{det}", minus[0][1]], [minus[1][0], f"({a})/{det}"]]
+def _zeros(*shape: int) -> defaultdict[tuple[str, int], FloatArray]:
+    """By a noise or a wave and a power of ε a matrix and its derivative, at first 0."""
+    return defaultdict(lambda: np.zeros((2, *shape)))
 
 
-def _value(entry: Entry, names: Mapping[str, Form]) -> float:
-    """The number that an entry of a matrix is at the values of the parameters."""
-    return (evaluate(entry, names, "the entry").scalar or (math.nan,))[0] if isinstance(entry, str) else entry
+def _series(place: Place, rows: Rows, names: Mapping[str, Form]) -> Mapping[tuple[str, int], FloatArray]:
+    """A matrix and its derivative by the waves and the powers of ε that multiply them. Raises `TableError`."""
+    found = _zeros(len(rows), len(rows))
+    for (i, j), entry in np.ndenumerate(np.array(rows, dtype=object)):
+        if isinstance(entry, str):
+            try:
+                for (_, wave, power), series in evaluate(entry, names, "the entry").parts.items():
+                    found[wave, power][:, i, j] = series
+            except ExpressionError as error:
+                raise TableError(str(error), *place, i, j) from None
+        elif entry:
+            found["", 0][0, i, j] = entry
+    return found
+
+
+def _by_noise(key: str, given: Any, noises: Mapping[str, str]) -> Iterator[tuple[Place, str, Any]]:
+    """The matrices of a key, each with its place and its noise, "" for none. Raises `TableError`."""
+    if not key.endswith("_noise"):
+        if given or key in ("mass", "stiffness") or not isinstance(given, list | tuple):
+            yield (key,), "", given
+    elif isinstance(given, Mapping):
+        for name, matrix in given.items():
+            if name not in noises:
+                raise TableError(f"is none of the noises, which are {', '.join(noises)}; rename it", key, name)
+            yield (key, name), name, matrix
+    elif given and len(noises) > 1:
+        names = " and ".join(noises)
+        raise TableError(f"is one matrix for the noises {names}; write a table with one for each", key)
+    elif given:
+        yield from (((key,), name, given) for name in noises)
+
+
+def _count(mass: Any) -> int:
+    """The number of modes. Raises `TableError`."""
+    if not isinstance(mass, list | tuple) or not 1 <= len(mass) <= MOST_MODES:
+        must = f"must be a matrix of 1 to {MOST_MODES} rows, one for each mode"
+        raise TableError(f"got {shown(mass)}; {must}", "mass")
+    return len(mass)
+
+
+def _rows(matrix: Any, count: int, place: Place) -> Rows:
+    """The rows of a matrix, numbers and texts. Raises `TableError`."""
+    stated = matrix if isinstance(matrix, list | tuple) else ()
+    if [len(row) if isinstance(row, list | tuple) else 0 for row in stated] != [count] * count:
+        size = f"{count} row{'s' * (count > 1)} of {count}, as mass is"
+        raise TableError(f"got {shown(matrix)}; must be {size}", *place)
+    return tuple(tuple(_entry(each, (*place, i, j)) for j, each in enumerate(row)) for i, row in enumerate(stated))
+
+
+def _entry(given: Any, place: Place) -> Entry:
+    """An entry of a matrix. Raises `TableError`."""
+    if isinstance(given, str):
+        return given
+    try:
+        return real_number(given, "it")
+    except ValueError:
+        must = "must be a number, or an expression in the parameters"
+        raise TableError(f"got {shown(given)}; {must}; write, for example, 1.0", *place) from None
 
 
 def _listed(given: Any) -> Any:
@@ -337,10 +306,3 @@ def _listed(given: Any) -> Any:
     if isinstance(given, np.ndarray | np.generic):
         return given.tolist()
     return type(given)(map(_listed, given)) if isinstance(given, list | tuple) else given
-
-
-def _product(a: Entry, b: Entry) -> str:
-    """a b in parentheses."""
-    if not isinstance(a, str) and not isinstance(b, str):
-        return f"({a * b!r})"
-    return "*".join(f"({each})" for each in (a, b) if each != 1.0)
