@@ -349,13 +349,6 @@ class Code(Enum):
         "warning: {target} cannot be reached with {frame}: {side:?{side} everywhere¦{symbol} is from {least:.6g} to "
         "{most:.6g}} there, and nearest at {place}; use a wider range, or other parameters"
     )
-    CURVED = (
-        "warning: the first-order interval of {symbol}, {low:.6g} to {high:.6g}, does not serve: that of {count} "
-        "samples is {least:.6g} to {most:.6g}, and on the same sets both differ by {size:.0%} of the width, as "
-        "{symbol} bends over it; rely on the samples"
-    )
-    SAMPLES_MISSING = "failure: {count} of {of} samples did not converge, in whole or in part; they are left out"
-    SAMPLES_ABSENT = "note: {count} of {of} samples have no {symbol}; its quantiles are of the others"
     DESIGN_GAPS = (
         "failure: {target} was not found{count:?, and Λ could not be solved at {count} of the values tried}: {reason}"
     )

@@ -1,4 +1,4 @@
-"""What is uncertain of λ, δ_p and Λ(p) where parameters are: to first order by the derivatives, and by samples.
+"""What is uncertain of λ, δ_p and Λ(p) where parameters are: to first order by the derivatives; and samples of them.
 
 Each parameter θᵢ has a normal law around its value, cut at the ends of its range, and is independent of the others.
 With mᵢ the mean and sᵢ the standard deviation of that law, to first order

@@ -27,6 +27,7 @@ from fpsolve.arrays import FloatArray, shown
 from fpsolve.case.kinds import half_of, kinds_of, parameters_of, sections_of
 from fpsolve.case.read_vary import EXAMPLE, vary_of
 from fpsolve.case.refusals import REFUSALS
+from fpsolve.case.removed import take_removed
 from fpsolve.case.sections import (
     EIGENFUNCTIONS,
     EXCURSIONS,
@@ -50,7 +51,7 @@ from fpsolve.case.sections import (
     Value,
     Varied,
 )
-from fpsolve.case.toml import Place, read_document
+from fpsolve.case.toml import Place, dotted, read_document
 from fpsolve.case.uncertain import EXAMPLE as UNCERTAIN
 from fpsolve.case.uncertain import Uncertain, uncertain_of
 from fpsolve.case.vary import REDUCIBLE, RTOL_REDUCED, Vary, assignments
@@ -474,6 +475,7 @@ def load_case(path: str | Path, overrides: Sequence[str] = (), options: Mapping[
         raise TypeError(f"got {shown(path)}; must be the path of a case file")
     document = read_document(path, overrides, options)
     faults, data = document.faults, document.data
+    faults += (document.fault(path, dotted(path), told) for path, told in take_removed(data))
     context = {"folder": Path(path).parent, "varies": bool(data.get("vary")), "kinds": kinds_of(data)}
     try:
         case = Case.model_validate(data, context=context)

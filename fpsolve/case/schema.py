@@ -19,7 +19,6 @@ from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from fpsolve.case.case import Case
 from fpsolve.case.kinds import EQUATIONS, USUAL, Half
 from fpsolve.case.sections import NonEmpty, Sweep, Text
-from fpsolve.case.uncertain import Count, Seed
 from fpsolve.data import plain_unit
 from fpsolve.model.faults import fields_of
 from fpsolve.model.kinds import NOISES, SYSTEMS, noise_kind, system_kind
@@ -69,13 +68,10 @@ Uncertain = Annotated[float, Field(gt=0)] | StandardDeviation
 
 
 class UncertainSection(BaseModel):
-    """How uncertain parameters are: by their keys, with quotes and dots or in tables; and samples of them."""
+    """How uncertain parameters are: by their keys, with quotes and dots or in tables."""
 
     model_config = _OPEN
     __pydantic_extra__: dict[str, Uncertain | dict[str, Uncertain | dict[str, Any]]]
-
-    sample: Count | None = None
-    seed: Seed = 0
 
 
 class _Generator(GenerateJsonSchema):

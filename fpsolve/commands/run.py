@@ -8,7 +8,7 @@ from typing import Annotated, Any
 from cyclopts import Parameter
 
 from fpsolve.commands.errors import print_error
-from fpsolve.commands.options import ALL_OPTIONS, NOT_CONVERGED, Cases, Count, Fresh, Reporting
+from fpsolve.commands.options import ALL_OPTIONS, NOT_CONVERGED, Cases, Fresh, Reporting
 from fpsolve.signals import INTERRUPTED
 
 
@@ -28,10 +28,6 @@ def run(
     table: Annotated[
         bool, Parameter(help="Print every number of up to ten curves, also Λ(p) at more than 12 p.", negative="")
     ] = False,
-    sample: Annotated[
-        Count | None,
-        Parameter(help="Also solve so many samples of the parameters that [uncertain] of the case names."),
-    ] = None,
     options: Reporting = ALL_OPTIONS,
 ) -> int:
     """Solve case files; write tables, figures and ParaView files into OUT/<case>/.
@@ -47,21 +43,17 @@ def run(
     """
     from fpsolve.output.tables import whole_summary
     from fpsolve.page.terminal import print_blocks
-    from fpsolve.parts.intervals import refuse_wrong_samples
     from fpsolve.show.notes import left_out
     from fpsolve.show.results import done_of, known_of
     from fpsolve.workflow.cases import run_case
     from fpsolve.workflow.simulate import refuse_obstacles
 
     code = 0
-    typed = {} if sample is None else {f"--sample {sample}": f"uncertain.sample={sample}"}
-    typed |= {"--all": 'output.quantities="all"'} if everything else {}
-    loaded = options.load(cases, typed)
-    for case in loaded:
-        refuse_wrong_samples(case)
-        if monte_carlo:
+    loaded = options.load(cases, {"--all": 'output.quantities="all"'} if everything else {})
+    if monte_carlo:
+        for case in loaded:
             refuse_obstacles(case)
-    pool = options.pool(() if sample else loaded)
+    pool = options.pool(loaded)
     for case in loaded:
         watch = replace(options.watch(is_json=json), is_whole=table)
         how: dict[str, Any] = {"monte_carlo": monte_carlo, "is_fresh": fresh}
@@ -79,6 +71,6 @@ def run(
             )
         if outcome.interruption:
             return INTERRUPTED
-        if outcome.failed or (outcome.samples and outcome.samples.failed):
+        if outcome.failed:
             code = NOT_CONVERGED
     return code

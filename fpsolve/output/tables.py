@@ -1,4 +1,4 @@
-"""Results as tables: summary.json, moments.csv, curves.csv; sample.json."""
+"""Results as tables: summary.json, moments.csv, curves.csv."""
 
 from __future__ import annotations
 
@@ -20,15 +20,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fpsolve import __version__
-from fpsolve.analysis.spreads import LEVEL
 from fpsolve.case.case import Case, Curve
 from fpsolve.case.remedies import CASE_WORDS
 from fpsolve.case.vary import BLOCK
-from fpsolve.files import draft, write_json
+from fpsolve.files import draft
 from fpsolve.messages import message_of
 from fpsolve.model.quantity import MOMENT, STATUS, Quantity
 from fpsolve.parts.every import PARTS
-from fpsolve.parts.intervals import SAMPLE, Samples, plain_spread
 from fpsolve.results.curve import CurveResult, Status
 from fpsolve.results.table import Column, Row, Table, plain, rows_over_p
 from fpsolve.study.columns import COUNTS, columns_of, row_of, table_of
@@ -174,25 +172,6 @@ def _entry(case: Case, number: int, content: Mapping[str, Any]) -> str:
     indent = 1 if case.planned <= MOST_INDENTED else None
     text = json.dumps(content, indent=indent, allow_nan=False, ensure_ascii=False).replace("\n", "\n  ")
     return (",\n  " if number else "\n  ") + text
-
-
-def write_samples(case: Case, samples: Samples, folder: Path) -> None:
-    """sample.json: the quantiles of the samples of a case, beside the first order."""
-    rows = [
-        {"quantity": each.quantity.name, "p": each.p}
-        | {name: getattr(each, name) for name in ("count", "mean", "deviation", "low", "median", "high")}
-        | {"share_below_0": each.below, "first_order": plain_spread(each.spread), "apart": each.apart}
-        for each in samples.rows
-    ]
-    content = {
-        **head(case),
-        "parameters": dict(case.curve({}).parameters),
-        "level": LEVEL,
-        **{name: getattr(samples, name) for name in ("planned", "seed", "failed")},
-        "rows": [{key: None if each != each else each for key, each in row.items()} for row in rows],
-        "warnings": in_case_words(samples.remarks),
-    }
-    write_json(folder / f"{SAMPLE}.json", content)
 
 
 def in_case_words(messages: Sequence[str]) -> list[str]:

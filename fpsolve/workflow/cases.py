@@ -15,12 +15,10 @@ from fpsolve.errors import FpsolveError, NotConverged, WorkersDied
 from fpsolve.files import writable
 from fpsolve.messages import Code, Message
 from fpsolve.model.problem import even_only
-from fpsolve.output.tables import write_samples
-from fpsolve.parts.intervals import Samples, sampled_case, samples_of, show_samples
 from fpsolve.pool import Pool, cluster, parallel, serial
 from fpsolve.results.curve import CurveResult, SimulatedCurve
 from fpsolve.show import results
-from fpsolve.show.notes import MONTE_CARLO, note_on, notes
+from fpsolve.show.notes import MONTE_CARLO, notes
 from fpsolve.signals import signals_held
 from fpsolve.workflow.folders import (
     SIMULATED,
@@ -36,9 +34,6 @@ from fpsolve.workflow.sets import TABLES, Sweep
 from fpsolve.workflow.simulate import SIMULATION, Simulations, refuse_obstacles
 from fpsolve.workflow.simulate import show as show_simulated
 
-SAMPLING = ("sample.json",)
-"""The file with all numbers of samples."""
-
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
@@ -52,7 +47,6 @@ class Outcome:
         known: how many of its curves an earlier run had finished.
         outdated: how many records of its curves another version has written; these are not used.
         failed: how many of its curves have failed in a run, also in part.
-        samples: what the samples of its uncertain parameters say; None where there are none.
     """
 
     results: Sequence[CurveResult] = ()
@@ -62,7 +56,6 @@ class Outcome:
     known: int = 0
     outdated: int = 0
     failed: int = 0
-    samples: Samples | None = None
 
     @property
     def failures(self) -> tuple[Message, ...]:
@@ -142,7 +135,6 @@ def run_case(
     if monte_carlo:
         refuse_obstacles(case)
     simulated: list[SimulatedCurve] = []
-    samples: Samples | None = None
     interruption = ""
     simulators = pool if pool and pool.is_elsewhere else None
     replaced = (SOLVED, SIMULATED) if monte_carlo else (SOLVED,)
@@ -156,13 +148,11 @@ def run_case(
                 is_whole = not interruption and len(simulated) == case.planned * monte_carlo
                 blocks = chain(
                     results.show(case, sweep.results, folder, simulated, sweep.results.table),
-                    show_samples(case, samples) if samples else (),
                     show_simulated(case, simulated, sweep.results) if simulated else (),
                     sweep.notes,
                     notes(case, simulated, MONTE_CARLO),
-                    (note_on(case.name, each) for each in (samples.remarks if samples else ())),
                 )
-                files = TABLES + SIMULATION * bool(simulated) + SAMPLING * bool(samples)
+                files = TABLES + SIMULATION * bool(simulated)
                 is_whole &= sweep.done == case.planned
                 write_report(case, folder, watch, blocks, facts=sweep.facts, files=files, complete=is_whole)
 
@@ -171,8 +161,6 @@ def run_case(
             table = sweep.results.table
             watch.shown(results.show(case, sweep.results, folder, (), table, is_whole=watch.is_whole))
             watch.noted(sweep.notes)
-            if case.uncertain.sample:
-                samples = _sample(case, sweep, folder, pool or serial(), watch, is_fresh=is_fresh)
             if monte_carlo:
                 simulations = Simulations(case, folder, is_fresh=is_fresh)
                 simulated = simulations.simulated
@@ -185,7 +173,6 @@ def run_case(
         known=sweep.known,
         outdated=sweep.records.outdated,
         failed=sweep.failed,
-        samples=samples,
     )
 
 
@@ -210,16 +197,3 @@ def _solve(case: Case, folder: Path, pool: Pool, watch: Watch, *, is_fresh: bool
         with watch.bar(Phase(case.name, "tables")), signals_held():
             sweep.write_all()
     return sweep
-
-
-def _sample(case: Case, sweep: Sweep, folder: Path, pool: Pool, watch: Watch, *, is_fresh: bool) -> Samples:
-    """Solve the samples of a case, in a folder of their own, and write what they say."""
-    drawn = sampled_case(case)
-    with own_folder(drawn, folder, (SOLVED,)) as inner:
-        solved = _solve(drawn, inner, pool, watch, is_fresh=is_fresh)
-    samples = samples_of(case, sweep.results[0], solved.results)
-    with writable(folder):
-        write_samples(case, samples, folder)
-    watch.shown(show_samples(case, samples))
-    watch.noted(note_on(case.name, each) for each in samples.remarks)
-    return samples

@@ -18,7 +18,6 @@ SOLVED = (
     r"|(figure|rate_function|(sensitivities|densities)(-\d+)?)\.(png|pdf)"
     r"|density\.vtu|densities(-\d+)?\.nc|show\.py|eigenfunctions(-\d+)?(\.pvd|/p[+-][\d.e+-]+\.vtu)"
     r"|response(_3d)?(-\d+)?\.(csv|vtu|vti|png|pdf)"  # .vti of simulations by earlier versions
-    r"|sample\.json|sample/(summary\.json|(moments|curves)\.csv|curves\.pvd|results\.nc)"
 )
 SIMULATED = r"monte_carlo(-\d+)?\.json|monte_carlo_response(-\d+)?\.(csv|vti|png|pdf)"
 REPORT = r"report\.html"

@@ -1,4 +1,4 @@
-"""Intervals of cases by first order and by samples, on the command line and in files."""
+"""Intervals of cases by first order, against samples, on the command line and in files."""
 
 import math
 
@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
+from fpsolve.analysis import latin_hypercube
+from fpsolve.case.vary import Vary
 from fpsolve.cli import main
-from fpsolve.messages import Code
-from fpsolve.parts.intervals import sampled_case, samples_of, spreads_of
+from fpsolve.parts.intervals import spreads_of
 from fpsolve.study.solve import Numerics, everything, solve_curve
 from tests.conftest import sampled
 from tests.kit import case_in, read_csv, read_json
@@ -75,50 +76,26 @@ CASES += [WALL.replace("c1 = -0.4", "c1 = -0.2").replace('"noise.D0" = 0.05', '"
 @pytest.mark.parametrize("text", sampled(*CASES[2:], keep=0))
 def test_samples_lie_in_the_intervals_as_stated(text, tmp_path):
     """Of 200 some 95 %: by more than four standard errors of chance, 6 %, they are no others."""
-    case = case_of(tmp_path, text, "uncertain.sample=200", "moments.p=[2.0]")
-    [result], drawn = solved(case), solved(sampled_case(case))
+    case = case_of(tmp_path, text, "moments.p=[2.0]")
+    sets = latin_hypercube(case.uncertain.laws(case.problem), 200)
+    [result], drawn = solved(case), solved(case.model_copy(update={"vary": Vary(sets, "zip")}))
     spreads = spreads_of(case, result)
     for name, spread in spreads.indices.items():
         values = np.array([each.estimates[name].value for each in drawn])
         assert np.mean((values > spread.low) & (values < spread.high)) == pytest.approx(0.95, abs=0.06)
-    samples = samples_of(case, result, drawn)
-    assert not samples.remarks
-    assert samples.failed == 0
-    for row in samples.rows:
-        assert row.count == 200
-        assert row.deviation == pytest.approx(row.spread.deviation, rel=0.15)
-
-
-def test_a_curved_quantity_is_named(tmp_path):
-    """Λ(2) = 2a + 2σ²/α² bends where α is uncertain by a quarter; its median is that at the median of α."""
-    text = UNIFORM.format(uncertain='"noise.alpha" = 0.25, sample = 100, seed = 5')
-    case = case_of(tmp_path, text, "moments.p=[2.0]", "output.quantities=['moment', 'lyapunov_exponent']")
-    [result], drawn = solved(case), solved(sampled_case(case))
-    samples = samples_of(case, result, drawn)
-    named = {each.data["symbol"] for each in samples.remarks if each.code is Code.CURVED}
-    assert named == {"Λ(2)"}  # λ = a does not depend on α
-    row = next(each for each in samples.rows if each.p == 2.0)
-    alpha = np.array([each.curve.varied["noise.alpha"] for each in drawn])
-    exact, linear = -0.6 + 0.5 / alpha**2, -0.6 + 0.5 / 0.64 * (1 - 2 * (alpha / 0.8 - 1))
-    ends = np.quantile(exact, [0.025, 0.5, 0.975], method="hazen")
-    assert [row.low, row.median, row.high] == pytest.approx(ends, abs=1e-8)
-    first = np.quantile(linear, [0.025, 0.975], method="hazen")
-    moved, width = ends[[0, 2]] - first, first[1] - first[0]
-    assert row.apart == pytest.approx(max(*abs(moved), abs(moved[1] - moved[0])) / width, rel=1e-6)
-    for share, end in zip((0.975, 0.5, 0.025), ends, strict=True):  # a value of α in each hundredth of its law
-        least, most = -0.6 + 0.5 / (0.8 * (1 + 0.25 * norm.ppf([share + 0.01, share - 0.01]))) ** 2
-        assert least < end < most
+        assert np.std(values) == pytest.approx(spread.deviation, rel=0.15)
+    values = np.array([each.moment(2.0).value for each in drawn])
+    assert np.std(values) == pytest.approx(spreads.moments[2.0].deviation, rel=0.15)
 
 
 def test_files_and_the_terminal_say_it(tmp_path, capsys):
     case_of(tmp_path, UNIFORM.format(uncertain='"system.a" = { sd = 0.05 }'))
-    arguments = ["run", str(tmp_path / "case.toml"), "--out", str(tmp_path), "--sample", "20", "--jobs", "1"]
+    arguments = ["run", str(tmp_path / "case.toml"), "--out", str(tmp_path), "--jobs", "1"]
     assert main([*arguments, "--set", "output.figure=false"]) == 0
     said = capsys.readouterr().out
     assert "95% interval" in said
     sure = "almost every path decays with a probability of > 99.9 %; the mean square grows with a probability of 96.5 %"
     assert sure in said.lower()  # norm.cdf(1.8125)
-    assert "20 samples of a Latin hypercube, seed 0" in said
     [curve] = read_json(tmp_path / "case/summary.json")["curves"]
     size = norm.ppf(0.975) * 0.05
     assert curve["uncertainty"]["lyapunov_exponent"]["high"] == pytest.approx(-0.3 + size, abs=1e-9)
@@ -126,19 +103,10 @@ def test_files_and_the_terminal_say_it(tmp_path, capsys):
     assert float(row["lyapunov_exponent_low"]) == pytest.approx(-0.3 - size, abs=1e-9)
     rows = read_csv(tmp_path / "case/moments.csv")
     assert float(rows[1]["moment_low"]) == pytest.approx(-0.6 + 0.5 / 0.64 - 2 * size, abs=1e-9)
-    told = read_json(tmp_path / "case/sample.json")
-    assert (told["planned"], told["seed"], told["failed"]) == (20, 0, 0)
-    values = [float(each["system.a"]) for each in read_csv(tmp_path / "case/sample/curves.csv")]
-    assert len(values) == 20
-    assert told["rows"][0]["median"] == pytest.approx(np.median(values), abs=1e-9)  # λ = a
     assert main([*arguments, "--report", "--set", "output.figure=false"]) == 0
     page = (tmp_path / "case/report.html").read_text(encoding="utf-8")
     assert "the mean square grows with a probability of 96.5 %." in page
-    assert "20 samples of a Latin hypercube, seed 0" in page
     assert "1 of 1 known" in capsys.readouterr().out
-    assert main([*arguments[:4], "--jobs", "1", "--set", "output.figure=false"]) == 0  # a run without samples
-    assert not (tmp_path / "case/sample.json").exists()
-    assert not (tmp_path / "case/sample/curves.csv").exists()
 
 
 def test_a_law_that_is_cut_moves_the_interval(tmp_path):

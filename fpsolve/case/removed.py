@@ -1,0 +1,23 @@
+"""Keys that case files had once."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+_SETS = 'write sets of values into a file, and [vary] with file = "sets.csv"'
+REMOVED: Mapping[tuple[str, ...], str] = {
+    ("uncertain", "sample"): _SETS,
+    ("uncertain", "seed"): _SETS,
+}
+"""What to write instead of each of them."""
+
+
+def take_removed(data: dict[str, Any]) -> Iterator[tuple[tuple[str, ...], str]]:
+    """Take these keys out of a case; what each is told."""
+    for path, instead in REMOVED.items():
+        *above, key = path
+        table = data.get(above[0]) if above else data
+        if isinstance(table, dict) and key in table:
+            del table[key]
+            yield path, f"is gone; {instead}, and remove it here"
