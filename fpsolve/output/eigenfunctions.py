@@ -21,32 +21,24 @@ FINER = 2
 Field = Literal["T", "T_adjoint", "tilted_density"]
 
 
-def draw_eigenfunction(
-    pair: PrincipalPair, field: Field = "T", *, cylinder: bool = False, cmap: str = "viridis"
-) -> Picture:
+def draw_eigenfunction(pair: PrincipalPair, field: Field = "T", *, cmap: str = "viridis") -> Picture:
     """Draw an eigenfunction, or the tilted density, over phase and noise; for noise with states a line for each.
 
     Of more than two variables over directions, see `analysis.DirectionDensity`, as the functions of the pair have it: T
     as its mean, T* and T T* as densities.
 
-    In space by pyvista where this machine can render, which takes some seconds to find out the first time; else in
-    the plane by matplotlib.
-
     Args:
         pair: the eigenpair.
         field: "T", "T_adjoint", or their product "tilted_density".
-        cylinder: whether φ goes around a cylinder; only where this machine can render.
         cmap: the colours, by matplotlib's names.
 
     Raises:
-        ValueError: there is no such field, or a cylinder is wanted of more than two variables.
+        ValueError: there is no such field.
         OutputError: T depends on more than φ and ξ.
     """
     if pair.generator.problem.dimension > 2:
-        if cylinder:
-            raise ValueError("got cylinder = True, which is for functions of phase and noise; leave it out")
         return _picture_of_directions(pair, _known(field), cmap)
-    return picture_of(surface_of(pair, field), cmap, cylinder=cylinder)
+    return picture_of(surface_of(pair, field), cmap)
 
 
 def _known(field: str) -> str:

@@ -230,8 +230,6 @@ def test_what_densities_say():
     assert axes.get_xlabel().startswith("share of (x₃, x₄) in the sum of squares")
     assert axes.get_ylabel().startswith("phase of (x₁, x₂) less that")
     assert draw_eigenfunction(pair, "T_adjoint").png.startswith(b"\x89PNG")
-    with pytest.raises(ValueError, match="cylinder"):
-        draw_eigenfunction(pair, cylinder=True)
     with pytest.raises(ValueError, match="field"):
         draw_eigenfunction(pair, "U")
     with pytest.raises(ValueError, match="p = 0, but the pair has p = 1"):

@@ -14,9 +14,8 @@ from fpsolve.model.noises.non_gaussian import NonGaussianNoise
 from fpsolve.model.problem import Problem
 from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
 from fpsolve.output.eigenfunctions import draw_eigenfunction, surface_of
-from fpsolve.parts import surfaces
 from fpsolve.parts.nodes import FIELDS
-from fpsolve.parts.surfaces import can_render, flat_figure
+from fpsolve.parts.surfaces import figure_of
 from tests.conftest import FIG1, UNIT_NOISE
 
 pytestmark = pytest.mark.usefixtures("pictures")
@@ -28,58 +27,6 @@ EXACT = NonGaussianNoise(D0=0.5, tau0=1.0, r0=0.9)
 @pytest.fixture(scope="module")
 def pair():
     return ExponentSolver(Problem(HARD, EXACT)).pair(2.0)
-
-
-@pytest.fixture
-def probe(monkeypatch):
-    """Replaces what the child process does."""
-
-    def replace(code, patience=60.0):
-        monkeypatch.setattr(surfaces, "PROBE", code)
-        monkeypatch.setattr(surfaces, "PATIENCE", patience)
-        can_render.cache_clear()
-
-    yield replace
-    can_render.cache_clear()
-
-
-@pytest.mark.parametrize(
-    ("code", "patience", "answer"),
-    [
-        ("", 60.0, True),
-        ("raise SystemExit(1)", 60.0, False),
-        ("import os, signal; os.kill(os.getpid(), signal.SIGABRT)", 60.0, False),
-        ("import time; time.sleep(60)", 0.5, False),
-    ],
-)
-def test_a_child_process_finds_out_whether_this_machine_can_render(probe, code, patience, answer):
-    probe(code, patience)
-    assert can_render() is answer
-
-
-def test_it_finds_out_once(probe, tmp_path):
-    probe(f"open({str(tmp_path / 'runs')!r}, 'a').write('.')")
-    assert can_render()
-    assert can_render()
-    assert (tmp_path / "runs").read_text() == "."
-
-
-@pytest.mark.parametrize("answer", [True, False])
-def test_who_draws(pair, monkeypatch, answer):
-    """Where nothing can be rendered the plane is drawn, and of a cylinder a warning tells how to get it."""
-    drawn = []
-    monkeypatch.setattr("fpsolve.parts.surfaces.can_render", lambda: answer)
-    monkeypatch.setattr(
-        "fpsolve.parts.surfaces.picture_in_space", lambda *_, cylinder: drawn.append(f"space {cylinder}")
-    )
-    monkeypatch.setattr("fpsolve.parts.surfaces.flat_picture", lambda *_: drawn.append("plane"))
-    draw_eigenfunction(pair)
-    if answer:
-        draw_eigenfunction(pair, cylinder=True)
-    else:
-        with pytest.warns(UserWarning, match="apt-get install libegl1"):
-            draw_eigenfunction(pair, cylinder=True)
-    assert drawn == (["space False", "space True"] if answer else ["plane", "plane"])
 
 
 @pytest.mark.parametrize("field", FIELDS)
@@ -112,7 +59,7 @@ def test_the_impact_is_a_jump(pair):
     ],
 )
 def test_words_of_the_plane(pair, field, label):
-    figure = flat_figure(surface_of(pair, field), "viridis")
+    figure = figure_of(surface_of(pair, field), "viridis")
     axes, bar = figure.axes
     assert (axes.get_xlabel(), axes.get_ylabel()) == (r"phase $\varphi$ (rad)", r"noise $\xi$ (1/time)")
     assert bar.get_ylabel() == label
@@ -130,26 +77,17 @@ def assert_not_blank(picture, shape):
     assert len(np.unique((content * 255).astype(int).reshape(-1, 3), axis=0)) > 300
 
 
-def test_picture_of_the_plane(pair, monkeypatch, tmp_path):
-    monkeypatch.setattr("fpsolve.parts.surfaces.can_render", lambda: False)
+def test_picture_of_the_plane(pair, tmp_path):
     picture = draw_eigenfunction(pair, "tilted_density", cmap="magma")
     assert_not_blank(picture, (750, 1080, 3))
     assert picture.save(tmp_path / "picture.png").read_bytes() == picture.png == picture._repr_png_()
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("cylinder", [True])
-def test_picture_in_space(pair, cylinder):
-    if not can_render():
-        pytest.skip("nothing can be rendered here: apt-get install libegl1 libgl1-mesa-dri")
-    assert_not_blank(draw_eigenfunction(pair, "tilted_density", cylinder=cylinder), (800, 1200, 3))
 
 
 def test_a_constant_has_a_picture():
     """T = 1 at p = 0."""
     surface = surface_of(ExponentSolver(Problem(FIG1, UNIT_NOISE)).pair(0.0), "T")
     assert surface.limits == (0, pytest.approx(1))
-    assert np.all(np.isfinite(surface.placed(surface.phi.ravel()[:, None], surface.xi, surface.values, cylinder=True)))
+    assert figure_of(surface, "viridis").axes[-1].get_ylim() == (0, pytest.approx(1))
 
 
 def test_what_spans_decades_is_drawn_by_its_logarithm():
@@ -157,9 +95,7 @@ def test_what_spans_decades_is_drawn_by_its_logarithm():
     surface = surface_of(ExponentSolver(problem, rtol=1e-4).pair(2.0), "T")
     low, high = surface.limits
     assert 0 < 1e3 * low < high
-    heights = [surface.placed(0.0, 0.0, each, cylinder=False)[2] for each in (low, np.sqrt(low * high), high)]
-    np.testing.assert_allclose(heights, [0, 0.2, 0.4], atol=1e-12)
-    assert flat_figure(surface, "viridis").axes[-1].get_yscale() == "log"
+    assert figure_of(surface, "viridis").axes[-1].get_yscale() == "log"
 
 
 def test_what_cannot_be_drawn_is_refused(pair):

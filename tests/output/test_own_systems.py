@@ -30,7 +30,7 @@ from fpsolve.output.figures import main_figure
 from fpsolve.output.tables import write_results
 from fpsolve.page.terminal import print_blocks
 from fpsolve.parts.eigenfunctions import PART, write_eigenfunctions
-from fpsolve.parts.surfaces import flat_figure
+from fpsolve.parts.surfaces import figure_of
 from fpsolve.show.notes import left_out, notes, shows_perturbed_moments
 from fpsolve.show.results import show
 from fpsolve.simulation import MonteCarlo
@@ -328,7 +328,7 @@ def test_files_say_where_the_impacts_are(tmp_path):
 def test_python_draws_lines_for_states(noise):
     solver = ExponentSolver(Problem(ParametricOscillator(stiffness=1.0, damping=0.1, restitution=0.8), noise))
     assert draw_eigenfunction(solver.pair(2.0)).png.startswith(b"\x89PNG")
-    figure = flat_figure(surface_of(solver.pair(2.0), "T"), "viridis")
+    figure = figure_of(surface_of(solver.pair(2.0), "T"), "viridis")
     lines = [line for line in figure.axes[0].lines if line.get_label().startswith(r"$\xi$")]
     assert len(lines) == len(noise.states)
     assert figure.axes[0].get_ylabel().startswith("eigenfunction")

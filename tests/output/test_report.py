@@ -19,7 +19,7 @@ from fpsolve.model.equation import equations_of, noise_sentences
 from fpsolve.output.tables import facts_of
 from fpsolve.page.page import Drawing
 from fpsolve.parts.eigenfunctions import surface_from
-from fpsolve.parts.surfaces import can_render, picture_of
+from fpsolve.parts.surfaces import picture_of
 from fpsolve.show import problem, results
 from fpsolve.show.verdict import meaning, verdicts
 from fpsolve.study.columns import table_of
@@ -90,10 +90,9 @@ def run(folder, text, *arguments, command="run", name="test.toml"):
 
 @pytest.fixture(scope="module")
 def solved(tmp_path_factory):
-    """A run of Fig. 1's oscillator on a machine that cannot render."""
+    """A run of Fig. 1's oscillator."""
     folder = tmp_path_factory.mktemp("reports")
-    with painted(), pytest.MonkeyPatch.context() as patch:
-        patch.setattr("fpsolve.parts.surfaces.can_render", lambda: False)
+    with painted():
         assert run(folder, ONE, "--report", "--set", "noise.D0=1.0") == 0
     return folder / "test"
 
@@ -131,7 +130,7 @@ def test_it_is_one_file_without_scripts_and_with_unique_ids(solved):
     assert len(text.encode()) < 3e6
 
 
-def test_an_eigenfunction_that_cannot_be_rendered_is_drawn_in_the_plane(solved):
+def test_an_eigenfunction_is_drawn(solved):
     page = Page(solved / "report.html")
     assert "Eigenfunction T(φ, ξ) of p = 2" in page.text
     assert "could not be drawn" not in page.text
@@ -139,7 +138,7 @@ def test_an_eigenfunction_that_cannot_be_rendered_is_drawn_in_the_plane(solved):
 
 
 def test_where_the_noise_has_states_each_is_a_line(tmp_path):
-    """T of telegraph noise as it was written, at each of its two values; it is drawn without rendering."""
+    """T of telegraph noise as it was written, at each of its two values."""
     with_eigenfunctions = OWN.replace('"lyapunov_exponent"]', '"eigenfunctions"]').replace('symbol = "<script>", ', "")
     assert run(tmp_path, with_eigenfunctions) == 0
     written = tmp_path / "test/eigenfunctions/p+2.0.vtu"
@@ -154,22 +153,6 @@ def test_where_the_noise_has_states_each_is_a_line(tmp_path):
         assert surface.values[:, round(y) - 1] == pytest.approx(found[line], rel=1e-12)
     picture_of(surface).save(tmp_path / "lines.png")
     assert (tmp_path / "lines.png").read_bytes()[1:4] == b"PNG"
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("pictures")
-def test_files_of_the_working_folder_are_no_modules(tmp_path, monkeypatch):
-    """The process that finds out whether this machine can render takes none for one that it imports."""
-    answer = can_render()
-    (tmp_path / "colorsys.py").write_text("raise SystemExit(1)", encoding="utf-8")
-    (tmp_path / "pyvista.py").write_text("raise SystemExit(1)", encoding="utf-8")
-    monkeypatch.chdir(tmp_path)
-    can_render.cache_clear()
-    assert run(tmp_path, ONE, "--report") == 0
-    assert can_render() is answer
-    page = (tmp_path / "test/report.html").read_text(encoding="utf-8")
-    assert "data:image/png;base64," in page
-    assert "this picture could not be drawn" not in page
 
 
 def test_texts_are_texts(tmp_path):
