@@ -59,14 +59,6 @@ MOST_VECTORS = 1000
 MOST_TALL = 50
 """Curves up to which the ticks of stability indices are tall; more of them would cover what is near zero."""
 _MARKERS = "osD^v<"  # one fewer than colours, so that both repeat together after 42 curves only
-CLOSE = 0.25
-"""Share of the abscissa, up to which the place where curves pass 0 is enlarged."""
-ROUGH = 0.02
-"""Error of a curve at its stability index, over the height of what is enlarged, up to which it is drawn there."""
-FREE = [(x, y, 0.36, 0.4) for y in (0.54, 0.14) for x in (0.32, 0.16, 0.6)]
-"""Where an enlarged part may be, by shares of the axes: left, bottom, width, height."""
-MARGIN = np.array([0.13, 0.13])
-"""Left of it and below it, for its numbers."""
 _TANGENT = 0.2
 """Length of a tangent, as a share of the width of the axes."""
 _GREY: dict[str, Any] = {"color": "0.35"}
@@ -86,7 +78,6 @@ class Series:
     Attributes:
         varied: the parameters that tell it from the others.
         simulated: x, y and the standard errors of y from a simulation, shape (3, n).
-        slopes: dy/dx at each x, where it is known.
         root: the stability index, which is marked on the zero line; None where there is none among the x.
         slope: λ, which is marked as the tangent at 0; None where it is not.
     """
@@ -97,7 +88,6 @@ class Series:
     line_x: FloatArray = field(default_factory=lambda: np.zeros(0))
     line_y: FloatArray = field(default_factory=lambda: np.zeros(0))
     simulated: FloatArray | None = None
-    slopes: FloatArray | None = None
     root: float | None = None
     slope: float | None = None
 
@@ -249,7 +239,6 @@ def _moment_series(case: Case, result: CurveResult, sample: SimulatedCurve | Non
         line,
         perturbed_moments(result.curve.problem, line),
         _columns([(each.p, each.value, each.standard_error) for each in estimates if each.value is not None]),
-        slopes=result.moments.derivative,
         root=root if root is not None and first <= root <= last else None,
         slope=slope if first <= 0 <= last else None,
     )
@@ -347,8 +336,6 @@ def draw_series(axes: Any, case: Case, series: Sequence[Series], equation: str) 
     scale_axis(axes.yaxis, "linear", setting.ylim)
     axes.ticklabel_format(axis="y", style="sci", scilimits=(-2, 3), useMathText=True)
     _mark(axes, series, colours)
-    if is_few:
-        _enlarge(axes, series, colours)
 
 
 def _draw_few(axes: Any, case: Case, series: Sequence[Series], equation: str) -> Sequence[Any]:
@@ -461,42 +448,6 @@ def _mark(axes: Any, series: Sequence[Series], colours: Any) -> None:
             axes.add_collection(LineCollection(list(np.stack([-ends, ends], axis=1)), **look), autolim=False)
         line = {"linewidth": points(3), "solid_capstyle": "butt", **_GREY}
         axes.plot([], [], label=f"slope {LYAPUNOV_EXPONENT.latex} at $p = 0$", **line)
-
-
-def _enlarge(axes: Any, series: Sequence[Series], colours: Any) -> None:
-    """Where several curves pass 0 close to each other, once more in a free place of the axes, if there is one."""
-    from scipy.interpolate import CubicHermiteSpline
-
-    roots = [0.0, *(item.root for item in series if item.root is not None)]
-    left, right = axes.get_xlim()
-    low, high = min(roots) - (room := 0.5 * (max(roots) - min(roots))), max(roots) + room
-    if len(series) < 2 or not 0 < high - low < CLOSE * (right - left):
-        return
-    p, curves = np.linspace(low, high, 100), list[tuple[FloatArray, Any]]()
-    for item, colour in zip(series, colours, strict=True):
-        order = np.argsort(item.x)
-        x, y, slopes = (np.asarray(each)[order] for each in (item.x, item.y, item.slopes))
-        if x.size < 2 or not np.isfinite([y, slopes]).all():
-            continue
-        curve = CubicHermiteSpline(x, y, slopes)
-        if item.root is not None and abs(curve(item.root)) > ROUGH * np.ptp(curve(p)):  # there are too few p
-            return
-        curves.append((curve(p), colour))
-    drawn = [line.get_xydata() for line in axes.lines if line.get_gid() != "zero"]
-    taken = axes.transAxes.inverted().transform(axes.transData.transform(np.concatenate(drawn)))
-    for place in FREE:
-        corner, size = np.array(place[:2]), np.array(place[2:])
-        if curves and not np.any(np.all((taken > corner - MARGIN) & (taken < corner + size + 0.03), axis=1)):
-            inset = axes.inset_axes(place)
-            for y, colour in curves:
-                inset.plot(p, y, color=colour)
-            inset.axhline(0, color="0.6", linewidth=points(0.8), zorder=0)
-            inset.set_xlim(low, high)
-            inset.tick_params(labelsize="x-small")
-            inset.ticklabel_format(axis="y", style="sci", scilimits=(-2, 3), useMathText=True)
-            inset.yaxis.get_offset_text().set_size("x-small")
-            inset.locator_params(nbins=4)
-            return
 
 
 def _draw_map(

@@ -293,17 +293,10 @@ def test_many_curves_over_two_keys_are_a_map_unasked(tmp_path, sets, x, y, is_ma
     assert (figure.x, figure.moment or figure.y, figure.map) == (x, y, is_map)
 
 
-def test_where_curves_pass_zero_is_enlarged_and_ticks_cover_none(pictures, drawn, tmp_path):
-    case = drawn_case(tmp_path, ["vary.noise.D0=[0.9, 1.0, 1.1]"])
-    [inset] = drawn[0].axes[0].child_axes
-    roots = [second_order(curve.problem).stability_index for curve in case.curves()]
-    assert inset.get_xlim()[0] < min(roots) < 0 < inset.get_xlim()[1]
-    for line, root in zip(inset.lines, roots, strict=False):
-        assert abs(np.interp(root, *line.get_data())) < 1e-3 * np.ptp(line.get_ydata())
+def test_ticks_of_stability_indices_cover_none(pictures, drawn, tmp_path):
+    drawn_case(tmp_path, ["vary.noise.D0=[0.9, 1.0, 1.1]"])
     [ticks] = [each for each in drawn[0].axes[0].collections if len(each.get_offsets()) == 3]
     assert np.all(np.diff(ticks.get_sizes()) < 0)
-    drawn_case(tmp_path, ["vary.noise.D0=[0.9, 1.0, 1.1]", "moments.p=[-2.0, -1.0, -0.5, 0.1]"])
-    assert not drawn[1].axes[0].child_axes  # it is large anyway
 
 
 @pytest.mark.slow
