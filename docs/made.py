@@ -124,21 +124,19 @@ CHART = """
 # Its chart takes up to minutes. So these lines draw it from the files that ``fpsolve chart`` wrote, which are in
 # docs/charts of the repository. To draw a chart of your own, write its folder of results instead:
 
-from pathlib import Path
-
 import matplotlib.pyplot as plt
+import pandas
 
 import fpsolve
 from fpsolve.drawing import label_axes, scale_axis
-from fpsolve.output.figures import read_line
 
 case = fpsolve.load_case("{file}")
 x, y = case.chart.x.axis, case.chart.y.axis
 figure, axes = plt.subplots(layout="constrained")
+table = pandas.read_csv("../../charts/{name}/chart.csv")
 for number, zero in enumerate(case.chart.zero):
-    lines, _ = read_line(Path("../../charts/{name}"), (x.key, y.key), zero, case.curve({{}}).parameters)
-    for branch, line in enumerate(lines):
-        axes.plot(*line, color=f"C{{number}}", label=zero.latex if branch == 0 else None)
+    for branch, line in table[table.line == zero.name].groupby("branch"):
+        axes.plot(line.x, line.y, color=f"C{{number}}", label=zero.latex if branch == 1 else None)
 label_axes(axes, case.about(x.key).attributes, case.about(y.key).attributes)
 scale_axis(axes.xaxis, x.scale, (x.start, x.stop))
 scale_axis(axes.yaxis, y.scale, (y.start, y.stop))

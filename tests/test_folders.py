@@ -6,9 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from fpsolve.analysis.zero import Zero
 from fpsolve.errors import OutputError
-from fpsolve.output.figures import read_line
 from fpsolve.workflow.folders import SOLVED, own_folder
 from tests.kit import case_in, case_text, read_json
 
@@ -144,23 +142,3 @@ def test_a_folder_that_cannot_be_read_is_left_alone(case, folder, tmp_path, monk
 
     monkeypatch.setattr(Path, "iterdir", refusing)
     assert left(case, tmp_path) == {*EVERYTHING, "private"}
-
-
-HEAD = "line,branch,x,y,width,label\n"
-ROWS = f"{HEAD}lyapunov_exponent,1,0.1,0.05,0,\nlyapunov_exponent,1,0.5,0.2,0,\n"
-
-
-@pytest.mark.parametrize("table", [ROWS, HEAD, "", ROWS.replace("0.2", "nan"), ROWS.replace("0.2", "x" * 200_000)])
-def test_a_line_of_a_chart_is_one_or_none(case, folder, table):
-    chart = read_json(folder / "chart.json")
-    chart |= {"complete": True, "lines": [{"line": "lyapunov_exponent", "branches": [{"closed": False}]}]}
-    (folder / "chart.json").write_text(json.dumps(chart), encoding="utf-8")
-    (folder / "chart.csv").write_text(table, encoding="utf-8")
-    keys, parameters = ("noise.D0", "oscillator.c1"), next(case.curves()).parameters
-    branches, _ = read_line(folder, keys, Zero("lyapunov_exponent"), parameters)
-    assert [branch.tolist() for branch in branches] == ([[[0.1, 0.5], [0.05, 0.2]]] if table is ROWS else [])
-    (folder / "chart.json").write_text(NESTED, encoding="utf-8")
-    assert read_line(folder, keys, Zero("lyapunov_exponent"), parameters) == ([], True)
-    (folder / "chart.json").unlink()
-    os.mkfifo(folder / "chart.json")
-    assert read_line(folder, keys, Zero("lyapunov_exponent"), parameters) == ([], True)

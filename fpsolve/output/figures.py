@@ -6,8 +6,6 @@ value of a key.
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -17,7 +15,6 @@ from typing import Any
 
 import numpy as np
 
-from fpsolve.analysis.zero import Zero
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case
 from fpsolve.case.sections import MOST_NAMED, Value, Varied, same
@@ -38,7 +35,6 @@ from fpsolve.drawing import (
 )
 from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, STABILITY_INDEX
-from fpsolve.files import parsed_json, plain_text
 from fpsolve.model.problem import Problem
 from fpsolve.model.quantity import (
     GROWTH,
@@ -66,7 +62,7 @@ _GREY: dict[str, Any] = {"color": "0.35"}
 STYLES = ("-", (0, (4, 1.5)), (0, (1, 1.2)), (0, (5, 1.5, 1, 1.5)))
 """Of lines, for up to so many combinations of keys."""
 _BETWEEN = "#00C800"
-"""Of the line between values, which may lie on the black one of a chart."""
+"""Of the line of zeros between values."""
 Pair = tuple[CurveResult, SimulatedCurve | None]
 _NOTHING = np.zeros(0)
 
@@ -146,7 +142,6 @@ def main_figure(
     case: Case,
     results: Sequence[CurveResult],
     simulated: Sequence[SimulatedCurve],
-    folder: Path,
     table: Table | None = None,
 ) -> Drawing:
     """figure.png and .pdf: finite elements, perturbation theory, dots of a simulation.
@@ -155,20 +150,18 @@ def main_figure(
     none of a case that does not ask for Λ(p).
 
     Args:
-        folder: where a chart may have traced the line of the zeros of a map.
         table: the numbers of all curves, if these are known already.
     """
     over = "p" if case.figure.x == "p" else case.about(case.figure.x).words
     title = f"The {case.figure.quantity.words}, {case.figure.quantity.symbol}, over {over}"
     table = table_of(case, results) if table is None else table
-    return Drawing(title, partial(_draw, case, results, simulated, folder, table), "figure", case.caption)
+    return Drawing(title, partial(_draw, case, results, simulated, table), "figure", case.caption)
 
 
 def _draw(
     case: Case,
     results: Sequence[CurveResult],
     simulated: Sequence[SimulatedCurve],
-    folder: Path,
     table: Table,
     paths: Sequence[Path],
     heading: str,
@@ -180,7 +173,7 @@ def _draw(
     with figure_for(paths, heading, held, FORMATS[setting.width]) as figure:
         axes = figure.add_subplot()
         if other := map_key(setting, case.vary):
-            _draw_map(axes, case, results, table, (setting.x, other), folder)
+            _draw_map(axes, case, table, (setting.x, other))
             return
         samples = {each.curve.key: each for each in simulated}
         pairs = [(result, samples.get(result.curve.key)) for result in results]
@@ -450,12 +443,10 @@ def _mark(axes: Any, series: Sequence[Series], colours: Any) -> None:
         axes.plot([], [], label=f"slope {LYAPUNOV_EXPONENT.latex} at $p = 0$", **line)
 
 
-def _draw_map(
-    axes: Any, case: Case, results: Sequence[CurveResult], table: Table, keys: tuple[str, str], folder: Path
-) -> None:
+def _draw_map(axes: Any, case: Case, table: Table, keys: tuple[str, str]) -> None:
     """A quantity over two keys in colours around zero, hatched where it is not known, grey where there is none.
 
-    The line of its zeros is dashed between the values, and black where a chart has traced it in the same folder.
+    The line of its zeros is dashed between the values.
     """
     from matplotlib.collections import PatchCollection
     from matplotlib.patches import Rectangle
@@ -493,48 +484,6 @@ def _draw_map(
         look: dict[str, Any] = {"colors": _BETWEEN, "linestyles": "--", "linewidths": wide, "zorder": 3}
         axes.contour(x, y, np.ma.masked_invalid(values), levels=[0.0], **look)
         axes.plot([], [], "--", color=_BETWEEN, linewidth=wide, label="zero, interpolated between the values")
-    zero = Zero("moment", setting.moment) if setting.moment else Zero("lyapunov_exponent")
-    branches, is_whole = read_line(folder, keys, zero, results[0].curve.parameters)
-    words = f"{zero.latex}, traced by a chart{'' if is_whole else ', not finished'}"
-    for i, branch in enumerate(branches):
-        label = "" if i else words
-        axes.plot(*branch, color="black", linewidth=points(2.6), label=label, scalex=False, scaley=False)
-
-
-def read_line(folder: Path, keys: tuple[str, str], zero: Zero, parameters: Varied) -> tuple[list[FloatArray], bool]:
-    """The branches of a line of the chart in a folder over two keys, each of shape (2, n), and whether it is finished.
-
-    There are none where the chart has no such line, or is not of these parameters.
-
-    Args:
-        keys: of the abscissa and of the ordinate, in whichever order the chart has them.
-        parameters: those of which the chart must hold all but the two keys.
-    """
-    try:
-        summary = parsed_json(plain_text(folder / "chart.json"))
-        found = summary["x"]["key"], summary["y"]["key"]
-        if set(found) != set(keys) or not summary["parameters"].items() <= parameters.items():
-            return [], True
-        table = csv.DictReader(io.StringIO(plain_text(folder / "chart.csv"), newline=""))
-        rows = [row for row in table if row["line"] == zero.name]
-        branches = []
-        of_line = (each for line in summary["lines"] if line["line"] == zero.name for each in line["branches"])
-        for number, branch in enumerate(of_line, start=1):
-            points = [[float(row[key]) for key in "xy"] for row in rows if row["branch"] == str(number)]
-            path = np.array(points + points[:1] if branch["closed"] else points).T
-            if len(path) != 2 or not np.isfinite(path).all():
-                raise ValueError("a branch has no points")
-            branches.append(path if found == keys else path[::-1])
-        return branches, bool(summary["complete"])
-    except (
-        OSError,
-        ValueError,
-        LookupError,
-        TypeError,
-        AttributeError,
-        csv.Error,
-    ):  # there is none, or it is none of ours
-        return [], True
 
 
 def _draw_values(axes: Any, values: FloatArray, edges: tuple[FloatArray, FloatArray], about: Mapping[str, Any]) -> None:

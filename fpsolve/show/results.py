@@ -36,7 +36,7 @@ def show(
     """
     table = table_of(case, results) if table is None else table
     yield from verdicts(case, results, table)
-    yield main_figure(case, results, simulated, folder, table)
+    yield main_figure(case, results, simulated, table)
     yield rate_figure(case, results)
     samples = {each.curve.number: each for each in simulated}
     if len(results) > 1 or case.figure.x != "p":
@@ -75,7 +75,7 @@ def write_figures(
     case: Case, results: Sequence[CurveResult], simulated: Sequence[SimulatedCurve], folder: Path, table: Table
 ) -> None:
     """Write all figures that have files: those of all curves together, and those of each."""
-    main_figure(case, results, simulated, folder, table).write(folder)
+    main_figure(case, results, simulated, table).write(folder)
     rate_figure(case, results).write(folder)
     samples = {each.curve.number: each for each in simulated}
     of_first, of_others = (

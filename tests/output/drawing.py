@@ -43,7 +43,7 @@ def _result(case, curve, *, has_failed):
 
 def drawn_case(folder: Path, sets=(), *, fails=lambda number: False):
     case = case_of(folder, sets)
-    main_figure(case, results_of(case, fails), [], folder).write(folder)
+    main_figure(case, results_of(case, fails), []).write(folder)
     return case
 
 

@@ -1,7 +1,5 @@
 """Figures of few and of many curves, of maps and of narrow columns: read from where matplotlib has put all."""
 
-import csv
-import json
 import time
 
 import numpy as np
@@ -223,47 +221,6 @@ def test_what_failed_is_hatched_and_what_is_not_there_is_grey(drawn, tmp_path):
     assert words(drawn[0])[:2] == ["failed or not solved", "no stability index from -20 to 20"]
 
 
-def chart(folder, x, y, *, r0=0.95, complete=True):
-    """A chart as `fpsolve chart` writes it, with a line for Λ(2)."""
-    held = {"oscillator.epsilon": 0.1, "noise.r0": r0}
-    lines = [{"line": "moment 2", "branches": [{"points": 3, "closed": False, "obstacles": []}]}]
-    summary = {"complete": complete, "parameters": held, "x": {"key": x}, "y": {"key": y}, "lines": lines}
-    (folder / "chart.json").write_text(json.dumps(summary), encoding="utf-8")
-    with (folder / "chart.csv").open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file)
-        writer.writerow(["line", "branch", "x", "y", "width", "label"])
-        writer.writerows([["moment 2", 1, place, 2 * place, 0.0, ""] for place in (0.5, 0.7, 0.9)])
-
-
-TRACED = "$\\Lambda(2) = 0$, traced by a chart"
-LINE = [[0.5, 0.7, 0.9], [1.0, 1.4, 1.8]]
-
-
-@pytest.mark.parametrize(
-    ("keys", "more", "said", "points"),
-    [
-        (("oscillator.omega", "noise.D0"), {}, [TRACED], [LINE]),
-        (("noise.D0", "oscillator.omega"), {}, [TRACED], [LINE[::-1]]),
-        (("oscillator.omega", "noise.D0"), {"complete": False}, [f"{TRACED}, not finished"], [LINE]),
-        (("oscillator.omega", "noise.D0"), {"r0": 0.9}, [], []),
-        (("oscillator.omega", "noise.tau0"), {}, [], []),
-    ],
-)
-def test_the_line_of_a_chart_is_on_the_map(drawn, tmp_path, keys, more, said, points):
-    chart(tmp_path, *keys, **more)
-    drawn_case(tmp_path, COARSE)
-    assert words(drawn[0])[1:] == said
-    found = [line.get_data() for line in drawn[0].axes[0].lines if np.size(line.get_xdata())]
-    assert [np.array(each).tolist() for each in found] == points
-
-
-@pytest.mark.parametrize("text", sampled('{"x": {"key": "noise.D0"}, "y": 3}', "", "{}", "[]", '{"x": 1}', keep=2))
-def test_a_chart_that_is_none_is_left(drawn, tmp_path, text):
-    (tmp_path / "chart.json").write_text(text, encoding="utf-8")
-    drawn_case(tmp_path, COARSE)
-    assert words(drawn[0]) == ["zero, interpolated between the values"]
-
-
 @pytest.mark.parametrize(
     ("count", "more", "key"), [(9, "", "noise.D0"), (8, "", ""), (8, "figure.map=true", "noise.D0")]
 )
@@ -272,7 +229,7 @@ def test_when_it_is_a_map(drawn, tmp_path, count, more, key):
     case = case_of(tmp_path, list(filter(None, sets)))
     assert (map_key(case.figure, case.vary) or "") == key
     if more:
-        main_figure(case, results_of(case), [], tmp_path).write(tmp_path)
+        main_figure(case, results_of(case), []).write(tmp_path)
         [mesh] = [each for each in drawn[0].axes[0].collections if type(each).__name__ == "QuadMesh"]
         assert mesh.get_array().shape == (count, 3)
 
@@ -304,7 +261,7 @@ def test_thousands_of_curves_take_seconds(pictures, tmp_path):
     case = case_of(tmp_path, ["vary.noise.D0={start=0.1, stop=3.0, num=2500}"])
     results = results_of(case)
     started = time.process_time()
-    main_figure(case, results, [], tmp_path).write(tmp_path)
+    main_figure(case, results, []).write(tmp_path)
     assert time.process_time() - started < 5  # some 1 where nothing else runs
     assert (tmp_path / "figure.pdf").stat().st_size < 500_000
 

@@ -186,7 +186,7 @@ def test_short_logarithmic_axes_have_round_ticks(pictures, start, stop):
 
 def test_a_short_list_of_moments_is_on_an_even_axis(drawn, tmp_path):
     case = case_in(tmp_path, own("telegraph") + MOMENTS + '[output]\nquantities = ["moment"]\n')
-    main_figure(case, solve_case(case), [], tmp_path).write(tmp_path)
+    main_figure(case, solve_case(case), []).write(tmp_path)
     assert drawn[0].axes[0].get_xscale() == "linear"
 
 

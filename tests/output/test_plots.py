@@ -113,7 +113,7 @@ def test_the_labels_of_a_response_have_units_and_room(drawn, tmp_path):
 def test_stability_index_of_a_case_is_marked_where_p_reaches_it(drawn, tmp_path, p, count):
     case = load_case(CASE.path, [f"moments.p={p}"])
     results = solve_case(case)
-    main_figure(case, results, [], tmp_path).write(tmp_path)
+    main_figure(case, results, []).write(tmp_path)
     found = [x for x, _, _ in marks(drawn[0])]
     assert found == [results[0].stability_index.value][:count]
 
@@ -126,5 +126,5 @@ def test_theory_that_is_not_drawn_is_not_computed(drawn, tmp_path, monkeypatch):
     results = solve_case(case)
     make, made = type(case).curve, []
     monkeypatch.setattr(type(case), "curve", lambda *arguments: made.append(1) or make(*arguments))
-    main_figure(case, results, [], tmp_path).write(tmp_path)
+    main_figure(case, results, []).write(tmp_path)
     assert len(made) <= 3 * 400  # of three lines, as the legend says
