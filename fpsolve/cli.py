@@ -23,7 +23,7 @@ from fpsolve.page.letters import HANDLER
 from fpsolve.signals import INTERRUPTED, ended_by_signals
 
 COMMANDS = {
-    "new": "Copy a case that comes with fpsolve, or write a commented one of a kind.",
+    "new": "Copy a case that comes with fpsolve.",
     "run": "Solve cases; write tables, figures and ParaView files.",
     "check": "Compare results with the values that cases expect.",
     "chart": "Trace where stability ends in a plane of two parameters.",

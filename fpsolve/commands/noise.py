@@ -11,15 +11,14 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
-from fpsolve.commands.options import NOT_CONVERGED, Count, ModeRows, ModesFile, Options
+from fpsolve.commands.options import NOT_CONVERGED, Count, Options
 from fpsolve.errors import FpsolveError
 from fpsolve.messages import escaped
 
 if TYPE_CHECKING:
     from fpsolve.case.case import Case
-    from fpsolve.case.new import Modes
     from fpsolve.measured import Record, Spectrum
-    from fpsolve.workflow.noise import Wanted
+    from fpsolve.workflow.noise import Modes, Wanted
 
 CLOSE = 0.02
 """By which share of it two statements of a frequency may differ."""
@@ -58,8 +57,11 @@ class Statement:
         float | None, Parameter(help="Speed after a bounce off its wall over that before; no wall if omitted.")
     ] = None
     case: Annotated[Path | None, Parameter(help="A case instead, whose noise is replaced.")] = None
-    modes: ModesFile = None
-    mode: ModeRows = None
+    modes: Annotated[
+        Path | None,
+        Parameter(help="A table of natural frequencies and damping ratios, Fn and Xi, as pyOMA writes it."),
+    ] = None
+    mode: Annotated[list[Count] | None, Parameter(help="A row of this table; of two modes twice.", negative="")] = None
     noise_in: Annotated[
         Literal["stiffness", "damping"] | None,
         Parameter(help="Where the noise is; stiffness if neither this nor --of is stated."),
@@ -226,10 +228,9 @@ def _modes(stated: Statement, of: str, case: Case | None) -> Modes:
     """The natural frequencies and the damping by the one option that states them."""
     import numpy as np
 
-    from fpsolve.case.new import modes_of
     from fpsolve.measured.spectrum import UNITS
     from fpsolve.measured.units import GRAVITY
-    from fpsolve.workflow.noise import natural_frequencies
+    from fpsolve.workflow.noise import Modes, natural_frequencies
 
     restitution, zeta = stated.restitution, stated.damping_ratio
     if zeta is not None and math.isnan(zeta):
@@ -262,9 +263,18 @@ def _modes(stated: Statement, of: str, case: Case | None) -> Modes:
         if len(other) != len(frequencies) or not np.allclose(np.sort(other), np.sort(frequencies), rtol=CLOSE):
             told = " and ".join(f"{key} {', '.join(f'{f:.4g} Hz' for f in each)}" for key, each in found.items())
             raise FpsolveError(f"got {told}; leave out one of {first} and {name}")
-    known = zeta if zeta is not None else table.zeta[0] if table is not None else math.nan
-    checked = modes_of(frequencies, [] if math.isnan(known) else [known], restitution)
-    return replace(checked, zeta=(known,) * len(frequencies))
+    known = zeta if zeta is not None else table.zeta if table is not None else math.nan
+    for option, values, low, high, remedy in (
+        ("--frequency", frequencies, 1e-12, 1e12, "state it in Hz"),
+        ("--damping-ratio", [] if math.isnan(known) else [known], -1.0, 1.0, "0.01 is 1 % of critical damping"),
+        ("--restitution", [] if restitution is None else [restitution], 0.0, 1.0 + 1e-15, "1 means no wall"),
+    ):
+        for value in values:
+            if not low < value < high:
+                raise FpsolveError(f"got {option} {value:g}; must be > {low:g} and < {high:g}; {remedy}")
+    if len(frequencies) > 2:
+        raise FpsolveError(f"got {len(frequencies)} frequencies; must be one or two; choose those of the coupled modes")
+    return Modes(tuple(2 * math.pi * each for each in frequencies), known, restitution)
 
 
 def modes_from(path: Path, numbers: Sequence[int], restitution: float | None) -> Modes:
@@ -273,8 +283,8 @@ def modes_from(path: Path, numbers: Sequence[int], restitution: float | None) ->
     Raises:
         FpsolveError: the file is none, there are more than two modes, or a number is none of a row.
     """
-    from fpsolve.case.new import Modes
     from fpsolve.measured import read_modes
+    from fpsolve.workflow.noise import Modes
 
     found = read_modes(path)
     for number in numbers:
@@ -284,7 +294,7 @@ def modes_from(path: Path, numbers: Sequence[int], restitution: float | None) ->
     if len(chosen) > 2:
         raise FpsolveError(f"{path}: has {len(chosen)} modes; choose one or two by --mode, such as --mode 1 --mode 2")
     omega = tuple(2 * math.pi * each.frequency for each in chosen)
-    return Modes(omega, tuple(each.damping_ratio for each in chosen), restitution)
+    return Modes(omega, chosen[0].damping_ratio, restitution)
 
 
 NOTHING_STATED = Statement()

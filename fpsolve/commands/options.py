@@ -36,10 +36,6 @@ def _whole(_: type, tokens: Sequence[Token]) -> int:
 
 
 Count = Annotated[int, Parameter(converter=_whole)]
-ModesFile = Annotated[
-    Path | None, Parameter(help="A table of natural frequencies and damping ratios, Fn and Xi, as pyOMA writes it.")
-]
-ModeRows = Annotated[list[Count] | None, Parameter(help="A row of this table; of two modes twice.", negative="")]
 Cases = Annotated[list[Path], Parameter(help="Case files.", consume_multiple=True, negative="")]
 Fresh = Annotated[bool, Parameter(help="Also solve or simulate again what an earlier run has finished.", negative="")]
 SET = (

@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
+import tomlkit
 from scipy.special import chdtri
 
 from fpsolve import __version__
 from fpsolve.analysis.spreads import LEVEL, Spread
 from fpsolve.arrays import FloatArray, one
 from fpsolve.case.case import Case
-from fpsolve.case.new import Modes, case_text, sum_text
 from fpsolve.case.remedies import CASE_WORDS
 from fpsolve.case.rewrite import with_noise
 from fpsolve.drawing import COLOURS, figure_for, label_axes, plain_numbers
@@ -62,6 +62,21 @@ STILL = 1e-6
 """Of a modulus: imaginary parts below are none."""
 
 
+@dataclass(frozen=True)
+class Modes:
+    """What is known of the system.
+
+    Attributes:
+        omega: natural frequencies, in rad/s, one or two.
+        zeta: damping ratio of the first; NaN where it is not known.
+        restitution: speed after a bounce over that before; None where there is no wall.
+    """
+
+    omega: tuple[float, ...]
+    zeta: float
+    restitution: float | None = None
+
+
 @dataclass(frozen=True, eq=False)
 class Wanted:
     """What is to be fitted, and for what.
@@ -69,7 +84,7 @@ class Wanted:
     Attributes:
         of: what was measured, one of `SIGNALS`.
         kind, terms, method: as for `fit_noise`, or the kind "non-gaussian" of a record.
-        modes: natural frequencies, and damping ratios that may be NaN.
+        modes: natural frequencies, damping, a wall.
         height: GM where its variation was measured.
         case: whose system the noise is for; None for an oscillator with the first mode's damping.
         segment: of a record, in s; None for what the frequencies need.
@@ -227,23 +242,27 @@ def _system(wanted: Wanted, terms: int) -> System | None:
     """The system of the case, or an oscillator with the damping and the wall that are stated; None without either."""
     if wanted.case:
         return wanted.case.system
-    omega, zeta, r = wanted.modes.omega[0], wanted.modes.zeta[0], wanted.modes.restitution
+    omega, zeta, r = wanted.modes.omega[0], wanted.modes.zeta, wanted.modes.restitution
     if math.isnan(zeta) or len(wanted.modes.omega) > 1 or terms == len(NAMES):
         return None
     if terms > 1:
-        names = NAMES[:terms]
-        drive, sign = (" + ".join(names), "+") if wanted.noise_in == "damping" else (" + ".join(names), "-")
-        force = f"{sign} ({drive}) * {'v' if wanted.noise_in == 'damping' else 'x'}"
-        return PlaneSystem.of_equations(
-            ("x", "v"),
-            ("v", f"-omega**2 * x - 2*zeta*omega * v {force}"),
-            {"omega": omega, "zeta": zeta},
-            noises={name: f"noise.{name}" for name in names},
-            walls=[] if r is None else [{"at": "x = 0", "restitution": r}],
-        )
+        return PlaneSystem.of_equations(**_sum(wanted.modes, wanted.noise_in, NAMES[:terms]))
     if wanted.noise_in == "stiffness":
         return ParametricOscillator(stiffness=omega**2, damping=zeta * omega, restitution=r or 1.0)
     return VibroImpactOscillator(omega, r or 1.0, -2 * zeta * omega, 1.0, impact=ImpactLaw.RESTITUTION)
+
+
+def _sum(modes: Modes, noise_in: Where, names: Sequence[str]) -> dict[str, Any]:
+    """The equation of one mode under the sum of several noises, by their names."""
+    force = f"+ ({' + '.join(names)}) * v" if noise_in == "damping" else f"- ({' + '.join(names)}) * x"
+    wall = [] if modes.restitution is None else [{"at": "x = 0", "restitution": modes.restitution}]
+    return {
+        "variables": ["x", "v"],
+        "drift": ["v", f"-omega**2 * x - 2*zeta*omega * v {force}"],
+        "parameters": {"omega": modes.omega[0], "zeta": modes.zeta},
+        "noises": {name: f"noise.{name}" for name in names},
+        "walls": wall,
+    }
 
 
 def _critical(fit: NoiseFit, wanted: Wanted) -> dict[str, Any]:
@@ -383,15 +402,29 @@ def write_noise(outcome: NoiseOutcome, source: Path, shown: Convention, folder: 
 def case_of(outcome: NoiseOutcome, folder: Path) -> str:
     """The case with the noise, ready to run; empty where there is no system."""
     wanted, sections = outcome.wanted, noise_sections(outcome)
+    omega, zeta = (float(f"{each:.12g}") for each in (wanted.modes.omega[0], wanted.modes.zeta))
     if wanted.case:
         return with_noise(wanted.case, sections, folder)
     count = len(outcome.fit.parts)
-    if math.isnan(wanted.modes.zeta[0]) or len(wanted.modes.omega) > 1 or count == len(NAMES):
+    if math.isnan(zeta) or len(wanted.modes.omega) > 1 or count == len(NAMES):
         return ""
     if count > 1:
-        return sum_text(wanted.modes, NAMES[:count], wanted.noise_in, sections)
-    kind = "parametric" if wanted.noise_in == "stiffness" else "oscillator"
-    return case_text(kind, wanted.modes, sections)
+        section, table = "system", _sum(wanted.modes, wanted.noise_in, NAMES[:count])
+    elif wanted.noise_in == "stiffness":
+        section, table = "system", {"kind": "parametric", "stiffness": omega**2, "damping": zeta * omega}
+    else:
+        section = "oscillator"
+        table = {"omega": omega, "c1": -2 * zeta * omega, "impact": "restitution", "epsilon": 1.0}
+    if count == 1:
+        table["restitution"] = wanted.modes.restitution or 1.0
+    hertz = f"{omega / (2 * math.pi):.4g} Hz, {zeta:.4g} of critical damping"
+    data = {
+        "title": f"Oscillator with noise in its {wanted.noise_in}: {hertz}",
+        section: table,
+        "units": {"time": "s"},
+        "moments": {"p": {"start": -2.0, "stop": 4.0, "num": 25}},
+    }
+    return tomlkit.dumps(data) + sections
 
 
 def summary(outcome: NoiseOutcome, source: Path) -> dict[str, Any]:
@@ -554,7 +587,7 @@ def _missing(outcome: NoiseOutcome) -> str:
     if len(outcome.fit.parts) == len(NAMES):
         return "No case takes three noises; for λ and Λ(2) use --terms 1 or 2."
     if len(outcome.wanted.modes.omega) > 1:
-        return "For λ and Λ(2) of two modes state their case by --case; `fpsolve new my.toml --kind modes` starts one."
+        return "For λ and Λ(2) of two modes state their case by --case; `fpsolve new coupled` copies one."
     return "For λ and Λ(2) of an oscillator state its damping by --damping-ratio."
 
 

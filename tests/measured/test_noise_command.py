@@ -20,6 +20,13 @@ ROOT = Path(__file__).parents[2]
 F = np.linspace(0.05, 20, 400)
 NOISE = OrnsteinUhlenbeck(alpha=12.0, sigma=0.15)
 OMEGA = 4 * math.pi
+MY_CASE = f"""
+title = "Noise in the damping, 2 Hz, 2 %"
+oscillator = {{ omega = {OMEGA}, c1 = {-0.04 * OMEGA}, restitution = 1.0, epsilon = 1.0 }}
+noise = {{ kind = "white", s = 0.1 }}
+moments = {{ p = [2.0] }}
+units = {{ time = "s" }}
+"""
 
 
 @pytest.fixture(autouse=True)
@@ -79,7 +86,7 @@ def test_a_spectrum_becomes_a_case_and_a_verdict(capsys):
 
 def test_noise_in_the_damping_of_a_case_needs_0_too(capsys):
     """Λ(2) = −2ζω + S(2ω)/2 + S(0)/2, and S(0) here is some ten times S(2ω)."""
-    assert main(["new", "my.toml", "--frequency", "2", "--damping-ratio", "0.02"]) == 0
+    Path("my.toml").write_text(MY_CASE, encoding="utf-8")
     file = spectrum(header="f (Hz),G (1/s²/Hz)", factor=0.4)
     found = noise(file, "--sided", "one", "--of", "damping", "--case", "my.toml")
     assert [each["name"] for each in found["frequencies"]] == ["2ω", "0"]
@@ -228,8 +235,7 @@ def test_what_is_refused(name, capsys):
     x *= NOISE.standard_deviation / x.std()
     np.savetxt("record.csv", np.column_stack([np.arange(512) / 64, x]), delimiter=",", header="t (s),x", comments="")
     if "my.toml" in options:
-        assert main(["new", "my.toml", "--frequency", "2"]) == 0
-        capsys.readouterr()
+        Path("my.toml").write_text(MY_CASE, encoding="utf-8")
     before = sorted(Path().rglob("*"))
     assert main(["noise", *options]) == BAD_INPUT
     out, error = capsys.readouterr()
