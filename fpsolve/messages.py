@@ -287,10 +287,6 @@ class Code(Enum):
         "warning: the search for the parameters was stopped after {steps} steps, so that another noise may fit better; "
         "use fewer terms, or another kind"
     )
-    WHOLE_RECORD = (
-        "note: the record has {periods:.3g} periods of the lowest frequency that matters, too few for four segments of "
-        "{needed} periods; it is fitted by Whittle's likelihood of the whole record"
-    )
     SPECTRUM_GAP = "note: nothing was measured from {low:.4g} to {high:.4g} rad/time"
     NO_SPECTRUM_ERROR = (
         "note: the errors of the measured values are not known, and are taken from how far these are from the fit; "

@@ -110,15 +110,14 @@ def fitted(data, kind, **options):
 
 
 def main(seeds=100):
-    """Prints a line for each noise and method."""
+    """Prints a line for each noise, of spectra and of records."""
     for noise in NOISES:
         rows = {
-            "spectrum": (spectrum_of, {}),
-            "record": (record_of, {}),
-            "whittle": (record_of, {"method": "whittle"}),
+            "spectrum": spectrum_of,
+            "record": record_of,
         }
-        for name, (make, options) in rows.items():
-            shares, others, known = coverage(noise, make, functools.partial(fitted, kind=noise.kind, **options), seeds)
+        for name, make in rows.items():
+            shares, others, known = coverage(noise, make, functools.partial(fitted, kind=noise.kind), seeds)
             print(noise, name, shares, "std", known.std(axis=0).round(2), "others", others, flush=True)
     for r0 in (0.7, 0.95):
         noise = NonGaussianNoise(D0=0.5, tau0=1.0, r0=r0)

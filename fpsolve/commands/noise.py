@@ -80,11 +80,7 @@ class Statement:
     kind: Annotated[
         Literal["ornstein-uhlenbeck", "filter", "bounded", "non-gaussian"], Parameter(help="The kind of noise.")
     ] = "ornstein-uhlenbeck"
-    terms: Annotated[Count, Parameter(help="How many noises of the kind are added, 1 to 3.")] = 1
-    method: Annotated[
-        Literal["spectrum", "whittle"],
-        Parameter(help="Of a record: its spectrum by Welch's method, or Whittle's likelihood."),
-    ] = "spectrum"
+    terms: Annotated[Count, Parameter(help="How many noises of the kind are added, 1 or 2.")] = 1
     column: Annotated[str | None, Parameter(help="The column of values, if the file has several.")] = None
     rate: Annotated[float | None, Parameter(help="Values of the record per second, if the file states no times.")] = (
         None
@@ -155,14 +151,14 @@ def measurement_of(
         raise FpsolveError(f"--gm belongs to --of height; {remedy}")
     if stated.gm is not None and not 0 < stated.gm < math.inf:
         raise FpsolveError(f"got --gm {stated.gm}; must be > 0, in m")
-    wanted = Wanted(of, stated.kind, stated.terms, stated.method, modes, stated.gm, case, stated.segment)
+    wanted = Wanted(of, stated.kind, stated.terms, modes, stated.gm, case, stated.segment)
     limits = {name: each for name in ("rtol", "seconds") if (each := getattr(stated, name)) is not None}
     for name, each in limits.items():
         if not 0 < each < math.inf or (name == "rtol" and each >= 1):
             raise FpsolveError(f"got --{name} {each:g}; must be > 0{' and < 1' if name == 'rtol' else ', in seconds'}")
     wanted = replace(wanted, **limits)
     if stated.named:
-        of_files = "rate", "segment", "method", "sided", "averages", "column", "over", "row", "skip", "log_log"
+        of_files = "rate", "segment", "sided", "averages", "column", "over", "row", "skip", "log_log"
         _refuse_stated(stated, of_files, "is for a file, and a density was named")
         return _named(stated, of, 2 * modes.omega[0]), wanted, source
     how: dict[str, Any] = {
@@ -175,7 +171,7 @@ def measurement_of(
     of_record = how if spectrum is None else {"of": of}
     record = read_record(stated.record, rate=stated.rate, column=stated.column, **of_record) if stated.record else None
     if spectrum is not None:
-        of_records = "segment", "method", *(["rate"] if record is None else [])
+        of_records = "segment", *(["rate"] if record is None else [])
         _refuse_stated(stated, of_records, "is for a record, and a spectrum was named")
     if spectrum is None and record is not None:
         names = "sided", "averages", "row", "log_log"

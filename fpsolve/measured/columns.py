@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -42,8 +42,6 @@ class Table:
         lines: of a text the line of each row.
         rows: of a file with several spectra over one abscissa each of them, shape (k, n).
         notes: what was assumed to read it.
-        sideways: reads it with the names of its columns, which are numbers, as frequencies; None where they are no
-            numbers.
     """
 
     path: Path
@@ -54,7 +52,6 @@ class Table:
     lines: Sequence[int] | IntArray = ()
     rows: FloatArray | None = None
     notes: tuple[str, ...] = ()
-    sideways: Callable[[], Table] | None = None
 
     def unit_of(self, name: str) -> str:
         """The unit of a column, also of one whose cells are no numbers."""

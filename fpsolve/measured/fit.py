@@ -1,7 +1,7 @@
 """Noises whose spectral densities are those that were measured.
 
 A value Ŝᵢ that is the mean of nᵢ independent periodograms has the density of a gamma variable with the mean Sᵢ and the
-relative standard error 1/√nᵢ. Whittle's likelihood takes the values as independent. The deviance
+relative standard error 1/√nᵢ. The likelihood takes the values as independent. The deviance
 
     D(θ) = 2 Σ wᵢ nᵢ (Ŝᵢ/Sᵢ(θ) − 1 − ln Ŝᵢ/Sᵢ(θ))
 
@@ -19,7 +19,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import least_squares, nnls
@@ -33,7 +33,7 @@ from fpsolve.model import Noise, Noises
 
 FLOOR, WIDTH = 0.02, 0.3
 """The weight far from the frequencies that matter, and how far in ln ω the weight has fallen by half."""
-NAMES = ("first", "second", "third")
+NAMES = ("first", "second")
 """Of the noises of a sum."""
 MOST_TERMS = len(NAMES)
 AT_END = 1e-4
@@ -42,8 +42,6 @@ UNTOLD = 1e-8
 """Of the information of scaled parameters: a smaller eigenvalue is of a direction that the values do not tell."""
 SEGMENTS, LEAST_SEGMENTS, SAMPLES, BLOCK = 2000, 200, 2e7, 63
 """How many segments are simulated for standard errors: fewer of long ones, for some samples in all; in such blocks."""
-FADING = 0.1
-"""The share of a whole record that fades, by halves at its ends."""
 LAGS = 3
 """How many steps apart segments count as correlated."""
 PERIODS = 8
@@ -85,7 +83,6 @@ class NoiseFit:
         covariance: in the order of the keys, shape (k, k).
         misfit: at each frequency that matters.
         spectrum: what was measured, or is made of the record.
-        method: "spectrum", "whittle" or "moments".
         messages: what is to be said of the fit.
     """
 
@@ -94,7 +91,6 @@ class NoiseFit:
     covariance: FloatArray
     misfit: tuple[Misfit, ...]
     spectrum: Spectrum
-    method: str
     messages: tuple[Message, ...] = ()
 
     @property
@@ -104,11 +100,7 @@ class NoiseFit:
 
     @cached_property
     def noise(self) -> Noise:
-        """The noise for a `Problem`; a sum has the names "first" and "second".
-
-        Raises:
-            ValueError: it is the sum of three, which no problem takes.
-        """
+        """The noise for a `Problem`; a sum has the names "first" and "second"."""
         return self.parts[0] if len(self.parts) == 1 else Noises(tuple(zip(NAMES, self.parts, strict=False)))
 
     def spectral_density(self, omega: float) -> float:
@@ -200,7 +192,6 @@ def fit_noise(
     second_frequency: float | None = None,
     noise_in: Where = "stiffness",
     terms: int = 1,
-    method: Literal["spectrum", "whittle"] = "spectrum",
     segment: float | None = None,
 ) -> NoiseFit:
     """The noise of a kind whose spectral density is nearest to a measured one, most of all where it matters.
@@ -212,9 +203,7 @@ def fit_noise(
         second_frequency: of a second mode, in rad/time.
         noise_in: "stiffness", for which S(2ω) counts, or "damping", for which S(0) counts as well; of two modes
             S(2ω₁), S(2ω₂), S(ω₁ ± ω₂).
-        terms: 1 to 3, how many independent noises of the kind ξ is the sum of. A `Problem` takes two of them at most.
-        method: of a record "spectrum", Welch's estimate, or "whittle", the periodogram of the whole record. One too
-            short for four segments that resolve the frequencies is fitted by its periodogram, which a note says.
+        terms: 1 or 2, how many independent noises of the kind ξ is the sum of.
         segment: of a record the time of a segment; None for the shortest that resolves the frequencies, or a
             thirty-second of the record if that is longer.
 
@@ -226,16 +215,11 @@ def fit_noise(
         raise ValueError(f"got kind = {shown(kind)}; must be one of {', '.join(KINDS)}")
     if isinstance(terms, bool) or terms not in range(1, MOST_TERMS + 1):
         raise ValueError(f"got terms = {shown(terms)}; must be a whole number from 1 to {MOST_TERMS}")
-    if method not in ("spectrum", "whittle"):
-        raise ValueError(f"got method = {shown(method)}; must be spectrum or whittle")
-    notes: tuple[Message, ...] = ()
     if isinstance(data, Spectrum):
-        spectrum, used, method = data, _of_spectrum(data), "spectrum"
+        spectrum, used = data, _of_spectrum(data)
     elif isinstance(data, Record):
-        length, notes = _segment(data, segment, matter)
-        method = method if length else "whittle"
-        spectrum = data.spectrum(length or data.values.size // 2)
-        used = _of_record(data, length if method == "spectrum" else data.values.size)
+        length = _segment(data, segment, matter)
+        spectrum, used = data.spectrum(length), _of_record(data, length)
     else:
         raise TypeError(f"got {shown(data)}; must be a Spectrum or a Record")
     _refuse_far(spectrum, matter)
@@ -246,13 +230,13 @@ def fit_noise(
         zip([[family] * terms for family in KINDS[kind]], *zip(*fits, strict=True), strict=True),
         key=lambda each: each[2] + len(each[1]) * math.log(len(used.values)),
     )
-    found = _told(used, families, theta, weights, matter, spectrum, method)
+    found = _told(used, families, theta, weights, matter, spectrum)
     stopped = (Message(Code.FIT_STOPPED, steps=MORE_STEPS),) if is_stopped else ()
-    return replace(found, messages=(*notes, *stopped, *found.messages))
+    return replace(found, messages=(*stopped, *found.messages))
 
 
-def _segment(record: Record, stated: float | None, matter: Mapping[str, float]) -> tuple[int, tuple[Message, ...]]:
-    """Samples of a segment; 0 where four of them do not resolve the lowest frequency that matters, with a note.
+def _segment(record: Record, stated: float | None, matter: Mapping[str, float]) -> int:
+    """Samples of a segment, of which at least four resolve the lowest frequency that matters.
 
     Raises:
         ValueError: the record has too few periods of it, or the stated time is none of a segment.
@@ -265,16 +249,14 @@ def _segment(record: Record, stated: float | None, matter: Mapping[str, float]) 
             raise ValueError(
                 f"got segment = {stated:g}; must be from {low:.4g} to {high:.4g}, in the unit of its times"
             )
-        return int(stated / record.step), ()
-    if periods < PERIODS:
+        return int(stated / record.step)
+    if periods * MOST_SEGMENT < PERIODS:
         raise ValueError(
-            f"the record has {periods:.3g} periods of the frequency {lowest:.4g} rad/time, and must have {PERIODS}; "
+            f"the record has {periods:.3g} periods of the frequency {lowest:.4g} rad/time, and must have "
+            f"{PERIODS / MOST_SEGMENT:g}; "
             "record for longer, or correct the natural frequency, its unit, or --rate"
         )
-    needed = math.ceil(PERIODS / periods * n)
-    if needed > MOST_SEGMENT * n:
-        return 0, (Message(Code.WHOLE_RECORD, periods=periods, needed=PERIODS),)
-    return max(record.segment_length(), needed), ()
+    return max(record.segment_length(), math.ceil(PERIODS / periods * n))
 
 
 def _refuse_far(spectrum: Spectrum, matter: Mapping[str, float]) -> None:
@@ -314,14 +296,8 @@ def _of_spectrum(data: Spectrum) -> _Data:
 
 
 def _of_record(record: Record, length: int) -> _Data:
-    """Periodograms of segments with Hann's window that overlap by half, or of the whole record, whose ends fade.
-
-    Without that its ends would leak into all high frequencies alike, whose values were then not independent.
-    """
-    from scipy.signal.windows import tukey
-
-    whole = length == record.values.size
-    window = np.asarray(tukey(length, FADING) if whole else np.hanning(length + 1)[:-1], dtype=float)
+    """Periodograms of segments with Hann's window that overlap by half."""
+    window = np.hanning(length + 1)[:-1]
     window /= math.sqrt(float(window @ window))
     cut = _Cut(window, record.step)
     segments = cut.periodograms(record.values)
@@ -428,21 +404,19 @@ def _told(
     weights: FloatArray,
     matter: Mapping[str, float],
     spectrum: Spectrum,
-    method: str,
 ) -> NoiseFit:
     fitted, slopes = _sum(data, families, theta), _slopes(data, families, theta)
     slopes[:, theta > np.concatenate([family.highest for family in families]) - AT_END] = 0.0  # fixed there
     ratio = data.values / fitted - 1
     n, k = data.values.size, theta.size
-    unknown = method == "spectrum" and spectrum.relative_error is None
+    unknown = spectrum.relative_error is None
     dispersion = float(np.sum(weights * ratio**2) / np.sum(weights)) * n / max(n - k, 1) if unknown else 1.0
     information = slopes.T @ (slopes * (weights * data.number)[:, None])
     bread = np.linalg.pinv(information, hermitian=True)
     if data.record is not None and any(family.path for family in families):
         meat = _simulated(data, data.record, families, theta, fitted, weights[:, None] * slopes)
-    elif data.record is None or method == "whittle":
-        inflation = dispersion if data.record is None else data.record.inflation
-        meat = inflation * slopes.T @ (slopes * (weights**2 * data.number)[:, None])
+    elif data.record is None:
+        meat = dispersion * slopes.T @ (slopes * (weights**2 * data.number)[:, None])
     else:
         # Hann's window correlates neighbours: of a Gaussian noise by 4/9, and by 1/36 at two steps
         rows = slopes * (weights * data.number * math.sqrt(data.variance))[:, None]
@@ -476,7 +450,6 @@ def _told(
         covariance=covariance,
         misfit=misfit,
         spectrum=spectrum,
-        method=method,
         messages=tuple(messages),
     )
 

@@ -60,7 +60,6 @@ def non_gaussian_from_record(record: Record) -> NoiseFit:
         covariance=slopes @ covariance_of_means @ slopes.T,
         misfit=(),
         spectrum=record.spectrum(),
-        method="moments",
         messages=messages,
     )
 

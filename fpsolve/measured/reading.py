@@ -93,8 +93,6 @@ def read_spectrum(
             raise ValueError("is a record, not a spectrum; name it by --record")
         if sided not in ("one", "two"):
             raise ValueError('states not whether the density is one-sided; state sided, "one" or "two" (--sided)')
-        if table.sideways is not None and column is None and not _of_frequencies(table, over):
-            table = table.sideways()
         f_name = _abscissa(table, FREQUENCY_NAMES, FREQUENCIES, "frequencies, such as f (Hz),", over)
         f = _numbers(table, f_name)
         _refuse_other_unit(f_name, f)
@@ -123,12 +121,6 @@ def read_spectrum(
             places, values = _between(places, values)
         made = Spectrum.from_columns(places, values, per, sided, averages, variance)
         return replace(made, notes=(*notes, *more), is_formula=log_log)
-
-
-def _of_frequencies(table: Table, over: str | None) -> bool:
-    """Whether a column of a table is stated, or known, to be one of frequencies."""
-    names = (name.lower() in FREQUENCY_NAMES or among(table.unit_of(name), FREQUENCIES) for name in table.columns)
-    return over is not None or any(names)
 
 
 def _between(f: FloatArray, density: FloatArray) -> tuple[FloatArray, FloatArray]:

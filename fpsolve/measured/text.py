@@ -1,8 +1,7 @@
 """Tables of numbers in text, as loggers, programs and buoys write them.
 
 A table begins where rows of one shape begin. What stands above is a preamble; its last line with a name for each cell
-is the header, also behind #, % or //, and the line below that may hold the units. A table whose header ends in numbers
-lies on its side: these are frequencies, and each row is a spectrum.
+is the header, also behind #, % or //, and the line below that may hold the units.
 """
 
 from __future__ import annotations
@@ -14,13 +13,12 @@ import warnings
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
-from fpsolve.arrays import FloatArray, IntArray
+from fpsolve.arrays import IntArray
 from fpsolve.measured.columns import WORDS, Column, Table, heading
 from fpsolve.measured.signals import FREQUENCIES, SIGNALS, TIMES, among, density_unit
 from fpsolve.reading import Unreadable, read_text
@@ -29,8 +27,6 @@ NO_TABLE = "has no table of numbers"
 MOST_COLUMNS = 1000
 MOST_TEXT, MOST_LINES = 2**26, 4_000_000
 """Bytes and lines of a text; to read it takes some twelve times as many bytes, or 200 a line."""
-LEAST_FREQUENCIES = 5
-"""Numbers at the end of a header that are taken for frequencies."""
 LETTERS = ("g", "m", "V")
 """Units of one letter, which may be names, too."""
 NAMED_WITH_UNITS: Sequence[tuple[str, Iterable[str]]] = (
@@ -169,7 +165,6 @@ def read_text_table(path: Path, skip: int = 0) -> Table:
             raise Unreadable(f"{told}; complete the row, or remove it", i)
     if not names and separator == "," and count == 2:
         _refuse_decimal_commas(table)
-    is_sideways = bool(names) and all(map(_is_number, names[-LEAST_FREQUENCIES:]))
     ends = [k for k in range(count) if not first[k] and not any(table.cells(k))]
     if names:
         twice = next((name for name in names if name and names.count(name) > 1), None)
@@ -187,7 +182,6 @@ def read_text_table(path: Path, skip: int = 0) -> Table:
         abscissa=_stamps(columns, first),
         lines=table.numbers,
         notes=notes,
-        sideways=partial(_sideways, path, table, names) if is_sideways else None,
     )
 
 
@@ -333,11 +327,7 @@ def _names(text: str, separator: str | None, count: int) -> list[str] | None:
         found = found[:-1]
     if len(found) != count or not any(found) or any("=" in each for each in found):
         return None
-    numbers = [k for k, each in enumerate(found) if _is_number(each)]
-    tail = range(numbers[0], count) if numbers else range(0)
-    is_wide = len(tail) >= LEAST_FREQUENCIES and [*tail] == numbers and numbers[0] > 0
-    is_rising = is_wide and all(np.diff([float(found[k]) for k in tail]) > 0)
-    return found if not numbers or is_rising or _counts(found) else None
+    return found if not any(map(_is_number, found)) or _counts(found) else None
 
 
 def _counts(names: Sequence[str]) -> bool:
@@ -348,16 +338,6 @@ def _counts(names: Sequence[str]) -> bool:
         and not (first and _fits(first))
         and any(tail == [str(begin + k) for k in range(len(tail))] for begin in (0, 1))
     )
-
-
-def _sideways(path: Path, rows: _Lines, names: Sequence[str]) -> Table:
-    """A spectrum in each row, over the frequencies in the header."""
-    begin = next(k for k, name in enumerate(names) if _is_number(name))
-    f = np.array([float(name) for name in names[begin:]])
-    every = _Columns(rows, {name: k for k, name in enumerate(names)}, dict.fromkeys(names, ""))
-    values: FloatArray = np.array([every[name].values for name in names[begin:]]).T
-    columns = {"f": Column(f), "S": Column(values[0])}
-    return Table(path, columns, abscissa="f", kind="spectrum", rows=values)
 
 
 def _stamps(columns: _Columns, first: Sequence[str]) -> str:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import tomlkit
@@ -83,7 +83,7 @@ class Wanted:
 
     Attributes:
         of: what was measured, one of `SIGNALS`.
-        kind, terms, method: as for `fit_noise`, or the kind "non-gaussian" of a record.
+        kind, terms: as for `fit_noise`, or the kind "non-gaussian" of a record.
         modes: natural frequencies, damping, a wall.
         height: GM where its variation was measured.
         case: whose system the noise is for; None for an oscillator with the first mode's damping.
@@ -94,7 +94,6 @@ class Wanted:
     of: str
     kind: str
     terms: int
-    method: Literal["spectrum", "whittle"]
     modes: Modes
     height: float | None = None
     case: Case | None = None
@@ -191,10 +190,6 @@ def measure(data: Spectrum | Record, wanted: Wanted, progress: Callable[[], None
                 raise ValueError("a spectrum does not tell r0; name a record by --record")
             if wanted.terms > 1:
                 raise ValueError(f"got --terms {wanted.terms} for --kind {NON_GAUSSIAN}, which has one; leave it out")
-            if wanted.method != "spectrum":
-                raise ValueError(
-                    f"got --method {wanted.method} for --kind {NON_GAUSSIAN}, which has none; leave it out"
-                )
             fit = non_gaussian_from_record(converted)
         else:
             second = omega[1] if len(omega) > 1 else None
@@ -205,7 +200,6 @@ def measure(data: Spectrum | Record, wanted: Wanted, progress: Callable[[], None
                 second_frequency=second,
                 noise_in=wanted.noise_in,
                 terms=wanted.terms,
-                method=wanted.method,
                 segment=wanted.segment,
             )
     except ValueError as error:
@@ -215,7 +209,7 @@ def measure(data: Spectrum | Record, wanted: Wanted, progress: Callable[[], None
     scaled = fit.scaled(_factor(wanted))
     found = {"exponent": None, "moment": None, "verdict": None, "failure": None} | _critical(fit, wanted)
     system = _system(wanted, len(fit.parts))
-    if system is not None and wanted.terms < len(NAMES):
+    if system is not None:
         try:
             problem = Problem(system, scaled.noise)
             rtol, budget = max(problem.usual_rtol, wanted.rtol), Budget(seconds=wanted.seconds)
@@ -243,24 +237,24 @@ def _system(wanted: Wanted, terms: int) -> System | None:
     if wanted.case:
         return wanted.case.system
     omega, zeta, r = wanted.modes.omega[0], wanted.modes.zeta, wanted.modes.restitution
-    if math.isnan(zeta) or len(wanted.modes.omega) > 1 or terms == len(NAMES):
+    if math.isnan(zeta) or len(wanted.modes.omega) > 1:
         return None
     if terms > 1:
-        return PlaneSystem.of_equations(**_sum(wanted.modes, wanted.noise_in, NAMES[:terms]))
+        return PlaneSystem.of_equations(**_sum(wanted.modes, wanted.noise_in))
     if wanted.noise_in == "stiffness":
         return ParametricOscillator(stiffness=omega**2, damping=zeta * omega, restitution=r or 1.0)
     return VibroImpactOscillator(omega, r or 1.0, -2 * zeta * omega, 1.0, impact=ImpactLaw.RESTITUTION)
 
 
-def _sum(modes: Modes, noise_in: Where, names: Sequence[str]) -> dict[str, Any]:
-    """The equation of one mode under the sum of several noises, by their names."""
-    force = f"+ ({' + '.join(names)}) * v" if noise_in == "damping" else f"- ({' + '.join(names)}) * x"
+def _sum(modes: Modes, noise_in: Where) -> dict[str, Any]:
+    """The equation of one mode under the sum of two noises."""
+    force = f"+ ({' + '.join(NAMES)}) * v" if noise_in == "damping" else f"- ({' + '.join(NAMES)}) * x"
     wall = [] if modes.restitution is None else [{"at": "x = 0", "restitution": modes.restitution}]
     return {
         "variables": ["x", "v"],
         "drift": ["v", f"-omega**2 * x - 2*zeta*omega * v {force}"],
         "parameters": {"omega": modes.omega[0], "zeta": modes.zeta},
-        "noises": {name: f"noise.{name}" for name in names},
+        "noises": {name: f"noise.{name}" for name in NAMES},
         "walls": wall,
     }
 
@@ -406,10 +400,10 @@ def case_of(outcome: NoiseOutcome, folder: Path) -> str:
     if wanted.case:
         return with_noise(wanted.case, sections, folder)
     count = len(outcome.fit.parts)
-    if math.isnan(zeta) or len(wanted.modes.omega) > 1 or count == len(NAMES):
+    if math.isnan(zeta) or len(wanted.modes.omega) > 1:
         return ""
     if count > 1:
-        section, table = "system", _sum(wanted.modes, wanted.noise_in, NAMES[:count])
+        section, table = "system", _sum(wanted.modes, wanted.noise_in)
     elif wanted.noise_in == "stiffness":
         section, table = "system", {"kind": "parametric", "stiffness": omega**2, "damping": zeta * omega}
     else:
@@ -456,7 +450,6 @@ def summary(outcome: NoiseOutcome, source: Path) -> dict[str, Any]:
         "of": wanted.of,
         "noise_in": wanted.noise_in,
         "kind": wanted.kind,
-        "method": fit.method,
         "units": {"time": "s"},
         "natural_frequencies": list(wanted.modes.omega),
         "fit": {"signal": SIGNAL_WORDS[wanted.noise_in], **numbers(fit)},
@@ -584,8 +577,6 @@ def sentences(outcome: NoiseOutcome) -> Iterator[str]:
 
 def _missing(outcome: NoiseOutcome) -> str:
     """What to do for λ and Λ(2)."""
-    if len(outcome.fit.parts) == len(NAMES):
-        return "No case takes three noises; for λ and Λ(2) use --terms 1 or 2."
     if len(outcome.wanted.modes.omega) > 1:
         return "For λ and Λ(2) of two modes state their case by --case; `fpsolve new coupled` copies one."
     return "For λ and Λ(2) of an oscillator state its damping by --damping-ratio."

@@ -126,18 +126,14 @@ def path_of(noise, n, step, rng):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("kind", "seconds", "f"), [
-    ("ornstein-uhlenbeck", 20, 0.8), ("ornstein-uhlenbeck", 40, 0.8),
-    ("ornstein-uhlenbeck", 20, 0.4),  # the whole record by its likelihood
-])  # fmt: skip
-def test_standard_errors_of_short_records_cover(kind, seconds, f):
+@pytest.mark.parametrize("seconds", [20, 40])
+def test_standard_errors_of_short_records_cover(seconds):
     """Of 100 records 95 ± 5 intervals of ±1.96 standard errors have the parameter, and ln S where it matters."""
-    step, true = 0.02, OrnsteinUhlenbeck(3.0, 2.5) if kind == "ornstein-uhlenbeck" else Filter(9.0, 0.3, 4.0, 1.0, 0.0)
+    step, true = 0.02, OrnsteinUhlenbeck(3.0, 2.5)
     inside = []
     for seed in range(100):
         record = Record(path_of(true, int(seconds / step), step, np.random.default_rng(seed)), step)
-        fit = fit_noise(record, kind, frequency=2 * math.pi * f)
-        assert fit.method == ("whittle" if f == 0.4 else "spectrum")
+        fit = fit_noise(record, "ornstein-uhlenbeck", frequency=2 * math.pi * 0.8)
         z = [(fit.parameters[key] - true.values[key]) / fit.errors[key] for key in list(fit.parameters)[:3]]
         inside.append([abs(each) < 1.96 for each in z])
     shares = np.mean(inside, axis=0)
