@@ -36,7 +36,6 @@ from fpsolve.case.sections import (
     RESPONSE,
     SENSITIVITIES,
     ChartSection,
-    DesignSection,
     ExcursionSection,
     Expectation,
     FigureSection,
@@ -201,7 +200,6 @@ class Case(Section):
     figure: Annotated[FigureSection, parameter("what is drawn", "[figure]")] = FigureSection()
     output: Annotated[OutputSection, parameter("what is written", "[output]")] = OutputSection()
     chart: Annotated[ChartSection | None, parameter("the lines of a chart, on which stability ends", "[chart]")] = None
-    design: Annotated[DesignSection | None, parameter("what parameters shall be changed for", "[design]")] = None
     uncertain: Annotated[
         InstanceOf[Uncertain], BeforeValidator(uncertain_of), parameter("how uncertain parameters are", UNCERTAIN)
     ] = Uncertain()

@@ -19,7 +19,6 @@ from pydantic import ValidationError
 from pydantic.fields import FieldInfo
 
 from fpsolve.analysis.excursions import STATIONARY, check_start
-from fpsolve.analysis.target import target_of
 from fpsolve.analysis.zero import axis_faults, said
 from fpsolve.arrays import FloatArray, is_log_spaced
 from fpsolve.case.kinds import parameters_of, problem_of
@@ -30,7 +29,6 @@ from fpsolve.case.sections import (
     RESPONSE,
     ChartAxis,
     ChartSection,
-    DesignSection,
     ExcursionSection,
     Expectation,
     FigureSection,
@@ -386,30 +384,6 @@ def _of_chart(chart: ChartSection | None, valid: Known, context: Known) -> Itera
             return
 
 
-def _of_design(design: DesignSection | None, valid: Known, context: Known) -> Iterator[Refusal]:
-    """Parameters that are none of this case, that stand twice, or whose ranges are none."""
-    problem, parameters = problem_of(valid), parameters_of(valid, context)
-    if design is None or problem is None or parameters is None:
-        return
-    wanted = target_of(design.target)
-    named = {"lyapunov_exponent": "λ", "stability_index": "δ_p"}.get(wanted.kind) or f"Λ({wanted.p:g})"
-    if (named[0] != "Λ" or wanted.p % 2) and (told := even_only(problem, named)):
-        yield ("target",), design.target, told.words(CASE_WORDS)
-    for i, each in enumerate(design.by):
-        if each.key in [other.key for other in design.by[:i]]:
-            yield ("by", i, "key"), each.key, f'got "{each.key}" twice; parameters must differ; remove one of them'
-        elif each.key not in problem.differentiable:
-            stand_in = ChartAxis(key=each.key, start=0.0, stop=1.0)
-            yield from ((("by", i, *path), *rest) for path, *rest in _of_axis(stand_in, problem, parameters))
-        else:
-            if (ends := each.ends(problem)) is None:
-                text = "is 0, so that its range must be stated; write start and stop, or --from and --to"
-                yield ("by", i), each.key, f"{each.key} {text}"
-                continue
-            axis = ChartAxis(key=each.key, start=ends[0], stop=ends[1], scale=each.scale)
-            yield from ((("by", i, *path), *rest) for path, *rest in _of_axis(axis, problem, parameters))
-
-
 def _of_axis(axis: ChartAxis, problem: Problem, ranges: Mapping[str, FieldInfo]) -> Iterator[Refusal]:
     """A key that is none to differentiate by, or ends that are out of its range, or not in order."""
     known = problem.differentiable
@@ -453,7 +427,6 @@ REFUSALS: Mapping[str, Callable[[Any, Known, Known], Iterator[Refusal]]] = {
     "figure": _of_figure,
     "output": _of_output,
     "chart": _of_chart,
-    "design": _of_design,
     "uncertain": _of_uncertain,
     "expect": _of_expect,
     EXCURSIONS: _of_excursions,

@@ -7,6 +7,7 @@ from typing import Any
 
 _SETS = 'write sets of values into a file, and [vary] with file = "sets.csv"'
 REMOVED: Mapping[tuple[str, ...], str] = {
+    ("design",): 'write `fpsolve design CASE --for "moment(2) = 0" --by noise.sigma --from 0.01 --to 2`',
     ("uncertain", "sample"): _SETS,
     ("uncertain", "seed"): _SETS,
 }

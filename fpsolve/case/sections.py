@@ -25,8 +25,6 @@ from pydantic import (
 )
 
 from fpsolve.analysis.excursions import STATIONARY
-from fpsolve.analysis.inverse import MOST_PARAMETERS
-from fpsolve.analysis.target import start_and_stop, target_of
 from fpsolve.analysis.zero import Axis, Zero, zero_of
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import MeshError
@@ -48,7 +46,7 @@ from fpsolve.fem.mesh import MAX_CELLS, MAX_DEGREE, CylinderMesh, make_mesh, rea
 from fpsolve.messages import is_control
 from fpsolve.model.faults import table_of
 from fpsolve.model.parameters import Section, parameter
-from fpsolve.model.problem import RTOL, RTOL_BEYOND_PLANE, RTOL_OF_SEVERAL, Problem
+from fpsolve.model.problem import RTOL, RTOL_BEYOND_PLANE, RTOL_OF_SEVERAL
 from fpsolve.model.quantity import RATE_FUNCTION, Quantity, moment_at
 from fpsolve.simulation.setup import BATCHES, MAX_PATHS, PATHS, Estimator
 
@@ -532,53 +530,6 @@ class ChartSection(Section):
             text = f'got "{self.y.key}" for both axes; must be two parameters; choose another for one of them'
             refuse([(("y", "key"), self.y.key, text)])
         return self
-
-
-class DesignParameter(Section):
-    """{ key, start, stop, scale, unit }: a parameter that a design may change."""
-
-    key: Annotated[Text, parameter("the parameter", 'key = "oscillator.c1"')]
-    start: Annotated[
-        float | None, parameter("its smallest value; half of the value, or twice it, if omitted", "start = -2.0")
-    ] = None
-    stop: Annotated[
-        float | None, parameter("its largest value; twice the value, or half of it, if omitted", "stop = 0.0")
-    ] = None
-    scale: Annotated[Scale, parameter("whether it is searched linearly or by factors", 'scale = "log"')] = "linear"
-    unit: Annotated[
-        float | None,
-        parameter("what its change is measured by; the absolute value if omitted", "unit = 0.1", gt=0),
-    ] = None
-
-    def ends(self, problem: Problem) -> tuple[float, float] | None:
-        """Its range; None where its value is 0 and not both ends are stated."""
-        usual = start_and_stop(problem, self.key)
-        start = self.start if self.start is not None or usual is None else usual.start
-        stop = self.stop if self.stop is not None or usual is None else usual.stop
-        return None if start is None or stop is None else (start, stop)
-
-
-def _checked_target(text: str) -> str:
-    target_of(text)
-    return text
-
-
-class DesignSection(Section):
-    """[design]: what is wanted, and which parameters may change for it."""
-
-    target: Annotated[
-        Text, AfterValidator(_checked_target), parameter("what is wanted", 'target = "stability_index = 1"')
-    ]
-    by: Annotated[
-        tuple[DesignParameter, ...],
-        parameter(
-            "the parameters that may change",
-            'by = [{ key = "oscillator.c1", start = -2.0, stop = 0.0 }]',
-            strict=False,
-            min_length=1,
-            max_length=MOST_PARAMETERS,
-        ),
-    ]
 
 
 class ExcursionSection(Section):

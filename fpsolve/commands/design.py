@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from json import dumps
 from time import monotonic
 from typing import Annotated
 
 from cyclopts import Parameter
 
 from fpsolve.commands.options import CHECK_FAILED, NOT_CONVERGED, OPTIONS_OF_FILES, Cases, Writing
-from fpsolve.errors import FpsolveError
 
 
 def design(
@@ -20,8 +17,7 @@ def design(
         str | None,
         Parameter(
             name="--for",
-            help="What is wanted: 'stability_index = 1', 'lyapunov_exponent = -0.01' or 'moment(2) = 0'; as [design] "
-            "target of the case states it if omitted.",
+            help="What is wanted: 'stability_index = 1', 'lyapunov_exponent = -0.01' or 'moment(2) = 0'.",
         ),
     ] = None,
     by: Annotated[
@@ -55,14 +51,13 @@ def design(
     """
     from fpsolve.page.page import Note
     from fpsolve.page.terminal import print_blocks
-    from fpsolve.workflow.design import design_case, found_of, refuse_no_design, show
+    from fpsolve.workflow.design import design_case, found_of, show, wanted_of
 
-    code, loaded = 0, options.load(cases, design_options(target, by, start, stop))
-    for case in loaded:
-        refuse_no_design(case)
-    for case in loaded:
+    code, loaded = 0, options.load(cases)
+    wanted = [wanted_of(case, target, by or (), start or (), stop or ()) for case in loaded]
+    for case, (what, ranges) in zip(loaded, wanted, strict=True):
         begun = monotonic()
-        outcome = design_case(case, options.out, watch=options.watch(is_json=json))
+        outcome = design_case(case, what, ranges, options.out, watch=options.watch(is_json=json))
         if json:
             lines = (options.out / case.name / "design.json").read_text(encoding="utf-8").splitlines()
             print(" ".join(line.strip() for line in lines))
@@ -75,28 +70,3 @@ def design(
         elif outcome.found is None:
             code = NOT_CONVERGED
     return code
-
-
-def design_options(
-    target: str | None, by: Sequence[str] | None, start: Sequence[float] | None, stop: Sequence[float] | None
-) -> dict[str, str]:
-    """The keys of [design] that options state, by what was typed."""
-    stated = (
-        {f"--for {dumps(target, ensure_ascii=False)}": f"design.target={dumps(target)}"} if target is not None else {}
-    )
-    ends = {"--from": ("start", start or ()), "--to": ("stop", stop or ())}
-    for option, (_, values) in ends.items():
-        if len(values) not in (0, len(by or ())):
-            raise FpsolveError(
-                f"got {len(values)} {option} for {len(by or ())} --by; must be one for each --by, or none"
-            )
-    if by:
-        entries = []
-        for i, key in enumerate(by):
-            own = [f"{name} = {values[i]!r}" for name, values in ends.values() if values]
-            entries.append(f"{{ {', '.join([f'key = {dumps(key)}', *own])} }}")
-        typed = [f"--by {key}" for key in by] + [
-            f"{option} {each:g}" for option, (_, some) in ends.items() for each in some
-        ]
-        stated[" ".join(typed)] = f"design.by=[{', '.join(entries)}]"
-    return stated

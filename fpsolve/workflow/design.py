@@ -2,25 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from fpsolve.analysis.inverse import Design, units_of
+from fpsolve.analysis.inverse import Design, axes_of, units_of
 from fpsolve.analysis.inverse import design as nearest_design
-from fpsolve.analysis.target import Target, target_of
+from fpsolve.analysis.target import Target, start_and_stop, target_of
 from fpsolve.analysis.zero import Axis
 from fpsolve.case.case import Case
 from fpsolve.case.remedies import CASE_WORDS
 from fpsolve.case.rewrite import rewritten
-from fpsolve.case.sections import DesignSection
 from fpsolve.data import plain_unit, short_names
 from fpsolve.errors import FpsolveError
 from fpsolve.exponent.error import Absent, digits
 from fpsolve.files import writable, write_json, write_text
 from fpsolve.messages import Code, Message
+from fpsolve.model.problem import even_only
 from fpsolve.output.tables import head
 from fpsolve.page.page import Block, Column, Grid, Sentence
 from fpsolve.results.text import plural
@@ -66,37 +66,60 @@ class DesignOutcome:
         }  # fmt: skip
 
 
-def designed(case: Case) -> DesignSection:
-    """What is wanted of a case. Raises `FpsolveError` where nothing is."""
-    if case.design is not None:
-        return case.design
-    raise FpsolveError(
-        f"{case.path}: design: missing; name what is wanted and by which parameter, as with "
-        '--for "stability_index = 1" --by oscillator.c1 --from -2 --to 0'
-    )
+def wanted_of(
+    case: Case, target: str | None, by: Sequence[str], start: Sequence[float], stop: Sequence[float]
+) -> tuple[str, tuple[Axis, ...]]:
+    """What is wanted of a case, and the ranges of the parameters that may change for it.
 
+    Args:
+        target: such as "stability_index = 1".
+        by: the keys of these parameters.
+        start, stop: the ends of their ranges, one for each or none; from half to twice the value without them.
 
-def refuse_no_design(case: Case) -> None:
-    """Refuse a case without a design, or with several curves. Raises `FpsolveError`."""
-    designed(case)
+    Raises:
+        FpsolveError: nothing is wanted, it is none of this case, or the case has several curves.
+    """
+    if target is None or not by:
+        text = '--for "stability_index = 1" --by oscillator.c1 --from -2 --to 0'
+        raise FpsolveError(f"{case.path}: name what is wanted and by which parameter, as with {text}")
+    for option, values in (("--from", start), ("--to", stop)):
+        if len(values) not in (0, len(by)):
+            raise FpsolveError(f"got {len(values)} {option} for {len(by)} --by; must be one for each --by, or none")
     if case.vary:
         raise FpsolveError(
             f"{case.path}: vary: a design starts from one set of parameters; remove [vary], or write --set vary={{}}"
         )
+    problem, ranges = case.problem, list[str | Axis]()
+    try:
+        wanted = target_of(target)
+        named = {"lyapunov_exponent": "λ", "stability_index": "δ_p"}.get(wanted.kind) or f"Λ({wanted.p:g})"
+        if (named[0] != "Λ" or wanted.p % 2) and (told := even_only(problem, named)):
+            raise ValueError(told.words(CASE_WORDS))
+        for i, key in enumerate(by):
+            if start and stop:
+                ranges.append(Axis(key, start[i], stop[i]))
+            elif key not in problem.differentiable:
+                ranges.append(key)  # which is refused
+            elif (usual := start_and_stop(problem, key)) is None:
+                raise ValueError(f"{key} is 0, so that its range must be stated; write --from and --to")
+            else:
+                ranges.append(Axis(key, start[i] if start else usual.start, stop[i] if stop else usual.stop))
+        return target, axes_of(problem, ranges)
+    except ValueError as failure:
+        raise FpsolveError(f"{case.path}: {failure}") from None
 
 
-def solve_design(case: Case, progress: Callable[[], None] = lambda: None) -> DesignOutcome:
-    """The design of a case, see `refuse_no_design`; or why there is none.
+def solve_design(
+    case: Case, target: str, by: tuple[Axis, ...], progress: Callable[[], None] = lambda: None
+) -> DesignOutcome:
+    """The design of a case, see `wanted_of`; or why there is none.
 
     Args:
         progress: called after each solve.
     """
-    wanted, problem = designed(case), case.problem
-    axes = tuple(Axis(each.key, *ends, each.scale) for each in wanted.by if (ends := each.ends(problem)) is not None)
-    units = units_of(problem, axes, {each.key: each.unit for each in wanted.by if each.unit is not None})
-    begun = DesignOutcome(target_of(wanted.target), axes, units)
+    begun = DesignOutcome(target_of(target), by, units_of(case.problem, by, {}))
     try:
-        found = nearest_design(problem, wanted.target, axes, units=units, budget=case.budget, progress=progress)
+        found = nearest_design(case.problem, target, by, budget=case.budget, progress=progress)
     except FpsolveError as failure:
         return replace(begun, reason=failure.message)
     return replace(begun, reason=found.reason) if isinstance(found, Absent) else replace(begun, found=found)
@@ -141,15 +164,15 @@ def summary(case: Case, outcome: DesignOutcome, facts: Mapping[str, Any]) -> dic
     }
 
 
-def design_case(case: Case, out: str | Path = "results", *, watch: Watch = SILENT) -> DesignOutcome:
-    """Find the design of a case, and write design.json and, where there is one, design.toml into `out`/<case>/.
+def design_case(
+    case: Case, target: str, by: tuple[Axis, ...], out: str | Path = "results", *, watch: Watch = SILENT
+) -> DesignOutcome:
+    """Find the design of a case, see `wanted_of`; write design.json and, where there is one, design.toml.
 
     Raises:
         OutputError: the folder cannot be made or written to, or another run writes into it.
-        FpsolveError: the case has no design, or several curves; nothing is written.
         KeyboardInterrupt: nothing is kept.
     """
-    refuse_no_design(case)
     started = datetime.now(UTC)
     with (
         own_folder(case, out, (DESIGNED,)) as folder,
@@ -157,7 +180,7 @@ def design_case(case: Case, out: str | Path = "results", *, watch: Watch = SILEN
         writable(folder),
     ):
         with watch.bar(Phase(case.name, "design", unit=SOLVES)) as progress:
-            found = solve_design(case, progress)
+            found = solve_design(case, target, by, progress)
         write_design(case, found, folder, facts_since(case, started))
     return found
 

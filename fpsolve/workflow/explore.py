@@ -182,13 +182,10 @@ class Explorer:
             }  # fmt: skip
 
     def _range(self, key: str, value: float) -> tuple[float, float, str]:
-        """The ends of a slider: those of a chart, of what is varied or designed, of the parameter, or usual ones."""
+        """The ends of a slider: those of a chart, of what is varied, of the parameter, or usual ones."""
         for axis in (self.source.chart.x, self.source.chart.y) if self.source.chart else ():
             if axis.key == key:
                 return axis.start, axis.stop, axis.scale
-        for each in self.source.design.by if self.source.design else ():
-            if each.key == key and (ends := each.ends(self.first)):
-                return *ends, each.scale
         varied = self.source.vary.columns.get(key, ())
         if len(varied) > 1 and not self.source.vary.is_text(key):
             low, high = float(min(varied)), float(max(varied))

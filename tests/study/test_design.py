@@ -79,16 +79,6 @@ def test_several_parameters_state_their_metric(design, tmp_path):
     assert [(each["start"], each["stop"]) for each in told["by"]] == [(0.4, 1.0), (0.5, 2.0)]
 
 
-def test_a_section_states_the_same(design, tmp_path):
-    by = '{ key = "oscillator.c1", start = -2.0, stop = 0.0 }'
-    section = f'design={{ target = "stability_index = 1", by = [{by}] }}'
-    assert design("--set", section)[0] == 0
-    told = read_json(tmp_path / "old/design.json")
-    assert told["by"][0]["after"] == pytest.approx(-0.65415415855, abs=5e-12)
-    text = (tmp_path / "old/design.toml").read_text(encoding="utf-8")
-    assert 'target = "stability_index = 1"' in text
-
-
 def test_what_is_not_solved_exits_3(design):
     code, _, err = design(*BY_DAMPING, "--set", "budget={ unknowns = 100 }")
     assert code == 3
