@@ -19,7 +19,6 @@ from fpsolve.commands.errors import drop_blocked_output, print_error
 from fpsolve.commands.options import BAD_INPUT, NOT_CONVERGED
 from fpsolve.errors import FpsolveError, NotConverged, WorkersDied
 from fpsolve.messages import escaped
-from fpsolve.page.letters import HANDLER
 from fpsolve.signals import INTERRUPTED, ended_by_signals
 
 COMMANDS = {
@@ -73,9 +72,9 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _run(argv: Sequence[str] | None) -> int:
-    for stream in (sys.stdout, sys.stderr):  # a terminal that has no Greek shows its names
+    for stream in (sys.stdout, sys.stderr):  # an output whose encoding has no Greek shows a question mark
         if isinstance(stream, TextIOWrapper):
-            stream.reconfigure(errors=HANDLER)
+            stream.reconfigure(errors="replace")
     given = sys.argv[1:] if argv is None else argv
     try:
         try:

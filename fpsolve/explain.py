@@ -34,8 +34,6 @@ BY_KIND = Discriminator(lambda value: _TAGS.get(type(value), TABLE if isinstance
 DEPENDENT = "cannot be judged, as the kinds of the system and the noise are not known; correct these"
 """Of a section; which kinds are wrong is another fault."""
 _UNKNOWN = ("extra_forbidden", "unexpected_keyword_argument")
-MOVED = {("figure", "time_unit"): 'write time = "s", or another unit, in [units]'}
-"""Keys of earlier releases, and what to write instead."""
 _KINDS = {bool: "a boolean", str: "a string", list: "a list", dict: "a table", int: "a number", float: "a number"}
 
 UNBOUNDED = parameter("a parameter", "")
@@ -182,8 +180,6 @@ def _sentence(
         return str(detail["msg"] if kind == _OWN else detail["ctx"]["error"])
     if kind == "too_long":
         return too_long(detail)
-    if kind in _UNKNOWN and path in MOVED:
-        return f"moved; {MOVED[path]}, and remove it here"
     if kind in _UNKNOWN:
         known = _known_keys(path, fields)
         beside = ", ".join(key for key in known if "." not in key)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
@@ -84,8 +83,6 @@ MOST_DRAWN = 10
 MOST_DENSITIES = 3
 """p of which densities of more than two variables are written unasked, which take seconds each."""
 USUAL_P = 2.0
-_NO_FOLDER = re.compile(r".*[. ]|(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE | re.DOTALL)
-"""Names that are ".", "..", or what Windows changes or has for devices."""
 
 
 @dataclass(frozen=True)
@@ -494,11 +491,10 @@ def load_case(path: str | Path, overrides: Sequence[str] = (), options: Mapping[
 
 
 def _faults_of_name(name: str) -> Iterator[Fault]:
-    """Why a file's name without its ending, which names the folder of the results, is none of a folder everywhere."""
-    if any(map(is_control, name)) or "\\" in name or _NO_FOLDER.fullmatch(name):
+    """Why a file's name without its ending, which names the folder of the results, is none of one."""
+    if any(map(is_control, name)) or name in (".", ".."):
         text = f"got {json.dumps(name)} as the file's name without its ending, which names the folder of its results; "
-        remedy = "must have no control characters and no backslash, not end in a dot or a space, and be no device"
-        yield Fault("", None, f"{text}{remedy}; rename the file")
+        yield Fault("", None, f"{text}must have no control characters, and be more than dots; rename the file")
 
 
 def _spread(p: FloatArray, most: int = 9) -> FloatArray:

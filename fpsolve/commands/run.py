@@ -66,9 +66,7 @@ def run(
             print(whole_summary(case, outcome.results, outcome.facts))
         else:
             what = done_of(case, len(outcome.results), outcome.failed)
-            options.print_written(
-                case, what, outcome.facts["wall_seconds"], known_of(case, outcome.known, outcome.outdated)
-            )
+            options.print_written(case, what, outcome.facts["wall_seconds"], known_of(case, outcome.known))
         if outcome.interruption:
             return INTERRUPTED
         if outcome.failed:

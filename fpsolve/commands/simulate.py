@@ -59,7 +59,7 @@ def simulate(
         if outcome.interruption:
             print_error(outcome.interruption)
         what = done_of(case, sum(not each.interrupted for each in outcome.simulated))
-        options.print_written(case, what, monotonic() - start, known_of(case, outcome.known, outcome.records.outdated))
+        options.print_written(case, what, monotonic() - start, known_of(case, outcome.known))
         if outcome.interruption:
             return INTERRUPTED
     return 0

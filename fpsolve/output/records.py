@@ -109,11 +109,6 @@ class Records:
     def are_there(self) -> bool:
         return bool(self._addresses)
 
-    @property
-    def outdated(self) -> int:
-        """How many another version of fpsolve has written; they are not read."""
-        return sum(not key.startswith(f"{RESULT_VERSION}-") for key in self._addresses)
-
     def address(self, key: str) -> Address | None:
         """The last record of a key."""
         return self._addresses[key][-1] if key in self._addresses else None

@@ -16,7 +16,6 @@ from rich.table import Table
 from rich.text import Text
 
 from fpsolve.messages import Severity, escaped
-from fpsolve.page.letters import encodable
 from fpsolve.page.page import TONES, WORDS, Block, Column, Grid, Note, Sentence
 
 ENDLESS = 1_000_000
@@ -81,7 +80,7 @@ class Screen:
     def say(self, text: str, style: str = "") -> None:
         """Print a text in lines that fit, indented from the second one on; its own line ends remain."""
         for line in text.split("\n"):
-            for each in wrapped(self._plain(line), self.width - 1):
+            for each in wrapped(escaped(line), self.width - 1):
                 self.console.print(Text(each), style=style, soft_wrap=True)
 
     def show(self, grid: Grid) -> None:
@@ -89,8 +88,8 @@ class Screen:
 
         Where it has too little room, rich would break numbers; so columns and the breaks of headings are chosen here.
         """
-        columns = [replace(each, heading=self._plain(each.heading)) for each in grid.columns]
-        rows = [[Text(self._plain(each), STYLES.get(TONES.get(each, ""), "")) for each in row] for row in grid.rows]
+        columns = [replace(each, heading=escaped(each.heading)) for each in grid.columns]
+        rows = [[Text(escaped(each), STYLES.get(TONES.get(each, ""), "")) for each in row] for row in grid.rows]
         chosen = self._layout(columns, rows)
         if chosen is None:
             for row in rows:
@@ -135,9 +134,6 @@ class Screen:
             if not leaving:
                 return None
             kept.remove(leaving.pop())
-
-    def _plain(self, text: str) -> str:
-        return encodable(escaped(text), self.console.encoding)
 
 
 def wrapped(text: str, width: int) -> list[str]:

@@ -97,8 +97,6 @@ def done_of(case: Case, done: int, failed: int = 0, fault: str = "not converged"
     return f"{count} {plural('curve', case.planned)}{f', {failed} {fault}' if failed else ''}"
 
 
-def known_of(case: Case, known: int, outdated: int) -> str:
-    """How many of its curves an earlier run had done, and how many records another version has written, if any."""
-    parts = [f"{known} of {case.planned} known from an earlier run"] * bool(known)
-    parts += [f"{outdated} {plural('record', outdated)} of another version not used"] * bool(outdated)
-    return "; ".join(parts)
+def known_of(case: Case, known: int) -> str:
+    """How many of its curves an earlier run had done, if any."""
+    return f"{known} of {case.planned} known from an earlier run" if known else ""

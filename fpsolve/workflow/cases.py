@@ -45,7 +45,6 @@ class Outcome:
         interruption: where an interrupt ended the simulation, what is kept, and how to go on; empty without interrupt.
         facts: versions, the command and the time of a run that solves, see `facts_of`.
         known: how many of its curves an earlier run had finished.
-        outdated: how many records of its curves another version has written; these are not used.
         failed: how many of its curves have failed in a run, also in part.
     """
 
@@ -54,7 +53,6 @@ class Outcome:
     interruption: str = ""
     facts: Mapping[str, Any] = field(default_factory=dict)
     known: int = 0
-    outdated: int = 0
     failed: int = 0
 
     @property
@@ -171,7 +169,6 @@ def run_case(
         interruption,
         facts=sweep.facts,
         known=sweep.known,
-        outdated=sweep.records.outdated,
         failed=sweep.failed,
     )
 

@@ -17,7 +17,7 @@ SOLVED = (
     r"summary\.json|(moments|curves)\.csv|curves\.pvd|results\.nc"
     r"|(figure|rate_function|(sensitivities|densities)(-\d+)?)\.(png|pdf)"
     r"|density\.vtu|densities(-\d+)?\.nc|show\.py|eigenfunctions(-\d+)?(\.pvd|/p[+-][\d.e+-]+\.vtu)"
-    r"|response(_3d)?(-\d+)?\.(csv|vtu|vti|png|pdf)"  # .vti of simulations by earlier versions
+    r"|response(_3d)?(-\d+)?\.(csv|vtu|png|pdf)"
 )
 SIMULATED = r"monte_carlo(-\d+)?\.json|monte_carlo_response(-\d+)?\.(csv|vti|png|pdf)"
 REPORT = r"report\.html"

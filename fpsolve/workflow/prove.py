@@ -17,7 +17,6 @@ from pydantic import TypeAdapter
 
 from fpsolve import __version__
 from fpsolve.case.case import Case, Curve
-from fpsolve.case.sections import EXCURSIONS
 from fpsolve.errors import FpsolveError, NoSuchExponent
 from fpsolve.exponent.quantities import LYAPUNOV_EXPONENT, STABILITY_INDEX
 from fpsolve.files import writable, write_text

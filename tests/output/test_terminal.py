@@ -13,7 +13,6 @@ from fpsolve.exponent.error import Estimate, Failure
 from fpsolve.exponent.quantities import INDICES
 from fpsolve.messages import Code, Message, Severity
 from fpsolve.model.quantity import OSCILLATOR_RESPONSE
-from fpsolve.page.letters import encodable
 from fpsolve.page.page import Column, Grid, Note
 from fpsolve.page.terminal import print_blocks
 from fpsolve.results.curve import CurveResult, MomentColumns
@@ -395,13 +394,6 @@ def test_a_narrow_terminal_breaks_no_comparison(tmp_path, capsys, terminal, coun
 )
 def test_durations(seconds, text):
     assert duration(seconds) == text
-
-
-def test_letters_that_an_encoding_does_not_have_are_replaced_by_the_nearest():
-    assert encodable("λ = 1 ± 2, Λ″(0), δ_p ≤ ε²", "ascii") == "lambda = 1 +- 2, Lambda''(0), delta_p <= eps^2"
-    assert encodable("λ ± é", "latin-1") == "lambda ± é"
-    assert encodable("Λ ± …", "utf-8") == "Λ ± …"
-    assert encodable("ж", "ascii") == "?"
 
 
 def test_columns_of_theories_that_there_are_not_are_left_out(tmp_path):
