@@ -13,7 +13,6 @@ from fpsolve.model.plane import System
 
 SYSTEMS: Mapping[str, str] = {
     "vibro-impact": "vibro_impact:VibroImpactOscillator",
-    "plane": "plane_system:PlaneSystem",
     "parametric": "parametric:ParametricOscillator",
     "equations": "equations:EquationSystem",
     "modes": "modal:ModalSystem",

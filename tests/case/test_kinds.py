@@ -1,4 +1,4 @@
-"""Cases of systems and noises of any kind: plane systems, chains."""
+"""Cases of systems and noises of any kind."""
 
 from __future__ import annotations
 
@@ -16,8 +16,6 @@ from fpsolve.model.noises.markov_chain import MarkovChain, Telegraph
 from fpsolve.model.noises.non_gaussian import NonGaussianNoise, ReducedNoise
 from fpsolve.model.problem import Problem
 from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
-from fpsolve.simulation.setup import simulated_parts
-from fpsolve.workflow.prove import refuse_unprovable_case
 
 OSCILLATOR = """\
 title = "kinds"
@@ -26,17 +24,6 @@ omega = 1.0
 restitution = 0.8
 c1 = 0.1
 epsilon = 0.1
-"""
-PLANE = """\
-title = "plane"
-[system]
-kind = "plane"
-damping = 0.1
-terms = [
-    { matrix = [[0, 1], [-1, 0]] },
-    { matrix = [[0, 0], [0, -2]], factor = "damping" },
-    { ORDER, matrix = [[0, 0], [-1, 0]], noise = true },
-]
 """
 MOMENTS = "[moments]\np = [2.0]\n"
 ONLY = '[output]\nquantities = ["moment", "lyapunov_exponent"]\n'
@@ -74,7 +61,7 @@ def test_the_system_has_two_names(tmp_path: Path) -> None:
     [text] = said(tmp_path, OSCILLATOR, named.partition("\n")[2], REDUCED, MOMENTS)
     assert text.endswith("oscillator: stands beside [system], but a case has one system; remove one of the two")
     [text] = said(tmp_path, OSCILLATOR, 'kind = "markov-chain"\n', REDUCED, MOMENTS)
-    assert text.startswith('7: oscillator.kind: got "markov-chain"; must be one of vibro-impact, plane, ')
+    assert text.startswith('7: oscillator.kind: got "markov-chain"; must be one of vibro-impact, parametric, ')
 
 
 @pytest.mark.parametrize(
@@ -113,34 +100,10 @@ def test_figures_speak_of_the_parameters_of_the_case(tmp_path: Path) -> None:
     assert legend({"noise.amplitude": 2.0}, case.about) == "$A$ = 2/s"
 
 
-@pytest.mark.parametrize(("order", "has_theory"), [("order = 1", True), ("order = 0", False)])
-def test_a_plane_system_from_a_file(tmp_path: Path, order: str, has_theory: bool) -> None:
-    """ẍ + 0.2ẋ + (1 + ξ)x = 0 under sine-Wiener noise, against the moment hierarchy; noise of order 0 has no theory."""
-    rest = '[vary]\n"system.damping" = [0.1, 0.2]\n'
-    path = write(tmp_path, PLANE.replace("ORDER", order), SINE, MOMENTS, ONLY, rest)
-    first, second = solved(path, tmp_path / "out").values()
-    assert first == pytest.approx(-0.0773243898649, abs=1e-10)
-    assert second < first
-    summary = json.loads((tmp_path / "out/kinds/summary.json").read_text(encoding="utf-8"))
-    assert (summary["curves"][0]["moments"][0]["moment_perturbation"] is not None) == has_theory
-    case = load_case(path)
-    refuse_unprovable_case(case, None)  # it can be proven, and simulated
-    assert simulated_parts(case.problem)
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "words"),
-    [
-        ("noise = true", "nois = true", 'system.terms[2].nois: unknown key; did you mean "noise"?'),
-        ("damping = 0.1", "damping = true", "got damping = True; must be a finite number"),
-        ("damping = 0.1", "stiffness = 0.1", "got values of ['stiffness']; must be of ['damping']"),
-        ("[[0, 1], [-1, 0]]", "[[0, 1], [-1]]", "system.terms[0].matrix[1][1]: missing"),
-        ("terms =", "term =", "system.terms: missing; must be a non-empty list of tables with the keys matrix"),
-    ],
-)
-def test_what_is_wrong_with_a_plane_system(tmp_path: Path, old: str, new: str, words: str) -> None:
-    texts = said(tmp_path, PLANE.replace("ORDER", "order = 1").replace(old, new), REDUCED, MOMENTS)
-    assert any(words in text for text in texts)
+def test_a_system_by_matrices_is_written_as_equations(tmp_path: Path) -> None:
+    [text] = said(tmp_path, 'title = "plane"\n[system]\nkind = "plane"\nterms = []\n', REDUCED, MOMENTS)
+    assert 'system.kind: got "plane"; must be one of vibro-impact, parametric, equations, modes;' in text
+    assert 'write the matrices as equations, for example variables = ["x", "v"], drift = ' in text
 
 
 def test_a_chain_from_a_file(tmp_path: Path) -> None:

@@ -145,11 +145,9 @@ def test_sensitivities_are_differences_of_moment_equations():
 def test_sensitivity_to_what_the_impulses_multiply():
     """c in ẍ + 0.4 ẋ + x = −c ξ x, which changes exp(w A)."""
 
-    def spring(c):
-        return [CoefficientMatrix(0, FREE), CoefficientMatrix(1, [[0.0, 0.0], [-c, 0.0]], identity)]
-
+    spring = PlaneSystem.of_equations(("x", "v"), ("v", "-x - 0.4*v - c*xi*x"), {"c": 0.8})
     law = 0.9, (1.0, -0.5), (0.5, 0.5), 2
-    [found] = sensitivities(Problem(PlaneSystem.of(spring, c=0.8), Poisson(rate=0.9, sizes=(1.0, -0.5))), 2.0).moments
+    [found] = sensitivities(Problem(spring, Poisson(rate=0.9, sizes=(1.0, -0.5))), 2.0).moments
     ahead, behind = (
         moment_hierarchy.impulses_exponent(FREE, [[0.0, 0.0], [-c, 0.0]], *law) for c in (0.8 + 1e-4, 0.8 - 1e-4)
     )

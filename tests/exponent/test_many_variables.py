@@ -13,7 +13,7 @@ from fpsolve.cli import main
 from fpsolve.commands.options import BAD_INPUT
 from fpsolve.errors import NoSuchExponent, NotConverged
 from fpsolve.messages import Code
-from fpsolve.model import CoefficientMatrix, LinearSystem, NonGaussianNoise, Poisson, White
+from fpsolve.model import CoefficientMatrix, LinearSystem, ModalSystem, NonGaussianNoise, Poisson, White
 from tests.kit import chain_of_masses
 from tests.oracles import kronecker
 
@@ -34,10 +34,11 @@ p = [2.0, 4.0]
 
 def masses(count, noise, damping=0.02):
     """A chain with noise in its first spring, and the damping ratio as a parameter."""
-    free, driven, _ = chain_of_masses(count, 0.0)
-    damper = chain_of_masses(count, 1.0)[0] - free
-    terms = [("", CoefficientMatrix(0, free)), ("zeta", CoefficientMatrix(0, damper))]
-    return Problem(LinearSystem.of_terms([*terms, ("", CoefficientMatrix(1, driven, identity))], zeta=damping), noise)
+    free, driven, _ = chain_of_masses(count, 1.0)
+    stiffness, damper, load = -free[count:, :count], -free[count:, count:], -driven[count:, :count]
+    damper = [[f"{each!r}*zeta" for each in row] for row in damper.tolist()]
+    values = {"zeta": damping}
+    return Problem(ModalSystem.of(np.eye(count), stiffness, damper, stiffness_noise=load, parameters=values), noise)
 
 
 def test_even_moments_and_bounds():

@@ -6,23 +6,26 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fpsolve import OrnsteinUhlenbeck, Problem, lyapunov_exponent, moment_lyapunov, sensitivities, stability_index
-from fpsolve.arrays import identity
+from fpsolve import (
+    OrnsteinUhlenbeck,
+    PlaneSystem,
+    Problem,
+    lyapunov_exponent,
+    moment_lyapunov,
+    sensitivities,
+    stability_index,
+)
 from fpsolve.cli import main
-from fpsolve.model import Bounded, CoefficientMatrix, LinearSystem, Poisson, SineWiener, Telegraph, White
+from fpsolve.model import Bounded, Poisson, SineWiener, Telegraph, White
 from tests.oracles import kronecker
 
 P = np.array([-1.0, 0.3, 1.0, 2.0, 3.7])
 A, B = 0.1, 0.8
 
 
-def terms(a, b):
-    return [CoefficientMatrix(0, ((-a,),)), CoefficientMatrix(0, ((b,),), identity)]
-
-
 def scalar(noise, unit=1.0):
     """With the unit of time of ẋ = −ax."""
-    return Problem(LinearSystem.of(terms, a=A * unit, b=B * unit), noise)
+    return Problem(PlaneSystem.of_equations(("x",), ("-a*x + b*xi*x",), {"a": A * unit, "b": B * unit}), noise)
 
 
 def turning(amplitude, nu, sigma, is_sine):

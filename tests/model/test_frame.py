@@ -16,24 +16,19 @@ from fpsolve import (
     tilted_density,
 )
 from fpsolve.analysis import furstenberg_khasminskii
-from fpsolve.arrays import identity
 from fpsolve.exponent import impact_rate
 from fpsolve.exponent.fields import fields
-from fpsolve.model import CoefficientMatrix, Jump, White
+from fpsolve.model import CoefficientMatrix, White
 
 OU = OrnsteinUhlenbeck(alpha=1.0, sigma=0.7)
 
 
-def beam(omega, damping, loss, unit):
-    """ẍ + 2 damping ẋ + (ω² + ωξ) x = 0 with a wall at x = 0, by the state (x, ẋ/unit)."""
-    free = CoefficientMatrix(0, ((0.0, unit), (-(omega**2) / unit, 0.0)))
-    damped = CoefficientMatrix(1, ((0.0, 0.0), (0.0, -2 * damping)))
-    driven = CoefficientMatrix(1, ((0.0, 0.0), (-omega / unit, 0.0)), identity)
-    return [free, damped, driven], [Jump(math.pi / 2, -loss)]
-
-
 def of(unit, noise=OU, omega=10.0):
-    return Problem(PlaneSystem.of(beam, omega=omega, damping=0.1, loss=0.1, unit=unit), noise)
+    """ẍ + 2 damping ẋ + (ω² + ωξ) x = 0 with a wall at x = 0, by the state (x, ẋ/unit)."""
+    rates = "unit*v", "-omega**2/unit*x - 2*epsilon*damping*v - epsilon*omega/unit*xi*x"
+    values = {"omega": omega, "damping": 0.1, "loss": 0.1, "unit": unit, "epsilon": 1.0}
+    wall = {"at": "x = 0", "restitution": "exp(-loss)"}
+    return Problem(PlaneSystem.of_equations(("x", "v"), rates, values, walls=[wall]), noise)
 
 
 PLAIN, UNIFORM = of(1.0), of(10.0)

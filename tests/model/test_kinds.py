@@ -18,7 +18,7 @@ from fpsolve import (
     sensitivities,
 )
 from fpsolve.arrays import Constant, Linear
-from fpsolve.model import CoefficientMatrix, Jump, ReducedNoise, noise_kind, system_kind
+from fpsolve.model import CoefficientMatrix, ReducedNoise, noise_kind, system_kind
 from fpsolve.model.kinds import NOISES, SYSTEMS
 from fpsolve.model.plane import affine, coefficient, is_driven
 from fpsolve.theory import second_order
@@ -113,62 +113,12 @@ def test_no_function_is_refused():
         CoefficientMatrix(0, ROTATION, 3.0)
 
 
-def pendulum(omega, damping, loss):
-    """Powers and a wall, so that no derivative is that of a linear function."""
-    free = CoefficientMatrix(0, ((0.0, omega), (-omega, 0.0)))
-    return [
-        free,
-        CoefficientMatrix(0, ((0.0, 0.0), (0.0, -(damping**2)))),
-        CoefficientMatrix(1, STIFFNESS, Linear()),
-    ], [Jump(math.pi / 2, math.log(1 - loss))]
-
-
-def test_derivatives_by_named_parameters():
-    system = PlaneSystem.of(pendulum, omega=1.3, damping=0.4, loss=0.1)
-    [rotation], none = system.derivative("omega")
-    np.testing.assert_allclose(rotation.matrix, [[0, 1], [-1, 0]], atol=1e-12)
-    assert none == ()
-    [damping], _ = system.derivative("damping")
-    np.testing.assert_allclose(damping.matrix, [[0, 0], [0, -0.8]], atol=1e-12)
-    nothing, [slope] = system.derivative("loss")
-    assert nothing == ()
-    assert slope == pytest.approx(-1 / 0.9, rel=1e-11)
-
-
-@pytest.mark.slow
-def test_sensitivities_to_named_parameters_are_differences():
-    theta = {"omega": 1.3, "damping": 0.4, "loss": 0.1}
-    [found] = sensitivities(Problem(PlaneSystem.of(pendulum, **theta), NOISE), 1.5).moments
-    for name, h in dict.fromkeys(theta, 1e-4).items():
-        ahead, behind = (
-            moment_lyapunov(
-                Problem(PlaneSystem.of(pendulum, **{**theta, name: theta[name] + d}), NOISE), 1.5, rtol=1e-11
-            ).value[0]
-            for d in (h, -h)
-        )
-        assert found[f"system.{name}"].value == pytest.approx((ahead - behind) / (2 * h), rel=1e-6)
-
-
-def test_terms_that_carry_their_parameters():
-    terms = [
-        ("", CoefficientMatrix(0, ROTATION)),
-        ("c", CoefficientMatrix(0, ((0.0, 0.0), (0.0, -1.0)))),
-        ("s", CoefficientMatrix(1, STIFFNESS, Linear())),
-    ]
-    system = PlaneSystem.of_terms(terms, c=0.2, s=1.0, epsilon=0.3)
-    assert (
-        moment_lyapunov(Problem(system, NOISE), 2.0).value[0]
-        == moment_lyapunov(Problem(driven(Linear()), NOISE), 2.0).value[0]
-    )
-    assert system.at({"c": 0.5}).terms[1].matrix == ((0.0, 0.0), (0.0, -0.5))
-    assert dict(system.at({"epsilon": 0.1}).values) == {"epsilon": 0.1, "c": 0.2, "s": 1.0}
+def test_a_system_by_terms_has_one_parameter():
+    system = driven(Linear())
+    assert dict(system.at({"epsilon": 0.1}).values) == {"epsilon": 0.1}
     assert pickle.loads(pickle.dumps(system)) == system
-    with pytest.raises(ValueError, match=r"got values of \['c'\]; must be of \['c', 's'\]"):
-        PlaneSystem.of_terms(terms, c=0.2)
-    with pytest.raises(ValueError, match="got mass; the parameters are epsilon, c, s"):
+    with pytest.raises(ValueError, match="got mass; the parameter is epsilon"):
         system.at({"mass": 1.0})
-    with pytest.raises(ValueError, match="got c = nan; must be a finite number"):
-        PlaneSystem.of_terms(terms, c=math.nan, s=1.0)
 
 
 def test_a_problem_knows_its_parameters():

@@ -141,11 +141,9 @@ def test_moments_of_negative_p_mirror_those_of_positive_p():
 
 
 def test_derivatives_by_every_parameter():
-    def build(stiffness, damping, loss):
-        free = CoefficientMatrix(0, ((0.0, 1.0), (-stiffness, -2 * damping)))
-        return [free, CoefficientMatrix(1, DAMPING, identity)], [Jump(math.pi / 2, -loss)]
-
-    problem = Problem(PlaneSystem.of(build, stiffness=1.2, damping=0.1, loss=0.2), White(0.5, "ito"))
+    values = {"epsilon": 1.0, "stiffness": 1.2, "damping": 0.1, "loss": 0.2}
+    rates, wall = ("v", "-stiffness*x - 2*damping*v + epsilon*xi*v"), {"at": "x = 0", "restitution": "exp(-loss)"}
+    problem = Problem(PlaneSystem.of_equations(("x", "v"), rates, values, walls=[wall]), White(0.5, "ito"))
     slopes = sensitivities(problem, 2.0)
     assert {*slopes.theta} == {*(f"system.{name}" for name in ("epsilon", "stiffness", "damping", "loss")), "noise.s"}
     for key, theta in slopes.theta.items():

@@ -5,7 +5,6 @@ import json
 import pytest
 
 from fpsolve.cli import main
-from fpsolve.commands.options import BAD_INPUT
 from fpsolve.proofs.claims import claims_from
 from fpsolve.workflow.prove import check_proof, prove_case
 from tests.kit import case_in, read_json
@@ -68,32 +67,3 @@ def test_the_check_says_that_parameters_are_labels(tmp_path, capsys):
     said = capsys.readouterr().out
     assert "accepted: " in said
     assert "note: parameters are labels; the bounds are of the matrices and rates" in said
-
-
-TURNED = """
-title = "beam"
-[system]
-kind = "plane"
-terms = [
-    { matrix = [[0.0, 1.0], [-1.0, 0.0]] },
-    { matrix = [[0.0, 0.0], [-1.0, 0.0]], noise = true, order = 1 },
-]
-jumps = [{ phase = 0.0, log_factor = -0.1 }]
-[noise]
-kind = "ornstein-uhlenbeck"
-alpha = 1.0
-sigma = 0.2
-[moments]
-p = [2.0]
-"""
-
-
-def test_a_ray_that_the_noise_turns_is_refused(tmp_path, capsys):
-    path = tmp_path / "beam.toml"
-    path.write_text(TURNED, encoding="utf-8")
-    assert main(["prove", str(path), "--out", str(tmp_path)]) == BAD_INPUT
-    told = " ".join(capsys.readouterr().err.split())
-    assert (
-        "ornstein-uhlenbeck noise moves the phase across the ray of a jump, phi = 0, which it does over no wall" in told
-    )
-    assert not (tmp_path / "beam").exists()
