@@ -192,10 +192,6 @@ class Code(Enum):
         "carried at several places, or are of several blocks or of more than two variables, or two eigenvalues cross; "
         "ask for single p"
     )
-    NO_SURFACE = (
-        "failure: there is no surface over {keys}, as functions do not move smoothly with these, no space serves all "
-        "points, or a moment is carried at several places; solve at single points"
-    )
     NOT_CONVEX = (
         "failure: the computed Λ(p) is not convex between p = {p:g} and p = {other:g}, while the exponent is: a wrong "
         "eigenvalue was found"

@@ -15,8 +15,7 @@ from scipy.interpolate import RegularGridInterpolator
 
 import fpsolve
 from fpsolve import ExponentSolver, OrnsteinUhlenbeck, Problem, VibroImpactOscillator
-from fpsolve.analysis import Axis, Surface, design, excursion, uncertainty
-from fpsolve.analysis.index_surface import IndexSurface
+from fpsolve.analysis import Axis, design, excursion, uncertainty
 from fpsolve.case import Curve
 from fpsolve.data import Result
 from fpsolve.errors import FpsolveError
@@ -70,9 +69,6 @@ MAIN = {
     "design": "oscillator.c1",
     "uncertainty": "moment",
     "excursion": "level",
-    "line": "lyapunov_exponent",
-    "line of the index": "stability_index",
-    "surface": "moment",
 }
 """Results, by their names here, each with its main variable."""
 
@@ -136,9 +132,6 @@ def results(fig1_solver):
         "design": design(Problem(FIG1, REDUCED), "moment(2) = 0.02", Axis("oscillator.c1", -2.0, 2.0)),
         "uncertainty": uncertainty(Problem(FIG1, REDUCED), {"noise.D0": 0.05}, [1.0, 2.0]),
         "excursion": excursion(Problem(ParametricOscillator(stiffness=1.0, damping=0.08), Telegraph(a=0.8, k=1.0))),
-        "line": Surface(Problem(FIG1, REDUCED), {"oscillator.c1": (0.0, 0.2)}),
-        "line of the index": IndexSurface(Problem(FIG1, REDUCED), {"oscillator.c1": (0.0, 0.05)}),
-        "surface": Surface(Problem(FIG1, REDUCED), {"oscillator.c1": (0.0, 0.2), "noise.D0": (0.2, 1.0, "log")}, 2.0),
     }
     assert set(found) == set(MAIN)
     return found

@@ -107,7 +107,6 @@ def test_while_a_slider_moves_numbers_are_within_their_error():
 
 
 def test_a_map_shows_the_rows_of_its_grid_as_they_come_and_is_stopped_between_them(monkeypatch):
-    monkeypatch.setattr("fpsolve.analysis.stability.Boundary.reduced_scan", lambda line: None)
     explorer, told = explorer_of("systems/telegraph"), []
     axes = [{"key": key, "start": 0.05, "stop": 1.0} for key in ("system.damping", "noise.a")]
 

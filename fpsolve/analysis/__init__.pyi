@@ -18,5 +18,4 @@ from .spreads import laws_of as laws_of
 from .spreads import uncertainty as uncertainty
 from .stability import Boundary as Boundary
 from .stability import boundary as boundary
-from .surface import Surface as Surface
 from .zero import Axis as Axis

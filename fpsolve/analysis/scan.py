@@ -75,7 +75,6 @@ class Scan:
         gradients: ∂F/∂(u, v), shape (n, n, 2).
         reasons: why F does not exist at some nodes, each once.
         seconds: of the processor, that it took.
-        rtol: the error of F that was wanted, relative to its scale.
     """
 
     nodes: FloatArray
@@ -83,7 +82,6 @@ class Scan:
     gradients: FloatArray
     reasons: tuple[Message, ...] = ()
     seconds: float = 0.0
-    rtol: float = 0.0
 
     def between(self, i: Any, j: Any, s: FloatArray, t: FloatArray) -> FloatArray:
         """F in the cells of the nodes (i, j) to (i + 1, j + 1), s and t in [0, 1], by bicubic interpolation.

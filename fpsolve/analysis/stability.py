@@ -19,13 +19,10 @@ import numpy as np
 from fpsolve.analysis.continuation import LONGEST, SHORTEST, Trace, find_branches, with_branch
 from fpsolve.analysis.scan import Row, Scan, ScannedRow, scan_row, scanned
 from fpsolve.analysis.special_points import Placed, crossings, with_folds, with_points, with_values
-from fpsolve.analysis.surface import Surface
 from fpsolve.analysis.zero import Axis, Known, Zero, ZeroField, check_axes, is_dear, line_rtol, zero_of
 from fpsolve.arrays import FloatArray, is_whole, real_number, shown
-from fpsolve.budget import Countdown
 from fpsolve.data import Result, brief, dataset
 from fpsolve.drawing import add_legend, coloured, label_axes, scale_axis
-from fpsolve.errors import FpsolveError
 from fpsolve.exponent.adapt import Budget
 from fpsolve.messages import Code, Message
 from fpsolve.model.problem import Problem
@@ -37,10 +34,6 @@ if TYPE_CHECKING:
 
 SCAN_RTOL = 1e-5
 """Smallest error of F on the grid of a scan that is asked for, relative to its scale."""
-REDUCED_RTOL = 1e-4
-"""Error of F by a reduced basis, relative to its scale, on a grid twice as fine."""
-ONE_SPACE = 4000
-"""Unknowns of one space for the whole frame beyond which each point of a grid is solved on its own."""
 NODES, DEAR_NODES = 13, 7
 """Number of points of a scan, each way, and where F is dear."""
 DEAR_STEP = 0.05
@@ -175,34 +168,11 @@ class Boundary(Result):
         rough = partial(ZeroField, *frame, self.budget, self.scan_rtol, seconds, spent, self.known)
         return [Row(rough, count, number) for number in range(count)]
 
-    def reduced_scan(self) -> Scan | None:
-        """F on a grid twice as fine from a reduced basis, see `Surface`; None where there is none, or F is dear.
-
-        The basis of a dear F would take longer than its signs on the grid.
-        """
-        if is_dear(self.problem, self.zero):
-            return None
-        most, p = self.budget.line_seconds, self.zero.p
-        whole = Countdown(math.inf if most is None else SCAN_SHARE * most)
-        ranges = {axis.key: (axis.start, axis.stop, axis.scale) for axis in (self.x, self.y)}
-        nodes = np.linspace(0, 1, 2 * self.nodes - 1)
-        try:
-            with whole.running():
-                surface = Surface(self.problem, ranges, p, rtol=REDUCED_RTOL, budget=self.budget, unknowns=ONE_SPACE)
-                if not surface.is_converged:
-                    return None
-                found = surface.at_shares(np.array([*product(nodes, nodes)]))
-        except FpsolveError:
-            return None
-        values, gradients = (each.reshape(nodes.size, nodes.size, -1) / (p or 1.0) for each in found)
-        return Scan(nodes, values[:, :, 0], gradients, seconds=whole.spent, rtol=REDUCED_RTOL)
-
     def solve(
         self,
         rows: Iterator[ScannedRow] | None = None,
         progress: Callable[[], None] = lambda: None,
         stepped: Callable[[], None] = lambda: None,
-        scan: Scan | None = None,
     ) -> Iterator[Boundary]:
         """The scan, then one branch after the other, and the whole line: what there is so far, each time.
 
@@ -210,15 +180,9 @@ class Boundary(Result):
             rows: what `scan_row` gives for its `rows`, in order, of which no more are taken; None to scan them here.
             progress: called once for each node of the scan.
             stepped: called once for each point of a branch.
-            scan: what there is in place of rows.
         """
-        if scan is None:
-            tasks = self.rows()
-            made = scanned(tasks, map(scan_row, tasks) if rows is None else rows, progress)
-            scan = replace(made, rtol=self.scan_rtol)
-        else:
-            for _ in range(self.nodes**2):
-                progress()
+        tasks = self.rows()
+        scan = scanned(tasks, map(scan_row, tasks) if rows is None else rows, progress)
         now = replace(self, scan=scan, traces=(), seconds=scan.seconds, obstacles=(), complete=False)
         yield now
         zero_field = now.zero_field
@@ -313,7 +277,7 @@ def boundary(
     if nodes is not None and not is_whole(nodes, 2):
         raise ValueError(f"got nodes = {shown(nodes)}; must be a whole number from 2")
     line = begun(zero_of(zero), x, y, problem, step=step, nodes=nodes, budget=budget or Budget())
-    *_, whole = line.solve(progress=progress, stepped=progress, scan=line.reduced_scan())
+    *_, whole = line.solve(progress=progress, stepped=progress)
     return whole
 
 

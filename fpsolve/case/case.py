@@ -52,7 +52,7 @@ from fpsolve.case.sections import (
 from fpsolve.case.toml import Place, dotted, read_document
 from fpsolve.case.uncertain import EXAMPLE as UNCERTAIN
 from fpsolve.case.uncertain import Uncertain, uncertain_of
-from fpsolve.case.vary import REDUCIBLE, RTOL_REDUCED, Vary, assignments
+from fpsolve.case.vary import Vary, assignments
 from fpsolve.errors import CaseError, Fault
 from fpsolve.explain import explain, refuse, shortened
 from fpsolve.exponent.adapt import Budget
@@ -268,15 +268,11 @@ class Case(Section):
     @property
     def rtol(self) -> float:
         """The relative error wanted of Λ(p), as the case states it, or else what is usual for its problem."""
-        if "rtol" in self.moments.model_fields_set:
-            return self.moments.rtol
-        return max(self.problem.usual_rtol, RTOL_REDUCED * self.vary.reduced)
+        return self.moments.rtol if "rtol" in self.moments.model_fields_set else self.problem.usual_rtol
 
     @cached_property
     def asked(self) -> tuple[str, ...]:
         """The names of what is computed: those of [output], or else what is cheap and what other sections name."""
-        if self.vary.reduced:
-            return tuple(name for name in REDUCIBLE if not self.output.lacks(name))
         if self.output.names is not None:
             has_all = self.output.lists_quantities or not self.problem.is_closed_only
             return self.output.names if has_all else (MOMENT.name, SENSITIVITIES)
@@ -295,7 +291,7 @@ class Case(Section):
     @property
     def unasked(self) -> tuple[str, ...]:
         """What else there is of this case, where it leaves open what is computed."""
-        if self.output.names is not None or self.vary.reduced:
+        if self.output.names is not None:
             return ()
         is_there = {RESPONSE: self.responds, EIGENFUNCTIONS: not self.problem.no_picture}
         is_there |= dict.fromkeys(BY_JUMP, bool(self.problem.system.jumps))

@@ -7,7 +7,6 @@ import io
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
@@ -67,13 +66,9 @@ def vary_of(value: Any, info: ValidationInfo) -> Vary:
         refuse([((), value, DEPENDENT)])
         return Vary()
     table = flat(value, parameters)
-    reduced, refusals = table.pop("reduced", False), list[Refusal]()
-    if type(reduced) is not bool:
-        text = f"got {shown_with_kind(reduced)}; must be true or false; write reduced = true, or remove it"
-        refuse([(("reduced",), reduced, text)])
     if "file" in table:
-        return replace(_of_file(table, parameters, context.get("folder", Path())), reduced=reduced)
-    mode, columns = table.pop("mode", "product"), Columns()
+        return _of_file(table, parameters, context.get("folder", Path()))
+    mode, columns, refusals = table.pop("mode", "product"), Columns(), list[Refusal]()
     if mode not in ("product", "zip"):
         text = f'got {shown_with_kind(mode)}; must be one of "product", "zip";{nearest(mode, ("product", "zip"))}'
         refusals.append((("mode",), mode, f'{text} write mode = "zip", or remove it'))
@@ -81,12 +76,12 @@ def vary_of(value: Any, info: ValidationInfo) -> Vary:
         if key in parameters:
             refusals += _column(key, item, parameters[key], columns)
         else:
-            known = (*parameters, "mode", "file", "reduced")
+            known = (*parameters, "mode", "file")
             text = f"cannot be varied;{nearest(key, known)} known keys: {', '.join(known)}; rename or remove it"
             refusals.append(((key,), item, text))
     refuse(refusals)
     refuse(_uneven(columns) if mode == "zip" else _repeated(columns))
-    return Vary(columns, mode, reduced=reduced)
+    return Vary(columns, mode)
 
 
 def _of_file(table: Mapping[str, Any], parameters: Known, folder: Path) -> Vary:

@@ -40,8 +40,7 @@ from fpsolve.case.sections import (
     Varied,
     same,
 )
-from fpsolve.case.uncertain import Uncertain
-from fpsolve.case.vary import REDUCIBLE, Vary, assignments, map_key
+from fpsolve.case.vary import Vary, assignments, map_key
 from fpsolve.errors import FpsolveError, MeshError, NoSuchExponent
 from fpsolve.explain import Refusal, faults_in, nearest, quoted, shown
 from fpsolve.exponent.quantities import INDICES
@@ -68,9 +67,7 @@ def _of_moments(moments: Moments, valid: Known, context: Known) -> Iterator[Refu
 
 def _of_vary(vary: Vary, valid: Known, context: Known) -> Iterator[Refusal]:
     """Too many curves, or the first one that cannot be solved; of a file every one."""
-    if vary.reduced and (problem := problem_of(valid)) and (text := _irreducible(vary, problem)):
-        yield ("reduced",), True, f"{text}, or remove reduced"
-    elif len(vary) > MAX_CURVES:
+    if len(vary) > MAX_CURVES:
         yield (), None, f"makes {len(vary)} curves; must be at most {MAX_CURVES}; list fewer values"
     elif vary.file:
         reasons = _unsolvable(valid, vary) if vary.lines.size else ()
@@ -79,31 +76,6 @@ def _of_vary(vary: Vary, valid: Known, context: Known) -> Iterator[Refusal]:
             yield ("file",), None, f"{vary.file}:{line}: {text}"
     else:
         yield from (((), None, text) for _, text in islice(_unsolvable(valid, vary), 1))
-
-
-def _irreducible(vary: Vary, problem: Problem) -> str:
-    """Why few solves cannot tell all sets, or nothing."""
-    if problem.dimension != 2 or problem.classes or problem.is_closed_only:
-        return "got true, but few solves tell all sets of a system of two variables in one block alone; solve each set"
-    for key in vary.keys:
-        if key not in problem.differentiable or len(vary.values(key)) < 2:
-            known = ", ".join(problem.differentiable)
-            return (
-                f"got true with {key}; must be over one or two keys, with several values each, of {known}; choose these"
-            )
-    return "" if 1 <= len(vary.keys) <= 2 else f"got true with {len(vary.keys)} keys; must be one or two; vary fewer"
-
-
-def _beyond_reduced(names: Iterable[str], valid: Known) -> str:
-    """What few solves do not tell of all sets, where the case leaves it to them; or nothing."""
-    others = [name for name in names if name not in REDUCIBLE] if valid.get("vary", Vary()).reduced else []
-    told = f"is not there with vary.reduced = true, which gives {quoted(REDUCIBLE)}"
-    return f"{quoted(others[:1])} {told}; leave it out, or remove vary.reduced" if others else ""
-
-
-def _of_uncertain(uncertain: Uncertain, valid: Known, context: Known) -> Iterator[Refusal]:
-    if uncertain and (text := _beyond_reduced(["uncertain"], valid)):
-        yield (), None, text
 
 
 def _unsolvable(valid: Known, vary: Vary, *, with_moments: bool = False) -> Iterator[tuple[int, str]]:
@@ -166,9 +138,6 @@ def obstacle(base: Problem, varied: Varied, p: FloatArray, *, with_moments: bool
 
 def _of_mesh(mesh: MeshSection, valid: Known, context: Known) -> Iterator[Refusal]:
     """A mesh that cannot be read or made, is larger than the budget, or too wide for the noise of some curve."""
-    if mesh.model_fields_set and (text := _beyond_reduced(["mesh"], valid)):
-        yield (), None, text
-        return
     try:
         with np.errstate(all="ignore"):
             made = mesh.mesh(context.get("folder", Path()))
@@ -242,8 +211,6 @@ def _of_figure(figure: FigureSection, valid: Known, context: Known) -> Iterator[
     vary: Vary | None = valid.get("vary")
     if vary is None:
         return
-    if figure.model_fields_set & {"x", "y"} and (text := _beyond_reduced([figure.needed], valid)):
-        yield ("y",), None, text
     known = ["p", *(key for key in vary.keys if not vary.is_text(key))]
     if figure.x not in known:
         text = f";{nearest(figure.x, known)} must be p or a key of [vary]: {', '.join(known)}; add it to [vary]"
@@ -265,10 +232,7 @@ def _of_figure(figure: FigureSection, valid: Known, context: Known) -> Iterator[
 
 def _of_output(output: OutputSection, valid: Known, context: Known) -> Iterator[Refusal]:
     """Eigenfunctions at p that are not among the moments, a figure of what is not computed, and what is none."""
-    problem, names = problem_of(valid), list((output.names or ()) if output.lists_quantities else ())
-    names += [name for name in ("eigenfunctions", "sensitivities") if getattr(output, name)]
-    if text := _beyond_reduced(names, valid):
-        yield (), None, text
+    problem = problem_of(valid)
     if problem and output.lists_quantities:
         for name in {*(output.names or ())} & INDICES.keys():
             if told := even_only(problem, INDICES[name].symbol):
@@ -288,8 +252,6 @@ def _of_output(output: OutputSection, valid: Known, context: Known) -> Iterator[
 
 def _of_expect(expect: tuple[Expectation, ...], valid: Known, context: Known) -> Iterator[Refusal]:
     """Each p that is not among the moments, and each key of a `where` that is not varied, or not with that value."""
-    if text := _beyond_reduced([item.quantity for item in expect], valid):
-        yield (), None, text
     orders = (((i, "p"), item.p) for i, item in enumerate(expect) if item.p is not None)
     yield from _of_orders(valid, orders, f"choose one of them, {_without('expect')}")
     problem = problem_of(valid)
@@ -346,8 +308,6 @@ def _unwanted(name: str, section: Section, valid: Known) -> Iterator[Refusal]:
     output: OutputSection = valid.get("output", OutputSection())
     if section.model_fields_set and output.lacks(name):
         text = f'stands here, but output.quantities has no "{name}"; add it there, or remove this section'
-        yield (), None, text
-    if section.model_fields_set and (text := _beyond_reduced([name], valid)):
         yield (), None, text
 
 
@@ -427,7 +387,6 @@ REFUSALS: Mapping[str, Callable[[Any, Known, Known], Iterator[Refusal]]] = {
     "figure": _of_figure,
     "output": _of_output,
     "chart": _of_chart,
-    "uncertain": _of_uncertain,
     "expect": _of_expect,
     EXCURSIONS: _of_excursions,
     RESPONSE: _of_response,

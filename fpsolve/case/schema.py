@@ -52,7 +52,6 @@ class VarySection(BaseModel):
     file: Annotated[Text, Field(description="a file of sets: a header that names the keys, and a row for each set")] = (
         ""
     )
-    reduced: Annotated[bool, Field(description="whether few solves tell all sets of one or two keys")] = False
 
 
 class StandardDeviation(BaseModel):

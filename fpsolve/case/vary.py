@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from fpsolve.arrays import FloatArray
 from fpsolve.case.sections import MOST_NAMED, SAME, FigureSection, Value
 from fpsolve.data import written
-from fpsolve.model.quantity import LYAPUNOV_EXPONENT, MOMENT, STABILITY_INDEX, Quantity
+from fpsolve.model.quantity import Quantity
 
 WHOLLY_CHECKED = 1000
 """Sets of a case whose problems are all made and checked when it is loaded."""
@@ -22,10 +22,6 @@ SPREAD = 250
 """Sets of a case with more whose problems are, evenly spread, beside those at the ends of the keys."""
 BLOCK = 4096
 """Sets that are read or made at a time."""
-REDUCIBLE = MOMENT.name, LYAPUNOV_EXPONENT.name, STABILITY_INDEX.name
-"""What few solves can tell of all sets."""
-RTOL_REDUCED = 1e-6
-"""The relative error wanted of these where nothing else is stated."""
 Column = FloatArray | tuple[str, ...]
 """The values of a varied key: numbers, or texts."""
 Columns = dict[str, Column]
@@ -42,7 +38,6 @@ class Vary:
         file: where they were read, for messages; empty for those of the case itself.
         lines: where each set stands in this file, integers of shape (sets,).
         faults: what is wrong in other rows, with their lines.
-        reduced: whether few solves tell all sets.
     """
 
     columns: Mapping[str, Column] = field(default_factory=dict)
@@ -50,7 +45,6 @@ class Vary:
     file: str = ""
     lines: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=int))
     faults: tuple[tuple[int, str], ...] = ()
-    reduced: bool = False
 
     def __post_init__(self) -> None:
         columns = {key: values if holds_texts(values) else np.asarray(values) for key, values in self.columns.items()}
@@ -94,13 +88,6 @@ class Vary:
         columns = [_plain(picked(values, each)) for values, each in zip(self.columns.values(), at, strict=True)]
         for row in zip(*columns, strict=True):
             yield dict(zip(self.columns, row, strict=True))
-
-    @property
-    def points(self) -> FloatArray:
-        """The values of all sets, numbers alone, shape (sets, keys)."""
-        columns = [np.asarray(values) for values in self.columns.values()]
-        at = np.meshgrid(*columns, indexing="ij") if self.mode == "product" else columns
-        return np.stack([each.ravel() for each in at], axis=-1)
 
     @property
     def checked(self) -> NDArray[np.int64]:

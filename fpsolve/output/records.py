@@ -40,16 +40,14 @@ from fpsolve.errors import OutputError, Remedy
 from fpsolve.exponent.error import Moment
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import Code, Message, Severity, message_of
-from fpsolve.model.quantity import SECONDS, STATUS
 from fpsolve.output.tables import says_more
 from fpsolve.parts.every import BY_NAME
 from fpsolve.parts.moments import PART as MOMENTS
 from fpsolve.parts.moments import Moments, begun_of, unfinished
 from fpsolve.parts.part import Entry, Job, Numerics, Part, Reason, Settings
-from fpsolve.results.curve import CurveResult, SimulatedCurve, Status
+from fpsolve.results.curve import CurveResult, SimulatedCurve
 from fpsolve.results.table import Table
 from fpsolve.study.columns import row_of, table_of
-from fpsolve.study.reduced import OfSets, Wanted, result_at, seconds_of
 from fpsolve.study.solve import Asked, everything, result_of
 
 SOLVED_RECORDS = "records/solved"
@@ -180,8 +178,6 @@ class Results(Sequence[CurveResult]):
         self._order: list[int] = []
         self._kept: dict[int, CurveResult] = {}
         self._room = KEPT
-        self._of_sets: Mapping[Wanted, OfSets] = {}
-        self._are_told = np.zeros(case.planned, dtype=bool)
 
     def asked(self, number: int) -> Asked:
         """What is asked of the curve with a number."""
@@ -198,25 +194,6 @@ class Results(Sequence[CurveResult]):
             self._given[number] = found
         self._kept.pop(number, None)
         self._unread.add(number)
-
-    def is_told(self, number: int) -> bool:
-        """Whether a surface tells the curve with a number."""
-        return bool(self._are_told[number - 1])
-
-    def tell(self, known: Mapping[Wanted, OfSets]) -> int:
-        """Count the sets that surfaces tell among those that are known; how many these are."""
-        self._of_sets, self._are_told = known, np.all([of.are_told for of in known.values()], axis=0)
-        told, table = np.flatnonzero(self._are_told), self._table
-        self._order = sorted({*self._order, *(told + 1).tolist()})
-        for (name, p), of in known.items():
-            at = (told, self._case.p.tolist().index(p)) if table[name].quantity.dims else told
-            table[name].values[at], table[f"{name}_error"].values[at] = of.values[told], of.errors[told]
-        numbers: dict[str, float] = {"p_solved": self._case.p.size * (MOMENTS.name in self._case.asked), "p_failed": 0}
-        numbers |= {STATUS.name: Status.CONVERGED, SECONDS.name: seconds_of(known)}
-        for name, number in numbers.items():
-            table[name].values[told] = number
-        self.says[told] = False
-        return told.size
 
     @property
     def table(self) -> Table:
@@ -287,8 +264,6 @@ class Results(Sequence[CurveResult]):
             return known
         [varied] = self._case.vary.sets(number - 1, number)
         curve = Curve(self._case.problem, varied, number)
-        if self._are_told[number - 1]:
-            return result_at(curve, self._of_sets)
         return self._keep(curve, *self.entries(curve))
 
     def _keep(self, curve: Curve, entries: Mapping[str, Entry], begun: Mapping[float, Moment]) -> CurveResult:

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from fpsolve.analysis.regions import P_BIFURCATIONS, Region, Regions, regions
-from fpsolve.analysis.scan import Row, Sample, Scan, ScannedRow, scan_row
+from fpsolve.analysis.scan import Row, Sample, ScannedRow, scan_row
 from fpsolve.analysis.stability import Boundary, begun, crossed, is_of_line
 from fpsolve.analysis.zero import Axis, Zero, is_dear, line_of_value
 from fpsolve.arrays import FloatArray
@@ -28,7 +28,7 @@ from fpsolve.errors import FpsolveError, NoPerturbationTheory
 from fpsolve.files import writable, write_csv, write_json
 from fpsolve.messages import Code, Message, message_of
 from fpsolve.model.problem import Problem
-from fpsolve.output.records import Record, Records, append, key_of, made_of, record_of
+from fpsolve.output.records import Records, append, key_of, made_of, record_of
 from fpsolve.output.tables import head, in_case_words
 from fpsolve.page.page import Block, Column, Drawing, Grid, Sentence
 from fpsolve.pool import Pool, serial
@@ -157,17 +157,13 @@ def solve_chart(
         known: gives what is recorded of the points of a line.
         has_closed_forms: whether they are found, too, which takes seconds.
     """
-    lines = begun_lines(case)
-    records = [known(line) for line in lines]
-    lines = [replace(line, known=of) for line, of in zip(lines, records, strict=True)]
+    lines = [replace(line, known=known(line)) for line in begun_lines(case)]
     x, y = lines[0].x, lines[0].y
     chart = Chart((), _closed_forms(lines[0].problem, charted(case).zero, (x, y)) if has_closed_forms else ())
-    scans = [of.scan(line) if of else line.reduced_scan() for line, of in zip(lines, records, strict=True)]
-    tasks = [row for line, reduced in zip(lines, scans, strict=True) if reduced is None for row in line.rows()]
-    rows = iter(map(scan_row, tasks))
-    for each, reduced in zip(lines, scans, strict=True):
+    rows = iter(map(scan_row, [row for line in lines for row in line.rows()]))
+    for each in lines:
         done = chart.lines
-        for line in each.solve(rows, progress, stepped, reduced):
+        for line in each.solve(rows, progress, stepped):
             chart = replace(chart, lines=(*done, line))
             yield chart
     whole = tuple(crossed(chart.lines))
@@ -210,7 +206,7 @@ class Point:
 
 
 class Points:
-    """The points of a line, recorded one by one as they are solved, and a scan from a reduced basis.
+    """The points of a line, recorded one by one as they are solved.
 
     Args:
         folder: of the case.
@@ -220,10 +216,8 @@ class Points:
 
     def __init__(self, folder: Path, case: Case, line: Boundary) -> None:
         frame = [repr(each) for each in (line.zero, *(replace(axis, at=()) for axis in (line.x, line.y)), line.budget)]
-        curve = case.curve({})
         self._folder = folder.resolve() / LINE_RECORDS
-        self._key = key_of(Point, curve, frame=frame)
-        self._scan_key = key_of(Scan, curve, frame=frame, nodes=line.nodes)
+        self._key = key_of(Point, case.curve({}), frame=frame)
         self._found: dict[tuple[float, ...], Sample | Message | None] | None = None
 
     def find(self, rtol: float, at: FloatArray) -> Sample | Message | None:
@@ -243,23 +237,6 @@ class Points:
             append(self._folder, self._key, record_of(Point(rtol, at, found, None)))
         elif not found.tells_of(Code.NO_MEMORY) and found.code is not Code.LINE_SPENT and not is_of_line(found):
             append(self._folder, self._key, record_of(Point(rtol, at, None, found)))
-
-    def scan(self, line: Boundary) -> Scan | None:
-        """Its reduced scan, from records where it is there."""
-        records = Records(self._folder).look()
-        if (found := records.made(self._scan_key, lambda record: _scan_of(record, 2 * line.nodes - 1))) is not None:
-            return found
-        if (made := line.reduced_scan()) is not None:
-            append(self._folder, self._scan_key, record_of(made))
-        return made
-
-
-def _scan_of(record: Record, count: int) -> Scan:
-    """A scan from its record. Raises `ValueError` where that has another form."""
-    found = Scan(**made_of(Scan, record))
-    if (found.nodes.shape, found.values.shape, found.gradients.shape) != ((count,), (count,) * 2, (count, count, 2)):
-        raise ValueError("this is no record of a scan")
-    return found
 
 
 def write_chart(case: Case, chart: Chart, folder: Path) -> None:
@@ -291,7 +268,7 @@ def write_chart(case: Case, chart: Chart, folder: Path) -> None:
                 "rtol": line.rtol,
                 "scan": {
                     "nodes": [line.scan.nodes.size] * 2,
-                    "rtol": line.scan.rtol,
+                    "rtol": line.scan_rtol,
                     "of_value": line_of_value(line.problem, line.zero),
                 },
                 "branches": [

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 from datetime import UTC, datetime
 from functools import partial
-from itertools import chain
 from pathlib import Path
 from time import monotonic
 from typing import Any
@@ -14,7 +13,6 @@ import numpy as np
 
 from fpsolve.case.case import Case, Curve
 from fpsolve.case.sections import Varied
-from fpsolve.messages import Severity
 from fpsolve.model.quantity import MOMENT, STATUS
 from fpsolve.output.datasets import write_dataset
 from fpsolve.output.records import (
@@ -24,9 +22,6 @@ from fpsolve.output.records import (
     Results,
     append,
     begun_record,
-    key_of,
-    made_of,
-    record_of,
     record_of_set,
     set_key,
 )
@@ -40,7 +35,6 @@ from fpsolve.pool import Pool, serial
 from fpsolve.results.curve import CurveResult, Status
 from fpsolve.results.table import Table
 from fpsolve.show.notes import notes
-from fpsolve.study.reduced import OfSets, Wanted, solved_sets, stated, wanted
 from fpsolve.study.solve import Order, Solved, batches, result_of, solve_batch
 from fpsolve.workflow.progress import MOMENTS, SETS, Advance, Phase
 
@@ -92,7 +86,6 @@ class Sweep:
 
     failed = 0
     notes: tuple[Note, ...] = ()
-    _solves = 0
 
     def __init__(self, case: Case, folder: Path, *, is_fresh: bool = False) -> None:
         self.case, self.folder = case, folder.resolve()
@@ -105,7 +98,7 @@ class Sweep:
         self._due, self._unfinished = 0.0, set[int]()
         self._are_drawn = [any(BY_NAME[name].is_drawn for name in self.results.asked(number)) for number in (1, 2)]
         self._steps_each = max(case.p.size if MOMENT.name in case.asked else 0, 1) if case.planned == 1 else 1
-        self._settled = self._tell(solves=False)
+        self._settled = 0
         self.find()
         self.known = len(self.results)
 
@@ -121,28 +114,10 @@ class Sweep:
         """How many sets are finished."""
         return len(self.results) - len(self._unfinished)
 
-    def _tell(self, *, solves: bool) -> int:
-        """Count the sets that few solves tell, kept by an earlier run or found now; how many sets these are."""
-        if not self.case.vary.reduced:
-            return 0
-        [first], known = self.case.curves(0, 1), dict[Wanted, OfSets]()
-        self.records.look()
-        for what in wanted(self.case):
-            key = key_of(OfSets, first, **stated(self.case, what))
-            found = self.records.made(key, lambda record: OfSets(**made_of(OfSets, record)))
-            if found is None and solves:
-                found = solved_sets(self.case, what)
-                append(self.folder / SOLVED_RECORDS, key, record_of(found))
-            if found is None:
-                return 0
-            known[what] = found
-        self._solves = sum(of.nodes for of in known.values())
-        return self.results.tell(known)
-
     def find(self) -> None:
         """Look for the records of all sets, also those that a worker has finished without reporting them."""
         for curve in self.case.curves() if self.records.look().are_there else ():
-            if not self.results.is_told(curve.number) and self.results.find(curve):
+            if self.results.find(curve):
                 self._unfinished.discard(curve.number)
                 self._settled += not self._is_drawn(curve.number)
 
@@ -170,8 +145,6 @@ class Sweep:
         is_alone = self.case.planned == 1 and not pool.is_elsewhere
         if self._settled:
             progress(self._settled * self._steps_each, known=True)
-        if self.case.vary.reduced and not self._solves:
-            progress(self._tell(solves=True))
         kept = partial(keep, self.folder, self.numerics)
         growing = self._grow if is_alone else partial(grow, self.folder, self.numerics)
         task = partial(solve_batch, problem=self.case.problem, numerics=self.numerics, keep=kept, grow=growing)
@@ -209,13 +182,7 @@ class Sweep:
                 write(result, self.folder)
         write_dataset(self.case, table, self.folder, self.facts)
         self.failed = int(np.isin(table[STATUS.name].values, [each for each in Status if each.fails]).sum())
-        said = notes(self.case, self.results.telling, count=len(self.results))
-        if self.case.vary.reduced:
-            told = sum(map(self.results.is_told, range(1, self.case.planned + 1)))
-            whole = "" if told == self.case.planned else f", each of the other {self.case.planned - told} its own"
-            text = f"{self.case.name}: {self._solves} solves tell {told} curves{whole}"
-            said = chain([Note(Severity.NOTE, text)], said)
-        self.notes = tuple(said)
+        self.notes = tuple(notes(self.case, self.results.telling, count=len(self.results)))
 
     def _is_drawn(self, number: int) -> bool:
         """Whether pictures of a set are wanted, which are drawn in each run."""

@@ -14,7 +14,6 @@ from fpsolve import (
     ExponentSolver,
     NonGaussianNoise,
     OrnsteinUhlenbeck,
-    PlaneSystem,
     Problem,
     VibroImpactOscillator,
     boundary,
@@ -31,7 +30,7 @@ from fpsolve.errors import FpsolveError
 from fpsolve.exponent import Budget
 from fpsolve.fem import generator
 from fpsolve.messages import Code, Message
-from fpsolve.model import Bounded, MarkovChain, White
+from fpsolve.model import MarkovChain
 from tests.conftest import sampled
 
 NOISE = NonGaussianNoise(D0=0.5, tau0=0.5, r0=0.95)
@@ -422,22 +421,6 @@ def test_a_frame_without_a_line(zero, c1, text):
     assert found.remark() == text
 
 
-@pytest.mark.slow
-def test_an_island_that_a_coarse_grid_misses():
-    """The tongue of Mathieu's equation at ν = 2/3 shows at no point of a grid of 13 × 13."""
-    equation, names = "-2*b*v - (1 + load + shake)*x", {"load": "noise.load", "shake": "noise.shake"}
-    system = PlaneSystem.of_equations(("x", "v"), ("v", equation), {"b": 0.03}, noises=names)
-    problem = Problem(system, {"load": Bounded(0.4, 2.0, 0.0), "shake": White(0.1)})
-    x, y = Axis("noise.load.nu", 0.6, 1.4), Axis("noise.load.mu", 0.2, 0.8)
-    scan = begun(zero_of(SECOND), x, y, problem).reduced_scan()
-    is_tongue = scan.values[x.value(scan.nodes) < 0.75] > 0
-    assert is_tongue.any()
-    assert not is_tongue[::2, ::2].any()
-    u, v = np.argwhere(is_tongue)[0]
-    inside = problem.at({x.key: float(x.value(scan.nodes[u])), y.key: float(y.value(scan.nodes[v]))})
-    assert ExponentSolver(inside).solution(2.0).pair.value > 0
-
-
 def test_a_remark_only_speaks_of_where_f_exists():
     """For r₀ > 1 Λ(2) is infinite, and refused."""
     found = line(SECOND, Axis("noise.r0", 0.5, 1.5), Axis("oscillator.c1", -9.0, -8.0), exact=True)
@@ -524,12 +507,6 @@ def test_f_is_solved_in_one_thread(monkeypatch):
 def test_each_row_and_each_point_is_told_as_it_is_found(monkeypatch):
     told, seen, sample = [], [], ZeroField._at
     monkeypatch.setattr(ZeroField, "_at", lambda self, *given: (seen.append(len(told)), sample(self, *given))[1])
-    found = line(progress=lambda: told.append(1))
-    assert found.scan.nodes.size == 5
-    assert len(told) == 9 + sum(branch.x.size for branch in found.branches)
-    told.clear()
-    seen.clear()
-    monkeypatch.setattr(Boundary, "reduced_scan", lambda self: None)
     found = line(progress=lambda: told.append(1))
     assert found.scan.nodes.size == 3
     assert seen[:9] == [0, 0, 0, 3, 3, 3, 6, 6, 6]
