@@ -57,11 +57,11 @@ from fpsolve.errors import CaseError, Fault
 from fpsolve.explain import explain, refuse, shortened
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.quantities import (
-    BY_JUMP,
     CRITICAL_IMPACT_FACTOR,
     IMPACT_RATE,
     LYAPUNOV_EXPONENT,
     MOMENT,
+    OF_IMPACTS,
     STABILITY_INDEX,
 )
 from fpsolve.fem.mesh import CylinderMesh
@@ -294,7 +294,7 @@ class Case(Section):
         if self.output.names is not None:
             return ()
         is_there = {RESPONSE: self.responds, EIGENFUNCTIONS: not self.problem.no_picture}
-        is_there |= dict.fromkeys(BY_JUMP, bool(self.problem.system.jumps))
+        is_there |= dict.fromkeys(OF_IMPACTS, bool(self.problem.system.jumps))
         if self.problem.is_closed_only:
             is_there |= dict.fromkeys({*QUANTITY_NAMES} - {MOMENT.name, SENSITIVITIES}, False)
         known = {*self.asked} - ({EIGENFUNCTIONS} if not self.output.asks_for_eigenfunctions else set())

@@ -262,10 +262,6 @@ INDICES: Mapping[str, Index] = {
         *(IMPACT_RATE, CRITICAL_IMPACT_FACTOR, CRITICAL_RESTITUTION),
     )
 }
-BY_JUMP: Mapping[str, Callable[[ExponentSolver, int], Estimate | Absent]] = {
-    IMPACT_RATE.name: impact_rate,
-    CRITICAL_IMPACT_FACTOR.name: critical_impact_factor,
-    CRITICAL_RESTITUTION.name: critical_restitution,
-}
-"""Those of them that each jump of a system has."""
+OF_IMPACTS = IMPACT_RATE.name, CRITICAL_IMPACT_FACTOR.name, CRITICAL_RESTITUTION.name
+"""Those of them that a system without impacts has not."""
 QUANTITIES: Mapping[str, Quantity] = {MOMENT.name: MOMENT, **INDICES}

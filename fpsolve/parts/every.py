@@ -20,7 +20,6 @@ PARTS: tuple[Part, ...] = (
     moments.PART,
     rate_function.PART,
     *indices.PARTS,
-    indices.JUMPS,
     indices.THEORY,
     moments.CLASSES,
     excursions.PART,

@@ -4,19 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import cache, partial
-from typing import Any
+from functools import cache
 
 from fpsolve.case.case import Case, Curve
 from fpsolve.data import Quantity
 from fpsolve.errors import NoSuchExponent
 from fpsolve.exponent.error import Absent, Estimate, digits
 from fpsolve.exponent.quantities import (
-    BY_JUMP,
     CRITICAL_RESTITUTION,
     INDICES,
     MOMENT,
+    OF_IMPACTS,
     STABILITY_INDEX,
     VARIANCE_RATE,
     Index,
@@ -25,19 +23,19 @@ from fpsolve.messages import Code, Message, Remedy, message_of
 from fpsolve.model.quantity import MEAN_SQUARE
 from fpsolve.page.page import Block, Column, filled
 from fpsolve.parts.intervals import INTERVAL, spreads_of
-from fpsolve.parts.part import Job, Numerics, Part, Reason, Settings, attempt
+from fpsolve.parts.part import Job, Numerics, Part, Reason, Settings
 from fpsolve.results.curve import CurveResult
 from fpsolve.results.table import Row, pair
 from fpsolve.results.text import NUMBER_COLUMNS, interval, row_of
 
 
-def index_of(found: Estimate | Absent, name: str, symbol: str, place: str = "") -> Estimate | Reason:
+def index_of(found: Estimate | Absent, name: str, symbol: str) -> Estimate | Reason:
     """An index, or why there is none; of δ_p that is a limit, as Λ(p) may have a root far out."""
     if found:
         return found
     if name == STABILITY_INDEX.name:
-        return Reason("impossible", found.reason, "stability index", place)
-    return Reason("absent", found.reason, symbol, place)
+        return Reason("impossible", found.reason, "stability index")
+    return Reason("absent", found.reason, symbol)
 
 
 def is_estimate(number: Estimate) -> bool:
@@ -97,70 +95,6 @@ PARTS: tuple[Part, ...] = tuple(map(part_of, INDICES.values()))
 """A part for each index."""
 
 
-@dataclass(frozen=True)
-class JumpIndex:
-    """An index of one jump of a system; or why there is none."""
-
-    estimate: Estimate | None
-    reason: Reason | None = None
-
-
-OfJumps = tuple[Mapping[str, JumpIndex], ...]
-"""The indices of each jump, by their names."""
-
-
-def _jump_settings(case: Case, number: int) -> Settings | None:
-    names = [name for name in BY_JUMP if name in case.asked] if len(case.problem.system.jumps) > 1 else []
-    return {"names": names} if names else None
-
-
-def _solve_jumps(job: Job, settings: Settings) -> OfJumps:
-    """The indices of each jump of a system with several."""
-    rays = job.curve.problem.system.jumps
-    found = list[dict[str, JumpIndex]]()
-    for number, ray in enumerate(rays):
-        place, of_ray = f"at φ = {ray.phase:.6g}", dict[str, JumpIndex]()
-        for name in settings["names"]:
-            symbol = INDICES[name].symbol
-            solve = partial(BY_JUMP[name], job.solver, number)
-            each = attempt(lambda: index_of(solve(), name, symbol, place), symbol, place)  # noqa: B023
-            of_ray[name] = JumpIndex(None, each) if isinstance(each, Reason) else JumpIndex(each)
-        found.append(of_ray)
-    return tuple(found)
-
-
-def _content_of_jumps(case: Case, result: CurveResult) -> Mapping[str, Any]:
-    rays = result.curve.problem.system.jumps if result.jumps else ()
-    found = list[dict[str, Any]]()
-    for ray, of_ray in zip(rays, result.jumps, strict=True):
-        numbers = {key: each for name, number in of_ray.items() for key, each in pair(name, number).items()}
-        found.append({"phase": ray.phase, "log_factor": ray.log_factor, **numbers})
-    return {"jumps": found} if found else {}
-
-
-def _jumps_are_whole(found: OfJumps, curve: Curve, settings: Settings) -> bool:
-    return len(found) == len(curve.problem.system.jumps) and all(
-        each.keys() <= BY_JUMP.keys() and all(is_estimate(one.estimate) for one in each.values() if one.estimate)
-        for each in found
-    )
-
-
-def _reasons_of_jumps(found: OfJumps) -> Iterator[Message]:
-    return (each.reason.message for of_jump in found for each in of_jump.values() if each.reason)
-
-
-JUMPS: Part = Part(
-    "jumps",
-    _jump_settings,
-    _solve_jumps,
-    OfJumps,
-    content=_content_of_jumps,
-    reasons=_reasons_of_jumps,
-    is_whole=_jumps_are_whole,
-)
-"""The indices of impacts, of each place of several."""
-
-
 @cache
 def _column_of_theory(name: str) -> str:
     return INDICES[name].perturbation.name
@@ -188,7 +122,7 @@ def asked(case: Case) -> list[Index]:
 def told_indices(case: Case) -> list[Index]:
     """The indices that a case asks for, without those of impacts where it names none, and not one ray has them."""
     has_impacts = len(case.system.jumps) == 1 or case.output.lists_quantities
-    return [index for index in asked(case) if has_impacts or index.name not in BY_JUMP]
+    return [index for index in asked(case) if has_impacts or index.name not in OF_IMPACTS]
 
 
 def index_text(index: Index, result: CurveResult, most: int = 17) -> str:
@@ -222,10 +156,6 @@ def _show(case: Case, result: CurveResult) -> Iterator[Block]:
         told, spread = f"{closed:.6g}, Eq. {MOMENT.closed_form}" * math.isfinite(closed), of_p.get(2.0)
         row = [*row_of(MEAN_SQUARE, square, case.units.time), told]
         rows.append([*row, interval(spread.low, spread.high) if spread else ""])
-    for ray, of_ray in zip(problem.system.jumps, result.jumps, strict=False):
-        for name, found in of_ray.items():
-            about = replace(INDICES[name], words=f"{INDICES[name].words} at φ = {ray.phase:.6g}")
-            rows += [[*row_of(about, found, case.units.time), "", ""]] if found else []
     if any(result.estimates.values()):
         yield filled("", [*NUMBER_COLUMNS, Column("perturbation theory", 3), Column(INTERVAL, 1)], rows)
 

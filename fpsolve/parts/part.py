@@ -62,13 +62,11 @@ class Reason:
         kind: whether it is known that there is none, or that there is none of this kind of problem, or solving failed.
         message: why.
         symbol: what the number is called.
-        place: to which of several places it belongs; empty where there is one.
     """
 
     kind: Literal["absent", "impossible", "failed"]
     message: Message
     symbol: str
-    place: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +84,7 @@ class Entry:
     seconds: float = 0.0
 
 
-def attempt(solve: Callable[[], Any], symbol: str, place: str = "") -> Any:
+def attempt(solve: Callable[[], Any], symbol: str) -> Any:
     """What is solved, or the `Reason` why it is missing, which takes nothing else with it."""
     try:
         return solve()
@@ -98,7 +96,7 @@ def attempt(solve: Callable[[], Any], symbol: str, place: str = "") -> Any:
         raise
     except Exception as failure:
         message = fault(failure)
-    return Reason("failed", message, symbol, place)
+    return Reason("failed", message, symbol)
 
 
 def fault(failure: Exception) -> Message:

@@ -146,7 +146,6 @@ class CurveResult(Result):
         warnings: what limits these numbers.
         notes: where the theories compared with are not valid.
         failures: why some p are missing, or with all p some indices.
-        jumps: where a system has several, the `BY_JUMP` of each by their names, as `estimates`.
         classes: λ and Λ(p) of blocks of variables, or on a ray that the phase never leaves and across it.
         parts: what else was found, by the names of `Part`s; without what is not wanted, or did not converge.
         seconds: how long the processor took.
@@ -159,7 +158,6 @@ class CurveResult(Result):
     warnings: tuple[Message, ...] = ()
     notes: tuple[Message, ...] = ()
     failures: tuple[Failure, ...] = ()
-    jumps: tuple[Mapping[str, Estimate | None], ...] = ()
     classes: tuple[InvariantClass, ...] = ()
     parts: Mapping[str, Any] = field(default_factory=dict)
     seconds: float = 0.0

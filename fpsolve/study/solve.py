@@ -23,7 +23,6 @@ from fpsolve.exponent.quantities import INDICES
 from fpsolve.messages import Code, Message, Severity, message_of
 from fpsolve.model.problem import Problem
 from fpsolve.parts.every import BY_NAME, PARTS
-from fpsolve.parts.indices import JUMPS
 from fpsolve.parts.moments import CLASSES, Moments, unfinished
 from fpsolve.parts.moments import PART as MOMENTS
 from fpsolve.parts.part import Entry, Job, Numerics, Part, Reason, Settings, attempt
@@ -131,8 +130,6 @@ def result_of(
                 said[message.severity].append(message)
         elif (entry := entries.get(part.name)) and entry.reason and part.name in asked and part.symbol:
             reasons.append((part, entry.reason))
-    jumps = known.get(JUMPS.name, ())
-    reasons += [(JUMPS, each.reason) for of_jump in jumps for each in of_jump.values() if each.reason]
     for message in missing(reasons, moments.failures):
         if numerics.is_stated or not message.tells_of(Code.NOT_ONE_RAY):
             said[message.severity].append(message)
@@ -146,14 +143,13 @@ def result_of(
         warnings=tuple(said[Severity.WARNING]),
         notes=tuple(said[Severity.NOTE]),
         failures=failures if is_whole else (*failures, Failure(None, Message(Code.UNFINISHED))),
-        jumps=tuple({name: each.estimate for name, each in of_jump.items()} for of_jump in jumps),
         classes=known.get(CLASSES.name, ()),
         parts={name: found for name, found in known.items() if name not in _OWN},
         seconds=sum(entry.seconds for name, entry in entries.items() if name in asked),
     )
 
 
-_OWN = {MOMENTS.name, *INDICES, JUMPS.name, CLASSES.name, "discretisation"}
+_OWN = {MOMENTS.name, *INDICES, CLASSES.name, "discretisation"}
 """Names of parts that have attributes of their own in a result."""
 
 
@@ -175,8 +171,8 @@ def missing(reasons: Sequence[tuple[Part, Reason]], failures: Sequence[Failure])
         elif message.severity is not Severity.FAILURE:
             yield message
             continue
-        group = reason.place if part.name in _OWN else part.name
-        groups.setdefault((code, message, group), []).append(f"{reason.symbol} {reason.place}".strip())
+        group = "" if part.name in _OWN else part.name
+        groups.setdefault((code, message, group), []).append(reason.symbol)
     for (code, message, _), symbols in groups.items():
         yield Message(code, symbols=symbols, reason=message)
 

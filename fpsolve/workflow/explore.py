@@ -75,7 +75,7 @@ MOST_EQUATIONS = 4
 """Variables whose rates the page shows; of more they would fill it."""
 NO_BOUND = 1e3
 """A bound from which on it keeps formulas from overflow, and tells nothing of what is usual."""
-NUMBERS = {MOMENT.name, *INDICES, "theory", "jumps", "classes", "discretisation"}
+NUMBERS = {MOMENT.name, *INDICES, "theory", "classes", "discretisation"}
 """The parts that are solved."""
 Answer = Mapping[str, Any]
 """What JSON can hold."""

@@ -22,7 +22,7 @@ from fpsolve.errors import NotConverged, OutputError
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.error import Moment
 from fpsolve.fem.mesh import make_mesh
-from fpsolve.messages import Code, Message
+from fpsolve.messages import Code
 from fpsolve.output import records as plain
 from fpsolve.output.records import (
     Records,
@@ -37,8 +37,7 @@ from fpsolve.output.records import (
 )
 from fpsolve.parts import PARTS
 from fpsolve.parts.every import BY_NAME
-from fpsolve.parts.indices import JumpIndex
-from fpsolve.parts.part import Entry, Job, Numerics, Reason
+from fpsolve.parts.part import Entry, Job, Numerics
 from fpsolve.study import solve
 from fpsolve.study.solve import everything, solve_curve
 from fpsolve.workflow.simulate import simulation_key
@@ -329,22 +328,16 @@ def test_what_a_budget_has_limited_is_solved_again_with_another(tmp_path, monkey
 
 
 def test_what_lacks_something_for_a_small_budget_is_solved_again_with_another(tmp_path):
-    """Sensitivities of p that failed, and impacts at one of several places; what lacks nothing stays."""
+    """Sensitivities of p that failed; what lacks nothing stays."""
     case = case_in(tmp_path, TEXT, [ALL, "vary={}"])
     [solved], [curve], asked, numerics = solve_sets(case), case.curves(), everything(case), Numerics.of(case)
     more = replace(numerics, budget=Budget(seconds=500.0))
     found = solved.entries["sensitivities"].found
-    failed = Reason("failed", Message(Code.NO_MEMORY), "N")
-    lacking = {
-        "sensitivities": replace(found, p=found.p[1:], moments=found.moments[1:]),
-        "jumps": ({"impact_rate": JumpIndex(None, failed)},),
-    }
-    for entries, is_kept in ((solved.entries, True), ({"sensitivities": Entry(lacking["sensitivities"])}, False)):
+    lacking = replace(found, p=found.p[1:], moments=found.moments[1:])
+    for entries, is_kept in ((solved.entries, True), ({"sensitivities": Entry(lacking)}, False)):
         record = record_of_set(curve, asked, numerics, entries)
         assert "sensitivities" in entries_of(record, curve, asked, numerics)[0]
         assert ("sensitivities" in entries_of(record, curve, asked, more)[0]) == is_kept
-    [jumps] = BY_NAME["jumps"].reasons(lacking["jumps"])
-    assert jumps.tells_of(Code.NO_MEMORY)  # so that it is not recorded
 
 
 def test_moments_of_an_unfinished_run_are_taken_with_its_budget_alone(tmp_path):

@@ -147,7 +147,7 @@ class EquationSystem(System):
         drift: their rates.
         named: the values of the parameters by their names.
         noises: what the noise is called in the rates, and the section that states it, one pair.
-        walls: where the state is reflected; of more than two variables one.
+        walls: where the state is reflected, one at most.
         quantities: what parameters are, by their names, as far as that is stated.
 
     Raises:
@@ -237,14 +237,11 @@ class EquationSystem(System):
             if name.startswith(AMPLITUDE.name) or name == JOINT_DENSITY.name:
                 what = "which has another meaning in the stationary response of terms of degree 3; rename it"
                 raise TableError(f"got the name {name}, {what}", "variables", i)
-        if self.walls and (self.pasts or len(self.walls) > {1: 0, 2: 2}.get(len(self.variables), 1)):
+        if self.walls and (self.pasts or len(self.walls) > 1 or len(self.variables) < 2):
             found = f"{len(self.walls)} for {len(self.variables)} variables{' with a delay' * bool(self.pasts)}"
-            why = "must be two at most for two variables, one for more, and none with a delay"
+            why = "must be one at most, and none for one variable or with a delay"
             raise TableError(f"got {found}; {why}; leave out walls", "walls")
-        _ = self.stop
-        jumps = self.jumps
-        if len({jump.phase for jump in jumps}) < len(jumps):
-            raise TableError("two walls are at the same place; remove one of them", "walls")
+        _ = self.stop, self.jumps  # refuse what they cannot be
 
     def _given_names(self) -> Iterator[tuple[Any, Place]]:
         """All names with their places."""
@@ -527,26 +524,23 @@ class EquationSystem(System):
 
     @cached_property
     def jumps(self) -> tuple[Jump, ...]:  # type: ignore[override]
-        """Where the phase passes the rays of the walls: x = 0 is φ = π/2, v = 0 is φ = 0."""
-        found = list[Jump]()
-        for number, wall in enumerate(self.walls if len(self.variables) == 2 else ()):
-            place, _, _ = self._place(number)
-            log_factor, leading = self._log_factor(number)[0], None
-            if EPSILON in names_in(str(wall.restitution)):
-                try:
-                    zeroth, first, second = self._log_factor(number, EPSILON, 0.0, order=2)
-                    leading = zeroth + first * self.epsilon + second * self.epsilon**2
-                except TableError:  # no power series
-                    leading = None
-            found.append(Jump(math.pi / 2 if place == 0 else 0.0, log_factor, leading))
-        return tuple(found)
+        """Where the phase passes the ray of the wall: x = 0 is φ = π/2, v = 0 is φ = 0."""
+        if not self.walls or len(self.variables) > 2:
+            return ()
+        place, _, _ = self._place()
+        log_factor, leading = self._log_factor()[0], None
+        if EPSILON in names_in(str(self.walls[0].restitution)):
+            with suppress(TableError):  # no power series
+                zeroth, first, second = self._log_factor(EPSILON, 0.0, order=2)
+                leading = zeroth + first * self.epsilon + second * self.epsilon**2
+        return (Jump(math.pi / 2 if place == 0 else 0.0, log_factor, leading),)
 
     @cached_property
     def stop(self) -> Stop | None:  # type: ignore[override]
         """The wall of more than two variables. Raises `TableError`."""
         if not self.walls or len(self.variables) == 2:
             return None
-        coordinates, restitution = self._wall_coordinates(), math.exp(self._log_factor(0)[0])
+        coordinates, restitution = self._wall_coordinates(), math.exp(self._log_factor()[0])
         if restitution > 1:
             text = f"got {restitution:g}; must be <= 1 at a wall of more than two variables; reduce it"
             raise TableError(text, "walls", 0, "restitution")
@@ -554,22 +548,20 @@ class EquationSystem(System):
 
     def _wall_coordinates(self) -> FloatArray:
         """q, q̇ and all others as rows: an impact changes the velocity alone."""
-        i, j, speed = self._place(0)
+        i, j, speed = self._place()
         order = [i, j, *(k for k in range(len(self.variables)) if k not in (i, j))]
         rows = np.eye(len(order))[order]
         rows[1] *= speed
         return rows
 
-    def _place(self, number: int) -> tuple[int, int, float]:
-        """Which of the variables is 0 at a wall, which one is its rate, and over what. Raises `TableError`."""
-        at, names = self.walls[number].at, self.variables
+    def _place(self) -> tuple[int, int, float]:
+        """Which of the variables is 0 at the wall, which one is its rate, and over what. Raises `TableError`."""
+        at, names = self.walls[0].at, self.variables
         match = re.fullmatch(r"\s*(\w+)\s*=\s*0(?:\.0*)?\s*", str(at))
         if match is None or match[1] not in names:
             must = f'must be "{names[0]} = 0" or "{names[1]} = 0"; jumps on other rays are for PlaneSystem in Python'
             must = must if len(names) == 2 else f'must be one variable, such as "{names[0]} = 0"; {_COMBINED}'
-            raise TableError(
-                f'got {shown(at)}; {must}; write, for example, at = "{names[0]} = 0"', "walls", number, "at"
-            )
+            raise TableError(f'got {shown(at)}; {must}; write, for example, at = "{names[0]} = 0"', "walls", 0, "at")
         i = names.index(variable := match[1])
         parts = self._rates[i].parts
         speed = sum(series[0] * self.epsilon**power for (_, _, power), series in parts.items())
@@ -580,12 +572,12 @@ class EquationSystem(System):
             must = f"there {variable}'s rate must be c*{other} with c > 0 and nothing else"
             told = f"but it is {' '.join(self.drift[i].split())}{f', c = {speed:g}' if is_alone else ''}"
             remedy = "choose variables for which it is, or remove the wall"
-            raise TableError(f'got "{variable} = 0"; {must}, {told}; {remedy}', "walls", number, "at")
+            raise TableError(f'got "{variable} = 0"; {must}, {told}; {remedy}', "walls", 0, "at")
         return i, names.index(other), speed
 
-    def _log_factor(self, number: int, by: str = "", value: float | None = None, order: int = 1) -> tuple[float, ...]:
-        """Taylor coefficients of ln R of a wall by a parameter, at a value of it. Raises `TableError`."""
-        restitution = self.walls[number].restitution
+    def _log_factor(self, by: str = "", value: float | None = None, order: int = 1) -> tuple[float, ...]:
+        """Taylor coefficients of ln R of the wall by a parameter, at a value of it. Raises `TableError`."""
+        restitution = self.walls[0].restitution
         named = dict(self.named) if value is None else {**dict(self.named), by: value}
         try:
             if isinstance(restitution, bool) or not isinstance(restitution, str | float | int):
@@ -597,7 +589,7 @@ class EquationSystem(System):
             }
             return log_of(str(restitution), names, "the restitution")
         except ExpressionError as error:
-            raise TableError(str(error), "walls", number, "restitution") from None
+            raise TableError(str(error), "walls", 0, "restitution") from None
 
     @cached_property
     def _derivatives(self) -> Mapping[str, tuple[tuple[CoefficientMatrix, ...], tuple[float, ...]]]:
@@ -606,10 +598,10 @@ class EquationSystem(System):
         for name, _ in self.named:
             try:
                 terms = by_epsilon(self) if name == EPSILON else self._terms_of(self._rates_by(name), 1)
-                slopes = tuple(self._log_factor(number, name)[1] for number in range(len(self.walls)))
+                slope = self._log_factor(name)[1] if self.walls else 0.0
             except TableError:
                 continue
-            found[name] = terms, slopes if any(slopes) else ()
+            found[name] = terms, (slope,) if slope else ()
         return found
 
     @cached_property
@@ -660,7 +652,7 @@ class EquationSystem(System):
 
     @property
     def impact_parameter(self) -> str:
-        if len(self.walls) != 1:
+        if not self.walls:
             return ""
         own = names_in(str(self.walls[0].restitution)) - {EPSILON}
         return next(iter(own)) if len(own) == 1 and not own & self._used else ""
@@ -672,7 +664,7 @@ class EquationSystem(System):
         if not name:
             return ""
         try:
-            at_one, slope = self._log_factor(0, name, 1.0)
+            at_one, slope = self._log_factor(name, 1.0)
         except TableError:
             return ""
         return name if abs(at_one) <= ROUNDED and slope > 0 else ""
@@ -688,7 +680,7 @@ class EquationSystem(System):
         value, step = 1.0, math.inf
         for _ in range(_NEWTON):
             try:
-                known, slope = self._log_factor(0, name, value)
+                known, slope = self._log_factor(name, value)
             except TableError:  # R is not positive there
                 step /= 2
                 value -= step
@@ -704,7 +696,7 @@ class EquationSystem(System):
     def impact_slope(self, log_factor: float) -> float:
         if not (name := self._law):
             return super().impact_slope(log_factor)
-        return 1 / self._log_factor(0, name, self.impact_value(log_factor))[1]
+        return 1 / self._log_factor(name, self.impact_value(log_factor))[1]
 
 
 def _coefficient(noise: str, names: Mapping[str, str]) -> tuple[Any, str]:

@@ -200,7 +200,7 @@ class ModalSystem(EquationSystem):
 
     def _wall_coordinates(self) -> FloatArray:
         """The displacement of the wall and its rate, then those of the other modes, M-orthogonal to it."""
-        row = self._wall_row(0)
+        row = self._wall_row()
         shares = self._mobility()[0] @ row
         first = int(np.argmax(np.abs(row * shares)))
         if not row @ shares > np.abs(row) @ np.abs(shares) / SINGULAR:
@@ -211,26 +211,26 @@ class ModalSystem(EquationSystem):
         others = np.delete(np.eye(len(row)) - np.outer(shares / shares[first], np.eye(len(row))[first]), first, axis=0)
         return np.asarray(np.kron(np.vstack([row, others]), np.eye(2)))
 
-    def _place(self, number: int) -> tuple[int, int, float]:
+    def _place(self) -> tuple[int, int, float]:
         """That of the wall of one mode."""
-        self._wall_row(number)
+        self._wall_row()
         return 0, 1, 1.0
 
-    def _wall_row(self, number: int) -> FloatArray:
-        """The displacement of a wall, a row of those of the modes. Raises `TableError`."""
-        modes, at = self.variables[::2], str(self.walls[number].at)
+    def _wall_row(self) -> FloatArray:
+        """The displacement of the wall, a row of those of the modes. Raises `TableError`."""
+        modes, at = self.variables[::2], str(self.walls[0].at)
         text, _, zero = at.partition("=")
         try:
             names = {name: constant(value) for name, value in self.named}
             states = {name: Form({((name,), "", 0): (1.0,)}) for name in modes}
             parts = evaluate(text, {**names, **states}, "at").parts
         except ExpressionError as error:
-            raise TableError(str(error), "walls", number, "at") from None
+            raise TableError(str(error), "walls", 0, "at") from None
         found = {states: series[0] for (states, _, _), series in parts.items()}
         row = np.array([found.pop((name,), 0.0) for name in modes])
         if found or not row.any() or zero.strip().rstrip("0") not in ("", "0.") or "=" not in at:
             must = f'must be a displacement or a sum of several, such as "{modes[0]} - 0.5*{modes[-1]} = 0"'
-            raise TableError(f"got {shown(at)}; {must}; the modes are {', '.join(modes)}", "walls", number, "at")
+            raise TableError(f"got {shown(at)}; {must}; the modes are {', '.join(modes)}", "walls", 0, "at")
         return row
 
 

@@ -87,13 +87,13 @@ class PlaneSystem(System):
         ((0.0, 1.0), (-4.0, -0.4))
 
         Args:
-            variables: their names, two; more for a system beyond the plane, which has one wall at most.
+            variables: their names, two; more for a system beyond the plane.
             drift: their rates: linear in the variables and affine in the noise, of numbers, names, + - * / **, pi,
                 exp() and sqrt().
             parameters: values by names. One called epsilon is ε, in whose powers all coefficients must be polynomials.
             noises: what the noise is called in the rates, and which section of keys it has; {"xi": "noise"} if None.
-            walls: where the state is reflected, v⁺ = −R v⁻ at x = 0, R = `restitution` a number or an expression; there
-                ẋ must be c v, c > 0.
+            walls: where the state is reflected, one at most: v⁺ = −R v⁻ at x = 0, R = `restitution` a number or an
+                expression; there ẋ must be c v, c > 0.
 
         Raises:
             ValueError: with the place and the term that is not what it must be.
