@@ -215,14 +215,9 @@ class Moments(Section):
     rtol: Annotated[float, parameter(WANTED, "rtol = 1e-8", gt=1e-13, lt=1, name="wanted relative error")] = RTOL
 
     @property
-    def is_range(self) -> bool:
-        """Whether p is a range, of which the file states the ends alone."""
-        return isinstance(self.p, Sweep)
-
-    @property
     def values(self) -> FloatArray:
         """All p, in the file's order."""
-        return self.p.values if self.is_range else np.array(self.p)  # type: ignore[union-attr]
+        return self.p.values if isinstance(self.p, Sweep) else np.array(self.p)
 
     @cached_property
     def increasing(self) -> tuple[float, ...]:

@@ -5,18 +5,15 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Annotated, Self
+from typing import Annotated
 
 import numpy as np
-from pydantic import Field, ValidationError, model_validator
+from pydantic import Field, ValidationError
 
 from fpsolve.proofs.certificate import Certificate, Enclosure, MalformedProof, follows
 from fpsolve.proofs.forms import FormCertificate
 from fpsolve.proofs.statement import Record
 from fpsolve.proofs.verify import objection
-
-MOST_WORK = 2 * 10**10
-"""Operations for all certificates of a file, about an hour."""
 
 
 class Bound(Record):
@@ -129,17 +126,6 @@ class Claims(Record):
     case: str
     complete: bool
     curves: Annotated[list[CurveClaims], Field(min_length=1)]
-
-    @model_validator(mode="after")
-    def _is_done_in_time(self) -> Self:
-        bounds = [each for curve in self.curves for claim in curve.claims.values() for each in claim.bounds]
-        work = sum(each.certificate.work for each in bounds if each.certificate is not None)
-        if work > MOST_WORK:
-            raise ValueError(
-                f"{len(bounds)} certificates ask for {work:.1e} operations; at most {MOST_WORK:.0e} are done for one "
-                "file: divide the curves among several"
-            )
-        return self
 
     @property
     def count(self) -> int:

@@ -58,11 +58,6 @@ class FormCertificate(Record):
         return self
 
     @property
-    def work(self) -> int:
-        """About how many operations it takes to verify."""
-        return 20 * (1 + len(self.stated.diffusions)) * len(self.factor) ** 3
-
-    @property
     def rest(self) -> Balls:
         """L*H − μH in the coordinates Gx, in which H is 1. Raises `ZeroDivisionError` where G may be singular."""
         factor = balls(self.factor)

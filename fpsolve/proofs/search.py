@@ -23,13 +23,13 @@ from fpsolve.exponent.adapt import Budget
 from fpsolve.proofs.balls import above, ball, balls, below, precision
 from fpsolve.proofs.basis import OTHERS, Basis, Core, Whole, hermite_table
 from fpsolve.proofs.bounds import LOWER, UPPER, Bounder, Bounds, HeldBounds, Trial
-from fpsolve.proofs.certificate import MOST, NOTHING, BasisRecord, Certificate, Enclosure, SideRecord, enclosure_of
+from fpsolve.proofs.certificate import NOTHING, BasisRecord, Certificate, Enclosure, SideRecord, enclosure_of
 from fpsolve.proofs.statement import Cylinder, Statement, cylinder
 from fpsolve.proofs.verify import objection
 from fpsolve.superlu import sparse_lu
 
-SMALLEST, GROWTH, MOST_UNKNOWNS = (5, 9), 1.35, 25_000
-"""Modes on either side and polynomials of the first trial, by what one of both grows, and how far."""
+SMALLEST, GROWTH, MOST, MOST_UNKNOWNS = (5, 9), 1.35, 399, 25_000
+"""Modes on either side and polynomials of the first trial, by what one of both grows, how far each and both."""
 ABSENT = 1e9
 """What a missing bound counts for."""
 PATIENCE, PROGRESS, FAR = {False: 2, True: 6}, 0.7, 1e-2
@@ -286,8 +286,8 @@ def _enlarged(
                 idle += 1
         cost = timer.elapsed - begun
         waves, degrees = (
-            min(math.ceil(GROWTH * n) + 1, most) if of_it > 0.1 * edge else n
-            for n, of_it, most in zip((waves, degrees), edges, (MOST["rows"] - 1, MOST["columns"]), strict=True)
+            min(math.ceil(GROWTH * n) + 1, MOST) if of_it > 0.1 * edge else n
+            for n, of_it in zip((waves, degrees), edges, strict=True)
         )
     if passed is not None:
         basis, pair, waves, degrees = passed
@@ -305,7 +305,7 @@ def _apart(certificate: Certificate) -> float:
 def bases(noise: Cylinder, p: float | None) -> Iterator[Basis]:
     """What is worth trying, in this order: the whole support, or a core about where the noise is in the moment."""
     slope = float(noise.slope)
-    if (kind := noise.noise.bases[0]) in OTHERS:
+    if (kind := noise.law.bases[0]) in OTHERS:
         yield OTHERS[kind]
         return
     if noise.is_bounded and slope < WHOLE_BELOW:
@@ -347,18 +347,6 @@ def certificate_of(stated: Statement, noise: Cylinder, basis: Basis, p: float | 
     upper, lower = _sides(trial, phases)
     if upper is None and lower is None:
         return None
-    return _certificate(stated, basis, p, pair, phases, upper, lower)
-
-
-def _certificate(
-    stated: Statement,
-    basis: Basis,
-    p: float | None,
-    pair: Pair,
-    phases: int,
-    upper: SideRecord | None,
-    lower: SideRecord | None,
-) -> Certificate:
     return Certificate(
         p=p,
         stated=stated,

@@ -309,14 +309,14 @@ class Cylinder:
     """L(p) between jumps, gauged, in balls.
 
     Attributes:
-        noise: its law.
+        law: of the noise.
         h, q: phase speed and growth rate, h₀ and h₁, q₀ and q₁, each by its coefficients of e^{2idφ}, d = −1, 0, 1.
         kappa: κ.
         nu, slope: ν and b′(0).
         states, rates: of a chain, shapes (n,) and (n, n); None of other noise.
     """
 
-    noise: NoiseRecord
+    law: NoiseRecord
     h: tuple[Balls, Balls]
     q: tuple[Balls, Balls]
     kappa: arb
@@ -328,12 +328,12 @@ class Cylinder:
     @property
     def is_bounded(self) -> bool:
         """Whether b = b′(0) z/(1 − z²), |z| < 1."""
-        return self.noise.kind == "bounded"
+        return self.law.kind == "bounded"
 
     @property
     def is_white(self) -> bool:
         """Whether L = F₀ + ½ F₁²."""
-        return self.noise.kind == "white"
+        return self.law.kind == "white"
 
     def drift(self, z: Any) -> Any:
         """b(z)."""
@@ -369,7 +369,7 @@ def cylinder(stated: Statement) -> Cylinder:
         rates = rates - np.diag(np.diagonal(rates))
         rates = rates - np.diag(rates.sum(axis=1))
     return Cylinder(
-        noise=noise,
+        law=noise,
         h=(still[0], driven[0] * ball(noise.unit)),
         q=(still[1], driven[1] * ball(noise.unit)),
         kappa=kappa,

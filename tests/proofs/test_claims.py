@@ -8,7 +8,6 @@ import pytest
 
 from fpsolve.cli import main
 from fpsolve.commands.options import BAD_INPUT, CHECK_FAILED
-from fpsolve.proofs import claims
 from fpsolve.proofs.certificate import MalformedProof
 from fpsolve.proofs.claims import claims_from, plain, verdicts
 from fpsolve.workflow.prove import prove_case
@@ -204,18 +203,6 @@ def _at(data, path):
     return data
 
 
-def test_a_file_of_many_certificates_is_refused_by_its_work(data, monkeypatch):
-    monkeypatch.setattr(claims, "MOST_WORK", 10**5)
-    with pytest.raises(MalformedProof, match=r"certificates ask for .* operations; at most 1e\+05 are done"):
-        claims_from(json.dumps(data))
-
-
-MUCH = {
-    **{"nodes": [float(i) for i in range(10_000)], "values": [0.0] * 10_000, "phases": 800},
-    **{"cosine": [[0.0] * 100] * 100, "sine": [[0.0] * 100] * 100},
-}
-
-
 @pytest.mark.parametrize(
     ("change", "words"),
     [
@@ -225,10 +212,7 @@ MUCH = {
         ({"cosine": [[1.0]]}, "tables of one shape"),
         ({"cosine": [[1.0, 2.0], [1.0]], "sine": [[1.0, 2.0], [1.0]]}, "tables of one shape"),
         ({"cosine": [], "sine": []}, "should have at least 1 item"),
-        ({"cosine": [[0.0] * 401], "sine": [[0.0] * 401]}, "should have at most 400 items"),
-        ({"phases": 10**9}, "should be less than or equal to 8192"),
-        ({"nodes": [float(i) for i in range(20_000)], "values": [0.0] * 20_000, "phases": 8192}, "too many together"),
-        (MUCH, "asks for 1.4e+09 operations; at most 2e+08 are done"),
+        ({"phases": 0}, "should be greater than 0"),
         ({"tails": None}, "a core has tails"),
         ({"tails": None, "basis": {"kind": "whole"}}, "the basis whole is of other noise"),
         ({"delta": -1e-9}, "should be greater than or equal to 0"),

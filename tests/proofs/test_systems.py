@@ -258,9 +258,9 @@ def test_random_systems(seed):
     assert found.off <= 1
 
 
-def test_trials_stay_within_what_a_certificate_may_hold(monkeypatch):
+def test_trials_stay_below_a_size(monkeypatch):
     """The phase stands still in either state: functions of it are not smooth, and no number of waves suffices."""
-    monkeypatch.setitem(search.MOST, "rows", 40)
+    monkeypatch.setattr(search, "MOST", 39)
     found = bounds(SADDLE, Telegraph(0.5, 2.0), None)
     assert len(found.certificate.cosine) <= 40
     assert not found.is_met
