@@ -22,13 +22,12 @@ from fpsolve.fem.levels import ENTRY_BYTES, ENTRY_OPERATIONS, LevelFactors, neig
 from fpsolve.fem.refined import RefinedFactors
 from fpsolve.fem.rings import Ring, RingFactors
 from fpsolve.fem.wave_factors import WaveFactors
-from fpsolve.signals import left_at_signals
 from fpsolve.superlu import sparse_lu
 
 FEW_UNKNOWNS = 350
 """Largest number of unknowns of one dense matrix that is taken without counting what others take."""
 LONG = 1e10
-"""Number of operations, 0.35 s, from which on a factorisation runs where it can be left, and may be rough."""
+"""Number of operations, 0.35 s, from which on a factorisation may be rough."""
 FRONT_OPERATIONS = 5.0
 """Number of operations that take the time of SuperLU for an unknown and the square of the width of a front, 0.18 ns."""
 CELL_OPERATIONS = 6e3
@@ -98,10 +97,7 @@ def factorised(
 
 def _factorise(kind: Factors, operator: KroneckerSum) -> Factors:
     charge(kind.operations, kind.gigabytes, operator.size)
-    if kind.operations > LONG:
-        left_at_signals(kind.make)
-    else:
-        kind.make()
+    kind.make()
     return kind
 
 

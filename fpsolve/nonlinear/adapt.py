@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -25,7 +25,6 @@ from fpsolve.fem.space import first_axis
 from fpsolve.messages import Code, Message
 from fpsolve.nonlinear.elimination import Solution, Tail, mean_damping, solved, solved_tail
 from fpsolve.nonlinear.operator import Elements, Flow, Plane
-from fpsolve.signals import left_at_signals
 
 SHARE = 0.2
 """Share of the tolerance that one direction may lack."""
@@ -200,7 +199,7 @@ class Search:
                 plane = Plane(self.flow, self._circle(choice.phi_degree), choice.xi)
                 self._planes[levels[:2]] = plane, solved_tail(plane, self.index)
             plane, tail = self._planes[levels[:2]]
-            return left_at_signals(partial(solved, plane, Elements(choice.lines, choice.degree), tail))
+            return solved(plane, Elements(choice.lines, choice.degree), tail)
 
 
 @dataclass(frozen=True, eq=False)

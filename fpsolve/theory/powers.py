@@ -29,8 +29,6 @@ ENTRY_OPERATIONS = 8e4
 """Number of operations that take the time of a factorisation for an entry of a sparse matrix, 2.8 µs."""
 ENTRY_BYTES = 250
 """Memory of its factors, in bytes for each of its entries."""
-MANY_ENTRIES = 1e5
-"""Number of entries from which on it is factorised where a signal can leave it."""
 SETTLED, NEAREST, KRYLOV = 1e-7, 1e-3, 16
 """As in `Rates`: each σ takes a factorisation."""
 
@@ -258,5 +256,5 @@ class PowerRates:
             return lambda x, trans=0: dgetrs(lu, pivots, x, trans=trans)[0]
         matrix = (sigma * sparse.eye_array(self.matrix.shape[0]) - self.matrix).tocsc()
         charge(ENTRY_OPERATIONS * matrix.nnz, 1e-9 * ENTRY_BYTES * matrix.nnz, matrix.shape[0])
-        factors = sparse_lu(matrix, permc_spec="COLAMD", many=MANY_ENTRIES)
+        factors = sparse_lu(matrix, permc_spec="COLAMD")
         return lambda x, trans=0: np.asarray(factors.solve(x, "T" if trans else "N"))
