@@ -57,7 +57,7 @@ def uncertain_of(value: Any, info: ValidationInfo) -> Uncertain:
     deviations = dict[str, Deviation]()
     for key, stated in table.items():
         refusals += _deviation(key, stated, problem, vary, deviations)
-    if not table and not refusals:
+    if not table:
         refusals.append(((), value, f"names no parameter; write, for example, {_EXAMPLE}"))
     refuse(refusals)
     return Uncertain(deviations)

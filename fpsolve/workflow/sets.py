@@ -40,7 +40,6 @@ from fpsolve.workflow.progress import MOMENTS, SETS, Advance, Phase
 
 Found = tuple[int, Address | CurveResult | None, bool]
 """The number of a curve, its numbers where they are new, and whether some of these are missing."""
-SIMULATED_RECORDS = "records/simulated"
 TABLES = "summary.json", "curves.csv", "moments.csv", "results.nc"
 """The files with all numbers of a run."""
 REST = 50
