@@ -396,7 +396,7 @@ def write_noise(outcome: NoiseOutcome, source: Path, shown: Convention, folder: 
 def case_of(outcome: NoiseOutcome, folder: Path) -> str:
     """The case with the noise, ready to run; empty where there is no system."""
     wanted, sections = outcome.wanted, noise_sections(outcome)
-    omega, zeta = (float(f"{each:.12g}") for each in (wanted.modes.omega[0], wanted.modes.zeta))
+    omega, zeta = wanted.modes.omega[0], wanted.modes.zeta
     if wanted.case:
         return with_noise(wanted.case, sections, folder)
     count = len(outcome.fit.parts)
@@ -414,7 +414,7 @@ def case_of(outcome: NoiseOutcome, folder: Path) -> str:
     hertz = f"{omega / (2 * math.pi):.4g} Hz, {zeta:.4g} of critical damping"
     data = {
         "title": f"Oscillator with noise in its {wanted.noise_in}: {hertz}",
-        section: table,
+        section: {key: float(f"{each:.12g}") if isinstance(each, float) else each for key, each in table.items()},
         "units": {"time": "s"},
         "moments": {"p": {"start": -2.0, "stop": 4.0, "num": 25}},
     }
