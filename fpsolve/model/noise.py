@@ -200,17 +200,13 @@ class Noise(Parametrised):
         """
         return 0.125 * self.squared_diffusion(xi) * np.gradient(self.log_density(xi), xi, edge_order=2) ** 2
 
-    def sample(self, size: int, rng: np.random.Generator) -> FloatArray:
-        """Independent values of ξ from the stationary law, shape (size,)."""
-        raise NotImplementedError
-
     def start(self, size: int, rng: np.random.Generator) -> FloatArray:
         """Stationary initial values of the paths of a simulation: ξ, or the numbers of states, shape (size,).
 
         Noise that is no Markov process by itself returns an array of the shape (rows, size). The first row is ξ, and
         the others are the variables on which its future depends.
         """
-        return self.sample(size, rng)
+        raise NotImplementedError
 
     def step(self, h: float, bias: float = 0.0) -> Any:
         """One step of length h of dξ = (f(ξ) + σ²·bias) dt + σ dW, for the simulation.
@@ -257,11 +253,6 @@ class Noise(Parametrised):
         return MotionDerivative(terms)
 
     @property
-    def replaces(self) -> Noise | None:
-        """The noise that this one approximates, as the reduction (12)-(14) does that of Eq. (7); else None."""
-        return None
-
-    @property
     def one_sided(self) -> Sequence[str]:
         """The names of the parameters by which only the derivative from below exists, at their present values."""
         return ()
@@ -298,7 +289,7 @@ class Memoryless(Noise):
     def reached(self) -> FloatArray:
         return np.zeros(1)
 
-    def sample(self, size: int, rng: np.random.Generator) -> FloatArray:
+    def start(self, size: int, rng: np.random.Generator) -> FloatArray:
         """0: it has no value."""
         return np.zeros(size)
 

@@ -206,7 +206,9 @@ def quantities_of(kind: type[Parametrised]) -> Mapping[str, Quantity]:
 
 
 def unknown_parameter(key: str) -> Quantity:
-    """A parameter of which no more than its key is known; a Greek name such as omega_0 is its symbol."""
+    """A parameter of which no more than its key is known; a Greek name such as omega_0 is its symbol; epsilon is ε."""
+    if key.endswith(".epsilon"):
+        return Quantity(key, key, "small parameter", r"$\varepsilon$")
     greek = re.fullmatch(GREEK, key.rpartition(".")[2])
     latex = rf"$\{greek[1]}{f'_{{{greek[2]}}}' if greek[2] else ''}$" if greek else ""
     return Quantity(key, key, key, latex, "unknown")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from itertools import chain
 from textwrap import wrap
@@ -535,12 +535,9 @@ class Problem:
         for section, half in self.sections.items():
             kind: Any = type(half)
             values, name = repr(tuple(half.values.items())), "" if half.words else kind.__qualname__
-            stated: Any = repr(half)
-            if is_dataclass(kind):
-                names = [each.name for each in fields(kind) if each.repr and each.name not in half.values]
-                others = {each: repr(getattr(half, each)) for each in names}
-                stated = {each: other for each, other in others.items() if other != values}
-            kinds.append((section, name, stated))
+            names = [each.name for each in fields(kind) if each.repr and each.name not in half.values]
+            others = {each: repr(getattr(half, each)) for each in names}
+            kinds.append((section, name, {each: other for each, other in others.items() if other != values}))
         return repr(kinds)
 
     @property

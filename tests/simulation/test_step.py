@@ -137,7 +137,7 @@ def test_zhuravlev_map(nonlinear):
     phase = rng.uniform(0, math.pi, n)
     x, u = np.sin(phase), np.cos(phase)
     y, w = -x, -u  # behind the wall, where it is not seen
-    noise, xi = UNIT_NOISE.step(h), UNIT_NOISE.sample(n, rng)
+    noise, xi = UNIT_NOISE.step(h), UNIT_NOISE.start(n, rng)
     mean, end, push = np.empty((3, n))
     impacts = 0
     for _ in range(2000):
@@ -222,7 +222,7 @@ def test_noise_has_its_stationary_law(r0, origin):
     """A Kolmogorov-Smirnov test of 1e5 independent paths against Eq. (9)."""
     noise = NonGaussianNoise(D0=0.8, tau0=1.3, r0=r0)
     rng = np.random.default_rng([7, int(100 * r0), len(origin)])
-    xi = noise.sample(100_000, rng) if origin == "stationary" else np.zeros(100_000)
+    xi = noise.start(100_000, rng) if origin == "stationary" else np.zeros(100_000)
     xi = noise_after(noise, xi, noise.tau0 * (2 if origin == "stationary" else 6), rng)
     assert np.all(np.abs(xi) < noise.half_width)
     reach = min(noise.half_width, 60 * noise.standard_deviation)
@@ -237,7 +237,7 @@ def test_heavy_tails_are_kept():
     """For r₀ = 1.2, P_s ~ |ξ|^(−10): of 4e5 paths some are beyond 5 std, where a Gaussian would have none."""
     noise = NonGaussianNoise(D0=0.8, tau0=1.0, r0=1.2)
     rng = np.random.default_rng(3)
-    xi = noise_after(noise, noise.sample(400_000, rng), 3 * noise.tau0, rng)
+    xi = noise_after(noise, noise.start(400_000, rng), 3 * noise.tau0, rng)
     far = 5 * noise.standard_deviation
     tail = np.linspace(far, 100 * far, 1_000_001)
     expected = 2 * 400_000 * np.trapezoid(noise.density(tail), tail)
@@ -250,7 +250,7 @@ def test_noise_with_a_bias_has_its_law():
     b, n, h = 0.4, 200_000, 0.02
     for noise in (FIG1_NOISE, FIG1_NOISE.ou_reduction()):
         rng = np.random.default_rng(5)
-        xi = noise_after(noise, noise.sample(n, rng), 6 * 0.5, rng, h, b)
+        xi = noise_after(noise, noise.start(n, rng), 6 * 0.5, rng, h, b)
         grid = np.linspace(-1, 1, 200_001) * min(noise.half_width, 12 * noise.standard_deviation)
         weight = np.nan_to_num(noise.density(grid)) * np.exp(2 * b * grid)
         expected = np.sum(weight * grid) / np.sum(weight)
@@ -261,7 +261,7 @@ def test_push_is_the_integral_of_the_drift():
     """Exactly for Ornstein-Uhlenbeck noise, whose mean over the step is known; for Eq. (7) by the trapezoidal rule."""
     n, h = 1000, 0.02
     rng = np.random.default_rng(6)
-    xi = FIG1_NOISE.sample(n, rng)
+    xi = FIG1_NOISE.start(n, rng)
     mean, end, push = np.empty(n), np.empty(n), np.zeros(n)
     draw(FIG1_NOISE.step(h), xi, mean, end, push, rng)
     np.testing.assert_allclose(push, h / 2 * (FIG1_NOISE.drift(xi) + FIG1_NOISE.drift(end)), atol=1e-13)
@@ -278,7 +278,7 @@ def test_norms_are_taken_out_of_the_state():
     for interval in (200, 1, 7):
         rng = np.random.default_rng(2)
         phase = rng.uniform(0, math.pi, n)
-        x, u, xi = np.sin(phase), np.cos(phase), UNIT_NOISE.sample(n, rng)
+        x, u, xi = np.sin(phase), np.cos(phase), UNIT_NOISE.start(n, rng)
         log_norm, push = np.zeros((2, n))
         advance(
             coefficients(STRONG, UNIT_NOISE).motion(h),

@@ -121,9 +121,6 @@ class NoiseOfAngle(Noise):
         """ξ = A cos θ, in the shape of θ."""
         return np.asarray(self.amplitude * np.cos(theta))
 
-    def sample(self, size: int, rng: np.random.Generator) -> FloatArray:
-        return self.start(size, rng)[0]
-
     def start(self, size: int, rng: np.random.Generator) -> FloatArray:
         """ξ and θ, shape (2, size)."""
         theta = rng.uniform(0, 2 * math.pi, size)

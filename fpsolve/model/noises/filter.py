@@ -193,9 +193,6 @@ class Filter(Noise):
         z = np.asarray(xi, dtype=float) / self.standard_deviation
         return -0.5 * z**2 - math.log(math.sqrt(2 * math.pi) * self.standard_deviation)
 
-    def sample(self, size: int, rng: np.random.Generator) -> FloatArray:
-        return self.start(size, rng)[0]
-
     def start(self, size: int, rng: np.random.Generator) -> FloatArray:
         """ξ, y/std(y) and y′/std(y′), shape (3, size)."""
         u, w = rng.standard_normal((2, size))

@@ -86,9 +86,6 @@ class Chain(Noise):
     def start(self, size: int, rng: np.random.Generator) -> FloatArray:
         return rng.choice(len(self.states), size, p=self.probabilities).astype(float)
 
-    def sample(self, size: int, rng: np.random.Generator) -> FloatArray:
-        return np.array(self.states)[self.start(size, rng).astype(int)]
-
     def step(self, h: float, bias: float = 0.0) -> ChainStep:
         """The jumps in any time, without a bias."""
         jumps = np.array(self.rates) * (1 - np.eye(len(self.states)))

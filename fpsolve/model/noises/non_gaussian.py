@@ -241,7 +241,7 @@ class NonGaussianNoise(TreatedNoise):
             )
         return ReducedNoise(D0=self.D0, tau0=self.tau0, r0=self.r0)
 
-    def sample(self, size: int, rng: np.random.Generator) -> FloatArray:
+    def start(self, size: int, rng: np.random.Generator) -> FloatArray:
         """Eq. (9) as a beta or a Student variable."""
         if self.r0 == 1:
             return self.standard_deviation * rng.standard_normal(size)

@@ -104,7 +104,7 @@ class GaussianNoise(Noise):
         """S(ω) = σ₀²/(α₀² + ω²), Eq. (16)."""
         return self.sigma**2 / (self.alpha**2 + omega**2)
 
-    def sample(self, size: int, rng: np.random.Generator) -> FloatArray:
+    def start(self, size: int, rng: np.random.Generator) -> FloatArray:
         return self.standard_deviation * rng.standard_normal(size)
 
     def step(self, h: float, bias: float = 0.0) -> LinearStep:

@@ -709,8 +709,7 @@ def _coefficient(noise: str, names: Mapping[str, str]) -> tuple[Any, str]:
 
 def _quantity(name: str, stated: StatedParameter) -> Quantity:
     """The name, the words and the unit of a parameter, as far as they are stated."""
-    key = f"{EquationSystem.section}.{name}"
-    plain = Quantity(key, key, "small parameter", r"$\varepsilon$") if name == EPSILON else unknown_parameter(key)
+    plain = unknown_parameter(f"{EquationSystem.section}.{name}")
     return replace(
         plain,
         words=stated.words or plain.words,

@@ -11,6 +11,7 @@ import numpy as np
 
 from fpsolve.arrays import real_number, shown
 from fpsolve.model.faults import TableError
+from fpsolve.model.parameters import unknown_parameter
 from fpsolve.model.plane import MOST_VARIABLES, CoefficientMatrix, Jump, Stop, System, as_plane, by_epsilon, is_driven
 from fpsolve.model.quantity import Quantity
 from fpsolve.model.systems.equations import EquationSystem, walls_of
@@ -119,8 +120,7 @@ class PlaneSystem(System):
         return {"epsilon": float(self.epsilon)}
 
     def quantity_of(self, name: str) -> Quantity:
-        key = f"{self.section}.{name}"
-        return Quantity(key, key, "small parameter", r"$\varepsilon$")
+        return unknown_parameter(f"{self.section}.{name}")
 
     def at(self, values: Mapping[str, float | str]) -> Self:
         for name in values:
