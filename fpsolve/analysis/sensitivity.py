@@ -31,11 +31,10 @@ from fpsolve.drawing import add_legend, draw_bars
 from fpsolve.errors import NoSuchExponent, NotConverged
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.eigen import PairDerivatives
-from fpsolve.exponent.error import Estimate, MissingModes, Solution
+from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.function import nonzero_root
 from fpsolve.exponent.solver import ExponentSolver, solver_of
 from fpsolve.fem.axis import KroneckerSum
-from fpsolve.fem.factors import one_thread
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.problem import ParameterDerivative, Problem, checked_moments
@@ -147,24 +146,10 @@ class Changed:
         """∂Λ/∂θ with the error of rounding, also in T and T*; the scale is that of the terms of L − Λ."""
         pair = self._pair
         x, y, turns = pair.right, pair.left, pair.space.turns
-        parts = turns * np.array([y @ image for image in self._images])
+        parts = turns * np.array([y @ (KroneckerSum([term]) @ x) for term in self._operator(0).terms])
         sizes, scale = turns * float(abs(y) @ (abs(self._operator(0)) @ abs(x))), float(np.sum(np.abs(parts)))
         of_pair = (pair.residual + _EPS) * self._around.size / pair.generator.problem.unit_rate
         return Estimate(float(np.sum(parts)), _EPS * sizes + of_pair * scale, scale)
-
-    @cached_property
-    def of_right(self) -> FloatArray:
-        """(∂L − Λ∂M)T."""
-        return np.asarray(sum(self._images))
-
-    @cached_property
-    def of_left(self) -> FloatArray:
-        """(∂L − Λ∂M)ᵀT*."""
-        return self._operator(0).T @ self._pair.left
-
-    @cached_property
-    def _images(self) -> list[FloatArray]:
-        return [KroneckerSum([term]) @ self._pair.right for term in self._operator(0).terms]
 
     @cached_property
     def slope(self) -> Estimate:
@@ -320,12 +305,9 @@ def held_by(
 
 
 class Gradient:
-    """The derivatives along some directions, with their errors.
+    """The derivatives along some directions on a finer discretisation, with errors from the differences to it.
 
-    That of ∂Λ(p)/∂θ is about how what Λ(p) lacks by its highest modes changes, see `MissingModes`; that of ∂λ/∂θ is
-    the same next to p = 0, over p. Where the modes do not tell, on a given mesh, for algebraic tails and
-    beyond the plane, errors are from the differences to a finer discretisation, for algebraic tails also a wider one:
-    at their ends ∂ ln P_s/∂r₀ is large. So are those of ∂Λ″(0)/∂θ, as that of Λ″(0) is.
+    For algebraic tails that is also a wider one: at their ends ∂ ln P_s/∂r₀ is large.
 
     Args:
         solver: of the problem.
@@ -334,6 +316,7 @@ class Gradient:
 
     def __init__(self, solver: ExponentSolver, along: Mapping[str, ParameterDerivative]) -> None:
         self._solver, self._along, self.budget = solver, along, solver.budget
+        self._slope_errors: dict[float, float] = {}  # of Λ′(p)
 
     @one_number("∂Λ({:g})/∂θ")
     def moment(self, p: float) -> Slopes:
@@ -347,33 +330,20 @@ class Gradient:
             slopes = {key: known.slope(key) for key in along}
             sizes = {key: known.scale / abs(by.theta) if by.theta else abs(slopes[key][0]) for key, by in along.items()}
             return {key: Estimate(*slopes[key], scale=sizes[key]) for key in along}
-        solution = solver.solution(p)
-        around = PairDerivatives(solution.pair)
-        changed = _changed(around, along)
-        values = {key: each.value for key, each in changed.items()}
-        if solution.modes_tell:
-            errors = changes_of_errors(solution, around, changed)
-            sizes = {key: float(np.sum(np.abs(each))) for key, each in errors.items()}
-            return _with_errors(values, sizes, solution.error / solver.scale(p))
-        finer = solver.whole.finer_pair(solution.pair)
-        share = abs(finer.value - solution.pair.value) / solver.scale(p)
-        return _compared(
-            values, {key: each.value for key, each in _changed(PairDerivatives(finer), along).items()}, share
+        pair = solver.solution(p).pair
+        finer = solver.whole.finer_pair(pair)
+        self._slope_errors[p] = 2 * abs(finer.derivative - pair.derivative)
+        coarse, fine = (
+            {key: each.value for key, each in _changed(PairDerivatives(of), along).items()} for of in (pair, finer)
         )
+        return _compared(coarse, fine, abs(finer.value - pair.value) / solver.scale(p))
 
     @one_number("∂λ/∂θ")
     def lyapunov_exponent(self) -> dict[str, Estimate]:
         """∂λ/∂θ. Raises `NotConverged`, `NoSuchExponent`."""
-        solver, along = held_by(self._solver, 0.0, self._along)
-        near = solver.whole.near_zero(0.0)
-        values = {key: each.slope for key, each in self._at_zero.items()}
-        if not near.modes_tell:
-            share = solver.ratio_alone(0.0)[1] / solver.scales.linear
-            return _compared(values, {key: each.slope for key, each in self._finer_at_zero.items()}, share)
-        around = PairDerivatives(near.pair)
-        errors = changes_of_errors(near, around, _changed(around, along))
-        sizes = {key: float(np.sum(np.abs(each))) / abs(near.pair.p) for key, each in errors.items()}
-        return _with_errors(values, sizes, near.error / solver.scale(near.pair.p))
+        solver, _ = held_by(self._solver, 0.0, self._along)
+        coarse, fine = ({key: each.slope for key, each in at.items()} for at in (self._at_zero, self._finer_at_zero))
+        return _compared(coarse, fine, solver.ratio_alone(0.0)[1] / solver.scales.linear)
 
     @one_number("∂Λ″(0)/∂θ")
     def variance_rate(self) -> Slopes:
@@ -388,14 +358,15 @@ class Gradient:
     def root(self, p: float) -> Slopes:
         """∂δ_p/∂θ, p being δ_p: that of Λ(p)/p, for small p from its derivatives at p = 0, over that by p.
 
-        With its own error each has twice the relative one of δ_p.
+        With its own error each has twice the relative one of δ_p, and that of the slope.
         """
         _, slope_by_p, error = self._solver.ratio(p)
+        lost = 2 * error / abs(slope_by_p) / max(abs(p), SMALL_P)
         if abs(p) >= SMALL_P:
             slopes: Slopes = {key: _times(1 / p, each) for key, each in self.moment(p).items()}
+            lost += self._slope_errors.get(p, 0.0) / abs(p * slope_by_p)
         else:
             slopes = self._by_small_p(p)
-        lost = 2 * error / abs(slope_by_p) / max(abs(p), SMALL_P)
         found = {key: _times(-1 / slope_by_p, each) for key, each in slopes.items()}
         return {
             key: replace(each, error_estimate=each.error_estimate + lost * abs(each.value))
@@ -426,41 +397,18 @@ def _changed(around: PairDerivatives, along: Mapping[str, ParameterDerivative]) 
     return {key: Changed(around, by) for key, by in along.items()}
 
 
-def changes_of_errors(
-    solution: Solution, around: PairDerivatives, changed: Mapping[str, Changed]
-) -> dict[str, list[float]]:
-    """∂e/∂θ along some directions, for every e of `MissingModes`; but for the change of P_s in ⟨T*, T⟩, which changes e
-    only by its own size.
-
-    T and T* change by (L − Λ)T_θ = −BT and its adjoint, of which one pair of equations takes account for all θ:
-    ∂e/∂θ ⟨T*, T⟩ = ⟨y, Bx⟩ − ⟨w, BT⟩ − ⟨T*, Bv⟩, (L − Λ)ᵀw and (L − Λ)v the derivatives of e by T and T*.
-    """
-    found: dict[str, list[float]] = {key: [] for key in changed}
-    for each in MissingModes.of(solution):
-        with one_thread():
-            w = around.solve(each.by_right, adjoint=True, refinements=1)
-            v = around.solve(each.by_left, refinements=1)
-        for key, by in changed.items():
-            own = each.left @ by.image(each.right, 0, by.value.value)
-            found[key].append(float(own - w @ by.of_right - by.of_left @ v) / around.norm)
-    return found
-
-
-def _with_errors(values: Slopes, errors: Mapping[str, float], share: float) -> dict[str, Estimate]:
-    """Derivatives with errors of about these sizes.
+def _compared(coarse: Slopes, fine: Slopes, share: float) -> dict[str, Estimate]:
+    """The finer ones, their errors from how far both are apart.
 
     That of one parameter may be small by chance, or fall slowly: twice as much counts, and of the scale of each the
     share that the error of what is derived has of its own scale, as both are of one pair.
     """
     return {
-        key: replace(each, error_estimate=each.error_estimate + 2 * abs(errors[key]) + share * each.scale)
-        for key, each in values.items()
+        key: replace(
+            each, error_estimate=each.error_estimate + 2 * abs(each.value - coarse[key].value) + share * each.scale
+        )
+        for key, each in fine.items()
     }
-
-
-def _compared(coarse: Slopes, fine: Slopes, share: float) -> dict[str, Estimate]:
-    """The finer ones, their errors from how far both are apart."""
-    return _with_errors(fine, {key: each.value - coarse[key].value for key, each in fine.items()}, share)
 
 
 def _summed(parts: Sequence[Any], norm: float) -> Estimate:

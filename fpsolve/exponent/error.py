@@ -208,11 +208,6 @@ class Solution:
         """Estimate of the error of `pair.value`, the sum of its parts."""
         return sum(self.parts)
 
-    @property
-    def modes_tell(self) -> bool:
-        """Whether the error is that by the highest modes alone, so that it has derivatives."""
-        return self.measured is None and not self.pair.space.xi.lines.size
-
 
 @dataclass(frozen=True, eq=False)
 class Ladder:
@@ -314,46 +309,6 @@ def effects_on(
         share = NET * sum(nets) / max(sum(each.error for each in found if each), sys.float_info.min)
         found = [each and replace(each, share=min(share, 1.0), least_fall=LEAST_FALL) for each in found]
     return tuple(found)
-
-
-@dataclass(frozen=True, eq=False)
-class MissingModes:
-    """e = ⟨y, (L − Λ)x⟩/⟨T*, T⟩, about what Λ lacks in every second cell along one direction.
-
-    x is what T has of the two highest modes, and y the same of T* in these cells, the coefficients of the rougher of
-    both times the share that is thought to be left, with the sign of the product.
-
-    Attributes:
-        right, left: x and y, shape (size,).
-        by_right, by_left: the derivatives of e ⟨T*, T⟩ by the coefficients of T and of T*, shape (size,).
-    """
-
-    right: FloatArray
-    left: FloatArray
-    by_right: FloatArray
-    by_left: FloatArray
-
-    @classmethod
-    def of(cls, solution: Solution) -> Iterator[MissingModes]:
-        """Those of a pair and its effects: of the even and of the odd cells along every direction."""
-        pair, space = solution.pair, solution.pair.space
-        smooth, rough, operator = smoother_first(pair)
-        for ladder, effects in zip(ladders(space), solution.effects, strict=True):
-            if ladder is None or effects is None:
-                continue
-            mask, back = ladder.along(ladder.highest(2)), [None if each is None else each.T for each in ladder.nested]
-            first, last = (mask * along(ladder.nested, space.table(each)) for each in (smooth, rough))
-            image = space.table(operator @ np.ravel(first))
-            shares = effects.of_cells / np.maximum(effects.two, sys.float_info.min)
-            weights = ladder.along(shares[ladder.cells]) * np.sign(last * image)
-            for turn in range(min(2, ladder.degrees.size)):
-                own = weights * ladder.along(ladder.cells % 2 == turn)
-                of_last = space.table(operator.T @ np.ravel(own * last))
-                by_first, by_last = (np.ravel(along(back, mask * each)) for each in (of_last, own * image))
-                found = np.ravel(first), np.ravel(own * last), by_first, by_last
-                if smooth is pair.left:
-                    found = found[1], found[0], by_last, by_first
-                yield cls(*found)
 
 
 def truncation(pair: PrincipalPair) -> tuple[float, float]:

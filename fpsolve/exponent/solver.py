@@ -505,7 +505,7 @@ class ExponentSolver:
         solution = self.solution(p)
         with one_thread():
             jump = self._jump() if is_at_corner(self.problem, p) else 0.0
-            if solution.modes_tell:
+            if solution.measured is None:
                 return slope_error(solution.pair) + jump
             coarser = [each.pair for each in getattr(solution.start, "before", ())]
             other = coarser[-1] if coarser else self.whole.finer_pair(solution.pair)

@@ -13,11 +13,9 @@ from fpsolve import (
     lyapunov_exponent,
     sensitivities,
 )
-from fpsolve.analysis.sensitivity import SMALL_P, Changed, Gradient, changes_of_errors, solve_sensitivities
+from fpsolve.analysis.sensitivity import SMALL_P, Gradient, solve_sensitivities
 from fpsolve.arrays import identity
-from fpsolve.exponent import Budget, principal_pair
-from fpsolve.exponent.eigen import PairDerivatives
-from fpsolve.exponent.error import Solution
+from fpsolve.exponent import Budget
 from fpsolve.exponent.function import nonzero_root
 from fpsolve.fem import Generator
 from fpsolve.model import CoefficientMatrix
@@ -233,41 +231,6 @@ def test_progress_is_told_of_each_p_and_index():
     problem, _ = problem_of(theta, law, is_exact)
     sensitivities(problem, [1.0, 2.0], rtol=1e-4, progress=lambda: told.append(1))
     assert len(told) == 2 + 3
-
-
-@pytest.mark.parametrize("p", [-1.2, 1.4])
-def test_errors_are_how_what_lacks_changes(p):
-    """∂e/∂r against differences of e, the sum of the effects of the two highest modes where all of it counts.
-
-    By other parameters the loads between cells change, too, which the derivative holds.
-    """
-    oscillator = VibroImpactOscillator(omega=1.1, restitution=0.8, c1=0.2, epsilon=0.8)
-    problem, key, h = Problem(oscillator, NonGaussianNoise(D0=0.5, tau0=0.6, r0=0.6)), "oscillator.restitution", 1e-5
-    chosen = ExponentSolver(problem, rtol=1e-3).solution(p).pair.generator.chosen
-
-    def solved(r):
-        generator = Generator(problem.at({key: r}), chosen)
-        generator.slowest = [1.0, 1.0]
-        return Solution(principal_pair(generator, p))
-
-    solution = solved(0.8)
-    around = PairDerivatives(solution.pair)
-    [found] = changes_of_errors(solution, around, {key: Changed(around, problem.derivative(key))}).values()
-    more, less = (sum(each.error for each in solved(0.8 + side * h).effects) for side in (1, -1))
-    assert sum(found) == pytest.approx((more - less) / (2 * h), rel=1e-4)
-
-
-def test_no_larger_discretisation_than_that_of_the_moment(monkeypatch):
-    made = list[int]()
-    monkeypatch.setattr(Generator, "at", lambda self, p, own=Generator.at: made.append(self.size) or own(self, p))
-    problem = Problem(
-        VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=0.3), OrnsteinUhlenbeck(1.0, 0.5)
-    )
-    solver = ExponentSolver(problem)
-    solver.solution(2.0)
-    size = max(made)
-    solve_sensitivities(solver, np.array([2.0]), problem.derivatives(), indices=["lyapunov_exponent"])
-    assert max(made) == size
 
 
 def test_the_error_of_a_derivative_does_not_depend_on_others():
