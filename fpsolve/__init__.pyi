@@ -17,10 +17,10 @@ from .errors import CaseError as CaseError
 from .errors import FpsolveError as FpsolveError
 from .errors import NotConverged as NotConverged
 from .exponent.function import MomentLyapunovFunction as MomentLyapunovFunction
-from .exponent.function import moment_lyapunov as moment_lyapunov
 from .exponent.quantities import lyapunov_exponent as lyapunov_exponent
 from .exponent.quantities import stability_index as stability_index
 from .exponent.solver import ExponentSolver as ExponentSolver
+from .exponent.solver import moment_lyapunov as moment_lyapunov
 from .fem.mesh import CylinderMesh as CylinderMesh
 from .fem.mesh import make_mesh as make_mesh
 from .model.noises.non_gaussian import NonGaussianNoise as NonGaussianNoise

@@ -17,7 +17,7 @@ from fpsolve.analysis.sensitivity import Gradient
 from fpsolve.budget import SECONDS_PER_OPERATION, Countdown, charge, counted, under_way, watched
 from fpsolve.errors import NotConverged
 from fpsolve.exponent import Budget, critical_restitution, impact_rate
-from fpsolve.exponent.function import nonzero_root
+from fpsolve.exponent.root import nonzero_root
 from fpsolve.model import Bounded, Filter, MarkovChain, ModalSystem, White
 from tests.benchmarks.measure import peak_memory
 from tests.conftest import FIG1, FIG1_NOISE, sampled

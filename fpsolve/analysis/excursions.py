@@ -39,7 +39,7 @@ from fpsolve.errors import NotConverged
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.error import Estimate
-from fpsolve.exponent.function import nonzero_root
+from fpsolve.exponent.root import nonzero_root
 from fpsolve.exponent.solver import ExponentSolver, solver_of
 from fpsolve.fem.generator import Generator
 from fpsolve.messages import Code, Message, Remedy

@@ -32,7 +32,7 @@ from fpsolve.errors import NoSuchExponent, NotConverged
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.eigen import PairDerivatives
 from fpsolve.exponent.error import Estimate
-from fpsolve.exponent.function import nonzero_root
+from fpsolve.exponent.root import nonzero_root
 from fpsolve.exponent.solver import ExponentSolver, solver_of
 from fpsolve.fem.axis import KroneckerSum
 from fpsolve.fem.mesh import CylinderMesh

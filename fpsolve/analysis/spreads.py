@@ -27,7 +27,7 @@ from fpsolve.data import Result, dataset
 from fpsolve.errors import NotConverged
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.error import Absent, Estimate
-from fpsolve.exponent.function import nonzero_root
+from fpsolve.exponent.root import nonzero_root
 from fpsolve.exponent.solver import solver_of
 from fpsolve.model.problem import Problem, checked_moments, checked_problem
 from fpsolve.model.quantity import LYAPUNOV_EXPONENT, MOMENT, STABILITY_INDEX, P, Quantity

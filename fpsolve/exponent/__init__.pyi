@@ -6,8 +6,6 @@ from .eigen import spectrum as spectrum
 from .error import Estimate as Estimate
 from .error import Failure as Failure
 from .function import MomentLyapunovFunction as MomentLyapunovFunction
-from .function import moment_lyapunov as moment_lyapunov
-from .function import solve_moments as solve_moments
 from .quantities import INDICES as INDICES
 from .quantities import QUANTITIES as QUANTITIES
 from .quantities import Index as Index
@@ -19,3 +17,5 @@ from .quantities import lyapunov_exponent as lyapunov_exponent
 from .quantities import stability_index as stability_index
 from .solver import ExponentSolver as ExponentSolver
 from .solver import MomentLyapunov as MomentLyapunov
+from .solver import moment_lyapunov as moment_lyapunov
+from .solver import solve_moments as solve_moments

@@ -35,7 +35,7 @@ from fpsolve.budget import one_number
 from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.error import Absent, Estimate, checked
-from fpsolve.exponent.function import SEARCH_INTERVAL, nonzero_root
+from fpsolve.exponent.root import SEARCH_INTERVAL, nonzero_root
 from fpsolve.exponent.solver import ExponentSolver, solver_of
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import Code, Message

@@ -6,8 +6,9 @@ import math
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import KW_ONLY, dataclass, field
+from dataclasses import KW_ONLY, dataclass, field, replace
 from functools import cached_property, partial
+from itertools import pairwise, repeat
 from numbers import Real
 from typing import TYPE_CHECKING, Any
 
@@ -27,12 +28,14 @@ from fpsolve.exponent.adapt import (
     solved_p,
     spent_remedy,
 )
+from fpsolve.exponent.curve import Curve, Node, polynomial, values
 from fpsolve.exponent.eigen import PairDerivatives, PrincipalPair, second_derivative, slope_rounding
 from fpsolve.exponent.error import Estimate, Failure, Moment, Solution, checked, slope_error
 from fpsolve.exponent.starts import warnings_of_other_places
 from fpsolve.fem.factors import one_thread
+from fpsolve.fem.generator import SMALL_P
 from fpsolve.fem.mesh import CylinderMesh
-from fpsolve.messages import ALMOST_EVERY, Code, Message, Remedy
+from fpsolve.messages import ALMOST_EVERY, Code, Message, Remedy, message_of
 from fpsolve.model import quantity
 from fpsolve.model.problem import (
     Problem,
@@ -43,6 +46,7 @@ from fpsolve.model.problem import (
     refuse_infinite,
     refuse_tails,
 )
+from fpsolve.theory.frozen import eigenvalues_at
 from fpsolve.theory.moments import EvenMoment, even_moment
 from fpsolve.theory.perturbation import Scale, scale_of
 
@@ -57,6 +61,12 @@ SURELY = 10.0
 """Multiple of the errors of two values from which on they contradict each other."""
 ROUNDED = 1e-6
 """Share of the values themselves that is added to that."""
+NODES = 0.3
+"""Share of the tolerance of a curve for the errors of its nodes, which may grow between them."""
+FEW_MOMENTS = 16
+"""Up to so many p are solved one by one."""
+SLOPE_SHARE = 1e-3
+"""Of what a tangent rises, by which it may lie too high, as slopes have errors."""
 TINY_P = 1e-3
 """Below it Λ(p)/p is a mean of Λ′, as rounding is not proportional to p."""
 TINIEST_P = 1e-9
@@ -113,7 +123,7 @@ class MomentLyapunov(Result):
         residual: backward error of the eigenpairs, shape (n,); NaN where there is none.
         solver: what solved them.
         warnings: on the p where `error_estimate` exceeds rtol.
-        function: of which these are values; None where each p was solved.
+        curves: of which these are values; none where each p was solved.
         root: where Λ(p)/p changes its sign, near δ_p; None where that is not among the p, or Λ was not interpolated.
         failures: why some p are missing, or none is to be trusted.
         notes: on them.
@@ -126,7 +136,7 @@ class MomentLyapunov(Result):
     residual: FloatArray
     solver: ExponentSolver
     warnings: tuple[Message, ...] = ()
-    function: Any = field(default=None, repr=False)
+    curves: tuple[Curve, ...] = field(default=(), repr=False)
     root: float | None = None
     failures: tuple[Failure, ...] = ()
     notes: tuple[Message, ...] = ()
@@ -138,8 +148,8 @@ class MomentLyapunov(Result):
     @cached_property
     def derivative_error(self) -> FloatArray:
         """Estimate of |error of `derivative`|, shape (n,), which takes some solves; NaN where none is known."""
-        if self.function is not None:
-            return np.asarray(self.function.derivative_error(self.p))
+        if self.curves:
+            return values(self.curves, self.p).derivative_error
         known = zip(self.p.tolist(), np.isfinite(self.derivative).tolist(), strict=True)
         return np.array([self.solver.slope_error(p) if is_known else math.nan for p, is_known in known])
 
@@ -394,6 +404,42 @@ class ExponentSolver:
         """The largest error allowed of a value of Λ(p)."""
         return tolerated(self.rtol, self.of_value, self.scales, p, value)
 
+    def curves(
+        self, low: float, high: float, otherwise: Callable[..., Curve | None] = lambda *_: None
+    ) -> tuple[Curve, ...]:
+        """Λ on an interval, of two variables: a polynomial, or what does otherwise, in two where a saddle has a corner.
+
+        Args:
+            low, high: the interval.
+            otherwise: takes the arguments of `polynomial` where there is none.
+
+        Raises:
+            NotConverged: there is none.
+        """
+        ends, found = [low, high], list[Curve]()
+        if self.problem.dimension > 2 or len(self.classes) > 1:
+            raise NotConverged(Message(Code.NO_FUNCTION, low=low, high=high))
+        if low < -1 < high and not eigenvalues_at(self.problem, 0.0)[2]:
+            ends.insert(1, -1.0)
+        for start, end in pairwise(ends):
+            with one_thread():
+                curve = polynomial(self._node, start, end, self._allowed) or otherwise(
+                    self._node, start, end, self._allowed
+                )
+            if curve is None:
+                raise NotConverged(Message(Code.NO_FUNCTION, low=low, high=high))
+            found.append(curve)
+        return tuple(found)
+
+    def _allowed(self, p: float) -> float:
+        """The largest error of Λ(p)/p, and of λ."""
+        return self.tolerance(max(abs(p), SMALL_P), 0.0) / max(abs(p), SMALL_P)
+
+    def _node(self, p: float) -> Node:
+        tolerance = partial(share_of, NODES * self._allowed(p))
+        ratio, error = self.ratio_alone(p, tolerance)
+        return Node(ratio, error, self.solution(p, tolerance).pair.derivative if p else ratio)
+
     @property
     def goes_on(self) -> bool:
         """Whether numbers of an earlier run do in place of eigenpairs, which others need for their messages."""
@@ -606,6 +652,11 @@ def solver_of(
     return ExponentSolver(problem, mesh, rtol=rtol, budget=budget or Budget())
 
 
+def share_of(most: float, p: float, value: float) -> float:
+    """The tolerance of Λ(p) that leaves Λ(p)/p an error of this at most."""
+    return most * abs(p)
+
+
 def _of_moments(even: EvenMoment) -> Moment:
     return Moment(even.value, math.nan, math.nan, even.error, math.nan)
 
@@ -652,3 +703,193 @@ def bounds(solver: ExponentSolver, p: FloatArray, value: FloatArray, error: Floa
     root = f"> {low:g}" * (low > 0) + " and " * (low > 0 and high < math.inf) + f"< {high:g}" * (high < math.inf)
     bound = float(value[at] + error[at]) / float(p[at])
     return (Message(Code.CONVEX_BOUNDS, p=p[at], bound=bound, root=root or None),)
+
+
+def moment_lyapunov(
+    problem: Problem,
+    p: ArrayLike,
+    *,
+    rtol: float | None = None,
+    mesh: CylinderMesh | None = None,
+    budget: Budget | None = None,
+) -> MomentLyapunov:
+    """The moment Lyapunov exponent Λ(p) = lim (1/t) ln E‖x(t)‖^p, Eq. (1), as the principal eigenvalue of Eq. (19).
+
+    >>> moment_lyapunov(problem, 2.0)  # the `problem` of `Problem`
+    MomentLyapunov(Λ(2) = -0.00739783... ± ...)
+
+    Args:
+        problem: a motion and its noise.
+        p: one moment, or an array of shape (n,).
+        rtol: |error| ≤ rtol·max(|Λ|, the terms of Eq. (37) before they cancel); None is 1e-8, under two noises
+            that are not white 1e-6, for more than two variables 1e-5.
+        mesh: a mesh for all p, where an `error_estimate` above rtol gives a warning; None chooses one that meets rtol.
+        budget: what the choice of a mesh may cost; None for the default one.
+
+    Many p are interpolated, see `exponent.curve`, where that saves solves; then `pairs` solves each p.
+
+    Raises:
+        ValueError: p is not finite, or empty, or rtol is not positive.
+        NoSuchExponent: Λ(p) is infinite.
+        NotConverged: some p are not resolved on the mesh, or within the budget; `partial` is the result for the others.
+    """
+    solver = solver_of(problem, mesh, rtol, budget)
+    result = solve_moments(solver, real_numbers(p, "p"))
+    if result.failures:
+        reasons = [*dict.fromkeys(failure.reason for failure in result.failures)]
+        raise NotConverged(Message(Code.SEVERAL, reasons=reasons), result)
+    return result
+
+
+def solve_moments(
+    solver: ExponentSolver,
+    p: ArrayLike,
+    *,
+    progress: Callable[[], None] = lambda: None,
+    known: dict[float, Moment] | None = None,
+) -> MomentLyapunov:
+    """Λ at several p, by interpolation where that saves solves; what did not converge is in its `failures`.
+
+    Args:
+        solver: of the problem.
+        p: one moment, or an array of shape (n,), which here may be empty; equal ones are solved once.
+        progress: called once for each p, whatever the number of solves.
+        known: Λ(p) of an earlier run, by p; it takes each p that is solved before `progress` is called.
+
+    Raises:
+        NoSuchExponent: Λ(p) is infinite for one of the p.
+    """
+    asked = checked_moments(p, solver.problem, may_be_empty=True)
+    points, reports = np.array([*dict.fromkeys(asked.tolist())], dtype=float), repeat(progress, asked.size)
+
+    def report() -> None:
+        next(reports, lambda: None)()
+
+    result = None
+    if points.size > FEW_MOMENTS:
+        with suppress(NotConverged):
+            result = interpolated(solver, solver.curves(float(points.min()), float(points.max())), points)
+            if result.warnings and solver.mesh is None:  # single solves round less
+                result = None
+    result = result or _one_by_one(solver, points, report, known)
+    for each in reports:
+        each()
+    return result if points.size == asked.size else _at(result, asked)
+
+
+def _at(result: MomentLyapunov, p: FloatArray) -> MomentLyapunov:
+    """A result at p some of which are equal, without those that failed."""
+    places = {each: i for i, each in enumerate(result.p.tolist())}
+    index = [places[each] for each in p.tolist() if each in places]
+    names = ("p", "value", "derivative", "error_estimate", "residual")
+    return replace(result, **{name: getattr(result, name)[index] for name in names})
+
+
+def _one_by_one(
+    solver: ExponentSolver, p: FloatArray, progress: Callable[[], None], known: dict[float, Moment] | None
+) -> MomentLyapunov:
+    """Λ at each p by a solve of its own, if these are convex; Λ(0) = 0 even where its eigenpair failed."""
+    result = solver.moments(p, progress=progress, known=known)
+    columns = result.p, result.value, result.derivative, result.error_estimate
+    obstacle = None
+    if not result.failures:
+        steep = partial(getattr, result, "derivative_error")
+        obstacle = broken_convexity(*columns, steep) or contradiction(solver, *columns, steep)
+    if obstacle:
+        return replace(result, failures=(Failure(None, message_of(obstacle).advising(solver.refinement)),))
+    failures = tuple(failure for failure in result.failures if failure.p != 0)
+    if len(failures) == len(result.failures):
+        return result
+    failed = {failure.p for failure in failures}
+    place = [float(each) for each in p if each not in failed].index(0.0)
+    row = {"p": 0.0, "value": 0.0, "derivative": np.nan, "error_estimate": 0.0, "residual": np.nan}
+    with_zero: dict[str, Any] = {name: np.insert(getattr(result, name), place, number) for name, number in row.items()}
+    return replace(result, failures=failures, **with_zero)
+
+
+def interpolated(solver: ExponentSolver, curves: tuple[Curve, ...], p: FloatArray) -> MomentLyapunov:
+    """Λ at several p by curves; the residual is the largest of the nodes. Raises `NotConverged` if they contradict."""
+    value, derivative, _, error, slope_error = values(curves, p)
+    columns = p, value, derivative, error
+    steep = partial(np.asarray, slope_error)
+    if obstacle := broken_convexity(*columns, steep) or contradiction(solver, *columns, steep):
+        raise NotConverged(obstacle, remedy=solver.refinement)
+    for i in np.flatnonzero(p):
+        estimate = Estimate(float(value[i]), float(error[i]), solver.scale(p[i]), quantity=quantity.moment_at(p[i]))
+        checked(estimate, solver.refinement, float(p[i]))
+    pairs = [solver.solution(each).pair for curve in curves for each in curve.nodes.tolist()]
+    return MomentLyapunov(
+        p=p,
+        value=value,
+        derivative=derivative,
+        error_estimate=error,
+        residual=np.full(p.size, max(pair.residual for pair in pairs)),
+        solver=solver,
+        warnings=(*missed(solver, p, value, error), *warnings_of_other_places(solver.mesh, pairs)),
+        curves=curves,
+        root=sign_change(p, value, derivative),
+        notes=of_the_start(solver, p),
+    )
+
+
+def sign_change(p: FloatArray, value: FloatArray, slope: FloatArray) -> float | None:
+    """Where Λ(p)/p, which increases, changes its sign, by one step of Newton; None where it does not."""
+    order = np.argsort(p)
+    order = order[p[order] != 0]
+    p, ratio, rise = p[order], value[order] / p[order], slope[order] - value[order] / p[order]
+    sides = np.flatnonzero((ratio[:-1] <= 0) & (ratio[1:] > 0))
+    if not sides.size:
+        return None
+    i = sides[0] + int(abs(ratio[sides[0] + 1]) < abs(ratio[sides[0]]))
+    return float(np.clip(p[i] - ratio[i] * p[i] / rise[i], p[sides[0]], p[sides[0] + 1]))
+
+
+def broken_convexity(
+    p: FloatArray, value: FloatArray, slope: FloatArray, errors: FloatArray, slope_errors: Callable[[], FloatArray]
+) -> Message | None:
+    """Where a point, or Λ(0) = 0, lies below a tangent by more than the errors explain; or None, as Λ(p) is convex.
+
+    The errors of the slopes are asked for where those of the values do not suffice.
+    """
+    if not p.size:
+        return None
+    value = np.where(p == 0, 0.0, value)  # but for rounding
+    others, away = np.append(value, 0.0), np.append(p, 0.0)[None] - p[:, None]
+    above = others[None] - (value[:, None] + slope[:, None] * away)
+    above = np.where(np.isfinite(above), above, math.inf)  # where no slope is known
+    slack = 10 * (errors[:, None] + np.append(errors, 0.0)[None]) + 1e-6 * np.abs(others[None])
+    if np.any(above < -slack):
+        steep = np.nan_to_num(slope_errors(), nan=1e300)
+        slack += 3 * steep[:, None] * np.abs(away)
+    i, j = np.unravel_index(np.argmin(above + slack), above.shape)
+    if not above[i, j] < -slack[i, j]:
+        return None
+    return Message(Code.NOT_CONVEX, p=p[i], other=np.append(p, 0.0)[j])
+
+
+def contradiction(
+    solver: ExponentSolver,
+    p: FloatArray,
+    value: FloatArray,
+    slope: FloatArray,
+    errors: FloatArray,
+    slope_errors: Callable[[], FloatArray],
+) -> Message | None:
+    """Where a point lies on the wrong side of the chord from Λ(0) = 0 to an even moment, or its tangent above that.
+
+    The even moments are Λ(2) and those of the p themselves, by equations that know no directions, see `even`. The
+    errors of the slopes are asked for where those of the values do not suffice.
+    """
+    for q in sorted({2.0, *p[(p > 0) & (p % 2 == 0)].tolist()} if p.size else ()):
+        if not (known := solver.even(q)):
+            continue
+        slack = np.array([solver.doubt(error, known) for error in errors]) * np.maximum(1.0, np.abs(p) / q)
+        above, rise = value - p / q * known.value, slope * (q - p)
+        is_wrong = np.where((p > 0) & (p < q), above, -above) > slack
+        too_steep = value + rise - known.value - slack - SLOPE_SHARE * np.abs(rise)
+        if np.any(too_steep > 0):
+            is_wrong |= too_steep > 3 * np.nan_to_num(slope_errors(), nan=1e300) * np.abs(q - p)
+        if np.any(is_wrong):
+            i = int(np.argmax(is_wrong))
+            return Message(Code.NOT_PRINCIPAL, p=p[i], value=value[i], other=q, expected=known.value)
+    return None

@@ -13,8 +13,7 @@ from fpsolve.case.case import Case, Curve
 from fpsolve.data import Quantity
 from fpsolve.errors import NoSuchExponent
 from fpsolve.exponent.error import Failure, Moment, digits
-from fpsolve.exponent.function import solve_moments
-from fpsolve.exponent.solver import InvariantClass
+from fpsolve.exponent.solver import InvariantClass, solve_moments
 from fpsolve.messages import Code, Message
 from fpsolve.model.problem import Problem, refuse_infinite
 from fpsolve.model.quantity import LYAPUNOV_EXPONENT, MOMENT, OVER_P

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 from fpsolve.errors import NoHierarchy, NotConverged
 from fpsolve.exponent.adapt import Budget
-from fpsolve.exponent.function import nonzero_root
+from fpsolve.exponent.root import nonzero_root
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.model.problem import Problem
 from fpsolve.proofs.certificate import NOTHING, Enclosure, enclosure_of, trivial

@@ -16,7 +16,7 @@ from fpsolve import (
 from fpsolve.analysis.sensitivity import SMALL_P, Gradient, solve_sensitivities
 from fpsolve.arrays import identity
 from fpsolve.exponent import Budget
-from fpsolve.exponent.function import nonzero_root
+from fpsolve.exponent.root import nonzero_root
 from fpsolve.fem import Generator
 from fpsolve.model import CoefficientMatrix
 from fpsolve.model.systems.vibro_impact import DAMPING

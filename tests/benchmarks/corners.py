@@ -17,7 +17,7 @@ import numpy as np
 from fpsolve import ExponentSolver, NonGaussianNoise, Problem, VibroImpactOscillator
 from fpsolve.analysis.sensitivity import solve_sensitivities
 from fpsolve.errors import NotConverged
-from fpsolve.exponent.function import nonzero_root
+from fpsolve.exponent.root import nonzero_root
 from tests.benchmarks.cpu import race
 from tests.benchmarks.problem import CASES
 from tests.benchmarks.rows import Row, print_rows

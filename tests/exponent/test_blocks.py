@@ -21,7 +21,7 @@ from fpsolve.arrays import identity
 from fpsolve.errors import NoSuchExponent, NotConverged
 from fpsolve.exponent import Budget
 from fpsolve.exponent.adapt import WholeProblem
-from fpsolve.exponent.function import nonzero_root
+from fpsolve.exponent.root import nonzero_root
 from fpsolve.exponent.solver import tolerated
 from fpsolve.messages import Code
 from fpsolve.model import CoefficientMatrix, LinearSystem, ModalSystem, Telegraph, White

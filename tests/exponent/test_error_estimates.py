@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from fpsolve import ExponentSolver, NonGaussianNoise, Problem, VibroImpactOscillator, make_mesh
-from fpsolve.exponent.function import nonzero_root
+from fpsolve.exponent.root import nonzero_root
 from tests.conftest import UNIT_NOISE
 from tests.random_problems import Outcome, problems, solve
 

@@ -19,9 +19,9 @@ from fpsolve import (
 )
 from fpsolve.errors import NoSuchExponent, NotConverged
 from fpsolve.exponent import Estimate, second_derivative
-from fpsolve.exponent.basis import Basis
+from fpsolve.exponent.adapt import WholeProblem
 from fpsolve.exponent.error import Absent
-from fpsolve.exponent.function import nonzero_root
+from fpsolve.exponent.root import nonzero_root
 from fpsolve.messages import Code, Message
 from fpsolve.model import ParametricOscillator
 from tests.conftest import FIG1, FIG1_NOISE, UNIT_NOISE, oracle_arguments
@@ -126,15 +126,15 @@ def test_an_interval_on_one_side_of_zero():
 
 
 def test_a_wrong_eigenvalue_breaks_convexity(monkeypatch):
-    true = Basis._solution
+    true = WholeProblem.solution
 
-    def fooled(self, p):
-        solution = true(self, p)
-        if 0 < p < 3:
+    def fooled(self, p, tolerance=None):
+        solution = true(self, p, tolerance)
+        if 0.6 < p < 2.9:
             object.__setattr__(solution.pair, "correction", 1e-3)
         return solution
 
-    monkeypatch.setattr(Basis, "_solution", fooled)
+    monkeypatch.setattr(WholeProblem, "solution", fooled)
     with pytest.raises(NotConverged, match=r"Λ\(p\) is not convex .*; use a smaller rtol$"):
         MomentLyapunovFunction(Problem(FIG1, WEAK_NOISE), (0.5, 3.0))
 

@@ -8,7 +8,7 @@ import pytest
 from fpsolve import ExponentSolver, OrnsteinUhlenbeck, PlaneSystem, Problem, moment_lyapunov, sensitivities
 from fpsolve.arrays import identity
 from fpsolve.errors import NoSuchExponent, NotConverged
-from fpsolve.exponent.function import nonzero_root
+from fpsolve.exponent.root import nonzero_root
 from fpsolve.model import CoefficientMatrix, Jump, MarkovChain, White
 
 NOISES = {

@@ -8,8 +8,8 @@ import pytest
 
 from fpsolve import ExponentSolver, Problem, VibroImpactOscillator, make_mesh, moment_lyapunov
 from fpsolve.errors import NotConverged
-from fpsolve.exponent import Budget, function, solve_moments
-from fpsolve.exponent.function import FEW_MOMENTS
+from fpsolve.exponent import Budget, solver, solve_moments
+from fpsolve.exponent.solver import FEW_MOMENTS
 from tests.conftest import FIG1, FIG1_NOISE
 
 WEAK_NOISE = FIG1_NOISE.ou_reduction()
@@ -49,7 +49,7 @@ def test_what_is_raised_is_the_result_with_its_failures():
 
 
 def test_a_curve_that_is_not_convex_is_a_failure_of_all(monkeypatch):
-    monkeypatch.setattr(function, "broken_convexity", lambda *columns: "not convex")
+    monkeypatch.setattr(solver, "broken_convexity", lambda *columns: "not convex")
     found = solve_moments(ExponentSolver(Problem(FIG1, WEAK_NOISE)), [1.0, 2.0])
     np.testing.assert_array_equal(found.p, [1.0, 2.0])
     assert [(failure.p, failure.reason) for failure in found.failures] == [(None, "not convex; use a smaller rtol")]

@@ -18,7 +18,7 @@ from fpsolve import (
 from fpsolve.arrays import identity
 from fpsolve.cli import main
 from fpsolve.exponent import critical_impact_factor, impact_rate
-from fpsolve.exponent.function import nonzero_root
+from fpsolve.exponent.root import nonzero_root
 from fpsolve.messages import Code
 from fpsolve.model import (
     Bounded,

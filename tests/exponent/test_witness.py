@@ -8,7 +8,7 @@ import pytest
 from fpsolve import ExponentSolver, OrnsteinUhlenbeck, PlaneSystem, Problem
 from fpsolve.arrays import identity
 from fpsolve.errors import NotConverged
-from fpsolve.exponent.function import contradiction
+from fpsolve.exponent.solver import contradiction
 from fpsolve.messages import Code, Message
 from fpsolve.model import CoefficientMatrix, Filter, LinearSystem, Telegraph, White
 from tests.theory.test_moments import NODE, NODE_FILTER, NODE_NOISE, driven, second_moment
@@ -22,13 +22,20 @@ def node():
 def test_a_lower_eigenvalue_is_seen(node, monkeypatch):
     """That of |x|^(p − 2) |v|², which was given for Λ(4), lies below the chord of Λ(2) and its own even moment."""
     at, slope, error = np.array([4.0]), np.array([0.2]), np.array([5e-10])
-    found = contradiction(node, at, np.array([-0.32793]), slope, error)
+
+    def exact():
+        return np.zeros(1)
+
+    found = contradiction(node, at, np.array([-0.32793]), slope, error, exact)
     assert found.code is Code.NOT_PRINCIPAL
     assert found.data["expected"] == pytest.approx(0.78527655968609, abs=1e-11)
-    assert contradiction(node, at, np.array([1.570632172319]), slope + 0.19265, error) is None
-    low = contradiction(node, np.array([1.0]), np.array([0.39]), np.array([0.5]), error)  # its tangent is above Λ(2)
+    assert contradiction(node, at, np.array([1.570632172319]), slope + 0.19265, error, exact) is None
+    low = contradiction(
+        node, np.array([1.0]), np.array([0.39]), np.array([0.5]), error, exact
+    )  # its tangent is above Λ(2)
     assert low.code is Code.NOT_PRINCIPAL
-    monkeypatch.setattr("fpsolve.exponent.solver.even_moment", lambda *_, **__: SimpleNamespace(value=0.79, error=1e-9))
+    moment = SimpleNamespace(value=0.79, error=1e-9)
+    monkeypatch.setattr("fpsolve.exponent.solver.even_moment", lambda *_, **__: moment)
     with pytest.raises(NotConverged, match="p = 2 is not the principal one: by the equations of the moments"):
         ExponentSolver(node.problem).solution(2.0)
 

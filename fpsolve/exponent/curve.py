@@ -1,0 +1,110 @@
+"""Λ(p) on an interval from solves at few p, by a polynomial of Λ(p)/p.
+
+In weak noise that is a polynomial to rounding at nine points of Chebyshev, with both ends. At p = 0 it is λ, and its
+tolerance does not fall there. Every second point is one of the polynomial before. Where coefficients fall slowly, as
+n⁻² at a corner, which a convex Λ does not hide between two points, n times the last ones are left; where they fall
+fast, the square of what the polynomial before is off at the other points, over the values. In strong noise Λ has
+branch points beside the real axis, and there is none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+from numpy.polynomial import Chebyshev
+
+from fpsolve.arrays import FloatArray
+
+COUNTS = (5, 9, 17)
+NEXT_TO_ZERO = 1e-3
+"""Share of the interval; a point nearer to 0 is put there."""
+
+
+class Node(NamedTuple):
+    """What is solved at one p: Λ(p)/p, which is λ at p = 0, the estimate of its error, and Λ′(p)."""
+
+    ratio: float
+    error: float
+    slope: float
+
+
+class Curve(NamedTuple):
+    """Λ on an interval.
+
+    Attributes:
+        nodes: the p that were solved, increasing.
+        derivative: the k-th derivative of Λ, by p and k.
+        errors: estimates of |error| of Λ and of Λ′, by p.
+    """
+
+    nodes: FloatArray
+    derivative: Callable[[FloatArray, int], FloatArray]
+    errors: Callable[[FloatArray], tuple[FloatArray, FloatArray]]
+
+
+class Values(NamedTuple):
+    """Λ, Λ′, Λ″ at some p, and estimates of |error| of the first two."""
+
+    value: FloatArray
+    derivative: FloatArray
+    second: FloatArray
+    error: FloatArray
+    derivative_error: FloatArray
+
+
+def values(curves: Sequence[Curve], p: FloatArray) -> Values:
+    """What one or more curves, of intervals next to each other, are at p, shape (n,); but for rounding Λ(0) = 0."""
+    found, place = np.zeros((5, p.size)), np.searchsorted([curve.nodes[0] for curve in curves[1:]], p, side="right")
+    for number, curve in enumerate(curves):
+        own = p[place == number]
+        found[:, place == number] = *(curve.derivative(own, k) for k in range(3)), *curve.errors(own)
+    found[np.ix_([0, 3], p == 0)] = 0.0
+    return Values(*found)
+
+
+def polynomial(
+    solve: Callable[[float], Node], low: float, high: float, allowed: Callable[[float], float]
+) -> Curve | None:
+    """Λ by a polynomial, if at all points the error of Λ(p)/p is allowed, or twice that of the point at most."""
+    known, half, last = dict[float, Node](), 0.5 * (high - low), None
+    for count in COUNTS:
+        points = low + half - half * np.cos(np.pi * np.arange(count) / (count - 1))
+        points[-1] = high
+        points[np.abs(points) < 2 * half * NEXT_TO_ZERO] = 0.0
+        known |= {p: solve(p) for p in sorted(points.tolist(), key=abs, reverse=True) if p not in known}
+        ratios, errors, _ = np.array([known[p] for p in points.tolist()]).T
+        ratio = Chebyshev.fit(points, ratios, count - 1, domain=(low, high))
+        if last is not None:
+            off, size = float(np.max(np.abs(last(points) - ratios))), float(np.max(np.abs(ratios)))
+            left = count * float(np.sum(np.abs(ratio.coef[-3:]))) + off**2 / max(off, size)
+            error = partial(_error, points, errors, left)
+            most = np.maximum([allowed(p) for p in points.tolist()], 2 * errors)
+            if np.all(error(points) <= most):
+                return _of_ratio(points, ratio, error)
+            if left**2 > size * np.min(most):  # twice as many points leave about that
+                return None
+        last = ratio
+    return None
+
+
+def _error(points: FloatArray, errors: FloatArray, left: float, p: FloatArray) -> FloatArray:
+    """What is left, and the errors of all points as much as they may grow between these."""
+    growth = [Chebyshev.fit(points, row, points.size - 1, domain=(points[0], points[-1]))(p) for row in np.diag(errors)]
+    return np.asarray(left + np.abs(growth).sum(axis=0))
+
+
+def _of_ratio(points: FloatArray, ratio: Chebyshev, error: Callable[[FloatArray], FloatArray]) -> Curve:
+    """Λ by Λ(p)/p with its error."""
+    steepness = 2 * (points.size - 1) ** 2 / np.ptp(points)  # of a polynomial that is 1 at most (Markov)
+    most = float(np.max(error(points)))
+
+    def derivative(p: FloatArray, k: int) -> FloatArray:
+        return np.asarray(p * ratio.deriv(k)(p) + (k * ratio.deriv(k - 1)(p) if k else 0.0))
+
+    def errors(p: FloatArray) -> tuple[FloatArray, FloatArray]:
+        return error(p) * np.abs(p), most * (1 + steepness * np.abs(p))
+
+    return Curve(points, derivative, errors)
