@@ -169,10 +169,7 @@ class Code(Enum):
     )
     NO_ARNOLDI = "failure: the Arnoldi iteration for p = {p:g} did not converge"
     UNKNOWNS_SPENT = "failure: the next mesh has {unknowns} unknowns, more than budget.unknowns = {most}"
-    MEMORY_SPENT = "failure: the next mesh needs some {size:.2g} GB of memory, more than budget.memory = {most:.2g}"
-    SECONDS_SPENT = (
-        "failure: the next mesh needs some {seconds:.2g} s of processor time, more than budget.seconds = {most:g}"
-    )
+    SECONDS_SPENT = "failure: it takes some {seconds:.2g} s of processor time, more than budget.seconds = {most:g}"
     NUMBER_SPENT = "failure: {symbol} did not converge: {reason}"
     MESHES_SPENT = "failure: {count} meshes were tried"
     ROUNDED = "failure: rounding alone may change it by {size:.1e}; use a larger rtol"

@@ -26,7 +26,6 @@ from types import ModuleType
 from typing import Any, TypeVar
 
 from fpsolve.arrays import is_whole, shown
-from fpsolve.budget import share_memory
 from fpsolve.errors import FpsolveError, WorkersDied
 
 Item = TypeVar("Item")
@@ -259,7 +258,6 @@ def _processes(count: int) -> Executor:
 def _begin_worker(count: int) -> None:
     """A worker has one processor, one share of the memory, and ends when what started it does, however that ends."""
     limit_processors(1)
-    share_memory(count)
     parent = multiprocessing.parent_process()
 
     def end_with_parent() -> None:

@@ -6,7 +6,7 @@ import re
 import pytest
 from rich.console import Console
 
-from fpsolve.budget import SECONDS_PER_OPERATION, charge
+from fpsolve.budget import charge
 from fpsolve.exponent import Budget
 from fpsolve.workflow import Phase
 from fpsolve.workflow.progress import MOMENTS, PERCENT, POINTS, SETS, SILENT, Bars, counted, seconds_left
@@ -27,6 +27,14 @@ class Clock:
 @pytest.fixture
 def clock():
     return Clock()
+
+
+@pytest.fixture(autouse=True)
+def processor(monkeypatch):
+    """The time of the processor, which `spend` passes."""
+    found = Clock()
+    monkeypatch.setattr("fpsolve.budget.time.thread_time", found)
+    return found
 
 
 def console(width=80, **options):
@@ -156,31 +164,32 @@ def test_nothing_is_seen_of_silent_phases(capsys):
     assert capsys.readouterr() == ("", "")
 
 
-def spend(number=3):
+def spend(processor, number=3):
     """Some factorisations of Λ″(0)."""
     with Budget(seconds=60.0).countdown("Λ″(0)").running():
         for _ in range(number):
-            charge(13.0 / SECONDS_PER_OPERATION, unknowns=12_400)
+            processor.now += 13.0
+            charge(12_400)
 
 
-def test_a_file_is_told_what_a_long_number_waits_for(clock):
+def test_a_file_is_told_what_a_long_number_waits_for(clock, processor):
     bars = Bars(console(), clock)
     with bars.bar(Phase("mathieu", "solving", 11, MOMENTS)):
-        spend()  # a short one is not told
+        spend(processor)  # a short one is not told
         assert bars.console.file.getvalue() == ""
         clock.now += 12
-        spend(3)
+        spend(processor, 3)
     assert bars.console.file.getvalue() == "mathieu, solving: Λ″(0), 12,400 unknowns, 13 s of 60 s\n"
-    spend()
+    spend(processor)
     assert bars.console.file.getvalue().count("\n") == 1
 
 
 @pytest.mark.parametrize("width", [60, 80, 120, 150])
-def test_a_terminal_shows_what_a_number_waits_for(clock, width, monkeypatch):
+def test_a_terminal_shows_what_a_number_waits_for(clock, width, processor):
     screen = console(width, force_terminal=True, color_system=None, legacy_windows=False)
     bars = Bars(screen, clock)
     with bars.bar(Phase("mathieu", "solving", 11, MOMENTS)):
-        spend()
+        spend(processor)
         bars._display.refresh()
     shown = screen.file.getvalue()
     assert ("Λ″(0), 12,400 unknowns, 39 s of 60 s" in shown) == (width > 60)

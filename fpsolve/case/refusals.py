@@ -164,7 +164,7 @@ def _misfit(mesh: CylinderMesh, valid: Known) -> str:
         judged.add(shape)
         told = _with({key: value for key, value in varied.items() if key in shaping})
         chosen = Space.on(mesh, noise)
-        size, most = chosen.size, valid["budget"].unknowns
+        size, most = chosen.size, valid["budget"].most(chosen)
         if size > most:
             return (
                 f"{told}makes {size} unknowns; must be at most budget.unknowns = {most}; use fewer cells or "

@@ -15,7 +15,7 @@ from typing import Annotated, NamedTuple, NoReturn, TypeVar
 
 import numpy as np
 
-from fpsolve.budget import Countdown, OverBudget, counted, half_the_memory, under_way
+from fpsolve.budget import Countdown, OverBudget, counted, under_way
 from fpsolve.errors import FpsolveError, MeshError, NotConverged, SingularMatrix
 from fpsolve.exponent.eigen import PairDerivatives, PrincipalPair, pair_at_zero, principal_pair
 from fpsolve.exponent.error import Solution
@@ -68,12 +68,9 @@ class Budget:
     """What one number may cost, and a line of a chart. A number that is given does not depend on it.
 
     Args:
-        unknowns: of the largest system.
-        seconds: of a processor for one number, such as Λ(2), λ or Λ″(0), with all that it takes; foreseen before each
-            factorisation, by counting operations at a fixed speed. The nodes of a row of a scan share it, and each may
-            take half of what is left.
-        memory: of the process, in gigabytes, foreseen as the seconds; None for half of that of the machine, which the
-            processes of a run share.
+        unknowns: of the largest system; None for as many as 1.5 GB hold, see `Space.most_unknowns`.
+        seconds: of a processor for one number, such as Λ(2), λ or Λ″(0), with all that it takes, asked before each
+            factorisation. The nodes of a row of a scan share it, and each may take half of what is left.
         line_seconds: of a processor for a line of a chart, its scan, which may take half of them, and its branches;
             None for any time.
 
@@ -81,19 +78,22 @@ class Budget:
         ParameterError: a number is out of its range.
     """
 
-    unknowns: Annotated[int, parameter("number of unknowns of the largest system", "unknowns = 80000", ge=100)] = 80_000
-    seconds: Annotated[float, parameter("seconds of processor time for one number", "seconds = 60.0", gt=0)] = 60.0
-    memory: Annotated[
-        float | None,
-        parameter("memory in GB; if omitted, half of that of the machine", "memory = 8.0", gt=0),
+    unknowns: Annotated[
+        int | None,
+        parameter("number of unknowns of the largest system; if omitted, what 1.5 GB hold", "unknowns = 80000", ge=100),
     ] = None
+    seconds: Annotated[float, parameter("seconds of processor time for one number", "seconds = 60.0", gt=0)] = 60.0
     line_seconds: Annotated[
         float | None, parameter("seconds of processor time for a line of a chart", "line_seconds = 600.0", gt=0)
     ] = None
 
+    def most(self, space: Space) -> int:
+        """Number of unknowns that a space may have."""
+        return space.most_unknowns if self.unknowns is None else self.unknowns
+
     def countdown(self, name: str) -> Countdown:
         """For one number."""
-        return Countdown(self.seconds, self.memory or half_the_memory(), name)
+        return Countdown(self.seconds, name)
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,10 +181,10 @@ class WholeProblem:
             NotConverged: it cannot be made, has a third more unknowns than the budget allows, or does not resolve it.
         """
         chosen = widened(pair.generator).enriched()
-        limit = A_THIRD_MORE * self.budget.unknowns if self.mesh is None else math.inf
+        limit = A_THIRD_MORE * self.budget.most(chosen) if self.mesh is None else math.inf
         reason: Message | str
         if chosen.size > limit:
-            reason = Message(Code.UNKNOWNS_SPENT, unknowns=chosen.size, most=self.budget.unknowns)
+            reason = Message(Code.UNKNOWNS_SPENT, unknowns=chosen.size, most=self.budget.most(chosen))
         else:
             try:
                 with one_thread(), counted(self.budget.countdown(f"a finer Λ({pair.p:g})")):
@@ -338,7 +338,7 @@ class Search:
         """The place of a solution, with a space that should be within the tolerance."""
         start = known.start or Start(self.whole.problem, known.pair.generator.chosen)
         allowed = self.tolerance(self.p, known.pair.value)
-        return start.refined(known, allowed, 0, self.whole.budget.unknowns)
+        return start.refined(known, allowed, 0, self.whole.budget.most(start.space))
 
     def confirm(self, found: Solution) -> Solution:
         """A solution that agrees with that of halved cells of φ within its error, or within what is allowed.
@@ -353,7 +353,7 @@ class Search:
         if self.whole.rtol <= SURELY_SEEN or not isinstance(chosen.phi, PhaseAxis):
             return found
         halved = chosen.with_axis(0, chosen.phi.doubled())
-        if halved.size > min(MOST_HALVED, self.whole.budget.unknowns):
+        if halved.size > min(MOST_HALVED, self.whole.budget.most(halved)):
             return found
         start = Start(self.whole.problem, halved)
         finer = self.attempt(lambda: Solution(start.pair(self.p, found.pair))) or self.adapt(start)
@@ -431,7 +431,7 @@ class Search:
                     best = Best(solution, solution.error / allowed)
                 if near.rounding > allowed:
                     raise Ended(Message(Code.ROUNDED, size=near.rounding))
-                start = start.refined(solution, allowed, self.stages, self.whole.budget.unknowns)
+                start = start.refined(solution, allowed, self.stages, self.whole.budget.most(start.space))
         except (OverBudget, Ended) as failure:
             if best is not None and best.share <= 1:  # within the tolerance, but for its slope
                 return best.solution
@@ -441,7 +441,7 @@ class Search:
 
     def check(self, chosen: Space) -> None:
         """Refuse a stage beyond the budget, and count it."""
-        size, spent, most = chosen.size, self.countdown.spent, self.whole.budget.unknowns
+        size, spent, most = chosen.size, self.countdown.spent, self.whole.budget.most(chosen)
         if size > most:
             raise Ended(Message(Code.UNKNOWNS_SPENT, unknowns=size, most=most))
         seconds = spent + (spent - self.last[0]) * size / max(self.last[1], 1)  # what it takes at least

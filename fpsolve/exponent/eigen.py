@@ -22,14 +22,11 @@ import scipy.linalg
 from scipy.sparse.linalg import ArpackError, ArpackNoConvergence, LinearOperator, eigs, gmres
 
 from fpsolve.arrays import FloatArray, finite, one
-from fpsolve.budget import charge
 from fpsolve.data import brief
 from fpsolve.errors import NotConverged, NumericalFailure, SingularMatrix
 from fpsolve.fem.axis import KroneckerSum
-from fpsolve.fem.dense import Factors
-from fpsolve.fem.factors import LONG, one_thread
+from fpsolve.fem.factors import Factors, one_thread
 from fpsolve.fem.generator import Generator, Pencil
-from fpsolve.fem.refined import RefinedFactors
 from fpsolve.fem.space import Space
 from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.problem import Problem
@@ -84,10 +81,6 @@ MAX_SPECTRUM_UNKNOWNS = 4000
 """Largest number of unknowns of which all eigenvalues are computed."""
 LARGEST_NORM = 1e150
 """Of L(p): vectors of this size have lengths."""
-OPERATIONS_OF_SOLVE = 5000.0
-"""Operations that take the time of a solution with factors for an unknown, 0.18 µs."""
-OPERATIONS_OF_GIGABYTE = 5e9
-"""The same for a gigabyte of factors, of a solution that is refined, 0.17 s."""
 SURVEYED_UNKNOWNS = 600
 """Up to so many, a chain is checked by all eigenvalues."""
 
@@ -321,22 +314,11 @@ def _from_the_right(pencil: Pencil, generator: Generator) -> tuple[FloatArray, F
             shift = value + SHIFT_RATIO * (shift - value)
         factor: Any = None  # there is room for the next ones
         factor, last = pencil.factorised(shift), value
-        right, value = _nearest(lambda v, lu=factor: -_solution(lu, space.weighed(v)), right, shift, pencil.p)
+        right, value = _nearest(lambda v, lu=factor: -lu.solve(space.weighed(v)), right, shift, pencil.p)
         if abs(value - last) <= NEAR_ENOUGH * (shift - value):
             break
-    left, _ = _nearest(lambda v: -_solution(factor, space.weighed(v), True), left, shift, pencil.p, value)
+    left, _ = _nearest(lambda v: -factor.solve(space.weighed(v), transposed=True), left, shift, pencil.p, value)
     return right, left, value, 0.5 * (shift - value)
-
-
-def _solution(factor: Factors, load: FloatArray, transposed: bool = False) -> FloatArray:
-    """One of many with the same factors, which is counted."""
-    _count(factor, load.size)
-    return factor.solve(load, transposed=transposed)
-
-
-def _count(factor: Factors, unknowns: int) -> None:
-    """Count a solution."""
-    charge(OPERATIONS_OF_SOLVE * unknowns + OPERATIONS_OF_GIGABYTE * factor.gigabytes)
 
 
 def _nearest(
@@ -510,15 +492,13 @@ class PairDerivatives:
 
     @cached_property
     def _factor(self) -> Factors:
-        found = self.kept[0][1] if self.kept else self._pencil.factorised(self.pair.eigenvalue + 1e-6 * self._rate)
-        return found.rough if isinstance(found, RefinedFactors) else found  # which would refine the share of T, too
+        return self.kept[0][1] if self.kept else self._pencil.factorised(self.pair.eigenvalue + 1e-6 * self._rate)
 
     @cached_property
     def _of_factor(self) -> tuple[tuple[FloatArray, FloatArray], ...]:
         """w and Mv/⟨w, Mv⟩ of the pair that the factors themselves have next to Λ, and the same of the adjoint.
 
-        Rough factors, or those of another p, have another one than L, so close to the shift that solutions would be
-        full of it.
+        Factors of another p have another one than L, so close to the shift that solutions would be full of it.
         """
         space, (of_right, of_left) = self.pair.space, self._weighed
         v, w = self._factor.solve(of_right), self._factor.solve(of_left, transposed=True)
@@ -533,7 +513,6 @@ class PairDerivatives:
         source = space.weighed(space.constant)
 
         def carried(load: FloatArray) -> FloatArray:
-            _count(self._factor, load.size)
             return self.solve(load, adjoint=adjoint, enough=0.1 * RESOLVED)
 
         moved = LinearOperator(2 * own.shape, lambda v: v - shift * carried(space.weighed(v)), dtype=float)
@@ -545,9 +524,7 @@ class PairDerivatives:
     def solve(
         self, source: FloatArray, *, adjoint: bool = False, refinements: int = REFINEMENTS, enough: float = REFINED
     ) -> FloatArray:
-        """v from the load f, in `one_thread`; each refinement leaves 1e-6 of a rate over the gap of the spectrum, or
-        what the factors round.
-        """
+        """v from the load f, in `one_thread`; each refinement leaves 1e-6 of a rate over the gap of the spectrum."""
         own, other = self.pair.right, self.pair.left
         weighed, operator, change = self._weighed[0], self._operator, 0.0 * own
         if adjoint:
@@ -618,7 +595,6 @@ def pair_at_zero(near: PrincipalPair) -> PrincipalPair | None:
             y, size, last = y + step, length(step), size
     if not size <= KNOWN * length(y):
         return None
-    pencil.kept[:] = (each for each in around.kept if each[1].operations > LONG)
     x = pencil.space.constant
     found = Iterate(0.0, 0.0, x, y, pencil.space.weighed(x), pencil.space.weighed(y))
     return _pair(near.generator, pencil, found)

@@ -33,17 +33,17 @@ class Axis:
 
     Attributes:
         lines: the vertices of cells; none where the functions are of the whole axis.
-        is_full: whether every function is coupled to most others.
+        most_unknowns: of a space with this first axis and no chain, of which SuperLU's factors take 1.5 GB.
+        is_chain: whether each function is coupled to few next to it alone, as polynomials of noise are.
         slowest: the least share of the effect of the highest modes that two more may leave, see `ModeEffects`.
-        ring: its cells, a `Ring`, where only their end values couple them; None for others.
-        is_of_waves: whether it is the first of a sum that `WaveFactors` may take.
+        is_of_waves: whether it is of waves of the phase.
         slope: s/p of the factor exp(s z) that moves with p.
     """
 
     __dataclass_fields__: ClassVar[dict[str, Any]]
     lines = NO_LINES
-    ring: Any = None
-    is_full = is_of_waves = False
+    most_unknowns = 50_000
+    is_chain = is_of_waves = False
     slowest, slope = 0.0, 0.0
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -67,14 +67,6 @@ class Axis:
     @property
     def nested(self) -> Matrix | None:
         """To coefficients of modes whose sums by degree are all functions of a lower one; None where they are that."""
-        return None
-
-    @property
-    def levels(self) -> Sequence[IntArray] | None:
-        """Functions to be eliminated together, of which each level is coupled to its neighbours only.
-
-        Empty where the matrices tell them, None where every function can be by itself.
-        """
         return None
 
     @property
@@ -270,36 +262,16 @@ class KroneckerSum:
         product = scipy.sparse.kron if self.is_sparse else np.kron
         return [(reduce(product, term[:-1]), term[-1]) for term in self.terms]
 
-    @cached_property
-    def patterns(self) -> Sequence[csc_matrix]:
-        """For each axis where any of its factors has an entry."""
-        kind = csc_matrix if self.is_sparse else np.asarray
-        return [csc_matrix(sum(abs(kind(each)) for each in of_axis)) for of_axis in zip(*self.terms, strict=True)]
-
-    @cached_property
-    def entries(self) -> int:
-        """Of the sparse matrix, at most."""
-        return math.prod(pattern.nnz for pattern in self.patterns)
-
     @property
     def halves(self) -> tuple[int, int]:
         """The number of functions along the last axis, after that of all others."""
         last = self.shape[-1]
         return self.size // last, last
 
-    @cached_property
-    def band(self) -> int:
-        """How many diagonals the matrices of the last axis have on each side; all for sparse ones."""
-        if any(issparse(term[-1]) for term in self.terms):
-            return self.shape[-1] - 1
-        rows, columns = np.nonzero(sum(abs(term[-1]) for term in self.terms))
+    def band(self, axis: int) -> int:
+        """How many diagonals the matrices of an axis have on each side."""
+        rows, columns = csc_matrix(sum(abs(csc_matrix(term[axis])) for term in self.terms)).nonzero()
         return int(np.max(np.abs(rows - columns), initial=0))
-
-    @property
-    def pair_gigabytes(self) -> float:
-        """Memory that `pairs` takes of more than two axes, as arrays and as sparse matrices."""
-        is_of_arrays = len(self.shape) > 2 and not self.is_sparse
-        return 12e-9 * self.halves[0] ** 2 * len(self.terms) * is_of_arrays
 
     def toarray(self) -> FloatArray:
         """The dense matrix, shape (size, size)."""

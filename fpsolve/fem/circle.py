@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -30,6 +29,7 @@ class CircleAxis(CountedAxis):
     """
 
     word = "waves"
+    is_chain = True
 
     @property
     def size(self) -> int:
@@ -42,10 +42,6 @@ class CircleAxis(CountedAxis):
     @cached_property
     def modes(self) -> IntArray:
         return -(-self._waves // self.noise.harmonics)
-
-    @cached_property
-    def levels(self) -> Sequence[IntArray]:
-        return [np.flatnonzero(self.modes == k) for k in range(self.count + 1)]
 
     @cached_property
     def rule(self) -> Rule:

@@ -1,41 +1,30 @@
-"""LU factors of a Kronecker sum, of the kind that takes the fewest operations."""
+"""LU factors of a Kronecker sum: of one array, by levels along the noise, or by SuperLU."""
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from functools import cached_property, lru_cache
+from functools import lru_cache
+from itertools import pairwise
 from threading import RLock
+from typing import Protocol
 
 import numpy as np
-from scipy.sparse import csc_matrix, identity
-from scipy.sparse.csgraph import reverse_cuthill_mckee
+from scipy.linalg.lapack import dgetrf, dgetrs
+from scipy.sparse import identity
 from threadpoolctl import ThreadpoolController
 
-from fpsolve.arrays import FloatArray, IntArray
+from fpsolve.arrays import FloatArray, IntArray, dense
 from fpsolve.budget import charge
 from fpsolve.errors import SingularMatrix
 from fpsolve.fem.axis import KroneckerSum
-from fpsolve.fem.dense import ArrayFactors, Factors, dense_operations
-from fpsolve.fem.levels import ENTRY_BYTES, ENTRY_OPERATIONS, LevelFactors, neighbours, paired
-from fpsolve.fem.refined import RefinedFactors
-from fpsolve.fem.rings import Ring, RingFactors
-from fpsolve.fem.wave_factors import WaveFactors
 from fpsolve.superlu import sparse_lu
 
-FEW_UNKNOWNS = 350
-"""Largest number of unknowns of one dense matrix that is taken without counting what others take."""
-LONG = 1e10
-"""Number of operations, 0.35 s, from which on a factorisation may be rough."""
-FRONT_OPERATIONS = 5.0
-"""Number of operations that take the time of SuperLU for an unknown and the square of the width of a front, 0.18 ns."""
-CELL_OPERATIONS = 6e3
-"""Number of operations that take the time of SuperLU for an entry of a matrix of cells of φ and ξ, 0.2 µs."""
-CELL_BYTES = 90.0
-"""Bytes of SuperLU for such an entry."""
-FRONT_BYTES = 24.0
-"""Bytes of an unknown times the width of a front in SuperLU."""
+FEW_UNKNOWNS = 600
+"""Largest number of unknowns of one dense matrix."""
+LARGEST_GROWTH = 1e3
+"""Largest entry of a P_k over the norm of the matrix, as rows of different levels are not exchanged."""
 
 _limited = RLock()
 
@@ -62,126 +51,53 @@ def _pools(modules: int) -> ThreadpoolController:
     return ThreadpoolController()
 
 
-Levels = Sequence[Sequence[IntArray] | None]
-"""For each axis the functions that are eliminated together, see `Axis`."""
+class Factors(Protocol):
+    """LU factors of a matrix A."""
+
+    def solve(self, b: FloatArray, *, transposed: bool = False) -> FloatArray:
+        """x of A x = b, or of Aᵀx = b."""
 
 
-def factorised(
-    operator: KroneckerSum,
-    levels: Levels = (),
-    *,
-    is_full: bool = False,
-    is_of_waves: bool = False,
-    ring: Ring | None = None,
-) -> Factors:
+def factorised(operator: KroneckerSum, noise: int | None) -> Factors:
     """LU factors of a sum. A pivot that vanishes is made tiny: next to an eigenvalue that is what is wanted.
 
     Args:
         operator: the sum.
-        levels: for each axis the functions that are eliminated together, see `Axis`; nothing where none are.
-        is_full: whether most functions of the first axis are coupled, so that no order of elimination spares anything.
-        is_of_waves: whether the first axis is of waves of φ.
-        ring: the cells of the first axis, where only their end values couple them.
+        noise: the axis whose functions are coupled to their neighbours alone; None where there is none.
 
     Raises:
-        OverBudget: what it takes is more than a number may still cost.
+        OverBudget: the seconds of a number have passed.
     """
-    *others, last = candidates(operator, levels, is_full, ring, is_of_waves)
-    for kind in others:
+    charge(operator.size)
+    if operator.size <= FEW_UNKNOWNS:
+        return ArrayFactors(operator.toarray())
+    if noise is not None:
         try:
-            return _factorise(kind, operator)
+            return LevelFactors(operator, neighbours(operator, noise), noise)
         except SingularMatrix:
-            continue
-    return _factorise(last, operator)
+            pass
+    return SparseFactors(operator)
 
 
-def _factorise(kind: Factors, operator: KroneckerSum) -> Factors:
-    charge(kind.operations, kind.gigabytes, operator.size)
-    kind.make()
-    return kind
+class ArrayFactors:
+    """LAPACK's LU of an array. A pivot that vanishes is made tiny."""
 
+    def __init__(self, matrix: FloatArray) -> None:
+        self._lu, self._pivots, info = dgetrf(matrix, overwrite_a=1)
+        if info > 0:
+            pivots = np.einsum("ii->i", self._lu)
+            pivots[pivots == 0] = np.finfo(float).eps * np.max(np.abs(pivots))
 
-def candidates(
-    operator: KroneckerSum, levels: Levels, is_full: bool, ring: Ring | None, is_of_waves: bool = False
-) -> list[Factors]:
-    """All kinds that there may be, by their operations: of a small matrix one dense array alone."""
-    if operator.size <= FEW_UNKNOWNS and not operator.is_sparse:
-        return [DenseFactors(operator)]
-    found: list[Factors] = list(_ordered(operator, levels, is_full, ring))
-    if is_of_waves and WaveFactors.may_take(operator):
-        found.append(WaveFactors(operator))
-    found.sort(key=lambda each: each.operations)
-    is_of_cells = len(operator.shape) == 2 and (not levels or levels[-1] is None)
-    whole = DenseFactors(operator) if is_full else SparseFactors(operator, is_of_cells=is_of_cells)
-    if found and found[0].operations < ENTRY_OPERATIONS * operator.entries:  # so many are all that is sure of SuperLU
-        return [*found, whole]
-    return sorted([*found, whole], key=lambda each: each.operations)
-
-
-def _ordered(operator: KroneckerSum, levels: Levels, is_full: bool, ring: Ring | None) -> Iterator[Factors]:
-    """What goes cell by cell, or level by level along any axis, of directions refined, and in single precision, too.
-
-    A level of directions that paths cross has pivots that may be small; those of the functions of a filter are too
-    small for single precision.
-    """
-    if ring is not None and len(operator.shape) == 2 and len(ring.number) > 2:
-        yield RefinedFactors(operator, RingFactors(operator, ring))
-    for axis, own in enumerate(levels or [None] * len(operator.shape)):
-        if axis or own is not None:
-            groups = neighbours(operator, axis, own)
-            for each in [groups, paired(groups)][: len(groups) - 1]:
-                by_levels = LevelFactors(operator, each, axis)
-                yield RefinedFactors(operator, by_levels) if is_full else by_levels
-                if is_full and by_levels.operations > LONG:
-                    yield RefinedFactors(operator, LevelFactors(operator, each, axis, np.float32))
-
-
-class DenseFactors:
-    """LU factors of all unknowns as one array."""
-
-    def __init__(self, operator: KroneckerSum) -> None:
-        self._operator = operator
-        self.operations, self.gigabytes = dense_operations(operator.size), 16e-9 * operator.size**2
-
-    def make(self) -> None:
-        """Eliminate."""
-        self._lu = ArrayFactors(self._operator.toarray())
-        self.solve = self._lu.solve
+    def solve(self, b: FloatArray, *, transposed: bool = False) -> FloatArray:
+        """x of A x = b, or of Aᵀx = b; several b are columns."""
+        return np.asarray(dgetrs(self._lu, self._pivots, b, trans=transposed)[0])
 
 
 class SparseFactors:
-    """SuperLU, ordered for a symmetric pattern and pivoting only where it must: half the time and the fill-in.
+    """SuperLU, ordered for a symmetric pattern and pivoting only where it must: half the time and the fill-in."""
 
-    It is about as good as an elimination along the axis that makes narrow fronts, but fills in little of cells of a
-    plane.
-    """
-
-    def __init__(self, operator: KroneckerSum, *, is_of_cells: bool = False) -> None:
-        self._operator, self._is_of_cells = operator, is_of_cells
-
-    @cached_property
-    def operations(self) -> float:
-        if self._is_of_cells:
-            return CELL_OPERATIONS * self._operator.entries
-        return FRONT_OPERATIONS * self._operator.size * self._width**2 + ENTRY_OPERATIONS * self._operator.entries
-
-    @cached_property
-    def gigabytes(self) -> float:
-        operator = self._operator
-        if self._is_of_cells:
-            return 1e-9 * CELL_BYTES * operator.entries
-        numbers = FRONT_BYTES * operator.size * self._width + ENTRY_BYTES * operator.entries
-        return 1e-9 * numbers + operator.pair_gigabytes
-
-    @cached_property
-    def _width(self) -> int:
-        """Of the narrowest fronts."""
-        operator = self._operator
-        return min(bandwidth(each) * operator.size // each.shape[0] for each in operator.patterns)
-
-    def make(self) -> None:
-        """Eliminate."""
-        matrix = self._operator.tocsc()
+    def __init__(self, operator: KroneckerSum) -> None:
+        matrix = operator.tocsc()
         try:
             self._lu = sparse_lu(matrix, diag_pivot_thresh=0.01)
         except SingularMatrix:  # the shift is the eigenvalue to the last bit
@@ -193,9 +109,72 @@ class SparseFactors:
         return np.asarray(self._lu.solve(b, trans="T" if transposed else "N"))
 
 
-def bandwidth(pattern: csc_matrix) -> int:
-    """How far apart coupled functions are in the order of Cuthill and McKee."""
-    order = reverse_cuthill_mckee((pattern + pattern.T).tocsr(), symmetric_mode=True)
-    place = np.argsort(order)
-    rows, columns = pattern.nonzero()
-    return int(np.max(np.abs(place[rows] - place[columns]), initial=0)) + 1
+def neighbours(operator: KroneckerSum, axis: int) -> list[IntArray]:
+    """The functions of an axis in levels, each coupled to the next ones only; both waves of a k are in one."""
+    size, band = operator.shape[axis], max(operator.band(axis), 1)
+    return np.split(np.arange(size), range(size % band or band, size, band))
+
+
+class LevelFactors:
+    """LU factors by levels along an axis, of functions that are coupled to those of the next levels only.
+
+    The matrix is block tridiagonal: D_k, with U_k above and L_k below. From the last level on, of the functions that
+    noise damps the most,
+
+        P_k = D_k − U_k P_{k+1}⁻¹ L_k.
+
+    Args:
+        operator: the sum.
+        groups: the functions of an axis in each level.
+        axis: this axis.
+
+    Raises:
+        SingularMatrix: a P_k is singular, of functions that noise moves only by way of those of another level.
+    """
+
+    def __init__(self, operator: KroneckerSum, groups: Sequence[IntArray], axis: int = -1) -> None:
+        self._shape, self._axis, self._order = operator.shape, axis, np.concatenate(groups)
+        pairs = operator.with_last(axis).pairs
+        befores = np.stack([dense(before).T.ravel() for before, _ in pairs])
+        lasts = np.stack([dense(last) for _, last in pairs])
+        m, most = operator.size // operator.shape[axis], LARGEST_GROWTH * operator.norm
+        ends = m * np.cumsum([0, *(group.size for group in groups)])
+        self._parts = [slice(*pair) for pair in pairwise(ends.tolist())]
+
+        def between(rows: IntArray, columns: IntArray) -> FloatArray:
+            table = lasts[:, rows[:, None], columns].reshape(len(lasts), -1).T @ befores
+            ordered = table.reshape(rows.size, columns.size, m, m).transpose(1, 2, 0, 3)
+            return np.asarray(ordered.reshape(m * columns.size, m * rows.size).T, order="F")
+
+        self._up = [between(group, after) for group, after in pairwise(groups)]
+        self._pivots, self._quotients = list[ArrayFactors](), list[FloatArray]()
+        for k in range(len(groups) - 1, -1, -1):
+            rest = between(groups[k], groups[k])
+            if self._pivots:
+                self._quotients.insert(0, self._pivots[0].solve(between(groups[k + 1], groups[k])))
+                rest -= self._up[k] @ self._quotients[0]
+            if not np.abs(rest).max() < most:
+                raise SingularMatrix("the pivot of a level is singular")
+            self._pivots.insert(0, ArrayFactors(rest))
+
+    def solve(self, b: FloatArray, *, transposed: bool = False) -> FloatArray:
+        """x of A x = b, or of Aᵀx = b; several b are columns."""
+        axis = self._axis % len(self._shape)
+        table = np.moveaxis(b.reshape(*self._shape, *b.shape[1:]), axis, 0)
+        rest = table[self._order].reshape(b.shape)
+        upward, downward = (self._quotients, self._up) if transposed else (self._up, self._quotients)
+        for k in range(len(self._parts) - 1, -1, -1):
+            own, last = self._parts[k], self._parts[k - 1]
+            if not transposed:
+                rest[own] = self._pivots[k].solve(rest[own])
+            if k:
+                rest[last] -= upward[k - 1].T @ rest[own] if transposed else upward[k - 1] @ rest[own]
+        for k, own in enumerate(self._parts):
+            if k:
+                last = rest[self._parts[k - 1]]
+                rest[own] -= downward[k - 1].T @ last if transposed else downward[k - 1] @ last
+            if transposed:
+                rest[own] = self._pivots[k].solve(rest[own], transposed=True)
+        found = np.empty(table.shape)
+        found[self._order] = rest.reshape(table.shape)
+        return np.moveaxis(found, 0, axis).reshape(b.shape)

@@ -13,11 +13,9 @@ from scipy.sparse.linalg import LinearOperator
 
 from fpsolve.arrays import Mask, Matrix, dense, one
 from fpsolve.fem.axis import KroneckerSum, along
-from fpsolve.fem.dense import Factors
-from fpsolve.fem.factors import Levels, factorised
+from fpsolve.fem.factors import Factors, factorised
 from fpsolve.fem.mesh import CylinderMesh, vertices_at
 from fpsolve.fem.noise_axes import NoiseAxis
-from fpsolve.fem.rings import Ring
 from fpsolve.fem.space import Space
 from fpsolve.fem.terms import ALL_ORDERS, Term, Terms, TermSum, power_of_epsilon
 from fpsolve.model.problem import ParameterDerivative, Problem
@@ -46,8 +44,7 @@ class Pencil:
         p: the moment.
         space: the trial and test functions.
         matrix: that of L(p), its first term with the matrices of noise that `space.mass` has.
-        levels: for each axis, see `Axis`.
-        ring: the cells of φ, where only their end values couple them.
+        chain: the axis of noise along which L(p) is eliminated; None where there is none.
         keeps_factors: whether the last factors are kept when a pair is found, for its derivatives.
         kept: the shift and the factors of the last one.
     """
@@ -55,17 +52,13 @@ class Pencil:
     p: float
     space: Space
     matrix: KroneckerSum
-    levels: Levels
-    ring: Ring | None = None
+    chain: int | None
     keeps_factors: bool = False
     kept: list[tuple[float, Factors]] = field(init=False, default_factory=list)
 
     def on(self, axis: int, kept: Mask) -> Pencil:
         """What it is on some functions of an axis, where a mask is true."""
-        levels, place = list(self.levels), np.cumsum(kept) - 1
-        if own := levels[axis]:
-            levels[axis] = [place[level[kept[level]]] for level in own]
-        return replace(self, matrix=self.matrix.on(axis, kept), levels=levels)
+        return replace(self, matrix=self.matrix.on(axis, kept))
 
     @cached_property
     def numerical_abscissa(self) -> float:
@@ -88,11 +81,9 @@ class Pencil:
         return float(ritz[-1] + abs(ends[-1, -1]) * math.sqrt(rest @ space.weighed(rest)))
 
     def factorised(self, shift: float) -> Factors:
-        """LU factors of L(p) − σM, of the kind that takes the fewest operations."""
+        """LU factors of L(p) − σM."""
         self.kept.clear()
-        phi = self.space.phi
-        shifted, kinds = self.matrix.shifted(shift), {"is_full": phi.is_full, "is_of_waves": phi.is_of_waves}
-        found = factorised(shifted, self.levels, ring=self.ring, **kinds)
+        found = factorised(self.matrix.shifted(shift), self.chain)
         self.kept.append((shift, found))
         return found
 
@@ -145,9 +136,8 @@ class Generator:
         """What is solved at p; the last one is kept."""
         if self._last is None or self._last.p != p:
             space = self.space(p)
-            levels = [axis.levels for axis in space.axes]
             keeps_factors = self.keeps_factors or abs(p) == SMALL_P
-            self._last = Pencil(p, space, self.matrix(p), levels, self._ring, keeps_factors)
+            self._last = Pencil(p, space, self.matrix(p), space.chain, keeps_factors)
         return self._last
 
     def forget(self) -> None:
@@ -159,11 +149,6 @@ class Generator:
         """For each axis the least share of the effect of its highest modes that two more may leave."""
         has_states = any(noise.has_states for noise in self.problem.noise.parts.values())
         return [LEFT_BY_STATES * has_states, *(axis.slowest for axis in self.space(0.0).noises)]
-
-    @property
-    def _ring(self) -> Ring | None:
-        """The cells of φ, if noise without a value does not couple what lies within them."""
-        return None if self.problem.diffusions or self.problem.impulses else self.phi.ring
 
     def enriched(self) -> Generator:
         """The generator on the next finer space."""

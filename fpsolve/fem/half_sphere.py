@@ -148,11 +148,6 @@ class HalfSphereAxis(DirectionAxis):
         return np.flatnonzero(kept)
 
     @cached_property
-    def levels(self) -> Sequence[IntArray]:
-        first_cells = self.line.first_cells[np.unravel_index(self._kept, self._shape)[0]]
-        return [np.flatnonzero(first_cells == k) for k in range(self.lines.size - 1)]
-
-    @cached_property
     def constant(self) -> FloatArray:
         constant = np.zeros(self._shape)
         constant[:, 0, 0] = math.sqrt(math.pi) * self.line.constant()

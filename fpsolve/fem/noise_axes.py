@@ -276,6 +276,7 @@ class PolynomialAxis(CountedAxis, LineAxis):
     p: float = 1.0
 
     word = "polynomials"
+    is_chain = True
 
     @property
     def size(self) -> int:

@@ -12,7 +12,6 @@ from scipy.sparse import csr_matrix, diags, issparse
 
 from fpsolve.arrays import FloatArray, IntArray, Mask, Matrix, one
 from fpsolve.fem.axis import MAX_DENSE_UNKNOWNS, DividedAxis
-from fpsolve.fem.rings import Ring
 from fpsolve.model.plane import CoefficientMatrix, Harmonics, Impulse, changed_exponential
 from fpsolve.polynomials import Orthonormal, gauss_legendre, legendre, orthonormal
 
@@ -222,13 +221,6 @@ class PhaseAxis(DividedAxis):
         sizes = np.diff(cuts)[:, None]
         middles = np.repeat(0.5 * (cuts[:-1] + cuts[1:]), local.size)
         return (cuts[:-1, None] + sizes * local).ravel(), middles, (sizes * weights).ravel()
-
-    @cached_property
-    def ring(self) -> Ring:
-        """The cells, as long as nothing but their end values couples them."""
-        kept = self._kept
-        ends = (self._table.ends[:, None] / np.sqrt(self._sizes)[:, None]).transpose(1, 2, 0)
-        return Ring(np.where(kept, self._number, -1), np.where(kept[:, :, None], ends, 0.0))
 
     @cached_property
     def _mean_slope(self) -> Matrix:

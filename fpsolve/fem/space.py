@@ -22,6 +22,8 @@ from fpsolve.fem.phase import PhaseAxis
 from fpsolve.model.frame import Frame
 from fpsolve.model.noise import Noise
 
+MOST_BYTES = 1.5e9
+"""Of the factors of a generator."""
 LITTLE = 1e-2
 """Share of the largest effect of an axis below which others are left as they are, while nothing is resolved."""
 FIRST: dict[str, Callable[[Noise, int], NoiseAxis]] = {
@@ -95,6 +97,18 @@ class Space:
     def size(self) -> int:
         """Number of unknowns."""
         return math.prod(self.shape)
+
+    @cached_property
+    def chain(self) -> int | None:
+        """The longest axis that is a chain, along which generators are eliminated; None where there is none."""
+        return max((k for k, axis in enumerate(self.axes) if axis.is_chain), key=lambda k: self.shape[k], default=None)
+
+    @property
+    def most_unknowns(self) -> int:
+        """So many that their factors take 1.5 GB: three squares of a block for each level, otherwise as measured."""
+        if self.chain is None:
+            return int(self.phi.most_unknowns)
+        return int(math.sqrt(MOST_BYTES / 24 * self.shape[self.chain]))
 
     @property
     def turns(self) -> int:

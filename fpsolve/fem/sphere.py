@@ -29,7 +29,6 @@ from scipy.sparse import csc_matrix, csr_matrix, diags
 from scipy.sparse.linalg import LinearOperator
 
 from fpsolve.arrays import Coefficient, FloatArray, IntArray, Matrix, one
-from fpsolve.budget import charge
 from fpsolve.fem.axis import Axis, along, on_one_pattern, product_pattern
 from fpsolve.fem.line import LineSpace
 from fpsolve.fem.mesh import halved
@@ -44,10 +43,6 @@ MOST_DEGREE = 10
 """Highest degree of an element in η: beyond, elements are halved."""
 SIDE = 16
 """Least number of points along each angle at which signs are looked at."""
-ENTRY_OPERATIONS = 1500.0
-"""Number of operations that take the time of an entry of a form and of the sums that it is in, 50 ns."""
-ENTRY_BYTES = 60
-"""Bytes of an entry of what forms share, while they are assembled."""
 Coordinates = tuple[tuple[float, ...], ...]
 Parts = list[tuple[FloatArray, csr_matrix]]
 """Σ f(η) ⊗ g: values at points of η, shape (points, nodes), and waves, shape (all, own)."""
@@ -165,8 +160,7 @@ class DirectionAxis(Axis):
     """
 
     coordinates: Coordinates
-
-    is_full = True
+    most_unknowns = 15_000
 
     @property
     def n(self) -> int:
@@ -252,7 +246,6 @@ def assembled(forms: Sequence[Sequence[tuple[Matrix, Matrix, Matrix]]], kept: In
     entries = first.nnz * middle.nnz * last.nnz
     if not entries:  # as of what no parameter moves
         return [csr_matrix((kept.size, kept.size))] * len(forms)
-    charge(ENTRY_OPERATIONS * len(forms) * entries, 1e-9 * (ENTRY_BYTES + 12 * len(forms)) * entries)
     inner_order, rows, starts = product_pattern(first, middle)
     size = first.shape[0] * middle.shape[0]
     order, rows, starts = product_pattern(csc_matrix((np.ones(rows.size), rows, starts), shape=(size, size)), last)
@@ -357,10 +350,6 @@ class SphereAxis(DirectionAxis):
     @cached_property
     def nested(self) -> csr_matrix:
         return self._on_kept(self.line.nested)
-
-    @cached_property
-    def levels(self) -> Sequence[IntArray]:
-        return [np.flatnonzero(self.line.first_cells[self._node] == k) for k in range(self.elements)]
 
     @cached_property
     def constant(self) -> FloatArray:

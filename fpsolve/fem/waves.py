@@ -35,7 +35,7 @@ class WaveAxis(PhaseAxis):
         return WaveAxis(lines, np.asarray(degrees, dtype=int))
 
     @property
-    def ring(self) -> None:  # type: ignore[override]
+    def ring(self) -> None:
         """None, as each wave is coupled to others."""
 
     @property

@@ -21,7 +21,7 @@ from scipy.linalg import lu_factor, lu_solve, solve
 from fpsolve.arrays import FloatArray, one
 from fpsolve.budget import charge
 from fpsolve.fem.axis import KroneckerSum
-from fpsolve.fem.levels import LevelFactors, neighbours
+from fpsolve.fem.factors import LevelFactors, neighbours
 from fpsolve.nonlinear.operator import Elements, Plane
 
 TAIL_TERMS = 8
@@ -68,7 +68,7 @@ class Tail:
 
 def solved_tail(plane: Plane, guess: float) -> Tail:
     """The tail whose exponent is closest to a guess, −δ_p."""
-    charge(2 * TAIL_TERMS * plane.size**3, 48e-9 * plane.size**2, plane.size)
+    charge(plane.size)
     rise, turn, steep, bend = map(plane.whole, (plane.rise, plane.turn, plane.steep, plane.bend))
     factors = lu_factor(turn - guess * rise)
     psi, kappa = plane.constant.copy(), guess
@@ -155,8 +155,7 @@ class Cell:
     def __init__(self, own: Tables, into: Tables, out: Tables, noise: Tables) -> None:
         self._into, self._out, self._noise = into, out, noise
         operator = KroneckerSum(list(zip(own, noise, strict=True)))
-        self._factors = LevelFactors(operator, neighbours(operator, 1, None))
-        self._factors.make()
+        self._factors = LevelFactors(operator, neighbours(operator, 1))
 
     def values(self, others: FloatArray) -> FloatArray:
         """The values of these functions, shape (n, n_ξ), from those of the others, shape (m, n_ξ)."""
@@ -249,8 +248,7 @@ def solved(plane: Plane, height: Elements, tail: Tail) -> Solution:
         matrix = element.between
         matrix[:size, :size] += front
         inner = len(matrix) - size
-        gigabytes = 16e-9 * (len(matrix) ** 2 + inner * size)
-        charge(4 * inner**2 * (inner + 2 * size), gigabytes, height.size * size)
+        charge(height.size * size)
         columns = np.zeros((inner, size + 1))
         columns[:, :-1] = matrix[:-size, -size:]
         columns[:size, -1] = right

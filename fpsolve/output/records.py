@@ -339,7 +339,7 @@ def part_key(part: Part, settings: Settings, numerics: Numerics, *, is_limited: 
         mesh = numerics.mesh
         content["numerics"] = [numerics.rtol, mesh and codec(CylinderMesh).plain(mesh)]
     if is_limited:
-        content["budget"] = [numerics.budget.unknowns, numerics.budget.seconds, numerics.budget.memory]
+        content["budget"] = [numerics.budget.unknowns, numerics.budget.seconds]
     return f"{part.name}-{_hash(content)[:16]}"
 
 

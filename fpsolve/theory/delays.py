@@ -185,7 +185,7 @@ class DelayRates:
         drift[0] -= 0.5 * sigma * one
         moving = _outer([(functions, drift), *zip(self.masses, (load * fall for load in own.loads), strict=True)], one)
         generator = _kron(self.generator, np.eye(n * n))
-        charge(30.0 * (2 * count * len(generator)) ** 3)
+        charge(2 * count * len(generator))
         ends = self._collocated(moving, generator) if generator.any() else self._carried(moving)
         same, size = np.eye(len(ends)), len(generator)
         starts = np.linalg.solve(same - np.eye(len(ends), k=-size) @ ends, same[:, :size])  # each is where one ends
@@ -232,7 +232,7 @@ class DelayRates:
         degree = math.ceil((FEWEST + slow) * GROWTH**self.finer)
         x = np.cos(np.pi * np.arange(degree, -1, -1) / degree)
         slopes = _differentiating(x)
-        charge((count * width * (degree + 1.0)) ** 3)
+        charge(count * width * (degree + 1))
         whole = np.zeros((count, degree + 1, width, count, degree + 1, width), dtype=np.result_type(*moving))
         for j, i in np.ndindex(count, degree + 1):
             rows, time = whole[j, i], 0.5 * (1 + x[i]) * unit

@@ -25,10 +25,6 @@ from fpsolve.theory.rightmost import Eigenpair, Solve, polished, rightmost
 
 DENSE = 200
 """Number of equations up to which matrices are not sparse."""
-ENTRY_OPERATIONS = 8e4
-"""Number of operations that take the time of a factorisation for an entry of a sparse matrix, 2.8 µs."""
-ENTRY_BYTES = 250
-"""Memory of its factors, in bytes for each of its entries."""
 SETTLED, NEAREST, KRYLOV = 1e-7, 1e-3, 16
 """As in `Rates`: each σ takes a factorisation."""
 
@@ -255,6 +251,6 @@ class PowerRates:
                 raise SingularMatrix("singular")
             return lambda x, trans=0: dgetrs(lu, pivots, x, trans=trans)[0]
         matrix = (sigma * sparse.eye_array(self.matrix.shape[0]) - self.matrix).tocsc()
-        charge(ENTRY_OPERATIONS * matrix.nnz, 1e-9 * ENTRY_BYTES * matrix.nnz, matrix.shape[0])
+        charge(matrix.shape[0])
         factors = sparse_lu(matrix, permc_spec="COLAMD")
         return lambda x, trans=0: np.asarray(factors.solve(x, "T" if trans else "N"))

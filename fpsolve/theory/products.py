@@ -160,7 +160,7 @@ class ProductRates:
 
     def __matmul__(self, x: Any) -> Any:
         given = x.reshape(self.count, self.n, self.n)
-        charge(4.0 * self.n**3 * self.count * (1 + len(self.squares)))
+        charge(self.n * self.n * self.count)
         total = self.rates * given + self._over_noise(self.of_noise, given)
         for load, xi in self.loads:
             half = _times(load, given if xi is None else self._over_noise(xi, given))

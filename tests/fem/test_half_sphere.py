@@ -1,17 +1,10 @@
 """Functions on the half sphere: the impact as a point load, its derivatives, and spaces within each other."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from fpsolve.fem import Generator
 from fpsolve.fem.half_sphere import HalfSphereAxis
-from fpsolve.fem.levels import LevelFactors
-from fpsolve.fem.noise_axes import StateAxis
-from fpsolve.fem.space import Space
-from tests import random_stops
 
 IDENTITY = tuple(map(tuple, np.eye(4).tolist()))
 LOG = np.log(0.7)
@@ -78,21 +71,6 @@ def test_an_impact_keeps_the_other_mode():
     first, second = fitted(fine, np.diag([1, 1, 0, 0]), np.diag([0, 0, 1, 1])).T
     assert_allclose(fine.struck(LOG, 2.0) @ second, 0, atol=1e-7)
     assert_allclose(fine.struck(LOG, 2.0) @ first, fine.struck(LOG, 2.0) @ fine.constant, atol=1e-7)
-
-
-def test_elimination_from_one_end_to_the_other_where_impacts_lead_past_several_elements():
-    """Small elements, and half of the speed lost: tan η doubles at each impact."""
-    problem = random_stops.drawn(1)[1]
-    stop = replace(problem.system.stop, restitution=0.5)
-    problem = replace(problem, system=replace(problem.system, stop=stop))
-    lines, in_theta = np.linspace(0, 0.5, 9) * np.pi, np.array([-0.5, 0.0, 0.5]) * np.pi
-    axis = HalfSphereAxis(IDENTITY, lines, 2, in_theta, 2, 2)
-    pencil = Generator(problem, Space((axis, StateAxis(problem.noise)))).at(1.3)
-    operator, b = pencil.matrix.shifted(0.7), directions(pencil.space.size)[1]
-    matrix, factors = operator.tocsc().toarray(), LevelFactors(operator, axis.levels, 0)
-    factors.make()
-    assert_allclose(factors.solve(b), np.linalg.solve(matrix, b), rtol=1e-9, atol=1e-9)
-    assert_allclose(factors.solve(b, transposed=True), np.linalg.solve(matrix.T, b), rtol=1e-9, atol=1e-9)
 
 
 def test_nothing_moves_nothing(axis):

@@ -8,9 +8,8 @@ from fpsolve import OrnsteinUhlenbeck, PlaneSystem, Problem
 from fpsolve.arrays import identity
 from fpsolve.exponent.eigen import rayleigh_iteration
 from fpsolve.fem.axis import KroneckerSum
-from fpsolve.fem.factors import DenseFactors, SparseFactors
+from fpsolve.fem.factors import ArrayFactors, LevelFactors, SparseFactors, neighbours
 from fpsolve.fem.generator import Pencil
-from fpsolve.fem.levels import LevelFactors, neighbours
 from fpsolve.fem.noise_axes import PolynomialAxis
 from fpsolve.fem.phase import PhaseAxis
 from fpsolve.fem.space import Space
@@ -35,7 +34,7 @@ def pencil(p, cells=4, degree=8, count=11):
     ]
     problem = Problem(PlaneSystem(terms), dict(zip(("axial", "lateral"), NOISES, strict=True)))
     matrix = TermSum(Terms(problem, space).whole()).matrix(space, p)
-    return Pencil(p, space, matrix, [axis.levels for axis in space.axes])
+    return Pencil(p, space, matrix, space.chain)
 
 
 @pytest.mark.slow
@@ -82,9 +81,8 @@ def test_sums_of_three_factors(operator, rng):
     assert operator.norm >= np.abs(matrix).sum(axis=0).max() - 1e-9
     rest = np.kron(*operator.terms[0][1:])
     np.testing.assert_allclose(operator.shifted(0.3).toarray(), matrix - 0.3 * np.kron(np.eye(4), rest), atol=1e-12)
-    by_levels = [LevelFactors(operator, neighbours(operator, axis, None), axis) for axis in (1, 2)]
-    for factors in (DenseFactors(operator), *by_levels, SparseFactors(operator)):
-        factors.make()
+    by_levels = [LevelFactors(operator, neighbours(operator, axis), axis) for axis in (1, 2)]
+    for factors in (ArrayFactors(matrix.copy()), *by_levels, SparseFactors(operator)):
         np.testing.assert_allclose(factors.solve(v), np.linalg.solve(matrix, v), rtol=1e-8, atol=1e-10)
         np.testing.assert_allclose(
             factors.solve(v, transposed=True), np.linalg.solve(matrix.T, v), rtol=1e-8, atol=1e-10

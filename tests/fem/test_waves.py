@@ -6,12 +6,10 @@ import pytest
 from fpsolve import Problem, lyapunov_exponent
 from fpsolve.arrays import identity
 from fpsolve.exponent.eigen import principal_pair
-from fpsolve.fem.axis import KroneckerSum
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.pairs import PairAxis
 from fpsolve.fem.phase import PhaseAxis
 from fpsolve.fem.space import Space
-from fpsolve.fem.wave_factors import WaveFactors
 from fpsolve.fem.waves import WaveAxis
 from fpsolve.model import CoefficientMatrix, Filter, LinearSystem
 from fpsolve.model.plane import Harmonics
@@ -37,22 +35,6 @@ def test_matrices_are_those_of_the_products():
     for found, trial in ((axis.mass(f), values), (axis.convection(f), slopes)):
         assert found == pytest.approx(values.T @ (f(phi)[:, None] * trial) * np.pi / 400, abs=1e-8)
     assert axis.mass() == pytest.approx(values.T @ values * np.pi / 400, abs=1e-13)
-
-
-@pytest.mark.parametrize("p", [0.0, 0.01, 1.3, -0.7])
-def test_factors_are_those_of_the_dense_matrix(p, rng):
-    operator = on_waves(oscillator(1.3, 0.2), 5, 6).at(p).matrix.shifted(0.3)
-    assert WaveFactors.may_take(operator)
-    factors, matrix, b = WaveFactors(operator), operator.toarray(), rng.standard_normal(operator.size)
-    factors.make()
-    assert matrix @ factors.solve(b) == pytest.approx(b, abs=1e-9)
-    assert matrix.T @ factors.solve(b, transposed=True) == pytest.approx(b, abs=1e-9)
-
-
-def test_white_noise_takes_waves_to_their_mirror_images():
-    own, operator = CoefficientMatrix(1, [[0, 0], [-1, 0]]), on_waves(oscillator(1.3, 0.2), 4, 3).at(1.0).matrix
-    diffused = sum(WaveAxis.of(LINES, np.array([4])).diffusion(own, own))
-    assert not WaveFactors.may_take(KroneckerSum([*operator.terms, (diffused, *operator.terms[0][1:])]))
 
 
 @pytest.mark.slow
