@@ -52,24 +52,12 @@ THINNEST = 1e-3
 """The least width: of modes that nothing couples the layer has none."""
 WORST_CONDITION = 100.0
 """Of the eigenvectors of the motion without noise, up to which they are the coordinates."""
-BEYOND = (10.0, 1.5, 1.0)
-"""What is left after the correction by a change, over this change, by how many spaces agree: one, two, and more."""
-FALLING = 10.0
-"""What is left after one space, over the rest of a geometric series: it was up to 6 times that, in strong noise.
-
-Beside an even p, for which the waves that there are have T, the change falls as the distance from it; T* is for p what
-T is for −n − p.
-"""
-HARDLY = 0.01
-"""The least fall from one degree to the next, over what is left of it."""
-LEAST = 0.1
-"""What is left after one space at least, over the change: λ has the correction at `SMALL_P`."""
+OF_LAST = 10.0
+"""What is left after the correction, over the last change of the corrected value."""
 SETTLED_SLOPE = 3e-3
 """Share of Λ′ by which it may change from one level to the next."""
 MOST_FOR_SLOPES = 4
 """Number of levels that may be added for Λ′."""
-LEFT = 0.5
-"""What is left, over what two degrees more changed in the corrected value, or will change in the other: `left_of`."""
 MINOR = 0.25
 """Share of the tolerance that elements, or polynomials of a noise, may lack where others are made finer."""
 MEASURED = 3.0
@@ -152,27 +140,6 @@ def first_directions(problem: Problem) -> DirectionAxis:
     return SphereAxis(coordinates, lines, FIRST_DEGREE, FIRST_WAVES)
 
 
-def left_of(degrees: Sequence[int], values: Sequence[float]) -> float:
-    """What higher degrees may still change, from how values changed from one even degree to the next.
-
-    With A and B the sums of all changes from half the degree and from a quarter to half of it, A²/(B − A): exact where
-    the changes fall as a power of the degree, as where T, or T*, is not smooth. Where each of the last three changes
-    is a share of the one before, twice the rest of a geometric series with the largest of these shares, if that is
-    less. Of two changes alone their ratio tells.
-    """
-    changes, m = np.abs(np.diff(values)), np.array(degrees[1:])
-    halves = m > m[-1] / 2, (m > m[-1] / 4) & (m <= m[-1] / 2)
-    if not np.any(halves[1]):
-        halves = m == m[-1], m == m[-1] - 2
-    if not np.any(halves[1]):
-        return 0.0
-    last, before = (float(np.sum(changes[each])) for each in halves)
-    left = last * last / (before - last) if last < before else math.inf
-    if len(changes) > 3 and (share := float(np.max(changes[-3:] / np.maximum(changes[-4:-1], 1e-300)))) < 1:
-        left = min(left, 2 * float(changes[-1]) * share / (1 - share))
-    return left
-
-
 def first_order_changes(pair: PrincipalPair, finer: Generator, axis: int, new: Any) -> FloatArray:
     """What each new function of an axis of a finer space changes in Λ(p), to first order, in a table by all axes."""
     pencil, space, old = finer.at(pair.p), finer.space(pair.p), pair.space
@@ -186,10 +153,9 @@ def first_order_changes(pair: PrincipalPair, finer: Generator, axis: int, new: A
     return np.reshape(found, [-1 if k == axis else size for k, size in enumerate(space.shape)])
 
 
-def first_order_change(pair: PrincipalPair, finer: Generator, axis: int, new: Any) -> tuple[float, float]:
-    """The sum of `first_order_changes`, and that of their sizes."""
-    changes = first_order_changes(pair, finer, axis, new)
-    return float(np.sum(changes)), float(np.sum(np.abs(changes)))
+def first_order_change(pair: PrincipalPair, finer: Generator, axis: int, new: Any) -> float:
+    """The sum of `first_order_changes`."""
+    return float(np.sum(first_order_changes(pair, finer, axis, new)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -236,24 +202,15 @@ class SphereStart(Start):
         return min(known, key=lambda pair: abs(pair.p - p))
 
     def with_error(self, pair: PrincipalPair, allowed: float) -> Solution:
-        """The pair, corrected by what the next waves change, with what is left then; first the other parts of it."""
+        """The pair, corrected by what the next waves change, with what is left then; first the other parts of it.
+
+        What is left is `OF_LAST` times the last change of the corrected value, which takes two spaces.
+        """
         of_axes, start = self._of_axes(pair, allowed), replace(self, before=(), enough=None)
         if sum(of_axes) > 0.5 * allowed:
             return Solution(pair, math.inf, of_axes, start)
-        change, size = self.change(pair)
-        pair = replace(pair, correction=change, rounding=pair.rounding + self._rounding(pair))
-        steps = [*(each.pair for each in self.before), pair]
-        left = BEYOND[min(len(steps), len(BEYOND)) - 1] * abs(change)
-        if len(steps) == 1 and not (self.problem.diffusions or self.problem.impulses):  # these reach beyond the next
-            even, both = range(2, self.space.phi.waves + 1, 2), (pair.p, -self.problem.dimension - pair.p)
-            apart = min(1.0, *(abs(1 - p / k) for p in both for k in even))
-            fallen = max(apart * self._size_of_highest(pair) - size, HARDLY * size, sys.float_info.min)
-            left = max(LEAST * abs(change), min(FALLING * size * size / fallen, max(left, size)))
-        if len(steps) > 1:
-            waves = [each.space.phi.waves for each in steps]
-            uncorrected = left_of(waves, [each.eigenvalue for each in steps])
-            step, beyond = abs(pair.value - steps[-2].value), left_of(waves, [each.value for each in steps])
-            left = max(left, beyond, LEFT * step, LEFT * uncorrected)
+        pair = replace(pair, correction=self.change(pair), rounding=pair.rounding + self._rounding(pair))
+        left = OF_LAST * abs(pair.value - self.before[-1].pair.value) if self.before else math.inf
         if self.enough is not None:  # of Λ, not of Λ′
             left = min(left, self.enough.search + abs(pair.value - self.enough.pair.value))
         return Solution(pair, left, of_axes, start)
@@ -291,17 +248,10 @@ class SphereStart(Start):
                 noises[k] = axis.enriched() if error < effects.error else axis.refined(effects, share, False)
         return noises
 
-    def change(self, pair: PrincipalPair) -> tuple[float, float]:
-        """What waves of the next degree change in Λ(p), to first order, and the sum of the sizes of its parts."""
+    def change(self, pair: PrincipalPair) -> float:
+        """What waves of the next degree change in Λ(p), to first order."""
         finer = self._with(2).generator
         return first_order_change(pair, finer, 0, finer.phi.degrees > pair.space.phi.waves)
-
-    def _size_of_highest(self, pair: PrincipalPair) -> float:
-        """The same sum of what waves of the highest degree have changed."""
-        highest = self.space.phi.degrees > self.space.phi.waves - 2
-        operator = pair.generator.at(pair.p).on(0, highest).matrix.shifted(pair.eigenvalue)
-        right, left = (np.compress(highest, pair.space.table(v), axis=0).ravel() for v in (pair.right, pair.left))
-        return float(np.sum(np.abs(left * (operator @ right))) / abs(pair.left @ pair.space.weighed(pair.right)))
 
     def _rounding(self, pair: PrincipalPair) -> float:
         """Of the rates of growth: an entry of S⁻¹AS is a sum of products twice, which may cancel."""

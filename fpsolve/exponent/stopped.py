@@ -115,7 +115,7 @@ class StopStart(SphereStart):
         phi, found = self.space.phi, list[float]()
         for finer in phi.finer:
             generator = Generator(self.problem, self.space.with_axis(0, finer))
-            found.append(abs(first_order_change(pair, generator, 0, finer.new_in(phi))[0]))
+            found.append(abs(first_order_change(pair, generator, 0, finer.new_in(phi))))
         pair, left = replace(pair, rounding=pair.rounding + self._rounding(pair)), float(self._left(found) @ found)
         for each in self.before:
             step, lacked = abs(pair.value - each.pair.value), sum(each.start.changes)

@@ -30,7 +30,7 @@ from fpsolve.arrays import identity
 from fpsolve.errors import FpsolveError, NoSuchExponent
 from fpsolve.exponent import principal_pair, spectrum
 from fpsolve.exponent.eigen import PairDerivatives
-from fpsolve.exponent.modes import BEYOND, SphereStart, first_directions, left_of, modal_coordinates, second_moments
+from fpsolve.exponent.modes import SphereStart, first_directions, modal_coordinates, second_moments
 from fpsolve.fem.generator import SMALL_P, Generator
 from fpsolve.fem.space import Space, first_axis
 from fpsolve.fem.sphere import SphereAxis
@@ -161,21 +161,8 @@ def test_what_finer_waves_change_is_told_to_first_order(noise, driven):
     assert abs(solution.pair.value - found[1].value) < solution.search
     assert start.refined(replace(solution, search=math.inf), 1.0, 1, 10**6).space.phi.waves == 6  # no other elements
     assert start.refined(solution, 1e-20, 1, 10**6).space.phi.waves == 2
-    told, size = start.change(found[0])
-    assert solution.search <= max(BEYOND[0] * abs(told), size)
+    told = start.change(found[0])
     assert told == pytest.approx(found[1].value - found[0].value, rel=0.1)
-
-
-@pytest.mark.parametrize(("seed", "p"), [(1, 1.0), (17, 1.9), (25, 1.5)])
-def test_what_is_left_after_one_space(seed, p):
-    """Where the parts of the change cancel, it is 23 times the change; beside p = 2 the change is small."""
-    given = random_modes.drawn(seed)[1]
-    noises = [first_axis(each, 7) for each in given.coloured.parts.values()]
-    axis = first_directions(given)
-    start, finer = (SphereStart(given, Space((replace(axis, waves=waves), *noises))) for waves in (2, 8))
-    pair = start.pair(p, None)
-    solution, better = start.with_error(pair, math.inf), finer.pair(p, pair)
-    assert abs(solution.pair.value - better.value) < solution.search
 
 
 @pytest.mark.parametrize(("seed", "count"), [(3, 3), (9, 8)])
@@ -247,21 +234,9 @@ def test_eigenfunctions_change_as_the_equations_say_where_factors_are_rough():
 def test_coordinates_of_directions_are_those_of_the_system(seed):
     """The layers of two modes are the same in other units and coordinates, so that a solve costs the same."""
     _, problem, units = random_units.drawn(seed)
-    _, width, places = modal_coordinates(problem(random_units.Units(1.0, 1.0, np.eye(4))))
-    _, width_there, places_there = modal_coordinates(problem(units))
-    assert (width_there, *places_there) == pytest.approx((width, *places), rel=1e-3)
-
-
-@pytest.mark.parametrize("power", [1.5, 2.0, 4.0])
-def test_what_is_left_of_an_algebraic_series(power):
-    """Of what is left ~ m^−k, to first order in 1/m; and of one that falls by 10 each time hardly anything."""
-    for count in (16, 32):
-        m = np.arange(2.0, 2 * count + 2, 2)
-        assert left_of(m, -(m**-power)) == pytest.approx(m[-1] ** -power, rel=3 * power / count)
-    assert left_of([4, 6, 8, 10], [1.0, 1.1, 1.11, 1.111]) < 2e-4
-    falling = [1 - 10.0**-k for k in range(5)]
-    assert left_of([2, 4, 6, 8, 10], falling) == pytest.approx(2 * (1 - falling[-1]), rel=1e-9)
-    assert left_of([4, 6, 8], [1.0, 1.1, 1.3]) == math.inf
+    _, _, places = modal_coordinates(problem(random_units.Units(1.0, 1.0, np.eye(4))))
+    _, _, places_there = modal_coordinates(problem(units))
+    assert places_there == pytest.approx(places, rel=1e-3)
 
 
 # by elements and by harmonics of the sphere of another code, to the last digit written
