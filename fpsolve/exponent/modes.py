@@ -3,8 +3,7 @@
 The functions are those of directions in coordinates that the second moments choose. E‖x‖² grows with Λ(2), and
 T = xᵀQx is its eigenfunction for p = 2: in the coordinates of the eigenvectors of Q the strong modes are one group and
 the weak ones the other. Where the noise is weak against the difference of their dampings, T has a layer of the width
-√(q_weak/q_strong) beside the weak ones, and T* one beside the strong ones, for which the elements are graded; where
-both grow alike there is none, and harmonics of the sphere take the place of the elements.
+√(q_weak/q_strong) beside the weak ones, and T* one beside the strong ones, for which the elements are graded.
 
 Any search begins at p = 0, where T = 1, and goes from p to p on the coarsest space; on finer ones it begins with what
 the coarser one has found. What two degrees of waves change tells their error, that of all else comes from the highest
@@ -28,10 +27,9 @@ from fpsolve.exponent.eigen import PrincipalPair, principal_pair
 from fpsolve.exponent.error import Solution, ladders, mode_effects
 from fpsolve.exponent.starts import SHARE, Question, Start
 from fpsolve.fem.generator import SMALL_P, Generator
-from fpsolve.fem.harmonics import HarmonicAxis
 from fpsolve.fem.noise_axes import CountedAxis
 from fpsolve.fem.space import Space, first_axis
-from fpsolve.fem.sphere import Coordinates, DirectionAxis, SphereAxis, group_dimensions
+from fpsolve.fem.sphere import Coordinates, SphereAxis, group_dimensions
 from fpsolve.model.problem import Problem
 from fpsolve.theory.moments import even_moment
 from fpsolve.theory.powers import moment_form
@@ -42,8 +40,6 @@ FIRST_DEGREE = 6
 """Degree of the polynomials of the first space."""
 LARGEST_STEP = 1.0
 """Difference in p from one pair to the next one on the coarsest space."""
-ROUND = 0.6
-"""Width of a layer from which on there is none to speak of, and harmonics of the sphere settle the soonest."""
 WEAK = 0.2
 """Width of a layer of T or T* up to which elements are graded."""
 GRADED_STEP = 1.3
@@ -78,8 +74,8 @@ def second_moments(problem: Problem) -> tuple[float, FloatArray, FloatArray]:
     return found.value, q * np.sign(np.trace(q)), moments * np.sign(np.trace(moments))
 
 
-def modal_coordinates(problem: Problem) -> tuple[Coordinates, float, tuple[float, float]]:
-    """S of y = S⁻¹x whose directions are solved for, the width of the layer of T, and where T and T* have theirs.
+def modal_coordinates(problem: Problem) -> tuple[Coordinates, tuple[float, float]]:
+    """S of y = S⁻¹x whose directions are solved for, and where T and T* have their layers.
 
     Between the groups 1 and 2 of y these lie at ln tan η = ½ ln(q₁/q₂) and ½ ln(p₂/p₁), q and p the sizes of Q and of
     E yyᵀ on each: T is about (yᵀQy)^½p there, and T* a power of yᵀ(E yyᵀ)⁻¹y. Each mode of the motion without noise
@@ -111,12 +107,8 @@ def modal_coordinates(problem: Problem) -> tuple[Coordinates, float, tuple[float
         _, own = scipy.linalg.matrix_balance(free, permute=False)
     sizes, axes = np.linalg.eigh(own.T @ q @ own)
     sizes, axes = np.maximum(sizes[::-1], 1e-300), axes[:, ::-1]
-    count = len(sizes) // 2
     if len(sizes) == 3 and sizes[0] * sizes[2] < sizes[1] ** 2:  # the weakest one is by itself
         axes = axes[:, [2, 0, 1]]
-        width = math.sqrt(sizes[2] / sizes[1])
-    else:
-        width = math.sqrt(sizes[count] / sizes[count - 1])
     found = own @ axes
     inverse, first = np.linalg.inv(found), group_dimensions(len(sizes))[0]
     places = []
@@ -124,14 +116,12 @@ def modal_coordinates(problem: Problem) -> tuple[Coordinates, float, tuple[float
         one_group, other = (np.mean(each) for each in np.split(np.maximum(np.diagonal(form), 0.0), [first]))
         share = one_group / max(other, 1e-300)
         places.append(sign * math.log(min(max(share, THINNEST**2), THINNEST**-2)))
-    return tuple(map(tuple, found.tolist())), max(width, THINNEST), (places[0], places[1])
+    return tuple(map(tuple, found.tolist())), (places[0], places[1])
 
 
-def first_directions(problem: Problem) -> DirectionAxis:
+def first_directions(problem: Problem) -> SphereAxis:
     """The coarsest functions of directions."""
-    coordinates, width, places = modal_coordinates(problem)
-    if width >= ROUND:
-        return HarmonicAxis(coordinates, FIRST_WAVES)
+    coordinates, places = modal_coordinates(problem)
     lines = np.linspace(0, math.pi / 2, 3)
     if max(map(abs, places)) > math.log(1 / WEAK):
         low, high = min(places) - 1, max(places) + 1
@@ -160,7 +150,7 @@ def first_order_change(pair: PrincipalPair, finer: Generator, axis: int, new: An
 
 @dataclass(frozen=True, eq=False)
 class SphereStart(Start):
-    """Directions of three or four variables, by elements, or none, and waves of a degree.
+    """Directions of three or four variables, by elements and waves of a degree.
 
     Attributes:
         before: solutions with the same elements and functions of the noise, but waves of lower degrees.

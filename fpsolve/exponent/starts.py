@@ -22,7 +22,6 @@ from fpsolve.fem.noise_axes import CellAxis, PolynomialAxis
 from fpsolve.fem.pairs import PairAxis
 from fpsolve.fem.phase import PhaseAxis
 from fpsolve.fem.space import Space, first_axis
-from fpsolve.fem.waves import WaveAxis
 from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.plane import System, Xi, phase_speed
 from fpsolve.model.problem import Problem
@@ -34,10 +33,6 @@ FREE_STAGES = 4
 """From this number of stages on, no cell is made coarser."""
 SHARE = 0.05
 """Share of the tolerance that a new discretisation is made for in each direction, so that it serves other p too."""
-SHARE_OF_WAVES = 0.3
-"""The same where functions are waves of the phase: what more of them lack falls slowly."""
-NET_FALL = 0.6
-"""The power of what waves lack in all with which the effects fall in which nothing cancels."""
 ALONE = 0.5
 """Share of the tolerance in each direction of a discretisation that serves one p only."""
 MOST_GAIN = 1e-3
@@ -108,7 +103,7 @@ class Start:
         if self.space.xi.lines.size:
             goal = max(goal, MOST_GAIN * solution.error)
         found = refined(solution, goal, stages)
-        if found.size > most and not self.space.phi.is_of_waves:
+        if found.size > most:
             found = refined(solution, ALONE / SHARE * goal, stages)
         return replace(self, space=found)
 
@@ -130,26 +125,11 @@ def refined(solution: Solution, tolerance: float, stages: int) -> Space:
     """A discretisation on which every cell should lack no more than its share of the tolerance."""
     chosen = solution.pair.generator.chosen
     share, may_coarsen = SHARE * tolerance, stages < FREE_STAGES
-    if chosen.phi.is_of_waves:
-        share, may_coarsen = balanced(solution.effects, tolerance), False
     new = chosen.refined(solution.effects, share, may_coarsen)
     if chosen.xi.lines.size:
         lower, upper = solution.truncation
         new = new.with_axis(1, new.xi.reaching(lower > share, upper > share))
     return new if new.size > chosen.size or solution.error <= tolerance else new.raised()
-
-
-def balanced(effects: Sequence[ModeEffects | None], tolerance: float) -> float:
-    """What each axis should lack by its effects, of waves of the phase and functions of noises.
-
-    No axis need lack less than what is left of another one that has half as many functions more.
-    """
-    known = [each for each in effects if each]
-    error, at_most = sum(each.error for each in known), [each.after(1.5 * each.degrees[0]) for each in known]
-    share = SHARE * tolerance
-    if known[0].share < 1 and error > tolerance:
-        share = error * (SHARE_OF_WAVES * tolerance / error) ** NET_FALL
-    return max(share, *at_most)
 
 
 def _effects_of(failure: Exception | None) -> Sequence[ModeEffects | None]:
@@ -171,10 +151,7 @@ def first(problem: Problem, p: float, rtol: float, center: float | None = None) 
     if frozen is None:  # the noise has states, or a state of its own, or there are several
         axes = [first_axis(each, digits) for each in noise.parts.values()]
         is_smooth = sum(axis.dimension for axis in axes) > 1
-        if is_smooth and not (system.jumps or problem.impulses):
-            phase = WaveAxis.of(np.array([0.0, math.pi]), np.array([round(digits / 2) + 3]))
-        else:
-            phase = _phase(system, problem.typical, digits, is_smooth=is_smooth)
+        phase = _phase(system, problem.typical, digits, is_smooth=is_smooth)
         if len(axes) == 1 and isinstance(axis := axes[0], PairAxis):
             if center is None:
                 center = float(steady_places(problem, p)[0][0])

@@ -36,14 +36,13 @@ class Axis:
         most_unknowns: of a space with this first axis and no chain, of which SuperLU's factors take 1.5 GB.
         is_chain: whether each function is coupled to few next to it alone, as polynomials of noise are.
         slowest: the least share of the effect of the highest modes that two more may leave, see `ModeEffects`.
-        is_of_waves: whether it is of waves of the phase.
         slope: s/p of the factor exp(s z) that moves with p.
     """
 
     __dataclass_fields__: ClassVar[dict[str, Any]]
     lines = NO_LINES
     most_unknowns = 50_000
-    is_chain = is_of_waves = False
+    is_chain = False
     slowest, slope = 0.0, 0.0
 
     def __reduce__(self) -> tuple[Any, ...]:

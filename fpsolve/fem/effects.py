@@ -21,6 +21,8 @@ SPLIT_DEGREE = 6
 """Lowest degree at which the highest modes tell whether halves of a cell take fewer functions."""
 MOST_DEGREE = 14
 """Highest degree of a cell: beyond, it is halved."""
+LEAST_FALL = 0.3
+"""Least fall of the logarithm of an effect with each degree."""
 STILL = 3 / 7
 """Ratio of the effects of two and of four modes where no fall is seen: then thrice the first may be left."""
 SPARE = 1.0
@@ -35,15 +37,11 @@ class ModeEffects:
         degrees: of the cells, shape (cells,).
         highest: the effects of the highest mode, of the two highest and so on up to four, shape (4, cells).
         slowest: the least share of the effect of two modes that is thought to be left.
-        share: of what all that lacks seems to change that is left where this cancels.
-        least_fall: see `fall`.
     """
 
     degrees: IntArray
     highest: FloatArray
     slowest: float = 0.0
-    share: float = 1.0
-    least_fall: float = 0.3
 
     @property
     def two(self) -> FloatArray:
@@ -59,7 +57,7 @@ class ModeEffects:
         """
         of_two = np.minimum(self.two / np.maximum(self.highest[3], 1e-300), STILL)
         left = np.maximum(np.clip(np.sqrt(self._left_by_two), self.slowest, 1.0), of_two / (1 - 2 * of_two))
-        return self.share * self.two * left
+        return self.two * left
 
     @property
     def error(self) -> float:
@@ -68,7 +66,7 @@ class ModeEffects:
     @property
     def fall(self) -> FloatArray:
         """By how much the logarithm of the effect falls with each degree, shape (cells,)."""
-        return np.maximum(-0.5 * np.log(np.maximum(self._left_by_two, 1e-300)), self.least_fall)
+        return np.maximum(-0.5 * np.log(np.maximum(self._left_by_two, 1e-300)), LEAST_FALL)
 
     @property
     def _left_by_two(self) -> FloatArray:
@@ -78,10 +76,6 @@ class ModeEffects:
         """
         of_one, of_two = self.highest[:2] / np.maximum(self.highest[2:], 1e-300)
         return np.where(self.degrees >= SPLIT_DEGREE, np.maximum(of_one, of_two), of_two)
-
-    def after(self, degree: float) -> float:
-        """What is lacked with all cells of a degree."""
-        return float(np.sum(self.of_cells * np.exp(-self.fall * (degree - self.degrees))))
 
     def needed(self, tolerance: float) -> FloatArray:
         """The degree at which each cell would lack `tolerance`, shape (cells,)."""

@@ -7,16 +7,14 @@ import numpy as np
 import pytest
 
 from fpsolve.arrays import dense
-from fpsolve.fem.harmonics import HarmonicAxis
 from fpsolve.fem.sphere import SphereAxis
 
 LINES = np.array([0.0, 0.5, math.pi / 2])
 TURNS = 2 * math.pi * np.arange(12) / 12
 
 
-def axis_of(kind, n):
-    unit = tuple(map(tuple, np.eye(n).tolist()))
-    return HarmonicAxis(unit, 4) if kind == "harmonics" else SphereAxis(unit, LINES, 4, 4)
+def axis_of(n):
+    return SphereAxis(tuple(map(tuple, np.eye(n).tolist())), LINES, 4, 4)
 
 
 def rule(n, lines=LINES):
@@ -35,12 +33,10 @@ def rule(n, lines=LINES):
 
 
 @pytest.mark.parametrize("n", [3, 4])
-@pytest.mark.parametrize("kind", ["elements", "harmonics"])
-def test_integrals_by_points_are_the_matrices(kind, n):
+def test_integrals_by_points_are_the_matrices(n):
     """∫ u v, and ∫ v q u of a matrix, whose q is eᵀXe: the first fixes the order of the functions, too."""
-    axis, (points, weights) = axis_of(kind, n), rule(n)
-    values = axis.at(points)
-    values = values.toarray() if kind == "elements" else values
+    axis, (points, weights) = axis_of(n), rule(n)
+    values = axis.at(points).toarray()
     mass = values.T @ (weights[:, None] * values) / axis.area
     np.testing.assert_allclose(mass, dense(axis.identity), atol=1e-8)
     matrix = np.random.default_rng(1).standard_normal((n, n))
@@ -51,23 +47,9 @@ def test_integrals_by_points_are_the_matrices(kind, n):
 
 
 @pytest.mark.parametrize("n", [3, 4])
-@pytest.mark.parametrize("kind", ["elements", "harmonics"])
-def test_opposite_directions_are_one(kind, n):
-    axis = axis_of(kind, n)
+def test_opposite_directions_are_one(n):
+    axis = axis_of(n)
     points = np.random.default_rng(2).standard_normal((n, 50))
     points /= np.linalg.norm(points, axis=0)
     own = np.random.default_rng(3).standard_normal(axis.size)
     np.testing.assert_allclose(axis.at(points) @ own, axis.at(-points) @ own, atol=1e-9)
-
-
-def test_elements_and_harmonics_meet_the_same_polynomial():
-    """A harmonic of the degree 4, smooth in η, by its projection on many elements, at points that no rule has."""
-    unit, lines = tuple(map(tuple, np.eye(4).tolist())), np.linspace(0, math.pi / 2, 7)
-    elements, harmonics = SphereAxis(unit, lines, 9, 4), axis_of("harmonics", 4)
-    points, weights = rule(4, lines)
-    own = np.random.default_rng(4).standard_normal(harmonics.size)
-    by_points = elements.at(points).T @ (weights * (harmonics.at(points) @ own)) / elements.area
-    found = np.linalg.solve(dense(elements.identity), by_points)
-    others = np.random.default_rng(5).standard_normal((4, 100))
-    others /= np.linalg.norm(others, axis=0)
-    np.testing.assert_allclose(elements.at(others) @ found, harmonics.at(others) @ own, atol=1e-9)
