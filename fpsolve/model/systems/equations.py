@@ -239,7 +239,7 @@ class EquationSystem(System):
                 raise TableError(f"got the name {name}, {what}", "variables", i)
         if self.walls and (self.pasts or len(self.walls) > 1 or len(self.variables) < 2):
             found = f"{len(self.walls)} for {len(self.variables)} variables{' with a delay' * bool(self.pasts)}"
-            why = "must be one at most, and none for one variable or with a delay"
+            why = "must be one at most, none of one variable, and none with a delay"
             raise TableError(f"got {found}; {why}; leave out walls", "walls")
         _ = self.stop, self.jumps  # refuse what they cannot be
 
