@@ -15,7 +15,6 @@ from fpsolve.errors import CaseError, NotConverged
 from fpsolve.messages import Code, Message
 from fpsolve.model.quantity import OSCILLATOR_RESPONSE
 from fpsolve.parts import response
-from fpsolve.parts.intervals import sampled_case
 from fpsolve.parts.response import PART, shape
 from fpsolve.results.curve import Status
 from fpsolve.show.verdict import verdict
@@ -200,9 +199,7 @@ def test_when_it_is_computed(tmp_path):
         assert (asked_of(case), case.leaves_out_response) == (None, False)
     case = wanted(tmp_path, '[vary]\n"oscillator.c3" = [0.0, 0.2]\n', c2=0.0, c3=0.0)
     assert asked_of(case) == written
-    case = wanted(tmp_path, '[uncertain]\nsample = 20\n"noise.D0" = 0.05\n')
-    assert asked_of(case) == written
-    assert asked_of(sampled_case(case)) is None
+    assert asked_of(wanted(tmp_path, '[uncertain]\n"noise.D0" = 0.05\n')) == written
 
 
 @pytest.mark.parametrize(
