@@ -10,6 +10,7 @@ REMOVED: Mapping[tuple[str, ...], str] = {
     ("design",): 'write `fpsolve design CASE --for "moment(2) = 0" --by noise.sigma --from 0.01 --to 2`',
     ("uncertain", "sample"): _SETS,
     ("uncertain", "seed"): _SETS,
+    ("budget", "memory"): "write unknowns = 80000, which bounds the memory",
     ("vary", "reduced"): "each set is solved by itself: list fewer where that takes long",
 }
 """What to write instead of each of them."""

@@ -12,7 +12,7 @@ from fpsolve.case.case import load_case
 from fpsolve.case.vary import legend
 from fpsolve.cli import main
 from fpsolve.commands.options import BAD_INPUT
-from fpsolve.exponent.function import moment_lyapunov
+from fpsolve.exponent.solver import moment_lyapunov
 from fpsolve.model.problem import RTOL_BEYOND_PLANE
 from fpsolve.model.systems import EquationSystem, VibroImpactOscillator
 from fpsolve.output.records import set_key

@@ -11,7 +11,7 @@ import xarray as xr
 from fpsolve.case.case import load_case
 from fpsolve.cli import main
 from fpsolve.commands.options import BAD_INPUT
-from fpsolve.exponent.function import moment_lyapunov
+from fpsolve.exponent.solver import moment_lyapunov
 from fpsolve.measured.tables import read_table
 from fpsolve.model.faults import TableError
 from fpsolve.model.kinds import kind_classes

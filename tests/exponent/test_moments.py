@@ -8,7 +8,7 @@ import pytest
 
 from fpsolve import ExponentSolver, Problem, VibroImpactOscillator, make_mesh, moment_lyapunov
 from fpsolve.errors import NotConverged
-from fpsolve.exponent import Budget, solver, solve_moments
+from fpsolve.exponent import Budget, solve_moments, solver
 from fpsolve.exponent.solver import FEW_MOMENTS
 from tests.conftest import FIG1, FIG1_NOISE
 
