@@ -156,7 +156,7 @@ def zero_of(value: str | Mapping[str, float]) -> Zero:
     )
 
 
-def said(failure: ValueError) -> str:
+def said(failure: Exception) -> str:
     """What is wrong with the parameters of a problem, in one line."""
     if not isinstance(failure, ValidationError):
         return str(failure)

@@ -104,6 +104,14 @@ class Curve:
         """What the solver takes."""
         return self.base.at(self.varied) if self.varied else self.base
 
+    @cached_property
+    def is_possible(self) -> bool:
+        """Whether its parameters do not contradict each other."""
+        try:
+            return self.problem is not None
+        except ValueError:
+            return False
+
     @property
     def oscillator(self) -> Any:
         """The system."""
@@ -337,7 +345,7 @@ class Case(Section):
     @cached_property
     def responds(self) -> bool:
         """Whether some of the first curves are."""
-        return any(self.problem.at(varied).system.responds for varied in self.vary.sets(0, MOST_DRAWN))
+        return any(each.is_possible and each.problem.system.responds for each in self.curves(0, MOST_DRAWN))
 
     @property
     def differentiated(self) -> FloatArray:
@@ -364,11 +372,8 @@ class Case(Section):
 
     def curves(self, start: int = 0, stop: int | None = None) -> Iterator[Curve]:
         """One curve for each set of the varied values, from one place to another; each is made when it is asked for."""
-        places = range(self.planned)[start:stop]
-        return (
-            Curve(self.problem, varied, place + 1)
-            for place, varied in zip(places, self.vary.sets(start, stop), strict=True)
-        )
+        sets = enumerate(self.vary.sets[start:stop], start + 1)
+        return (Curve(self.problem, varied, number) for number, varied in sets)
 
     def membership(self) -> Callable[[Varied], bool]:
         """Tells whether parameters by their keys are those of a curve."""
@@ -402,7 +407,8 @@ class Case(Section):
     def theory_reduces_noise(self) -> bool:
         """Whether perturbation theory takes the reduction in place of the noise of some curve."""
         texts = [key for key in self.vary.keys if self.vary.is_text(key)]
-        return any(self.curve(varied).theory_reduces_noise for varied in self.vary.among(texts))
+        kinds = map(self.curve, self.vary.among(texts))
+        return any(each.is_possible and each.theory_reduces_noise for each in kinds)
 
     def heading(self, curve: Curve) -> str:
         """The headline, with which of the curves."""

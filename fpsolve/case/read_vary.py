@@ -7,17 +7,16 @@ import io
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from operator import itemgetter
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any
 
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, TypeAdapter, ValidationError, ValidationInfo
 from pydantic.fields import FieldInfo
 
 from fpsolve.case.kinds import parameters_of
 from fpsolve.case.sections import MAX_MOMENTS, Sweep, Values, flat
-from fpsolve.case.vary import BLOCK, Column, Columns, Vary, assignments, groups, holds_texts, picked, repeats
+from fpsolve.case.vary import Column, Columns, Vary, assignments, repeats
 from fpsolve.explain import (
     DEPENDENT,
     Refusal,
@@ -51,10 +50,7 @@ def values_of(known: FieldInfo, most: int | None = None) -> TypeAdapter[Values]:
 
 
 def vary_of(value: Any, info: ValidationInfo) -> Vary:
-    """What [vary] means; a `Vary` is left. Raises ValidationError with all that is wrong with it.
-
-    Of a file the rows that are wrong by themselves are not raised, but among its `faults`.
-    """
+    """What [vary] means; a `Vary` is left. Raises ValidationError with all that is wrong with it."""
     context = info.context or {}
     parameters = parameters_of(info.data, context)
     if isinstance(value, Vary):
@@ -121,7 +117,7 @@ def _column(key: str, values: Any, field: FieldInfo, columns: Columns) -> Iterat
         yield from _range(key, values, field, columns)
     else:
         try:
-            columns[key] = np.array(values_of(field, MAX_MOMENTS).validate_python(values))
+            columns[key] = values_of(field, MAX_MOMENTS).validate_python(values)
         except ValidationError as error:
             yield from (((key, *detail["loc"]), detail["input"], too_long(detail)) for detail in faults_in(error))
 
@@ -137,8 +133,8 @@ def _range(key: str, table: Mapping[str, Any], field: FieldInfo, columns: Column
     ends = ("start", sweep.start), ("stop", sweep.stop)
     wrong = [ends[i] for i in _out_of_range(field, [end for _, end in ends])]
     yield from (((key, name), end, "") for name, end in wrong)
-    values = sweep.values
-    if np.unique(groups(values)).size < values.size:
+    values = tuple(sweep.values.tolist())
+    if repeats((each,) for each in values):
         text = f"got num = {sweep.num}, which makes values equal to 12 digits; use a smaller num, or ends further apart"
         yield (key, "num"), sweep.num, text
     elif not wrong:
@@ -156,7 +152,7 @@ def _out_of_range(field: FieldInfo, values: Sequence[float]) -> list[int]:
 def _repeated(columns: Columns) -> Iterator[Refusal]:
     """The values of a product that a key has already."""
     for key, values in columns.items():
-        for i in np.flatnonzero(groups(values) != np.arange(len(values))).tolist():
+        for i, _ in repeats((each,) for each in values):
             yield (key, i), values[i], f"got {values[i]} twice; values must be distinct; remove one of them"
 
 
@@ -168,21 +164,22 @@ def _uneven(columns: Columns) -> Iterator[Refusal]:
         text = f'{told}; with mode = "zip" all must have one length; complete the shorter ones, or use mode = "product"'
         yield (), None, text
         return
-    for place, first in repeats(columns, next(iter(lengths.values()), 0)):
+    for place, first in repeats(zip(*columns.values(), strict=True)):
         varied = {key: values[place] for key, values in columns.items()}
         text = f"sets {first + 1} and {place + 1} are both {assignments(varied)}; must be distinct; remove one of them"
         yield (next(iter(columns)), place), varied, text
 
 
 def read_sets(file: str, folder: Path, parameters: Known) -> Vary:
-    """The sets of a file, with the faults of its rows.
+    """The sets of a file.
 
     Raises:
         Unreadable: there are no rows in it, no commas, or wrong quotes.
+        ValidationError: with all that is wrong with its rows.
     """
     reader = csv.reader(io.StringIO(read_text(folder / file, _WORDS), newline=""), strict=True)
-    line, header, unknown = 1, list[str](), list[tuple[int, str]]()
-    faults, rows, blocks = list[tuple[int, str]](), dict[int, list[str]](), list[_Block]()
+    line, header = 1, list[str]()
+    faults, rows = list[tuple[int, str]](), dict[int, list[str]]()
     try:
         for row in reader:
             cells = [cell.strip() for cell in row]
@@ -191,56 +188,29 @@ def read_sets(file: str, folder: Path, parameters: Known) -> Vary:
                     mark = "semicolons" if ";" in cells[0] else "tabs"
                     raise Unreadable(f"is separated by {mark}; write commas, and decimal points in the numbers", line)
                 header = cells
-                unknown = [(line, reason) for reason in _header_faults(header, parameters)]
+                faults += ((line, reason) for reason in _header_faults(header, parameters))
             elif any(cells) and len(cells) != len(header):
                 faults.append((line, _wrong_length(cells, header)))
             elif any(cells):
                 rows[line] = cells
-            if len(rows) == BLOCK:
-                blocks.append(_block_of(rows, header, parameters))
-                rows = {}
             line = reader.line_num + 1
     except csv.Error as error:
         raise Unreadable(f"cannot be read as comma-separated values ({error}); correct its quotes", line) from None
-    blocks.append(_block_of(rows, header, parameters))
-    faults += (fault for block in blocks for fault in block.faults)
-    lines = np.concatenate([block.lines for block in blocks])
-    if not (lines.size or faults):
+    if not (rows or faults):
         raise Unreadable("has a header but no sets; write a row of values for each set")
-    if unknown:
-        return Vary({}, "zip", file, lines[:0], (*unknown, *faults))
-    columns = {key: _joined([block.columns[key] for block in blocks]) for key in blocks[0].columns}
-    for place, first in repeats(columns, lines.size):
-        text = f"is the same set as line {lines[first]}; must be distinct; remove one of them"
-        faults.append((int(lines[place]), text))
-    return Vary(columns, "zip", file, lines, tuple(faults))
-
-
-class _Block(NamedTuple):
-    """Some rows of a file: the lines and the columns of those that are right, and the faults of the others."""
-
-    lines: NDArray[np.int64]
-    columns: Columns
-    faults: list[tuple[int, str]]
-
-
-def _block_of(rows: Mapping[int, Sequence[str]], header: Sequence[str], parameters: Known) -> _Block:
-    lines, columns = np.array([*rows], dtype=int), Columns()
-    faults, is_right = list[tuple[int, str]](), np.full(len(rows), True)
-    for key, cells in zip(header, zip(*rows.values(), strict=True) if rows else [()] * len(header), strict=True):
+    lines, columns, wrong = tuple(rows), Columns(), set[int]()
+    for key, column in zip(header, zip(*rows.values(), strict=True), strict=False):
         if key in parameters:
-            columns[key], reasons = _cells(cells, parameters[key])
-            faults += [(int(lines[i]), f"{key}: {reason}") for i, reason in reasons.items()]
-            is_right[[*reasons]] = False
-    right = np.flatnonzero(is_right)
-    return _Block(lines[right], {key: picked(values, right) for key, values in columns.items()}, faults)
-
-
-def _joined(parts: Sequence[Column]) -> Column:
-    """The values of a key in several blocks."""
-    if any(map(holds_texts, parts)):
-        return tuple(each for part in parts for each in part)
-    return np.concatenate(parts)
+            columns[key], reasons = _cells(column, parameters[key])
+            faults += ((lines[i], f"{key}: {reason}") for i, reason in reasons.items())
+            wrong |= reasons.keys()
+    for place, first in repeats(zip(*columns.values(), strict=True)) if len(columns) == len(header) else ():
+        if wrong.isdisjoint((place, first)):
+            text = f"is the same set as line {lines[first]}; must be distinct; remove one of them"
+            faults.append((lines[place], text))
+    faults.sort(key=itemgetter(0))
+    refuse((("file",), None, f"{file}:{line}: {text}") for line, text in faults)
+    return Vary(columns, "zip", file, lines)
 
 
 def _header_faults(header: Sequence[str], parameters: Known) -> Iterator[str]:
@@ -271,8 +241,7 @@ def _cells(cells: Sequence[str], field: FieldInfo) -> tuple[Column, dict[int, st
         for i, cell in enumerate(cells):
             if cell not in texts:
                 wrong[i] = f"must be one of {', '.join(texts)};{nearest(cell, texts)} write one of them"
-        known = {text: text for text in texts}
-        values: Column = tuple(known.get(cell, "") for cell in cells)  # one text for all that are alike
+        values: Column = tuple(cells)
     else:
         must, numbers = f"must be {accepted(field)} ({meaning_of(field)})", list[float]()
         for i, cell in enumerate(cells):
@@ -287,6 +256,6 @@ def _cells(cells: Sequence[str], field: FieldInfo) -> tuple[Column, dict[int, st
                 wrong[i] = f"{must}; {remedy}"
         for i in _out_of_range(field, numbers) if numbers else ():
             wrong.setdefault(i, f"{must}; change it, or remove the row")
-        values = np.array(numbers)
+        values = tuple(numbers)
     got = (f"got {shortened(cell)}" if cell else "is empty" for cell in cells)
     return values, {i: f"{each}; {wrong[i]}" for i, each in enumerate(got) if i in wrong}

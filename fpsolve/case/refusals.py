@@ -9,8 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
-from itertools import islice, product
-from operator import itemgetter
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -52,7 +51,7 @@ from fpsolve.simulation.setup import obstacles, simulated_parts
 from fpsolve.theory.perturbation import second_order_or_none
 
 Known = Mapping[str, Any]
-MAX_CURVES = 1_000_000
+MAX_CURVES = 100_000
 _MODERATE = "parameters and p must have moderate sizes; bring the extreme ones nearer to 1"
 
 
@@ -61,50 +60,25 @@ def _of_moments(moments: Moments, valid: Known, context: Known) -> Iterator[Refu
     problem = problem_of(valid)
     is_told = not context.get("varies", False) or (problem is not None and problem.is_closed_only)
     is_told &= problem is None or not problem.is_simulated_only
-    found = _unsolvable({**valid, "moments": moments}, Vary(), with_moments=is_told)
-    return (((), None, text) for _, text in islice(found, 1))
+    if text := _unsolvable({**valid, "moments": moments}, {}, with_moments=is_told):
+        yield (), None, text
 
 
 def _of_vary(vary: Vary, valid: Known, context: Known) -> Iterator[Refusal]:
-    """Too many curves, or the first one that cannot be solved; of a file every one."""
+    """Too many curves, or a first one that cannot be solved; the others are told of when they are solved."""
     if len(vary) > MAX_CURVES:
         yield (), None, f"makes {len(vary)} curves; must be at most {MAX_CURVES}; list fewer values"
-    elif vary.file:
-        reasons = _unsolvable(valid, vary) if vary.lines.size else ()
-        of_rows = [(int(vary.lines[place]), text) for place, text in reasons]
-        for line, text in sorted([*vary.faults, *of_rows], key=itemgetter(0)):
-            yield ("file",), None, f"{vary.file}:{line}: {text}"
-    else:
-        yield from (((), None, text) for _, text in islice(_unsolvable(valid, vary), 1))
+    elif text := _unsolvable(valid, vary.sets[0]):
+        yield ("file",) if vary.file else (), None, vary.line_of(1) + text
 
 
-def _unsolvable(valid: Known, vary: Vary, *, with_moments: bool = False) -> Iterator[tuple[int, str]]:
-    """The places of sets that contradict themselves or overflow, or of which some Λ(p) is not computed, and why.
-
-    Of many sets some alone are made problems, see `Vary.checked`; of the others the system and the noises are made.
-    """
+def _unsolvable(valid: Known, varied: Varied, *, with_moments: bool = False) -> str:
+    """Why a set contradicts itself or overflows, or why some Λ(p) of it is not computed, or nothing."""
     problem = problem_of(valid)
     if problem is None or "moments" not in valid:
-        return
-    p, is_wholly = valid["moments"].values, np.full(len(vary), False)
-    is_wholly[vary.checked] = True
-    names = {
-        section: {key: key.rpartition(".")[2] for key in vary.keys if key.rpartition(".")[0] == section}
-        for section in problem.sections
-    }
-    halves = [(half, names[section]) for section, half in problem.sections.items() if names[section]]
-    for place, varied in enumerate(vary.sets()):
-        reason = ""
-        if is_wholly[place]:
-            reason = obstacle(problem, varied, p, with_moments=with_moments)
-        else:
-            try:
-                for half, own in halves:
-                    half.at({name: varied[key] for key, name in own.items()})
-            except ValueError as error:
-                reason = said(error)
-        if reason:
-            yield place, _with(varied) + reason
+        return ""
+    reason = obstacle(problem, varied, valid["moments"].values, with_moments=with_moments)
+    return _with(varied) + reason if reason else ""
 
 
 def _with(varied: Varied) -> str:
@@ -180,29 +154,26 @@ def _misfit(mesh: CylinderMesh, valid: Known) -> str:
 
 
 def _of_monte_carlo(section: MonteCarloSection, valid: Known, context: Known) -> Iterator[Refusal]:
-    """The first parameter set for which the time, the step or a p of the simulation is not right."""
+    """The time, the step or a p of the simulation that is not right for the first parameter set."""
     base = problem_of(valid)
     if base is None or "vary" not in valid:
         return
     p = np.array(section.p or (0.0,))
     vary: Vary = valid["vary"]
+    varied, place = vary.sets[0], vary.line_of(1) + _with(vary.sets[0])
     is_known = section.p is None and "moments" in valid  # then there are such curves, and λ is finite
-    for place, varied in zip(vary.checked.tolist(), vary.sets_at(vary.checked), strict=True):
-        row = vary.line_of(place + 1)
-        reason, faults = "" if is_known else obstacle(base, varied, p, with_moments=not base.is_closed_only), {}
-        with suppress(ValueError):  # that is the reason
-            try:
-                faults = obstacles(*simulated_parts(base.at(varied)), time=section.time, step=section.step)
-            except FpsolveError as error:
-                yield (), None, row + _with(varied) + error.message.words(CASE_WORDS)
-                return
-        for name, text in faults.items():
-            if getattr(section, name) is not None:
-                yield (name,), getattr(section, name), row + _with(varied) + text
-        if reason:
-            yield ("p",), section.p, row + _with(varied) + reason
-        if faults or reason:
+    reason, faults = "" if is_known else obstacle(base, varied, p, with_moments=not base.is_closed_only), {}
+    with suppress(ValueError):  # that is the reason
+        try:
+            faults = obstacles(*simulated_parts(base.at(varied)), time=section.time, step=section.step)
+        except FpsolveError as error:
+            yield (), None, place + error.message.words(CASE_WORDS)
             return
+    for name, text in faults.items():
+        if getattr(section, name) is not None:
+            yield (name,), getattr(section, name), place + text
+    if reason:
+        yield ("p",), section.p, place + reason
 
 
 def _of_figure(figure: FigureSection, valid: Known, context: Known) -> Iterator[Refusal]:
@@ -277,21 +248,19 @@ def _of_expect(expect: tuple[Expectation, ...], valid: Known, context: Known) ->
 
 
 def _of_excursions(section: ExcursionSection, valid: Known, context: Known) -> Iterator[Refusal]:
-    """Excursions that are not computed, or a start that the noise of some curve does not have."""
+    """Excursions that are not computed, or a start that the noise of the first curve does not have."""
     yield from _unwanted(EXCURSIONS, section, valid)
     problem, vary = problem_of(valid), valid.get("vary", Vary())
     if problem is None or section.xi == STATIONARY:
         return
-    for varied in vary.sets_at(vary.checked):
-        try:
-            made = problem.at(varied)
-        except ValueError:  # another fault tells why
-            continue
-        try:
-            check_start(made, section.phi, section.xi)
-        except ValueError as error:
-            yield ("xi",), section.xi, f"{_with(varied)}{error}"
-            return
+    try:
+        made = problem.at(vary.sets[0])
+    except ValueError:  # another fault tells why
+        return
+    try:
+        check_start(made, section.phi, section.xi)
+    except ValueError as error:
+        yield ("xi",), section.xi, f"{_with(vary.sets[0])}{error}"
 
 
 def _of_response(section: ResponseSection, valid: Known, context: Known) -> Iterator[Refusal]:

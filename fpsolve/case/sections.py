@@ -52,8 +52,8 @@ from fpsolve.simulation.setup import BATCHES, MAX_PATHS, PATHS, Estimator
 
 MAX_MOMENTS = 100_000
 MAX_NODES = 1000
-_DIGITS = 12
-SAME = 10.0**-_DIGITS
+DIGITS = 12
+SAME = 10.0**-DIGITS
 """p that differ by no more are one p; values of a varied key, relative to their size."""
 EXCURSIONS = "excursions"
 RESPONSE = "response"
@@ -182,10 +182,10 @@ class Sweep(Section):
     def values(self) -> FloatArray:
         """The numbers, those between the ends without the rounding errors of the division, and 0 without a sign."""
         if self.scale == "log":
-            inner = [float(f"{value:.{_DIGITS}g}") for value in np.geomspace(self.start, self.stop, self.num)[1:-1]]
+            inner = [float(f"{value:.{DIGITS}g}") for value in np.geomspace(self.start, self.stop, self.num)[1:-1]]
         else:
             size = max(abs(self.start), abs(self.stop))
-            decimals = max(_DIGITS, _DIGITS - 1 - math.floor(math.log10(size)))
+            decimals = max(DIGITS, DIGITS - 1 - math.floor(math.log10(size)))
             inner = [round(value, decimals) for value in np.linspace(self.start, self.stop, self.num)[1:-1].tolist()]
         return np.array([self.start, *inner, self.stop]) + 0.0
 

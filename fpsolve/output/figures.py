@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from fpsolve.arrays import FloatArray
-from fpsolve.case.case import Case
+from fpsolve.case.case import Case, Curve
 from fpsolve.case.sections import MOST_NAMED, Value, Varied, same
 from fpsolve.case.vary import legend, map_key
 from fpsolve.drawing import (
@@ -35,7 +35,6 @@ from fpsolve.drawing import (
 )
 from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, STABILITY_INDEX
-from fpsolve.model.problem import Problem
 from fpsolve.model.quantity import (
     GROWTH,
     MOMENT,
@@ -230,7 +229,7 @@ def _moment_series(case: Case, result: CurveResult, sample: SimulatedCurve | Non
         p,
         result.moments.value,
         line,
-        perturbed_moments(result.curve.problem, line),
+        perturbed_moments(result.curve.problem, line) if line.size else line,
         _columns([(each.p, each.value, each.standard_error) for each in estimates if each.value is not None]),
         root=root if root is not None and first <= root <= last else None,
         slope=slope if first <= 0 <= last else None,
@@ -239,7 +238,8 @@ def _moment_series(case: Case, result: CurveResult, sample: SimulatedCurve | Non
 
 def _rates(result: CurveResult, *, with_theory: bool) -> Series:
     """I over s, beside the parabola (s − λ)²/2Λ″(0) of perturbation theory."""
-    found, theory = result.moments, perturbation.second_order_or_none(result.curve.problem)
+    found = result.moments
+    theory = perturbation.second_order_or_none(result.curve.problem) if found.p.size else None
     known = np.isfinite(found.derivative)
     s, line, values = found.derivative[known], _NOTHING, _NOTHING
     if with_theory and theory and theory.variance_rate and s.size:
@@ -268,7 +268,7 @@ def _over_parameter(case: Case, pairs: Sequence[Pair], numbers: FloatArray) -> l
                 x,
                 numbers[[result.curve.number - 1 for result, _ in group]],
                 line,
-                np.array([_theory(case, case.curve({**dict(others), key: float(each)}).problem) for each in line]),
+                np.array([_theory(case, case.curve({**dict(others), key: float(each)})) for each in line]),
                 _columns([(at, *dot) for at, dot in dots if dot]),
             )
         )
@@ -287,11 +287,13 @@ def _numbers(case: Case, table: Table) -> FloatArray:
     return found[:, int(np.argmin(abs(case.p - case.figure.moment)))]  # which is among them, but for its last digits
 
 
-def _theory(case: Case, problem: Problem) -> float:
+def _theory(case: Case, curve: Curve) -> float:
+    if not curve.is_possible:
+        return math.nan
     if case.figure.moment is not None:
-        return float(perturbed_moments(problem, np.array(case.figure.moment)))
+        return float(perturbed_moments(curve.problem, np.array(case.figure.moment)))
     index = INDICES[case.figure.needed]
-    value = index.theory(problem)
+    value = index.theory(curve.problem)
     return value if index.interval[0] <= value <= index.interval[1] else math.nan
 
 

@@ -262,8 +262,7 @@ class Results(Sequence[CurveResult]):
         """That of the curve with a number."""
         if (known := self._given.get(number) or self._kept.get(number)) is not None:
             return known
-        [varied] = self._case.vary.sets(number - 1, number)
-        curve = Curve(self._case.problem, varied, number)
+        curve = Curve(self._case.problem, self._case.vary.sets[number - 1], number)
         return self._keep(curve, *self.entries(curve))
 
     def _keep(self, curve: Curve, entries: Mapping[str, Entry], begun: Mapping[float, Moment]) -> CurveResult:

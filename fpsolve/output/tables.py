@@ -22,7 +22,6 @@ from numpy.typing import NDArray
 from fpsolve import __version__
 from fpsolve.case.case import Case, Curve
 from fpsolve.case.remedies import CASE_WORDS
-from fpsolve.case.vary import BLOCK
 from fpsolve.files import draft
 from fpsolve.messages import message_of
 from fpsolve.model.quantity import MOMENT, STATUS, Quantity
@@ -92,23 +91,21 @@ def write_results(
         by_moment.writerow([*case.vary.keys, *over_p])
         by_curve.writerow([*case.vary.keys, *of_curve])
         summary.write(_beginning(case, len(results) if finished is None else finished, facts, held=is_short))
-        for start in range(0, known.size, BLOCK):
-            block = known[start : start + BLOCK]
-            sets = list(case.vary.sets_at(block))
-            cells = zip(*(_cells(table[name], block) for name in of_curve), strict=True)
-            by_curve.writerows([*varied.values(), *row] for varied, row in zip(sets, cells, strict=True))
-            for at, row in _over_p(case, table, over_p[1:], block):
-                by_moment.writerow([*sets[at].values(), *row])
-            for place, (number, varied) in enumerate(zip(block.tolist(), sets, strict=True), start):
-                if not is_short:
-                    result = results[place]
-                    content = _summary(case, result, row_of(case, result), columns)
-                elif says is None or says[number]:
-                    content = _short_summary(case, results[place])
-                else:
-                    word = Status(int(table[STATUS.name].values[number])).word
-                    content = {"varied": varied, "status": word, "warnings": [], "notes": []}
-                summary.write(_entry(case, place, content))
+        sets = [case.vary.sets[number] for number in known.tolist()]
+        cells = zip(*(_cells(table[name], known) for name in of_curve), strict=True)
+        by_curve.writerows([*varied.values(), *row] for varied, row in zip(sets, cells, strict=True))
+        for at, row in _over_p(case, table, over_p[1:], known):
+            by_moment.writerow([*sets[at].values(), *row])
+        for place, (number, varied) in enumerate(zip(known.tolist(), sets, strict=True)):
+            if not is_short:
+                result = results[place]
+                content = _summary(case, result, row_of(case, result), columns)
+            elif says is None or says[number]:
+                content = _short_summary(case, results[place])
+            else:
+                word = Status(int(table[STATUS.name].values[number])).word
+                content = {"varied": varied, "status": word, "warnings": [], "notes": []}
+            summary.write(_entry(case, place, content))
         summary.write(_END)
     return table
 

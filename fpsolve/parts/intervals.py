@@ -86,7 +86,7 @@ def _row(case: Case, result: CurveResult) -> Row:
 
 def _content(case: Case, result: CurveResult) -> Mapping[str, Any]:
     """What is uncertain of a curve, and how that of the parameters is."""
-    if not case.uncertain:
+    if not (case.uncertain and result.curve.is_possible):
         return {}
     found, laws = spreads_of(case, result), case.uncertain.laws(result.curve.problem)
     content = {

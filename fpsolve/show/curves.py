@@ -176,5 +176,5 @@ def _interval(case: Case, name: str, result: CurveResult) -> str:
 
 
 def _theory(index: Index, result: CurveResult) -> str:
-    value = index.theory(result.curve.problem)
+    value = index.theory(result.curve.problem) if result.curve.is_possible else math.nan
     return "" if math.isnan(value) else f"{value:.6g}"

@@ -42,6 +42,8 @@ def show(
     if len(results) > 1 or case.figure.x != "p":
         yield from curves.show(case, results, table)
     for place, result in enumerate(results if len(results) <= EACH else results[:PICTURES]):
+        if not result.curve.is_possible:
+            continue
         if len(results) == 1 or (is_whole and len(results) <= EACH):
             told, p = [*told_of(case, result)], result.moments.p
             has_indices = any(result.estimates.values())  # which has Λ(2), too

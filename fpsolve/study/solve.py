@@ -240,7 +240,7 @@ def batches(case: Case, order: Callable[[int, Varied], Order | None]) -> Iterato
     size = batch_size(case.planned)
     starts = [*range(min(size, case.planned)), *range(size, case.planned, size), case.planned]
     for start, stop in pairwise(starts):
-        if found := tuple(filter(None, map(order, range(start + 1, stop + 1), case.vary.sets(start, stop)))):
+        if found := tuple(filter(None, map(order, range(start + 1, stop + 1), case.vary.sets[start:stop]))):
             yield found
 
 

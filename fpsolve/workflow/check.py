@@ -8,6 +8,7 @@ from functools import partial
 
 import numpy as np
 
+from fpsolve.analysis.zero import said
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case, Curve
 from fpsolve.case.sections import RESPONSE, Expectation, Varied
@@ -104,9 +105,9 @@ def refuse_no_hierarchy(case: Case) -> None:
     for curve in case.curves():
         try:
             refuse_open_hierarchy(curve.problem, float(orders.max()))
-        except NoHierarchy as failure:
+        except (NoHierarchy, ValueError) as failure:
             place = f"{case.path}: with {curve.label}" if curve.varied else str(case.path)
-            raise FpsolveError(f"{place}: {failure}") from None
+            raise FpsolveError(f"{place}: {said(failure)}") from None
 
 
 def compare_with_hierarchy(case: Case, results: Sequence[CurveResult]) -> list[Comparison]:

@@ -16,6 +16,7 @@ from typing import Any, TypeAlias, cast
 from pydantic import TypeAdapter
 
 from fpsolve import __version__
+from fpsolve.analysis.zero import said
 from fpsolve.case.case import Case, Curve
 from fpsolve.errors import FpsolveError, NoSuchExponent
 from fpsolve.exponent.quantities import LYAPUNOV_EXPONENT, STABILITY_INDEX
@@ -155,7 +156,7 @@ def refuse_unprovable_case(case: Case, width: float | None) -> None:
             with precision():  # which raises `MissingFlint` before anything is written
                 statement_of(curve.problem)
         except (TypeError, ValueError) as failure:
-            raise FpsolveError(f"{place}: {failure}") from None
+            raise FpsolveError(f"{place}: {said(failure)}") from None
         except NoSuchExponent as failure:
             raise NoSuchExponent(Message(Code.PLACED, place=place, reason=failure.message)) from None
 

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from fpsolve.analysis.zero import said
 from fpsolve.case.case import Case, Curve
 from fpsolve.case.sections import MonteCarloSection
 from fpsolve.drawing import Format, figure_for
@@ -70,8 +71,8 @@ def refuse_obstacles(case: Case) -> None:
         place = f"with {curve.label}: " if curve.varied else ""
         try:
             parts = simulated_parts(curve.problem)
-        except FpsolveError as failure:
-            raise FpsolveError(f"{case.path}: {place}{failure}") from None
+        except (FpsolveError, ValueError) as failure:
+            raise FpsolveError(f"{case.path}: {place}{said(failure)}") from None
         found = obstacles(*parts, time=case.monte_carlo.time, step=case.monte_carlo.step)
         for name, sentence in found.items():
             raise FpsolveError(f"{case.path}: monte_carlo.{name}: {place}{sentence}")

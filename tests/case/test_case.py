@@ -313,7 +313,7 @@ def test_override_of_a_text_needs_no_quotes(write: Write) -> None:
 @pytest.mark.parametrize("stated", ['"noise.D0" = [1]', "noise.D0 = [1]", ""])
 @pytest.mark.parametrize("override", ['vary."noise.D0"=[2]', "vary.noise.D0=[2]", 'vary={"noise.D0"=[2]}'])
 def test_override_of_a_varied_key(write: Write, stated: str, override: str) -> None:
-    assert load_case(write(f"{SMALL}[vary]\n{stated}"), [override]).vary.columns == {"noise.D0": [2.0]}
+    assert load_case(write(f"{SMALL}[vary]\n{stated}"), [override]).vary.columns == {"noise.D0": (2.0,)}
 
 
 def test_later_overrides_win_and_tables_replace_tables(write: Write) -> None:

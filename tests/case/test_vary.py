@@ -3,25 +3,18 @@
 from __future__ import annotations
 
 import csv
-import hashlib
 import itertools
-import json
 import os
 import pickle
-import time
-import tracemalloc
-from collections.abc import Callable, Mapping, Sequence
-from functools import partial
-from operator import itemgetter
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 import pytest
 
 from fpsolve.case.case import load_case
-from fpsolve.case.sections import QUANTITY_NAMES, Sweep, same
-from fpsolve.case.vary import Vary, assignments, first_places, groups, legend
+from fpsolve.case.sections import QUANTITY_NAMES, Sweep
+from fpsolve.case.vary import Vary, assignments, legend, repeats
 from fpsolve.cli import main
 from fpsolve.errors import CaseError
 from fpsolve.model.noises.non_gaussian import NonGaussianNoise, ReducedNoise
@@ -66,42 +59,25 @@ COLUMNS = {"noise.D0": (0.1, 0.5, 1.0), "noise.treatment": ("exact", "ou-reducti
 def test_a_product_has_all_combinations_the_last_key_fastest() -> None:
     vary = Vary(COLUMNS)
     expected = [dict(zip(COLUMNS, values, strict=True)) for values in itertools.product(*COLUMNS.values())]
-    assert list(vary.sets()) == expected
+    assert list(vary.sets) == expected
     assert len(vary) == 12
     assert vary.keys == tuple(COLUMNS)
-    assert list(pickle.loads(pickle.dumps(vary)).sets()) == expected
-    for start, stop in [(0, 0), (3, 7), (11, None), (5, 100), (12, None)]:
-        assert list(vary.sets(start, stop)) == expected[start:stop]
+    assert list(pickle.loads(pickle.dumps(vary)).sets) == expected
 
 
 def test_sets_side_by_side() -> None:
     vary = Vary({"noise.D0": (0.1, 0.5, 0.1), "noise.r0": (0.9, 0.9, 0.8)}, "zip")
     assert len(vary) == 3
-    assert list(vary.sets(1)) == [{"noise.D0": 0.5, "noise.r0": 0.9}, {"noise.D0": 0.1, "noise.r0": 0.8}]
+    assert vary.sets[1:] == ({"noise.D0": 0.5, "noise.r0": 0.9}, {"noise.D0": 0.1, "noise.r0": 0.8})
     assert vary.values("noise.D0") == (0.1, 0.5)
     assert list(vary.among(["noise.r0"])) == [{"noise.r0": 0.9}, {"noise.r0": 0.8}]
-
-
-@pytest.mark.parametrize("value", ["exact", 0.1])
-def test_many_equal_values_are_grouped_at_once(value: float | str) -> None:
-    started = time.process_time()
-    assert not groups((value,) * 20_000 if isinstance(value, str) else np.full(20_000, value)).any()
-    assert time.process_time() - started < 1
 
 
 @pytest.mark.parametrize("mode", ["product", "zip"])
 def test_nothing_varied_is_one_set(mode: str) -> None:
     vary = Vary({}, mode)  # type: ignore[arg-type]
     assert not vary
-    assert (len(vary), list(vary.sets()), vary.keys) == (1, [{}], ())
-
-
-def test_any_place_of_a_large_product_is_reached_at_once() -> None:
-    vary = Vary({f"key {i}": tuple(map(float, range(1000))) for i in range(4)})
-    started = time.process_time()
-    assert next(vary.sets(123_456_789_012)) == {"key 0": 123, "key 1": 456, "key 2": 789, "key 3": 12}
-    assert len(vary) == 10**12
-    assert time.process_time() - started < 0.1
+    assert (len(vary), vary.sets, vary.keys) == (1, ({},), ())
 
 
 def test_curves_are_made_when_they_are_asked_for(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -153,7 +129,7 @@ def test_a_range_has_a_constant_factor() -> None:
 )
 def test_spellings_of_a_range(write: Write, spelling: str) -> None:
     case = load_case(write(spelling), ['moments.p={ start = 0.01, stop = 1.0, num = 3, scale = "log" }'])
-    assert case.vary.columns["noise.D0"].tolist() == [0.1, 1.0, 10.0]
+    assert case.vary.columns["noise.D0"] == (0.1, 1.0, 10.0)
     assert case.p.tolist() == [0.01, 0.1, 1.0]
 
 
@@ -283,89 +259,17 @@ def test_overrides_of_ranges_and_files(write: Write, tmp_path: Path) -> None:
     assert not load_case(write('file = "other.csv"'), ["vary={}"]).vary
 
 
-def first_places_one_by_one(columns: Sequence[Sequence[float | str]]) -> list[int]:
-    """For each set the place of the first one that is the same, by chains of values in the order of their size."""
-    alike = []
-    for values in columns:
-        order = sorted(range(len(values)), key=values.__getitem__)
-        runs = [order[:1]]
-        for place in order[1:]:
-            if same(values[runs[-1][-1]], values[place]):
-                runs[-1].append(place)
-            else:
-                runs.append([place])
-        alike.append({place: min(run) for run in runs for place in run})
-    rows = [tuple(of[place] for of in alike) for place in range(len(columns[0]))]
-    return [rows.index(row) for row in rows]
-
-
-@pytest.mark.parametrize("seed", range(20))
-def test_sets_that_are_the_same_are_found(seed: int) -> None:
-    """Numbers are the same to 12 digits, also in chains; zeros of either sign are."""
-    rng = np.random.default_rng(seed)
-    numbers = rng.choice([0.0, -0.0, 0.3, -0.3, 1e300, -1e300], 60) * (1 + 6e-13 * rng.integers(0, 4, 60))
-    texts = tuple(rng.choice(["exact", "ou-reduction"], 60).tolist())
-    columns = [numbers, texts, rng.choice([1.0, 2.0], 60)]
-    expected = first_places_one_by_one([each if isinstance(each, tuple) else each.tolist() for each in columns])
-    assert first_places(columns, 60).tolist() == expected
-
-
-MANY = 1200
-"""Sets of which not all are made problems when a case is loaded."""
-
-
-def many_sets(changes: Mapping[int, Sequence[float]]) -> str:
-    """A file of `MANY` sets, some of them changed."""
-    rows = [changes.get(place, (0.1 + place / 1e4, 0.1, 0.9)) for place in range(MANY)]
-    return "noise.D0,oscillator.epsilon,oscillator.restitution\n" + "".join(f"{a},{b},{c}\n" for a, b, c in rows)
-
-
-@pytest.mark.parametrize("mode", ["product", "zip"])
-def test_of_many_sets_those_at_the_ends_of_the_keys_are_checked(mode: Literal["product", "zip"]) -> None:
-    rng = np.random.default_rng(1)
-    names = ("exact", "ou-reduction")
-    if mode == "product":
-        columns = {
-            "noise.D0": rng.permutation(60) + 1.0,
-            "noise.treatment": names,
-            "noise.r0": rng.permutation(30) / 30,
-        }
-    else:
-        numbers = (rng.permutation(MANY) + 1.0 for _ in range(2))
-        texts = tuple(rng.choice(names, MANY).tolist())
-        columns = dict(
-            zip(("noise.D0", "noise.treatment", "noise.r0"), (next(numbers), texts, next(numbers)), strict=True)
-        )
-    vary = Vary(columns, mode)
-    sets, checked = list(vary.sets()), list(vary.sets_at(vary.checked))
-    assert len(checked) < 300
-    assert all(each in sets for each in checked)
-    for text, end, other in itertools.product(names, (min, max), (min, max)):
-        of_text = [each for each in sets if each["noise.treatment"] == text]
-        if mode == "product":
-            corner = {"noise.D0": end(columns["noise.D0"]), "noise.r0": other(columns["noise.r0"])}
-            assert {**corner, "noise.treatment": text} in checked
-        else:
-            assert end(of_text, key=itemgetter("noise.D0")) in checked
-            assert other(of_text, key=itemgetter("noise.r0")) in checked
-
-
-def test_each_set_is_checked_for_what_its_system_or_its_noise_refuses(write: Write, tmp_path: Path) -> None:
-    """Set 503 is not among those that are made problems, and no value of it is at an end."""
-    sets_file(tmp_path, many_sets({777: (0.17, 3.0, 1.0), 3: (0.11, 0.1, 0.1), 502: (0.15, 2.0, 0.6)}))
-    text = only_fault(write('file = "sets.csv"'))
-    assert 502 not in load_case(write('file = "sets.csv"'), ['oscillator.impact="delta"']).vary.checked
-    stated = "with noise.D0 = 0.15, oscillator.epsilon = 2.0, oscillator.restitution = 0.6"
-    assert text.startswith(f"vary.file: sets.csv:504: {stated}: the restitution law")
+def test_sets_that_are_the_same_are_found() -> None:
+    """Numbers are the same to 12 digits, zeros of either sign, too."""
+    rows = [(0.3, "a"), (0.3 * (1 + 1e-14), "a"), (0.3, "b"), (-0.0, "a"), (0.3 * (1 + 1e-11), "a"), (0.0, "a")]
+    assert repeats(rows) == [(1, 0), (5, 3)]
 
 
 @pytest.mark.slow
 def test_a_set_that_is_found_not_to_be_possible_fails_alone(
-    write: Write, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    write: Write, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """It is told with its line, which may be another one the next time, and the others are solved."""
-    monkeypatch.setattr("fpsolve.case.vary.WHOLLY_CHECKED", 4)
-    monkeypatch.setattr("fpsolve.case.vary.SPREAD", 2)
     rows = "1,0.1,0.9\n1.1,1e4,1\n1.2,0.1,0.1\n1.3,1e3,0.5\n1.4,0.1,0.9\n"
     only = '[output]\nquantities = ["moment"]\nfigure = false'
     path = write('file = "sets.csv"', only)
@@ -379,40 +283,25 @@ def test_a_set_that_is_found_not_to_be_possible_fails_alone(
         assert (status[3], status[0], status[2], status[4]) == ("failed", "converged", "converged", "converged")
 
 
-def processor_time(work: Callable[[], object]) -> float:
-    """The least of three times, in seconds."""
-    times = []
-    for _ in range(3):
-        started = time.process_time()
-        work()
-        times.append(time.process_time() - started)
-    return min(times)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("kind", ["product"])
-def test_many_sets_are_read_about_as_fast_as_their_file(write: Write, tmp_path: Path, kind: str) -> None:
-    """A set more takes some five times as long as its row by `csv` and `sha256`, and 0.5 kB with its columns."""
-    few, many = 3_000, 23_000
-    times, sizes = {}, {}
-    for count in (few, many):
-        rows = (f"{0.1 + i / 1000},{1 + i / 7000},{'exact' if i % 3 else 'ou-reduction'}\n" for i in range(count))
-        sets_file(tmp_path, "noise.D0,oscillator.omega,noise.treatment\n" + "".join(rows))
-        ends = f"{{ start = 0.1, stop = 10.0, num = {count // 100} }}", "{ start = 0.1, stop = 10.0, num = 100 }"
-        path = write('file = "sets.csv"' if kind == "file" else f"noise.D0 = {ends[0]}\noscillator.omega = {ends[1]}")
-        times[count] = processor_time(partial(load_case, path))
-        tracemalloc.start()
-        assert load_case(path).planned == count
-        sizes[count] = tracemalloc.get_traced_memory()[1]
-        tracemalloc.stop()
-
-    def hashed() -> None:
-        with (tmp_path / "sets.csv").open(newline="", encoding="utf-8") as stream:
-            for *numbers, word in itertools.islice(csv.reader(stream), 1, None):
-                hashlib.sha256(json.dumps([*map(float, numbers), word]).encode()).digest()
-
-    assert times[many] - times[few] < 10 * processor_time(hashed)
-    assert sizes[many] - sizes[few] < 0.5 * 1024 * (many - few)
+@pytest.mark.parametrize(
+    "options",
+    [
+        ["--report"],
+        ["--all", "--table", "--set", "figure={ x = 'oscillator.epsilon', y = 'lyapunov_exponent' }"],
+        ["--set", "uncertain={ 'noise.D0' = 0.1 }", "--set", "output.quantities=['moment', 'rate_function']"],
+    ],
+)
+def test_a_set_that_contradicts_itself_is_told_beside_the_others(
+    write: Write, tmp_path: Path, capsys: pytest.CaptureFixture[str], options: list[str]
+) -> None:
+    path = write('"oscillator.epsilon" = [0.1, 9.0, 0.2]')
+    assert main(["run", str(path), "--out", str(tmp_path / "out"), "--jobs", "1", *options]) == 3
+    assert "the restitution law needs" in capsys.readouterr().err
+    with (tmp_path / "out/varied/curves.csv").open(newline="", encoding="utf-8") as table:
+        assert [row["status"] for row in csv.DictReader(table)] == ["converged", "failed", "converged"]
+    for command in ("simulate", "prove"):
+        assert main([command, str(path)]) == 2
+        assert "with oscillator.epsilon = 9: the restitution law needs" in capsys.readouterr().err
 
 
 def test_quantities(write: Write) -> None:
