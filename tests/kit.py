@@ -102,7 +102,7 @@ def from_record(case: Case, solved: Solved) -> CurveResult:
     """A solved set as it comes back from its record."""
     curve, asked, numerics = solved.result.curve, everything(case), Numerics.of(case)
     record = json.loads(json.dumps(record_of_set(curve, asked, numerics, solved.entries)))
-    return result_of(curve, asked, numerics, *entries_of(record, curve, asked, numerics))
+    return result_of(curve, asked, numerics, *entries_of(record, asked, numerics))
 
 
 def read_json(path: Path) -> Any:

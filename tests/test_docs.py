@@ -134,7 +134,7 @@ def test_the_part_of_the_walk_through_is_solved_recorded_and_tabulated(monkeypat
     [curve], asked = case.curves(), {"moment": {"p": [], "slopes": True}, part.name: {"level": 1.0}}
     solved = solve_curve(curve, asked, Numerics.of(case))
     record = json.loads(json.dumps(record_of_set(curve, asked, Numerics.of(case), solved.entries)))
-    entries, _ = entries_of(record, curve, asked, Numerics.of(case))
+    entries, _ = entries_of(record, asked, Numerics.of(case))
     expected = 0.5 * math.erfc(1.0 / (math.sqrt(2) * curve.noise.standard_deviation))
     for found in (solved.result, result_of(curve, asked, Numerics.of(case), entries)):
         assert found.parts[part.name].value == pytest.approx(expected, rel=1e-8)

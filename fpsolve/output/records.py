@@ -21,7 +21,7 @@ from base64 import b64decode, b64encode
 from bisect import bisect_left, insort
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import dataclass, fields, is_dataclass
 from errno import ENOSPC
 from functools import cache, lru_cache
 from pathlib import Path
@@ -34,7 +34,6 @@ import numpy as np
 
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case, Curve
-from fpsolve.case.remedies import CASE_WORDS
 from fpsolve.data import Quantity
 from fpsolve.errors import OutputError, Remedy
 from fpsolve.exponent.error import Moment
@@ -56,8 +55,6 @@ RESULT_VERSION = 5
 """Of what is computed from the same parameters; records of another one are computed anew."""
 SHARED_SECONDS = 60.0
 """After which a file that another machine has written is there, if it ever is."""
-LONGEST, MOST_NUMBERS = 2**28, 2**24
-"""Of a line, in bytes, and of an array."""
 KEPT = 2**21
 """Bytes of the records whose results stay in memory once they are read, as of few curves all are asked for again."""
 MOST_LISTED = 8
@@ -95,7 +92,7 @@ class Records:
             start = self._seen.get(path.name, 0)
             with path.open("rb") as file:
                 file.seek(start)
-                while len(line := file.readline(LONGEST)) not in (0, LONGEST):  # what is longer is no record
+                for line in file:
                     if found := _parsed(line):
                         place = Address(path.name, start, len(line))
                         self._addresses[found[0]] = (*self._addresses.get(found[0], ()), place)
@@ -238,7 +235,7 @@ class Results(Sequence[CurveResult]):
             with suppress(OSError, ValueError):  # which counts as none
                 found = self._records.read(place)
                 record |= found if isinstance(found, dict) else {}
-        return entries_of(record, curve, self.asked(curve.number), self._numerics)
+        return entries_of(record, self.asked(curve.number), self._numerics)
 
     def has(self, number: int) -> bool:
         """Whether the curve with a number is known."""
@@ -389,36 +386,27 @@ def messages_of(part: Part, entry: Entry, curve: Curve, numerics: Numerics) -> I
         yield from part.reasons(entry.found)
 
 
-def entries_of(
-    record: Record, curve: Curve, asked: Asked, numerics: Numerics
-) -> tuple[dict[str, Entry], dict[float, Moment]]:
+def entries_of(record: Record, asked: Asked, numerics: Numerics) -> tuple[dict[str, Entry], dict[float, Moment]]:
     """The entries of a record that answer what is asked for, and Λ(p) of an unfinished run, by p.
 
-    An entry that cannot be read, or does not fit, is none.
+    An entry that cannot be read is none.
     """
     entries = dict[str, Entry]()
     for name, keys in part_keys(json.dumps(asked), numerics).items():
         for key in reversed(keys):  # what no budget limits counts
-            if key in record and (entry := _entry_of(record[key], BY_NAME[name], curve, asked[name])):
+            if key in record and (entry := _entry_of(record[key], BY_NAME[name])):
                 entries[name] = entry
     begun = dict[float, Moment]()
-    if (data := record.get(begun_key(numerics))) is not None:
-        fits = replace(
-            MOMENTS, is_whole=lambda found, *_: MOMENTS.is_whole(found, curve, {"p": found.columns.p.tolist()})
-        )
-        if (entry := _entry_of(data, fits, curve, {})) and entry.found is not None:
-            begun = begun_of(entry.found)
+    if (key := begun_key(numerics)) in record and (entry := _entry_of(record[key], MOMENTS)) and entry.found:
+        begun = begun_of(entry.found)
     return entries, begun
 
 
-def _entry_of(data: Any, part: Part, curve: Curve, settings: Settings) -> Entry | None:
-    """An entry from what a record has of it; None where that has another form, or does not fit."""
+def _entry_of(data: Any, part: Part) -> Entry | None:
+    """An entry from what a record has of it; None where that has another form."""
     try:
         plain, reason, seconds = data
-        found = None if plain is None else codec(part.kind).made(plain)
-        entry = Entry(found, _REASON.made(reason), _number(seconds))
-        is_known = part.is_whole(found, curve, settings) if found is not None else entry.reason is not None
-        return entry if is_known and 0 <= entry.seconds < math.inf else None
+        return Entry(None if plain is None else codec(part.kind).made(plain), _REASON.made(reason), float(seconds))
     except _OF_ANOTHER_FORM:
         return None
 
@@ -479,16 +467,14 @@ def codec(kind: Any) -> Codec:
         row = Codec(
             [kind.__name__, *([name, one.form] for name, one in attributes.items())],
             lambda value: [one.plain(getattr(value, name)) for name, one in attributes.items()],
-            lambda data: kind(
-                *[one.made(part) for one, part in zip(attributes.values(), _checked(data, list), strict=True)]
-            ),
+            lambda data: kind(*[one.made(part) for one, part in zip(attributes.values(), data, strict=True)]),
         )
         if kind is not Quantity:
             return row
         # a text for each, as there are few of them and many numbers
         plain = lru_cache(lambda value: json.dumps(row.plain(value)))
         made = lru_cache(lambda text: row.made(json.loads(text)))
-        return Codec(row.form, plain, lambda data: made(_checked(data, str)))
+        return Codec(row.form, plain, made)
     if origin is get_origin(FloatArray):  # np.ndarray, or NDArray itself since NumPy 2.5
         return Codec("array or list", _packed, _unpacked)
     if origin is Literal:
@@ -505,21 +491,21 @@ def codec(kind: Any) -> Codec:
         return Codec(
             [inner.form],
             lambda value: [inner.plain(each) for each in value],
-            lambda data: tuple(map(inner.made, _checked(data, list))),
+            lambda data: tuple(map(inner.made, data)),
         )
     if origin is tuple:
         each = [codec(part) for part in parts]
         return Codec(
             [one.form for one in each],
             lambda value: [one.plain(part) for one, part in zip(each, value, strict=True)],
-            lambda data: tuple(one.made(part) for one, part in zip(each, _checked(data, list), strict=True)),
+            lambda data: tuple(one.made(part) for one, part in zip(each, data, strict=True)),
         )
     if origin in (dict, Mapping):
         inner = codec(parts[1])
         return Codec(
             {"": inner.form},
             lambda value: {key: inner.plain(each) for key, each in value.items()},
-            lambda data: {key: inner.made(each) for key, each in _checked(data, dict).items()},
+            lambda data: {key: inner.made(each) for key, each in data.items()},
         )
     raise TypeError(f"values of {kind} cannot be recorded")
 
@@ -537,13 +523,6 @@ def _recorded(kind: Any) -> Mapping[str, Codec]:
     return {name: codec(hints[name]) for name in names if name != "curve"}
 
 
-def _checked(data: Any, kind: Any) -> Any:
-    """Plain data of a kind. Raises TypeError where they are of another one."""
-    if not isinstance(data, kind) or (isinstance(data, bool) and kind is not bool):
-        raise TypeError(f"{data!r} is of another kind than {kind}")
-    return data
-
-
 def _packed(value: FloatArray) -> Record | list[float | str]:
     if value.ndim == 1 and value.size <= MOST_LISTED:
         return [each if math.isfinite(each) else str(each) for each in map(float, value)]
@@ -553,53 +532,19 @@ def _packed(value: FloatArray) -> Record | list[float | str]:
 
 def _unpacked(packed: Any) -> FloatArray:
     if isinstance(packed, list):
-        return np.array(list(map(_number, packed)), dtype=float)
-    shape = tuple(_checked(size, int) for size in packed["shape"])
-    if min(shape, default=1) < 0 or (count := math.prod(shape)) > MOST_NUMBERS:
-        raise ValueError(f"there is no array of shape {shape}")
-    unpacker = zlib.decompressobj()
-    data = unpacker.decompress(b64decode(_checked(packed["data"], str), validate=True), 8 * count + 1)
-    if not unpacker.eof:
-        raise ValueError("an array is cut off")
-    return np.frombuffer(data, dtype="<f8").reshape(shape).astype(float)
-
-
-def _number(data: Any) -> float:
-    if type(data) is float:
-        return data
-    return float(data if data in ("nan", "inf", "-inf") else _checked(data, int))
-
-
-def _text(data: Any) -> str:
-    _checked(data, str).encode()  # half a pair of UTF-16 is no text
-    return str(data)
-
-
-def _strict(data: Any) -> Any:
-    """What strict JSON in UTF-8 can hold."""
-    if type(data) is int or (type(data) is float and math.isfinite(data)):
-        return data
-    _text(json.dumps(data, allow_nan=False, ensure_ascii=False))
-    return data
-
-
-def _message(data: Any) -> Message:
-    """A message that can be said in the words of case files, too, and sorted by its size."""
-    message = Message.from_data(data)
-    _text(message + message.words(CASE_WORDS))
-    if message.size is not None:
-        _number(message.size)
-    return message
+        return np.array(list(map(float, packed)), dtype=float)
+    data = zlib.decompress(b64decode(packed["data"]))
+    return np.frombuffer(data, dtype="<f8").reshape(packed["shape"]).astype(float)
 
 
 _SIMPLE: Mapping[Any, Codec] = {
-    Any: Codec("any", lambda value: value, _strict),
-    str: Codec("text", str, _text),
-    bool: Codec("bool", bool, lambda data: _checked(data, bool)),
-    int: Codec("int", int, lambda data: _checked(data, int)),
-    float: Codec("float", lambda value: float(value) if math.isfinite(value) else str(float(value)), _number),
-    float | str: Codec("number or text", lambda value: value, lambda data: _checked(data, float | str)),
-    Message: Codec("message", lambda value: message_of(value).to_data(), _message),
+    Any: Codec("any", lambda value: value, lambda data: data),
+    str: Codec("text", str, str),
+    bool: Codec("bool", bool, bool),
+    int: Codec("int", int, int),
+    float: Codec("float", lambda value: float(value) if math.isfinite(value) else str(float(value)), float),
+    float | str: Codec("number or text", lambda value: value, lambda data: data),
+    Message: Codec("message", lambda value: message_of(value).to_data(), Message.from_data),
 }
 """For what has no parts."""
 _REASON = codec(Reason | None)

@@ -13,7 +13,6 @@ from fpsolve.case.case import Case, Curve
 from fpsolve.case.sections import EXCURSIONS
 from fpsolve.messages import Message
 from fpsolve.page.page import Sentence
-from fpsolve.parts.indices import is_estimate
 from fpsolve.parts.part import Job, Numerics, Part, Settings
 from fpsolve.results.curve import CurveResult
 from fpsolve.results.table import pair
@@ -53,11 +52,6 @@ def _content(case: Case, result: CurveResult) -> Mapping[str, Any]:
         ],
     }
     return {EXCURSIONS: content}
-
-
-def _is_whole(found: Excursion, curve: Curve, settings: Settings) -> bool:
-    numbers = found.lyapunov_exponent, found.stability_index, found.lower, found.upper, found.upcrossings
-    return all(is_estimate(each) for each in numbers if each)
 
 
 def _show(case: Case, result: CurveResult) -> Iterator[Sentence]:
@@ -107,6 +101,5 @@ PART: Part = Part(
     SYMBOL,
     said=_said,
     content=_content,
-    is_whole=_is_whole,
     show=_show,
 )

@@ -38,11 +38,6 @@ def index_of(found: Estimate | Absent, name: str, symbol: str) -> Estimate | Rea
     return Reason("absent", found.reason, symbol)
 
 
-def is_estimate(number: Estimate) -> bool:
-    """Whether a number from a record can be written."""
-    return not math.isinf(number.value) and not number.error_estimate < 0
-
-
 def part_of(index: Index) -> Part:
     """The part of an index."""
 
@@ -75,9 +70,6 @@ def part_of(index: Index) -> Part:
     def row(case: Case, result: CurveResult) -> Row:
         return pair(index.name, result.estimates[index.name])
 
-    def is_whole(found: Estimate, curve: Curve, settings: Settings) -> bool:
-        return is_estimate(found)
-
     return Part(
         index.name,
         settings,
@@ -87,7 +79,6 @@ def part_of(index: Index) -> Part:
         said=said,
         columns=columns,
         row=row,
-        is_whole=is_whole,
     )
 
 

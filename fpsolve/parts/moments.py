@@ -106,20 +106,6 @@ def begun_of(found: Moments) -> dict[float, Moment]:
     return {p: Moment(*row) for p, row in zip(columns.p.tolist(), rows, strict=True)}
 
 
-def _is_whole(found: Moments, curve: Curve, settings: Settings) -> bool:
-    """Whether the numbers are of the p that were asked for, each found or failed, and can be written."""
-    columns, asked = vars(found.columns), set(settings["p"])
-    p, failed = found.columns.p.tolist(), {failure.p for failure in found.failures}
-    return (
-        found.columns.p.ndim == 1
-        and all(each.shape == found.columns.p.shape for each in columns.values())
-        and not any(np.isinf(each).any() for each in columns.values())
-        and bool(np.isfinite(found.columns.value).all())
-        and len(set(p)) == len(p)
-        and {*p} <= asked <= (asked if None in failed else {*p, *failed})
-    )
-
-
 def _said(found: Moments, curve: Curve, numerics: Numerics) -> Iterator[Message]:
     yield from found.warnings
     yield from found.notes
@@ -165,7 +151,6 @@ PART: Part = Part(
     columns=_columns,
     row=_row,
     reasons=_reasons,
-    is_whole=_is_whole,
 )
 
 
@@ -184,19 +169,6 @@ def _said_of_classes(classes: Sequence[InvariantClass], curve: Curve, numerics: 
     else:
         along, across = rates
         yield Message(Code.INVARIANT_CLASSES, phase=classes[0].phase, along=along, across=across)
-
-
-def _classes_are_whole(classes: Sequence[InvariantClass], curve: Curve, settings: Settings) -> bool:
-    """Whether all numbers are finite, each class with all p."""
-    return all(
-        each.p.shape == each.value.shape == each.error_estimate.shape
-        and set(each.p.tolist()) <= set(settings["p"])
-        and all(bool(np.isfinite(column).all()) for column in (each.value, each.error_estimate))
-        and all(
-            map(math.isfinite, (each.phase or 0.0, each.lyapunov_exponent.value, each.lyapunov_exponent.error_estimate))
-        )
-        for each in classes
-    )
 
 
 def _content_of_classes(case: Case, result: CurveResult) -> Mapping[str, Any]:
@@ -226,6 +198,5 @@ CLASSES: Part = Part(
     said=_said_of_classes,
     content=_content_of_classes,
     lacks=lambda found, settings: any({*each.p.tolist()} != {*settings["p"]} for each in found),
-    is_whole=_classes_are_whole,
 )
 """λ and Λ(p) of blocks of variables, or on a ray that the phase never leaves and across it."""

@@ -196,7 +196,6 @@ class Part:
         figures: of a curve in a folder, beside its simulation if there is one.
         reasons: why some of it is missing.
         lacks: whether it lacks something that is asked for, as another part lacks it.
-        is_whole: whether what a record holds is what can be written and drawn.
         uses_solver: whether rtol and the mesh of Λ(p) decide its numbers.
     """
 
@@ -215,7 +214,6 @@ class Part:
     figures: Callable[[Case, CurveResult, Path, SimulatedCurve | None], Iterable[Drawing]] | None = None
     reasons: Callable[[Any], Iterable[Message]] = _nothing
     lacks: Callable[[Any, Settings], bool] = lambda *_: False
-    is_whole: Callable[[Any, Curve, Settings], bool] = lambda *_: True
     uses_solver: bool = True
 
     @property

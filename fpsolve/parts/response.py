@@ -4,7 +4,6 @@ their files and figures.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
@@ -13,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fpsolve.arrays import FloatArray
-from fpsolve.case.case import Case, Curve
+from fpsolve.case.case import Case
 from fpsolve.case.sections import RESPONSE
 from fpsolve.data import Quantity
 from fpsolve.drawing import COLOURS, Format, draw_colours, draw_dots, figure_for, label_axes, points
@@ -25,7 +24,6 @@ from fpsolve.model.plane import System
 from fpsolve.model.problem import Problem
 from fpsolve.model.quantity import ResponseQuantities
 from fpsolve.page.page import Block, Drawing, Sentence, filled
-from fpsolve.parts.indices import is_estimate
 from fpsolve.parts.part import Job, Part, Settings
 from fpsolve.results.curve import CurveResponse, CurveResult, ResponseDensity, SimulatedCurve
 from fpsolve.results.table import Row, pair
@@ -139,30 +137,6 @@ def _content(case: Case, result: CurveResult) -> Mapping[str, Any]:
             "unknowns": found.unknowns,
         }
     return {RESPONSE: content}
-
-
-def _is_whole(found: CurveResponse, curve: Curve, settings: Settings) -> bool:
-    """Whether the numbers are all there, and the density is one over a grid."""
-    about: ResponseQuantities = curve.problem.system.response
-    if found.balance is None or found.stability_index is None or found.least is None:
-        return found.numbers.keys() == about.numbers.keys() and all(map(is_estimate, found.numbers.values()))
-    density, numbers = found.density, (found.stability_index, found.least)
-    is_whole = (
-        found.numbers.keys() <= about.numbers.keys()
-        and all(map(math.isfinite, numbers))
-        and all(map(is_estimate, (*found.numbers.values(), found.balance)))
-        and (density is None) == (settings["grid"] is None)
-    )
-    if density is None or not is_whole:
-        return is_whole
-    places = density.amplitude, density.phi, density.xi
-    shape = tuple(each.size for each in places)
-    tables = {1: density.of_amplitude, 2: density.of_plane, 3: density.whole}
-    return (
-        all(each.ndim == 1 and each.size > 1 and bool(np.all(np.diff(each) > 0)) for each in places)
-        and all(each.shape == shape[:size] for size, each in tables.items())
-        and all(bool(np.isfinite(each).all()) for each in (*places, *tables.values()))
-    )
 
 
 def _files(result: CurveResult, folder: Path) -> None:
@@ -287,6 +261,5 @@ PART: Part = Part(
     files=_files,
     show=_show,
     figures=_figures,
-    is_whole=_is_whole,
     uses_solver=False,
 )

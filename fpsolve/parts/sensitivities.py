@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
@@ -18,7 +17,6 @@ from fpsolve.exponent.error import MEANINGLESS, Estimate
 from fpsolve.messages import Message
 from fpsolve.model.quantity import MOMENT
 from fpsolve.page.page import Drawing
-from fpsolve.parts.indices import is_estimate
 from fpsolve.parts.part import Job, Numerics, Part, Settings
 from fpsolve.results.curve import CurveResult, SimulatedCurve
 from fpsolve.theory.perturbation import scale_of
@@ -68,21 +66,6 @@ def _lacks(found: Sensitivities, settings: Settings) -> bool:
     return not (is_there and all(found.moments))
 
 
-def _is_whole(found: Sensitivities, curve: Curve, settings: Settings) -> bool:
-    """Whether the derivatives are of p that were asked for, by parameters of the curve."""
-    keys, rows = found.theta.keys(), [*found.moments, *found.indices.values()]
-    return (
-        found.p.shape == (len(found.moments),)
-        and set(found.p.tolist()) <= set(settings["p"])
-        and keys == found.quantities.keys()
-        and keys <= curve.parameters.keys()
-        and all(row.keys() <= keys for row in rows)
-        and found.indices.keys() <= {*settings["indices"]}
-        and all(map(math.isfinite, found.theta.values()))
-        and all(is_estimate(each) for row in rows for each in row.values())
-    )
-
-
 def _figures(case: Case, result: CurveResult, folder: Path, simulated: SimulatedCurve | None) -> Iterator[Drawing]:
     """sensitivities.png and .pdf, if the case asks for them."""
     if case.output.sensitivities and result.sensitivities:
@@ -111,5 +94,4 @@ PART: Part = Part(
     content=_content,
     figures=_figures,
     lacks=_lacks,
-    is_whole=_is_whole,
 )

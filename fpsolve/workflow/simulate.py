@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import asdict, replace
@@ -130,26 +129,6 @@ def simulated_of(record: Mapping[str, Any], curve: Curve) -> SimulatedCurve:
     return SimulatedCurve(curve, **made_of(SimulatedCurve, record))
 
 
-def simulation_fits(simulated: SimulatedCurve, orders: Sequence[float]) -> bool:
-    """Whether the numbers of a simulation are of the p that were asked for, and can be written and drawn."""
-    found, response = simulated.result, simulated.response
-    numbers = [found.lyapunov_exponent, found.lyapunov_exponent_error, found.variance_rate, found.variance_rate_error]
-    numbers += [found.time, found.step]
-    for each in found.estimates:
-        numbers += [each.p, each.effective_paths, each.value or 0.0, each.standard_error or 0.0]
-    is_whole = [each.p for each in found.estimates] == list(orders)
-    if response is not None:
-        edges = response.x_edges, response.v_edges, response.amplitude_edges
-        *cells, count = [each.size - 1 for each in edges]
-        numbers += [response.outside, response.impact_rate or 0.0, response.time, *sum(response.means.values(), ())]
-        is_whole &= (
-            all(each.ndim == 1 and each.size > 1 and bool(np.all(np.diff(each) > 0)) for each in edges)
-            and response.density.shape == tuple(cells)
-            and response.amplitude_density.shape == response.amplitude_error.shape == (count,)
-        )
-    return is_whole and all(map(math.isfinite, numbers))
-
-
 def simulation_key(curve: Curve, orders: Sequence[float], setting: MonteCarloSection) -> str:
     """What the record of a curve is found by."""
     return key_of(SimulatedCurve, curve, orders=list(orders), setting=setting.model_dump(mode="json"))
@@ -232,8 +211,7 @@ class Simulations:
 
     def _found(self, curve: Curve) -> SimulatedCurve | None:
         """Its simulation, if that is known; a record of another form does not count."""
-        found = self.records.made(self._key(curve), lambda record: simulated_of(record, curve))
-        return found if found and simulation_fits(found, self._orders) else None
+        return self.records.made(self._key(curve), lambda record: simulated_of(record, curve))
 
 
 def write_simulation(case: Case, simulated: SimulatedCurve, folder: Path) -> None:

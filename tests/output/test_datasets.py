@@ -2,11 +2,8 @@
 
 import json
 import math
-import os
 import resource
-import shutil
 
-import h5py
 import numpy as np
 import pytest
 import xarray as xr
@@ -182,86 +179,6 @@ def test_no_results(tmp_path, monkeypatch, places):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(FpsolveError, match=r"no results.nc in .*(nowhere|none\*|nothing); run a case first"):
         fpsolve.open_results(*places)
-
-
-@pytest.mark.parametrize(
-    "damaged",
-    [lambda _: b"no netCDF", lambda whole: whole[:3000], lambda whole: b"????".join(whole.rsplit(b"OHDR", 1))],
-)
-def test_a_damaged_file_is_named(runs, tmp_path, damaged):
-    (tmp_path / "results.nc").write_bytes(damaged((runs / "alone/results.nc").read_bytes()))
-    with pytest.raises(FpsolveError, match=r"results\.nc cannot be read as results of a run: .*; run its case again"):
-        fpsolve.open_results(tmp_path)
-
-
-def rewritten(name, make):
-    """Another dataset in the place of one of a file."""
-
-    def change(file):
-        if name in file:
-            del file[name]
-        make(file)
-
-    return change
-
-
-def named(file):
-    """A variable with a dimension of its own."""
-    file["x"], file["extra"] = [0, 1, 2], [0, 1, 2]
-    file["x"].make_scale("x")
-    file["extra"].dims[0].attach_scale(file["x"])
-
-
-FOREIGN = {
-    "empty": (lambda file: [file.pop(name) for name in list(file)], "no variable status over its sets"),
-    "another program's": (
-        lambda file: [file.pop(name) for name in list(file)] and file.update(x=[0, 1, 2]), "no variable status"
-    ),
-    "an array for a parameter": (
-        lambda file: file.attrs.update({"oscillator.c1": np.arange(3)}), "attribute oscillator.c1 is no number"
-    ),
-    "a further variable": (lambda file: file.update(extra=np.zeros((7, 2))), "dimensions of extra have no names"),
-    "a variable with names": (named, "no run writes a variable such as extra"),
-    "a scale that is a text": (lambda file: file["moment"].attrs.update(scale_factor="abc"), "."),
-    "p twice": (lambda file: file["p"].write_direct(np.array([2.0, 2.0, 0.0])), "p are not finite and different"),
-    "p is nan": (lambda file: file["p"].write_direct(np.array([2.0, math.nan, 0.0])), "p are not finite"),
-    "three thousand million sets": (
-        rewritten("status", lambda file: file.create_dataset("status", (3 * 10**9,), "i1", chunks=(1000,))),
-        "it states 3000000.* bytes of numbers and can hold",
-    ),
-    "texts for numbers": (rewritten("seconds", lambda file: file.update(seconds="x")), "such as seconds"),
-    "a link": (rewritten("p", lambda file: file.update(p=h5py.ExternalLink("/dev/zero", "/"))), "of its own"),
-    "a group": (lambda file: file.create_group("x"), "x is no variable of its own"),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize(("change", "reason"), FOREIGN.values(), ids=FOREIGN)
-def test_what_is_no_file_of_a_run_is_named_and_left_out(runs, tmp_path, change, reason):
-    bad = tmp_path / "results.nc"
-    shutil.copy(runs / "alone/results.nc", bad)
-    with h5py.File(bad, "r+") as file:
-        change(file)
-    with pytest.raises(
-        FpsolveError, match=rf"{bad} cannot be read as .* run: .*{reason}.*; run its case again"
-    ) as raised:
-        fpsolve.open_results(runs / "noises", bad)
-    assert "\n" not in str(raised.value)
-    with pytest.warns(UserWarning, match=rf"left out: {bad} cannot be read"):
-        found = fpsolve.open_results(bad, runs / "noises", errors="warn")
-    assert found.equals(fpsolve.open_results(runs / "noises"))
-    with (
-        pytest.warns(UserWarning, match="left out"),
-        pytest.raises(FpsolveError, match=rf"none of {bad} is a file of a run"),
-    ):
-        fpsolve.open_results(bad, errors="warn")
-
-
-def test_what_is_no_plain_file_is_refused(runs, tmp_path):
-    os.mkfifo(tmp_path / "results.nc")
-    with pytest.raises(FpsolveError, match=r"results\.nc cannot be read as results of a run: it is no plain file"):
-        fpsolve.open_results(tmp_path)
-    with pytest.raises(FpsolveError, match='errors is "raise" or "warn", not "ignore"'.replace('"ignore"', "'ignore'")):
-        fpsolve.open_results(runs / "alone", errors="ignore")
 
 
 def test_the_unit_of_time_labels_files_and_tables(tmp_path, capsys):

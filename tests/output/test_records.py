@@ -1,13 +1,10 @@
 """Records: exact, in files that only grow; what is torn or damaged is none."""
 
-import base64
 import contextlib
-import copy
 import json
 import math
 import multiprocessing
 import os
-import zlib
 from dataclasses import replace
 from pathlib import Path
 
@@ -26,8 +23,6 @@ from fpsolve.messages import Code
 from fpsolve.output import records as plain
 from fpsolve.output.records import (
     Records,
-    Results,
-    _packed,
     append,
     begun_record,
     entries_of,
@@ -39,7 +34,7 @@ from fpsolve.parts import PARTS
 from fpsolve.parts.every import BY_NAME
 from fpsolve.parts.part import Entry, Job, Numerics
 from fpsolve.study import solve
-from fpsolve.study.solve import everything, solve_curve
+from fpsolve.study.solve import everything
 from fpsolve.workflow.simulate import simulation_key
 from tests.kit import ALL, case_in, from_record, solve_sets
 from tests.output.test_datasets import HOPELESS, PRODUCT, TEXT
@@ -336,8 +331,8 @@ def test_what_lacks_something_for_a_small_budget_is_solved_again_with_another(tm
     lacking = replace(found, p=found.p[1:], moments=found.moments[1:])
     for entries, is_kept in ((solved.entries, True), ({"sensitivities": Entry(lacking)}, False)):
         record = record_of_set(curve, asked, numerics, entries)
-        assert "sensitivities" in entries_of(record, curve, asked, numerics)[0]
-        assert ("sensitivities" in entries_of(record, curve, asked, more)[0]) == is_kept
+        assert "sensitivities" in entries_of(record, asked, numerics)[0]
+        assert ("sensitivities" in entries_of(record, asked, more)[0]) == is_kept
 
 
 def test_moments_of_an_unfinished_run_are_taken_with_its_budget_alone(tmp_path):
@@ -345,8 +340,8 @@ def test_moments_of_an_unfinished_run_are_taken_with_its_budget_alone(tmp_path):
     [curve], asked, numerics = case.curves(), everything(case), Numerics.of(case)
     job = Job(curve, numerics, begun={2.0: Moment(0.1, 0.2, 0.0, 0.05, 0.0)})
     record = json.loads(json.dumps(begun_record(job)))
-    assert entries_of(record, curve, asked, numerics)[1] == job.begun
-    assert not entries_of(record, curve, asked, replace(numerics, budget=Budget(unknowns=500)))[1]
+    assert entries_of(record, asked, numerics)[1] == job.begun
+    assert not entries_of(record, asked, replace(numerics, budget=Budget(unknowns=500)))[1]
 
 
 def test_the_discretisation_is_that_of_the_moments_asked_for(tmp_path):
@@ -382,7 +377,6 @@ def rewritten(folder, change):
 
 
 def test_a_record_of_another_form_is_solved_anew(tmp_path, capsys):
-    """All other forms below are none either."""
     (tmp_path / "test.toml").write_text(TEXT, encoding="utf-8")
     command = ["run", str(tmp_path / "test.toml"), "--out", str(tmp_path)]
     assert main([*command, "--quiet"]) == 0
@@ -396,112 +390,6 @@ def test_a_record_of_another_form_is_solved_anew(tmp_path, capsys):
     assert (tmp_path / "test/moments.csv").read_bytes() == moments
     assert main([*command, "--quiet"]) == 0
     assert "1 of 1 known from an earlier run" in capsys.readouterr().out
-
-
-@pytest.fixture(scope="module")
-def solved(tmp_path_factory):
-    """A case, its first curve, and the entries of the record of that by the names of their parts."""
-    case = case_in(tmp_path_factory.mktemp("solved"), TEXT + PRODUCT, [ALL])
-    [curve] = case.curves(0, 1)
-    asked, numerics = everything(case), Numerics.of(case)
-    record = record_of_set(curve, asked, numerics, solve_curve(curve, asked, numerics).entries)
-    return case, curve, {key.rpartition("-")[0]: entry for key, entry in record.items()}, record
-
-
-def is_taken(folder, solved, change):
-    """Whether a record is taken as it is, or changed, with a right checksum."""
-    case, curve, entries, record = solved
-    changed = change(copy.deepcopy(entries))
-    names = {key.rpartition("-")[0]: key for key in record}
-    content = json.dumps({names.get(name, name): each for name, each in changed.items()}).encode()
-    line = b'{"key": "%s", "crc32": %d, "record": %s}\n' % (set_key(curve).encode(), zlib.crc32(content), content)
-    (folder / "x.jsonl").write_bytes(line)
-    return Results(case, Records(folder).look(), Numerics.of(case)).find(curve)
-
-
-def column(i, values):
-    """Another column of the moments."""
-    return lambda record: record["moment"][0][0].__setitem__(i, _packed(np.array(values))) or record
-
-
-def compressed(**change):
-    """The p in the form of long arrays, with something changed."""
-    data = base64.b64encode(zlib.compress(np.array([2.0, 0.0, -1.0]).tobytes())).decode()
-    return lambda record: record["moment"][0][0].__setitem__(0, {"shape": [3], "data": data} | change) or record
-
-
-def estimate(value, i):
-    return lambda record: record["lyapunov_exponent"][0].__setitem__(i, value) or record
-
-
-def slope(key, i=3):
-    """Another attribute of the sensitivities."""
-    return lambda record: record["sensitivities"][0].__setitem__(i, key) or record
-
-
-def of_moments(i, value):
-    """Another attribute of Λ(p): its columns, root, failures, warnings or notes."""
-    return lambda record: record["moment"][0].__setitem__(i, value) or record
-
-
-def seconds(value):
-    return lambda record: record["stability_index"].__setitem__(2, value) or record
-
-
-WRONG = {
-    "nothing": lambda record: {},
-    "a column too few": lambda record: record["moment"][0][0].pop() and record,
-    "no entry": lambda record: record | {"moment": []},
-    "neither found nor missing": lambda record: record | {"lyapunov_exponent": [None, None, 0.0]},
-    "one estimate alone": lambda record: {"lyapunov_exponent": record["lyapunov_exponent"]},
-    "seconds are a word": seconds("soon"),
-    "warnings are a text": of_moments(3, "none"),
-    "one p of another": column(0, [7.0]),
-    "p of others": column(0, [7.0, 0.0, -1.0]),
-    "p twice": column(0, [2.0, 2.0, -1.0]),
-    "p is nan": column(0, [2.0, 0.0, math.nan]),
-    "p missing": of_moments(0, [_packed(np.zeros(0))] * 7),
-    "one value too many": column(1, [1.0, 2.0, 3.0, 4.0]),
-    "values in a table": column(1, [[1.0, 2.0, 3.0]]),
-    "no value": column(1, [math.nan, 0.0, 0.0]),
-    "infinite error": column(3, [math.inf, 0.0, 0.0]),
-    "a value in words": lambda record: record["moment"][0][0][1].__setitem__(0, "1.0") or record,
-    "a value that is true": lambda record: record["moment"][0][0][1].__setitem__(0, True) or record,
-    "no shape": compressed(shape=[-1]),
-    "a large shape": compressed(shape=[3 * 10**9]),
-    "much in little": compressed(data=base64.b64encode(zlib.compress(bytes(10**8))).decode()),
-    "seconds are infinite": seconds("inf"),
-    "seconds are true": seconds(True),
-    "seconds are a text": seconds("1.0"),
-    "seconds are too large": seconds(10**400),
-    "λ is infinite": estimate("inf", 0),
-    "error is negative": estimate(-1.0, 1),
-    "no λ": lambda record: record.pop("lyapunov_exponent") and record,
-    "discretisation": lambda record: record | {"discretisation": [{"xi": math.nan}, None, 0.0]},
-    "half a letter": lambda record: record | {"discretisation": [{"xi": "\ud800"}, None, 0.0]},
-    "a message with half a letter": of_moments(3, [{"code": "TEXT", "data": {"text": "\ud800"}}]),
-    "a message that cannot be said": of_moments(4, [{"code": "INFINITE", "data": {"p": "x"}}]),
-    "a message of no size": of_moments(4, [{"code": "TEXT", "data": {"text": "x", "size": "x"}}]),
-    "fewer derivatives": slope([]),
-    "derivatives by another key": slope({"oscillator.x": 1.0}, 0),
-    "nested": of_moments(4, json.loads("[" * 900 + "]" * 900)),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("change", WRONG.values(), ids=WRONG)
-def test_a_record_whose_numbers_do_not_fit_is_none(tmp_path, solved, change):
-    assert is_taken(tmp_path, solved, lambda record: record)
-    assert is_taken(tmp_path, solved, compressed())
-    assert not is_taken(tmp_path, solved, change)
-
-
-def test_a_line_that_is_nested_or_endless_is_no_record(tmp_path, solved, monkeypatch):
-    assert is_taken(tmp_path, solved, lambda record: record)
-    whole = (tmp_path / "x.jsonl").read_bytes()
-    (tmp_path / "x.jsonl").write_bytes(b"[" * 100_000 + b"\n" + whole)
-    assert Records(tmp_path).look().are_there
-    monkeypatch.setattr(plain, "LONGEST", 1000)
-    assert not Records(tmp_path).look().are_there
 
 
 def test_records_of_another_version_are_not_used(tmp_path, capsys):

@@ -3,7 +3,7 @@
 import json
 import math
 import pickle
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ from fpsolve.output.records import record_of
 from fpsolve.results.curve import SimulatedCurve
 from fpsolve.simulation.estimators import MomentEstimate, MonteCarlo
 from fpsolve.simulation.response import BINS, Response
-from fpsolve.workflow.simulate import simulate_curve, simulated_of, simulation_fits
+from fpsolve.workflow.simulate import simulate_curve, simulated_of
 from tests.kit import case_in, case_text, simulate_curves
 
 SECTIONS = "[moments]\np = [-1.0, 2.0]\n[monte_carlo]\npaths = 4096\ntime = 40.0\n"
@@ -37,11 +37,6 @@ RESULT = MonteCarlo(
     parameters={"noise.D0": 0.1, "noise.treatment": "exact"},
 )
 
-FINITE = replace(
-    RESULT,
-    estimates=tuple(replace(each, value=None, standard_error=0.1, effective_paths=9.0) for each in RESULT.estimates),
-    **{key: 1.0 for key, value in vars(RESULT).items() if isinstance(value, float)},
-)
 
 MEANS = "x", "x_squared", "v_squared", "amplitude", "energy"
 
@@ -139,7 +134,6 @@ def test_a_curve_is_a_small_task(case, curve):
         {"result": lambda row: row[:-1]},
         {"result": lambda row: [*row, 0]},
         {"result": lambda row: ["soon" if value == RESULT.time else value for value in row]},
-        {"result": lambda row: [str(value) if value is RESULT.paths else value for value in row]},
         {"result": lambda row: [[{}], *row[1:]]},
         {"result": lambda row: [[[9.0, 0.0, 0.0, "guessed", 1.0]], *row[1:]]},
         {"response": lambda none: {}},
@@ -147,7 +141,6 @@ def test_a_curve_is_a_small_task(case, curve):
         {"warnings": lambda texts: None},
         {"warnings": lambda texts: "a text"},
         {"warnings": lambda texts: [1]},
-        {"interrupted": lambda flag: 1},
     ],
 )
 def test_what_is_no_record_is_refused(curve, change):
@@ -158,56 +151,3 @@ def test_what_is_no_record_is_refused(curve, change):
         simulated_of(record | {name: other(record[name])}, curve)
     with pytest.raises(ValueError, match="this is no record of a SimulatedCurve: "):
         simulated_of({}, curve)
-
-
-@pytest.mark.parametrize(
-    "change",
-    [
-        {"time": math.inf},
-        {"lyapunov_exponent": math.nan},
-        {"estimates": RESULT.estimates[:-1]},
-        {"estimates": (replace(RESULT.estimates[0], effective_paths=math.inf), *RESULT.estimates[1:])},
-    ],
-)
-def test_numbers_that_cannot_be_written_are_no_simulation(curve, change):
-    orders = [each.p for each in RESULT.estimates]
-    assert simulation_fits(SimulatedCurve(curve, FINITE, None, ()), orders)
-    assert not simulation_fits(SimulatedCurve(curve, replace(FINITE, **change), None, ()), orders)
-
-
-def test_a_response_that_cannot_be_drawn_is_none(curve):
-    estimates = (MomentEstimate(2.0, None, None, "direct", 9.0),)
-    finite = replace(FINITE, estimates=estimates)
-    edges, cells = np.arange(4.0), np.zeros(3)
-    whole = Response({"x": (0.0, 0.1)}, edges, edges, np.zeros((3, 3)), edges, cells, cells, 0.0, 1.0, 1.0)
-
-    def is_taken(**change):
-        return simulation_fits(SimulatedCurve(curve, finite, replace(whole, **change), ()), [2.0])
-
-    assert is_taken()
-    assert not is_taken(x_edges=edges[::-1])
-    assert not is_taken(v_edges=np.arange(3.0))
-    assert not is_taken(amplitude_error=np.zeros(2))
-    assert not is_taken(means={"x": (0.0, math.nan)})
-
-
-@pytest.mark.parametrize(
-    "change",
-    [
-        {"shape": [2]},
-        {"shape": None},
-        {"data": "AAAA"},
-        {"data": "not base64"},
-        {"data": lambda data: data[:-8]},
-    ],
-)
-def test_a_damaged_array_is_refused(curve, change, rng):
-    record = record_of(SimulatedCurve(curve, RESULT, response(rng), ()))
-    place = [each.name for each in fields(Response)].index("density")
-    packed = record["response"][place]
-    assert simulated_of(record, curve).response.density.shape == (3, 6)
-    record["response"][place] = packed | {
-        key: value(packed["data"]) if callable(value) else value for key, value in change.items()
-    }
-    with pytest.raises(ValueError, match="this is no record of a SimulatedCurve: "):
-        simulated_of(record, curve)
