@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from fpsolve.analysis.excursions import SYMBOL, Excursion, solve_excursion
+from fpsolve.analysis.excursions import SYMBOL, Excursion, check_start, solve_excursion
 from fpsolve.case.case import Case, Curve
 from fpsolve.case.sections import EXCURSIONS
+from fpsolve.errors import FpsolveError
 from fpsolve.messages import Message
 from fpsolve.page.page import Sentence
 from fpsolve.parts.part import Job, Numerics, Part, Settings
@@ -24,6 +25,10 @@ def _settings(case: Case, number: int) -> Settings | None:
 
 
 def _solve(job: Job, settings: Settings) -> Excursion:
+    try:
+        check_start(job.curve.problem, settings["phi"], settings["xi"])
+    except ValueError as error:  # of sets after the first one
+        raise FpsolveError(str(error)) from None
     return solve_excursion(job.solver, phi=settings["phi"], xi=settings["xi"], root=job.root)
 
 

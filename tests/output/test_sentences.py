@@ -127,7 +127,7 @@ def test_bounds_are_rounded_outwards():
         (["excursions.levels=[1.0]"], "must be a finite number > 1 "),
         (["excursions.phi='first'"], 'must be a finite number or "uniform"'),
         (["excursions.xi=0.7"], "must be one of the states, -0.8, 0.8"),
-        (["excursions.xi=0.8", "vary={'noise.a'=[0.8, 0.7]}"], "with noise.a = 0.7: got xi = 0.8; must be one of"),
+        (["excursions.xi=0.8", "vary={'noise.a'=[0.7, 0.8]}"], "with noise.a = 0.7: got xi = 0.8; must be one of"),
         (["output.quantities=['moment']"], 'output.quantities has no "excursions"'),
     ],
 )
@@ -138,3 +138,12 @@ def test_what_is_no_excursion_is_refused(tmp_path, capsys, changes, words):
     assert main(["run", str(path), "--out", str(tmp_path), *options]) == 2
     assert words in " ".join(capsys.readouterr().err.split())
     assert not (tmp_path / "mine").exists()
+
+
+def test_a_set_without_the_start_of_an_excursion_is_told_beside_the_others(tmp_path, capsys):
+    path = tmp_path / "mine.toml"
+    path.write_text(TEXT)
+    options = ["--set", "excursions.xi=0.8", "--set", "vary={'noise.a'=[0.8, 0.7]}"]
+    assert main(["run", str(path), "--out", str(tmp_path), *options]) == 3
+    told = " ".join(capsys.readouterr().err.split())
+    assert "noise.a = 0.7: no P(sup ‖x‖ ≥ A): got xi = 0.8; must be one of the states, -0.7, 0.7" in told
