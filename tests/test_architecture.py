@@ -1,6 +1,12 @@
 """What every room of fpsolve promises; the order of imports between them is in pyproject.toml, for import-linter."""
 
+import ast
 import importlib
+import io
+import subprocess
+import tokenize
+import tomllib
+from collections import Counter
 from pathlib import Path
 
 import pytest
@@ -28,3 +34,48 @@ def test_public_names(room):
         assert not (folder / name).is_dir(), name
         assert getattr(package, name).__doc__, name
     assert not hasattr(package, "no_such_name")
+
+
+CHECKOUT = Path(__file__).parents[1]
+WEIGHT = Path(__file__).with_name("weight.toml")
+NOT_COUNTED = {getattr(tokenize, name) for name in ("COMMENT", "NL", "NEWLINE", "INDENT", "DEDENT", "ENDMARKER")}
+
+
+def tokens(text: str) -> int:
+    """Tokens of Python, but for comments and docstrings: no matter how lines are broken, or how long names are."""
+    docs = set[int]()
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str):
+            docs |= set(range(node.lineno, (node.end_lineno or node.lineno) + 1))
+    found = tokenize.generate_tokens(io.StringIO(text).readline)
+    return sum(each.type not in NOT_COUNTED and each.start[0] not in docs for each in found)
+
+
+def weights(top: str) -> dict[str, int]:
+    """The tokens of each room of the package, or of the tests; "." is what lies in no folder."""
+    found = Counter[str]()
+    for path in (CHECKOUT / top).rglob("*.py"):
+        within = path.relative_to(CHECKOUT / top)
+        found[within.parts[0] if len(within.parts) > 1 else "."] += tokens(path.read_text(encoding="utf-8"))
+    return dict(found)
+
+
+@pytest.mark.parametrize("top", ["fpsolve", "tests"])
+def test_no_room_is_heavier_than_its_row(top):
+    """Take away as much as you add; a move between rooms changes two rows by one number."""
+    rows, found = tomllib.loads(WEIGHT.read_text(encoding="utf-8"))[top], weights(top)
+    assert found.keys() == rows.keys()
+    assert not {room: f"{found[room]} tokens, its row says {row}" for room, row in rows.items() if found[room] > row}
+
+
+@pytest.mark.slow
+def test_rows_only_go_down():
+    """All rows of the package, and of the tests, together, against those of the main branch elsewhere."""
+    shown = subprocess.run(
+        ["git", "show", "origin/main:tests/weight.toml"], cwd=CHECKOUT, capture_output=True, text=True, check=False
+    )
+    if shown.returncode:
+        pytest.skip("there is no origin/main with rows")
+    before, now = tomllib.loads(shown.stdout), tomllib.loads(WEIGHT.read_text(encoding="utf-8"))
+    for top in ("fpsolve", "tests"):
+        assert sum(now[top].values()) <= sum(before[top].values()), top

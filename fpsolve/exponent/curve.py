@@ -78,8 +78,8 @@ def polynomial(
         ratios, errors, _ = np.array([known[p] for p in points.tolist()]).T
         ratio = Chebyshev.fit(points, ratios, count - 1, domain=(low, high))
         if last is not None:
-            off, size = float(np.max(np.abs(last(points) - ratios))), float(np.max(np.abs(ratios)))
-            left = count * float(np.sum(np.abs(ratio.coef[-3:]))) + off**2 / max(off, size)
+            off, size = np.max(np.abs(last(points) - ratios)), np.max(np.abs(ratios))
+            left = float(count * np.sum(np.abs(ratio.coef[-3:])) + off**2 / max(off, size))
             error = partial(_error, points, errors, left)
             most = np.maximum([allowed(p) for p in points.tolist()], 2 * errors)
             if np.all(error(points) <= most):
@@ -97,14 +97,16 @@ def _error(points: FloatArray, errors: FloatArray, left: float, p: FloatArray) -
 
 
 def _of_ratio(points: FloatArray, ratio: Chebyshev, error: Callable[[FloatArray], FloatArray]) -> Curve:
-    """Λ by Λ(p)/p with its error."""
-    steepness = 2 * (points.size - 1) ** 2 / np.ptp(points)  # of a polynomial that is 1 at most (Markov)
-    most = float(np.max(error(points)))
+    """Λ by Λ(p)/p with its error, and that of Λ′ by Markov's bound on the slope of a polynomial."""
+    steepness = 2 * (points.size - 1) ** 2 / np.ptp(points)
+    return Curve(points, partial(_derivative, ratio), partial(_errors, error, float(np.max(error(points))), steepness))
 
-    def derivative(p: FloatArray, k: int) -> FloatArray:
-        return np.asarray(p * ratio.deriv(k)(p) + (k * ratio.deriv(k - 1)(p) if k else 0.0))
 
-    def errors(p: FloatArray) -> tuple[FloatArray, FloatArray]:
-        return error(p) * np.abs(p), most * (1 + steepness * np.abs(p))
+def _derivative(ratio: Chebyshev, p: FloatArray, k: int) -> FloatArray:
+    return np.asarray(p * ratio.deriv(k)(p) + (k * ratio.deriv(k - 1)(p) if k else 0.0))
 
-    return Curve(points, derivative, errors)
+
+def _errors(
+    error: Callable[[FloatArray], FloatArray], most: float, steepness: float, p: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    return error(p) * np.abs(p), most * (1 + steepness * np.abs(p))

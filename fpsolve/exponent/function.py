@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -179,16 +180,16 @@ def pieces(solve: Callable[[float], Node], low: float, high: float, allowed: Cal
     nodes, starts = np.array(sorted(known)), np.array(sorted(settled))
     sizes, offs = np.array([settled[a] for a in starts.tolist()]).T
     worst = max(each.error for each in known.values())
+    return Curve(nodes, _cubic(known, nodes.tolist()), partial(_errors, starts, sizes, offs, worst))
 
-    def errors(p: FloatArray) -> tuple[FloatArray, FloatArray]:
-        at = np.clip(np.searchsorted(starts, p, side="right") - 1, 0, None)
-        x = (p - starts[at]) / sizes[at]
-        steep = 8 / sizes[at]
-        return 16 * offs[at] * (x * (1 - x)) ** 2 + worst * np.abs(p), steep * offs[at] + worst * (
-            1 + steep * np.abs(p)
-        )
 
-    return Curve(nodes, _cubic(known, nodes.tolist()), errors)
+def _errors(
+    starts: FloatArray, sizes: FloatArray, offs: FloatArray, worst: float, p: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """By what pieces were off in their middles, and the largest error of Λ(p)/p at a node."""
+    at = np.clip(np.searchsorted(starts, p, side="right") - 1, 0, None)
+    x, steep = (p - starts[at]) / sizes[at], 8 / sizes[at]
+    return 16 * offs[at] * (x * (1 - x)) ** 2 + worst * np.abs(p), steep * offs[at] + worst * (1 + steep * np.abs(p))
 
 
 def _cubic(known: dict[float, Node], points: Sequence[float]) -> BPoly:

@@ -196,7 +196,6 @@ def test_a_setting_of_a_part_changes_its_key_and_no_other(part, change):
         ({"mesh": make_mesh(phi_cells=2, xi_cells=4)}, OF_SOLVER, OF_SOLVER),
         ({"budget": Budget(unknowns=500)}, set(), ALL_PARTS),
         ({"budget": Budget(seconds=5.0)}, set(), ALL_PARTS),
-        ({"budget": Budget(memory=1.0)}, set(), ALL_PARTS),
         ({"is_stated": False}, set(), set()),
     ],
     ids=lambda each: "".join(each) if isinstance(each, dict) else "",
@@ -239,7 +238,7 @@ def test_every_setting_of_a_case_is_in_what_is_asked_of_a_part(tmp_path):
         "oscillator.c1=0.2": set(),
         "output.eigenfunctions=[-1.0]": {"eigenfunctions"},
         "moments.rtol=1e-6": set(),
-        "budget.memory=1.0": set(),
+        "budget.unknowns=90000": set(),
         "title='other'": set(),
     }.items():
         other = everything(case_in(tmp_path, TEXT, [ALL, "oscillator.c3=0.1", sets]))
@@ -297,7 +296,7 @@ def test_more_quantities_are_solved_alone_and_fewer_not_at_all(tmp_path, monkeyp
     again, parts = run("moment", "lyapunov_exponent", "excursions", more=["excursions.phi=0.5"])
     assert parts == {"excursions"}
     assert again.excursion.phi == 0.5
-    _, parts = run("moment", "lyapunov_exponent", more=["budget.memory=1.0"])
+    _, parts = run("moment", "lyapunov_exponent", more=["budget.unknowns=90000"])
     assert parts == set()
     _, parts = run("moment", "lyapunov_exponent", more=["moments.rtol=1e-7"])
     assert parts == {"moment", "lyapunov_exponent", "classes", "discretisation"}
