@@ -45,7 +45,8 @@ def with_values(field: Field, trace: Trace, axis: int, values: Sequence[tuple[fl
         beyond[np.abs(beyond) < EQUAL] = 0
         new += [(float(i), Point(trace.points[i].sample, label)) for i in np.flatnonzero(beyond == 0)]
         for i, j in _sign_changes(beyond, trace.closed):
-            found = _or_none(_value_on, field, trace, i, axis, value) if j == i + 1 else None
+            share = beyond[i] / (beyond[i] - beyond[j % beyond.size])
+            found = _or_none(_value_on, field, trace, i, share, axis, value) if j == i + 1 else None
             if found is not None:
                 new.append((found[0], Point(found[1], label)))
     return with_points(trace, new)
@@ -101,15 +102,20 @@ def _sign_change(
     return place % len(trace.points), at(place)
 
 
-def _value_on(field: Field, trace: Trace, i: int, axis: int, value: float) -> tuple[float, Sample] | None:
-    """The place between the point i and the next where u, or v, has a value, and F there."""
+def _value_on(field: Field, trace: Trace, i: int, share: float, axis: int, value: float) -> tuple[float, Sample] | None:
+    """The point where u, or v, has a value, about at a share of the way from the point i to the next."""
+    guess = trace.between(i, share)
+    size = float(np.linalg.norm(trace.between(i, 1.0) - trace.between(i, 0.0)))
+    direct = _or_none(correct_on_line, field, axis, value, guess)
+    if direct is not None and np.linalg.norm(direct.at - guess) < 0.1 * size:
+        return i + share, direct
     found = _sign_change(field, trace, (i, i + 1), lambda sample: float(sample.at[axis]) - value)
     if found is None:
         return None
     exact = _or_none(correct_on_line, field, axis, value, found[1].at)
-    if exact is None or np.linalg.norm(exact.at - found[1].at) > 10 * EQUAL:  # next to a fold
-        return found
-    return found[0], exact
+    if exact is not None and np.linalg.norm(exact.at - found[1].at) < 0.1 * size:
+        return found[0], exact
+    return found
 
 
 def _crossing(fields: tuple[Field, Field], at: FloatArray) -> tuple[Sample, Sample] | None:
