@@ -28,10 +28,8 @@ if TYPE_CHECKING:
 
 SETTLED = 0.02
 """Total variation between two densities in turn from which on the finer one is taken."""
-MOST_DIRECTIONS = 1700
+MOST_DIRECTIONS = 3000
 """Largest number of functions of directions that are made for a density alone: seconds of work."""
-MOST_AT_STOP = 3000
-"""The same at a stop, where fewer are coupled."""
 MOST_UNKNOWNS = 15_000
 """Largest number of unknowns that are made for a density alone."""
 SHARES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
@@ -66,11 +64,10 @@ class SettledDirections:
 def settled_directions(pair: PrincipalPair) -> SettledDirections:
     """Those of a pair of three or four variables, on as fine functions as its T* needs."""
     found = SettledDirections(pair.value, pair, Directions(pair).fields, math.nan)
-    most = MOST_AT_STOP if pair.generator.problem.system.stop else MOST_DIRECTIONS
     while not found.error <= SETTLED:
         generator = found.pair.generator
         finer = generator.chosen.with_axis(0, generator.chosen.phi.enriched())
-        if finer.phi.size > most or finer.size > MOST_UNKNOWNS:
+        if finer.phi.size > MOST_DIRECTIONS or finer.size > MOST_UNKNOWNS:
             return found
         try:
             new = principal_pair(Generator(generator.problem, finer), pair.p, start=found.pair)

@@ -15,10 +15,10 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial import Chebyshev
+from numpy.polynomial.chebyshev import chebvander
 
 from fpsolve.arrays import FloatArray
 
-COUNTS = (5, 9, 17)
 NEXT_TO_ZERO = 1e-3
 """Share of the interval; a point nearer to 0 is put there."""
 
@@ -70,40 +70,44 @@ def polynomial(
 ) -> Curve | None:
     """Λ by a polynomial, if at all points the error of Λ(p)/p is allowed, or twice that of the point at most."""
     known, half, last = dict[float, Node](), 0.5 * (high - low), None
-    for count in COUNTS:
+    for count in (5, 9, 17):
         points = low + half - half * np.cos(np.pi * np.arange(count) / (count - 1))
         points[-1] = high
         points[np.abs(points) < 2 * half * NEXT_TO_ZERO] = 0.0
-        known |= {p: solve(p) for p in sorted(points.tolist(), key=abs, reverse=True) if p not in known}
-        ratios, errors, _ = np.array([known[p] for p in points.tolist()]).T
+        places = points.tolist()
+        known |= {p: solve(p) for p in sorted(places, key=abs, reverse=True) if p not in known}
+        ratios, errors, _ = np.array([known[p] for p in places]).T
         ratio = Chebyshev.fit(points, ratios, count - 1, domain=(low, high))
+        most = np.maximum([allowed(p) for p in places], 2 * errors)
+        size = np.max(np.abs([ratios, most]))
+        beyond = ratio.coef[-1] ** 4 / size**3
         if last is not None:
-            off, size = np.max(np.abs(last(points) - ratios)), np.max(np.abs(ratios))
-            left = float(count * np.sum(np.abs(ratio.coef[-3:])) + off**2 / max(off, size))
+            off = np.max(np.abs(last(points) - ratios))
+            left = count * np.sum(np.abs(ratio.coef[-3:])) + off**2 / size
             error = partial(_error, points, errors, left)
-            most = np.maximum([allowed(p) for p in points.tolist()], 2 * errors)
             if np.all(error(points) <= most):
                 return _of_ratio(points, ratio, error)
-            if left**2 > size * np.min(most):  # twice as many points leave about that
-                return None
+            beyond = left**2 / size
+        if beyond > np.min(most):  # what 17 points leave, about
+            return None
         last = ratio
     return None
 
 
 def _error(points: FloatArray, errors: FloatArray, left: float, p: FloatArray) -> FloatArray:
     """What is left, and the errors of all points as much as they may grow between these."""
-    growth = [Chebyshev.fit(points, row, points.size - 1, domain=(points[0], points[-1]))(p) for row in np.diag(errors)]
-    return np.asarray(left + np.abs(growth).sum(axis=0))
+    own, table = (chebvander(2 * (x - points[0]) / np.ptp(points) - 1, points.size - 1) for x in (points, p))
+    return left + np.abs(table @ np.linalg.inv(own)) @ errors
 
 
 def _of_ratio(points: FloatArray, ratio: Chebyshev, error: Callable[[FloatArray], FloatArray]) -> Curve:
     """Λ by Λ(p)/p with its error, and that of Λ′ by Markov's bound on the slope of a polynomial."""
     steepness = 2 * (points.size - 1) ** 2 / np.ptp(points)
-    return Curve(points, partial(_derivative, ratio), partial(_errors, error, float(np.max(error(points))), steepness))
+    return Curve(points, partial(_derivative, ratio), partial(_errors, error, np.max(error(points)), steepness))
 
 
 def _derivative(ratio: Chebyshev, p: FloatArray, k: int) -> FloatArray:
-    return np.asarray(p * ratio.deriv(k)(p) + (k * ratio.deriv(k - 1)(p) if k else 0.0))
+    return p * ratio.deriv(k)(p) + (k * ratio.deriv(k - 1)(p) if k else 0.0)
 
 
 def _errors(

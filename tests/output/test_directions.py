@@ -51,7 +51,7 @@ def test_files_of_two_modes(modes):
     assert "show.py" not in names
     with xarray.open_dataset(folder / "densities.nc", engine="h5netcdf") as found:
         found = found.load()
-    assert result.discretisation["harmonics"] >= 4
+    assert result.discretisation["waves"] >= 4
     assert found.tilted_density.dims == ("p", "eta", "phase_difference")
     assert found.tilted_density.units == "1/rad^2"
     assert found.moment.values == pytest.approx(result.moments.value, rel=1e-15)
