@@ -160,7 +160,7 @@ class DirectionAxis(Axis):
     """
 
     coordinates: Coordinates
-    most_unknowns = 15_000
+    most_unknowns = 20_000
 
     @property
     def n(self) -> int:
