@@ -95,9 +95,6 @@ class Generator:
         problem: a motion and its noise.
         chosen: on the half circle (its principal eigenvalue is that of the full circle) or the full circle.
 
-    Attributes:
-        keeps_factors: see `Pencil`.
-
     Raises:
         MeshError: there is no φ-line at a jump, or a cell's polynomials in the noise cannot be told apart.
     """
@@ -106,7 +103,7 @@ class Generator:
         if isinstance(chosen, CylinderMesh):
             chosen = Space.on(chosen, problem.coloured, problem.frame)
         self.problem, self.chosen, self.size = problem, chosen, chosen.size
-        self.phi, self.keeps_factors = chosen.phi, False
+        self.phi = chosen.phi
         self._spaces: dict[float, Space] = {}
         self._changes: dict[ParameterDerivative, tuple[Term, ...]] = {}
         self._last: Pencil | None = None
@@ -136,8 +133,7 @@ class Generator:
         """What is solved at p; the last one is kept."""
         if self._last is None or self._last.p != p:
             space = self.space(p)
-            keeps_factors = self.keeps_factors or abs(p) == SMALL_P
-            self._last = Pencil(p, space, self.matrix(p), space.chain, keeps_factors)
+            self._last = Pencil(p, space, self.matrix(p), space.chain, keeps_factors=abs(p) == SMALL_P)
         return self._last
 
     def forget(self) -> None:
