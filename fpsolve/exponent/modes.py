@@ -48,8 +48,8 @@ THINNEST = 1e-3
 """The least width: of modes that nothing couples the layer has none."""
 WORST_CONDITION = 100.0
 """Of the eigenvectors of the motion without noise, up to which they are the coordinates."""
-OF_LAST = 10.0
-"""What is left after the correction, over the last change of the corrected value."""
+OF_CHANGES = 3.0
+"""What is left after the correction, over the last change of the corrected value with the correction added."""
 SETTLED_SLOPE = 3e-3
 """Share of Λ′ by which it may change from one level to the next."""
 MOST_FOR_SLOPES = 4
@@ -194,13 +194,15 @@ class SphereStart(Start):
     def with_error(self, pair: PrincipalPair, allowed: float) -> Solution:
         """The pair, corrected by what the next waves change, with what is left then; first the other parts of it.
 
-        What is left is `OF_LAST` times the last change of the corrected value, which takes two spaces.
+        What is left is `OF_CHANGES` times the last change of the corrected value and the correction together, which
+        takes two spaces: each of the two is by chance far too small at times.
         """
         of_axes, start = self._of_axes(pair, allowed), replace(self, before=(), enough=None)
         if sum(of_axes) > 0.5 * allowed:
             return Solution(pair, math.inf, of_axes, start)
         pair = replace(pair, correction=self.change(pair), rounding=pair.rounding + self._rounding(pair))
-        left = OF_LAST * abs(pair.value - self.before[-1].pair.value) if self.before else math.inf
+        changes = [abs(pair.value - each.pair.value) + abs(pair.correction) for each in self.before[-1:]]
+        left = OF_CHANGES * changes[0] if changes else math.inf
         if self.enough is not None:  # of Λ, not of Λ′
             left = min(left, self.enough.search + abs(pair.value - self.enough.pair.value))
         return Solution(pair, left, of_axes, start)
