@@ -27,6 +27,7 @@ def strong_pair():
     return principal_pair(Generator(Problem(STRONG, UNIT_NOISE), mesh), 1.0)
 
 
+@pytest.mark.slow
 def test_a_pair_of_strong_noise_is_little_more_than_its_vectors(strong_pair):
     assert len(pickle.dumps(strong_pair)) < strong_pair.right.nbytes + strong_pair.left.nbytes + 5000 < 200_000
     pair = copied(strong_pair)

@@ -49,7 +49,7 @@ THINNEST = 1e-3
 WORST_CONDITION = 100.0
 """Of the eigenvectors of the motion without noise, up to which they are the coordinates."""
 OF_CHANGES = 3.0
-"""What is left after the correction, over the last change of the corrected value with the correction added."""
+"""What is left after the correction, over that and the last change of the corrected value."""
 SETTLED_SLOPE = 3e-3
 """Share of Λ′ by which it may change from one level to the next."""
 MOST_FOR_SLOPES = 4
@@ -143,11 +143,6 @@ def first_order_changes(pair: PrincipalPair, finer: Generator, axis: int, new: A
     return np.reshape(found, [-1 if k == axis else size for k, size in enumerate(space.shape)])
 
 
-def first_order_change(pair: PrincipalPair, finer: Generator, axis: int, new: Any) -> float:
-    """The sum of `first_order_changes`."""
-    return float(np.sum(first_order_changes(pair, finer, axis, new)))
-
-
 @dataclass(frozen=True, eq=False)
 class SphereStart(Start):
     """Directions of three or four variables, by elements and waves of a degree.
@@ -194,15 +189,15 @@ class SphereStart(Start):
     def with_error(self, pair: PrincipalPair, allowed: float) -> Solution:
         """The pair, corrected by what the next waves change, with what is left then; first the other parts of it.
 
-        What is left is `OF_CHANGES` times the last change of the corrected value and the correction together, which
-        takes two spaces: each of the two is by chance far too small at times.
+        What is left is `OF_CHANGES` times the last change of the corrected value and the correction, from two spaces:
+        each is too small by chance.
         """
         of_axes, start = self._of_axes(pair, allowed), replace(self, before=(), enough=None)
         if sum(of_axes) > 0.5 * allowed:
             return Solution(pair, math.inf, of_axes, start)
         pair = replace(pair, correction=self.change(pair), rounding=pair.rounding + self._rounding(pair))
-        changes = [abs(pair.value - each.pair.value) + abs(pair.correction) for each in self.before[-1:]]
-        left = OF_CHANGES * changes[0] if changes else math.inf
+        change = pair.value - self.before[-1].pair.value if self.before else math.inf
+        left = OF_CHANGES * (abs(change) + abs(pair.correction))
         if self.enough is not None:  # of Λ, not of Λ′
             left = min(left, self.enough.search + abs(pair.value - self.enough.pair.value))
         return Solution(pair, left, of_axes, start)
@@ -243,7 +238,7 @@ class SphereStart(Start):
     def change(self, pair: PrincipalPair) -> float:
         """What waves of the next degree change in Λ(p), to first order."""
         finer = self._with(2).generator
-        return first_order_change(pair, finer, 0, finer.phi.degrees > pair.space.phi.waves)
+        return float(np.sum(first_order_changes(pair, finer, 0, finer.phi.degrees > pair.space.phi.waves)))
 
     def _rounding(self, pair: PrincipalPair) -> float:
         """Of the rates of growth: an entry of S⁻¹AS is a sum of products twice, which may cancel."""

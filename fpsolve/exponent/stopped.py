@@ -27,7 +27,7 @@ import scipy.linalg
 from fpsolve.arrays import FloatArray
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.error import Solution
-from fpsolve.exponent.modes import THINNEST, SphereStart, first_order_change, second_moments
+from fpsolve.exponent.modes import THINNEST, SphereStart, first_order_changes, second_moments
 from fpsolve.exponent.starts import SHARE, Question
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.half_sphere import HalfSphereAxis
@@ -115,7 +115,8 @@ class StopStart(SphereStart):
         phi, found = self.space.phi, list[float]()
         for finer in phi.finer:
             generator = Generator(self.problem, self.space.with_axis(0, finer))
-            found.append(abs(first_order_change(pair, generator, 0, finer.new_in(phi))))
+            changes = first_order_changes(pair, generator, 0, finer.new_in(phi))
+            found.append(float(abs(np.sum(changes))))
         pair, left = replace(pair, rounding=pair.rounding + self._rounding(pair)), float(self._left(found) @ found)
         for each in self.before:
             step, lacked = abs(pair.value - each.pair.value), sum(each.start.changes)

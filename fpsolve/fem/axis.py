@@ -14,7 +14,7 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 import scipy.sparse
-from scipy.sparse import csc_matrix, identity, issparse
+from scipy.sparse import coo_matrix, csc_matrix, csr_matrix, identity, issparse
 
 from fpsolve.arrays import Coefficient, FloatArray, IntArray, Mask, Matrix, dense, one
 from fpsolve.fem.effects import ModeEffects, split
@@ -303,10 +303,9 @@ def product_pattern(first: csc_matrix, last: csc_matrix) -> tuple[IntArray, IntA
 
 def on_one_pattern(matrices: Sequence[Matrix]) -> tuple[csc_matrix, FloatArray]:
     """Where any of some matrices has an entry, and the entries of each of them there, one row for each."""
-    columnwise = [csc_matrix(matrix) for matrix in matrices]
-    pattern = csc_matrix(sum(abs(matrix) for matrix in columnwise))
-    pattern.sort_indices()
-    columns = np.repeat(np.arange(pattern.shape[1]), np.diff(pattern.indptr))
-    if not columns.size:  # of no indices scipy returns no array
-        return csc_matrix(pattern, dtype=float), np.zeros((len(columnwise), 0))
-    return pattern, np.stack([np.ravel(matrix[pattern.indices, columns]) for matrix in columnwise])
+    table = scipy.sparse.vstack([coo_matrix(each).T.reshape(1, -1) for each in matrices], format="csr")
+    places, at = np.unique(table.indices, return_inverse=True)
+    (rows, columns), shape = matrices[0].shape, (len(matrices), places.size)
+    starts = np.searchsorted(places, rows * np.arange(columns + 1))
+    pattern = csc_matrix((np.ones(places.size), places % rows, starts), shape=(rows, columns))
+    return pattern, csr_matrix((table.data, at, table.indptr), shape=shape).toarray()

@@ -243,9 +243,6 @@ def assembled(forms: Sequence[Sequence[tuple[Matrix, Matrix, Matrix]]], kept: In
     """For each form Σ A_k ⊗ B_k ⊗ C_k on the products that are kept, sparse, on one pattern."""
     factors = zip(*(term for form in forms for term in form), strict=True)
     (first, firsts), (middle, middles), (last, lasts) = (on_one_pattern([each.T for each in own]) for own in factors)
-    entries = first.nnz * middle.nnz * last.nnz
-    if not entries:  # as of what no parameter moves
-        return [csr_matrix((kept.size, kept.size))] * len(forms)
     inner_order, rows, starts = product_pattern(first, middle)
     size = first.shape[0] * middle.shape[0]
     order, rows, starts = product_pattern(csc_matrix((np.ones(rows.size), rows, starts), shape=(size, size)), last)

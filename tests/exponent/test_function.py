@@ -38,7 +38,7 @@ def weak():
 
 @pytest.fixture(scope="module")
 def strong():
-    return MomentLyapunovFunction(Problem(STRONG, UNIT_NOISE), (-1.5, 3.0), rtol=1e-7)
+    return MomentLyapunovFunction(Problem(STRONG, UNIT_NOISE), (-1.5, 3.0), rtol=1e-5)
 
 
 @pytest.mark.parametrize("p", [-1.83, -0.4, 1.1, 3.3, 5.9])
@@ -53,7 +53,7 @@ def test_between_the_nodes_against_fourier_hermite(weak, p):
 def test_strong_noise_between_the_nodes_against_solves(strong, p):
     exact = ExponentSolver(Problem(STRONG, UNIT_NOISE), rtol=1e-10).pair(p).value
     error, scale = abs(strong(p) - exact), perturbation.moment_scale(STRONG, UNIT_NOISE, p)
-    assert error <= 1e-7 * max(abs(exact), scale)
+    assert error <= 1e-5 * max(abs(exact), scale)
     assert error <= 3 * strong.error_estimate(p)
 
 
@@ -136,7 +136,7 @@ def test_a_wrong_eigenvalue_breaks_convexity(monkeypatch):
 
     monkeypatch.setattr(WholeProblem, "solution", fooled)
     with pytest.raises(NotConverged, match=r"Λ\(p\) is not convex .*; use a smaller rtol$"):
-        MomentLyapunovFunction(Problem(FIG1, WEAK_NOISE), (0.5, 3.0))
+        MomentLyapunovFunction(Problem(FIG1, WEAK_NOISE), (0.5, 3.0), rtol=1e-3)
 
 
 @pytest.mark.parametrize("interval", [(-2.0, 2.0), (0.0, 4.0), (-1.0, 0.0)])

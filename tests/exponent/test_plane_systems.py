@@ -265,6 +265,7 @@ def test_a_chain_refuses_a_mesh_with_lines():
         Generator(Problem(oscillator(), TELEGRAPH), make_mesh())
 
 
+@pytest.mark.slow
 def test_slow_noise_is_sought_on_both_sides():
     """Symmetric noise does not know the sign of its term: the far place may lie at ξ < 0 although p > 0."""
     noise = OrnsteinUhlenbeck(alpha=0.05, sigma=0.05)

@@ -10,6 +10,7 @@ from fpsolve.exponent.adapt import Budget, WholeProblem
 from fpsolve.exponent.starts import Question
 from fpsolve.exponent.stopped import StopStart, stop_start
 from fpsolve.model import PlaneSystem, Problem, Telegraph, White
+from tests.conftest import sampled
 
 NAMES = "q1", "v1", "q2", "v2"
 TELEGRAPH = Telegraph(a=0.5, k=0.7)
@@ -34,11 +35,11 @@ def white_coupling(strength, walls=()):
 def test_an_elastic_stop_under_white_noise_in_the_coupling_changes_no_law():
     """|q₁| of the system without it: an impact turns the sign of dW, which remains white noise."""
     elastic = white_coupling(0.8, [{"at": "q1 = 0", "restitution": 1.0}])
-    found, expected = ExponentSolver(elastic, rtol=1e-4).solution(-1), ExponentSolver(white_coupling(0.8)).solution(-1)
-    assert abs(found.pair.value - expected.pair.value) <= found.error + expected.error < 1e-5
+    found, expected = (ExponentSolver(each, rtol=1e-3).solution(-1) for each in (elastic, white_coupling(0.8)))
+    assert abs(found.pair.value - expected.pair.value) <= found.error + expected.error < 1e-4
 
 
-@pytest.mark.parametrize("noise", [TELEGRAPH, White(s=0.35)])
+@pytest.mark.parametrize("noise", sampled(TELEGRAPH, White(s=0.35)))
 def test_a_mode_that_drives_another_has_the_exponents_of_the_oscillator_with_a_wall(noise):
     """Of the block by itself, and of both together by elements of the half sphere."""
     walls = [{"at": "q1 = 0", "restitution": 0.63}]
@@ -53,6 +54,7 @@ def test_a_mode_that_drives_another_has_the_exponents_of_the_oscillator_with_a_w
     assert abs(found.pair.value - expected) <= found.error < 5e-5
 
 
+@pytest.mark.slow
 def test_units_change_nothing_but_the_rate():
     """Time in 1/1000, and q₂ in 1/10: in these units the motion is solved in coordinates of its own."""
     rates = "v1", "-100*v1 - 1e6*(1 + xi)*q1 - 3e4*(1 + xi)*q2", "v2", "-160*v2 - 1e6*(2.56 + xi)*q2 - 3e6*(1 + xi)*q1"

@@ -75,7 +75,7 @@ def walled(noise, *terms, jumps=(WALL,)):
         ],
         pytest.param(Problem(FIG1, FIG1_NOISE), 2.0, id="the paper's oscillator"),
         pytest.param(walled(OrnsteinUhlenbeck(alpha=1.0, sigma=1.0)), -3.0, id="p < -1"),
-        pytest.param(walled(OrnsteinUhlenbeck(alpha=0.3, sigma=1.2)), 1.0, id="slow"),
+        pytest.param(walled(OrnsteinUhlenbeck(alpha=0.3, sigma=1.2)), 1.0, id="slow", marks=pytest.mark.slow),
         pytest.param(walled(White(s=0.5), FREE, DAMPED, jumps=(WALL, Jump(0.0, 0.2))), 2.0, id="two walls"),
         pytest.param(walled(White(s=0.5), BACK, DRIVEN), 2.0, id="backward, white"),
         pytest.param(walled(OrnsteinUhlenbeck(alpha=1.0, sigma=0.5), BACK, DRIVEN), 2.0, id="backward, OU"),

@@ -140,6 +140,7 @@ def test_standard_errors_of_short_records_cover(seconds):
     assert np.all((shares >= 0.90) & (shares <= 1.0)), shares
 
 
+@pytest.mark.slow
 def test_a_narrow_band_has_a_mean_square_where_the_exponent_takes_too_long():
     """Λ(2) by the equations of the moments, as by elements; λ is missing with its reason."""
     omega, noise = 2 * math.pi, Filter(4 * math.pi, 0.01, 8.0, 1.0, 0.0)

@@ -13,7 +13,9 @@ from fpsolve.parts.directions import PART
 ROOT = Path(__file__).parents[2]
 STATED = [
     "expect=[]",
-    "system.coupling=0.6",  # for which harmonics settle soon
+    "system.coupling=0.6",
+    "noise.s=0.3",  # of which few waves tell
+    "moments.rtol=1e-2",
     "moments.p=[1.0]",
     "output={quantities=['moment', 'eigenfunctions'], eigenfunctions=[1.0], figure=false}",
 ]
