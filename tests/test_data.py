@@ -101,7 +101,7 @@ def curve(p, *indices):
 @pytest.fixture(scope="module")
 def results(fig1_solver):
     moments = fpsolve.moment_lyapunov(Problem(FIG1, REDUCED), [2.0, -1.0, 0.0])
-    empty = {name: np.zeros(0) for name in ("p", "value", "derivative", "error_estimate", "residual")}
+    empty = {name: np.zeros(0) for name in ("p", "value", "slope", "error_estimate", "residual")}
     estimates = MomentEstimate(1.0, 0.004, 1e-4, "direct", 6000.0), MomentEstimate(9.0, None, None, "direct", 3.0)
     slopes = fpsolve.sensitivities(Problem(FIG1, REDUCED), [1.0, 2.0])
     line = fpsolve.boundary(Problem(FIG1, REDUCED), {"moment": 2.0}, *FRAME, nodes=5)

@@ -70,7 +70,7 @@ from fpsolve.model.noise import Noise
 from fpsolve.model.parameters import Parameter, Section, parameter
 from fpsolve.model.plane import System
 from fpsolve.model.problem import Problem
-from fpsolve.model.quantity import Quantity
+from fpsolve.model.quantity import DERIVATIVE, Quantity
 
 COMPUTED = ("oscillator", "system", "noise", "vary", "mesh")
 """The sections that say of what the numbers are."""
@@ -302,7 +302,7 @@ class Case(Section):
         if self.output.names is not None:
             return ()
         is_there = {RESPONSE: self.responds, EIGENFUNCTIONS: not self.problem.no_picture}
-        is_there |= dict.fromkeys(OF_IMPACTS, bool(self.problem.system.jumps))
+        is_there |= dict.fromkeys(OF_IMPACTS, bool(self.problem.system.jumps)) | {DERIVATIVE.name: False}
         if self.problem.is_closed_only:
             is_there |= dict.fromkeys({*QUANTITY_NAMES} - {MOMENT.name, SENSITIVITIES}, False)
         known = {*self.asked} - ({EIGENFUNCTIONS} if not self.output.asks_for_eigenfunctions else set())

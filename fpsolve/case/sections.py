@@ -47,7 +47,7 @@ from fpsolve.messages import is_control
 from fpsolve.model.faults import table_of
 from fpsolve.model.parameters import Section, parameter
 from fpsolve.model.problem import RTOL, RTOL_BEYOND_PLANE, RTOL_OF_SEVERAL
-from fpsolve.model.quantity import RATE_FUNCTION, Quantity, moment_at
+from fpsolve.model.quantity import DERIVATIVE, RATE_FUNCTION, Quantity, moment_at
 from fpsolve.simulation.setup import BATCHES, MAX_PATHS, PATHS, Estimator
 
 MAX_MOMENTS = 100_000
@@ -59,7 +59,9 @@ EXCURSIONS = "excursions"
 RESPONSE = "response"
 SENSITIVITIES = "sensitivities"
 EIGENFUNCTIONS = "eigenfunctions"
-QUANTITY_NAMES = (MOMENT.name, RATE_FUNCTION.name, *INDICES, EXCURSIONS, RESPONSE, SENSITIVITIES, EIGENFUNCTIONS)
+OF_MOMENTS = DERIVATIVE.name, RATE_FUNCTION.name
+"""What follows from Λ(p)."""
+QUANTITY_NAMES = (MOMENT.name, *OF_MOMENTS, *INDICES, EXCURSIONS, RESPONSE, SENSITIVITIES, EIGENFUNCTIONS)
 """What may be asked for."""
 EVERYTHING = "all"
 """What stands for all of these."""
@@ -435,10 +437,10 @@ class OutputSection(Section):
             if value and self.lacks(name):
                 text = f'got {shown(value)}, but output.quantities has no "{name}"; add it there, or write {instead}'
                 wrong.append(((name,), value, text))
-        if RATE_FUNCTION.name in (names := self.names or ()) and MOMENT.name not in names:
-            at = "quantities", names.index(RATE_FUNCTION.name)
-            text = f"got {shown(RATE_FUNCTION.name)}, which follows from Λ(p); add {shown(MOMENT.name)}, or remove it"
-            wrong.append((at, RATE_FUNCTION.name, text))
+        for at, name in enumerate(self.names or ()):
+            if name in OF_MOMENTS and self.lacks(MOMENT.name):
+                text = f"got {shown(name)}, which follows from Λ(p); add {shown(MOMENT.name)}, or remove it"
+                wrong.append((("quantities", at), name, text))
         refuse(wrong)
         return self
 

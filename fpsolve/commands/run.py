@@ -37,7 +37,7 @@ def run(
     Without [output] quantities a case computes moment, lyapunov_exponent, stability_index, of walls impact_rate and
     critical_impact_factor, of terms of degree 3 the response, one of the eigenfunctions, and what other sections name.
     Only where they are named, or with --all, it computes variance_rate, critical_restitution, sensitivities, all
-    eigenfunctions with densities, rate_function and excursions, too.
+    eigenfunctions with densities, rate_function, excursions, and moment_derivative where it takes long, too.
 
     Example: fpsolve run cases/fig1.toml --out results --set oscillator.omega=2.0
     """

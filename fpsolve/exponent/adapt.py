@@ -175,12 +175,16 @@ class WholeProblem:
     def finer_pair(self, pair: PrincipalPair) -> PrincipalPair:
         """That at the same p on a finer discretisation, which tells the errors of what the other says.
 
-        It has two degrees more each way; for algebraic tails its interval is wider, too.
+        It has two degrees more each way; for algebraic tails its interval is wider, too. Raises as `pair_among`.
+        """
+        return self.pair_among(widened(pair.generator).enriched(), pair)
+
+    def pair_among(self, chosen: Space, pair: PrincipalPair) -> PrincipalPair:
+        """That at the same p on other functions.
 
         Raises:
             NotConverged: it cannot be made, has a third more unknowns than the budget allows, or does not resolve it.
         """
-        chosen = widened(pair.generator).enriched()
         limit = A_THIRD_MORE * self.budget.most(chosen) if self.mesh is None else math.inf
         reason: Message | str
         if chosen.size > limit:

@@ -21,12 +21,14 @@ from fpsolve.data import Result, dataset
 from fpsolve.errors import NoHierarchy, NoSuchExponent, NotConverged
 from fpsolve.exponent.adapt import (
     AT_CORNER,
+    WIDER,
     Budget,
     Tolerance,
     WholeProblem,
     is_at_corner,
     solved_p,
     spent_remedy,
+    widened,
 )
 from fpsolve.exponent.curve import Curve, Node, polynomial, values
 from fpsolve.exponent.eigen import PairDerivatives, PrincipalPair, second_derivative, slope_rounding
@@ -115,9 +117,8 @@ class MomentLyapunov(Result):
     Attributes:
         p: the moments, shape (n,), in the order asked for, without those that failed.
         value: Λ(p), per unit time, shape (n,).
-        derivative: Λ′(p), shape (n,); NaN where only the value is known: at p = 0, as Λ(0) = 0 needs no solve, and
-            algebraic tails leave it no slope; and at even p where elements failed, and moments have equations of their
-            own.
+        slope: Λ′(p), shape (n,), where it takes no solve of its own, NaN elsewhere: at even p where moments have
+            equations of their own, and at p = 0 where algebraic tails leave it no slope.
         error_estimate: estimate of |error of `value`|, from the highest modes, the ends of a noise interval and the
             bound of rounding, at least half a unit in the last place of the value, shape (n,).
         residual: backward error of the eigenpairs, shape (n,); NaN where there is none.
@@ -131,7 +132,7 @@ class MomentLyapunov(Result):
 
     p: FloatArray
     value: FloatArray
-    derivative: FloatArray
+    slope: FloatArray
     error_estimate: FloatArray
     residual: FloatArray
     solver: ExponentSolver
@@ -146,11 +147,21 @@ class MomentLyapunov(Result):
         object.__setattr__(self, "error_estimate", np.maximum(self.error_estimate, least))
 
     @cached_property
+    def derivative(self) -> FloatArray:
+        """Λ′(p), shape (n,): `slope`, and what is solved now where that is NaN; NaN where there is none."""
+        known = zip(self.p.tolist(), self.slope.tolist(), strict=True)
+        return np.array([self.solver.slope(p) if p and math.isnan(slope) else slope for p, slope in known])
+
+    @property
     def derivative_error(self) -> FloatArray:
         """Estimate of |error of `derivative`|, shape (n,), which takes some solves; NaN where none is known."""
+        return self.errors_of(self.derivative)
+
+    def errors_of(self, slopes: FloatArray) -> FloatArray:
+        """Estimates of the errors of `slope` or of `derivative`."""
         if self.curves:
             return values(self.curves, self.p).derivative_error
-        known = zip(self.p.tolist(), np.isfinite(self.derivative).tolist(), strict=True)
+        known = zip(self.p.tolist(), np.isfinite(slopes).tolist(), strict=True)
         return np.array([self.solver.slope_error(p) if is_known else math.nan for p, is_known in known])
 
     @property
@@ -164,9 +175,10 @@ class MomentLyapunov(Result):
         return self.solver.by_class(self.p)
 
     def to_xarray(self) -> xarray.Dataset:
-        """Λ(p), Λ′(p), their errors and residuals over p."""
-        columns = ("value", "error_estimate", "derivative", "derivative_error", "residual")
-        numbers = {quantity.OVER_P[name]: getattr(self, name) for name in columns}
+        """Λ(p), `slope`, their errors and residuals over p."""
+        columns = {name: getattr(self, name) for name in ("value", "error_estimate", "residual")}
+        columns |= {"derivative": self.slope, "derivative_error": self.errors_of(self.slope)}
+        numbers = {quantity.OVER_P[name]: each for name, each in columns.items()}
         failures, values = [each.reason for each in self.failures], self.solver.problem.values
         more = {"warnings": self.warnings, "notes": self.notes, "failures": failures}
         title, places = quantity.MOMENT.words, {quantity.P: self.p}
@@ -477,28 +489,24 @@ class ExponentSolver:
                 self.take(point, rows[i])
                 progress()
                 continue
-            even = None
             try:
-                if self.problem.is_closed_only:
+                if self.problem.is_closed_only or (self.problem.dimension > 2 and self.even(point)):
                     rows[i] = known[point] = _of_moments(self.closed(point))
                     progress()
                     continue
-                even = self.even(point) if self.problem.dimension > 2 else None
-                if even:
-                    rows[i] = known[point] = _of_moments(even)
                 solution = self.solution(point)
                 estimate, pair = self.estimate(point, solution), solution.pair
-                if abs(point) >= TINIEST_P and not even:  # else Λ has no scale
+                if abs(point) >= TINIEST_P:  # else Λ has no scale
                     checked(estimate, self.refinement, point)
-                number, error = (even.value, even.error) if even else (estimate.value, estimate.error_estimate)
                 solved[i] = pair
-                rows[i] = known[point] = Moment(number, pair.derivative, math.nan, error, pair.residual)
+                rows[i] = Moment(estimate.value, pair.derivative, math.nan, estimate.error_estimate, pair.residual)
+                known[point] = rows[i]
                 if is_kept:
                     known[point] = rows[i]._replace(derivative_error=self.slope_error(point))
             except NotConverged as failure:
-                if not even and (even := self.even(point)):
+                if even := self.even(point):
                     rows[i] = known[point] = _of_moments(even)
-                elif not even:
+                else:
                     failures.append(Failure(point, failure.message))
             progress()
         pairs, found = tuple(solved[i] for i in sorted(solved)), points[sorted(rows)]
@@ -508,7 +516,7 @@ class ExponentSolver:
         return MomentLyapunov(
             p=found,
             value=value,
-            derivative=slope,
+            slope=slope,
             error_estimate=errors,
             residual=residuals,
             solver=self,
@@ -516,6 +524,12 @@ class ExponentSolver:
             failures=tuple(failures),
             notes=(*of_the_start(self, found), *bounds(self, found, value, errors)),
         )
+
+    def slope(self, p: float) -> float:
+        """Λ′(p) by eigenfunctions; NaN where these are not found, or there are none."""
+        with suppress(NotConverged, NoSuchExponent):
+            return self.solution(p).pair.derivative
+        return math.nan
 
     def estimate(self, p: float, solution: Solution) -> Estimate:
         """Λ(p) on the scale of the terms of Eq. (37) before they cancel.
@@ -639,9 +653,27 @@ class ExponentSolver:
             return max(each.ratio_alone(p, tolerance) for each in self.classes)
         points = {p * (0.5 + shift) for shift in (-0.5 / math.sqrt(3), 0.5 / math.sqrt(3))}
         pairs = [self.whole.solution(point, tolerance).pair for point in points]
+        if self.problem.has_algebraic_tails:  # of which Λ(p) for p < 0 hardly tells: their moments are finite
+            return self._among_tails(pairs[0])
         near = self.whole.near_zero(p, tolerance)
         error = near.error / abs(near.pair.p) + slope_rounding(pairs[0])
         return float(np.mean([pair.derivative for pair in pairs])) + near.pair.correction / near.pair.p, error
+
+    def _among_tails(self, pair: PrincipalPair) -> tuple[float, float]:
+        """λ from a pair at p = 0, on ever wider intervals of the noise, and what its modes and the ends leave.
+
+        As the variance is finite, an interval twice as wide leaves less than half of λ that the noise makes beyond it.
+        On a given mesh it is that of the mesh.
+        """
+        ends = pair.space.xi.lines[[0, -1]]
+        change = math.inf if np.any(pair.space.xi.weight(ends) * ends**2 > sys.float_info.epsilon) else 0.0
+        while change > (WIDER - 1) * self._allowed(0.0):
+            wider = self.whole.pair_among(widened(pair.generator), pair)
+            change = abs(wider.derivative - pair.derivative)
+            if self.mesh is not None:
+                return pair.derivative, change * WIDER / (WIDER - 1) + slope_error(pair)
+            pair = wider
+        return pair.derivative, change / (WIDER - 1) + slope_error(pair)
 
 
 def solver_of(
@@ -781,7 +813,7 @@ def _at(result: MomentLyapunov, p: FloatArray) -> MomentLyapunov:
     """A result at p some of which are equal, without those that failed."""
     places = {each: i for i, each in enumerate(result.p.tolist())}
     index = [places[each] for each in p.tolist() if each in places]
-    names = ("p", "value", "derivative", "error_estimate", "residual")
+    names = ("p", "value", "slope", "error_estimate", "residual")
     return replace(result, **{name: getattr(result, name)[index] for name in names})
 
 
@@ -790,10 +822,10 @@ def _one_by_one(
 ) -> MomentLyapunov:
     """Λ at each p by a solve of its own, if these are convex; Λ(0) = 0 even where its eigenpair failed."""
     result = solver.moments(p, progress=progress, known=known)
-    columns = result.p, result.value, result.derivative, result.error_estimate
+    columns = result.p, result.value, result.slope, result.error_estimate
     obstacle = None
     if not result.failures:
-        steep = partial(getattr, result, "derivative_error")
+        steep = partial(result.errors_of, result.slope)
         obstacle = broken_convexity(*columns, steep) or contradiction(solver, *columns, steep)
     if obstacle:
         return replace(result, failures=(Failure(None, message_of(obstacle).advising(solver.refinement)),))
@@ -802,7 +834,7 @@ def _one_by_one(
         return result
     failed = {failure.p for failure in failures}
     place = [float(each) for each in p if each not in failed].index(0.0)
-    row = {"p": 0.0, "value": 0.0, "derivative": np.nan, "error_estimate": 0.0, "residual": np.nan}
+    row = {"p": 0.0, "value": 0.0, "slope": np.nan, "error_estimate": 0.0, "residual": np.nan}
     with_zero: dict[str, Any] = {name: np.insert(getattr(result, name), place, number) for name, number in row.items()}
     return replace(result, failures=failures, **with_zero)
 
@@ -821,7 +853,7 @@ def interpolated(solver: ExponentSolver, curves: tuple[Curve, ...], p: FloatArra
     return MomentLyapunov(
         p=p,
         value=value,
-        derivative=derivative,
+        slope=derivative,
         error_estimate=error,
         residual=np.full(p.size, max(pair.residual for pair in pairs)),
         solver=solver,
@@ -849,22 +881,27 @@ def broken_convexity(
 ) -> Message | None:
     """Where a point, or Λ(0) = 0, lies below a tangent by more than the errors explain; or None, as Λ(p) is convex.
 
-    The errors of the slopes are asked for where those of the values do not suffice.
+    Tangents are those of the 1st, 2nd, 4th, 8th … p on each side, and of p = 0. The errors of the slopes are asked for
+    where those of the values do not suffice.
     """
     if not p.size:
         return None
-    value = np.where(p == 0, 0.0, value)  # but for rounding
-    others, away = np.append(value, 0.0), np.append(p, 0.0)[None] - p[:, None]
-    above = others[None] - (value[:, None] + slope[:, None] * away)
+    order, at_zero = np.argsort(p), np.flatnonzero(p == 0)[:1]
+    value = np.append(np.where(p == 0, 0.0, value), 0.0)  # but for rounding
+    sides = [(order[:-k], order[k:]) for k in 2 ** np.arange((p.size - 1).bit_length())]
+    pairs = [*sides, *(side[::-1] for side in sides), (order, np.full(p.size, p.size))]
+    pairs += [(np.repeat(at_zero, p.size), np.tile(order, at_zero.size))]
+    own, other = np.concatenate(pairs, axis=1)
+    away, errors = np.append(p, 0.0)[other] - p[own], np.append(errors, 0.0)
+    above = value[other] - (value[own] + slope[own] * away)
     above = np.where(np.isfinite(above), above, math.inf)  # where no slope is known
-    slack = 10 * (errors[:, None] + np.append(errors, 0.0)[None]) + 1e-6 * np.abs(others[None])
+    slack = 10 * (errors[own] + errors[other]) + 1e-6 * np.abs(value[other])
     if np.any(above < -slack):
-        steep = np.nan_to_num(slope_errors(), nan=1e300)
-        slack += 3 * steep[:, None] * np.abs(away)
-    i, j = np.unravel_index(np.argmin(above + slack), above.shape)
-    if not above[i, j] < -slack[i, j]:
+        slack += 3 * np.nan_to_num(slope_errors(), nan=1e300)[own] * np.abs(away)
+    worst = np.argmin(above + slack)
+    if not above[worst] < -slack[worst]:
         return None
-    return Message(Code.NOT_CONVEX, p=p[i], other=np.append(p, 0.0)[j])
+    return Message(Code.NOT_CONVEX, p=p[own[worst]], other=np.append(p, 0.0)[other[worst]])
 
 
 def contradiction(

@@ -8,7 +8,8 @@ and at each φ-vertex the point load ∫ P_s (v {w} − ½θ [w]) [T], with the 
 jump [w] = w(φ⁺) − w(φ⁻) of its two traces. θ = |v| is upwinding; for polynomials of ξ, which cannot follow its kink, θ
 is its size for the typical ξ, |Σ ε^n h| over what no noise drives + Σ ε^n |h| (mean of g²)^½ over the rest. At a wall
 v is one number for all ξ, and θ = |v|. The wall is the point load (R^p − 1)|v| δ(φ − φ_j) T of the trace of T that v
-brings, T(φ⁺) on w(φ⁻) for v > 0 and T(φ⁻) on w(φ⁺) for v < 0, so that T jumps by R^p.
+brings, T(φ⁺) on w(φ⁻) for v > 0 and T(φ⁻) on w(φ⁺) for v < 0, so that T jumps by R^p. The vertex has |v| times the same
+trace: it is left out there, and the wall has R^p, as a tiny R^p would be rounded beside 1.
 
 White noise by which dx has Bx ∘ dW adds ½ (h ∂φ + p q)² with h and q of B, see `PhaseAxis.diffusion`. Impulses
 exp(B) add their rate times |exp(B)e|^p T(ψ) − T, ψ being where they take φ, see `PhaseAxis.impulses`.
@@ -51,22 +52,26 @@ Noises = tuple[Coefficient | None, ...]
 
 @dataclass(frozen=True)
 class OfMoment:
-    """The coefficient pⁿ R^p, n ≤ 1 unless R = 1, less 1 where only the change at a jump counts.
+    """The coefficient pⁿ R^p, n ≤ 1 unless R = 1.
 
     Attributes:
         n: the power of p.
         log_factor: ln R.
-        is_change: whether 1 is taken away.
+        is_change: whether 1 of it is of order 0 in ε, so that the change at a jump is of the order of its term.
     """
 
     n: int
     log_factor: float = 0.0
     is_change: bool = False
 
+    def of_orders(self, p: float, derivative: int, has_first: bool, has_own: bool) -> float:
+        """Its k-th derivative, of order 0, of that of its term, or of both."""
+        if self.is_change and has_first != has_own and not derivative:
+            return math.expm1(p * self.log_factor) if has_own else 1.0
+        return self(p, derivative) if has_own else 0.0
+
     def __call__(self, p: float, derivative: int = 0) -> float:
         """Its k-th derivative."""
-        if self.is_change and not derivative:
-            return math.expm1(p * self.log_factor)
         if not self.log_factor:
             return math.perm(self.n, derivative) * float(p) ** max(self.n - derivative, 0)
         parts = p**self.n * self.log_factor**derivative, self.n * derivative * self.log_factor ** max(derivative - 1, 0)
@@ -140,7 +145,7 @@ class TermSum:
         for noises, parts in self._parts:
             total = phases.get(noises)
             for order, of_p, phase in parts:
-                if order in wanted and (size := of_p(p, derivative)):
+                if size := of_p.of_orders(p, derivative, 0 in wanted, order in wanted):
                     total = size * phase if total is None else total + size * phase
             if total is not None:
                 phases[noises] = total
@@ -212,6 +217,7 @@ class Terms(NoiseTerms):
         self._diffusions, self.phi, self.noises = problem.diffusions, space.phi, space.noises
         self._impulses = problem.impulses
         self._vertices, self._jump = self.phi.lines[:-1], self.phi.jump
+        brought = 0.0 * self._jump  # to a wall
         # where θ = |v|, and the sign of v where that is the same for all ξ, otherwise 0
         is_exact, direction = np.full(self._vertices.size, False), np.zeros(self._vertices.size)
         if all(axis.is_local for axis in self.noises):
@@ -224,6 +230,9 @@ class Terms(NoiseTerms):
             is_exact[at], direction[at] = True, math.copysign(1.0, v)
             left, right = self.phi.left_trace[at], self.phi.right_trace[at]
             self._walls.append(Wall(jump, v, left.T @ right if v > 0 else right.T @ left))
+            at_wall = np.isin(np.arange(self._vertices.size), at).astype(float)
+            brought = brought + by_rows(at_wall, self.phi.right_trace if v > 0 else -self.phi.left_trace)
+        self._step = self._jump - brought
         self._is_exact, self._two_way = is_exact, np.flatnonzero(is_exact & (direction == 0))
         # nothing is left of the other side: where ξ is large that would count
         self._trace = 0.5 * (self.phi.right_trace + self.phi.left_trace) - by_rows(0.5 * direction, self._jump)
@@ -266,7 +275,7 @@ class Terms(NoiseTerms):
         for k, (ray, v, delta) in enumerate(self._walls):
             if by.jumps:
                 yield self._term(by.jumps[k] * abs(v) * delta, one, text, OfMoment(1, ray.log_factor), order=2)
-            of_p = OfMoment(0, ray.log_factor, is_change=True)
+            of_p = OfMoment(0, ray.log_factor)
             yield self._term(math.copysign(1.0, v) * faster[k] * delta, one, text, of_p, order=2)
 
     def _driven(self, term: CoefficientMatrix) -> Iterator[Term]:
@@ -274,7 +283,7 @@ class Terms(NoiseTerms):
         size = self.system.epsilon**term.order
         text = (f"{power_of_epsilon(term.order)} " if term.order else "") + written_coefficient(term.g)
         if not term.h.vanishes:
-            loads = self._trace.T @ by_rows(term.h(self._vertices), self._jump)
+            loads = self._trace.T @ by_rows(term.h(self._vertices), self._step)
             along = size * (self.phi.convection(term.h) + loads)
             yield self._term(along, term.g, f"{text}{_written(term.h)} ∂φ", order=term.order, of=term.noise)
         if not term.q.vanishes:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from fpsolve.case.case import Case, Curve
+from fpsolve.case.sections import OF_MOMENTS
 from fpsolve.data import Quantity
 from fpsolve.errors import NoSuchExponent
 from fpsolve.exponent.error import Failure, Moment, digits
@@ -49,23 +50,26 @@ class Moments:
 
 
 def _settings(case: Case, number: int) -> Settings:
-    return {"p": case.p.tolist() if MOMENT.name in case.asked else [], "slopes": True}
+    p = case.p.tolist() if MOMENT.name in case.asked else []
+    every = case.problem.dimension > 2 and not {*OF_MOMENTS}.isdisjoint(case.asked)
+    return {"p": p, "slopes": True, "every_slope": every}
 
 
 def _solve(job: Job, settings: Settings) -> Moments:
-    """Λ(p), with an error of Λ′(p) where `slopes` says so, which may cost more than Λ(p)."""
+    """Λ(p), with errors of Λ′(p) if `slopes` says so, and with Λ′ that take a solve of their own if `every_slope`."""
     problem, has_slopes = job.curve.problem, settings["slopes"]
     refused = _refused(problem, settings["p"])
     for _ in refused:
         job.advance()
     computed = [p for p in settings["p"] if p not in refused]
     found = solve_moments(job.solver, computed, progress=job.advance, known=job.begun if has_slopes else None)
+    slopes = found.derivative if settings.get("every_slope") else found.slope
     columns = MomentColumns(
         p=found.p,
         value=found.value,
-        derivative=found.derivative,
+        derivative=slopes,
         error_estimate=found.error_estimate,
-        derivative_error=found.derivative_error if has_slopes else np.full(found.p.shape, np.nan),
+        derivative_error=found.errors_of(slopes) if has_slopes else np.full(found.p.shape, np.nan),
         residual=found.residual,
         perturbation=perturbed_moments(problem, found.p),  # Eq. (37)
     )

@@ -100,6 +100,10 @@ def even_moments(case: Case) -> FloatArray:
 def refuse_no_hierarchy(case: Case) -> None:
     """Refuse a case without an even p, or some curve of which has no hierarchy. Raises `FpsolveError`."""
     orders = even_moments(case)
+    if case.problem.dimension > 2:
+        raise FpsolveError(
+            f"{case.path}: has more than two variables, of which Λ(p) of even p is by the hierarchy anyway"
+        )
     if not orders.size:
         raise FpsolveError(f"{case.path}: moments.p: has no even p > 0, and the hierarchy is for these; add 2.0")
     for curve in case.curves():

@@ -22,6 +22,7 @@ from fpsolve.exponent import Estimate, second_derivative
 from fpsolve.exponent.adapt import WholeProblem
 from fpsolve.exponent.error import Absent
 from fpsolve.exponent.root import nonzero_root
+from fpsolve.exponent.solver import broken_convexity
 from fpsolve.messages import Code, Message
 from fpsolve.model import ParametricOscillator
 from tests.conftest import FIG1, FIG1_NOISE, UNIT_NOISE, oracle_arguments
@@ -123,6 +124,15 @@ def test_an_interval_on_one_side_of_zero():
     function = MomentLyapunovFunction(Problem(FIG1, WEAK_NOISE), (1.0, 3.0))
     assert function.root() is None
     assert function.stability_index().value == pytest.approx(-0.3629121344, rel=1e-6)
+
+
+@pytest.mark.parametrize("wrong", [0, 4321, 14_999])
+def test_of_many_moments_one_that_breaks_convexity_is_found(wrong):
+    p = np.linspace(-2.0, 6.0, 15_000)
+    value, slope, errors = 0.3 * p**2 - 0.1 * p, 0.6 * p - 0.1, np.full(p.size, 1e-9)
+    assert broken_convexity(p, value, slope, errors, lambda: errors) is None
+    value[wrong] += 1e-4
+    assert broken_convexity(p, value, slope, errors, lambda: errors).data["p"] in p[[max(wrong - 1, 0), wrong]]
 
 
 def test_a_wrong_eigenvalue_breaks_convexity(monkeypatch):

@@ -3,13 +3,17 @@
 The references are finite differences on another grid (asinh_grid), a simulation, and the Gaussian limit r₀ → 1.
 """
 
+import math
+
 import numpy as np
 import pytest
+from scipy.integrate import quad
 
 from fpsolve import (
     ExponentSolver,
     MomentLyapunovFunction,
     NonGaussianNoise,
+    PlaneSystem,
     Problem,
     VibroImpactOscillator,
     lyapunov_exponent,
@@ -20,6 +24,7 @@ from fpsolve import (
 from fpsolve.analysis import excursion
 from fpsolve.errors import NoSuchExponent
 from fpsolve.exponent import impact_rate
+from fpsolve.fem import make_mesh
 from tests.conftest import sampled
 from tests.oracles import asinh_grid
 
@@ -60,6 +65,25 @@ def check(case, rtol):
     for estimate, other, open_ in zip(both(case, rtol), known, doubt, strict=True):
         assert abs(estimate.value - other) <= estimate.error_estimate + open_
         assert open_ < 1e-3 * max(abs(other), estimate.scale)
+
+
+@pytest.mark.parametrize("rtol", [1e-2, 1e-4, 1e-6])
+def test_what_lies_beyond_an_interval_is_in_the_error(rtol):
+    """Far out noise is slow beside the motion, and ‖x‖ grows at the largest rate of each ξ: a share of 4e-3 more."""
+    noise = NonGaussianNoise(D0=0.5, tau0=0.4, r0=1.35)
+    system = PlaneSystem.of_equations(("x", "v"), ("v", "-x - 0.1*v - 0.6*xi*v"))
+    solved = lyapunov_exponent(Problem(system, noise), rtol=rtol)
+    mesh = make_mesh(phi_cells=10, phi_degree=10, xi_cells=12, xi_degree=10, xi_min=-40, xi_max=40, grading=3.0)
+    inside = lyapunov_exponent(Problem(system, noise), mesh=mesh)
+
+    def excess(xi):
+        rate = np.linalg.eigvals([[0, 1], [-1, -0.1 - 0.6 * xi]]).real.max()
+        return (rate - inside.value) * math.exp(noise.log_density(xi))
+
+    end = 40 * noise.standard_deviation
+    beyond = sum(quad(excess, *ends, epsrel=1e-9, epsabs=0)[0] for ends in ((-math.inf, -end), (end, math.inf)))
+    assert abs(solved.value - inside.value - beyond) <= solved.error_estimate + 0.02 * beyond
+    assert beyond <= inside.error_estimate < 2 * beyond
 
 
 @pytest.mark.slow

@@ -8,12 +8,20 @@ import numpy as np
 import pytest
 from scipy.special import hankel1
 
-from fpsolve import ExponentSolver, NonGaussianNoise, OrnsteinUhlenbeck, PlaneSystem, Problem, VibroImpactOscillator
+from fpsolve import (
+    ExponentSolver,
+    NonGaussianNoise,
+    OrnsteinUhlenbeck,
+    PlaneSystem,
+    Problem,
+    VibroImpactOscillator,
+    moment_lyapunov,
+)
 from fpsolve.arrays import identity
 from fpsolve.errors import NotConverged
 from fpsolve.exponent import INDICES, Budget, critical_impact_factor, critical_restitution, impact_rate
 from fpsolve.exponent.error import Absent
-from fpsolve.model import CoefficientMatrix, Jump, MarkovChain
+from fpsolve.model import CoefficientMatrix, Jump, MarkovChain, Telegraph, White
 
 STRONG = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=1.0)
 GAUSSIAN = NonGaussianNoise(D0=1.0, tau0=0.5, r0=1.0).ou_reduction()
@@ -26,6 +34,24 @@ ROTATION = ((0.0, 1.0), (-1.0, 0.0))
 
 def solver(system, noise, rtol=None):
     return ExponentSolver(Problem(system, noise), rtol=rtol or (1e-6 if noise == HEAVY else 1e-9))
+
+
+@pytest.mark.parametrize(
+    ("noise", "factor", "p", "expected"),
+    [
+        (Telegraph(a=0.5, k=0.5), 0.2, 20.0, -7.726127144527),
+        (Telegraph(a=0.5, k=0.5), 0.1, 10.0, -5.850081182888),
+        (Telegraph(a=0.2, k=0.3), 0.2, -2.0, 1.136476716839),
+        (White(s=0.05), 0.2, 20.0, -11.1134497872118),
+        (White(s=0.05), 0.3, 12.0, -5.1566178569916),
+    ],
+)
+def test_a_wall_that_takes_nearly_all(noise, factor, p, expected):
+    """By transfer matrices, det(R^p Φ − 1) = 0, and by Fourier waves of T R^(−pφ/π): R^p is not rounded beside 1."""
+    walls = [{"at": "x = 0", "restitution": factor}]
+    system = PlaneSystem.of_equations(("x", "v"), ("v", "-x - 0.1*v - xi*x"), walls=walls)
+    found = moment_lyapunov(Problem(system, noise), p)
+    assert abs(found.value[0] - expected) <= found.error_estimate[0] + 1e-12
 
 
 @LAWS

@@ -95,11 +95,13 @@ def test_second_moments(seed, n, kind):
 
 @pytest.mark.parametrize(("seed", "n"), [(0, 3), (3, 3), (2, 4)])
 def test_even_moments_under_white_noise(seed, n):
+    """By elements."""
     steady, driven = random_system(seed, n)
-    found = moment_lyapunov(problem(White(s=1.0), steady, driven), [2.0, 4.0], rtol=1e-5)
-    expected = [kronecker.white(steady, driven, p) for p in (2, 4)]
-    assert np.all(np.abs(found.value - expected) <= found.error_estimate + 1e-14)  # rounding of 4⁴ equations
-    assert np.all(found.error_estimate < 1e-3)
+    solver = ExponentSolver(problem(White(s=1.0), steady, driven), rtol=1e-5)
+    for p in (2, 4):
+        found = solver.solution(p)
+        assert abs(found.pair.value - kronecker.white(steady, driven, p)) <= found.error + 1e-14  # of 4⁴ equations
+        assert found.error < 1e-3
 
 
 def test_even_moments_under_telegraph_noise():
@@ -107,6 +109,14 @@ def test_even_moments_under_telegraph_noise():
     found = moment_lyapunov(problem(Telegraph(a=0.7, k=0.6), steady, driven), [2.0, 4.0], rtol=1e-5)
     expected = [kronecker.chain(steady, driven, (-0.7, 0.7), ((0, 0.6), (0.6, 0)), p) for p in (2, 4)]
     assert np.all(np.abs(found.value - expected) <= found.error_estimate)
+
+
+def test_even_moments_take_no_elements_until_their_slopes_are_read():
+    found = moment_lyapunov(problem(White(s=1.0)), [2.0, 4.0], rtol=1e-3)
+    assert not found.solver.whole.known
+    assert np.all(np.isnan(found.slope))
+    low, high = (kronecker.white(FREE, COUPLED, p) for p in (2, 4))
+    assert np.all(np.diff([low / 2, found.derivative[0], (high - low) / 2, found.derivative[1]]) > 0)  # Λ is convex
 
 
 @pytest.mark.slow

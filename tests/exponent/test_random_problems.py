@@ -8,8 +8,8 @@ from tests.random_problems import RTOL, Outcome, problems, solve
 
 @pytest.fixture(scope="module")
 def outcomes():
-    """Of 20; `python -m tests.random_problems` solves 300."""
-    return [solve(problem) for problem in problems(20)]
+    """Of 30; `python -m tests.random_problems` solves 300."""
+    return [solve(problem) for problem in problems(30)]
 
 
 @pytest.fixture(scope="module")

@@ -117,7 +117,8 @@ def test_coefficients_and_their_derivatives(coefficient, derivative):
     p, h = 1.3, 1e-4
     slope = (coefficient(p + h, derivative) - coefficient(p - h, derivative)) / (2 * h)
     assert coefficient(p, derivative + 1) == pytest.approx(slope, abs=1e-7)
-    assert coefficient(0.0) == (1 if coefficient == OfMoment(0) else 0)
+    assert coefficient.of_orders(0.0, 0, False, True) == (1 if coefficient == OfMoment(0) else 0)
+    assert coefficient.of_orders(p, 0, True, True) == coefficient(p)
 
 
 @pytest.mark.parametrize("p", sampled(0.5, -3.0, 4.0))

@@ -68,11 +68,10 @@ FIGURES = {
 SHOWN = ("eight", "exact and reduced, many", "map")
 
 
-@pytest.mark.parametrize("narrow", sampled([], [NARROW]), ids=["wide", "narrow"])
 @pytest.mark.parametrize("name", sampled(*SHOWN, *(name for name in FIGURES if name not in SHOWN), keep=len(SHOWN)))
-def test_all_has_its_place(sound, tmp_path, name, narrow):
+def test_all_has_its_place(sound, tmp_path, name):
     """Legends cover no data, all that is written is on the canvas and readable, and no two texts overlap."""
-    drawn_case(tmp_path, [*FIGURES[name], *narrow])
+    drawn_case(tmp_path, [*FIGURES[name], *[NARROW] * (len(name) % 2)])  # of every second one
     assert len(sound) == 2  # as .png and as .pdf
 
 

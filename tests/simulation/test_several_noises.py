@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fpsolve import OrnsteinUhlenbeck, PlaneSystem, Problem
-from fpsolve.model import Bounded, Poisson, Telegraph, White
+from fpsolve.model import Bounded, Telegraph, White
 from fpsolve.simulation.coefficients import coefficients
 from fpsolve.simulation.kernels import advance
 from fpsolve.simulation.setup import default_step, largest_step, starting_state, transient
@@ -24,7 +24,6 @@ SLOW = pytest.mark.slow  # each kind is compiled anew
     [
         White(s=0.4),
         pytest.param(Telegraph(a=0.5, k=1.5), marks=SLOW),
-        pytest.param(Poisson(rate=2.0, sizes=(-0.3, 0.2)), marks=SLOW),
     ],
 )
 def test_a_flow_alone_is_exact(noise):

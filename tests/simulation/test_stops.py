@@ -70,9 +70,7 @@ def problem(noise, restitution, coupling=0.0):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("noise", "restitution"), [(TELEGRAPH, 0.6), (OrnsteinUhlenbeck(1.0, 0.5), 0.6), (White(s=0.4), 1.0)]
-)
+@pytest.mark.parametrize(("noise", "restitution"), [(OrnsteinUhlenbeck(1.0, 0.5), 0.6), (White(s=0.4), 1.0)])
 def test_a_mass_that_nothing_drives_has_the_exponents_of_an_oscillator(noise, restitution):
     """λ, Λ(1) and the impacts N = ∂λ/∂ln R of the oscillator with a wall by finite elements; without one for R = 1."""
     walls = [{"at": "q = 0", "restitution": restitution}] if restitution < 1 else ()
