@@ -236,6 +236,7 @@ class Code(Enum):
         "noise P(sup ‖x‖ > A) may fall faster than any power of A}"
     )
     UNFINISHED = "failure: not everything is solved yet; the same command goes on"
+    LINEAR = "note: there is no δ_p, as Λ(p) is {value:.6g} p for all p, to its error"
     NO_ROOT_REACHED = "note: no δ_p was found in [{low:g}, {high:g}]; beyond, {reason}"
     EXCURSION_OPEN = (
         "note: λ = {value:.3g} cannot be distinguished from 0 within its error, {error:.1g}, so that nothing is known "

@@ -73,6 +73,8 @@ def nonzero_root(
         if "λ" in solver.spent:  # where this begins
             raise NotConverged(solver.spent["λ"])
         ratio, slope, error = solver.ratio(0.0)
+        if slope <= error and _is_linear(solver, low, high):
+            return Absent(Message(Code.LINEAR, value=ratio if abs(ratio) > error else 0.0))
         guess = -ratio / slope if slope > 0 else math.copysign(1.0, -ratio)
         guess = min(max(guess, -OUTWARD), OUTWARD)
         outward |= {-OUTWARD, OUTWARD}
@@ -100,6 +102,12 @@ def nonzero_root(
     if obstacle := contradiction(solver, place, value, steep, off, lambda: np.array([solver.slope_error(p)])):
         raise NotConverged(obstacle, remedy=solver.refinement)
     return checked(found, solver.refinement)
+
+
+def _is_linear(solver: ExponentSolver, low: float, high: float) -> bool:
+    """Whether Λ(p)/p, which increases, is the same far out on both sides, to its errors."""
+    sides = [solver.ratio_alone(float(np.clip(p, low, high))) for p in (-OUTWARD, OUTWARD)]
+    return abs(sides[1][0] - sides[0][0]) <= sides[0][1] + sides[1][1]
 
 
 def _index(p: float, ratio: float, slope: float, error: float) -> Estimate:

@@ -16,6 +16,7 @@ from fpsolve import (
     VibroImpactOscillator,
     make_mesh,
     moment_lyapunov,
+    stability_index,
 )
 from fpsolve.errors import NoSuchExponent, NotConverged
 from fpsolve.exponent import Estimate, second_derivative
@@ -24,7 +25,7 @@ from fpsolve.exponent.error import Absent
 from fpsolve.exponent.root import nonzero_root
 from fpsolve.exponent.solver import broken_convexity
 from fpsolve.messages import Code, Message
-from fpsolve.model import ParametricOscillator
+from fpsolve.model import ParametricOscillator, Telegraph, White
 from tests.conftest import FIG1, FIG1_NOISE, UNIT_NOISE, oracle_arguments
 from tests.oracles import fourier_hermite, perturbation
 
@@ -133,6 +134,27 @@ def test_of_many_moments_one_that_breaks_convexity_is_found(wrong):
     assert broken_convexity(p, value, slope, errors, lambda: errors) is None
     value[wrong] += 1e-4
     assert broken_convexity(p, value, slope, errors, lambda: errors).data["p"] in p[[max(wrong - 1, 0), wrong]]
+
+
+@pytest.mark.parametrize(
+    ("noise", "rate"),
+    [
+        (White(s=0.5), 0.0),
+        (White(s=0.5, interpretation="ito"), 0.125),
+        (OrnsteinUhlenbeck(alpha=1.0, sigma=0.5), 0.0),
+        (Telegraph(a=0.5, k=0.5), 0.0),
+    ],
+)
+def test_where_noise_turns_alone_there_is_no_index(noise, rate):
+    """Kubo's oscillator keeps ‖x‖, which in Itô's sense grows as exp(½s²t)."""
+    problem = Problem(PlaneSystem.of_equations(("x", "y"), ("-(1.3 + xi)*y", "(1.3 + xi)*x")), noise)
+    for p in (-1.5, 3.0):
+        found = moment_lyapunov(problem, p)
+        assert abs(found.value[0] - rate * p) <= found.error_estimate[0]
+    found = stability_index(problem)
+    assert not found
+    assert found.reason.code is Code.LINEAR
+    assert found.reason.data["value"] == pytest.approx(rate, abs=1e-12)
 
 
 def test_a_wrong_eigenvalue_breaks_convexity(monkeypatch):

@@ -5,7 +5,15 @@ import math
 import numpy as np
 import pytest
 
-from fpsolve import ExponentSolver, NonGaussianNoise, OrnsteinUhlenbeck, PlaneSystem, Problem, make_mesh
+from fpsolve import (
+    ExponentSolver,
+    NonGaussianNoise,
+    OrnsteinUhlenbeck,
+    PlaneSystem,
+    Problem,
+    make_mesh,
+    moment_lyapunov,
+)
 from fpsolve.analysis import furstenberg_khasminskii
 from fpsolve.analysis.sensitivity import solve_sensitivities
 from fpsolve.arrays import identity
@@ -40,6 +48,24 @@ def test_only_the_axis_that_lacks_functions_is_refined():
     assert abs(found.pair.value - 3.1913285717) <= found.error + 1e-10
     _, axial, lateral = found.pair.space.shape
     assert lateral > 2 * axial
+
+
+def test_a_slope_that_is_not_resolved_refuses_no_moment():
+    """Of a node under two noises: T of p = 4 takes few functions, T* many. By moment equations and five differences."""
+    steady = (-1.3960696175910667, 3.189804505143595), (0.2382010570421062, -1.506962933737433)
+    first = (-0.14477046177438552, 0.5518157121082798), (-0.378513641896167, 0.7288815789732673)
+    second = (-0.36957090671197107, -0.9142242725579968), (0.040173133735203655, -0.16123722803306492)
+    terms = (
+        CoefficientMatrix(0, steady),
+        *(CoefficientMatrix(1, matrix, identity, name) for matrix, name in ((first, "a"), (second, "b"))),
+    )
+    noises = {
+        "a": OrnsteinUhlenbeck(alpha=2.555306793986962, sigma=0.15016487721111638),
+        "b": OrnsteinUhlenbeck(alpha=3.3054676187684944, sigma=0.1315417262470089),
+    }
+    found = moment_lyapunov(Problem(PlaneSystem(terms), noises), 4.0)
+    assert abs(found.value[0] + 2.309419464523849) <= found.error_estimate[0]
+    assert abs(found.derivative[0] + 0.5761729688) <= found.derivative_error[0]
 
 
 def test_moments_of_two_and_four():
