@@ -261,8 +261,8 @@ def _sum(modes: Modes, noise_in: Where) -> dict[str, Any]:
 
 def _critical(fit: NoiseFit, wanted: Wanted) -> dict[str, Any]:
     """The damping ratios at which λ and Λ(2) vanish in weak noise, with errors as those of `verdict`."""
-    if len(wanted.modes.omega) > 1:
-        return {}
+    if len(wanted.modes.omega) > 1 or (wanted.case and wanted.case.system.noise_unit == "unknown"):
+        return {}  # of equations that have a coefficient of their own for the noise
     omega = wanted.modes.omega[0]
 
     def ratios(each: NoiseFit) -> FloatArray:
@@ -569,7 +569,8 @@ def sentences(outcome: NoiseOutcome) -> Iterator[str]:
     ):
         if each is not None:
             number = f"{symbol} = {sampled(each.value, each.deviation)} ± {each.deviation:.1g} 1/s"
-            yield f"{number}: {likely(what, each.below)}."
+            is_sure, open_ = abs(each.value) > each.deviation, f"{what} is not decided; measure for longer"
+            yield f"{number}: {likely(what, each.below) if is_sure else open_}."
     share = outcome.fit.off
     off = f", and that it is {share:.0%} off where stability depends on it (try another --kind)" if share else ""
     yield f"The probabilities count the standard errors of the fit{off}; see the page From a measurement to a case."

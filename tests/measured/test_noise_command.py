@@ -4,6 +4,7 @@ import math
 import re
 import shlex
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from fpsolve.case.case import load_case
 from fpsolve.cli import main
 from fpsolve.commands.options import BAD_INPUT
 from fpsolve.measured import read_spectrum, weak_exponent, weak_moment
-from fpsolve.workflow.noise import natural_frequencies
+from fpsolve.workflow.noise import natural_frequencies, sentences
 from tests.kit import read_json
 
 ROOT = Path(__file__).parents[2]
@@ -94,6 +95,27 @@ def test_noise_in_the_damping_of_a_case_needs_0_too(capsys):
     expected = weak_moment(2, OMEGA, 0.02, at_double, at_zero, "damping")
     assert found["second_moment"]["value"] == pytest.approx(expected, rel=1e-3)
     assert load_case("results/spectrum.csv/noise.toml").problem.values["oscillator.omega"] == pytest.approx(OMEGA)
+
+
+def test_a_coefficient_of_a_case_leaves_no_line_of_weak_noise(capsys):
+    """That is for a relative stiffness or a damping, and here ξ is multiplied by 2 first."""
+    parameters, text = f"{{ w = {OMEGA}, c = 0.5 }}", 'title = "x"\nunits.time = "s"\n[system]\n'
+    text += f'variables = ["x", "v"]\ndrift = ["v", "-w**2*(1 + 2*xi)*x - c*v"]\nparameters = {parameters}\n'
+    Path("my.toml").write_text(text + '[noise]\nkind = "white"\ns = 0.1\n[moments]\np = [2.0]\n', encoding="utf-8")
+    options = ["--per", "Hz", "--sided", "one", "--averages", "64", "--noise-in", "stiffness", "--case", "my.toml"]
+    found = noise(spectrum(), *options)
+    assert found["critical_damping_ratio"] == {"lyapunov_exponent": None, "moment": None}
+    expected = weak_moment(2, OMEGA, 0.25 / OMEGA, 4 * NOISE.spectral_density(2 * OMEGA), 0, "stiffness")
+    assert found["second_moment"]["value"] == pytest.approx(expected, rel=0.02)
+    assert "In weak noise" not in capsys.readouterr().out
+
+
+def test_an_error_above_the_value_decides_nothing():
+    """λ = 1 ± 70 is no growth with a probability of 50.6 %."""
+    known = SimpleNamespace(value=1.0, deviation=70.0, below=0.494)
+    fit, verdict = SimpleNamespace(off=0.0), SimpleNamespace(exponent=known, moment=None)
+    said = [*sentences(SimpleNamespace(exponent=None, moment=None, verdict=verdict, failure=None, fit=fit))]
+    assert said[0].endswith(": almost every path is not decided; measure for longer.")
 
 
 @pytest.mark.slow
