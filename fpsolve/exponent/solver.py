@@ -596,7 +596,8 @@ class ExponentSolver:
     def variance_rate(self) -> Estimate:
         """Λ″(0), the asymptotic growth rate of the variance of ln ‖x‖.
 
-        Its error is the difference from that of a finer discretisation.
+        Its error is what two finer discretisations change in it, as one change is small by chance; twice the first one
+        where the budget does not suffice for the second.
 
         Raises:
             NoSuchExponent: it does not exist, or the noise has algebraic tails.
@@ -611,8 +612,11 @@ class ExponentSolver:
         refuse_tails(self.problem, quantity.VARIANCE_RATE.symbol)
         scale = 2 * self.scales.quadratic
         value, better = self.around_zero.second_derivative, self.finer_around_zero.second_derivative
-        rounding = 10 * sys.float_info.epsilon * max(scale, abs(better))
-        error = abs(better - value) + rounding
+        error = 2 * abs(better - value)
+        with suppress(NotConverged):
+            finest = PairDerivatives(self.whole.finer_pair(self.finer_around_zero.pair)).second_derivative
+            error, better = abs(finest - better) + 0.5 * error, finest
+        error += 10 * sys.float_info.epsilon * max(scale, abs(better))
         return checked(Estimate(better, error, scale, quantity=quantity.VARIANCE_RATE), self.refinement)
 
     @cached_property
