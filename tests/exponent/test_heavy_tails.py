@@ -69,7 +69,7 @@ def check(case, rtol):
 
 @pytest.mark.parametrize("rtol", [1e-2, 1e-4, 1e-6])
 def test_what_lies_beyond_an_interval_is_in_the_error(rtol):
-    """Far out noise is slow beside the motion, and ‖x‖ grows at the largest rate of each ξ: a share of 4e-3 more."""
+    """Far out noise is slow beside the motion, and ‖x‖ grows at the largest rate of each ξ, to 2 %."""
     noise = NonGaussianNoise(D0=0.5, tau0=0.4, r0=1.35)
     system = PlaneSystem.of_equations(("x", "v"), ("v", "-x - 0.1*v - 0.6*xi*v"))
     solved = lyapunov_exponent(Problem(system, noise), rtol=rtol)

@@ -154,10 +154,10 @@ def test_a_telegraph_signal():
 )
 def test_simulated_paths(names, drift, noise):
     problem = Problem(EquationSystem(names, drift), noise)
-    paths, time = (4096, 101.0) if len(names) == 2 else (8192, 26.0)
+    paths, time = (4096, 101.0) if len(names) == 2 else (8192, 30.0)
     (found,) = simulate(problem, 2.0, estimator="population", paths=paths, time=time).estimates
     assert abs(found.value - even_moment(problem, 2, rtol=1e-9).value) <= 4 * found.standard_error
-    assert found.standard_error <= 1e-2
+    assert found.standard_error <= 5e-3
 
 
 @pytest.mark.slow
