@@ -320,6 +320,7 @@ class Code(Enum):
 
     NO_PROBLEM = "failure: no such problem: {reason}"
     NOWHERE = "note: {symbol} exists nowhere in the frame"
+    UNSOLVED = "failure: {symbol} is found at no point of the frame: {reason}"
     NO_LINE = "note: no line {line} was found, though {symbol} changes its sign in the frame"
     ONE_SIGN = "note: {side} {is_whole:?everywhere¦wherever it exists} in the frame"
     LINE_ENDS = "note: the line {line} ends inside of the frame: {reason}"

@@ -27,7 +27,7 @@ from scipy.optimize import brentq, minimize
 
 from fpsolve.analysis.scan import TOLERANCE, Sample
 from fpsolve.analysis.target import Distance, Target, start_and_stop, target_of
-from fpsolve.analysis.zero import Axis, said
+from fpsolve.analysis.zero import Axis, is_none, said
 from fpsolve.arrays import FloatArray, real_number, shown
 from fpsolve.data import Result, dataset, written
 from fpsolve.errors import NoSuchExponent, NotConverged
@@ -330,8 +330,8 @@ def _unreached(distance: Distance, axes: Sequence[Axis], is_crossed: bool) -> Ab
     samples, reasons = distance.samples, distance.reasons
     target = distance.target
     if not samples:
-        raise NoSuchExponent(reasons[0]) if all(map(_is_none, reasons)) else NotConverged(reasons[0])
-    missing = [reason for reason in reasons if not _is_none(reason)]
+        raise NoSuchExponent(reasons[0]) if all(map(is_none, reasons)) else NotConverged(reasons[0])
+    missing = [reason for reason in reasons if not is_none(reason)]
     if missing or is_crossed:
         reason = missing[0] if missing else Message(Code.NEWTON_UNSETTLED)
         raise NotConverged(Message(Code.DESIGN_GAPS, target=str(target), count=len(missing) or None, reason=reason))
@@ -345,14 +345,6 @@ def _unreached(distance: Distance, axes: Sequence[Axis], is_crossed: bool) -> Ab
         values = [target.level + each.value for each in samples]
         about |= {"symbol": target.quantity.symbol, "least": min(values), "most": max(values)}
     return Absent(Message(Code.UNREACHED, **about))
-
-
-def _is_none(reason: Message) -> bool:
-    """Whether there is no F for a reason, and it is not only not resolved."""
-    return reason.tells_of(Code.NO_PROBLEM) or reason.code in _INFINITE
-
-
-_INFINITE = (Code.TAILS, Code.INFINITE_VARIANCE)
 
 
 def _nearest(distance: Distance, axes: Sequence[Axis], units: FloatArray) -> Sample | Absent:

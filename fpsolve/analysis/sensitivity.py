@@ -326,7 +326,7 @@ class Gradient:
         if abs(p) < SMALL_P:
             return {key: _times(p, each) for key, each in self._by_small_p(p).items()}
         solver, along = held_by(self._solver, p, self._along)
-        if solver.problem.dimension > 2 and (known := solver.even(p)):
+        if known := solver.by_moments(p):
             slopes = {key: known.slope(key) for key in along}
             sizes = {key: known.scale / abs(by.theta) if by.theta else abs(slopes[key][0]) for key, by in along.items()}
             return {key: Estimate(*slopes[key], scale=sizes[key]) for key in along}

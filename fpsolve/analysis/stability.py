@@ -19,7 +19,7 @@ import numpy as np
 from fpsolve.analysis.continuation import LONGEST, SHORTEST, Trace, find_branches, with_branch
 from fpsolve.analysis.scan import Row, Scan, ScannedRow, scan_row, scanned
 from fpsolve.analysis.special_points import Placed, crossings, with_folds, with_points, with_values
-from fpsolve.analysis.zero import Axis, Known, Zero, ZeroField, check_axes, is_dear, line_rtol, zero_of
+from fpsolve.analysis.zero import Axis, Known, Zero, ZeroField, check_axes, is_dear, is_none, line_rtol, zero_of
 from fpsolve.arrays import FloatArray, is_whole, real_number, shown
 from fpsolve.data import Result, brief, dataset
 from fpsolve.drawing import add_legend, coloured, label_axes, scale_axis
@@ -141,11 +141,13 @@ class Boundary(Result):
 
     def remark(self) -> str:
         """That there is no line, or not all of it, as a `Message`, or an empty text."""
-        if self.obstacles:
+        exists = np.isfinite(self.scan.values)
+        if self.obstacles and exists.any():
             return Message(Code.LINE_STOPPED, line=self.zero.equation, reason=self.obstacles[0])
+        if self.obstacles:
+            return Message(Code.UNSOLVED, symbol=self.zero.symbol, reason=self.obstacles[0])
         if self.traces:
             return ""
-        exists = np.isfinite(self.scan.values)
         values = self.scan.values[exists]
         if not values.size:
             return Message(Code.NOWHERE, symbol=self.zero.symbol)
@@ -190,8 +192,8 @@ class Boundary(Result):
             now = replace(now, traces=with_branch(now.traces, self._special(zero_field, trace)))
             yield now
         obstacles = [] if zero_field.stopped is None else [zero_field.stopped]
-        for reason in scan.reasons:
-            obstacles += [reason] * is_of_line(reason)
+        is_empty = not np.isfinite(scan.values).any()
+        obstacles += [each for each in scan.reasons if is_of_line(each) or (is_empty and not is_none(each))]
         seconds = now.seconds + zero_field.spent_seconds
         yield replace(now, seconds=seconds, obstacles=tuple(obstacles), complete=not obstacles)
 

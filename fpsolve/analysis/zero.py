@@ -199,6 +199,11 @@ def line_of_value(problem: Problem, zero: Zero) -> float:
     return ITS_SIGN if is_dear(problem, zero) else 0.0
 
 
+def is_none(reason: Message) -> bool:
+    """Whether there is no F for a reason, and it is not only not resolved."""
+    return reason.tells_of(Code.NO_PROBLEM) or reason.code in (Code.TAILS, Code.INFINITE_VARIANCE)
+
+
 def is_dear(problem: Problem, zero: Zero) -> bool:
     """Whether F takes elements of three axes or more, and so seconds for each point."""
     if problem.dimension > 2:
@@ -215,7 +220,7 @@ def ratio_with_slopes(solver: ExponentSolver, p: float, keys: Sequence[str]) -> 
         NoSuchExponent: see `held_by`.
     """
     value, error = solver.ratio_alone(p)
-    if solver.problem.dimension > 2 and (known := solver.even(p)):
+    if known := solver.by_moments(p):
         return value, error, known.gradient(keys) / p
     held, by_key = held_by(solver, p, {key: solver.problem.derivative(key) for key in keys})
     along = [by_key[key] for key in keys]

@@ -354,16 +354,22 @@ class ExponentSolver:
             checked(Estimate(found.value, found.error, self.scale(p)), self.refinement, p)
         return found
 
-    def closed(self, p: float) -> EvenMoment:
-        """Λ(p) of an even p where these are all that is computed. Raises `NotConverged`."""
-        if p not in self._even:
+    def by_moments(self, p: float) -> EvenMoment | None:
+        """Λ(p) where the equations of the moments are its number, and no witness: beyond the plane, if they are found.
+
+        Raises:
+            NotConverged: they are all that is computed, and are not solved.
+        """
+        if not self.problem.is_closed_only:
+            return self.even(p) if self.problem.dimension > 2 else None
+        if p <= 0 or p % 2:
+            return None
+        if not self._even.get(p):
             try:
                 self._even[p] = self._solve_even(p)
             except (NoHierarchy, ArithmeticError) as failure:
                 raise NotConverged(Message(Code.NOT_CONVERGED, p=p, reason=str(failure))) from failure
-        if known := self._even[p]:
-            return known
-        raise NotConverged(Message(Code.NOT_CONVERGED, p=p, reason="the moments were not found"))
+        return self._even[p]
 
     def doubt(self, error: float, known: EvenMoment) -> float:
         """The difference beyond which a value with this error contradicts an even moment."""
@@ -490,8 +496,8 @@ class ExponentSolver:
                 progress()
                 continue
             try:
-                if self.problem.is_closed_only or (self.problem.dimension > 2 and self.even(point)):
-                    rows[i] = known[point] = _of_moments(self.closed(point))
+                if even := self.by_moments(point):
+                    rows[i] = known[point] = _of_moments(even)
                     progress()
                     continue
                 solution = self.solution(point)
@@ -504,7 +510,7 @@ class ExponentSolver:
                 if is_kept:
                     known[point] = rows[i]._replace(derivative_error=self.slope_error(point))
             except NotConverged as failure:
-                if even := self.even(point):
+                if not self.problem.is_closed_only and (even := self.even(point)):
                     rows[i] = known[point] = _of_moments(even)
                 else:
                     failures.append(Failure(point, failure.message))
@@ -647,7 +653,7 @@ class ExponentSolver:
 
         Near p = 0 it is the mean of Λ′ from 0 to p, by two points of Gauss; its error is that at p = ±`SMALL_P`.
         """
-        if self.problem.dimension > 2 and (known := self.even(p)):
+        if known := self.by_moments(p):
             return known.value / p, known.error / p
         self._refuse_negative(p)
         if abs(p) >= TINY_P:

@@ -208,7 +208,12 @@ def split_coefficients(system: System, noise: Noise) -> SplitCoefficients:
         if line := affine(term.g):
             steady += line[0] * system.epsilon**term.order * np.array(term.matrix)
     every = sum((np.abs(system.epsilon**term.order * np.array(term.matrix)) for term in system.terms), zero)
-    even = np.eye(len(zero)) if system.pasts else _even_coordinates(matrix_at(moved, 0.0, slice(0, 1)), every)
+    if system.pasts:
+        variables = [*range(len(zero) - len(system.pasts)), *(variable for variable, _ in system.pasts)]
+        folded = np.eye(len(zero))[variables]
+        even = np.diag(1 / _balance(folded.T @ every @ folded, 0.0)[variables])
+    else:
+        even = _even_coordinates(matrix_at(moved, 0.0, slice(0, 1)), every)
     back, intensity, intensities, loads = np.linalg.inv(even), 0.0, list[float](), list[tuple[FloatArray, Any]]()
     free = even @ matrix_at(moved, 0.0, slice(0, 1)) @ back
     for name, part in noise.parts.items():
@@ -409,7 +414,7 @@ def _modal_coordinates(free: FloatArray, every: FloatArray) -> FloatArray:
 
     Where modes are nearly parallel the given coordinates are kept, but for their scales.
     """
-    scales = _balance(every)
+    scales = _balance(every, 0.0)
     values, vectors = np.linalg.eig(free * scales / scales[:, None])
     columns, sizes = list[FloatArray](), list[int]()
     for value, vector in zip(values, vectors.T, strict=True):
@@ -426,11 +431,11 @@ def _modal_coordinates(free: FloatArray, every: FloatArray) -> FloatArray:
     return back / (_balance(shares) @ of_mode)[:, None]
 
 
-def _balance(matrix: FloatArray) -> FloatArray:
-    """The scales d for which entries a_ij d_j/d_i and a_ji d_i/d_j are alike, as far as both are there."""
+def _balance(matrix: FloatArray, least: float = _ONE_WAY) -> FloatArray:
+    """The scales d for which entries a_ij d_j/d_i and a_ji d_i/d_j are alike, where their ratio is above the least."""
     size = np.abs(matrix)
     small, large = np.minimum(size, size.T), np.maximum(size, size.T)
-    pairs = [(i, j) for i, j in zip(*np.nonzero(small > _ONE_WAY * large), strict=True) if i < j]
+    pairs = [(i, j) for i, j in zip(*np.nonzero(small > least * large), strict=True) if i < j]
     sides, gaps = np.zeros((len(pairs), len(size))), np.zeros(len(pairs))
     for k, (i, j) in enumerate(pairs):
         sides[k, i], sides[k, j], gaps[k] = 1.0, -1.0, 0.5 * math.log(size[i, j] / size[j, i])

@@ -60,6 +60,7 @@ class Delayed:
     Args:
         moving: what does, for the state and its past values as one vector, with rates of the state alone.
         pasts: which variable each of the last ones is, and how long ago.
+        units: of the state; None for those in which what moves it is balanced.
 
     Raises:
         NoHierarchy: the delays are no multiples of one, or there are too many moments.
@@ -67,7 +68,7 @@ class Delayed:
 
     most = MOST_SIZE
 
-    def __init__(self, moving: Moving, pasts: Sequence[tuple[int, float]]) -> None:
+    def __init__(self, moving: Moving, pasts: Sequence[tuple[int, float]], units: FloatArray | None = None) -> None:
         self._pasts, self.n = pasts, len(moving.steady) - len(pasts)
         try:
             self.unit, self.count = common_delay(pasts)
@@ -79,10 +80,14 @@ class Delayed:
         for rate, exponent in moving.impulses:  # whose second moments are those of white noise
             jump = expm(exponent) - np.eye(len(exponent))
             drift, squares = drift + rate * jump, [*squares, math.sqrt(rate) * jump]
-        self.drift, *others = map(self._split, (drift, *moving.loads, *squares))
+        parts = [self._split(each) for each in (drift, *moving.loads, *squares)]
+        sizes, first = [np.sum(np.abs(each), axis=0) for each in parts], 1 + len(moving.loads)
+        rest = sum((each @ each for each in sizes[first:]), np.zeros_like(sizes[0]))
+        self.units = moving.balance(sizes[:first], rest) if units is None else units
+        self.drift, *others = (each * self.units / self.units[:, None] for each in parts)
         self.loads, self.squares = others[: len(moving.loads)], others[len(moving.loads) :]
-        units = np.eye(self.n * (self.n + 1) // 2)
-        self.symmetric = np.array([moment_form(each, self.n, 2).ravel() for each in units]).T
+        ones = np.eye(self.n * (self.n + 1) // 2)
+        self.symmetric = np.array([moment_form(each, self.n, 2).ravel() for each in ones]).T
 
     @property
     def last(self) -> float:
@@ -102,9 +107,6 @@ class Delayed:
         """The number of second moments."""
         return self.symmetric.shape[1]
 
-    units: FloatArray | None = None
-    """Those in which H is balanced: it is small enough for none."""
-
     @property
     def starts(self) -> tuple[FloatArray, FloatArray]:
         """Moments of some law, and a positive polynomial."""
@@ -115,9 +117,16 @@ class Delayed:
 
     def moments(self, x: FloatArray) -> FloatArray:
         """E √(p!/α!) x^α of a right vector."""
-        return x
+        return x * self._scales
 
-    polynomial = moments
+    def polynomial(self, y: FloatArray) -> FloatArray:
+        """T, as coefficients of these functions, of a left vector."""
+        return y / self._scales
+
+    @property
+    def _scales(self) -> FloatArray:
+        i, j = np.triu_indices(self.n)
+        return self.units[i] * self.units[j]
 
     @property
     def is_still(self) -> bool:

@@ -312,7 +312,7 @@ class Equations:
         moving = Moving(steady, matrices, strengths, squares, jolts)
         self.state: Products | Powers | Delayed
         if pasts := problem.system.pasts:
-            self.state = Delayed(moving, pasts)
+            self.state = Delayed(moving, pasts, like.state.units if like else None)
         else:
             form = Products if p == 2 and problem.dimension > MOST_AS_POWERS else Powers
             self.state = form(moving, p, like.state.units if like else None)

@@ -23,6 +23,24 @@ y = { key = "noise.D0", start = 0.01, stop = 1.0 }
 zero = ["lyapunov_exponent", { moment = 2.0 }, { stability_index = -1.0 }]
 """
 CASE = case_text(CHART, noise={"D0": 0.1})
+LONG = """title = "A delay of thousands of periods"
+[system]
+variables = ["x", "v"]
+drift = ["v", "-x - 0.1*v + 0.5*x(t - tau) - 0.1*xi*x(t - tau)"]
+parameters = { tau = 3000.0 }
+[noise]
+kind = "white"
+s = 1.0
+[moments]
+p = [2.0]
+[output]
+quantities = ["moment"]
+[chart]
+x = { key = "system.tau", start = 3000.0, stop = 5000.0 }
+y = { key = "noise.s", start = 0.1, stop = 1.0 }
+zero = [{ moment = 2.0 }]
+nodes = 3
+"""
 
 
 @pytest.fixture(scope="module")
@@ -256,3 +274,12 @@ def test_a_map_and_its_chart_share_a_folder(path, tmp_path):
     held = read_json(tmp_path / "plane" / "chart.json")["parameters"]
     assert not {"oscillator.omega", "noise.D0"} & held.keys()
     assert {row["line"] for row in read_csv(tmp_path / "plane/chart.csv")} == {"moment 2"}
+
+
+def test_a_chart_of_which_nothing_is_solved_has_failed(tmp_path, capsys):
+    path = tmp_path / "long.toml"
+    path.write_text(LONG, encoding="utf-8")
+    assert main(["chart", str(path), "--out", str(tmp_path)]) == 3
+    told = " ".join(capsys.readouterr().err.split())
+    assert told.count("Λ(2) is found at no point of the frame: Λ(2) did not converge: ") == 1
+    assert told.count("is not found for a delay so long") == 1

@@ -12,6 +12,7 @@ from fpsolve.model import OrnsteinUhlenbeck, Telegraph, White
 from fpsolve.model.faults import TableError
 from fpsolve.model.systems.equations import EquationSystem
 from fpsolve.simulation import simulate
+from fpsolve.simulation.setup import default_step, transient
 from fpsolve.theory import even_moment
 from tests.oracles.segments import Segment
 from tests.random_delays import compared
@@ -50,6 +51,18 @@ def test_growth_by_many_orders_in_a_delay(a, b, tau):
     """Λτ from −300 to 100."""
     found = even_moment(scalar(a / tau, b / math.sqrt(tau), tau), 2)
     assert found.value * tau == pytest.approx(of_scalar(a, b, 1.0), rel=1e-12, abs=1e-12)
+
+
+@pytest.mark.parametrize("rate", [1e-6, 1e-3, 30.0, 100.0, 1e6])
+@pytest.mark.parametrize("unit", [1e-6, 1.0, 1e6])
+def test_units_of_time_and_of_a_variable(rate, unit):
+    """A turned workpiece with times in 1/rate, and v in a unit: Λ(2)/rate is that of the delay Lyapunov equation."""
+    turned = f"{rate * unit!r}*(-x - 0.1*(1 + xi)*(x - x(t - {2 * math.pi / rate!r})))"
+    drift = f"{rate / unit!r}*v", f"{turned} - {0.1 * rate!r}*v"
+    noise = White(s=1 / math.sqrt(rate), interpretation="ito")
+    problem = Problem(EquationSystem(("x", "v"), drift), noise)
+    assert even_moment(problem, 2).value / rate == pytest.approx(-0.0856994783178, abs=2e-13)
+    assert transient(problem.system, noise) / default_step(problem.system, noise) == pytest.approx(888, abs=1)
 
 
 def test_an_oscillator():
