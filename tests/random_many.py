@@ -88,7 +88,7 @@ def compared(seed: int, p: int = 2) -> tuple[bool, str]:
     """Whether both agree within the stated error and rounding, and a line that says it."""
     problem, kind, oracle = drawn(seed)
     started = time.process_time()
-    with mock.patch("fpsolve.theory.moments.MOST_AS_POWERS", 4 if seed % 2 else 16):
+    with mock.patch("fpsolve.theory.moments.MOST_AS_POWERS", 0 if seed % 2 else 10**6):
         found = even_moment(problem, p)
     seconds, expected = time.process_time() - started, oracle(p, found.value)
     off = abs(found.value - expected)

@@ -251,15 +251,25 @@ class DelayRates:
             rows[:, j] += (2 / unit) * np.multiply.outer(slopes[i], np.eye(width)).swapaxes(0, 1)
             for k, each in enumerate(moving):
                 if k <= j:
-                    rows[:, j - k, i] -= each @ expm(generator * unit * k)
+                    rows[:, j - k, i] -= each @ self._relaxed(unit * k)
                 else:
-                    rows[:, k - j - 1, degree - i] -= each @ expm(generator * (j * unit + time)) @ self._turn
+                    rows[:, k - j - 1, degree - i] -= each @ self._relaxed(j * unit + time) @ self._turn
             rows[:, j, i] -= generator
         starts = np.zeros((count, degree + 1, width, count, width))
         starts[np.arange(count), 0, :, np.arange(count)] = np.eye(width)
         size = count * (degree + 1) * width
         found = np.linalg.solve(whole.reshape(size, size), starts.reshape(size, -1))
         return found.reshape(count, degree + 1, width, -1)[:, -1].reshape(count * width, -1)
+
+    def _relaxed(self, time: float) -> Any:
+        """What functions of the noise become, for all matrices."""
+        if time not in self._powers:
+            self._powers[time] = expm(self.generator * time)
+        return _kron(self._powers[time], np.eye(self.state.n**2))
+
+    @cached_property
+    def _powers(self) -> dict[float, Any]:
+        return {}
 
     @cached_property
     def _bound(self) -> float:
@@ -289,13 +299,18 @@ class DelayRates:
         share = float(y @ (both.imag / TINY) @ x)
         return _Near(float(values[at].real) * float(y @ x) / share, x, y / share)
 
-    def rightmost(self, x: FloatArray, y: FloatArray, _: float | None) -> Eigenpair:
-        """Λ from the right, and its vectors, yᵀZ′x = 1: E‖x‖² ≥ ‖E x‖² bounds it from the left."""
+    def rightmost(self, x: FloatArray, y: FloatArray, near: float | None) -> Eigenpair:
+        """Λ from the right, and its vectors, yᵀZ′x = 1: E‖x‖² ≥ ‖E x‖² bounds it from the left.
+
+        Next to a known one it is sought from there.
+        """
         low, high = 2 * self.abscissa, self._bound
         if self.state.is_still:
             size = abs(low) + 1 / self.state.last
             return Eigenpair(low, x, y / (y @ x), 2 * SETTLED * size, size)
         gap, factor, least = high - low, math.exp(-STRIDE), NEAREST * (abs(low) + high - low)
+        if near is not None and near - low > 2 * least:
+            return self._settled(near)
         if not self.state.loads and self._log_radius(low + least) > 0:
             ends = math.log(least), math.log(gap)
             share = float(brentq(lambda log: self._log_radius(low + math.exp(log)), *ends, xtol=NEAR))
@@ -308,8 +323,8 @@ class DelayRates:
                 found = self._settled(low + gap)
                 if 0 <= found.value - low <= gap and found.change < gap:
                     return found
-            near = self._near(low + gap)
-            return Eigenpair(low + gap, near.x, near.y, gap, self._size(low + gap, near))
+            last = self._near(low + gap)
+            return Eigenpair(low + gap, last.x, last.y, gap, self._size(low + gap, last))
         least = factor * gap
         while gap > (1 + NEAR) * least:
             middle = math.sqrt(gap * least)
@@ -348,11 +363,11 @@ class DelayRates:
         moving = _outer(
             [(np.eye(len(self.generator)), own.drift), *zip(self.masses, own.loads, strict=True)], np.eye(1)
         )
-        relaxed = [expm(_kron(self.generator * own.unit * k, np.eye(own.n))) for k in range(count + 1)]
-        moving = [each @ relax for each, relax in zip(moving, relaxed, strict=True)]
-        moving[0] = moving[0] + _kron(self.generator, np.eye(own.n))
         size, last = len(moving[0]), complex(math.nan)
         degree = FEWEST + SHARE * own.last * float(np.linalg.norm(sum(map(np.abs, moving)), 2))
+        for k, each in enumerate(moving):
+            moving[k] = each @ _kron(expm(self.generator * own.unit * k), np.eye(own.n))
+        moving[0] = moving[0] + _kron(self.generator, np.eye(own.n))
         while size * degree <= MOST_SIZE:
             nodes = math.ceil(degree)
             x = np.cos(np.pi * np.arange(nodes + 1) / nodes)

@@ -34,8 +34,8 @@ from fpsolve.theory.powers import Moving, Powers, ladder, moment_form, multinomi
 from fpsolve.theory.products import MOST_NUMBERS, Products
 from fpsolve.theory.rightmost import REMEDY, ROUNDING
 
-MOST_AS_POWERS = 10
-"""Largest number of variables of which the second moments are one vector."""
+MOST_AS_POWERS = 1000
+"""Largest number of second moments that are one vector, times the first functions of the noises."""
 MOST = 20_000
 """Largest number of equations."""
 MOST_MOMENTS = 1000
@@ -101,13 +101,15 @@ def even_moment(
     counts, before = [FIRST] * len(equations.noises), cast(EvenMoment | None, None)
     if near:
         counts = [max(FIRST, int(count / GROWTH)) for count in near.enough]
+    failure = NoHierarchy(
+        f"got p = {p:g}; {most} equations, or {MOST_DEGREES} functions of each noise, are too few for moments "
+        f"under noise so strong or slow; use a smaller p, or {REMEDY}"
+    )
     while True:
         try:
             level = equations.moment(counts, most, before or near)
-        except NoHierarchy:
-            if before is None:
-                raise
-            level = None
+        except NoHierarchy as refusal:
+            level, failure = None, refusal
         if level is None:
             break
         allowed = rtol * level.scale if tolerance is None else tolerance
@@ -127,10 +129,7 @@ def even_moment(
         if not worst:
             break
     if before is None or tolerance is not None or not before.is_positive or before.error > MEANINGLESS * before.scale:
-        raise NoHierarchy(
-            f"got p = {p:g}; {most} equations, or {MOST_DEGREES} functions of each noise, are too few for moments "
-            f"under noise so strong or slow; use a smaller p, or {REMEDY}"
-        )
+        raise failure
     return before
 
 
@@ -314,7 +313,9 @@ class Equations:
         if pasts := problem.system.pasts:
             self.state = Delayed(moving, pasts, like.state.units if like else None)
         else:
-            form = Products if p == 2 and problem.dimension > MOST_AS_POWERS else Powers
+            pairs = math.comb(problem.dimension + 1, 2)
+            first = math.prod(each.degrees.size for each in self._axes([FIRST] * len(self.noises)))
+            form = Products if p == 2 and pairs * first > MOST_AS_POWERS else Powers
             self.state = form(moving, p, like.state.units if like else None)
         self.dimension = problem.dimension - len(pasts)
 
@@ -354,8 +355,10 @@ class Equations:
 
     def _beside(self, near: EvenMoment | None, counts: Sequence[int], own: Any, starts: list[Any]) -> float | None:
         """A σ next to Λ, by a pair next to it that becomes part of the starts; None where none is."""
-        if near is None or not near.is_positive or isinstance(self.state, Delayed):
+        if near is None or not near.is_positive:
             return None
+        if isinstance(self.state, Delayed):
+            return near.value
         axes = self._axes([max(each) for each in zip(counts, near.counts, strict=True)])
         at, there = (_outer([axis.degrees < k for axis, k in zip(axes, c, strict=True)]) for c in (counts, near.counts))
         units = cast("Products | Powers", near.equations.state).scales / self.state.scales

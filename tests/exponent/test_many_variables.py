@@ -102,14 +102,19 @@ def test_a_chart_and_uncertain_parameters():
     assert not found.indices
 
 
-def test_impulses_of_three_variables():
-    free, driven = np.array([[0, 1, 0], [-1, -0.2, 0.5], [0, -0.5, -1.0]]), np.diag([0.0, 0.5, 0.0])
-    terms = [CoefficientMatrix(0, free), CoefficientMatrix(0, driven, identity)]
-    problem = Problem(LinearSystem(terms), Poisson(2.0, (-0.5, 0.8)))
-    impulses = [(1.0, -0.5 * driven), (1.0, 0.8 * driven)]
-    assert moment_lyapunov(problem, 2.0).value[0] == pytest.approx(
-        kronecker.several(free, [], [], impulses, 2, 0.0), abs=1e-12
+@pytest.mark.parametrize("masses", [2, 12])
+def test_impulses_of_many_variables(masses):
+    rng, still, one = np.random.default_rng(5), np.zeros((masses, masses)), np.eye(masses)
+    stiffness, damping, load = rng.standard_normal((3, masses, masses)) / 5
+    stiffness -= np.diag(np.linspace(0.7, 4, masses))
+    free, driven = (
+        np.block([[still, one], [stiffness, 0.3 * (damping - one)]]),
+        np.block([[still, still], [load, still]]),
     )
+    terms = [CoefficientMatrix(0, free), CoefficientMatrix(0, driven, identity)]
+    found = moment_lyapunov(Problem(LinearSystem(terms), Poisson(2.0, (-0.4, 0.2))), 2.0).value[0]
+    impulses = [(1.0, -0.4 * driven), (1.0, 0.2 * driven)]
+    assert found == pytest.approx(kronecker.several(free, [], [], impulses, 2, found + 0.01), abs=1e-12)
 
 
 def test_a_case(tmp_path: Path, capsys: pytest.CaptureFixture[str]):

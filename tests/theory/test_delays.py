@@ -53,6 +53,17 @@ def test_growth_by_many_orders_in_a_delay(a, b, tau):
     assert found.value * tau == pytest.approx(of_scalar(a, b, 1.0), rel=1e-12, abs=1e-12)
 
 
+def test_a_delay_of_two_periods_of_a_load():
+    """By the renewal equation of the fundamental solution, with Chebyshev's polynomials in elements of time."""
+    steady = "-1.957*x - 0.178*v + 0.109*x(t - tau) - 0.29*v(t - tau)"
+    noisy = "-0.711*xi*x + 0.769*xi*x(t - tau) + 0.23*xi*v(t - tau)"
+    nu = 4 * math.pi / 1.848
+    loads = f"0.696*cos({nu!r}*t + 2.416)*x - 0.348*cos({nu!r}*t + 0.276)*x(t - tau)"
+    system = EquationSystem(("x", "v"), ("v", f"{steady} + {noisy} + {loads}"), (("tau", 1.848),))
+    found = moment_lyapunov(Problem(system, White(s=0.679, interpretation="stratonovich")), 2.0)
+    assert found.value[0] == pytest.approx(0.179280376748, abs=5e-12)
+
+
 @pytest.mark.parametrize("rate", [1e-6, 1e-3, 30.0, 100.0, 1e6])
 @pytest.mark.parametrize("unit", [1e-6, 1.0, 1e6])
 def test_units_of_time_and_of_a_variable(rate, unit):

@@ -159,7 +159,7 @@ def test_more_variables(rng, n):
     assert hierarchy_exponent(steady, 6)[0] == pytest.approx(6 * np.linalg.eigvals(free).real.max(), abs=1e-11)
 
 
-@pytest.mark.parametrize("most", [4, 10], ids=["as matrices", "as one vector"])
+@pytest.mark.parametrize("most", [0, 1000], ids=["as matrices", "as one vector"])
 @pytest.mark.parametrize("moved", [0.02, 0.1, 3.0])
 def test_beside_a_known_one(monkeypatch, most, moved):
     """The rightmost one, too, where the known one is of a block, and another that it does not move now grows faster."""
@@ -233,7 +233,7 @@ def test_many_variables_under_coloured_noise():
     free, matrix, _ = chain_of_masses(6)
     problem = driven(free, matrix, OrnsteinUhlenbeck(1.0, 0.4 * math.sqrt(2)))
     found = even_moment(problem, 2)
-    with mock.patch("fpsolve.theory.moments.MOST_AS_POWERS", 20):
+    with mock.patch("fpsolve.theory.moments.MOST_AS_POWERS", 10**6):
         other = even_moment(problem, 2)
     assert abs(found.value - other.value) <= found.error + other.error
     assert found.error < 1e-10
