@@ -32,7 +32,7 @@ from fpsolve.model.parameters import parameter
 from fpsolve.model.problem import Problem
 from fpsolve.theory.frozen import frozen_noise
 
-MAX_STAGES = 30
+MAX_STAGES = 60
 """Number of spaces of a search, of all its places."""
 WORTH_A_TRY = FEW_UNKNOWNS
 """Unknowns of a system that takes less time than finding another one."""
