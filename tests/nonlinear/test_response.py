@@ -1,4 +1,4 @@
-"""The stationary response against identities, a Markov chain, and another code's values."""
+"""The stationary response against identities, and another code's values."""
 
 import math
 
@@ -20,7 +20,6 @@ from fpsolve.fem.noise_axes import PolynomialAxis
 from fpsolve.nonlinear import stationary_response
 from fpsolve.nonlinear.elimination import Tail, solved
 from fpsolve.nonlinear.operator import Elements, Flow, Plane
-from tests.oracles.upwind_chain import Chain
 from tests.random_responses import distances, drawn
 
 SMOOTH = {"omega": 1.0, "epsilon": 0.5, "restitution": 1.0, "c1": 0.4, "c2": 0.5, "c3": 0.2}
@@ -65,36 +64,13 @@ def test_x_drifts_nowhere(rough):
 
 
 @pytest.mark.slow
-def test_moments_have_errors(rough):
+def test_moments_have_errors_and_values_of_two_other_codes_with_impacts(rough):
     assert rough.moment(2, 0).value == rough.means["x_squared"].value
-    finer = response(BOUNCING, 0.05, 0.5, 1e-3)
+    finer = response(BOUNCING, 0.05, 0.5, 1e-4)
     for n, m in ((1, 0), (3, 1), (0, 6)):
         assert agrees(rough.moment(n, m), finer.moment(n, m).value, finer.moment(n, m).error_estimate)
-
-
-@pytest.mark.slow
-def test_a_chain_approaches_it_with_the_first_order(smooth):
-    """The chain's law is positive, and its differences are halved with its steps."""
-    means = smooth.means
-    chain = Chain(1.0, 0.5, 0.4, 0.5, 0.2, 0.0, 2.0, math.sqrt(0.2) / 0.5)
-    coarse, fine = (chain.means((-2.5, 1.6), (20 * n, 16 * n, 10 * n)) for n in (1, 2))
-    assert min(coarse["minimum"], fine["minimum"]) >= 0
-    for name in ("amplitude_squared", "x_squared", "v_squared"):
-        first, second = (each[name] - means[name].value for each in (coarse, fine))
-        assert 0.8 < math.log2(first / second) < 1.3
-
-
-@pytest.mark.slow
-def test_white_noise_is_approached_with_the_first_order():
-    """With c₁ = D₀, c₂ = 0, R = 1 and ε = ω = 1, white noise has ρ ∝ exp(−c₃(x² + ẋ²)/(2D₀)), closed form."""
-    D0, c3 = 0.3, 0.5
-    system = {"omega": 1.0, "epsilon": 1.0, "restitution": 1.0, "c1": D0, "c2": 0.0, "c3": c3}
-    square = 2 * D0 / c3
-    limits = {"amplitude_squared": square, "amplitude_fourth": 2 * square**2}
-    means = [response(system, D0, tau0, 1e-4).means for tau0 in (0.01, 0.005)]
-    for name, limit in limits.items():
-        first, second = (each[name].value - limit for each in means)
-        assert math.log2(first / second) == pytest.approx(1, abs=0.12)
+    assert agrees(finer.means["amplitude"], 1.539962, 1e-6)
+    assert agrees(finer.means["amplitude_squared"], 2.510536, 1e-6)
 
 
 @pytest.mark.slow
@@ -136,14 +112,7 @@ def test_values_of_two_other_codes(smooth):
 
 
 @pytest.mark.slow
-def test_values_of_two_other_codes_with_impacts():
-    means = response(BOUNCING, 0.05, 0.5, 1e-4).means
-    assert agrees(means["amplitude"], 1.539962, 1e-6)
-    assert agrees(means["amplitude_squared"], 2.510536, 1e-6)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_what_the_noise_feeds_in_is_lost_at_impacts(seed):
     """E q + ln R times the flux of ρ at the impacts is 0, which the discrete equations do not imply."""
     rng = np.random.default_rng(seed)
@@ -157,7 +126,7 @@ def test_what_the_noise_feeds_in_is_lost_at_impacts(seed):
 @pytest.mark.parametrize("seed", [6])
 def test_the_simulation_has_the_same_means(seed):
     """Two of the twenty that `python -m tests.random_responses` compares."""
-    far = distances(drawn(seed), seed, rtol=1e-3, paths=4096)
+    far = distances(drawn(seed), seed, rtol=1e-3, paths=1024)
     assert max(map(abs, far.values())) < 4
 
 

@@ -219,26 +219,6 @@ def test_periodic_by_pi(grids):
     np.testing.assert_allclose(one, other, rtol=1e-4)
 
 
-def at_random(grid):
-    """A grid as VTK itself interpolates it, at 300 random points."""
-    rng = np.random.default_rng(5)
-    points = np.column_stack([rng.uniform(0, 2 * np.pi, 300), rng.uniform(-2, 2, 300), np.zeros(300)])
-    return pyvista.PolyData(points).sample(grid)
-
-
-@pytest.fixture(scope="module")
-def reference(tmp_path_factory):
-    solver = ExponentSolver(Problem(HARD, UNIT_NOISE), MESHES["full circle"])
-    return at_random(written(tmp_path_factory.mktemp("reference"), solver, [2.0])[2.0])
-
-
-@pytest.mark.slow
-def test_every_mesh_shows_the_same_field(grids, reference):
-    found = at_random(grids[2.0])
-    for name in ("T", "T_adjoint", "stationary_density"):
-        np.testing.assert_allclose(found[name], reference[name], atol=2e-4 * np.abs(reference[name]).max())
-
-
 def test_nodes_are_on_the_polynomials(tmp_path):
     """Values from the file against the elements evaluated at the middle of every mesh cell, in both half turns."""
     solver = ExponentSolver(Problem(HARD, UNIT_NOISE), make_mesh(phi_cells=3, phi_degree=4, xi_cells=6, xi_degree=4))

@@ -116,14 +116,6 @@ def test_nothing_moves_at_p_zero():
     assert not objection(found.certificate)
 
 
-@pytest.mark.slow
-def test_a_width_beyond_reach_is_told():
-    found = prove(problem(**FIG1 | {"epsilon": 0.05, "D0": 0.1}, reduced=True), 1.0, width=1e-30)
-    assert found.is_proven
-    assert not found.is_met
-    assert found.width < 1e-12
-
-
 def test_a_bound_takes_no_longer_than_stated(monkeypatch):
     """By a clock that each look sets forward by a second: a trial is foreseen to take as long as the last one."""
     seconds, told, motion = itertools.count(), [], problem(**FIG1 | {"reduced": True})
@@ -168,7 +160,10 @@ def test_random_problems(seed):
 
 
 @pytest.mark.slow
-def test_a_shift_next_to_an_eigenvalue_ends_the_search():
+def test_a_width_beyond_reach_is_told_and_a_shift_next_to_an_eigenvalue_ends_the_search():
     """p = 1e-300: the matrix shifted by Λ(p) is singular but for what underflows."""
     found = prove(problem(**FIG1 | {"epsilon": 0.05, "D0": 0.1}, reduced=True), 1e-300, width=1e-30)
     assert found.lower < 0 < found.upper
+    assert found.is_proven
+    assert not found.is_met
+    assert found.width < 1e-12

@@ -17,7 +17,7 @@ SEEDS = {
 def test_a_random_system_is_simulated(seed):
     """In the first a wall."""
     kind, problem = drawn(seed)
-    found = outcomes(problem, paths=2048 if " and " in kind else 4096, transients=4)
+    found = outcomes(problem, paths=2048 if " and " in kind else 4096, transients=2)
     assert kind == SEEDS[seed]
     assert problem.system.jumps or seed != 3
     for each in found:
