@@ -1,6 +1,5 @@
 """What every room of fpsolve promises; the order of imports between them is in pyproject.toml, for import-linter."""
 
-import ast
 import importlib
 import io
 import subprocess
@@ -40,17 +39,19 @@ CHECKOUT = Path(__file__).parents[1]
 WEIGHT = Path(__file__).with_name("weight.toml")
 MENDED = 4000
 """What all rows together may rise by while wrong numbers are mended; 0 afterwards."""
-NOT_COUNTED = {getattr(tokenize, name) for name in ("COMMENT", "NL", "NEWLINE", "INDENT", "DEDENT", "ENDMARKER")}
+NOT_SEEN = tokenize.COMMENT, tokenize.NL
+NOT_COUNTED = tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT, tokenize.ENDMARKER
 
 
 def tokens(text: str) -> int:
     """Tokens of Python, but for comments and docstrings: no matter how lines are broken, or how long names are."""
-    docs = set[int]()
-    for node in ast.walk(ast.parse(text)):
-        if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str):
-            docs |= set(range(node.lineno, (node.end_lineno or node.lineno) + 1))
-    found = tokenize.generate_tokens(io.StringIO(text).readline)
-    return sum(each.type not in NOT_COUNTED and each.start[0] not in docs for each in found)
+    found = [each for each in tokenize.generate_tokens(io.StringIO(text).readline) if each.type not in NOT_SEEN]
+    kinds = [tokenize.NEWLINE, *(each.type for each in found)]
+    docs = sum(
+        kind == tokenize.STRING and before in NOT_COUNTED and after == tokenize.NEWLINE
+        for before, kind, after in zip(kinds, kinds[1:], kinds[2:], strict=False)
+    )
+    return sum(each not in NOT_COUNTED for each in kinds) - docs
 
 
 def weights(top: str) -> dict[str, int]:

@@ -10,7 +10,6 @@ import sys
 import threading
 import tomllib
 from contextlib import ExitStack, contextmanager
-from itertools import product
 from pathlib import Path
 from statistics import median
 
@@ -336,8 +335,6 @@ def turn(page, key, value):
 @pytest.mark.parametrize(
     ("name", "key", "value"),
     [
-        ("fig1", "noise.D0", "0.7"),
-        ("systems/own_equation", "system.zeta", "0.15"),
         ("systems/beam", "noise.alpha", "1.5"),
         ("systems/hoisted", "noise.s", "0.03"),
     ],
@@ -395,7 +392,7 @@ def test_bad_input_reset_and_the_end_of_the_server(browser):
 def test_the_page_can_be_used_by_everyone(browser):
     axe = pytest.importorskip("axe_playwright_python.sync_playwright").Axe()
     with explored(browser, "fig1") as page:
-        for width, scheme in product((400, 1280), ("light", "dark")):
+        for width, scheme in ((400, "light"), (1280, "dark")):
             page.set_viewport_size({"width": width, "height": 900})
             page.emulate_media(color_scheme=scheme)
             for tab in page.locator("#views label").all():
@@ -462,7 +459,7 @@ async count => {
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "most", "count"), [("fig1", 500, 20), ("strong", 2000, 5)])
+@pytest.mark.parametrize(("name", "most", "count"), [("fig1", 500, 9), ("strong", 2000, 3)])
 def test_a_curve_follows_a_slider_at_once(browser, name, most, count):
     with explored(browser, name) as page:
         times = page.evaluate(MOVES, count)

@@ -28,7 +28,7 @@ TURNED = problem(White(s=1.0), RATES @ FREE @ np.linalg.inv(RATES), RATES @ COUP
 
 @pytest.fixture(scope="module")
 def white():
-    return ExponentSolver(problem(White(s=1.0)), rtol=1e-4)
+    return ExponentSolver(problem(White(s=1.0)), rtol=1e-3)
 
 
 def turning(n, coordinates):
@@ -52,7 +52,7 @@ def enriched(pair):
     return principal_pair(type(generator)(generator.problem, finer), pair.p, start=pair)
 
 
-@pytest.mark.parametrize(("n", "p"), sampled((3, 0.0), (4, 1.5), (3, 1.5), (4, 0.0), keep=2))
+@pytest.mark.parametrize(("n", "p"), sampled((3, 0.0), (4, 1.5)))
 def test_isotropic_systems_in_any_coordinates(n, p):
     """‖y‖ falls as exp(−0.1t) and its directions are uniform, so that those of x = Gy have 1/(|S| |det G| ‖G⁻¹e‖ⁿ)."""
     coordinates = np.eye(n) + 0.4 * np.random.default_rng(7).uniform(-1, 1, (n, n))
@@ -237,6 +237,7 @@ def test_what_densities_say():
         furstenberg_khasminskii(solver.pair(0.0))
 
 
+@pytest.mark.slow
 def test_at_a_stop_directions_are_those_between_impacts():
     """T(z) = T(Jz), as many paths come back as leave, and ∫T T* = 1, at a sum of displacements, on coarse functions."""
     system = ModalSystem.of(

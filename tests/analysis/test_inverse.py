@@ -182,7 +182,7 @@ def measured(problem, target):
     return value / wanted.order if wanted.kind == "stability_index" else value - wanted.value
 
 
-@pytest.mark.parametrize("seed", sampled(*range(10), keep=2))
+@pytest.mark.parametrize("seed", sampled(*range(5), keep=1))
 def test_random_designs_are_met_or_a_scan_shows_that_they_cannot_be(seed):
     problem, target, axis = drawn(seed)
     found = design(problem, target, axis)

@@ -26,7 +26,7 @@ from tests.oracles import moment_hierarchy, phase_fraction
 from tests.random_sensitivities import RTOL, central, drawn, problem_of
 
 
-@pytest.mark.parametrize("seed", sampled(*range(1, 8), keep=2))
+@pytest.mark.parametrize("seed", sampled(*range(1, 5), keep=2))
 def test_of_a_moment_are_central_differences(seed):
     """Many more: `python -m tests.random_sensitivities`."""
     theta, law, is_exact, p = drawn(seed)
@@ -43,7 +43,7 @@ def test_of_a_moment_are_central_differences(seed):
         assert estimate.error_estimate < 1e-6 * max(size, estimate.scale), key
 
 
-@pytest.mark.parametrize("seed", sampled(53, 54, 57))
+@pytest.mark.parametrize("seed", sampled(53, 57, keep=0))
 def test_of_the_indices_are_central_differences(seed):
     theta, law, is_exact, _ = drawn(seed)
     problem, _ = problem_of(theta, law, is_exact)
@@ -135,6 +135,7 @@ def test_damping_of_the_exact_moment():
         assert found[key].value == pytest.approx(value, abs=1e-9), key
 
 
+@pytest.mark.slow
 def test_against_the_moment_hierarchy():
     """Λ(2) without walls from equations without a phase, differentiated by differences of them."""
     theta = {"omega": 1.0, "c1": 0.1, "epsilon": 1.0, "D0": 1.0, "tau0": 0.5, "r0": 0.8}

@@ -67,11 +67,10 @@ def wanted(found, label):
     ]
 
 
-@pytest.mark.parametrize("epsilon", sampled(0.5, 0.1))
 @pytest.mark.parametrize("zero", sampled(LAMBDA, SECOND, INDEX))
-def test_f_is_zero_on_a_line(zero, epsilon):
+def test_f_is_zero_on_a_line(zero):
     """Also if it is solved anew and more tightly, which moves the line by less than its width."""
-    found = line(zero, epsilon=epsilon)
+    found = line(zero, epsilon=0.5)
     [trace] = found.traces
     assert [trace.points[k].label for k in (0, -1)] == [FRAME, FRAME]
     for point in trace.points[::4]:
@@ -103,9 +102,6 @@ def test_weak_noise_has_the_lines_of_the_paper(zero, omega):
     sampled(
         (1.0, 1.5, 0.4, 0.3, 1.3),
         (3.0, 1.0, 1.0, 0.2, 0.8),
-        (1.0, 0.1, 1.0, 0.5, 1.0),
-        (1.0, 0.5, 0.3, 2.0, 0.95),
-        (0.5, 1.0, 0.5, 1.0, 0.5),
         (2.0, 1.0, 2.0, 0.5, 0.0),
         keep=2,
     ),
@@ -125,7 +121,7 @@ def test_without_impacts_the_line_of_index_minus_two_is_exact(omega, epsilon, d0
     assert not any("fold" in label for label in branch.labels)  # though ∂F/∂ω = 0 all along
 
 
-@pytest.mark.parametrize("zero", sampled(LAMBDA, SECOND, INDEX, {"moment": 1e-5}))
+@pytest.mark.parametrize("zero", sampled(LAMBDA, INDEX))
 @pytest.mark.parametrize(
     ("x", "y", "at"),
     [
@@ -291,7 +287,7 @@ def test_almost_sure_stability_ends_at_the_paper_s_spectral_density():
         assert density(1.5, replace(NOISE, D0=d0)) == pytest.approx(-4 * c1 + 8 * 1.5 * 0.2 / math.pi, rel=1e-3)
 
 
-@pytest.mark.parametrize("index", sampled(-1.0, 0.5, 2.0))
+@pytest.mark.parametrize("index", sampled(-1.0, 0.5))
 def test_moment_stability_ends_at_the_paper_s_index(index):
     """Eq. (38): the moments 0 < p < δ_p are stable, so that δ_p = v is where that of p = v ceases to be."""
     omega = 2.0
@@ -313,10 +309,9 @@ def test_moment_stability_ends_at_the_paper_s_index(index):
         keep=2,
     ),
 )
-@pytest.mark.parametrize("zero", sampled(LAMBDA, SECOND))
-def test_what_the_paper_says_of_each_parameter(zero, key, values, sign):
+def test_what_the_paper_says_of_each_parameter(key, values, sign):
     """Section 5: D₀, r₀, r and c₁ take stability away; ω and τ₀ add to it: the c₁ where it ends falls, or rises."""
-    found = line(zero, Axis(key, *values), Axis("oscillator.c1", -5.0, 1.0))
+    found = line(x=Axis(key, *values), y=Axis("oscillator.c1", -5.0, 1.0))
     [branch] = found.branches
     order = np.argsort(branch.x)
     assert np.all(sign * np.diff(branch.y[order]) < 0)

@@ -49,6 +49,7 @@ def test_nothing_lies_right_of_the_principal_eigenvalue_in_strong_noise(epsilon,
     assert abs(rightmost.imag) < 1e-10
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("p", sampled(-1.0, 2.0))
 def test_spectrum_of_the_full_circle_against_fourier_hermite(p):
     oscillator = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=0.3)

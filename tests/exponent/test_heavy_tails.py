@@ -25,11 +25,8 @@ from fpsolve.analysis import excursion
 from fpsolve.errors import NoSuchExponent
 from fpsolve.exponent import impact_rate
 from fpsolve.fem import make_mesh
-from tests.conftest import sampled
 from tests.oracles import asinh_grid
 
-SETS = 2
-"""Random sets, of a second or two."""
 REASON = "for r0 > 1 the noise has algebraic tails, so that Λ\\(p\\) is infinite for p > 0 and p < -1, and between"
 
 
@@ -96,13 +93,12 @@ def test_an_interval_is_wide_enough_for_any_tolerance():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("case", sampled(HEAVY, problem(1.0, 0.5, 1.2, 0.1, restitution=0.8, c1=-0.2), keep=1))
-def test_by_finite_differences(case):
-    check(case, 1e-7)
+def test_by_finite_differences():
+    check(HEAVY, 1e-7)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(SETS))
+@pytest.mark.parametrize("seed", [0])
 def test_random_sets(seed):
     rng = np.random.default_rng(1000 + seed)
     case = problem(
@@ -122,7 +118,7 @@ def test_by_simulation():
     assert found.lyapunov_exponent_error < 0.05 * exponent.value
 
 
-@pytest.mark.parametrize("departure", [1e-12, 1e-9, 1e-7, 1e-6, 1e-5, 1e-4])
+@pytest.mark.parametrize("departure", [1e-12, 1e-7, 1e-4])
 def test_next_to_gaussian_noise(departure):
     """λ tends to that for r₀ = 1, linearly; no warning, as pytest makes errors of them."""
     exponents = [lyapunov_exponent(problem(0.5, 1.0, r0, 0.1, restitution=0.8)).value for r0 in (1.0, 1 + departure)]

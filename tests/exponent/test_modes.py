@@ -37,6 +37,7 @@ from fpsolve.fem.sphere import SphereAxis
 from fpsolve.model import CoefficientMatrix, Jump, LinearSystem, Poisson, Telegraph, White
 from fpsolve.simulation import simulated_response
 from tests import random_modes, random_units
+from tests.conftest import sampled
 from tests.oracles import kronecker
 
 FREE = np.array([[0, 1, 0, 0], [-1, -0.1, 0, 0], [0, 0, 0, 1], [0, 0, -2.56, -0.16]])
@@ -93,7 +94,7 @@ def test_second_moments(seed, n, kind):
         np.testing.assert_allclose(rate, expected * moments, atol=1e-9 * np.max(moments))
 
 
-@pytest.mark.parametrize(("seed", "n"), [(0, 3), (3, 3), (2, 4)])
+@pytest.mark.parametrize(("seed", "n"), sampled((0, 3), (2, 4)))
 def test_even_moments_under_white_noise(seed, n):
     """By elements."""
     steady, driven = random_system(seed, n)
@@ -157,7 +158,7 @@ def test_even_moments_alone_have_all_digits(seed):
         assert solver.even(float(p)).value == pytest.approx(expected(p), abs=1e-10)
 
 
-@pytest.mark.parametrize(("noise", "driven"), [(White(s=1.0), COUPLED), (Telegraph(a=0.5, k=0.5), COUPLED)])
+@pytest.mark.parametrize(("noise", "driven"), sampled((White(s=1.0), COUPLED), (Telegraph(a=0.5, k=0.5), COUPLED)))
 def test_what_finer_waves_change_is_told_to_first_order(noise, driven):
     """The value with the correction is nearer to that of a finer space by far, which has the next waves."""
     given = problem(noise, driven=driven)
@@ -175,7 +176,7 @@ def test_what_finer_waves_change_is_told_to_first_order(noise, driven):
     assert told == pytest.approx(found[1].value - found[0].value, rel=0.1)
 
 
-@pytest.mark.parametrize(("seed", "count"), [(3, 3), (9, 8)])
+@pytest.mark.parametrize(("seed", "count"), sampled((9, 8), (3, 3)))
 def test_what_polynomials_of_the_noise_lack_is_told(seed, count):
     """It is more than what many others change, and less than 50 times that: effects of the highest are 100 times."""
     given = random_modes.drawn(seed)[1]
@@ -203,6 +204,7 @@ def test_the_end_of_the_spectrum_takes_no_array_of_all_directions():
     assert peak < 2 * pencil.space.phi.size**2
 
 
+@pytest.mark.slow
 def test_a_sign_takes_a_smaller_space():
     """λ within 0.3 of itself, and within its stated error of that at a tighter rtol."""
     given = load_case(Path(__file__).parents[2] / "cases/systems/coupled_ou.toml").problem
@@ -262,9 +264,10 @@ def test_the_usual_error_is_that_of_cases():
     assert problem(White(s=1.0)).usual_rtol == 1e-5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("driven", "expected", "unit"),
-    [(COUPLED, WHITE, 1e-7), pytest.param(0.1 * COUPLED, WEAK, 1e-9, marks=pytest.mark.slow)],
+    [(COUPLED, WHITE, 1e-7), (0.1 * COUPLED, WEAK, 1e-9)],
     ids=["strong", "weak"],
 )
 def test_odd_moments_of_two_modes(driven, expected, unit):

@@ -65,6 +65,7 @@ def test_moments_are_those_of_monomials(p):
     assert planar.moment_exponent(planar.Planar(STEADY, white=(DRIVEN,)), p, 0)[0] == pytest.approx(expected)
 
 
+@pytest.mark.slow
 def test_fourier_series_are_those_of_another_code():
     for noise, made in (
         (planar.ornstein_uhlenbeck(1.7, 0.4), phase_circle.ornstein_uhlenbeck(STEADY, DRIVEN, 1.7, 0.4, 12)),

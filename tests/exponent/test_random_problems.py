@@ -17,6 +17,7 @@ def solved(outcomes):
     return [outcome for outcome in outcomes if isinstance(outcome, Outcome)]
 
 
+@pytest.mark.slow
 def test_none_is_refused(outcomes):
     assert not [outcome for outcome in outcomes if isinstance(outcome, str)]
 

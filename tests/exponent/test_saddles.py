@@ -55,7 +55,7 @@ def test_bounded_noise(steady):
     assert abs(found.pair.value - expected) <= found.error + 1e-10
 
 
-@pytest.mark.parametrize("noise", [SineWiener(amplitude=0.3, sigma=1.0), MarkovChain.telegraph(0.3, 1.0)])
+@pytest.mark.parametrize("noise", sampled(MarkovChain.telegraph(0.3, 1.0), SineWiener(amplitude=0.3, sigma=1.0)))
 def test_starts_matter_below_minus_one(noise):
     """A constant trace makes Λ even about −1, where another class takes over: that of starts around the slower mode."""
     own = solver(SADDLE, noise)

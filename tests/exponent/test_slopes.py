@@ -30,7 +30,7 @@ def differences(problem, p, h, rtol):
 @pytest.mark.parametrize(
     "noise", [OrnsteinUhlenbeck(1.0, 1.0), White(s=0.5), SineWiener(3.0, 0.6), Telegraph(3.0, 1.0)]
 )
-@pytest.mark.parametrize("p", [-2.0, 1.0, 2.0])
+@pytest.mark.parametrize("p", [-2.0, 1.0])
 def test_slopes_of_an_oscillator(noise, p):
     found = moment_lyapunov(problem := Problem(OSCILLATOR, noise), p)
     slope, rounding = differences(problem, p, 0.02, 1e-9)

@@ -10,7 +10,6 @@ from fpsolve.exponent.adapt import Budget, WholeProblem
 from fpsolve.exponent.starts import Question
 from fpsolve.exponent.stopped import StopStart, stop_start
 from fpsolve.model import PlaneSystem, Problem, Telegraph, White
-from tests.conftest import sampled
 
 NAMES = "q1", "v1", "q2", "v2"
 TELEGRAPH = Telegraph(a=0.5, k=0.7)
@@ -32,6 +31,7 @@ def white_coupling(strength, walls=()):
     return Problem(PlaneSystem.of_equations(NAMES, rates, walls=walls), White(0.7))
 
 
+@pytest.mark.slow
 def test_an_elastic_stop_under_white_noise_in_the_coupling_changes_no_law():
     """|q₁| of the system without it: an impact turns the sign of dW, which remains white noise."""
     elastic = white_coupling(0.8, [{"at": "q1 = 0", "restitution": 1.0}])
@@ -39,7 +39,8 @@ def test_an_elastic_stop_under_white_noise_in_the_coupling_changes_no_law():
     assert abs(found.pair.value - expected.pair.value) <= found.error + expected.error < 1e-4
 
 
-@pytest.mark.parametrize("noise", sampled(TELEGRAPH, White(s=0.35)))
+@pytest.mark.slow
+@pytest.mark.parametrize("noise", [TELEGRAPH, White(s=0.35)])
 def test_a_mode_that_drives_another_has_the_exponents_of_the_oscillator_with_a_wall(noise):
     """Of the block by itself, and of both together by elements of the half sphere."""
     walls = [{"at": "q1 = 0", "restitution": 0.63}]

@@ -29,7 +29,7 @@ def problem(noise, trace):
 
 
 def values(problem, p):
-    found = ExponentSolver(problem, rtol=1e-9).moments(p)
+    found = ExponentSolver(problem, rtol=1e-7).moments(p)
     assert not found.failures
     return found.value, found.error_estimate
 

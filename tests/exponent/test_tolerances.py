@@ -8,13 +8,13 @@ from tests.conftest import sampled
 from tests.random_tolerances import MOST, compared
 
 
-@pytest.mark.parametrize("seed", sampled(272, 380, 1486, 491, 2, 12, 31, 50, keep=4))
+@pytest.mark.parametrize("seed", sampled(272, 380, 1486, 491, 2, 12, keep=3))
 def test_random_tolerances(seed):
     """Many more: `python -m tests.random_tolerances`. In the first four a layer of T lay within a cell of φ."""
     assert (found := compared(seed)).share <= MOST, found
 
 
-@pytest.mark.parametrize("rtol", [1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 3e-5])
+@pytest.mark.parametrize("rtol", [1e-2, 1e-3, 1e-4])
 def test_effects_that_fall_slowly(rtol):
     """Slow, strong noise in the stiffness at p < 0, where each polynomial lowers the error by a tenth only.
 

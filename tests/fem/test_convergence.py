@@ -69,6 +69,7 @@ def test_order_with_the_end_point_power_of_a_bounded_noise(r0):
     assert orders(errors)[-1] > 3.9
 
 
+@pytest.mark.slow
 def test_truncation_error_falls_with_the_tilted_density_at_the_ends():
     errors = [error(**FINE_PHI, xi_cells=5, xi_degree=14, xi_min=-w, xi_max=w) for w in (4.0, 5.0, 6.0, 7.0)]
     assert errors[-1] < 1e-8

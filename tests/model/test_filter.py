@@ -22,6 +22,7 @@ from fpsolve.fem.space import Space
 from fpsolve.model import CoefficientMatrix, Filter, ParametricOscillator, White, noise_kind
 from fpsolve.simulation.motions import draw
 from tests import random_filters
+from tests.conftest import sampled
 from tests.kit import case_in
 from tests.oracles import filtered
 
@@ -63,7 +64,7 @@ def test_the_mean_square_of_a_spring(output, zeta, expected):
 
 
 @pytest.mark.parametrize("output", OUTPUTS)
-@pytest.mark.parametrize("zeta", [pytest.param(0.1, marks=pytest.mark.slow), 0.3])
+@pytest.mark.parametrize("zeta", sampled(0.3, 0.1))
 def test_fourth_moments(output, zeta):
     law = law_of(output, zeta)
     found = solved(Filter(*law), 4.0, rtol=1e-6 if zeta < 0.2 else 1e-8)
@@ -269,6 +270,7 @@ def test_random_filters(seed):
     assert (found := random_filters.compared(seed)).is_within, found
 
 
+@pytest.mark.slow
 def test_a_filter_that_needs_a_high_degree():
     """Of a few waves of φ each, which T of a filter needs no more than."""
     found = random_filters.compared(10)

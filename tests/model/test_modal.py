@@ -83,7 +83,7 @@ def test_one_mode_is_an_oscillator():
     assert abs(sensitivities(ours, 2.0).moments[0]["system.m"].value) < 1e-10
 
 
-@pytest.mark.parametrize("seed", sampled(*range(10), keep=2))
+@pytest.mark.parametrize("seed", sampled(*range(4), keep=2))
 def test_one_mode_and_its_matrices_are_one_system_of_the_plane(seed):
     """By mass, damping and stiffness, by matrices of any dimension, and by equations, to 1e-10."""
     rng = np.random.default_rng([30, seed])

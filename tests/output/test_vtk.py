@@ -1,5 +1,6 @@
 """ParaView files: what pyvista reads back from them."""
 
+import functools
 import os
 import subprocess
 import sys
@@ -33,9 +34,14 @@ ROOT = Path(__file__).parents[2]
 NO_FIGURE = "output.figure=false"
 
 
+@functools.cache
+def solver_on(mesh):
+    return ExponentSolver(Problem(HARD, UNIT_NOISE), MESHES[mesh])
+
+
 @pytest.fixture(scope="module", params=sampled(*list(MESHES)[:2]))
 def solver(request):
-    return ExponentSolver(Problem(HARD, UNIT_NOISE), MESHES[request.param])
+    return solver_on(request.param)
 
 
 @pytest.fixture(scope="module")
@@ -248,7 +254,7 @@ def test_first_order_eigenfunction(tmp_path):
 
 @pytest.mark.slow
 def test_stationary_pair_may_be_of_another_mesh(tmp_path):
-    coarse, fine = (ExponentSolver(Problem(HARD, UNIT_NOISE), MESHES[k]) for k in list(MESHES)[:2])
+    coarse, fine = map(solver_on, list(MESHES)[:2])
     _, own = write_eigenfunctions(tmp_path / "own", [coarse.pair(2.0)], coarse.pair(0.0))
     _, other = write_eigenfunctions(tmp_path / "other", [coarse.pair(2.0)], fine.pair(0.0))
     one, two = (pyvista.read(file)["stationary_density"] for file in (own, other))

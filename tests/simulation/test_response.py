@@ -28,7 +28,7 @@ def weak():
     exponent, s_square, _ = averaged(oscillator)
     step = default_step(oscillator, NOISE)
     return oscillator, simulated_response(
-        Problem(oscillator, NOISE), exponent, s_square, paths=1024, time=100.0, step=step, seed=1
+        Problem(oscillator, NOISE), exponent, s_square, paths=512, time=100.0, step=step, seed=1
     )
 
 

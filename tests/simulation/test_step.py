@@ -216,13 +216,13 @@ def noise_after(noise, xi, time, rng, h=None, bias=0.0):
 
 @pytest.mark.parametrize(
     ("r0", "origin"),
-    sampled(*product((0.5, 0.7, 0.95, 1.2), ("zero", "stationary")), (0.0, "stationary"), keep=8),
+    sampled(*product((0.5, 0.95, 1.2), ("zero", "stationary")), (0.0, "stationary"), keep=6),
 )
 def test_noise_has_its_stationary_law(r0, origin):
-    """A Kolmogorov-Smirnov test of 1e5 independent paths against Eq. (9)."""
+    """A Kolmogorov-Smirnov test of 4e4 independent paths against Eq. (9)."""
     noise = NonGaussianNoise(D0=0.8, tau0=1.3, r0=r0)
     rng = np.random.default_rng([7, int(100 * r0), len(origin)])
-    xi = noise.start(100_000, rng) if origin == "stationary" else np.zeros(100_000)
+    xi = noise.start(40_000, rng) if origin == "stationary" else np.zeros(40_000)
     xi = noise_after(noise, xi, noise.tau0 * (2 if origin == "stationary" else 6), rng)
     assert np.all(np.abs(xi) < noise.half_width)
     reach = min(noise.half_width, 60 * noise.standard_deviation)

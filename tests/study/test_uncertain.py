@@ -75,14 +75,14 @@ CASES += [WALL.replace("c1 = -0.4", "c1 = -0.2").replace('"noise.D0" = 0.05', '"
 
 @pytest.mark.parametrize("text", sampled(*CASES[2:], keep=0))
 def test_samples_lie_in_the_intervals_as_stated(text, tmp_path):
-    """Of 80 some 95 %: by more than four standard errors of chance, 10 %, they are no others."""
+    """Of 40 some 95 %: by more than four standard errors of chance, 14 %, they are no others."""
     case = case_of(tmp_path, text, "moments.p=[2.0]")
-    sets = latin_hypercube(case.uncertain.laws(case.problem), 80)
+    sets = latin_hypercube(case.uncertain.laws(case.problem), 40)
     [result], drawn = solved(case), solved(case.model_copy(update={"vary": Vary(sets, "zip")}))
     spreads = spreads_of(case, result)
     for name, spread in spreads.indices.items():
         values = np.array([each.estimates[name].value for each in drawn])
-        assert np.mean((values > spread.low) & (values < spread.high)) == pytest.approx(0.95, abs=0.1)
+        assert np.mean((values > spread.low) & (values < spread.high)) == pytest.approx(0.95, abs=0.14)
         assert np.std(values) == pytest.approx(spread.deviation, rel=0.15)
     values = np.array([each.moment(2.0).value for each in drawn])
     assert np.std(values) == pytest.approx(spreads.moments[2.0].deviation, rel=0.15)

@@ -170,16 +170,15 @@ def test_a_telegraph_signal():
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("names", "drift", "noise"),
+    ("drift", "noise", "paths"),
     [
-        (("x",), ("-x + 0.4*x(t - 1) + 0.2*xi*(x + x(t - 0.5))",), ITO),
-        (("x",), ("-x + 0.2*xi*x + 0.4*x(t - 1)",), OrnsteinUhlenbeck(alpha=1.0, sigma=0.8)),
+        ("-x + 0.4*x(t - 1) + 0.2*xi*(x + x(t - 0.5))", ITO, 8192),
+        ("-x + 0.2*xi*x + 0.4*x(t - 1)", OrnsteinUhlenbeck(alpha=1.0, sigma=0.8), 5120),
     ],
 )
-def test_simulated_paths(names, drift, noise):
-    problem = Problem(EquationSystem(names, drift), noise)
-    paths, time = (4096, 101.0) if len(names) == 2 else (8192, 30.0)
-    (found,) = simulate(problem, 2.0, estimator="population", paths=paths, time=time).estimates
+def test_simulated_paths(drift, noise, paths):
+    problem = Problem(EquationSystem(("x",), (drift,)), noise)
+    (found,) = simulate(problem, 2.0, estimator="population", paths=paths, time=30.0).estimates
     assert abs(found.value - even_moment(problem, 2, rtol=1e-9).value) <= 4 * found.standard_error
     assert found.standard_error <= 5e-3
 

@@ -160,7 +160,7 @@ def test_more_variables(rng, n):
 
 
 @pytest.mark.parametrize("most", [0, 1000], ids=["as matrices", "as one vector"])
-@pytest.mark.parametrize("moved", [0.02, 0.1, 3.0])
+@pytest.mark.parametrize("moved", [0.02, 3.0])
 def test_beside_a_known_one(monkeypatch, most, moved):
     """The rightmost one, too, where the known one is of a block, and another that it does not move now grows faster."""
     monkeypatch.setattr("fpsolve.theory.moments.MOST_AS_POWERS", most)
@@ -196,7 +196,7 @@ def test_random_systems(seed):
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("seed", "p"),
-    [(seed, 2) for seed in range(1, 27, 2)] + [(seed, 2) for seed in range(90, 117, 8)] + [(5, 4), (17, 4)],
+    [(seed, 2) for seed in range(1, 27, 4)] + [(90, 2), (106, 2), (5, 4)],
 )
 def test_more_random_systems(seed, p):
     """All kinds of up to six variables; `python -m tests.random_many` has others, of up to twelve, too."""
