@@ -111,13 +111,6 @@ def test_random_sets(seed):
     check(case, 1e-5)
 
 
-@pytest.mark.slow
-def test_by_simulation():
-    found, exponent = simulate(HEAVY, [], paths=4096, seed=3), lyapunov_exponent(HEAVY)
-    assert found.lyapunov_exponent == pytest.approx(exponent.value, abs=4 * found.lyapunov_exponent_error)
-    assert found.lyapunov_exponent_error < 0.05 * exponent.value
-
-
 @pytest.mark.parametrize("departure", [1e-12, 1e-7, 1e-4])
 def test_next_to_gaussian_noise(departure):
     """λ tends to that for r₀ = 1, linearly; no warning, as pytest makes errors of them."""

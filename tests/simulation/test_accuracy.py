@@ -17,12 +17,3 @@ def test_population_succeeds_where_the_direct_estimator_fails():
     assert not population.warnings
     assert population.estimates[0].value == pytest.approx(reference, rel=1e-2)
     assert population.estimates[0].standard_error < 2e-3 * reference
-
-
-@pytest.mark.slow
-def test_an_eighth_of_the_default_paths():
-    """A moment of strong noise is good to 2e-3."""
-    reference = exact(STRONG, REDUCED, [1.0])[0]
-    estimate = simulate(Problem(STRONG, REDUCED), [1.0], estimator="population", paths=4096).estimates[0]
-    assert estimate.standard_error < 2e-3 * reference
-    assert abs(estimate.value - reference) < 4 * estimate.standard_error
