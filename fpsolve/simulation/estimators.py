@@ -384,8 +384,8 @@ def population_estimates(plan: Plan, populations: Sequence[Population]) -> tuple
     variance = tallies["squares"] / count - mean**2
     neighbours = 2 * excess - tallies["first"] - tallies["last"]
     covariance = (tallies["products"] - mean * neighbours) / (count - 1) + mean**2
-    rate = np.maximum(variance + 2 * covariance, 0) / plan.length
-    growth = (expected + mean) / plan.length
+    lost = count / np.maximum(count - 3, 1)  # as all three are around a mean of the same slices
+    growth = (expected + mean + lost * np.maximum(0.5 * variance + covariance, 0)) / plan.length
     trends = (tallies["numbered"] - (count - 1) / 2 * excess) / count
     estimates, warnings = list[MomentEstimate](), list[Message]()
     for k, p in enumerate(plan.p):
@@ -395,9 +395,8 @@ def population_estimates(plan: Plan, populations: Sequence[Population]) -> tuple
         if abs(gap) > DRIFT * gap_error > 0:
             used = slice(int(gap > 0), None, 2)
             warnings.append(Message(Code.TWO_PLACES, p=p, gap=abs(gap), size=abs(gap) / gap_error))
-        value = float(growth[used, k].mean() + rate[used, k].mean() / 2)
         carrying = float(np.sum(tallies["effective"][used, k] / count[used, k]))
-        estimates.append(_estimate(plan, p, (value, standard_error(growth[used, k])), carrying))
+        estimates.append(_estimate(plan, p, (float(growth[used, k].mean()), standard_error(growth[used, k])), carrying))
         warnings += _drift(plan, p, float(trends[used, k].mean()), standard_error(trends[used, k]))
     return estimates, warnings
 

@@ -3,6 +3,7 @@
 import math
 import tracemalloc
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -183,3 +184,17 @@ def test_populations_are_taken_where_too_few_paths_carry_the_mean():
     assert found.estimates[0] == alone["direct"].estimates[0]
     assert found.estimates[1].estimator == "population"
     assert len(calls) == 100
+
+
+def test_the_error_of_a_population_has_that_of_its_variance(rng):
+    """Of growth in each slice as N(1, σ²), Λ = 1 + σ²/2: 400 times, with σ so large that the variance matters."""
+    plan, sigma, off = SimpleNamespace(p=np.array([2.0]), length=1.0, estimator="population"), 2.0, []
+    for _ in range(400):
+        populations = []
+        for d in rng.normal(1.0, sigma, (estimators.BATCHES, 64)):
+            sums = d.sum(), d @ d, d[1:] @ d[:-1], d @ np.arange(d.size)
+            tallies = np.array([(d.size, *sums, 1e6, d[0], d[-1])], estimators.TALLIES)
+            populations.append(SimpleNamespace(tallies=tallies, expected=0.0))
+        ((found,), _) = estimators.population_estimates(plan, populations)
+        off.append((found.value - 1 - sigma**2 / 2) / found.standard_error)
+    assert 0.8 < np.mean(np.square(off)) < 1.25
