@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -10,9 +11,14 @@ import numpy as np
 
 from fpsolve.arrays import FloatArray, real_array, shown
 from fpsolve.explain import refuse
+from fpsolve.model.systems.modal import MOST_MODES
+from fpsolve.reading import Unreadable, Words, read_bytes
 
 KEYS = ("mass", "stiffness", "damping", "gyroscopic", "circulatory", "stiffness_noise", "damping_noise")
 """Keys of [system] that may name a file."""
+MOST_BYTES = 2**26
+"""Of a file."""
+_WORDS = Words("the matrix", "a matrix", "mass.npy", ".npy, .mtx or .csv", "write rows of numbers")
 
 
 def with_matrices(table: Mapping[str, Any], folder: Path) -> dict[str, Any]:
@@ -31,29 +37,46 @@ def _read(name: Any, folder: Path, *place: str) -> Any:
     """The rows of a file; what is no name of one is left."""
     if not isinstance(name, str):
         return name
+    matrix, fault = np.zeros((0, 0)), "is no file"
     try:
-        matrix = real_array(_loaded(folder / name), "it")
-        fault = "" if matrix.ndim == 2 and len({*matrix.shape}) == 1 else f"has the shape {matrix.shape}"
-    except (OSError, ValueError, TypeError) as error:
-        matrix, fault = np.zeros((0, 0)), f"cannot be read: {error}"
-    if not (folder / name).is_file():
-        fault = "is no file"
-    must = "must be a square matrix of finite numbers in a .npy, .mtx or .csv file beside the case"
-    text = f"got {shown(name)}, which {fault}; {must}; write one, or rows of numbers here"
+        if (folder / name).exists():
+            matrix, fault = real_array(_loaded(folder / name), "it"), ""
+            _look_at(matrix.shape)
+    except Unreadable as error:
+        fault = error.sentence.partition(";")[0]
+    except Exception as error:  # each format raises its own kinds
+        fault = f"cannot be read: {error}"
+    must = f"must be a square matrix of finite numbers, of at most {MOST_MODES} rows, in a .npy, .mtx or .csv file"
+    text = f"got {shown(name)}, which {fault}; {must} beside the case; write one, or rows of numbers here"
     refuse([(place, name, text)] if fault else [])
     return matrix.tolist()
 
 
+def _look_at(shape: tuple[int, ...]) -> None:
+    """Refuse what is not square, or too large. Raises `Unreadable`."""
+    if len(shape) != 2 or shape[0] != shape[1] or shape[0] > MOST_MODES:
+        raise Unreadable(f"has the shape {shape}")
+
+
 def _loaded(path: Path) -> FloatArray:
-    """Raises `OSError`, `ValueError`."""
+    """The numbers of a file, of whose header the size is read first. Raises `Unreadable`, or what readers raise."""
+    content = read_bytes(path, _WORDS, MOST_BYTES)
     match path.suffix.lower():
         case ".npy":
-            return np.asarray(np.load(path, allow_pickle=False))
-        case ".csv":
-            return np.loadtxt(path, delimiter=",", ndmin=2)
-        case ".mtx":
-            from scipy.io import mmread
+            from fpsolve.measured.tables import npy
 
-            found = mmread(path)
+            return np.asarray(npy(content))
+        case ".csv":
+            if (columns := content.partition(b"\n")[0].count(b",") + 1) > MOST_MODES:
+                raise Unreadable(f"has {columns} columns")
+            return np.loadtxt(BytesIO(content), delimiter=",", ndmin=2, max_rows=MOST_MODES + 1)
+        case ".mtx":
+            from scipy.io import mminfo, mmread
+
+            rows, columns, entries, *_ = mminfo(BytesIO(content))
+            _look_at((rows, columns))
+            if entries > len(content):
+                raise Unreadable(f"states {entries} entries, more than the file holds")
+            found = mmread(BytesIO(content))
             return np.asarray(found if isinstance(found, np.ndarray) else found.toarray())
-    raise ValueError(f"of a kind {path.suffix or 'without ending'}")
+    raise Unreadable(f"is of a kind {path.suffix or 'without ending'}")

@@ -106,7 +106,7 @@ def _split(name: str, array: Any, unit: str = "") -> Iterator[tuple[str, Column]
 
 def _of_npy(path: Path) -> Table:
     content = read_bytes(path, WORDS, MOST_BYTES)
-    return Table(path, dict(_of_array("", _npy(content, ""))))
+    return Table(path, dict(_of_array("", npy(content))))
 
 
 def _of_array(name: str, array: Any) -> Iterator[tuple[str, Column]]:
@@ -118,7 +118,7 @@ def _of_array(name: str, array: Any) -> Iterator[tuple[str, Column]]:
         yield from _split(each, array[each])
 
 
-def _npy(content: bytes, name: str) -> Any:
+def npy(content: bytes, name: str = "") -> Any:
     """An array in the format of NumPy without Python objects, whose size is looked at first."""
     file = io.BytesIO(content)
     try:
@@ -148,7 +148,7 @@ def _of_npz(path: Path) -> Table:
             _looked_at((sum(entry.file_size for entry in archive.infolist()) // 8,), "")
             for entry in archive.infolist():
                 name = entry.filename.removesuffix(".npy")
-                columns |= _of_array(name, _npy(archive.read(entry), name))
+                columns |= _of_array(name, npy(archive.read(entry), name))
     except Unreadable:
         raise
     except Exception as error:  # each part of the archive raises its own kinds
