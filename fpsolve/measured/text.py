@@ -13,6 +13,7 @@ import warnings
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from decimal import Decimal
 from itertools import pairwise
 from pathlib import Path
 
@@ -25,6 +26,8 @@ from fpsolve.reading import Unreadable, read_text
 
 NO_TABLE = "has no table of numbers"
 MOST_COLUMNS = 1000
+LONGEST = 200
+"""Letters of the name of a column, and of a line in which PEER states how many values there are."""
 MOST_TEXT, MOST_LINES = 2**26, 4_000_000
 """Bytes and lines of a text; to read it takes some twelve times as many bytes, or 200 a line."""
 LETTERS = ("g", "m", "V")
@@ -40,12 +43,12 @@ SAMPLE = 2000
 TIMES_ALIKE = "alike, such as 2026-01-31 12:00:00.5"
 """How times are to be written."""
 _MARK = re.compile(r"^\s*(?:#+|%+|//+)\s?")
-_NUMBER = re.compile(r"[+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[ed][+-]?\d+)?|[+-]?(?:nan|inf)|", re.IGNORECASE)
+_NUMBER = re.compile(r"[+-]?(?:\d++[.,]?\d*+|[.,]\d++)(?:[ed][+-]?\d++)?|[+-]?(?:nan|inf)|", re.IGNORECASE)
 _DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+(e[+-]?\d+)?", re.IGNORECASE)
 _DAY, _CLOCK = r"\d{4}[-/]\d\d?[-/]\d\d?", r"\d\d?:\d\d(?::\d\d(?:\.\d*)?)?(?: ?[AP]M)?"
 _STAMP = re.compile(rf"(?:{_DAY}|\d\d?/\d\d?/\d\d(?:\d\d)?)(?:[T ]+{_CLOCK})?(?:Z| ?[+-]\d\d:?\d\d)?|{_CLOCK}")
 _OTHER_TIME = re.compile(r"\d+:\d\d|\d\d?\.\d\d?\.\d")
-_SPACED = re.compile(r"\S+(?:[ \t]+(?:[\[(]\S*[\])]|[\[(][^\])]*[\])])(?=\s|$))?")
+_SPACED = re.compile(r"\S+(?:[ \t]+(?:[\[(]\S*[\])]|[\[(][^\])\[(]*[\])])(?=\s|$))?")
 """Names between spaces, each with its unit in brackets."""
 SEPARATORS = ("\t", ";", ",", None)
 
@@ -108,7 +111,7 @@ def _last_digit(cells: Sequence[str]) -> float:
     found = list[float]()
     for cell in cells:
         mantissa, _, exponent = cell.lower().partition("e")
-        found.append(10.0 ** (int(exponent or 0) - len(mantissa.partition(".")[2])))
+        found.append(float(f"1e{exponent or 0}") * 10.0 ** -len(mantissa.partition(".")[2]))
     return sorted(found)[len(found) // 4]
 
 
@@ -190,7 +193,7 @@ def _refuse_decimal_commas(rows: _Lines) -> None:
     whole, behind = rows.cells(0), rows.cells(1)
     if not all(map(str.isdigit, behind)) or not all(re.fullmatch(r"[+-]?\d+", each) for each in whole):
         return
-    if any(int(a) >= int(b) for a, b in pairwise(whole)):
+    if any(Decimal(a) >= Decimal(b) for a, b in pairwise(whole)):
         text = (
             f'has "{whole[0]},{behind[0]}"; write decimal points; if these are two columns, name them in a line above'
         )
@@ -325,7 +328,7 @@ def _names(text: str, separator: str | None, count: int) -> list[str] | None:
         found = _cells(text, separator)
     if len(found) == count + 1 and separator is not None:
         found = found[:-1]
-    if len(found) != count or not any(found) or any("=" in each for each in found):
+    if len(found) != count or not any(found) or any("=" in each or len(each) > LONGEST for each in found):
         return None
     return found if not any(map(_is_number, found)) or _counts(found) else None
 
@@ -363,9 +366,10 @@ def read_peer_table(path: Path, skip: int = 0) -> Table:
         Unreadable: it has no DT, or not as many values as it states.
     """
     lines = read_text(path, WORDS, may_be_latin=True, most=MOST_TEXT).splitlines()
-    new = re.compile(r"NPTS\s*=\s*(?P<count>\d+).*DT\s*=\s*(?P<step>[\d.]+(?:E[+-]?\d+)?)", re.IGNORECASE)
+    new = re.compile(r"NPTS\s*=\s*(?P<count>\d+).*DT\s*=\s*(?P<step>(?:\d+\.?\d*|\.\d+)(?:E[+-]?\d+)?)", re.IGNORECASE)
     old = re.compile(r"\s*(?P<count>\d+)\s+(?P<step>[\d.]+(?:E[+-]?\d+)?)\s+NPTS,\s*DT", re.IGNORECASE)
-    stated = next(((i, m) for i, line in enumerate(lines[:20], 1) if (m := new.search(line) or old.match(line))), None)
+    heads = enumerate((line[:LONGEST] for line in lines[:20]), 1)
+    stated = next(((i, m) for i, line in heads if (m := new.search(line) or old.match(line))), None)
     if stated is None or not float(stated[1]["step"]) > 0:
         raise Unreadable("states no NPTS and DT above its values; export it again, or as .csv")
     values = [

@@ -169,6 +169,7 @@ _WAVE = (
     "of the time t write cos(nu*t) or sin(nu*t) alone; of sin(x) write the first terms of its series, x - x**3/6; of "
     "parameters write the value"
 )
+_DELAY = "write x(t - tau), tau a number or an expression in the parameters"
 _SMALL = "rates are of small amplitudes: sums of terms of degree 1, or of degree 3 in two variables"
 _REMEDIES = {"sin": _WAVE, "cos": _WAVE, "tan": _WAVE, "abs": _SMALL, "sign": _SMALL, "min": _SMALL, "max": _SMALL}
 _REMEDIES |= {"tanh": _SMALL, "log": "write its value as a parameter", "ln": "write its value as a parameter"}
@@ -226,9 +227,26 @@ def calls_of_time(text: str) -> Mapping[str, tuple[str, str]]:
                 *FUNCTIONS,
                 *_REMEDIES,
             }.difference(WAVES):
-                if any(isinstance(each, ast.Name) and each.id == TIME for each in ast.walk(time)):
-                    found[ast.unparse(node)] = name, ast.unparse(time)
+                inside = [*ast.walk(time)]
+                if any(isinstance(each, ast.Name) and each.id == TIME for each in inside):
+                    for each in inside:  # before anything is unparsed, as calls in calls take long
+                        if isinstance(each, ast.Call) and not _is_function(each.func):
+                            raise ExpressionError(f"has a call in that of {name}; {_REMEDIES.get(name, _DELAY)}")
+                    found[_plain(node)] = name, _plain(time)
     return found
+
+
+def _is_function(node: ast.expr) -> bool:
+    """Whether it is the name of a function of numbers."""
+    return isinstance(node, ast.Name) and node.id in FUNCTIONS
+
+
+def _plain(node: ast.expr) -> str:
+    """A node as Python writes it. Raises `ExpressionError`."""
+    try:
+        return ast.unparse(node)
+    except RecursionError:
+        raise ExpressionError(_TOO_DEEP) from None
 
 
 def evaluate(text: str, names: Mapping[str, Form], place: str) -> Form:
@@ -378,11 +396,10 @@ class _Walk:
 
     def _call(self, node: ast.Call) -> Form:
         name = self.written(node.func)
-        if (known := ast.unparse(node)) in self._names:
-            return self._names[known]
         if name not in FUNCTIONS:
-            known = f"the functions are {' and '.join(FUNCTIONS)}"
-            remedy = _REMEDIES.get(name.lower(), f"{known}; write * for products")
+            if (known := _plain(node)) in self._names:
+                return self._names[known]
+            remedy = _REMEDIES.get(name.lower(), f"the functions are {' and '.join(FUNCTIONS)}; write * for products")
             raise ExpressionError(f"has {self.written(node)}, which calls no known function; {remedy}")
         if len(node.args) != 1:
             raise ExpressionError(f"has {self.written(node)}, but {name} takes one number; write {name}(...)")

@@ -94,7 +94,7 @@ def meaning_of(field: FieldInfo) -> str:
 def without_unit(value: Any) -> str:
     """What to write for a text such as "1.0 Hz": "; write 6.283185 for 1.0 Hz, in rad/time"; "" for others."""
     text = value if isinstance(value, str) else ""
-    match = re.fullmatch(rf"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*({'|'.join(UNITS)})\s*", text)
+    match = re.fullmatch(rf"\s*([-+]?(?:\d++\.?\d*+|\.\d++)(?:[eE][-+]?\d++)?)\s*({'|'.join(UNITS)})\s*", text)
     if match is None:
         return ""
     factor, into = UNITS[match[2]]
