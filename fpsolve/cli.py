@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import sys
 import traceback
@@ -18,7 +19,7 @@ from fpsolve.arrays import shown
 from fpsolve.commands.errors import drop_blocked_output, print_error
 from fpsolve.commands.options import BAD_INPUT, NOT_CONVERGED
 from fpsolve.errors import FpsolveError, NotConverged, WorkersDied
-from fpsolve.messages import escaped
+from fpsolve.messages import escaped, short
 from fpsolve.signals import INTERRUPTED, ended_by_signals
 
 COMMANDS = {
@@ -52,7 +53,7 @@ app = App(
     version=lambda: f"fpsolve {__version__}",
     help_format="plaintext",
     suppress_keyboard_interrupt=False,
-    error_formatter=lambda error: CycloptsPanel(escaped(str(error))),
+    error_formatter=lambda error: CycloptsPanel(escaped(short(str(error)))),
 )
 for _name in COMMANDS:
     app.command(f"fpsolve.commands.{_name}:{_name}")
@@ -63,9 +64,10 @@ def main(argv: Sequence[str] | None = None) -> int:
 
     SIGHUP and SIGTERM interrupt it too; the exit code is then 128 and the number of the signal.
     """
-    if argv is None and not sys.warnoptions:  # errors of the numbers tell what NumPy warns of
-        warnings.simplefilter("ignore", RuntimeWarning)
-        os.environ["PYTHONWARNINGS"] = "ignore::RuntimeWarning"  # of workers
+    if argv is None and not sys.warnoptions:  # fpsolve tells what NumPy and matplotlib warn of
+        warnings.simplefilter("ignore")
+        os.environ["PYTHONWARNINGS"] = "ignore"  # of workers
+        logging.disable(logging.WARNING)
     with ended_by_signals() as received:
         code = _run(argv)
     return 128 + received[0] if received else code

@@ -92,7 +92,7 @@ def nearest(name: Any, known: Iterable[str]) -> str:
 def _guess(name: str, known: Iterable[str]) -> str | None:
     """The known name that is most like another; a key without its section finds the key with it."""
     keys = {key.lower(): key for key in known}
-    name = name.lower()
+    name = name.lower()[:60]
     found = [key for key in keys if key.endswith(f".{name}")] or get_close_matches(name, keys, n=1)
     return keys[found[0]] if found else None
 

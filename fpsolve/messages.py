@@ -11,6 +11,8 @@ from types import MappingProxyType
 from typing import Any
 from unicodedata import category
 
+LONGEST = 1200
+"""Letters of a line of a message."""
 ALMOST_EVERY = "growth rate of almost every path (Furstenberg-Khasminskii)"
 
 
@@ -480,8 +482,13 @@ class Message(str):
 
 
 def message_of(text: str) -> Message:
-    """A text as a message; a message as it is."""
-    return text if type(text) is Message else Message(Code.TEXT, text=text)
+    """A text as a message, without the middle of long lines; a message as it is."""
+    return text if type(text) is Message else Message(Code.TEXT, text="\n".join(map(short, text.split("\n"))))
+
+
+def short(line: str) -> str:
+    """A line of a message without its middle where it repeats something long."""
+    return line if len(line) <= LONGEST else f"{line[: LONGEST // 2]} ... {line[-LONGEST // 2 :]}"
 
 
 def is_control(letter: str) -> bool:

@@ -80,6 +80,8 @@ CHEAP_OF_WALLS = (IMPACT_RATE.name, CRITICAL_IMPACT_FACTOR.name)
 """What is computed in addition of a system with walls."""
 MOST_DRAWN = 10
 """Of so many curves at most the response is computed unasked, and densities of it are written."""
+MOST_FAULTS = 1000
+"""Of so many faults of a case at most each is told."""
 MOST_DENSITIES = 3
 """p of which densities of more than two variables are written unasked, which take seconds each."""
 USUAL_P = 2.0
@@ -481,6 +483,10 @@ def load_case(path: str | Path, overrides: Sequence[str] = (), options: Mapping[
                 remedy = f"write --set 'vary.\"{key}\"=[…]', or --set 'vary={{}}' as well"
                 faults.append(document.fault((key,), key, f"has no effect, as the case varies {key}; {remedy}"))
     except ValidationError as error:
+        if (count := error.error_count()) > MOST_FAULTS:
+            raise CaseError(
+                str(path), [Fault("", None, f"has {count} faults; start from a copy of a case, see `fpsolve new`")]
+            ) from None
         fields, parameters = sections_of(Case.model_fields, data), parameters_of({}, context)
         faults += (document.fault(*fault) for fault in explain(error, fields, parameters or {}))
     except RecursionError:

@@ -16,11 +16,13 @@ from fpsolve.messages import is_control
 from fpsolve.model.parameters import without_unit
 from fpsolve.reading import Unreadable, Words, read_text
 
-_BLANK = re.compile(r"(?:\s|#[^\n]*)*")
+_BLANK = re.compile(r"(?:\s|#[^\n]*)*+")
 _KEY = re.compile(r'"(?:\\.|[^"\\\n])*"|\'[^\'\n]*\'|[A-Za-z0-9_-]+')
 _STRING = re.compile(r'"""(?:\\.|[^\\])*?"""+|\'\'\'.*?\'\'\'+|"(?:\\.|[^"\\\n])*"|\'[^\'\n]*\'', re.DOTALL)
 _WORDS = Words("the case", "a case file", "fig1.toml", "TOML", "start from a copy of cases/minimal.toml")
 _SCALAR = re.compile(r"[^,\]}\n#]+")
+MOST_BYTES = 2**22
+"""Of a case file."""
 LONGEST_SHOWN = 200
 """Letters of an assignment of the command line in a message."""
 _TOO_DEEP = "lists or tables are nested too deeply; a case needs three levels"
@@ -224,7 +226,7 @@ def read_document(
         CaseError: the file cannot be read or is not TOML.
     """
     try:
-        text = read_text(Path(path), _WORDS)
+        text = read_text(Path(path), _WORDS, most=MOST_BYTES)
         document = document_of(text)
     except Unreadable as error:
         raise CaseError(str(path), [Fault("", error.line, error.sentence)]) from None

@@ -7,6 +7,7 @@ import math
 import os
 import re
 import time
+import tracemalloc
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from fpsolve.case.case import load_case
+from fpsolve.case.toml import Scanner
 from fpsolve.cli import main
 from fpsolve.commands.options import BAD_INPUT
 from fpsolve.errors import CaseError
@@ -75,6 +77,34 @@ def write(folder: Path, text: str) -> Path:
 )
 def test_what_is_too_long_to_show(tmp_path: Path, old: str, new: str, words: str) -> None:
     assert words in only_message(write(tmp_path, edited(old, new)))
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("\n" * 2**22 + "a = 1", "has 4194309 bytes, and a case file has at most 4194304"),
+        ("[[expect]]\n" * 500, "faults; start from a copy of a case"),
+        ("".join(f"a{k} = 1\n" for k in range(1001)), "faults; start from a copy of a case"),
+        ("a" * 10**6 + " = 1", "aaa ... aaa"),
+        ("a = 1 " + "b" * 10**6, "bbb ... bbb"),
+        (GOOD.replace("omega = 1.0", f'omega = "{"1" * 10**6}x"'), "oscillator.omega: got"),
+        (GOOD.replace("omega = 1.0", f'omega = "{"1" * 10**6} Hz"'), " ... "),
+    ],
+)
+def test_large_files_and_long_texts_are_refused_at_once_and_in_short(tmp_path: Path, text: str, words: str) -> None:
+    """Of a million digits a unit was looked for behind each one; a message repeated all of a line."""
+    started = time.process_time()
+    told = str(refused(write(tmp_path, text)))
+    assert words in told
+    assert max(map(len, told.splitlines())) < 1300
+    assert time.process_time() - started < 5
+
+
+def test_blanks_are_passed_without_memory() -> None:
+    tracemalloc.start()
+    Scanner("\n" * 10**6).scan()
+    assert tracemalloc.get_traced_memory()[1] < 10**8  # the places of line ends; it was twice that
+    tracemalloc.stop()
 
 
 def test_an_override_of_two_lines(tmp_path: Path) -> None:
@@ -221,7 +251,7 @@ NO_FILE = "is a pipe or a device, not a file; write the case into a file and nam
         ("nowhere.toml", "no such file; look in {} or give the full path"),
         ("", "is a directory; name a case file in it, such as fig1.toml"),
         *((name, NO_FILE) for name in ("/dev/zero", "/dev/null", "pipe.toml")),  # reading them might never end
-        ("huge.toml", f"has {2**40} bytes, and a case file has at most {2**29}; name another, such as fig1.toml"),
+        ("huge.toml", f"has {2**40} bytes, and a case file has at most {2**22}; name another, such as fig1.toml"),
         ("bad.toml/case.toml", "cannot be read (Not a directory); check its name and permissions"),
     ],
 )

@@ -65,7 +65,10 @@ def test_every_format(path):
         ('system.damping="wide.csv"', "system.damping: got 'wide.csv', which has the shape (1, 3)"),
         ('system.damping="text.csv"', "system.damping: got 'text.csv', which cannot be read"),
         ('system.stiffness_noise.a="none.mtx"', "system.stiffness_noise.a: got 'none.mtx', which is no file"),
-        ('system.mass="huge.mtx"', "which has the shape (25000, 25000); must be a square matrix of finite numbers, of at"),
+        (
+            'system.mass="huge.mtx"',
+            "which has the shape (25000, 25000); must be a square matrix of finite numbers, of at",
+        ),
         ('system.mass="full.mtx"', "which states 4000000000 entries, more than the file holds"),
         ('system.mass="long.mtx"', "which cannot be read: "),
         ('system.mass="lies.npy"', "which has 10000000000 numbers, and at most"),
