@@ -22,7 +22,7 @@ from fpsolve.model.expressions import TIME
 from fpsolve.model.frame import Frame, own_frame
 from fpsolve.model.noise import Noise, NoiseDerivative
 from fpsolve.model.noises.several import noises_of
-from fpsolve.model.parameters import Parameter, Parametrised, cached_by_problem
+from fpsolve.model.parameters import DERIVED, Parameter, Parametrised, cached_by_problem
 from fpsolve.model.plane import (
     BELOW,
     CoefficientMatrix,
@@ -49,6 +49,8 @@ MOST_BY_DIRECTIONS = 4
 """Largest number of variables of which functions of a direction are discretised."""
 PHASES = 360
 """Number of φ at which the direction of the phase is looked at."""
+RTOLS = {"gt": 1e-13, "lt": 1.0}
+"""The range of rtol."""
 RTOL = 1e-8
 """Relative error that is wanted of two variables where a case names none."""
 RTOL_OF_SEVERAL = 1e-6
@@ -122,6 +124,11 @@ class Problem:
                 raise TypeError(f"got {shown(half)} as a {kind}; must be a system and a noise: Problem(system, noise)")
         if self.system.clock:
             object.__setattr__(self, "noise", noises_of({**self.noise.parts, TIME: self.system.clock}))
+        sizes = [("coefficient", float(np.abs(term.matrix).max()), 0.0) for term in self.system.terms]
+        for name, size, least in (*sizes, *(("delay", delay, DERIVED["ge"]) for _, delay in self.system.pasts)):
+            if not least <= size <= DERIVED["le"]:
+                must = f"must be from {least:g} to {DERIVED['le']:g}; take another unit of time, or of a variable"
+                raise ValueError(f"got a {name} of {size:g}; {must}")
         wanted, given = self.system.noise_sections, self.noise.parts
         if len(wanted) > 1 or len(given) > 1:
             names = self.system.driven_by
