@@ -46,7 +46,7 @@ from fpsolve.fem.mesh import MAX_CELLS, MAX_DEGREE, CylinderMesh, make_mesh, rea
 from fpsolve.messages import is_control
 from fpsolve.model.faults import table_of
 from fpsolve.model.parameters import Section, parameter
-from fpsolve.model.problem import RTOL, RTOL_BEYOND_PLANE, RTOL_OF_SEVERAL
+from fpsolve.model.problem import RTOL, RTOL_BEYOND_PLANE, RTOL_OF_SEVERAL, RTOLS
 from fpsolve.model.quantity import DERIVATIVE, RATE_FUNCTION, Quantity, moment_at
 from fpsolve.simulation.setup import BATCHES, MAX_PATHS, PATHS, Estimator
 
@@ -214,7 +214,7 @@ class Moments(Section):
             name="order of the moment",
         ),
     ]
-    rtol: Annotated[float, parameter(WANTED, "rtol = 1e-8", gt=1e-13, lt=1, name="wanted relative error")] = RTOL
+    rtol: Annotated[float, parameter(WANTED, "rtol = 1e-8", **RTOLS, name="wanted relative error")] = RTOL
 
     @property
     def values(self) -> FloatArray:

@@ -40,6 +40,7 @@ from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import ALMOST_EVERY, Code, Message, Remedy, message_of
 from fpsolve.model import quantity
 from fpsolve.model.problem import (
+    RTOLS,
     Problem,
     checked_moments,
     checked_problem,
@@ -240,9 +241,9 @@ class ExponentSolver:
         if not (self.problem.noise.is_white or math.isfinite(self.problem.noise.standard_deviation)):
             raise NoSuchExponent(Message(Code.INFINITE_VARIANCE))
         with suppress(ValueError):
-            if real_number(self.rtol, "rtol") > 0:
+            if RTOLS["gt"] < real_number(self.rtol, "rtol") < RTOLS["lt"]:
                 return
-        raise ValueError(f"rtol is {shown(self.rtol)}; it must be a positive number such as 1e-8")
+        raise ValueError(f"got rtol = {shown(self.rtol)}; must be > {RTOLS['gt']:g} and < 1; write, for example, 1e-8")
 
     @cached_property
     def whole(self) -> WholeProblem:

@@ -37,8 +37,9 @@ def test_public_functions(solve, fig1_solver):
     found, again = solve(problem), solve(problem, rtol=1e-6)
     assert found.value == pytest.approx(INDICES[solve.__name__].solve(fig1_solver, None).value, rel=1e-7)
     assert abs(again.value - found.value) <= 2 * (again.error_estimate + found.error_estimate)
-    with pytest.raises(ValueError, match="rtol"):
-        solve(problem, rtol=-1.0)
+    for rtol in (-1.0, 1e-13, 1.0, float("nan")):
+        with pytest.raises(ValueError, match=r"got rtol = .*; must be > 1e-13 and < 1; write, for example, 1e-8"):
+            solve(problem, rtol=rtol)
 
 
 def test_there_may_be_no_stability_index():
