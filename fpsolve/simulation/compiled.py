@@ -6,9 +6,13 @@ import hashlib
 from pathlib import Path
 from typing import Any
 
-from numba import njit
+from numba import config, njit
 
+from fpsolve.errors import FpsolveError
 from fpsolve.model import noises
+
+if config.DISABLE_JIT:  # type: ignore[attr-defined]
+    raise FpsolveError("paths are not simulated where NUMBA_DISABLE_JIT is set; unset it, as they need compiled code")
 
 _FILES = [path for room in (noises.__file__, __file__) for path in sorted(Path(room).parent.glob("*.py"))]
 _SOURCES = hashlib.sha256(b"".join(path.read_bytes() for path in _FILES)).hexdigest()[:16]
