@@ -42,6 +42,16 @@ s = 0.1
 [moments]
 p = [2.0]
 """
+LIGHT = """[moments]
+p = [1.0, 2.0]
+rtol = 1e-3
+[output]
+quantities = ["moment"]
+eigenfunctions = []
+[monte_carlo]
+paths = 64
+time = 50.0
+"""
 EQUATIONS = """title = "delays"
 [system]
 variables = ["x", "v"]
@@ -105,8 +115,8 @@ HOSTILE: dict[str, Hostile] = {
     "mtx empty": of_matrix("k.mtx", "", "k.mtx"),
     "mtx cut": of_matrix("k.mtx", f"{MTX}2 2 2\n1 1 1.0\n", "k.mtx"),
     "mtx complex": of_matrix("k.mtx", f"{MTX.replace('real', 'complex')}1 1 1\n1 1 1 1\n", "k.mtx"),
-    "npy lies": of_matrix("k.npy", npy_header((25000, 25000)) + b"12345678", "(25000, 25000)"),
-    "npy lies more": of_matrix("k.npy", npy_header((10**9, 10**9)) + b"12345678", "(1000000000, 1000000000)"),
+    "npy lies": of_matrix("k.npy", npy_header((2500, 2500)) + b"12345678", "more than the file holds"),
+    "npy lies more": of_matrix("k.npy", npy_header((10**9, 10**9)) + b"12345678", "1000000000000000000 numbers"),
     "npy cut": of_matrix("k.npy", npy_header((2, 2)) + b"12345678", "k.npy"),
     "npy text": of_matrix("k.npy", "no array", "k.npy"),
     "csv wide": of_matrix("k.csv", ",".join("1" * 3_000_000), "k.csv"),
@@ -145,9 +155,12 @@ HOSTILE: dict[str, Hostile] = {
     "many delays": of_case(
         EQUATIONS.replace("RATE", "-x - 0.1*v - xi*x " + "".join(f"+x(t-{k})" for k in range(1, 1800)))
     ),
-    "empty lines": of_case("\n" * 20_000_000, "20000000 bytes"),
-    "4 MB of empty lines": of_case("\n" * 4_000_000 + "x", ""),
-    "4 MB of tables": of_case("[[expect]]\n" * 360_000, ""),
+    "empty lines": of_case("\n" * 20_000_000 + "a = 1", "20000005 bytes"),
+    "4 MB of empty lines": of_case("\n" * 4_000_000 + "a = 1", "title"),
+    "4 MB of keys": of_case("".join(f"a{k}=1\n" for k in range(400_000)), "faults"),
+    "4 MB of keys of a table": of_case("[noise]\n" + "".join(f"a{k}=1\n" for k in range(400_000)), "faults"),
+    "4 MB of lines of numbers": of_case("p = [\n" + "1,\n" * 1_300_000 + "]", ""),
+    "4 MB of tables": of_case("[[expect]]\n" * 360_000, "faults"),
     "4 MB of numbers": of_case("p = [" + "1," * 1_900_000 + "]", ""),
     "4 MB of a key": of_case("a" * 3_900_000 + " = 1", ""),
     "4 MB of a line": of_case("a = 1 " + "b" * 3_900_000, ""),
@@ -175,18 +188,18 @@ HOSTILE: dict[str, Hostile] = {
     ),
     "no JIT": Hostile(
         ["simulate", "case.toml", "--seed", "1"],
-        {"case.toml": case_text("[moments]\np = [2.0]\n[monte_carlo]\npaths = 64\ntime = 10.0\n")},
+        {"case.toml": case_text(LIGHT)},
         (0, BAD_INPUT, NOT_CONVERGED),
         environment={"NUMBA_DISABLE_JIT": "1"},
     ),
     "no JIT, run": Hostile(
-        ["run", "case.toml"], {"case.toml": case_text("[moments]\np = [2.0]\n")}, (0,),
+        ["run", "case.toml"], {"case.toml": case_text(LIGHT)}, (0,),
         environment={"NUMBA_DISABLE_JIT": "1"},
     ),
-    "a title in Chinese": of_case(case_text("[moments]\np = [1.0, 2.0]\n", "振动"), codes=(0,)),
-    "a title of no letters": of_case(case_text("[moments]\np = [1.0, 2.0]\n", "\U0001f600 \ue000"), codes=(0,)),
+    "a title in Chinese": of_case(case_text(LIGHT, "振动"), codes=(0,)),
+    "a title of no letters": of_case(f'title = "\U0001f600"\n{case_text(LIGHT).partition(chr(10))[2]}', codes=(0,)),
     "no place for fonts": Hostile(
-        ["run", "case.toml"], {"case.toml": case_text("[moments]\np = [1.0, 2.0]\n")}, (0,),
+        ["run", "case.toml"], {"case.toml": case_text(LIGHT)}, (0,),
         environment={"MPLCONFIGDIR": "/proc/none", "HOME": "/proc/none"},
     ),
 }  # fmt: skip
