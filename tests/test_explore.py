@@ -1,17 +1,22 @@
 """`fpsolve explore`: what its page asks and is told, whom its server answers, and the page in a real browser."""
 
+import errno
 import http.client
 import json
 import os
 import re
 import shutil
+import socket
 import subprocess
 import sys
 import threading
+import time
 import tomllib
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from socketserver import TCPServer
 from statistics import median
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -243,12 +248,42 @@ def test_only_the_own_page_of_this_machine_is_answered():
             {"Content_Type": "text/plain"},
         ):
             assert status("POST", "/start", good, **changed)[0] == 403
+        for origin in (page.address, "http://evil.example"):
+            assert status("POST", "/start", Origin=origin, Content_Length="1" * 5000)[0] == 403
         assert status("GET", "/", Host="evil.example")[0] == 403
         for path in ("/../pyproject.toml", "/etc/passwd", "/fpsolve"):
             assert status("GET", path)[0] == 403
         for body in ("", "[]", "{", "[" * 90_000, "1" * 200_000):
             assert status("POST", "/start", body)[0] == 403
         assert "refused" in status("POST", "/start", json.dumps({"page": "a"}))[1]
+
+
+def test_work_ends_with_its_connection_and_files_that_run_out_are_waited_for(monkeypatch):
+    ended, tries = threading.Event(), []
+
+    def answer(name, question, is_gone):
+        while not is_gone():
+            time.sleep(0.01)
+        ended.set()
+        return {}
+
+    def refuse(_):
+        tries.append(1)
+        raise OSError(errno.EMFILE, "Too many open files")
+
+    with served(SimpleNamespace(answer=answer)) as page:
+        connection = http.client.HTTPConnection(*page.server_address)
+        own = {"Host": page.host, "Origin": page.address, "Content-Type": "application/json"}
+        connection.request("POST", "/solve", "{}", own)
+        assert not ended.wait(0.3)
+        connection.close()
+        assert ended.wait(10)
+        monkeypatch.setattr(TCPServer, "get_request", refuse)
+        with socket.create_connection(page.server_address):
+            time.sleep(0.5)
+        assert 0 < len(tries) < 8
+    explorer = explorer_of("fig1")
+    assert explorer.answer("solve", question(explorer), lambda: True) == {"stopped": True}
 
 
 def test_a_notebook_shows_the_page_of_a_problem():

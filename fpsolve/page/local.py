@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import socket
 import sys
+import time
 from collections.abc import Callable, Mapping
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from importlib.resources import files
@@ -21,8 +23,10 @@ POLICY = (
     "form-action 'none'; frame-ancestors 'self' http://127.0.0.1:* http://localhost:*"
 )
 """What a browser lets the page do: nothing leaves it, and only pages of this machine may show it in a frame."""
-MOST = 100_000
-"""Bytes of a question."""
+DIGITS = 5
+"""Of the number of bytes of a question."""
+PAUSE = 0.1
+"""Seconds between two tries to take a connection."""
 LONGEST_WAIT = 300.0
 """Seconds after which a connection on which nothing comes is closed."""
 
@@ -34,15 +38,24 @@ class LocalPage(ThreadingHTTPServer):
     from another origin.
 
     Args:
-        answer: gives the answer, which JSON can hold, to a question by its name.
+        answer: gives the answer, which JSON can hold, to a question by its name; the last argument tells whether the
+            browser has closed the connection, so that nobody waits for it any more.
     """
 
     daemon_threads = True
 
-    def __init__(self, answer: Callable[[str, Mapping[str, Any]], Mapping[str, Any]]) -> None:
+    def __init__(self, answer: Callable[[str, Mapping[str, Any], Callable[[], bool]], Mapping[str, Any]]) -> None:
         super().__init__(("127.0.0.1", 0), _Talk)
         self.answer, self.host = answer, f"127.0.0.1:{self.server_port}"
         self.address = f"http://{self.host}"
+
+    def get_request(self) -> Any:
+        """A connection; without one, as where files run out, the next try is later."""
+        try:
+            return super().get_request()
+        except OSError:
+            time.sleep(PAUSE)
+            raise
 
     def handle_error(self, request: Any, client_address: Any) -> None:
         """Say nothing of a browser that has gone."""
@@ -68,7 +81,7 @@ class _Talk(BaseHTTPRequestHandler):
     def do_POST(self) -> None:
         size, headers = self.headers.get("Content-Length", ""), self.headers
         is_own = self._is_named() and headers.get("Origin") == self.server.address
-        is_read = size.isascii() and size.isdigit() and int(size) <= MOST
+        is_read = size.isascii() and size.isdigit() and len(size) <= DIGITS
         if not (is_own and is_read and headers.get("Content-Type") == "application/json"):
             return self._refuse()
         try:
@@ -77,8 +90,18 @@ class _Talk(BaseHTTPRequestHandler):
             question = None
         if not isinstance(question, dict):
             return self._refuse()
-        found = json.dumps(self.server.answer(self.path.removeprefix("/"), question), allow_nan=False)
+        found = json.dumps(self.server.answer(self.path.removeprefix("/"), question, self._is_gone), allow_nan=False)
         return self._send(200, found.encode(), "application/json")
+
+    def _is_gone(self) -> bool:
+        """Whether the connection is closed."""
+        self.connection.settimeout(0)
+        try:
+            return not self.connection.recv(1, socket.MSG_PEEK)
+        except OSError as failure:
+            return not isinstance(failure, BlockingIOError)
+        finally:
+            self.connection.settimeout(self.timeout)
 
     def _is_named(self) -> bool:
         return self.headers.get("Host") == self.server.host

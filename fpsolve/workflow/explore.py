@@ -10,6 +10,7 @@ import math
 import re
 import threading
 from collections.abc import Callable, Iterator, Mapping
+from contextvars import ContextVar
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import partial
@@ -79,6 +80,7 @@ NUMBERS = {MOMENT.name, *INDICES, "theory", "classes", "discretisation"}
 """The parts that are solved."""
 Answer = Mapping[str, Any]
 """What JSON can hold."""
+_is_gone: ContextVar[Callable[[], bool]] = ContextVar("is_gone", default=bool)
 
 
 class Explorer:
@@ -123,13 +125,15 @@ class Explorer:
             "python": ("python", self._python),
         }
 
-    def answer(self, name: str, question: Mapping[str, Any]) -> Answer:
+    def answer(self, name: str, question: Mapping[str, Any], is_gone: Callable[[], bool] = bool) -> Answer:
         """The answer to a question by its name, or a sentence why there is none.
 
         Args:
             name: "stop" ends what the page asked for "of" a kind.
             question: the "page" that asks, its "number", and "values" of parameters by their keys.
+            is_gone: whether nobody waits for the answer any more.
         """
+        _is_gone.set(is_gone)
         kind, answer = self._answers.get(name, (str(question.get("of")), lambda _: {}))
         asked, number = (str(question.get("page")), kind), question.get("number")
         if not isinstance(number, int | float):
@@ -153,7 +157,7 @@ class Explorer:
 
     def _look(self, asked: tuple[str, str], number: float) -> None:
         """End what is not wanted any more."""
-        if self._newest[asked] != number:
+        if self._newest[asked] != number or _is_gone.get()():
             raise KeyboardInterrupt
 
     def _start(self, _: Mapping[str, Any]) -> Answer:
