@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from io import BytesIO
 from pathlib import Path
@@ -69,7 +70,8 @@ def _loaded(path: Path) -> FloatArray:
         case ".csv":
             if (columns := content.partition(b"\n")[0].count(b",") + 1) > MOST_MODES:
                 raise Unreadable(f"has {columns} columns")
-            return np.loadtxt(BytesIO(content), delimiter=",", ndmin=2, max_rows=MOST_MODES + 1)
+            with warnings.catch_warnings(action="ignore"):  # of empty lines
+                return np.loadtxt(BytesIO(content), delimiter=",", ndmin=2, max_rows=MOST_MODES + 1)
         case ".mtx":
             from scipy.io import mminfo, mmread
 

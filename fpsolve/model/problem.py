@@ -124,11 +124,12 @@ class Problem:
                 raise TypeError(f"got {shown(half)} as a {kind}; must be a system and a noise: Problem(system, noise)")
         if self.system.clock:
             object.__setattr__(self, "noise", noises_of({**self.noise.parts, TIME: self.system.clock}))
+        # beyond, squares leave the range of numbers
         sizes = [("coefficient", float(np.abs(term.matrix).max()), 0.0) for term in self.system.terms]
         for name, size, least in (*sizes, *(("delay", delay, DERIVED["ge"]) for _, delay in self.system.pasts)):
             if not least <= size <= DERIVED["le"]:
                 must = f"must be from {least:g} to {DERIVED['le']:g}; take another unit of time, or of a variable"
-                raise ValueError(f"got a {name} of {size:g}; {must}")
+                raise ValueError(f"got a {name} of {size:g} in the motion; {must}")
         wanted, given = self.system.noise_sections, self.noise.parts
         if len(wanted) > 1 or len(given) > 1:
             names = self.system.driven_by

@@ -79,27 +79,6 @@ def test_what_is_too_long_to_show(tmp_path: Path, old: str, new: str, words: str
     assert words in only_message(write(tmp_path, edited(old, new)))
 
 
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("\n" * 2**22 + "a = 1", "has 4194309 bytes, and a case file has at most 4194304"),
-        ("[[expect]]\n" * 500, "faults; start from a copy of a case"),
-        ("".join(f"a{k} = 1\n" for k in range(1001)), "faults; start from a copy of a case"),
-        ("a" * 10**6 + " = 1", "aaa ... aaa"),
-        ("a = 1 " + "b" * 10**6, "bbb ... bbb"),
-        (GOOD.replace("omega = 1.0", f'omega = "{"1" * 10**6}x"'), "oscillator.omega: got"),
-        (GOOD.replace("omega = 1.0", f'omega = "{"1" * 10**6} Hz"'), " ... "),
-    ],
-)
-def test_large_files_and_long_texts_are_refused_at_once_and_in_short(tmp_path: Path, text: str, words: str) -> None:
-    """Of a million digits a unit was looked for behind each one; a message repeated all of a line."""
-    started = time.process_time()
-    told = str(refused(write(tmp_path, text)))
-    assert words in told
-    assert max(map(len, told.splitlines())) < 1300
-    assert time.process_time() - started < 5
-
-
 def test_blanks_are_passed_without_memory() -> None:
     tracemalloc.start()
     Scanner("\n" * 10**6).scan()
