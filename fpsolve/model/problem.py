@@ -49,7 +49,7 @@ MOST_BY_DIRECTIONS = 4
 """Largest number of variables of which functions of a direction are discretised."""
 PHASES = 360
 """Number of φ at which the direction of the phase is looked at."""
-RTOLS = {"gt": 1e-13, "lt": 1.0}
+RTOLS = {"gt": 1e-13, "lt": 1}
 """The range of rtol."""
 RTOL = 1e-8
 """Relative error that is wanted of two variables where a case names none."""
