@@ -36,6 +36,8 @@ STEP = 2.0
 """Norm of what moves S over the time from which times are doubled."""
 STRIDE = 0.5
 """Logarithm of the factor between two σ − 2a, a the growth rate of E x."""
+LEAST = 1e-300
+"""Share of S that noise drives, from which on it counts."""
 NEAREST = 1e-6
 """Share of the bounds of Λ to which σ − 2a falls: y stands still without noise at 2a, next to which Z is not known."""
 NEAR = 0.03
@@ -344,7 +346,8 @@ class DelayRates:
     def _log_radius(self, sigma: float) -> float:
         """ln of how much of S drives S that is without white noise; 0 at Λ, and below it for σ > Λ."""
         _, steady, noisy = self._sums(sigma)
-        return math.log(np.max(np.abs(np.linalg.eigvals(np.linalg.solve(-steady, noisy)))))
+        radius = float(np.max(np.abs(np.linalg.eigvals(np.linalg.solve(-steady, noisy)))))
+        return math.log(max(radius, LEAST))
 
     def _sums(self, sigma: float) -> tuple[list[Any], Any, Any]:
         """S(kτ) of S(0), and −Z(σ) without white noise and by it."""
