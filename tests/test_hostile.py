@@ -20,7 +20,7 @@ SAID = {
     "digits of Hz": "111 ... 111",
     "rate 1e160*x + xi*x": " in the motion; must be from 0 to 1e+32",
     "rate 1*x + 1*xi*x(t - 1e-300)": "got a delay of 1e-300 in the motion; must be from 1e-32 to 1e+32",
-    f"rate {DELAYS[:40]}": "has a call in that of x; write x(t - tau)",
+    f"rate {DELAYS[:40]}": "has another call inside x(...); write x(t - tau)",
 }
 
 

@@ -231,7 +231,7 @@ def calls_of_time(text: str) -> Mapping[str, tuple[str, str]]:
                 if any(isinstance(each, ast.Name) and each.id == TIME for each in inside):
                     for each in inside:  # before anything is unparsed, as calls in calls take long
                         if isinstance(each, ast.Call) and not _is_function(each.func):
-                            raise ExpressionError(f"has a call in that of {name}; {_REMEDIES.get(name, _DELAY)}")
+                            raise ExpressionError(f"has another call inside {name}(...); {_REMEDIES.get(name, _DELAY)}")
                     found[_plain(node)] = name, _plain(time)
     return found
 
