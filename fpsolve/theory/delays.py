@@ -23,7 +23,7 @@ import numpy as np
 from scipy.linalg import eig, eigvals, expm
 from scipy.optimize import brentq
 
-from fpsolve.arrays import FloatArray, dense
+from fpsolve.arrays import FloatArray, dense, finite
 from fpsolve.budget import charge
 from fpsolve.errors import NoHierarchy
 from fpsolve.model.plane import common_delay
@@ -295,7 +295,7 @@ class DelayRates:
     def _near(self, sigma: float) -> _Near:
         """What the smallest eigenvalue of Z(σ) says of Λ."""
         both = self.matrix(sigma + 1j * TINY)
-        values, left, right = eig(both.real, left=True)
+        values, left, right = eig(finite(both.real), left=True)
         at = int(np.argmin(np.abs(values)))
         x, y = right[:, at].real, left[:, at].real
         share = float(y @ (both.imag / TINY) @ x)
