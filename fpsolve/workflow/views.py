@@ -16,7 +16,7 @@ from fpsolve.case.case import Case
 from fpsolve.case.sections import ChartSection
 from fpsolve.data import plain_unit
 from fpsolve.errors import FpsolveError
-from fpsolve.explain import explain
+from fpsolve.explain import explain, is_number
 from fpsolve.page.html import part_of_page
 from fpsolve.page.page import Column, Drawing, Grid, Sentence
 from fpsolve.parts.eigenfunctions import FURTHEST
@@ -88,9 +88,9 @@ def map_of(case: Case, axes: object, tell: Callable[[Answer], None]) -> Answer:
     return answer(chart)
 
 
-def field_of(case: Case, p: object) -> Answer:
+def field_of(case: Case, p: Any) -> Answer:
     """T and the stationary density over phase and noise, of three and four variables densities of directions."""
-    if not isinstance(p, int | float) or not math.isfinite(p):
+    if not is_number(p):
         raise FpsolveError(f"got p = {p!r}; must be a finite number; write, for example, 2")
     problem = case.problem
     if why := problem.no_picture:
