@@ -24,7 +24,7 @@ INDICES = '["moment", "lyapunov_exponent", "stability_index", "variance_rate", "
 INDICES += ', "critical_restitution", "eigenfunctions"]'
 """All that is one number, Λ(p), and eigenfunctions."""
 OSCILLATOR = {"epsilon": 0.1, "omega": 1.0, "restitution": 0.8, "c1": 0.1}
-NOISE = {"D0": 0.5, "tau0": 0.5, "r0": 0.95}
+NOISE = {"D0": 0.5, "tau0": 0.5, "r0": 0.95, "treatment": "ou-reduction"}
 TEXT = """
 title = "A test"
 [oscillator]

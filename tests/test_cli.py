@@ -131,7 +131,8 @@ def test_what_is_set_is_told_above_the_results(case, capsys, monkeypatch):
     assert main(["run", case, *(f"--set={text}" for text in sets), *WITH_FIGURE]) == 0
     assert drawn == ["A test\nwith oscillator.omega = 2.0"]  # its values of p are on the axis
     told = " ".join(capsys.readouterr().out.split())
-    assert told.startswith("A test with oscillator.omega = 2.0 noise.D0 = 0.1: almost every path ")
+    assert told.startswith('A test with oscillator.omega = 2.0 noise.treatment = "ou-reduction": the noise is ')
+    assert ", as Eqs. (12)-(14) reduce it. noise.D0 = 0.1: almost every path " in told
     assert main(["run", case, *WITH_FIGURE]) == 0
     assert drawn[1:] == ["A test"]
 

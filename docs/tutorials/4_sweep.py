@@ -32,6 +32,7 @@ c1 = 0.1
 D0 = 0.1
 tau0 = 0.5
 r0 = 0.95
+treatment = "ou-reduction"
 
 [moments]
 p = [2.0]

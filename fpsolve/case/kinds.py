@@ -1,7 +1,7 @@
 """[system] and [noise] of a case: objects of the kinds that they name, and their parameters.
 
 [oscillator] is [system] with kind = "vibro-impact", [system] without a kind one of equations where it states some;
-[noise] without a kind is that of Eqs. (7)-(8), reduced or not. [noise.axial] is a noise that [system] calls so; there
+[noise] without a kind is that of Eqs. (7)-(8). [noise.axial] is a noise that [system] calls so; there
 may be several.
 """
 
@@ -25,8 +25,10 @@ from fpsolve.model.parameters import STRICT, Parametrised
 from fpsolve.model.problem import Problem
 
 Half = Literal["system", "noise"]
-USUAL: Mapping[Half, str] = {"system": "vibro-impact", "noise": "ou-reduction"}
+USUAL: Mapping[Half, str] = {"system": "vibro-impact", "noise": "non-gaussian"}
 """The kinds of sections that name none."""
+REDUCED = "ou-reduction"
+"""The kind of a noise (7) whose treatment is this."""
 EQUATIONS, STATING = "equations", ("variables", "drift")
 """The kind of a [system] that names none, but states one of these."""
 REMOVED = {"plane": 'write the matrices as equations, for example variables = ["x", "v"], drift = ["v", "-x - xi*x"]'}
@@ -84,10 +86,9 @@ def _misnamed(names: list[str], sections: Sequence[str]) -> Iterator[Refusal]:
 
 
 def _made(half: Half, table: Mapping[str, Any]) -> Parametrised:
-    name, known = table.get("kind"), {key: value for key, value in table.items() if key != "kind"}
+    known = {key: value for key, value in table.items() if key != "kind"}
     kind = _kind(half, table)
     foreign = {key for key in known if key not in fields_of(kind) and not kind.takes(key, known)}
-    foreign |= set(kind.words) & set(kind.stated) & set(known) if name is not None else set()
     faults = [
         InitErrorDetails(type="unexpected_keyword_argument", loc=(key,), input=known.pop(key))
         for key in table
@@ -120,6 +121,8 @@ def _kind(half: Half, table: Mapping[str, Any]) -> type[Parametrised]:
     name = table.get("kind")
     if name is None and half == "system" and any(key in table for key in STATING):
         name = EQUATIONS
+    if half == "noise" and name in (None, USUAL[half]) and table.get("treatment") == REDUCED:
+        name = REDUCED
     names = [*(SYSTEMS if half == "system" else NOISES)]
     if name is not None and name not in names:
         text = f"got {shown_with_kind(name, but=str)}; must be one of {', '.join(names)};{nearest(name, names)}"

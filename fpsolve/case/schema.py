@@ -131,9 +131,8 @@ def _union(half: Half) -> Any:
 
 
 def _table(half: Half, kind: type[Parametrised], variant: int = 0, *, is_named: bool = True) -> type[BaseModel]:
-    """A table of a kind; words that the name of the kind decides are stated where it is not there."""
-    words = {*kind.words} & {*kind.stated} if is_named else set()
-    known: dict[str, Any] = {name: (f.annotation, f) for name, f in fields_of(kind).items() if name not in words}
+    """A table of a kind, which it may leave out where that is the usual one."""
+    known: dict[str, Any] = {name: (f.annotation, f) for name, f in fields_of(kind).items()}
     name = f"{half}_{kind.kind}{f'_{variant + 1}' if variant else ''}{'' if is_named else '_without_kind'}"
     if is_named:
         known = {"kind": (Literal[kind.kind], _described(f"the kind of the {half}", f'kind = "{kind.kind}"'))} | known

@@ -25,19 +25,28 @@ BURSTS = (
     "judged by the mean square, by energy or by fatigue is unstable, though one record most likely looks calm."
 )
 
+TREATED = {
+    "exact": "that of Eq. (7) as it stands",
+    "ou-reduction": "Ornstein-Uhlenbeck noise in place of that of Eq. (7), as Eqs. (12)-(14) reduce it",
+}
+"""What the noise is, by its treatment."""
+
 
 def verdicts(case: Case, results: Sequence[CurveResult], table: Table) -> Iterator[Sentence]:
-    """What becomes of almost every path and of the mean square: of each curve, or of how many.
+    """Of which noise (7) the numbers are, and what becomes of almost every path and of the mean square.
 
     Args:
         table: the numbers of all curves.
     """
+    yield Sentence("", case.headline)
+    for key, stated in case.parameters.items():
+        if key.endswith(".treatment") and key not in case.vary.keys:
+            yield Sentence(f'{key} = "{stated.value}": the noise is {TREATED[str(stated.value)]}.')
     signs = _signs(case, table)
     if len(results) > EACH:
         told = [f"{what} decays in {sum(of < 0)} curves, and grows in {sum(of > 0)}" for what, of in signs.items()]
-        yield Sentence(_sentence(told), case.headline)
+        yield Sentence(_sentence(told))
     else:
-        yield Sentence("", case.headline)
         for each in results:
             if text := verdict(case, each):
                 yield Sentence(f"{each.curve.label}: {text[0].lower()}{text[1:]}" if len(results) > 1 else text)

@@ -356,6 +356,7 @@ def noise_sections(outcome: NoiseOutcome) -> str:
 
 def _lines(noise: Noise, fit: NoiseFit, part: str) -> Iterator[str]:
     yield f'kind = "{noise.kind}"'
+    yield from (f'{name} = "{word}"' for name, word in noise.words.items())
     errors = fit.errors
     values = {name: each for name, each in noise.values.items() if not isinstance(each, str)}
     if noise.kind == "filter":

@@ -82,7 +82,8 @@ figure = false
 """
     )
     known = load_case(write(stated)).curve({}).digest
-    changes = ["oscillator.omega=2.5", 'oscillator.impact="restitution"', 'noise.treatment="exact"', "noise.D0=2.0"]
+    changes = ["oscillator.omega=2.5", 'oscillator.impact="restitution"', "noise.D0=2.0"]
+    changes += ['noise.treatment="ou-reduction"']
     assert len({known, *(load_case(write(stated), [each]).curve({}).digest for each in changes)}) == 5
     assert load_case(write(stated), ["oscillator.c2=-0.0", "output.figure=true"]).curve({}).digest == known
     rates = """
@@ -192,7 +193,7 @@ def test_a_curve_holds_every_parameter() -> None:
 def test_defaults_and_integers(write: Write) -> None:
     case = load_case(write(SMALL))
     [curve] = case.curves()
-    assert curve == Curve(Problem(case.oscillator, NonGaussianNoise(D0=1.0, tau0=1.0, r0=1.0).ou_reduction()), {})
+    assert curve == Curve(Problem(case.oscillator, NonGaussianNoise(D0=1.0, tau0=1.0, r0=1.0)), {})
     assert isinstance(case.oscillator.omega, float)
     assert case.oscillator.impact is ImpactLaw.DELTA
     assert case.p.tolist() == [2.0, -1.0]
@@ -250,7 +251,7 @@ def test_curves_are_a_product_numbered_and_named(write: Write) -> None:
 
 
 def test_the_only_curve_needs_no_name_and_knows_the_noise_before_its_reduction(write: Write) -> None:
-    case = load_case(write(SMALL.replace("r0 = 1", "r0 = 0.9")))
+    case = load_case(write(SMALL.replace("r0 = 1", 'r0 = 0.9, treatment = "ou-reduction"')))
     [curve] = case.curves()
     assert (curve.number, curve.suffix, curve.label) == (1, "", "")
     assert case.heading(curve) == "small"

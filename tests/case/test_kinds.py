@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from fpsolve import moment_lyapunov
 from fpsolve.case.case import load_case
 from fpsolve.case.vary import legend
 from fpsolve.cli import main
@@ -16,6 +17,7 @@ from fpsolve.model.noises.markov_chain import MarkovChain, Telegraph
 from fpsolve.model.noises.non_gaussian import NonGaussianNoise, ReducedNoise
 from fpsolve.model.problem import Problem
 from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
+from tests.oracles import fourier_hermite, kronecker
 
 OSCILLATOR = """\
 title = "kinds"
@@ -27,7 +29,18 @@ epsilon = 0.1
 """
 MOMENTS = "[moments]\np = [2.0]\n"
 ONLY = '[output]\nquantities = ["moment", "lyapunov_exponent"]\n'
-REDUCED = "[noise]\nD0 = 1.0\ntau0 = 0.5\nr0 = 0.95\n"
+REDUCED = '[noise]\nD0 = 1.0\ntau0 = 0.5\nr0 = 0.95\ntreatment = "ou-reduction"\n'
+EXACT, NON_GAUSSIAN = 'treatment = "exact"\n', 'kind = "non-gaussian"\n'
+PARAMETRIC = """\
+title = "kinds"
+[system]
+variables = ["x", "v"]
+drift = ["v", "-x - 0.2*v - xi*x"]
+[noise]
+D0 = 0.3
+tau0 = 0.7
+r0 = 0.42
+"""
 SINE = '[noise]\nkind = "sine-wiener"\namplitude = 1.0\nsigma = 1.0\n'
 
 
@@ -50,14 +63,42 @@ def solved(path: Path, out: Path) -> dict[str, float]:
     return {str(curve["parameters"]): curve["moments"][0]["moment"] for curve in curves}
 
 
+@pytest.mark.parametrize("keys", ["", EXACT, NON_GAUSSIAN, NON_GAUSSIAN + EXACT])
+def test_the_noise_of_eq_7_is_taken_as_it_stands_however_it_is_named(
+    tmp_path: Path, keys: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """E x xᵀ and polynomials of the noise tell Λ(2)."""
+    text = write(tmp_path, PARAMETRIC, keys, MOMENTS)
+    driven = [[0.0, 0.0], [-1.0, 0.0]]
+    own, xi = (each.toarray() for each in fourier_hermite.bounded_noise(0.3, 0.7, 0.42, 40))
+    expected = kronecker.several([[0.0, 1.0], [-1.0, -0.2]], [(driven, own, xi)], [], [], 2, 0.0)
+    assert expected == pytest.approx(-0.1412, abs=5e-5)
+    problem = Problem(load_case(text).system, NonGaussianNoise(D0=0.3, tau0=0.7, r0=0.42))
+    assert moment_lyapunov(problem, 2.0).value[0] == pytest.approx(expected, abs=1e-9)
+    [(parameters, value)] = solved(text, tmp_path).items()
+    assert "'noise.treatment': 'exact'" in parameters
+    assert value == pytest.approx(expected, abs=1e-9)
+    assert capsys.readouterr().out.startswith(
+        'kinds\nnoise.treatment = "exact": the noise is that of Eq. (7) as it stands.\n'
+    )
+
+
+@pytest.mark.parametrize("keys", ["", NON_GAUSSIAN, 'kind = "ou-reduction"\n'])
+def test_the_reduction_is_taken_where_a_case_states_it(tmp_path: Path, keys: str) -> None:
+    stated = PARAMETRIC + 'treatment = "ou-reduction"\n'
+    problem = load_case(write(tmp_path, stated, keys, MOMENTS)).problem
+    assert problem.noise == ReducedNoise(D0=0.3, tau0=0.7, r0=0.42)
+    assert moment_lyapunov(problem, 2.0).value[0] == pytest.approx(-0.0833449128, abs=1e-9)
+    [text] = said(tmp_path, stated.replace("0.42", "1.8"), keys, MOMENTS)
+    assert "< 5/3" in text
+
+
 def test_the_system_has_two_names(tmp_path: Path) -> None:
     usual = load_case(write(tmp_path, OSCILLATOR, REDUCED, MOMENTS))
     named = OSCILLATOR.replace("[oscillator]", '[system]\nkind = "vibro-impact"')
     again = load_case(write(tmp_path, named, REDUCED.replace("D0", 'kind = "ou-reduction"\nD0'), MOMENTS))
     assert again.problem == usual.problem == Problem(usual.oscillator, ReducedNoise(D0=1.0, tau0=0.5, r0=0.95))
     assert again.curve({"oscillator.omega": 2.0}).parameters["oscillator.omega"] == 2.0
-    exact = load_case(write(tmp_path, OSCILLATOR, REDUCED.replace("D0", 'kind = "non-gaussian"\nD0'), MOMENTS))
-    assert exact.noise == NonGaussianNoise(D0=1.0, tau0=0.5, r0=0.95)
     [text] = said(tmp_path, OSCILLATOR, named.partition("\n")[2], REDUCED, MOMENTS)
     assert text.endswith("oscillator: stands beside [system], but a case has one system; remove one of the two")
     [text] = said(tmp_path, OSCILLATOR, 'kind = "markov-chain"\n', REDUCED, MOMENTS)
@@ -76,7 +117,10 @@ def test_the_system_has_two_names(tmp_path: Path) -> None:
             '10: noise.amplitud: unknown key; did you mean "amplitude"?',
         ),
         ('kind = "telegraph"\na = 1.0\nk = -1.0', "10: noise.k: got -1.0; must be a finite number >= 1e-15"),
-        ('kind = "ou-reduction"\nD0 = 1.0\ntau0 = 1.0\nr0 = 1.0\ntreatment = "exact"', "12: noise.treatment: unknown"),
+        (
+            'kind = "ou-reduction"\nD0 = 1.0\ntau0 = 1.0\nr0 = 1.0\ntreatment = "exact"',
+            '12: noise.treatment: got "exact" beside kind = "ou-reduction"; remove one of the two',
+        ),
         ('kind = "markov-chain"\nstates = [1.0]\nrates = [[1.0]]', "got (1,) states and (1, 1) rates; must be"),
         (
             'kind = "markov-chain"\nstates = 1.0\nrates = [[1.0]]',

@@ -23,7 +23,7 @@ FAULTY = [
     (FIG1, "omega = 1.0", "omga = 1.0"),
     (FIG1, "restitution = 0.8", "restitution = 1.1"),
     (FIG1, 'impact = "delta"', 'impact = "dleta"'),
-    (FIG1, "r0 = 0.95", "r0 = 2.0"),
+    (FIG1, "r0 = 0.95", "r0 = 3.0"),
     (FIG1, "tau0 = 0.5\n", ""),
     (FIG1, 'treatment = "ou-reduction"', 'kind = "ou-reductoin"'),
     (FIG1, "rtol = 1e-8", "rtol = 1.0"),

@@ -118,6 +118,16 @@ def test_an_error_above_the_value_decides_nothing():
     assert said[0].endswith(": almost every path is not decided; measure for longer.")
 
 
+def test_noise_of_eq_7_is_written_with_its_treatment(capsys):
+    """Two sines of random walks are bounded, with the kurtosis 2.25."""
+    values = 0.1 * np.sin(np.cumsum(0.3 * np.random.default_rng(0).normal(size=(20_000, 2)), axis=0)).sum(axis=1)
+    np.savetxt("record.csv", np.column_stack([0.02 * np.arange(values.size), values]), delimiter=",", header="t (s),k")
+    noise("--record", "record.csv", "--of", "stiffness", "--frequency", "2", "--damping-ratio", "0.01",
+          "--kind", "non-gaussian")  # fmt: skip
+    assert 'kind = "non-gaussian"\ntreatment = "exact"\n' in capsys.readouterr().out
+    assert load_case("results/record.csv/noise.toml").noise.values["treatment"] == "exact"
+
+
 @pytest.mark.slow
 def test_acceleration_of_a_support_and_two_terms():
     """ω² = g/ℓ and ξ = a/g; the sum of two noises is one with the same spectrum."""

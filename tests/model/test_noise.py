@@ -101,7 +101,7 @@ def test_spectral_density_is_the_fourier_transform_of_the_correlation():
 def test_no_reduction_where_the_variance_is_infinite(r0):
     noise = NonGaussianNoise(D0=1.0, tau0=0.5, r0=r0)
     assert noise.variance == noise.correlation_time == math.inf
-    with pytest.raises(ValueError, match=r"r0 = .* need r0 < 5/3"):
+    with pytest.raises(ValueError, match=r"r0 = .* choose r0 < 5/3"):
         noise.ou_reduction()
 
 

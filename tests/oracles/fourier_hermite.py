@@ -61,7 +61,7 @@ def moment_lyapunov_bounded_noise(
     """
     if not r0 < 1:
         raise ValueError(f"r0 = {r0}: the support is bounded for r0 < 1 only")
-    noise = _bounded_noise(D0, tau0, r0, gegenbauer)
+    noise = bounded_noise(D0, tau0, r0, gegenbauer)
     return _principal(noise, harmonics, omega, epsilon, c1, log_R, p)
 
 
@@ -99,7 +99,7 @@ def _gaussian_noise(alpha: float, sigma: float, size: int) -> tuple[sp.csr_array
     return sp.diags_array(-alpha * m).tocsr(), sp.diags_array([beta, beta], offsets=[-1, 1]).tocsr()
 
 
-def _bounded_noise(D0: float, tau0: float, r0: float, size: int) -> tuple[sp.csr_array, sp.csr_array]:
+def bounded_noise(D0: float, tau0: float, r0: float, size: int) -> tuple[sp.csr_array, sp.csr_array]:
     """The same in the polynomials P_m orthonormal under (1 − ξ²/ξ_s²)^a, a = 1/(1 − r0).
 
     They are Gegenbauer's, of index a + ½, with the recurrence ξ P_m = β_(m+1) P_(m+1) + β_m P_(m−1).

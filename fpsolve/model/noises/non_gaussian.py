@@ -13,7 +13,7 @@ from pydantic.fields import FieldInfo
 
 from fpsolve.arrays import FloatArray
 from fpsolve.messages import Code, Message, Remedy
-from fpsolve.model.faults import strict_dataclass
+from fpsolve.model.faults import TableError, strict_dataclass
 from fpsolve.model.noise import Noise, NoiseDerivative
 from fpsolve.model.noises.ornstein_uhlenbeck import GaussianNoise, LinearStep, linear_step
 from fpsolve.model.parameters import SIZE, parameter, stated_field
@@ -80,6 +80,12 @@ class ImplicitStep(NamedTuple):
             xi_mean[i] = 0.5 * (xi[i] + xi_end[i])
 
 
+def _treatment(usual: str) -> Mapping[str, FieldInfo]:
+    meaning = "Eq. (7) itself, or the reduction of Eqs. (12)-(14)"
+    kinds: Any = Literal["ou-reduction", "exact"]
+    return {"treatment": stated_field(kinds, meaning, 'treatment = "ou-reduction"', usual)}
+
+
 @strict_dataclass
 class TreatedNoise(Noise):
     """The noise of Eq. (7), taken as it stands or replaced by its reduction: a word, the treatment, tells which."""
@@ -88,19 +94,13 @@ class TreatedNoise(Noise):
     tau0: Annotated[float, parameter("correlation time", "tau0 = 0.5", r"$\tau_0$", "time", **SIZE)]
     r0: Departure
 
-    stated: ClassVar[Mapping[str, FieldInfo]] = {
-        "treatment": stated_field(
-            Literal["ou-reduction", "exact"],
-            "the reduction of Eqs. (12)-(14), or Eq. (7) itself",
-            'treatment = "ou-reduction"',
-            "ou-reduction",
-        )
-    }
+    stated: ClassVar[Mapping[str, FieldInfo]] = _treatment("exact")
 
     @classmethod
     def from_table(cls, table: Mapping[str, Any]) -> TreatedNoise:
-        words = {name: value for name, value in table.items() if name in cls.stated}
-        return cls(**{name: value for name, value in table.items() if name not in words}).at(words)
+        if table.get("treatment", cls.words["treatment"]) != cls.words["treatment"]:
+            raise TableError(f'got "exact" beside kind = "{cls.kind}"; remove one of the two', "treatment")
+        return cls(**{name: value for name, value in table.items() if name != "treatment"})
 
     def at(self, values: Mapping[str, float | str]) -> TreatedNoise:
         """The noise with other values of D₀, τ₀, r₀ or of its treatment, "exact" or "ou-reduction"."""
@@ -236,8 +236,8 @@ class NonGaussianNoise(TreatedNoise):
         """
         if self._bracket <= 0:
             raise ValueError(
-                f"r0 = {self.r0} has no Ornstein-Uhlenbeck reduction: Eqs. (11)-(12) need r0 < 5/3, "
-                "where the variance (10) is finite"
+                f"r0 = {self.r0} has an infinite variance (10), and no Ornstein-Uhlenbeck reduction, Eqs. (11)-(12); "
+                "choose r0 < 5/3"
             )
         return ReducedNoise(D0=self.D0, tau0=self.tau0, r0=self.r0)
 
@@ -305,6 +305,7 @@ class ReducedNoise(TreatedNoise, GaussianNoise):
     r0: Annotated[Departure, Field(lt=math.nextafter(5 / 3, 0))]  # at which 5 - 3 r0 is 0 already
 
     kind: ClassVar[str] = "ou-reduction"
+    stated: ClassVar[Mapping[str, FieldInfo]] = _treatment("ou-reduction")
     words: ClassVar[Mapping[str, str]] = {"treatment": "ou-reduction"}
 
     @property
