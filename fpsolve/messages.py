@@ -275,8 +275,8 @@ class Code(Enum):
     ALWAYS_UNSTABLE = "note: unstable for every {symbol} in (0, 1]: λ = 0 would need {symbol} = {value:.3g}"
 
     NOISE_MISFIT = (
-        "warning: near {name} the measured density is {relative:+.1%} off the fitted one, with a standard error of "
-        "{error:.1%}; take another kind of noise, or more terms"
+        "warning: near {name} the measured density is {relative:+.1%} off that of the best fit, and the fit is made to "
+        "have it; elsewhere it is off; take another kind of noise, or more terms"
     )
     AS_READ = "note: {text}"
     FIT_STOPPED = (
@@ -285,8 +285,8 @@ class Code(Enum):
     )
     SPECTRUM_GAP = "note: nothing was measured from {low:.4g} to {high:.4g} rad/time"
     NO_SPECTRUM_ERROR = (
-        "note: the errors of the measured values are not known, and are taken from how far these are from the fit; "
-        "state how many averages they are of"
+        "note: the errors of the measured values are not known, and are taken from how far each is from its "
+        "neighbours; state how many averages they are of"
     )
     UNTOLD_PARAMETERS = (
         "warning: the values do not tell all parameters of the fit, whose errors are then not known, though that of "

@@ -26,7 +26,7 @@ from scipy.optimize import least_squares, nnls
 
 from fpsolve.arrays import FloatArray, shown
 from fpsolve.measured.kinds import KINDS, Kind
-from fpsolve.measured.spectrum import Record, Spectrum, bracketed, gaps, welch_variance
+from fpsolve.measured.spectrum import MOST_AVERAGES, Record, Spectrum, bracketed, gaps, welch_variance
 from fpsolve.measured.weak import Where, frequencies_that_matter
 from fpsolve.messages import Code, Message
 from fpsolve.model import Noise, Noises
@@ -52,8 +52,14 @@ LEAST_SAMPLES = 16
 """In a segment."""
 MOST_STEPS, MORE_STEPS = 100, 2000
 """Evaluations of a search, and of one that goes on where this did not suffice."""
-MISFIT, UNSURE_MISFIT = 3.0, 2.0
-"""Standard errors by which a fit may be off where it matters before that is said; fewer where they count it."""
+MISFIT, SHARE = 3.0, 0.02
+"""Standard errors, and a share, by which a fit may be off where it matters before that is said."""
+EXACT = 1e-3
+"""The share by which it may be off without a standard error before it is made to pass there."""
+MEDIAN = 2.73
+"""Of the squares of second differences of independent normal numbers, over their variance."""
+PASSING = 100.0
+"""How much more than all other values together a density counts that a fit must have."""
 
 
 class Misfit(NamedTuple):
@@ -62,8 +68,8 @@ class Misfit(NamedTuple):
     Attributes:
         name: "2ω", or another.
         omega: in rad/time.
-        relative: measured/fitted − 1, the mean over a band.
-        error: its standard error; where those of the values are not known, by how far all of them are from the fit.
+        relative: measured/fitted − 1, both as lines through the nearest values have them at ω.
+        error: its standard error; where those of the values are not known, by how far these are from their neighbours.
     """
 
     name: str
@@ -173,7 +179,8 @@ class _Cut(NamedTuple):
 class _Data(NamedTuple):
     """Values, of how many each is the mean, and what `expected` makes of kinds: Sᵢ(θ).
 
-    Of a record `variance` is that of a mean over its square, and `record` how it is cut.
+    Of a record `variance` is that of a mean over its square, and `record` how it is cut. Where the errors of values are
+    not known, their number follows from how far each is from its neighbours.
     """
 
     omega: FloatArray
@@ -224,15 +231,60 @@ def fit_noise(
         raise TypeError(f"got {shown(data)}; must be a Spectrum or a Record")
     _refuse_far(spectrum, matter)
     weights = _weights(used.omega, [*matter.values()], 2 * frequency)
-    fits = [_fitted(used, [family] * terms, weights) for family in KINDS[kind]]
-    # more parameters must lower the deviance by ln n each, as in Bayes' criterion
-    families, theta, _, is_stopped = min(
-        zip([[family] * terms for family in KINDS[kind]], *zip(*fits, strict=True), strict=True),
-        key=lambda each: each[2] + len(each[1]) * math.log(len(used.values)),
-    )
-    found = _told(used, families, theta, weights, matter, spectrum)
-    stopped = (Message(Code.FIT_STOPPED, steps=MORE_STEPS),) if is_stopped else ()
-    return replace(found, messages=(*stopped, *found.messages))
+    places, errors = zip(*(_place(at, used) for at in matter.values()), strict=True)
+
+    def best(passed: Sequence[FloatArray]) -> NoiseFit:
+        fits = [_fitted(used, [family] * terms, weights, passed) for family in KINDS[kind]]
+        # more parameters must lower the deviance by ln n each, as in Bayes' criterion
+        families, theta, _, is_stopped = min(
+            zip([[family] * terms for family in KINDS[kind]], *zip(*fits, strict=True), strict=True),
+            key=lambda each: each[2] + len(each[1]) * math.log(len(used.values)),
+        )
+        off = np.dot(places, used.values) / np.dot(places, _sum(used, families, theta)) - 1
+        misfit = tuple(Misfit(*each) for each in zip(matter, matter.values(), off.tolist(), errors, strict=True))
+        found = _told(used, families, theta, weights, misfit, spectrum)
+        stopped = (Message(Code.FIT_STOPPED, steps=MORE_STEPS),) if is_stopped else ()
+        return replace(found, messages=(*stopped, *found.messages))
+
+    found = best([])
+    if not _off(found, EXACT):
+        return found
+    again = best(places)
+    if left := _off(again, SHARE):
+        text = "that was measured; take another kind, such as filter, or two terms"
+        raise ValueError(f"no {kind} noise found has the density near {left[0].name} {text}")
+    size = 0.5 * max(errors) * again.powers * np.array([*again.parameters.values()])
+    told = [Message(Code.NOISE_MISFIT, name=each.name, relative=each.relative) for each in _off(found, SHARE)]
+    return replace(again, covariance=again.covariance + np.outer(size, size), messages=(*told, *again.messages))
+
+
+def _off(fit: NoiseFit, share: float) -> list[Misfit]:
+    """Where a fit is off by more than its error, and a share."""
+    return [each for each in fit.misfit if abs(each.relative) > max(MISFIT * each.error, share)]
+
+
+def _place(at: float, data: _Data) -> tuple[FloatArray, float]:
+    """The weights of values that tell S(ω), those of a line through the nearest at ω, and its relative standard error.
+
+    There are as many as the error needs, within 10 % of ω, or five, and on a line but for their scatter; else two. At 0
+    it is their mean, as S is flat there.
+    """
+    distance = abs(data.omega - at)
+    order = np.argsort(distance)
+    number = data.number[order[0]]
+    count = min(math.ceil(1 / (number * SHARE**2)), max(int(np.sum(distance <= 0.1 * at)), 5))
+    while True:
+        near = order[: max(count, 2)]
+        line = np.vander((data.omega[near] - at) / distance[near[-1]], 1 + (at > 0))
+        inverse, values = np.linalg.pinv(line), data.values[near] / data.values[near].mean()
+        off, free = values - line @ (inverse @ values), near.size - line.shape[1]
+        if count <= 2 or number * off @ off <= free + math.sqrt(8 * free):  # two standard deviations, or more
+            break
+        count = 2 * count // 3
+    weights = np.zeros_like(data.omega)
+    weights[near] = np.maximum(inverse[-1], 0)
+    inflation = 1.0 if data.record is None else data.record.inflation
+    return weights, math.sqrt(inflation * np.sum(weights**2 / data.number)) if number < MOST_AVERAGES else 0.0
 
 
 def _segment(record: Record, stated: float | None, matter: Mapping[str, float]) -> int:
@@ -282,8 +334,11 @@ def _weights(omega: FloatArray, matter: Sequence[float], scale: float) -> FloatA
 
 
 def _of_spectrum(data: Spectrum) -> _Data:
-    number = np.ones_like(data.density) if data.relative_error is None else data.relative_error**-2
-    omega = data.frequencies
+    number, omega = np.full_like(data.density, MOST_AVERAGES), data.frequencies
+    if data.relative_error is not None:
+        number = data.relative_error**-2
+    elif not data.is_formula:
+        number /= 1 + MOST_AVERAGES * np.median(np.diff(np.log(data.density), 2) ** 2) / MEDIAN
     positive = omega > 0
     return _Data(
         omega[positive],
@@ -357,18 +412,26 @@ def _start(data: _Data, families: Sequence[Kind], weights: FloatArray) -> FloatA
     return np.concatenate(found)
 
 
-def _fitted(data: _Data, families: Sequence[Kind], weights: FloatArray) -> tuple[FloatArray, float, bool]:
-    """ln θ where the deviance is least, the deviance, and whether the search was stopped before its end."""
+def _fitted(
+    data: _Data, families: Sequence[Kind], weights: FloatArray, passed: Sequence[FloatArray]
+) -> tuple[FloatArray, float, bool]:
+    """ln θ where the deviance is least, the deviance, and whether the search was stopped before its end.
+
+    Args:
+        passed: weights with which the means of Ŝ and of S(θ) must be the same.
+    """
     size = np.sqrt(2 * weights * data.number)
+    large = PASSING * float(np.linalg.norm(size))
 
     def residuals(theta: FloatArray) -> FloatArray:
-        log_ratio = np.log(data.values) - np.log(_sum(data, families, theta))
-        bounded = np.clip(log_ratio, -100, 100)
-        return np.asarray(np.sign(bounded) * size * np.sqrt(np.maximum(np.expm1(bounded) - bounded, 0)))
+        fitted = _sum(data, families, theta)
+        bounded = np.clip(np.log(data.values) - np.log(fitted), -100, 100)
+        there = [large * math.log((each @ data.values) / (each @ fitted)) for each in passed]
+        return np.array([*np.sign(bounded) * size * np.sqrt(np.maximum(np.expm1(bounded) - bounded, 0)), *there])
 
     starts = [_start(data, families, weights)]
     if len(families) > 1:  # one part more beside the best sum of fewer, which halves a part of it in two places
-        fewer, _, _ = _fitted(data, families[1:], weights)
+        fewer, _, _ = _fitted(data, families[1:], weights, passed)
         first = fewer[: len(families[0].names)]
         shift = np.zeros_like(first)
         shift[0 if families[0].amplitude else 1] = 1.0
@@ -402,21 +465,17 @@ def _told(
     families: Sequence[Kind],
     theta: FloatArray,
     weights: FloatArray,
-    matter: Mapping[str, float],
+    misfit: tuple[Misfit, ...],
     spectrum: Spectrum,
 ) -> NoiseFit:
-    fitted, slopes = _sum(data, families, theta), _slopes(data, families, theta)
+    slopes = _slopes(data, families, theta)
     slopes[:, theta > np.concatenate([family.highest for family in families]) - AT_END] = 0.0  # fixed there
-    ratio = data.values / fitted - 1
-    n, k = data.values.size, theta.size
-    unknown = spectrum.relative_error is None
-    dispersion = float(np.sum(weights * ratio**2) / np.sum(weights)) * n / max(n - k, 1) if unknown else 1.0
     information = slopes.T @ (slopes * (weights * data.number)[:, None])
-    bread = np.linalg.pinv(information, hermitian=True)
+    bread = np.linalg.pinv(information, rcond=UNTOLD, hermitian=True)
     if data.record is not None and any(family.path for family in families):
-        meat = _simulated(data, data.record, families, theta, fitted, weights[:, None] * slopes)
+        meat = _simulated(data, data.record, families, theta, _sum(data, families, theta), weights[:, None] * slopes)
     elif data.record is None:
-        meat = dispersion * slopes.T @ (slopes * (weights**2 * data.number)[:, None])
+        meat = slopes.T @ (slopes * (weights**2 * data.number)[:, None])
     else:
         # Hann's window correlates neighbours: of a Gaussian noise by 4/9, and by 1/36 at two steps
         rows = slopes * (weights * data.number * math.sqrt(data.variance))[:, None]
@@ -424,22 +483,15 @@ def _told(
         for lag, share in ((1, 4 / 9), (2, 1 / 36)):
             meat += share * (rows[lag:].T @ rows[:-lag] + rows[:-lag].T @ rows[lag:])
     values = np.exp(theta)
-    covariance = bread @ meat @ bread * np.outer(values, values)
+    covariance = bread @ meat @ bread * np.outer(values, values) * (not spectrum.is_formula)
     parts, keys, place = [], list[str](), 0
     for name, family in zip(NAMES, families, strict=False):
         own = values[place : place + len(family.names)]
         parts.append(family.make(*own.tolist()))
         keys += [f"{name}.{each}" if len(families) > 1 else each for each in family.names]
         place += len(family.names)
-    misfit = tuple(_misfit(name, at, data, ratio, dispersion) for name, at in matter.items())
-    most = UNSURE_MISFIT if unknown else MISFIT
-    messages = [
-        Message(Code.NOISE_MISFIT, name=each.name, relative=each.relative, error=each.error)
-        for each in misfit
-        if abs(each.relative) > max(most * each.error, 0.02)
-    ]
-    messages += [Message(Code.SPECTRUM_GAP, low=low, high=high) for low, high in gaps(spectrum)]
-    if unknown and not spectrum.is_formula:
+    messages = [Message(Code.SPECTRUM_GAP, low=low, high=high) for low, high in gaps(spectrum)]
+    if spectrum.relative_error is None and not spectrum.is_formula:
         messages.append(Message(Code.NO_SPECTRUM_ERROR))
     size = np.sqrt(np.maximum(np.diag(information), 1e-300))
     if np.linalg.eigvalsh(information / np.outer(size, size))[0] < UNTOLD:
@@ -482,13 +534,3 @@ def _simulated(
             each += scores[lag:].T @ scores[: block - lag] * (measured - lag) / (block - lag) / blocks
     meat: FloatArray = sums[0] + sum(each + each.T for each in sums[1:])
     return meat
-
-
-def _misfit(name: str, at: float, data: _Data, ratio: FloatArray, dispersion: float) -> Misfit:
-    """In the band within 10 % of ω, or among the five nearest values."""
-    distance = abs(data.omega - at)
-    near = distance <= max(0.1 * at, float(np.sort(distance)[min(4, distance.size - 1)]))
-    number = data.number[near]
-    inflation = 1.0 if data.record is None else data.record.inflation
-    error = math.sqrt(dispersion * inflation / float(np.sum(number)))
-    return Misfit(name, at, float(np.average(ratio[near], weights=number)), error)

@@ -168,7 +168,7 @@ def named_spectrum(name: str, near: float, **parameters: float) -> Spectrum:
     named_density(name, 1.0, **parameters)
     known = {key: usual for key, (_, usual) in NAMED[name].parameters.items() if usual is not None} | parameters
     peak = NAMED[name].peak(known)
-    omega = np.geomspace(min(peak, near) / BELOW, max(peak, near) * ABOVE, POINTS)
+    omega = np.union1d(np.geomspace(min(peak, near) / BELOW, max(peak, near) * ABOVE, POINTS), near)
     density = named_density(name, omega, **parameters)
     inside = density > LEAST * density.max()
     return Spectrum(omega[inside], density[inside], is_formula=True)

@@ -260,21 +260,19 @@ def _sum(modes: Modes, noise_in: Where) -> dict[str, Any]:
 
 
 def _critical(fit: NoiseFit, wanted: Wanted) -> dict[str, Any]:
-    """The damping ratios at which λ and Λ(2) vanish in weak noise, with errors as those of `verdict`."""
+    """The damping ratios at which λ and Λ(2) vanish in weak noise, by the densities that were measured or named."""
     if len(wanted.modes.omega) > 1 or (wanted.case and wanted.case.system.noise_unit == "unknown"):
         return {}  # of equations that have a coefficient of their own for the noise
-    omega = wanted.modes.omega[0]
-
-    def ratios(each: NoiseFit) -> FloatArray:
-        at_double, at_zero = each.spectral_density(2 * omega), each.spectral_density(0.0)
-        exponent = weak_exponent(omega, 0.0, at_double, wanted.noise_in) / omega
-        return np.array([exponent, weak_moment(2, omega, 0.0, at_double, at_zero, wanted.noise_in) / (2 * omega)])
-
-    values, slopes = ratios(fit), slopes_of(fit, ratios)
-    errors = np.sqrt(np.maximum(np.einsum("ki,kl,li->i", slopes, fit.covariance, slopes), 0.0))
-    errors = np.hypot(errors, fit.off * values)
-    exponent, moment = (Critical(float(a), float(b)) for a, b in zip(values, errors, strict=True))
-    return {"exponent": exponent, "moment": moment}
+    omega, where = wanted.modes.omega[0], wanted.noise_in
+    values, errors = density_of(fit, [2 * omega, 0.0])
+    for i, each in enumerate(fit.misfit):
+        values[i] *= 1 + each.relative
+        errors[i] = each.error * values[i]
+    of_zero = [weak_moment(2, omega, 0.0, 0.0, each, where) for each in (values[1], errors[1])]
+    of_double = [weak_moment(2, omega, 0.0, each, 0.0, where) for each in (values[0], errors[0])]
+    exponent = [weak_exponent(omega, 0.0, each, where) / omega for each in (values[0], errors[0])]
+    moment = (of_double[0] + of_zero[0]) / (2 * omega), math.hypot(of_double[1], of_zero[1]) / (2 * omega)
+    return {"exponent": Critical(*exponent), "moment": Critical(*moment)}
 
 
 def slopes_of(fit: NoiseFit, numbers: Any) -> FloatArray:
@@ -372,7 +370,7 @@ def _lines(noise: Noise, fit: NoiseFit, part: str) -> Iterator[str]:
 def _line(name: str, value: float, errors: Mapping[str, float], part: str, parts: int) -> str:
     error = errors.get(name if parts == 1 else f"{part}.{name}")
     text = f"{name} = {_number(value, error or 0.0)}"
-    return text if error is None else f"{text:34}  # ± {error:.2g}"
+    return f"{text:34}  # ± {error:.2g}" if error else text
 
 
 def _number(value: float, error: float) -> str:
@@ -433,10 +431,11 @@ def summary(outcome: NoiseOutcome, source: Path) -> dict[str, Any]:
             "covariance": each.covariance.tolist(),
         }
 
-    def spread(each: Spread | None) -> dict[str, float] | None:
+    def spread(each: Spread | None) -> dict[str, float | None] | None:
         if each is None:
             return None
-        return {"value": each.value, "standard_error": each.deviation, "probability_below_0": each.below}
+        error, below = (None, None) if fit.spectrum.is_formula else (each.deviation, each.below)
+        return {"value": each.value, "standard_error": error, "probability_below_0": below}
 
     def critical(each: Critical | None) -> dict[str, float] | None:
         if each is None:
@@ -564,14 +563,19 @@ def sentences(outcome: NoiseOutcome) -> Iterator[str]:
         if outcome.failure is None:
             yield _missing(outcome)
         return
+    is_formula = outcome.fit.spectrum.is_formula
     for symbol, each, what in (
         ("λ", outcome.verdict.exponent, "almost every path"),
         ("Λ(2)", outcome.verdict.moment, "the mean square"),
     ):
         if each is not None:
-            number = f"{symbol} = {sampled(each.value, each.deviation)} ± {each.deviation:.1g} 1/s"
-            is_sure, open_ = abs(each.value) > each.deviation, f"{what} is not decided; measure for longer"
-            yield f"{number}: {likely(what, each.below) if is_sure else open_}."
+            number, error = sampled(each.value, each.deviation), "" if is_formula else f" ± {each.deviation:.1g}"
+            fate = likely(what, each.below).partition(" with" if is_formula else "\n")[0]
+            if abs(each.value) <= each.deviation:
+                fate = f"{what} is not decided; measure for longer, or try another --kind"
+            yield f"{symbol} = {number}{error} 1/s: {fate}."
+    if is_formula:
+        return
     share = outcome.fit.off
     off = f", and that it is {share:.0%} off where stability depends on it (try another --kind)" if share else ""
     yield f"The probabilities count the standard errors of the fit{off}; see the page From a measurement to a case."
@@ -587,7 +591,7 @@ def _missing(outcome: NoiseOutcome) -> str:
 def _percent(each: Critical) -> str:
     """A damping ratio in percent with two digits of its error."""
     value, error = 100 * each.value, 100 * each.error
-    return f"({sampled(value, error) if error > 0 else f'{value:.4g}'} ± {error:.1g}) %"
+    return f"({sampled(value, error)} ± {error:.1g}) %" if error else f"{value:.4g} %"
 
 
 def noise_case(

@@ -13,7 +13,7 @@ from fpsolve import OrnsteinUhlenbeck
 from fpsolve.case.case import load_case
 from fpsolve.cli import main
 from fpsolve.commands.options import BAD_INPUT
-from fpsolve.measured import read_spectrum, weak_exponent, weak_moment
+from fpsolve.measured import named_density, read_spectrum, weak_exponent, weak_moment
 from fpsolve.workflow.noise import natural_frequencies, sentences
 from tests.kit import read_json
 
@@ -113,9 +113,10 @@ def test_a_coefficient_of_a_case_leaves_no_line_of_weak_noise(capsys):
 def test_an_error_above_the_value_decides_nothing():
     """λ = 1 ± 70 is no growth with a probability of 50.6 %."""
     known = SimpleNamespace(value=1.0, deviation=70.0, below=0.494)
-    fit, verdict = SimpleNamespace(off=0.0), SimpleNamespace(exponent=known, moment=None)
+    fit = SimpleNamespace(off=0.0, spectrum=SimpleNamespace(is_formula=False))
+    verdict = SimpleNamespace(exponent=known, moment=None)
     said = [*sentences(SimpleNamespace(exponent=None, moment=None, verdict=verdict, failure=None, fit=fit))]
-    assert said[0].endswith(": almost every path is not decided; measure for longer.")
+    assert said[0].endswith(": almost every path is not decided; measure for longer, or try another --kind.")
 
 
 def test_noise_of_eq_7_is_written_with_its_treatment(capsys):
@@ -168,19 +169,65 @@ def test_the_sea_at_a_buoy():
     assert case.problem.values == pytest.approx(load_case("results/buoy.csv/noise.toml").problem.values, rel=1e-5)
 
 
-def test_a_fit_that_is_off_counts_its_distance(capsys):
-    """Noise that is not of the family: the error of Λ(2) is at least what the fit is off at 2f."""
+def test_a_fit_of_another_family_has_the_measured_density_and_its_error(capsys):
+    """At 2f, by the mean of the values within 10 % of it; so have Λ(2) and the line of weak noise."""
     path = ROOT / "cases/measured/buoy.csv"
     options = ["--of", "acceleration", "--column", "acceleration", "--sided", "one", "--averages", "12"]
     found = noise(str(path), *options, "--length", "60", "--damping-ratio", "0.001")
     [row], omega = found["frequencies"], math.sqrt(9.80665 / 60)
-    off = math.sqrt((row["measured_over_fitted"] - 1) ** 2 - row["measured_over_fitted_error"] ** 2)
-    assert off > 0.3
-    effect = 0.5 * omega**2 * row["density"] * off
-    assert found["second_moment"]["standard_error"] == pytest.approx(effect, rel=0.05)
+    sea = read_spectrum(path, sided="one", of="acceleration", column="acceleration").scaled(1 / 9.80665)
+    by_hand = np.mean(sea.density[np.argsort(abs(sea.frequencies - 2 * omega))[:5]])
+    assert row["density"] == pytest.approx(by_hand, rel=2 / math.sqrt(12 * 5))
+    assert row["measured_over_fitted"] == pytest.approx(1, abs=1e-3)
+    error = row["measured_over_fitted_error"] * omega**2 * row["density"] / 2
+    assert found["second_moment"]["standard_error"] == pytest.approx(error, rel=0.5)
+    assert found["critical_damping_ratio"]["moment"]["value"] == pytest.approx(omega * row["density"] / 4, rel=1e-3)
     said = capsys.readouterr()
-    assert "off the fitted one" in said.err
-    assert "off where stability depends on it" in said.out
+    assert "off that of the best fit" in said.err
+
+
+def by_formula(G):
+    return spectrum(noises=[SimpleNamespace(spectral_density=lambda omega: G(omega / (2 * math.pi)) / 2)])
+
+
+def laser(f):
+    """In units in which its 1 kHz are 2 Hz."""
+    return 5e-10 / (1 + (f / 40) ** 2) * (1 + 0.2 / f)
+
+
+def peaks(f):
+    return sum(a / ((1 - (f / g) ** 2) ** 2 + (0.1 * f / g) ** 2) for a, g in [(1e-6, 1), (3e-6, 4)])
+
+
+@pytest.mark.parametrize("kind", ["ornstein-uhlenbeck", "filter"])
+@pytest.mark.parametrize(("G", "zeta", "rel"), [(laser, 1e-9, 1e-3), (peaks, 0.01, 0.015)])  # of a peak between values
+def test_a_misfit_is_not_taken_for_scatter(G, zeta, rel, kind, capsys):
+    """By G(2f) itself: values without scatter whose averages are not stated."""
+    options = ["--sided", "one", "--frequency", "2", "--damping-ratio", f"{zeta}", "--kind", kind]
+    found, at_double = noise(by_formula(G), *options), G(4.0) / 2
+    assert found["critical_damping_ratio"]["moment"]["value"] == pytest.approx(OMEGA * at_double / 4, rel=rel)
+    assert found["frequencies"][0]["density"] == pytest.approx(at_double, rel=rel)
+    if G is laser:
+        moment = weak_moment(2, OMEGA, zeta, at_double, 0, "stiffness")
+        assert found["second_moment"]["value"] == pytest.approx(moment, rel=0.01) == pytest.approx(-4.6e-9, rel=0.01)
+        assert "grows" not in capsys.readouterr().out
+
+
+def test_a_named_density_has_no_errors(capsys):
+    stated = "--parameters", "Hs=2,Tp=9", "--of", "stiffness", "--scale", "0.01", "--damping-ratio", "0.01"
+    found = noise("--named", "jonswap", *stated, "--frequency", "0.05")
+    critical = 5e-5 * math.pi * 0.05 * float(named_density("jonswap", 0.2 * math.pi, Hs=2, Tp=9))
+    assert found["second_moment"]["standard_error"] is found["second_moment"]["probability_below_0"] is None
+    out = capsys.readouterr().out
+    assert f"Λ(2) < 0 above {100 * critical:.4g} %." in out
+    assert "probabilit" not in out
+
+
+def test_a_kind_that_cannot_have_all_densities_is_refused(capsys):
+    """An Ornstein-Uhlenbeck spectrum has no peaks at 4 and 12 Hz."""
+    by_formula(lambda f: 1 / (1 + (f - 4) ** 2) + 1 / (1 + (f - 12) ** 2))
+    assert main(["noise", *AT_2, "--frequency", "6"]) == BAD_INPUT
+    assert "near 2ω₁ that was measured; take another kind, such as filter" in capsys.readouterr().err
 
 
 def test_terms_that_are_not_told_apart(capsys):
