@@ -8,6 +8,7 @@ variable U. Küchler and B. Mensch, Stochastics 40 (1992) 23).
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -74,7 +75,7 @@ def stationary_moments(problem: Problem, rtol: float = 1e-6) -> StationaryMoment
     raise NotConverged(Message(Code.RESPONSE_OPEN, size=float(np.max(np.diag(errors)[:-1] / squares))))
 
 
-def _solved(equations: Equations, finer: int) -> tuple[FloatArray, FloatArray]:
+def _solved(equations: Equations, finer: int) -> Iterator[FloatArray]:
     """E yyᵀ of y = (x, 1) and what rounding changes, with steps and functions as fine as that."""
     counts = [math.ceil(FIRST * GROWTH**finer)] * len(equations.noises)
     mean, law = equations.means(counts)
@@ -87,5 +88,8 @@ def _solved(equations: Equations, finer: int) -> tuple[FloatArray, FloatArray]:
     inverse = np.linalg.inv(z[~is_one][:, ~is_one])
     moments[~is_one] = -inverse @ (z[~is_one][:, is_one] @ law)
     rounding[~is_one] = ROUNDING * np.abs(inverse) @ (sizes[~is_one] @ np.abs(moments))
-    square = moment_form(mean @ moments.reshape(-1, state.size), equations.dimension, 2)
-    return square, moment_form(np.abs(mean) @ rounding.reshape(-1, state.size), equations.dimension, 2)
+    unit = state.units[-1] ** 2
+    return (
+        moment_form(state.moments(weights @ each.reshape(-1, state.size)) / unit, equations.dimension, 2)
+        for weights, each in ((mean, moments), (np.abs(mean), rounding))
+    )

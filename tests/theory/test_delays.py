@@ -4,6 +4,8 @@ import math
 
 import numpy as np
 import pytest
+from scipy.linalg import expm
+from scipy.optimize import brentq
 from scipy.special import lambertw, wrightomega
 
 from fpsolve import Problem, moment_lyapunov, sensitivities
@@ -166,6 +168,28 @@ def test_a_telegraph_signal():
     found = even_moment(Problem(EquationSystem(("x",), ("(-1 + xi)*x + 0.4*x(t - 1)",)), noise), 2)
     own = Segment([(0.0, -one), (1.0, 0.4 * one)], [(0.0, one)], [], noise.states, noise.rates, 12)
     assert abs(own.exponent(found.value + 0.5) - found.value) <= 1e-8
+
+
+@pytest.mark.parametrize(("tau", "later"), [(0.5, 1.0), (0.5, 1.5), (2.0, 2.0)])
+def test_a_telegraph_signal_relaxes_between_two_delays(tau, later):
+    """dx = (−1 + ξ)x dt + (0.7x(t − τ₁) + 0.6x(t − τ₂))dW: E x² 1_i at three times is that at one, as dW is new."""
+    noise, a, b, c = Telegraph(a=0.8, k=0.7), -1.0, 0.7, 0.6
+    system = EquationSystem(
+        ("x",),
+        (f"(-1 + z)*x + w*({b}*x(t - {tau}) + {c}*x(t - {later}))",),
+        noises=(("z", "noise.z"), ("w", "noise.w")),
+    )
+    xi, rates = np.diag(noise.states), np.array(noise.rates).T
+    mean = expm((a * np.eye(2) + xi + rates) * (later - tau))
+
+    def left(sigma):
+        first, second = (math.exp(-sigma * each) * expm(rates * each) for each in (tau, later))
+        both = math.exp(-sigma * later) * expm(rates * tau) @ mean
+        steady = 2 * a * np.eye(2) + 2 * xi + rates
+        return np.linalg.eigvals(steady + b**2 * first + c**2 * second + 2 * b * c * both).real.max() - sigma
+
+    found = even_moment(Problem(system, {"z": noise, "w": ITO}), 2)
+    assert abs(found.value - brentq(left, -5, 5, xtol=1e-14)) <= found.error + 1e-13
 
 
 @pytest.mark.slow

@@ -61,8 +61,24 @@ def test_a_noise_that_does_both_moves_the_mean():
     """Under Stratonovich's noise ξ(ax + b) the mean rests where (−1 + ½a² + c)m + ½ab = 0."""
     found = moments("-x + 0.3*x(t - 1) + xi*(0.4*x + 0.5)", White(s=1.0))
     assert found.mean[0] == pytest.approx(0.1 / (1 - 0.08 - 0.3), rel=1e-13)
-    ito = moments("-0.92*x + 0.3*x(t - 1) + 0.5*xi + 0.4*xi*x")
-    assert found.covariance[0, 0] > ito.covariance[0, 0]
+    k, size = of_scalar(-0.92, 0.3, 1), 0.4 * found.mean[0] + 0.5  # what unit noise makes, and the noise at the mean
+    assert found.covariance[0, 0] == pytest.approx(k * size**2 / (1 - 0.16 * k), rel=1e-12)
+
+
+@pytest.mark.parametrize("unit", [1e-6, 1e3])
+def test_units_of_a_variable(unit):
+    """The pair (x, v/unit) has the moments of (x, v)."""
+    x, v = (
+        EquationSystem(("x", "v"), rates)
+        for rates in (
+            ("v", "-x - 0.3*v + 0.2*x(t - 1) + 0.2*xi*x(t - 1) + xi"),
+            (f"{unit}*v", f"(-x - 0.3*{unit}*v + 0.2*x(t - 1) + 0.2*xi*x(t - 1) + xi)/{unit}"),
+        )
+    )
+    one, other = (stationary_moments(Problem(each, ITO)) for each in (x, v))
+    scales = np.array([1.0, unit])
+    assert other.square * np.outer(scales, scales) == pytest.approx(one.square, rel=1e-11)
+    assert other.mean * scales == pytest.approx(one.mean, rel=1e-11)
 
 
 @pytest.mark.parametrize("n", [2, 3, 4])
