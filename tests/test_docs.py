@@ -159,6 +159,7 @@ def test_the_format_and_the_command_of_the_walk_through(tmp_path, capsys):
     )
 
 
+@pytest.mark.slow
 def test_every_name_at_the_top_has_an_example_that_runs(tmp_path, monkeypatch):
     """One after another, as the problem of the first one is that of the others."""
     monkeypatch.chdir(tmp_path)

@@ -74,6 +74,7 @@ def test_a_dead_worker_ends_a_run(workers):
         list(workers.run(deadly, range(15)))
 
 
+@pytest.mark.slow
 def test_a_cluster_without_workers_is_given_up(monkeypatch):
     monkeypatch.setattr(pool, "CONNECT_SECONDS", 0.5)
     monkeypatch.setattr(pool, "LOOK_SECONDS", 0.1)

@@ -85,7 +85,8 @@ class Delayed:
         parts = [self._split(each) for each in (drift, *moving.loads, *squares)]
         sizes, first = [np.sum(np.abs(each), axis=0) for each in parts], 1 + len(moving.loads)
         rest = sum((each @ each for each in sizes[first:]), np.zeros_like(sizes[0]))
-        self.units = moving.balance(sizes[:first], rest) if units is None else units
+        own, self.largest = moving.balance(sizes[:first], rest)
+        self.units = own if units is None else units
         self.drift, *others = (each * self.units / self.units[:, None] for each in parts)
         self.loads, self.squares = others[: len(moving.loads)], others[len(moving.loads) :]
         ones = np.eye(self.n * (self.n + 1) // 2)

@@ -15,6 +15,7 @@ others to the first, is added, and is the error, with what it is by the last one
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -199,8 +200,9 @@ class EvenMoment:
 
     @property
     def rounding(self) -> float:
-        """A bound of what rounding changes."""
-        return ROUNDING * self.scale
+        """A bound of what rounding changes, also in what moves the state: by its size, and the condition of Λ."""
+        condition = float(np.linalg.norm(self.x) * np.linalg.norm(self.y))
+        return ROUNDING * self.scale + sys.float_info.epsilon * self.equations.state.largest * condition
 
     @property
     def error(self) -> float:

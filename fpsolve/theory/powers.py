@@ -106,15 +106,20 @@ class Moving(NamedTuple):
     squares: Sequence[FloatArray]
     impulses: Sequence[tuple[float, FloatArray]]
 
-    def balance(self, linear: Sequence[Any], rest: Any) -> FloatArray:
-        """Units in which the sizes of A and D, of some power, and of the rest are balanced. Raises `NoHierarchy`."""
+    def balance(self, linear: Sequence[Any], rest: Any) -> tuple[FloatArray, float]:
+        """Units in which the sizes of A and D, of some power, and of the rest are balanced, and the largest size there.
+
+        Raises:
+            NoHierarchy: a size is not finite.
+        """
         sizes = abs(dense(rest))
         for strength, each in zip((1.0, *self.strengths), linear, strict=True):
             sizes = sizes + strength * abs(dense(each))
         if not np.isfinite(sizes).all():
             raise NoHierarchy("the equations of the moments are beyond floating-point numbers; use a smaller p")
         with np.errstate(invalid="ignore"):  # of units beyond an integer, which none are taken for here
-            return np.asarray(matrix_balance(sizes, permute=False, separate=True)[1][0])
+            balanced, (units, _) = matrix_balance(sizes, permute=False, separate=True)
+        return units, float(np.max(balanced))
 
 
 class Powers:
@@ -139,10 +144,11 @@ class Powers:
         for rate, exponent in moving.impulses:
             gain = expm(moved(exponent, p).toarray())
             rest = rest + sparse.csr_array(rate * (gain - np.eye(len(gain))))
-        self.units = moving.balance(linear, rest) if units is None else units
-        for each in (own := [linear[0] + rest, *linear[1:]]):
+        own, self.largest = moving.balance(linear, rest)
+        self.units = own if units is None else units
+        for each in (moves := [linear[0] + rest, *linear[1:]]):
             each.data *= self.units[each.indices] / np.repeat(self.units, np.diff(each.indptr))
-        self._steady, *self._loads = own
+        self._steady, *self._loads = moves
         self._start = gaussian(len(moving.steady), p)
 
     @property

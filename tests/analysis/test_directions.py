@@ -215,6 +215,7 @@ def test_noise_is_integrated_over():
     assert fields.total == pytest.approx(1, abs=1e-3)
 
 
+@pytest.mark.slow
 def test_what_densities_say():
     solver = ExponentSolver(turning(4, np.eye(4)), rtol=1e-3)
     pair = solver.pair(1.0)

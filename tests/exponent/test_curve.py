@@ -78,6 +78,7 @@ def test_strong_noise_against_a_fourier_hermite_code(strong):
     assert case.relative_error(strong(case.p), truth) <= case.rtol
 
 
+@pytest.mark.slow
 def test_slopes_and_curvatures_are_those_of_eigenvectors(strong):
     solver = ExponentSolver(strong.solver.problem, rtol=1e-8)
     for p in (-2.1, 0.3, 1.7):

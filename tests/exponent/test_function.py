@@ -52,6 +52,7 @@ def test_between_the_nodes_against_fourier_hermite(weak, p):
     assert error <= 3 * weak.error_estimate(p) + 1e-13
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("p", [-1.37, 2.71])
 def test_strong_noise_between_the_nodes_against_solves(strong, p):
     exact = ExponentSolver(Problem(STRONG, UNIT_NOISE), rtol=1e-10).pair(p).value

@@ -84,6 +84,7 @@ def test_what_lies_beyond_an_interval_is_in_the_error():
         assert abs(solved.value - inside.value - beyond) <= solved.error_estimate + 0.02 * beyond
 
 
+@pytest.mark.slow
 def test_an_interval_is_wide_enough_for_any_tolerance():
     """Finite volumes between sinh-spaced points give 0.13917269 ± 9e-7."""
     given = problem(1.0, 0.5, 1.3, 0.7, restitution=0.8, c1=0.1)

@@ -112,6 +112,7 @@ def test_even_moments_under_telegraph_noise():
     assert np.all(np.abs(found.value - expected) <= found.error_estimate)
 
 
+@pytest.mark.slow
 def test_even_moments_take_no_elements_until_their_slopes_are_read():
     found = moment_lyapunov(problem(White(s=1.0)), [2.0, 4.0], rtol=1e-3)
     assert not found.solver.whole.known

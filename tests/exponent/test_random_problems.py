@@ -22,6 +22,7 @@ def test_none_is_refused(outcomes):
     assert not [outcome for outcome in outcomes if isinstance(outcome, str)]
 
 
+@pytest.mark.slow
 def test_all_true_errors_meet_the_tolerance(solved):
     assert all(outcome.error <= RTOL + outcome.doubt for outcome in solved)
     assert all(outcome.doubt <= 0.3 * RTOL for outcome in solved)

@@ -71,6 +71,7 @@ def test_the_integral_is_the_variance(name, variance, rtol):
     assert found == pytest.approx(variance, rel=rtol)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("terms", [1, 2])
 def test_the_sea_is_fitted_by_filters_with_a_stated_misfit(terms):
     """What the fit is off at 2ω is off in the averaged formulas of λ and Λ(2), too, to first order."""

@@ -129,6 +129,7 @@ def runs(tmp_path_factory):
     return folder / "out"
 
 
+@pytest.mark.slow
 def test_many_runs_are_one_dataset(runs, monkeypatch):
     monkeypatch.chdir(runs.parent)
     found = fpsolve.open_results("out/*")

@@ -77,6 +77,7 @@ def assert_not_blank(picture, shape):
     assert len(np.unique((content * 255).astype(int).reshape(-1, 3), axis=0)) > 300
 
 
+@pytest.mark.slow
 def test_picture_of_the_plane(pair, tmp_path):
     picture = draw_eigenfunction(pair, "tilted_density", cmap="magma")
     assert_not_blank(picture, (750, 1080, 3))

@@ -265,6 +265,7 @@ def test_thousands_of_curves_take_seconds(pictures, tmp_path):
     assert (tmp_path / "figure.pdf").stat().st_size < 500_000
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("name", sampled("two", "map", "over a parameter", keep=2))
 @pytest.mark.parametrize("most", sampled(0, 1))

@@ -354,6 +354,7 @@ def test_the_discretisation_is_that_of_the_moments_asked_for(tmp_path):
     assert found["40.0", "one"]["unknowns"] > found["0.5", "one"]["unknowns"]
 
 
+@pytest.mark.slow
 def test_what_there_is_not_is_told_where_a_case_lists_it_without_solving_it_again(tmp_path, monkeypatch):
     found, told = solved_in(monkeypatch), []
     path, sets = CASES / "systems/stochastic_mathieu.toml", ["expect=[]", "figure={}", "vary={}", "moments.p=[2.0]"]

@@ -69,6 +69,7 @@ def cells(text):
     return [[cell.strip() for cell in line.split("│")[1:-1]] for line in text.splitlines() if line.startswith("│")]
 
 
+@pytest.mark.slow
 def test_quantities_are_whole(case, solved, capsys, terminal):
     simulated, place = tuple(simulate_curves(case)), case.path.parent
     for width, (blocks, names) in product(

@@ -60,6 +60,7 @@ def sides(grid, phi, name):
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("phi", [np.pi / 2, 3 * np.pi / 2])
 @pytest.mark.parametrize("p", MOMENTS)
 def test_jump_at_the_impacts(grids, p, phi):

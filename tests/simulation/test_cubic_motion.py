@@ -51,6 +51,7 @@ def test_both_forms_move_alike():
     np.testing.assert_allclose(*states, rtol=1e-10)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("names", [("x", "v"), ("v", "x")])
 def test_without_a_wall_it_has_order_four(names):
     """Against SciPy's integrator with constant noise; (x, u) and (−x, −u) are one."""

@@ -113,6 +113,7 @@ def test_lines_are_counted_in_a_rotation(noise):
     assert log[0] == pytest.approx(-0.2 * turns, abs=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "matrix",
     [((0.1, 2.0), (-1.0, 0.2)), ((0.5, 2.0), (1.0, -3.0)), ((0.3, 2.0), (0.0, 0.3)), ((0.0, 1.0), (-1.0, 0.0))],

@@ -47,6 +47,7 @@ def test_moments_travel_to_other_processes(estimator):
     assert pickle.loads(pickle.dumps(found)) == found
 
 
+@pytest.mark.slow
 def test_responses_travel_to_other_processes():
     found = response(Problem(OSCILLATOR, NOISE))
     np.testing.assert_equal(vars(found), vars(pickle.loads(pickle.dumps(found))))

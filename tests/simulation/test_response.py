@@ -53,6 +53,7 @@ def test_density_of_the_amplitude(weak):
     assert np.all(np.abs(response.amplitude_density - expected) <= tolerance)
 
 
+@pytest.mark.slow
 def test_histograms_are_densities(weak):
     _, response = weak
     dx, dv = np.diff(response.x_edges)[0], np.diff(response.v_edges)[0]

@@ -67,6 +67,7 @@ def test_the_step_under_white_noise_has_strong_order_three_halves():
     assert np.log2(errors[0] / errors[-1]) / 3 == pytest.approx(1.5, abs=0.2)
 
 
+@pytest.mark.slow
 def test_a_coarse_step_under_white_noise_keeps_the_mean_to_second_order():
     """E xᵢxⱼ of one step, by quadrature over its two Gaussian numbers, against that of the moment equations."""
     nodes, weights = np.polynomial.hermite_e.hermegauss(24)

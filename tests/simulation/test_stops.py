@@ -27,6 +27,7 @@ def flown(matrix, state, t, restitution, steps=1):
     return state, sum(_flown(m, matrix, t / steps, m.sizes[0], state, series) for _ in range(steps))
 
 
+@pytest.mark.slow
 def test_a_ball_bounces_until_it_rests():
     """q̈ = −1 from q = 1: impacts at the speeds √2 Rᵏ, the last after √2 (1 + R)/(1 − R)."""
     state, found = flown([[0, 1, 0], [0, 0, 1], [0, 0, 0]], [1, 0, -1], 5.0, 0.5)

@@ -55,6 +55,7 @@ def test_growth_by_many_orders_in_a_delay(a, b, tau):
     assert found.value * tau == pytest.approx(of_scalar(a, b, 1.0), rel=1e-12, abs=1e-12)
 
 
+@pytest.mark.slow
 def test_a_delay_of_two_periods_of_a_load():
     """By the renewal equation of the fundamental solution, with Chebyshev's polynomials in elements of time."""
     steady = "-1.957*x - 0.178*v + 0.109*x(t - tau) - 0.29*v(t - tau)"

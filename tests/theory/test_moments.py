@@ -18,6 +18,7 @@ from fpsolve.model import (
     Filter,
     LinearSystem,
     MarkovChain,
+    Noises,
     ParametricOscillator,
     Poisson,
     SineWiener,
@@ -159,6 +160,7 @@ def test_more_variables(rng, n):
     assert hierarchy_exponent(steady, 6)[0] == pytest.approx(6 * np.linalg.eigvals(free).real.max(), abs=1e-11)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("most", [0, 1000], ids=["as matrices", "as one vector"])
 @pytest.mark.parametrize("moved", [0.02, 3.0])
 def test_beside_a_known_one(monkeypatch, most, moved):
@@ -375,6 +377,22 @@ def test_slopes_by_parameters(rng):
     assert found.slope("noise.r0")[0] == pytest.approx((1.5 * found.value - 2 * near + 0.5 * far) / 1e-4, rel=1e-5)
     with pytest.raises(KeyError):
         found.slope("noise.none")
+
+
+@pytest.mark.parametrize(
+    ("n", "mu", "delta", "square"),
+    [(2, -0.8554694689402464, 9.993744373604739e-05, 1.7072315886796916), (4, -0.7269131714, 1.33646e-6, 1.4052498279)],
+)
+def test_rounding_of_what_moves_the_state_is_in_the_error(n, mu, delta, square):
+    """Patches x_i′ = μx_i + δΣ(x_j − x_i) + σx_i ξ_i in Itô's sense: E x_i² and E x_i x_j obey two equations."""
+    exchange = delta * (np.ones((n, n)) - n * np.eye(n))
+    terms = [CoefficientMatrix(0, mu * np.eye(n) + exchange)]
+    terms += [CoefficientMatrix(0, np.diag(np.eye(n)[i]), identity, f"w{i}") for i in range(n)]
+    noises = Noises({f"w{i}": White(math.sqrt(square), interpretation="ito") for i in range(n)})
+    found = even_moment(Problem((PlaneSystem if n == 2 else LinearSystem)(terms), noises), 2)
+    own, other = 2 * mu + square - 2 * (n - 1) * delta, 2 * mu - 2 * delta
+    expected = 0.5 * (own + other) + math.hypot(0.5 * (own - other), 2 * delta * math.sqrt(n - 1))
+    assert abs(found.value - expected) <= found.error <= 1e-13
 
 
 def test_the_error_is_what_few_functions_lack():
