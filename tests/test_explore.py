@@ -92,6 +92,7 @@ def test_python_gives_the_problem_of_the_page():
     assert abs(exponent.value - found["exponent"]) <= 2 * exponent.error_estimate
 
 
+@pytest.mark.slow
 def test_while_a_slider_moves_numbers_are_within_their_error():
     for name, changes in (
         ("fig1", (1.0, 1.1, 0.2)),
@@ -148,6 +149,7 @@ def test_bad_values_are_refused_with_the_sentences_of_cases(name, changed, words
         assert re.search(words, told["refused"]), told
 
 
+@pytest.mark.slow
 def test_a_newer_question_of_a_page_ends_an_older_one():
     explorer, told = explorer_of("strong"), {}
     started = threading.Event()
@@ -218,6 +220,7 @@ def served(explorer):
         page.server_close()
 
 
+@pytest.mark.slow
 def test_only_the_own_page_of_this_machine_is_answered():
     explorer = explorer_of("fig1")
     with served(explorer) as page:
@@ -259,6 +262,7 @@ def test_only_the_own_page_of_this_machine_is_answered():
         assert "refused" in status("POST", "/start", json.dumps({"page": "a"}))[1]
 
 
+@pytest.mark.slow
 def test_work_ends_with_its_connection_and_files_that_run_out_are_waited_for(monkeypatch):
     ended, tries = threading.Event(), []
 
@@ -287,6 +291,7 @@ def test_work_ends_with_its_connection_and_files_that_run_out_are_waited_for(mon
     assert explorer.answer("solve", question(explorer), lambda: True) == {"stopped": True}
 
 
+@pytest.mark.slow
 def test_a_notebook_shows_the_page_of_a_problem():
     problem = load_case(CASES / "theorem.toml").problem
     shown = explore(problem)

@@ -126,6 +126,7 @@ def test_a_message_is_not_changed_but_a_remedy_may_be_another():
     assert message_of(message) is message
 
 
+@pytest.mark.slow
 def test_nothing_reads_a_sentence():
     """No search in, nor comparison with, the text of an exception or of a message."""
     texts = [(path, path.read_text(encoding="utf-8")) for path in PACKAGE.rglob("*.py")]

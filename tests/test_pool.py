@@ -137,6 +137,7 @@ def test_workers_are_other_processes_with_one_processor_each():
     assert os.getpid() not in {number for number, _ in found}
 
 
+@pytest.mark.slow
 def test_little_work_is_done_here(monkeypatch):
     """Others would take as long to start."""
     monkeypatch.setattr(pool, "processors", lambda: 2)
@@ -208,6 +209,7 @@ def test_what_is_no_address_is_refused(address):
         cluster(address)
 
 
+@pytest.mark.slow
 def test_a_scheduler_that_does_not_answer(monkeypatch):
     pytest.importorskip("distributed")
     monkeypatch.setattr(pool, "CONNECT_SECONDS", 0.5)

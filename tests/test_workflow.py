@@ -143,6 +143,7 @@ def without_times(folder):
     return summary, moments, [line.rpartition(",")[0] for line in curves.splitlines()]
 
 
+@pytest.mark.slow
 def test_tables_are_the_same_twice(whole, tmp_path):
     """Of a case, and of the name of its file."""
     case = case_in(tmp_path, DRAWN)
@@ -266,6 +267,7 @@ def test_an_index_that_does_not_converge_is_a_failure(tmp_path, p, status):
     assert [text[:5] for text in curve["warnings"]] == ["no λ: "[:5]]
 
 
+@pytest.mark.slow
 def test_zero_has_no_sign(tmp_path):
     sets = [
         "moments.p=[-0.0, 2.0, -1.0]",
@@ -651,6 +653,7 @@ def test_a_density_that_python_refuses_is_not_written(tmp_path, intensity):
     assert not list((tmp_path / "out").rglob("*.vtu"))
 
 
+@pytest.mark.slow
 def test_sensitivities_are_written(tmp_path):
     """At nine p or all, and of the indices, each with its error; those of the Python function."""
     sets = [

@@ -95,6 +95,7 @@ def rounded(bounds):
     return [round(float(each), places) for each, places in zip(bounds, (3, 3, 3, 3, 4), strict=True)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("smooth", [True, pytest.param(False, marks=pytest.mark.slow)])
 def test_bounds_of_the_telegraph_case_by_another_method(telegraph, smooth, monkeypatch):
     """T in the coordinates (x, ẋ), though the solve turns them, with all phases, or those of growth."""

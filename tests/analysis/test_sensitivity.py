@@ -175,6 +175,7 @@ def test_slopes_of_the_exponent_under_algebraic_tails():
     assert found["noise.r0"].value == pytest.approx(expected, rel=1e-4)
 
 
+@pytest.mark.slow
 def test_gaussian_noise_is_met_from_below():
     """∂/∂r₀ at r₀ = 1 is that from r₀ < 1, and a note says so."""
     theta = dict(zip(drawn(0)[0], (1.2, 0.8, 0.1, 0.7, 0.6, 0.8, 1.0), strict=True))

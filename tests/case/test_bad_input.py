@@ -79,6 +79,7 @@ def test_what_is_too_long_to_show(tmp_path: Path, old: str, new: str, words: str
     assert words in only_message(write(tmp_path, edited(old, new)))
 
 
+@pytest.mark.slow
 def test_blanks_are_passed_without_memory() -> None:
     tracemalloc.start()
     Scanner("\n" * 10**6).scan()
@@ -148,6 +149,7 @@ WIDE = between(1e-15, 1e15)
 SIMULATED = ("monte_carlo.p", "monte_carlo.time", "monte_carlo.step")
 
 
+@pytest.mark.slow
 @settings(max_examples=80, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     numbers=st.fixed_dictionaries(

@@ -283,6 +283,7 @@ def test_a_set_that_is_found_not_to_be_possible_fails_alone(
         assert (status[3], status[0], status[2], status[4]) == ("failed", "converged", "converged", "converged")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "options",
     [

@@ -169,6 +169,7 @@ def test_a_mesh_that_leaves_the_faster_place_out_is_warned_of():
     assert moment_lyapunov(Problem(oscillator, noise), 9.0).warnings == ()
 
 
+@pytest.mark.slow
 def test_truncation_bounds_what_a_cut_changes():
     oscillator = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=0.3)
     full = moment_lyapunov(Problem(oscillator, WEAK_NOISE), 3.0, rtol=1e-12).value[0]

@@ -212,6 +212,7 @@ def of_equations(**changed):
     return PlaneSystem.of_equations(("y", "x", "v", "z"), rates, values)
 
 
+@pytest.mark.slow
 def test_sensitivities_are_those_of_the_largest_block():
     whole = Problem(of_equations(), White(s=0.6))
     found, step = sensitivities(whole, [1.0, 2.5], rtol=1e-9), 1e-4

@@ -154,6 +154,7 @@ def test_bounded_noise_between_the_nodes(noise):
         assert abs(function(p) - solution.pair.value) <= function.error_estimate(p) + solution.error
 
 
+@pytest.mark.slow
 def test_near_zero_the_error_is_that_of_the_ratio(strong):
     """Λ(p)/p near p = 0 is λ."""
     exponent = ExponentSolver(strong.solver.problem, rtol=1e-9).lyapunov_exponent()

@@ -77,6 +77,7 @@ def curvature_error(function, p):
     return error * (2 * n**2 / half + abs(p) * n**2 * (n**2 - 1) / 3 / half**2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["weak", "strong"])
 def test_derivatives_of_the_interpolant_and_of_the_eigenvectors_agree(name, request):
     function = request.getfixturevalue(name)

@@ -148,5 +148,6 @@ def test_there_is_no_stability_index():
     assert str(found.reason).startswith("δ_p is not computed: for r0 > 1 the noise has algebraic tails")
 
 
+@pytest.mark.slow
 def test_excursions_of_growing_paths_are_certain():
     assert excursion(HEAVY).is_certain

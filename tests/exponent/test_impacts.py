@@ -54,6 +54,7 @@ def test_a_wall_that_takes_nearly_all(noise, factor, p, expected):
     assert abs(found.value[0] - expected) <= found.error_estimate[0] + 1e-12
 
 
+@pytest.mark.slow
 @LAWS
 @NOISES
 def test_the_exponent_is_affine_in_the_logarithm_of_the_impact_factor(noise, law):

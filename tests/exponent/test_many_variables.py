@@ -41,6 +41,7 @@ def masses(count, noise, damping=0.02):
     return Problem(ModalSystem.of(np.eye(count), stiffness, damper, stiffness_noise=load, parameters=values), noise)
 
 
+@pytest.mark.slow
 def test_even_moments_and_bounds():
     """By Kronecker products; the note bounds λ and δ_p."""
     noise = OrnsteinUhlenbeck(1.0, 0.3)

@@ -94,6 +94,7 @@ def test_second_moments(seed, n, kind):
         np.testing.assert_allclose(rate, expected * moments, atol=1e-9 * np.max(moments))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("seed", "n"), sampled((0, 3), (2, 4)))
 def test_even_moments_under_white_noise(seed, n):
     """By elements."""
@@ -159,6 +160,7 @@ def test_even_moments_alone_have_all_digits(seed):
         assert solver.even(float(p)).value == pytest.approx(expected(p), abs=1e-10)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("noise", "driven"), sampled((White(s=1.0), COUPLED), (Telegraph(a=0.5, k=0.5), COUPLED)))
 def test_what_finer_waves_change_is_told_to_first_order(noise, driven):
     """The value with the correction is nearer to that of a finer space by far, which has the next waves."""
@@ -258,6 +260,7 @@ WHITE = {1.0: -0.00081016, 3.0: 0.1124463, -1.0: 0.0314237}
 WEAK = {0.5: -0.0248041093, 1.0: -0.0495297287, 3.0: -0.147647323}
 
 
+@pytest.mark.slow
 def test_the_usual_error_is_that_of_cases():
     found = moment_lyapunov(problem(White(s=1.0), driven=0.1 * COUPLED), 1.0)
     assert abs(found.value[0] - WEAK[1.0]) <= found.error_estimate[0] + 1e-9
@@ -342,6 +345,7 @@ def test_flutter_of_a_bridge_deck():
     assert branch.x[np.argmin(branch.y)] == pytest.approx(flutters, abs=1e-4)
 
 
+@pytest.mark.slow
 def test_matrices_are_freed_with_the_solver():
     """They may take a gigabyte: nothing waits for the search for cycles."""
     gc.disable()

@@ -99,6 +99,7 @@ def test_a_wall(noise):
     assert critical_impact_factor(ExponentSolver(problem)).value == pytest.approx(math.exp(0.1 / turns), rel=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("second", ["OU", "white", "chain", "filter"])
 def test_two_noises(second):
     still = [CoefficientMatrix(1, ((0.0, 0.0), (0.0, 0.0)), identity, name) for name in "ab"]

@@ -28,6 +28,7 @@ def test_all_true_errors_meet_the_tolerance(solved):
     assert all(outcome.doubt <= 0.3 * RTOL for outcome in solved)
 
 
+@pytest.mark.slow
 def test_error_estimates_are_honest(solved):
     """Never below the error, and mostly less than 300 times above it, where the reference can tell."""
     for outcome in solved:

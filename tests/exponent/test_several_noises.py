@@ -41,6 +41,7 @@ def test_random_systems_under_two_noises(seed):
     assert (found := compared(seed, 2.0, rtol=1e-6 if seed % 6 == 1 else 1e-8)).is_within, found
 
 
+@pytest.mark.slow
 def test_only_the_axis_that_lacks_functions_is_refined():
     """Λ(2) of the moment hierarchy for slow lateral and fast axial noise: some 24 x 8 x 30 functions."""
     problem = drawn(13)[0]
@@ -137,6 +138,7 @@ def test_a_wall_beside_two_noises():
         assert found.pair.value == pytest.approx(expected, abs=1e-8)
 
 
+@pytest.mark.slow
 def test_parameters_of_each_noise():
     problem = beam(GAUSSIAN, Telegraph(a=0.2, k=0.7))
     assert [*problem.values][2:] == ["noise.axial.alpha", "noise.axial.sigma", "noise.lateral.a", "noise.lateral.k"]

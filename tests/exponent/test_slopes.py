@@ -45,6 +45,7 @@ def test_slopes_at_even_moments_of_three_variables():
     assert found.derivative_error[0] < 3e-3
 
 
+@pytest.mark.slow
 def test_slopes_at_even_moments_under_a_filter():
     """0.39266, where the space that has Λ(2) has a slope of 0.3924: no reason to refuse Λ(2)."""
     found = moment_lyapunov(FILTERED, 2.0)

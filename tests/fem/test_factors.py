@@ -45,6 +45,7 @@ print(before)
 """
 
 
+@pytest.mark.slow
 def test_bodies_that_overlap_in_two_threads_leave_blas_as_it_was():
     """The first one begins and ends before the second one."""
     threads = dict.fromkeys(("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS"), "2")

@@ -218,6 +218,7 @@ def test_degrees_that_are_none_are_refused(tmp_path, values):
         read_mesh(path)
 
 
+@pytest.mark.slow
 def test_a_phase_that_turns_back_for_ordinary_noise_alone():
     """v̇ = −(1 − 3e^(−ξ²))x − 0.2v: the phase runs one way at both ends of the mesh and back between."""
     terms = (

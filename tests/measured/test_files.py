@@ -427,6 +427,7 @@ def test_rotten_files_are_read_or_refused_in_one_sentence(tmp_path):
     assert not [each for each in said if "\n" in each]
 
 
+@pytest.mark.slow
 def test_what_is_too_large_is_refused_before_it_is_read(tmp_path, monkeypatch):
     np.savez_compressed(tmp_path / "a.npz", **{f"a{k}": np.zeros(2**18) for k in range(4)})
     (tmp_path / "b.csv").write_text("t,x\n" + "1,2\n" * 5000, encoding="utf-8")

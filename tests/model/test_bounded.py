@@ -162,6 +162,7 @@ def test_a_narrow_band_is_almost_harmonic(sigma):
     assert abs(found.pair.value - hierarchy(sigma=sigma)) < found.error + 1e-12
 
 
+@pytest.mark.slow
 def test_fast_noise_is_white():
     """μ²/σ² fixed: S(0) = 2μ²/σ², and Λ(2) comes nearer to that of white noise as 1/σ² does."""
     white = moment_hierarchy.white_noise_exponent(steady(), [[[0.0, 0.0], [-math.sqrt(0.5), 0.0]]], 2)

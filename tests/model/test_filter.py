@@ -151,6 +151,7 @@ def test_a_step_has_the_transition_of_the_filter(noise):
     np.testing.assert_allclose(np.diagonal(tiny @ tiny.T) / scale**2, [1, 1 / 3, 1 / 20], rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_drawn_paths(rng):
     """One step from the stationary law: ξ keeps its variance, and ξ̄ has that of the mean of ξ."""
     n, h = 200_000, 0.6
@@ -167,6 +168,7 @@ def test_drawn_paths(rng):
     assert np.mean(mean * end) == pytest.approx(np.mean(mean * before), rel=0.05)  # its C(t) is even
 
 
+@pytest.mark.slow
 def test_as_an_overdamped_filter_it_is_ornstein_uhlenbeck_noise():
     """ω = 2ζα, ζ → ∞: y′/α + y = white noise but for y″/(2ζα)², of order 2."""
     alpha, deviation = 0.7, 0.5
@@ -206,6 +208,7 @@ def test_derivatives_of_the_law():
             assert change.log_scale == pytest.approx(logs, abs=1e-8)
 
 
+@pytest.mark.slow
 def test_derivatives_of_the_mean_square():
     """With ∂Λ/∂θ by parameters of the filter and of the oscillator, against differences."""
     problem, h = oscillator(MIXED), 3e-4
@@ -337,6 +340,7 @@ def test_bad_outputs_are_refused_in_words(tmp_path, output, words):
     print(failure.value)
 
 
+@pytest.mark.slow
 def test_moments_at_several_p_share_what_is_known():
     found = moment_lyapunov(oscillator(Filter(*law_of("y", 0.3))), [-1.0, 0.0, 1.0, 2.0], rtol=1e-6)
     assert found.value[1] == 0

@@ -98,6 +98,7 @@ def test_without_a_wall_both_sides_are_alike(swinging):
     assert np.sum(density * x[:, None] ** 2) * cell == pytest.approx(swinging.means["x_squared"].value, rel=5e-3)
 
 
+@pytest.mark.slow
 def test_rates_of_change_of_moments_vanish(swinging):
     """Those of E x², E x⁴, E xv and E H, H the energy with k x⁴/4; the discrete equations do not imply it."""
     solution, flow = swinging.solution, swinging.flow

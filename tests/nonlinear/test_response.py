@@ -48,6 +48,7 @@ def rough():
     return response(BOUNCING, 0.05, 0.5, 1e-2)
 
 
+@pytest.mark.slow
 def test_density_of_amplitude_has_the_means(rough):
     a = np.exp(np.linspace(rough.interval[0] - 8, rough.interval[1] + 1, 1000))
     rho = rough.amplitude_density(a)

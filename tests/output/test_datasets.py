@@ -33,6 +33,7 @@ def solved(folder, text, name="test", overrides=()):
         return case, results, found.load()
 
 
+@pytest.mark.slow
 def test_a_product_has_a_dimension_for_each_key(tmp_path):
     case, results, found = solved(tmp_path, TEXT + PRODUCT, overrides=[ALL])
     assert dict(found.sizes) == {"noise.D0": 2, "noise.treatment": 2, "p": 3}
@@ -160,6 +161,7 @@ def test_many_runs_are_one_dataset(runs, monkeypatch):
             assert own.moment.attrs == file.moment.attrs
 
 
+@pytest.mark.slow
 def test_runs_of_other_noises_are_one_dataset(runs, tmp_path):
     noise = TEXT.partition("[noise]")[0] + '[noise]\nkind = "sine-wiener"\namplitude = 1.0\nsigma = 1.0\n'
     solved(tmp_path, noise + TEXT[TEXT.index("[moments]") :], "sine")

@@ -90,6 +90,7 @@ def test_files_are_removed_with_other_parameters(modes):
     assert not [*folder.rglob("*.vtu"), *folder.glob("densities*")]
 
 
+@pytest.mark.slow
 def test_a_sphere_of_three_variables(tmp_path):
     (tmp_path / "three.toml").write_text(THREE, encoding="utf-8")
     run(load_case(tmp_path / "three.toml"), tmp_path)

@@ -104,6 +104,7 @@ def test_what_cannot_be_drawn_is_refused(pair):
         draw_eigenfunction(pair, "density")
 
 
+@pytest.mark.slow
 def test_solving_loads_nothing_that_draws():
     code = """
 import sys

@@ -68,6 +68,7 @@ FIGURES = {
 SHOWN = ("eight", "exact and reduced, many", "map")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", sampled(*SHOWN, *(name for name in FIGURES if name not in SHOWN), keep=len(SHOWN)))
 def test_all_has_its_place(sound, tmp_path, name):
     """Legends cover no data, all that is written is on the canvas and readable, and no two texts overlap."""
@@ -183,6 +184,7 @@ def test_a_moment_over_a_parameter(drawn, tmp_path):
     np.testing.assert_allclose(np.interp(points.get_xdata(), *theory.get_data()), points.get_ydata(), rtol=1e-3)
 
 
+@pytest.mark.slow
 def test_a_parameter_is_called_alike_in_all_figures(drawn, tmp_path):
     """In figures over it, beside their colours, and in plots of results.nc."""
     case = drawn_case(tmp_path, COARSE)
@@ -197,6 +199,7 @@ def test_a_parameter_is_called_alike_in_all_figures(drawn, tmp_path):
         assert drawn[2].axes[0].get_xlabel() == label_of(found["p"].attrs) == "order of the moment $p$"
 
 
+@pytest.mark.slow
 def test_a_map_is_centred_at_zero_and_has_its_line(pictures, drawn, tmp_path):
     drawn_case(tmp_path, PLANE)
     axes, bar = drawn[0].axes

@@ -80,6 +80,7 @@ def marks(figure):
     ]
 
 
+@pytest.mark.slow
 def test_stability_index_is_marked_on_the_zero_line(drawn, tmp_path):
     others = [series(root=1.0), series(), series(root=-0.5)]
     picture(tmp_path, *others)
@@ -90,6 +91,7 @@ def test_stability_index_is_marked_on_the_zero_line(drawn, tmp_path):
     assert [legend(figure).count(r"stability index $\delta_p$") for figure in drawn] == [1, 0]
 
 
+@pytest.mark.slow
 def test_the_labels_of_a_response_have_units_and_room(drawn, tmp_path):
     edges, density = np.linspace(0, 3, 31), np.exp(-3 * (np.linspace(0, 3, 30) - 1.5) ** 2)
     response = Response(
@@ -118,6 +120,7 @@ def test_stability_index_of_a_case_is_marked_where_p_reaches_it(drawn, tmp_path,
     assert found == [results[0].stability_index.value][:count]
 
 
+@pytest.mark.slow
 def test_theory_that_is_not_drawn_is_not_computed(drawn, tmp_path, monkeypatch):
     """Of many curves over a parameter: 200 points for each of 10,000 sets would take minutes."""
     over = 'vary={ mode = "zip", "noise.D0" = {start=0.1,stop=0.2,num=30}, "noise.tau0" = {start=0.5,stop=0.6,num=30} }'

@@ -115,6 +115,7 @@ def test_every_changed_byte_of_the_numbers_is_seen(tmp_path):
         records.read(place)
 
 
+@pytest.mark.slow
 def test_a_file_that_workers_do_not_share(tmp_path, monkeypatch):
     place = append(tmp_path, "key", VALUES)
     Records(tmp_path).expect(place)
@@ -273,6 +274,7 @@ def asking(*names, more=()):
     return [f"output.quantities={json.dumps(names)}", "output.eigenfunctions=[]", "vary={}", *more]
 
 
+@pytest.mark.slow
 def test_more_quantities_are_solved_alone_and_fewer_not_at_all(tmp_path, monkeypatch):
     found = solved_in(monkeypatch)
 
@@ -302,6 +304,7 @@ def test_more_quantities_are_solved_alone_and_fewer_not_at_all(tmp_path, monkeyp
     assert parts == {"moment", "lyapunov_exponent", "classes", "discretisation"}
 
 
+@pytest.mark.slow
 def test_what_a_budget_has_limited_is_solved_again_with_another(tmp_path, monkeypatch):
     found, names = solved_in(monkeypatch), ("moment", "lyapunov_exponent")
 

@@ -97,6 +97,7 @@ def solved(tmp_path_factory):
     return folder / "test"
 
 
+@pytest.mark.slow
 def test_the_page_holds_the_equation_numbers_meanings_and_the_case(solved):
     page = Page(solved / "report.html")
     words = " ".join(page.text.split())
@@ -174,6 +175,7 @@ def test_a_report_goes_with_what_it_reported(tmp_path, kind):
         assert files(folder) - {".fpsolve.lock"} == {"reports.html"}
 
 
+@pytest.mark.slow
 def test_a_simulation_is_compared_with_the_finite_elements(tmp_path):
     few = "monte_carlo={ paths = 64, time = 40.0 }"
     assert run(tmp_path, ONE, "--report", "--monte-carlo", "--set", few, "--set", "output.eigenfunctions=[]") == 0

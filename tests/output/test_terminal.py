@@ -133,6 +133,7 @@ def test_curves_stand_apart(tmp_path, capsys):
     assert (lines[0], lines[first - 1], lines[second - 1], lines[-1]) == (case.title, "", "", "")
 
 
+@pytest.mark.slow
 def test_what_is_missing_is_told_before_what_is_only_remarkable(case, solved, capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "200")
     (result,) = solved

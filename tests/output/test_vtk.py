@@ -73,6 +73,7 @@ def test_jump_at_the_impacts(grids, p, phi):
     np.testing.assert_allclose((after / before)[living], HARD.impact_factor(p), rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_nothing_else_jumps(grids):
     grid = grids[2.0]
     corners = grid.points[grid.cell_connectivity.reshape(grid.n_cells, -1)[:, 0], 0]
@@ -160,6 +161,7 @@ def test_files_of_a_curve_hold_its_parameters(tmp_path):
 TWO = 'vary."noise.D0"=[0.75, 0.5]'
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("overrides", "times", "names"),
     [

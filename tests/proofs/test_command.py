@@ -162,6 +162,7 @@ def test_without_flint_the_package_to_install_is_named(case, tmp_path, monkeypat
     assert not (tmp_path / "others").exists()
 
 
+@pytest.mark.slow
 def test_a_folder_holds_proofs_of_its_parameters_only(case, tmp_path):
     proof = tmp_path / "results/proven/proof.json"
     shorter = ["--quiet", "--set", "moments.p=[1.0]"]
@@ -309,6 +310,7 @@ def second_moment(treatment, count=40):
     return fourier_hermite.moment_lyapunov(alpha=alpha, sigma=sigma, hermite=count, **motion)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("treatment", "error"), [("exact", 1e-10), ("ou-reduction", 1e-13)])
 def test_the_moment_hierarchy_lies_within_the_bounds(case, tmp_path, treatment, error):
     value = second_moment(treatment)
@@ -323,6 +325,7 @@ def test_the_moment_hierarchy_lies_within_the_bounds(case, tmp_path, treatment, 
     assert moment["upper"] - moment["lower"] < 1e-6
 
 
+@pytest.mark.slow
 def test_curves_that_are_done_are_written_before_the_end(case, monkeypatch):
     """So that a run that is killed keeps them."""
     kept = []

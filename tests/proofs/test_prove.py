@@ -127,6 +127,7 @@ def test_a_bound_takes_no_longer_than_stated(monkeypatch):
     assert 8 <= next(seconds) <= 11
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("p", [1e6, "delta"])
 def test_what_cannot_be_proven_ends_with_its_time(p):
     """An index has twice the time, for both of its bounds; before, each of eight had a minute and a half."""

@@ -195,6 +195,7 @@ def mutated(entry):
             yield changed("stated", "noise", name, by=larger)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", QUICK)
 def test_both_checkers_refuse_what_does_not_follow(name):
     """Nearly all mutations fail at some sample; and these are refused. Of lines of ξ, which take long, every third."""

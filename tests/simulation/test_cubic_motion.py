@@ -76,6 +76,7 @@ def test_without_a_wall_it_has_order_four(names):
     assert np.all(np.log2(np.array(errors[:-1]) / errors[1:]) > 3.7)
 
 
+@pytest.mark.slow
 def test_a_large_step_is_taken_in_parts():
     """At an amplitude where a whole step would be unstable."""
     motion, _ = motion_of(PlaneSystem.of_equations(("x", "v"), GENERAL, {}))

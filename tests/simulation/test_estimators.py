@@ -54,6 +54,7 @@ def small(seed, estimator="direct", orders=(-1.0, 1.0)):
     return simulate(Problem(MODERATE, NOISE), list(orders), estimator=estimator, paths=640, time=60.0, seed=seed)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("estimator", sampled("direct", "population"))
 def test_seed_decides_whatever_the_threads(monkeypatch, estimator):
     found = small(3, estimator)
@@ -63,6 +64,7 @@ def test_seed_decides_whatever_the_threads(monkeypatch, estimator):
     assert small(4, estimator) != found
 
 
+@pytest.mark.slow
 def test_one_run_serves_all_orders():
     """The direct estimate of one p does not depend on which others are asked for; nor does λ."""
     alone, together = small(3, orders=(1.0,)), small(3, orders=(-1.0, 1.0, 2.0))
@@ -83,6 +85,7 @@ def test_memory_does_not_grow_with_time():
     assert peak(800.0) < 1.3 * peak(100.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("estimator", sampled("direct", "population"))
 def test_an_interrupt_keeps_what_is_done(estimator):
     calls = []
@@ -150,6 +153,7 @@ def test_bad_settings_are_refused(change, words):
         simulate(**({"problem": Problem(MODERATE, NOISE), "p": [1.0]} | change))
 
 
+@pytest.mark.slow
 def test_a_single_order_may_stand_without_a_list():
     settings = {"paths": 64, "time": 2 * transient(MODERATE, NOISE), "seed": 1}
     assert simulate(Problem(MODERATE, NOISE), 0.5, **settings) == simulate(Problem(MODERATE, NOISE), [0.5], **settings)

@@ -136,6 +136,7 @@ def test_a_chain_that_does_not_jump_moves_by_the_exponential(matrix):
     np.testing.assert_allclose(np.exp(log + 0.1 * crossed) * state[:, 0], fine[-1], rtol=1e-9, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_a_chain_has_its_law():
     """After a while the states have their probabilities, and of those left the next is drawn by the rates."""
     chain = MarkovChain([0.0, 1.0, 5.0], [[0, 1.0, 0.5], [2.0, 0, 1.0], [0.3, 0.1, 0]])
@@ -156,6 +157,7 @@ def parametric(b, R=1.0, k=1.0):
 VELOCITY = plane([[0.0, 1.0], [-1.0, 0.1]], ((0.0, 0.0), (0.0, 1.0)), (WALL,))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("system", "noise", "exponent", "moments"),
     sampled(
@@ -228,6 +230,7 @@ def test_a_phase_that_noise_hardly_disturbs():
     assert found.standard_error < 5e-4
 
 
+@pytest.mark.slow
 def test_a_function_of_a_chain_is_simulated():
     """g(ξ) = ξ³ of states ±½ is ξ/4."""
     one, other = (

@@ -82,6 +82,7 @@ def test_what_has_no_nonlinear_response(system, noise, words):
         response(Problem(system, noise))
 
 
+@pytest.mark.slow
 def test_progress_is_reported():
     calls = []
     moments(Problem(OSCILLATOR, NOISE), [1.0], estimator="population", progress=lambda: calls.append(1))

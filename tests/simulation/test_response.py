@@ -66,6 +66,7 @@ def test_histograms_are_densities(weak):
     assert mean == pytest.approx(response.means["x"][0], rel=2e-3)
 
 
+@pytest.mark.slow
 def test_impacts_come_twice_a_turn(weak):
     oscillator, response = weak
     assert response.impact_rate == pytest.approx(oscillator.omega / math.pi, rel=0.02)
@@ -78,6 +79,7 @@ def test_energy_is_that_of_x_and_v(weak):
     assert mean["energy"] == pytest.approx(energy, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_seed_decides_whatever_the_threads(weak, monkeypatch):
     oscillator, _ = weak
     arguments, found = (Problem(oscillator, NOISE), 0.05, 0.01), []

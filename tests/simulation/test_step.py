@@ -189,6 +189,7 @@ class SummedStep(NamedTuple):
             xi[1, i] += step.h * xi_mean[i]
 
 
+@pytest.mark.slow
 def test_a_noise_may_have_more_numbers_than_its_value():
     """The first row is ξ, which ends where the step says; the others are the noise's own."""
     known = linear_step(1.0, 0.5, 0.1, 0.0)
@@ -233,6 +234,7 @@ def test_noise_has_its_stationary_law(r0, origin):
     assert kstest(xi, lambda at: np.interp(at, nodes, cdf / cdf[-1])).pvalue > 0.01
 
 
+@pytest.mark.slow
 def test_heavy_tails_are_kept():
     """For r₀ = 1.2, P_s ~ |ξ|^(−10): of 4e5 paths some are beyond 5 std, where a Gaussian would have none."""
     noise = NonGaussianNoise(D0=0.8, tau0=1.0, r0=1.2)
@@ -245,6 +247,7 @@ def test_heavy_tails_are_kept():
     assert np.count_nonzero(np.abs(xi) > far) == pytest.approx(expected, abs=5 * math.sqrt(expected))
 
 
+@pytest.mark.slow
 def test_noise_with_a_bias_has_its_law():
     """With σ²b added to its drift the noise has the density P_s exp(2bξ)."""
     b, n, h = 0.4, 200_000, 0.02

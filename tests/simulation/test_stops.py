@@ -36,6 +36,7 @@ def test_a_ball_bounces_until_it_rests():
     assert found.real == 11  # √2/2¹⁰ is above 0.001
 
 
+@pytest.mark.slow
 def test_a_mass_leaves_the_wall_with_its_force():
     """q̈ = −cos t, at rest until ½π, and then q = t − ½π + cos t."""
     turn = [[0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1], [0, 0, -1, 0]]

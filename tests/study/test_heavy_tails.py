@@ -16,6 +16,7 @@ def text(sections=SECTIONS, **noise):
     return case_text(sections, "Heavy tails", TAILS | noise, epsilon=0.5, restitution=1.0, c1=0.0)
 
 
+@pytest.mark.slow
 def test_of_a_sweep_only_these_sets_fail(tmp_path):
     light, heavy = solve_case(case_in(tmp_path, text(), ["output.quantities=['moment', 'lyapunov_exponent']"]))
     assert (light.failures, light.moments.p.tolist()) == ((), [-0.4, 0.0])
@@ -31,6 +32,7 @@ def test_alone_such_a_set_is_refused_at_once(tmp_path):
         case_in(tmp_path, text("[moments]\np = [-0.4, 0.0]\n", r0=1.1), name="heavy")
 
 
+@pytest.mark.slow
 def test_what_is_not_computed_is_said(tmp_path, capsys):
     path = tmp_path / "heavy.toml"
     path.write_text(text("[moments]\np = [0.0]\n", r0=1.1), encoding="utf-8")

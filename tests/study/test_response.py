@@ -103,6 +103,7 @@ def test_the_densities_of_all_files_are_one(folder, case):
     assert plane.field_data["response_amplitude"][0] == means["amplitude"]
 
 
+@pytest.mark.slow
 def test_a_response_is_read_from_its_record(result, folder):
     """And all files are there again."""
     assert {f"response{name}" for name in (".csv", ".vtu", "_3d.vtu")} <= {path.name for path in folder.iterdir()}
@@ -210,6 +211,7 @@ def test_what_contradicts_itself_is_refused(tmp_path, more, text):
         wanted(tmp_path, more)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("index", "words", "titles"),
     [

@@ -44,6 +44,7 @@ def result(solved):
     return solved.result
 
 
+@pytest.mark.slow
 def test_results_pickle(case, solved, result):
     """Also solved curves with their eigenpairs, comparisons, and simulated curves."""
     [simulated], [comparison] = simulate_curves(case), compare(case, [result])
@@ -82,6 +83,7 @@ def test_what_did_not_converge_is_printed_once(case, tmp_path, capsys):
     assert "[mesh]" not in said  # there is none
 
 
+@pytest.mark.slow
 def test_a_density_that_is_none_is_not_written(tmp_path, capsys):
     path = tmp_path / "slow.toml"
     sections = SECTIONS.replace("[moments]", "[moments]\nrtol = 1e-4").replace("time = 40.0", "time = 4000.0")

@@ -125,6 +125,7 @@ def test_a_seed_gives_the_same_bytes(case, out):
     assert contents[0] == contents[1] != contents[2]
 
 
+@pytest.mark.slow
 def test_each_curve_has_its_file_and_stale_ones_go(case, out):
     assert simulate(case, "--out", out, *QUICK, *TWO) == 0
     assert [read(out / f"quick/{name}")["varied"] for name in ("monte_carlo.json", "monte_carlo-2.json")] == [
@@ -205,6 +206,7 @@ def test_run_adds_markers(case, out, capsys, drawn):
     assert "finite elements" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_run_adds_markers_over_a_parameter(pictures, case, out):
     arguments = [*TWO, "--set", 'figure={x="noise.D0", y="lyapunov_exponent"}']
     assert main(["run", str(case), "--out", str(out), "--monte-carlo", *arguments]) == 0
@@ -239,6 +241,7 @@ def kept(out, curve, planned):
     return f"interrupted {place}; what was done is kept in {out / 'quick'}; run it again to go on"
 
 
+@pytest.mark.slow
 def test_an_interrupted_simulation_of_a_run_says_how_to_go_on(case, out, capsys, fails):
     fails(2)
     assert main(["run", str(case), "--out", str(out), "--monte-carlo", *LONG]) == 130
@@ -265,6 +268,7 @@ def test_ctrl_c_before_a_curve_has_anything(case, out, capsys, fails):
     assert "64 paths" in printed.out
 
 
+@pytest.mark.slow
 def test_simulations_that_are_finished_are_not_made_again(case, out, monkeypatch):
     """Nor where they were interrupted later; what is written then is what an undisturbed simulation writes."""
     original, made, fails = simulated.simulate_curve, [], [0.2]

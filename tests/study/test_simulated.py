@@ -116,6 +116,7 @@ def test_a_simulation_comes_back_and_is_small(case):
     assert len(json.dumps(record_of(simulated))) < 50_000
 
 
+@pytest.mark.slow
 def test_a_curve_is_a_small_task(case, curve):
     orders = tuple(float(p) for p in case.simulated)
     task = pickle.dumps((simulate_curve, curve, orders, case.monte_carlo))

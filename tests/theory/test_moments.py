@@ -178,6 +178,7 @@ def test_beside_a_known_one(monkeypatch, most, moved):
     assert found.value == pytest.approx(second.value + moved, abs=1e-11)
 
 
+@pytest.mark.slow
 def test_the_last_functions_move_with_the_next_ones():
     """By far more of them: to first order alone the next ones of this filter have the other sign."""
     problem, _, _ = random_many.drawn(42)
