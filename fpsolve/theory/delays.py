@@ -85,12 +85,11 @@ class Delayed:
         parts = [self._split(each) for each in (drift, *moving.loads, *squares)]
         sizes, first = [np.sum(np.abs(each), axis=0) for each in parts], 1 + len(moving.loads)
         rest = sum((each @ each for each in sizes[first:]), np.zeros_like(sizes[0]))
-        own, self.largest = moving.balance(sizes[:first], rest)
-        self.units = own if units is None else units
+        self.units, self.largest = moving.balance(sizes[:first], rest, units)
         self.drift, *others = (each * self.units / self.units[:, None] for each in parts)
         self.loads, self.squares = others[: len(moving.loads)], others[len(moving.loads) :]
-        ones = np.eye(self.n * (self.n + 1) // 2)
-        self.symmetric = np.array([moment_form(each, self.n, 2).ravel() for each in ones]).T
+        one = np.eye(self.n * (self.n + 1) // 2)
+        self.symmetric = np.array([moment_form(each, self.n, 2).ravel() for each in one]).T
 
     @property
     def last(self) -> float:
@@ -120,14 +119,15 @@ class Delayed:
 
     def moments(self, x: FloatArray) -> FloatArray:
         """E √(p!/α!) x^α of a right vector."""
-        return x * self._scales
+        return x * self.scales
 
     def polynomial(self, y: FloatArray) -> FloatArray:
         """T, as coefficients of these functions, of a left vector."""
-        return y / self._scales
+        return y / self.scales
 
     @property
-    def _scales(self) -> FloatArray:
+    def scales(self) -> FloatArray:
+        """The units of the numbers for each function of the noise."""
         i, j = np.triu_indices(self.n)
         return self.units[i] * self.units[j]
 
@@ -209,7 +209,7 @@ class DelayRates:
             parts = square * fall
             reached = [k for k in range(count + 1) if square[k].any()]
             for k, j in combinations_with_replacement(reached, 2):
-                relaxed = _kron(expm(self.generator * own.unit * k), _kron(parts[k], parts[j]))
+                relaxed = _kron(self._power(own.unit * k), _kron(parts[k], parts[j]))
                 noisy.append((1 if k == j else 2) * relaxed @ later[j - k])
         return _Parts(later, steady, noisy)
 
@@ -266,9 +266,13 @@ class DelayRates:
 
     def _relaxed(self, time: float) -> Any:
         """What functions of the noise become, for all matrices."""
+        return _kron(self._power(time), np.eye(self.state.n**2))
+
+    def _power(self, time: float) -> Any:
+        """e^(Gᵀt), once for each time."""
         if time not in self._powers:
             self._powers[time] = expm(self.generator * time)
-        return _kron(self._powers[time], np.eye(self.state.n**2))
+        return self._powers[time]
 
     @cached_property
     def _powers(self) -> dict[float, Any]:
@@ -370,7 +374,7 @@ class DelayRates:
         size, last = len(moving[0]), complex(math.nan)
         degree = FEWEST + SHARE * own.last * float(np.linalg.norm(sum(map(np.abs, moving)), 2))
         for k, each in enumerate(moving):
-            moving[k] = each @ _kron(expm(self.generator * own.unit * k), np.eye(own.n))
+            moving[k] = each @ _kron(self._power(own.unit * k), np.eye(own.n))
         moving[0] = moving[0] + _kron(self.generator, np.eye(own.n))
         while size * degree <= MOST_SIZE:
             nodes = math.ceil(degree)

@@ -315,11 +315,15 @@ class Equations:
         if pasts := problem.system.pasts:
             self.state = Delayed(moving, pasts, like.state.units if like else None)
         else:
-            pairs = math.comb(problem.dimension + 1, 2)
-            first = math.prod(each.degrees.size for each in self._axes([FIRST] * len(self.noises)))
-            form = Products if p == 2 and pairs * first > MOST_AS_POWERS else Powers
+            form: type[Products | Powers] = Products if p == 2 and self._first_size > MOST_AS_POWERS else Powers
             self.state = form(moving, p, like.state.units if like else None)
         self.dimension = problem.dimension - len(pasts)
+
+    @property
+    def _first_size(self) -> int:
+        """Of the second moments, with the first functions of each noise."""
+        axes = self._axes([FIRST] * len(self.noises))
+        return math.comb(self.problem.dimension + 1, 2) * math.prod(each.degrees.size for each in axes)
 
     def moment(self, counts: Sequence[int], most: int, near: EvenMoment | None = None) -> EvenMoment | None:
         """Λ(p) with functions of degrees below these, sought from one next to it; None where they are too many."""

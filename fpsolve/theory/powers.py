@@ -106,8 +106,8 @@ class Moving(NamedTuple):
     squares: Sequence[FloatArray]
     impulses: Sequence[tuple[float, FloatArray]]
 
-    def balance(self, linear: Sequence[Any], rest: Any) -> tuple[FloatArray, float]:
-        """Units in which the sizes of A and D, of some power, and of the rest are balanced, and the largest size there.
+    def balance(self, linear: Sequence[Any], rest: Any, units: FloatArray | None) -> tuple[FloatArray, float]:
+        """Units of the state, the given ones or else those in which all sizes are balanced, and the largest size there.
 
         Raises:
             NoHierarchy: a size is not finite.
@@ -118,8 +118,8 @@ class Moving(NamedTuple):
         if not np.isfinite(sizes).all():
             raise NoHierarchy("the equations of the moments are beyond floating-point numbers; use a smaller p")
         with np.errstate(invalid="ignore"):  # of units beyond an integer, which none are taken for here
-            balanced, (units, _) = matrix_balance(sizes, permute=False, separate=True)
-        return units, float(np.max(balanced))
+            balanced, (own, _) = matrix_balance(sizes, permute=False, separate=True)
+        return own if units is None else units, float(np.max(balanced))
 
 
 class Powers:
@@ -144,11 +144,10 @@ class Powers:
         for rate, exponent in moving.impulses:
             gain = expm(moved(exponent, p).toarray())
             rest = rest + sparse.csr_array(rate * (gain - np.eye(len(gain))))
-        own, self.largest = moving.balance(linear, rest)
-        self.units = own if units is None else units
-        for each in (moves := [linear[0] + rest, *linear[1:]]):
+        self.units, self.largest = moving.balance(linear, rest, units)
+        for each in (own := [linear[0] + rest, *linear[1:]]):
             each.data *= self.units[each.indices] / np.repeat(self.units, np.diff(each.indptr))
-        self._steady, *self._loads = moves
+        self._steady, *self._loads = own
         self._start = gaussian(len(moving.steady), p)
 
     @property

@@ -87,8 +87,7 @@ class Products:
         steady = moving.steady + 0.5 * sum((each @ each for each in moving.squares), 0.0 * moving.steady)
         gains = [(1.0, each) for each in moving.squares] + [(rate, expm(each)) for rate, each in moving.impulses]
         rest = sum((rate * each * each for rate, each in gains), 0.0 * steady)
-        own, self.largest = moving.balance([steady, *moving.loads], rest)
-        self.units = own if units is None else units
+        self.units, self.largest = moving.balance([steady, *moving.loads], rest, units)
         shares = self.units / self.units[:, None]
         self._steady = shares * steady
         self._loads = [factors_of(shares * each) for each in moving.loads]

@@ -52,7 +52,6 @@ def enriched(pair):
     return principal_pair(type(generator)(generator.problem, finer), pair.p, start=pair)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("n", "p"), sampled((3, 0.0), (4, 1.5)))
 def test_isotropic_systems_in_any_coordinates(n, p):
     """‖y‖ falls as exp(−0.1t) and its directions are uniform, so that those of x = Gy have 1/(|S| |det G| ‖G⁻¹e‖ⁿ)."""

@@ -67,7 +67,6 @@ def wanted(found, label):
     ]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("zero", sampled(LAMBDA, SECOND, INDEX))
 def test_f_is_zero_on_a_line(zero):
     """Also if it is solved anew and more tightly, which moves the line by less than its width."""
@@ -81,7 +80,6 @@ def test_f_is_zero_on_a_line(zero):
         assert (abs(value) - error) / slope <= point.sample.width < 1e-8
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("zero", "omega"), sampled((SECOND, 3.0), (LAMBDA, 1.2), (INDEX, 3.0)))
 def test_weak_noise_has_the_lines_of_the_paper(zero, omega):
     """c₁ of Λ₂(p)/p = 0, Eq. (36), is off by O(ε²)."""

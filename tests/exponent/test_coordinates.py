@@ -147,7 +147,6 @@ def test_all_numbers_of_a_resonator_with_a_wall(rate):
     np.testing.assert_allclose(numbers(other, rate), numbers(own, 1.0), rtol=1e-11)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("rate", sampled(1e6, 1e-6))
 def test_two_modes_in_any_unit_of_time(rate):
     """In SI units and in those of the slower mode, by positions and velocities."""

@@ -39,7 +39,6 @@ def test_nothing_lies_right_of_the_principal_eigenvalue_on_random_meshes(rng, co
     assert 0.1 * count < sum(parities) < 0.9 * count  # even and odd numbers of unknowns
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("epsilon", "p"), sampled((1.0, 1.0), (0.5, -2.0), (0.5, 3.0)))
 def test_nothing_lies_right_of_the_principal_eigenvalue_in_strong_noise(epsilon, p):
     oscillator = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=epsilon)

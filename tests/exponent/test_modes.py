@@ -94,7 +94,6 @@ def test_second_moments(seed, n, kind):
         np.testing.assert_allclose(rate, expected * moments, atol=1e-9 * np.max(moments))
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("seed", "n"), sampled((0, 3), (2, 4)))
 def test_even_moments_under_white_noise(seed, n):
     """By elements."""
@@ -160,7 +159,6 @@ def test_even_moments_alone_have_all_digits(seed):
         assert solver.even(float(p)).value == pytest.approx(expected(p), abs=1e-10)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("noise", "driven"), sampled((White(s=1.0), COUPLED), (Telegraph(a=0.5, k=0.5), COUPLED)))
 def test_what_finer_waves_change_is_told_to_first_order(noise, driven):
     """The value with the correction is nearer to that of a finer space by far, which has the next waves."""

@@ -46,7 +46,6 @@ def reference(case, p, start, tilt, scale):
     return found[-1], np.inf
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("sets", sampled(8, 20))
 def test_odd_sets_are_right_to_their_error(sets):
     compared = solved = 0

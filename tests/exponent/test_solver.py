@@ -83,7 +83,6 @@ def test_strong_noise_finds_the_principal_eigenvalue(epsilon, p, value, rel):
     assert min(pair.sign_defects) < 1e-10
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("epsilon", sampled(0.5, 0.1, 0.3))
 @pytest.mark.parametrize("c1", [-0.4, 0.3])
 def test_identity_at_p_minus_2(epsilon, c1):
@@ -106,7 +105,6 @@ def test_without_noise_only_the_impacts_are_left(p, law):
     assert value == pytest.approx(p * 1.7 * oscillator.log_impact_factor / math.pi, rel=1e-10)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("p", sampled(-2.0, 4.0, 1.0, keep=2))
 @pytest.mark.parametrize("restitution", sampled(0.8, 1.0))
 def test_decoupled_phase_is_exactly_quadratic(monkeypatch, restitution, p):

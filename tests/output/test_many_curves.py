@@ -68,7 +68,6 @@ FIGURES = {
 SHOWN = ("eight", "exact and reduced, many", "map")
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", sampled(*SHOWN, *(name for name in FIGURES if name not in SHOWN), keep=len(SHOWN)))
 def test_all_has_its_place(sound, tmp_path, name):
     """Legends cover no data, all that is written is on the canvas and readable, and no two texts overlap."""
@@ -268,7 +267,6 @@ def test_thousands_of_curves_take_seconds(pictures, tmp_path):
     assert (tmp_path / "figure.pdf").stat().st_size < 500_000
 
 
-@pytest.mark.slow
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("name", sampled("two", "map", "over a parameter", keep=2))
 @pytest.mark.parametrize("most", sampled(0, 1))

@@ -104,7 +104,6 @@ def plain():
     return entry_of("plain Gaussian noise")
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", sampled(*PROOFS, keep=3))
 def test_both_checkers_take_a_proof(name):
     entry = checker.read(proven(name))
@@ -126,7 +125,6 @@ def test_both_checkers_refuse_mutations_that_do_not_follow(name, step):
     assert [each.change for each in broken if checker.check(each.entry) == ""] == []
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("p", sampled(2.0, -1.0))
 def test_w_levels_a_rough_trial_function(p, rng):
     """Few harmonics and degrees: |Lu/u − μ| is far greater than either δ; and neither W serves the other bound."""
@@ -157,7 +155,6 @@ def psi(side, z, sign):
     return lambda y: sign * (w * (y - z) + slope * (y - z) ** 2 / 2)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("of", sampled("path", "plain Gaussian noise"))
 @pytest.mark.parametrize(("name", "sign"), [("upper", 1), ("lower", -1)])
 def test_what_a_proof_says_of_the_generator(of, name, sign, rng):

@@ -122,7 +122,6 @@ def test_gaussian_noise_in_the_stiffness(stiffness, deviation, width):
     assert found.is_met
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("noise", sampled(fpsolve.OrnsteinUhlenbeck(1.7, 0.9), fpsolve.NonGaussianNoise(0.4, 0.6, 0.7)))
 def test_the_papers_oscillator_by_its_matrices(noise):
     """In (x, ẋ), where its phase is uneven, and in (x, ẋ/ω)."""

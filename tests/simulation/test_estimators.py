@@ -54,7 +54,6 @@ def small(seed, estimator="direct", orders=(-1.0, 1.0)):
     return simulate(Problem(MODERATE, NOISE), list(orders), estimator=estimator, paths=640, time=60.0, seed=seed)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("estimator", sampled("direct", "population"))
 def test_seed_decides_whatever_the_threads(monkeypatch, estimator):
     found = small(3, estimator)
@@ -85,7 +84,6 @@ def test_memory_does_not_grow_with_time():
     assert peak(800.0) < 1.3 * peak(100.0)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("estimator", sampled("direct", "population"))
 def test_an_interrupt_keeps_what_is_done(estimator):
     calls = []

@@ -157,7 +157,6 @@ def parametric(b, R=1.0, k=1.0):
 VELOCITY = plane([[0.0, 1.0], [-1.0, 0.1]], ((0.0, 0.0), (0.0, 1.0)), (WALL,))
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("system", "noise", "exponent", "moments"),
     sampled(
