@@ -89,7 +89,7 @@ def script(path: Path) -> str:
     """The script that draws the figure of a case."""
     case, text = fpsolve.load_case(path), path.read_text(encoding="utf-8")
     words = re.match(r"(?:#:.*\n)?((?:#.*\n)*)", text).group(1).replace("# ", "").replace("#", "")
-    own = case.problem.is_closed_only or case.problem.has_algebraic_tails  # there are no other p
+    own = not case.method.has_pairs or case.problem.has_algebraic_tails  # there are no other p
     few = case.figure.x == "p" and case.moments.values.size < 8 and not own
     sets = [] if own else ["output={ quantities = ['moment', 'lyapunov_exponent', 'stability_index'] }"]
     if few:
@@ -110,7 +110,7 @@ import fpsolve
 
 case = fpsolve.load_case("{path.name}", {_listed(sets)})
 results = fpsolve.run(case)
-{"" if few or case.problem.is_closed_only else INDICES}"""
+{"" if few or not case.method.has_pairs else INDICES}"""
     if path.stem in CHARTS:
         return head + shown + CHART.format(file=path.name, name=path.stem)
     return head + shown + run + KINDS.get(path.stem, "")
@@ -134,9 +134,9 @@ case = fpsolve.load_case("{file}")
 x, y = case.chart.x.axis, case.chart.y.axis
 figure, axes = plt.subplots(layout="constrained")
 table = pandas.read_csv("../../charts/{name}/chart.csv")
-for number, zero in enumerate(case.chart.zero):
-    for branch, line in table[table.line == zero.name].groupby("branch"):
-        axes.plot(line.x, line.y, color=f"C{{number}}", label=zero.latex if branch == 1 else None)
+for number, target in enumerate(case.chart.lines):
+    for branch, line in table[table.line == str(target)].groupby("branch"):
+        axes.plot(line.x, line.y, color=f"C{{number}}", label=target.latex if branch == 1 else None)
 label_axes(axes, case.about(x.key).attributes, case.about(y.key).attributes)
 scale_axis(axes.xaxis, x.scale, (x.start, x.stop))
 scale_axis(axes.yaxis, y.scale, (y.start, y.stop))

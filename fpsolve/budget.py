@@ -1,4 +1,4 @@
-"""What a number may cost: seconds of a processor, asked before each factorisation.
+"""What the numbers of a parameter set may cost together: seconds of a processor, asked before each factorisation.
 
 A number does not depend on its budget. Whether it is given may, on a slower machine.
 """
@@ -10,101 +10,82 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
-from functools import wraps
-from typing import Any, TypeVar
 
 from fpsolve.errors import NotConverged
 from fpsolve.messages import Code, Message, Remedy
 
-Solve = TypeVar("Solve", bound=Callable[..., Any])
-_running: ContextVar[tuple[Countdown, ...]] = ContextVar("running", default=())
-_watch: ContextVar[Callable[[Countdown], object] | None] = ContextVar("watch", default=None)
+_meter: ContextVar[Meter | None] = ContextVar("meter", default=None)
+_watch: ContextVar[Callable[[Meter], object] | None] = ContextVar("watch", default=None)
 
 
-class OverBudget(Exception):
-    """A countdown has ended; it passes all that may go on without one."""
-
-    def __init__(self, countdown: Countdown, reason: Message) -> None:
-        super().__init__(reason)
-        self.countdown, self.reason = countdown, reason
+class OverBudget(NotConverged):
+    """The seconds of a meter have passed; no number goes on without what it ends, see `unless_over_budget`."""
 
 
 @dataclass(eq=False)
-class Countdown:
-    """What is left for a number, or for several of them, while this is `running`.
+class Meter:
+    """The seconds of a processor that some numbers take, while this is `running`.
 
     Attributes:
-        seconds: of a processor.
-        name: of the number, such as "Λ″(0)"; empty for several.
+        seconds: that they may take together.
+        planned: how many numbers there are.
+        begun: how many of them were begun.
+        number: the symbol of the one that is being solved.
         unknowns: of the factorisation that is under way.
-        before: seconds of earlier runs.
-        since: when it began to run; None where it does not.
     """
 
     seconds: float
-    name: str = ""
+    planned: int = 0
+    begun: int = 0
+    number: str = ""
     unknowns: int = 0
-    before: float = 0.0
-    since: float | None = None
+    _before: float = 0.0
+    _since: float | None = None
 
     @property
     def spent(self) -> float:
         """Seconds of the processor so far."""
-        return self.before + (0.0 if self.since is None else time.thread_time() - self.since)
+        return self._before + (0.0 if self._since is None else time.thread_time() - self._since)
 
     @contextmanager
-    def running(self) -> Iterator[Countdown]:
-        """Count in the body, where `charge` raises `OverBudget` for this countdown."""
-        token, self.since = _running.set((*_running.get(), self)), time.thread_time()
+    def running(self) -> Iterator[Meter]:
+        """Count in the body, where `charge` asks it; within another meter that one counts."""
+        if other := _meter.get():
+            yield other
+            return
+        token, self._since = _meter.set(self), time.thread_time()
         try:
             yield self
         finally:
-            self.before, self.since = self.spent, None
-            _running.reset(token)
+            self._before, self._since = self.spent, None
+            _meter.reset(token)
+
+    def refuse(self, seconds: float) -> None:
+        """Raise `OverBudget` if so many seconds are more than there are."""
+        if seconds > self.seconds:
+            raise OverBudget(Message(Code.SECONDS_SPENT, seconds=seconds, most=self.seconds), remedy=Remedy.BUDGET)
 
 
-def under_way() -> Countdown | None:
-    """That of the number which is being solved; those that it takes are parts of it and have none of their own."""
-    return next((each for each in _running.get() if each.name), None)
+def begin(symbol: str) -> None:
+    """Let the meter know which number comes next."""
+    if meter := _meter.get():
+        meter.number, meter.begun = symbol, meter.begun + 1
 
 
 @contextmanager
-def counted(countdown: Countdown) -> Iterator[None]:
-    """What the body solves is the number of a countdown, or a part of the one that is under way.
-
-    Raises:
-        NotConverged: the budget does not suffice.
-    """
-    if under_way():
-        yield
-        return
+def unless_over_budget() -> Iterator[None]:
+    """What is not resolved in the body is done without, but for what a budget has ended: no number depends on that."""
     try:
-        with countdown.running():
-            yield
-    except OverBudget as failure:
-        if failure.countdown is not countdown:
-            raise
-        told = Message(Code.NUMBER_SPENT, symbol=countdown.name, reason=failure.reason)
-        raise NotConverged(told, remedy=Remedy.BUDGET) from None
-
-
-def one_number(name: str) -> Callable[[Solve], Solve]:
-    """What a function of something with a `budget` solves is one number, see `counted`; its p is "{:g}" in the name."""
-
-    def decorated(function: Solve) -> Solve:
-        @wraps(function)
-        def solve(solver: Any, *args: Any, **kwargs: Any) -> Any:
-            with counted(solver.budget.countdown(name.format(*args))):
-                return function(solver, *args, **kwargs)
-
-        return solve  # type: ignore[return-value]
-
-    return decorated
+        yield
+    except OverBudget:
+        raise
+    except NotConverged:
+        pass
 
 
 @contextmanager
-def watched(watch: Callable[[Countdown], object]) -> Iterator[None]:
-    """In the body `watch` is called before each factorisation, with the countdown of the number that waits for it."""
+def watched(watch: Callable[[Meter], object]) -> Iterator[None]:
+    """In the body `watch` is called with the meter before each factorisation."""
     token = _watch.set(watch)
     try:
         yield
@@ -114,10 +95,8 @@ def watched(watch: Callable[[Countdown], object]) -> Iterator[None]:
 
 def charge(unknowns: int) -> None:
     """Ask whether a factorisation of so many unknowns may begin. Raises `OverBudget`."""
-    running = _running.get()
-    for each in running:
-        if each.spent > each.seconds:
-            raise OverBudget(each, Message(Code.SECONDS_SPENT, seconds=each.spent, most=each.seconds))
-        each.unknowns = unknowns
-    if running and (watch := _watch.get()):
-        watch(under_way() or running[0])
+    if meter := _meter.get():
+        meter.refuse(meter.spent)
+        meter.unknowns = unknowns
+        if watch := _watch.get():
+            watch(meter)

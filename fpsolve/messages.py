@@ -171,8 +171,11 @@ class Code(Enum):
     )
     NO_ARNOLDI = "failure: the Arnoldi iteration for p = {p:g} did not converge"
     UNKNOWNS_SPENT = "failure: the next mesh has {unknowns} unknowns, more than budget.unknowns = {most}"
-    SECONDS_SPENT = "failure: it takes some {seconds:.2g} s of processor time, more than budget.seconds = {most:g}"
-    NUMBER_SPENT = "failure: {symbol} did not converge: {reason}"
+    SECONDS_SPENT = (
+        "failure: the numbers of this parameter set take some {seconds:.3g} s of processor time together, more than "
+        "budget.seconds = {most:g}"
+    )
+    NO_PAIR = "failure: there is no eigenfunction at p = {p:g} of this kind of problem"
     MESHES_SPENT = "failure: {count} meshes were tried"
     ROUNDED = "failure: rounding alone may change it by {size:.1e}; use a larger rtol"
     NOTHING_RESOLVED = (

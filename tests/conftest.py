@@ -91,53 +91,7 @@ def keeping(first, second, sizes=(0.7, -0.6)):
     return (rays @ np.diag(sizes) @ np.linalg.inv(rays)).tolist()
 
 
-LONGEST = (
-    "test_sweeps.py",
-    "simulation/test_spaces.py",
-    "test_docs.py",
-    "nonlinear/test_cubic.py",
-    "output/test_vtk.py",
-    "nonlinear/test_response.py",
-    "test_explore.py",
-    "test_cli.py",
-    "analysis/test_directions.py",
-    "exponent/test_stopped.py",
-    "exponent/test_curve.py",
-    "analysis/test_stability.py",
-    "proofs/test_prove.py",
-    "simulation/test_stops.py",
-    "theory/test_delays.py",
-    "exponent/test_modes.py",
-    "study/test_chart.py",
-    "study/test_systems.py",
-    "output/test_many_curves.py",
-    "proofs/test_certificate_checker.py",
-    "simulation/test_estimators.py",
-    "output/test_show.py",
-    "test_kills.py",
-    "study/test_figures.py",
-    "analysis/test_sensitivity.py",
-    "exponent/test_heavy_tails.py",
-    "simulation/test_motions.py",
-    "theory/test_moments.py",
-    "measured/test_files.py",
-    "test_workflow.py",
-    "study/test_simulate.py",
-    "case/test_refusals.py",
-    "test_data.py",
-    "study/test_response.py",
-    "output/test_datasets.py",
-    "exponent/test_blocks.py",
-)
-"""Files that begin first, so that no processor is left with a long one while the others have nothing to do."""
-
 gc.disable()  # what is collected stays, so that looking through it again finds nothing
-
-
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    place = {f"tests/{name}": k for k, name in enumerate(LONGEST)}
-    assert all((Path(__file__).parent / name).is_file() for name in LONGEST)
-    items.sort(key=lambda item: place.get(item.nodeid.partition("::")[0], len(place)))
 
 
 def pytest_collection_finish() -> None:

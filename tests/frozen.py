@@ -27,6 +27,7 @@ import numpy as np
 from fpsolve import OrnsteinUhlenbeck, PlaneSystem, Problem, load_case, moment_lyapunov
 from fpsolve.errors import FpsolveError, NotConverged
 from fpsolve.exponent import Budget, lyapunov_exponent, stability_index
+from fpsolve.exponent.kinds import choose
 from fpsolve.exponent.solver import solver_of
 from fpsolve.messages import Code
 from fpsolve.model import NonGaussianNoise, Telegraph, VibroImpactOscillator, White
@@ -92,7 +93,7 @@ class Number:
             if not here.size:
                 raise NotConverged("not among those that converged")
             value, error = float(found.value[here[0]]), float(found.error_estimate[here[0]])
-            size = max(abs(value), found.solver.scale(self.p))
+            size = max(abs(value), found.solver.method.scale(self.p))
             within = error <= max(found.solver.rtol * size, ROUNDED * size)
             return value, error, within or any(each.code is Code.RTOL_MISSED for each in found.warnings)
         if self.name == "Λ″":
@@ -129,7 +130,7 @@ def of_problem(problem: Problem, p: tuple[float, ...], interval: tuple[float, fl
     low, high = problem.moments
     p = tuple(each for each in p if low <= each <= high)
     yield from (Number(problem, "Λ", each) for each in p)
-    if problem.is_closed_only:
+    if not choose(problem).has_pairs:
         return
     yield Number(problem, "λ")
     if problem.dimension > 2:
@@ -150,7 +151,7 @@ def of_case(path: Path) -> Iterator[Number]:
     for number in sorted({1, case.planned}):
         [curve] = case.curves(number - 1, number)
         wanted = {-0.5, 1.0, 2.0, 3.5, *(each.p for each in case.expect if each.p is not None)}
-        if curve.problem.is_closed_only:
+        if not choose(curve.problem).has_pairs:
             wanted = {2.0}
         drawn = (-0.9, 4.0) if curve.problem.dimension == 2 else None
         for each in of_problem(curve.problem, tuple(sorted(wanted)), drawn):
@@ -159,55 +160,33 @@ def of_case(path: Path) -> Iterator[Number]:
 
 def of_random(family: str, seed: int) -> Iterator[Number]:
     """Those of a random problem; its family and seed draw it."""
-    from tests import (
-        random_delays,
-        random_filters,
-        random_many,
-        random_modes,
-        random_planar,
-        random_problems,
-        random_several,
-        random_stops,
-        random_systems,
-        random_tolerances,
-        random_units,
-    )
+    from tests.campaign import planar, same, spaces
 
     match family:
         case "problem":
-            drawn = random_problems.problems(seed + 1)[seed]
-            return of_problem(drawn.solved, (drawn.p,), (-0.9, 3.0) if seed % 4 == 0 else None)
-        case "system":
-            return of_problem(random_systems.drawn(seed)[0], (-0.5, 1.0, 2.0))
+            drawn, p = planar.oscillator(seed)
+            return of_problem(drawn.problem, (p,), (-0.9, 3.0) if seed % 4 == 0 else None)
         case "planar":
             curve = (-0.8, 4.0) if seed % 3 == 0 else None
-            return of_problem(random_planar.drawn(seed).problem, (1.0, 2.0), curve)
+            return of_problem(planar.drawn(seed).problem, (1.0, 2.0), curve)
+        case "wall":
+            return of_problem(planar.walled(seed).problem, (-0.5, 1.0, 2.0))
+        case "unit":
+            return of_problem(same.restated(*same.in_units(seed)), (1.0, 2.0))
         case "modes":
-            return of_problem(random_modes.drawn(seed)[1], (-1.0, 1.0, 2.0))
-        case "units":
-            _, made, units = random_units.drawn(seed)
-            return of_problem(made(units), (1.0, 2.0))
-        case "several":
-            return of_problem(random_several.drawn(seed)[0], (1.0, 2.0, 4.0))
-        case "filter":
-            return of_problem(random_filters.problem_of(*random_filters.drawn(seed)), (1.0, 2.0))
+            return of_problem(spaces.modes(seed), (-1.0, 1.0, 2.0))
         case "many":
-            return of_problem(random_many.drawn(seed)[0], (2.0,))
+            return of_problem(spaces.many(seed)[0], (2.0,))
         case "delay":
-            return of_problem(random_delays.drawn(seed)[0], (2.0,))
-        case "stop":
-            return of_problem(random_stops.drawn(seed)[1], (1.0,))
-    return of_problem(random_tolerances.drawn(seed).problem, (-0.5, 1.5))
+            return of_problem(spaces.delayed(seed)[0], (2.0,))
+    return of_problem(spaces.stopped(seed), (1.0,))
 
 
 COUNTS = {
     "problem": 40,
-    "system": 36,
-    "planar": 36,
-    "units": 16,
-    "tolerance": 20,
-    "several": 12,
-    "filter": 12,
+    "planar": 72,
+    "wall": 40,
+    "unit": 20,
     "many": 12,
     "delay": 8,
     "modes": 6,
@@ -275,7 +254,7 @@ def truth(task: tuple[str, Callable[[], Iterator[Number]]]) -> tuple[str, dict[s
         if number.known is not None:
             found[number.key] = [number.known, 1e-8 * abs(number.known)]
             continue
-        usual = number.rtol or number.problem.usual_rtol
+        usual = number.rtol or choose(number.problem).usual_rtol
         for share in FINER:
             rtol = max(share * usual, SMALLEST)
             if (id(number.problem), rtol) in hopeless:

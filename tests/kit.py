@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import csv
+import io
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import chdir, redirect_stderr, redirect_stdout
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from fpsolve import load_case
+from fpsolve import PlaneSystem, Problem, load_case
 from fpsolve.case import Case
+from fpsolve.cli import main
+from fpsolve.model import CoefficientMatrix, LinearSystem, Noise, System
 from fpsolve.output.records import entries_of, record_of_set
 from fpsolve.parts.part import Numerics
 from fpsolve.results import CurveResult, SimulatedCurve
@@ -61,6 +65,64 @@ COSTLY = (
 """What takes more than the tolerance of Λ(p) needs."""
 TABLES = {"summary.json", "moments.csv", "curves.csv", "results.nc"}
 """The files of what is solved."""
+
+
+def equations(text: str, walls: Sequence[Mapping[str, Any]] = (), **parameters: float) -> System:
+    """A system of rates as `x' = v; v' = -x - c*v - xi*x`, noises called xi or as in `rates`."""
+    drift = {
+        left.strip().removesuffix("'"): right.strip() for left, right in (each.split("=") for each in text.split(";"))
+    }
+    names = {name: f"noise.{name}" for name in ("xi1", "xi2", "xi3") if name in text}
+    return PlaneSystem.of_equations(tuple(drift), tuple(drift.values()), parameters, noises=names or None, walls=walls)
+
+
+def rates(
+    text: str, noise: Noise | Sequence[Noise], walls: Sequence[Mapping[str, Any]] = (), **parameters: float
+) -> Problem:
+    """A problem of rates as `x' = v; v' = -x - c*v - xi*x` and values of their parameters.
+
+    >>> rates("x' = v; v' = -x - c*v - xi*x", White(s=0.1), walls=[{"at": "x = 0", "restitution": 0.8}], c=0.2)
+    >>> rates("x' = v; v' = -(1 + xi1)*x - xi2*v", [White(s=0.1), Telegraph(a=0.5, k=1.0)])
+    """
+    noises = noise if isinstance(noise, Noise) else {f"xi{k}": each for k, each in enumerate(noise, 1)}
+    return Problem(equations(text, walls, **parameters), noises)
+
+
+def itself(xi: Any) -> Any:
+    """The load of a noise that is ξ."""
+    return xi
+
+
+def matrices(drift: Any, load: Any, noise: Noise | Sequence[Noise], **more: Any) -> Problem:
+    """The problem ẋ = (drift + ξ load) x of any number of variables, with `jumps` or a `stop`; lists of several."""
+    loads, noises = ([load], [noise]) if isinstance(noise, Noise) else (load, noise)
+    names = [""] if isinstance(noise, Noise) else [f"xi{k}" for k, _ in enumerate(noises, 1)]
+    driven = [CoefficientMatrix(1, each, itself, name) for each, name in zip(loads, names, strict=True)]
+    given = noise if isinstance(noise, Noise) else dict(zip(names, noises, strict=True))
+    return Problem(LinearSystem([CoefficientMatrix(0, drift), *driven], **more), given)
+
+
+class Run(NamedTuple):
+    """What a command did: its exit code, what it printed, and the folder that it ran in."""
+
+    code: int
+    out: str
+    err: str
+    folder: Path
+
+
+def run(folder: Path, *arguments: str, to: Callable[[], Any] = io.StringIO, **texts: str | bytes) -> Run:
+    """`fpsolve` with these arguments in a folder, in this process, with files of these texts; case=… is case.toml.
+
+    It prints to streams that `to` makes.
+    """
+    for name, text in texts.items():
+        path = folder / (f"{name}.toml" if "." not in name else name)
+        path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    out, err = to(), to()
+    with chdir(folder), redirect_stdout(out), redirect_stderr(err):
+        code = main(list(arguments))
+    return Run(code, out.getvalue(), err.getvalue(), folder)
 
 
 def case_text(more: str = "", title: str = "A test", noise: Mapping[str, Any] = NOISE, **oscillator: Any) -> str:

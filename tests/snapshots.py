@@ -2,40 +2,37 @@
 
 `python -m tests.snapshots` shows what is said otherwise now; with `--update` it becomes the text.
 
-A file in tests/case/refusals begins with a command and the name of a case, then has a good case up to a line of ====.
-The entries below it change this case, and hold each line that is said:
+A file in tests/contract/refusals begins with a command and the name of a case, then has a good case up to a line of
+====. The entries below it change this case, and hold each line that is said:
 
     ~ omega = -1.0          a line in place of that with its key
     - old line              lines in place of others (`+` alone: at the end)
     + new line
     x [vary]                a section is left out
     $ noise.D0=2            an argument of --set, or an option
-    @ sets.csv 'text'       a file beside the case
+    @ sets.csv 'text'       a file beside the case, or in its place
     | bad.toml:4: what is said; FOLDER is the folder of the case
 
-Each is refused with exit code 2, without any output, and nothing is written.
+Changes have {400 * 0} for 400 zeros. Each entry is refused with exit code 2, without any output, and nothing is
+written.
 """
 
 from __future__ import annotations
 
 import ast
-import io
 import re
 import sys
 import tempfile
-from contextlib import chdir, redirect_stderr, redirect_stdout
 from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
 from typing import NamedTuple
 
-from fpsolve.cli import main as fpsolve
-from fpsolve.commands.options import BAD_INPUT
+from tests.kit import run
 
-FOLDER = Path(__file__).parent / "case/refusals"
+FOLDER = Path(__file__).parent / "contract/refusals"
 END = "====\n"
-BIG = "1" + "0" * 400
-"""What {BIG} stands for, an integer that is no floating-point number."""
+BAD_INPUT = 2
 
 
 class Line(NamedTuple):
@@ -74,26 +71,24 @@ class Entry:
                     key = line.text.partition(" =")[0]
                     [old] = [each for each in text.splitlines() if each.startswith(f"{key} =")]
                     text = text.replace(f"\n{old}\n", f"\n{line.text}\n")
-        return text[1:].replace("{BIG}", BIG)
+        return repeated(text[1:])
 
     def outcome(self, folder: Path) -> tuple[str, ...]:
         """The lines that are said, where all else is as it must be."""
-        (folder / self.name).write_text(self.text, encoding="utf-8")
-        for line in self.changes:
-            if line.kind == "@":
-                name, _, content = line.text.partition(" ")
-                content = ast.literal_eval(content)
-                (folder / name).write_bytes(content if isinstance(content, bytes) else content.encode())
-        before = sorted(folder.rglob("*"))
-        stated = [text for kind, text in self.changes if kind == "$"]
+        texts = {self.name: self.text}
+        for name, _, content in (line.text.partition(" ") for line in self.changes if line.kind == "@"):
+            texts[name] = ast.literal_eval(repeated(content))
+        stated = [repeated(text) for kind, text in self.changes if kind == "$"]
         options = [word for text in stated for word in (text.split() if text.startswith("--") else ("--set", text))]
-        out, err = io.StringIO(), io.StringIO()
-        with chdir(folder), redirect_stdout(out), redirect_stderr(err):
-            code = fpsolve([self.command, self.name, *options])
-        assert code == BAD_INPUT, (code, err.getvalue())
-        assert out.getvalue() == ""
-        assert sorted(folder.rglob("*")) == before
-        return tuple(err.getvalue().replace(str(folder), "FOLDER").splitlines())
+        done = run(folder, self.command, self.name, *options, **texts)
+        assert (done.code, done.out) == (BAD_INPUT, ""), done.err
+        assert {each.name for each in folder.rglob("*")} == texts.keys()
+        return tuple(done.err.replace(str(folder), "FOLDER").splitlines())
+
+
+def repeated(text: str) -> str:
+    """A text with the zeros of {400 * 0}."""
+    return re.sub(r"\{(\d+) \* ([^}]+)\}", lambda found: int(found[1]) * found[2], text)
 
 
 def _edited(text: str, lines: list[Line]) -> str:

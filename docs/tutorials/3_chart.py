@@ -22,8 +22,8 @@ from fpsolve.model import White
 system = PlaneSystem.of_equations(("x", "v"), ("v", "-x - 2*b*v - xi*x"), {"b": 0.1})
 problem = Problem(system, White(s=0.5))
 frame = Axis("noise.s", 0.3, 1.2), Axis("system.b", 0.02, 0.3)
-paths = boundary(problem, "lyapunov_exponent", *frame, nodes=5)
-square = boundary(problem, {"moment": 2.0}, *frame, nodes=5)
+paths = boundary(problem, "lyapunov_exponent = 0", *frame, nodes=5)
+square = boundary(problem, "moment(2) = 0", *frame, nodes=5)
 
 # %%
 # Every point of a line is solved to 1e-10 of the scale. So the line must agree with the known one:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fpsolve.arrays import FloatArray
+from fpsolve.budget import OverBudget
 from fpsolve.data import Quantity, Result, dataset
 from fpsolve.drawing import QUARTERS, draw_colours, label_axes
 from fpsolve.errors import MeshError, NotConverged, SingularMatrix
@@ -71,6 +72,8 @@ def settled_directions(pair: PrincipalPair) -> SettledDirections:
             return found
         try:
             new = principal_pair(Generator(generator.problem, finer), pair.p, start=found.pair)
+        except OverBudget:
+            raise
         except (NotConverged, SingularMatrix, MeshError):  # what there is stands, with its error
             return found
         fields = Directions(new).fields
@@ -139,14 +142,6 @@ class DirectionDensity(Result):
     def negative_share(self) -> float:
         """∫|ρ| where ρ < 0 over ∫|ρ|."""
         return negative_part(self.grid, self.values)
-
-    def first_marginal(self) -> FloatArray:
-        """∫ρ over the second coordinate, at the nodes of the first."""
-        return self.values @ self.grid.second_weights
-
-    def second_marginal(self) -> FloatArray:
-        """∫ρ over the first coordinate, at the nodes of the second."""
-        return self.grid.first_weights @ self.values
 
 
 def negative_part(grid: DirectionGrid, values: FloatArray) -> float:

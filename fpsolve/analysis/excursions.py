@@ -32,19 +32,19 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fpsolve.arrays import FloatArray, dense, real_array, real_number, real_numbers, shown
-from fpsolve.budget import one_number
+from fpsolve.budget import unless_over_budget
 from fpsolve.data import Quantity, Result, dataset
 from fpsolve.drawing import add_legend, coloured, label_axes
 from fpsolve.errors import NotConverged
-from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.error import Estimate
+from fpsolve.exponent.method import Budget, refuse_tails
 from fpsolve.exponent.root import nonzero_root
 from fpsolve.exponent.solver import ExponentSolver, solver_of
 from fpsolve.fem.generator import Generator
 from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.plane import Harmonics, growth_rate
-from fpsolve.model.problem import Problem, refuse_tails
+from fpsolve.model.problem import Problem
 from fpsolve.model.quantity import LEAST_PROBABLE, LEVEL, MOST_PROBABLE, UPCROSSINGS
 
 if TYPE_CHECKING:
@@ -193,7 +193,6 @@ def excursion(
     return solve_excursion(solver, phi=phi, xi=xi)
 
 
-@one_number("the bounds of P(sup ‖x‖ ≥ A)")
 def solve_excursion(
     solver: ExponentSolver, *, phi: Start = 0.0, xi: StartOfNoise = STATIONARY, root: float | None = None
 ) -> Excursion:
@@ -215,8 +214,10 @@ def solve_excursion(
     if not index:
         return replace(found, notes=(_without_index(index.reason),))
     found = replace(found, stability_index=index)
-    if reason := _no_eigenfunction(problem):
-        return replace(found, notes=(reason,))
+    if problem.dimension > 2:  # T is not looked at
+        return replace(found, notes=(Message(Code.EXCURSION_PLANE, count=problem.dimension),))
+    if (phase := solver.method.ray) is not None:
+        return replace(found, notes=(Message(Code.EXCURSION_RAY, phase=phase),))
     crossing, notes = Crossing.of(problem), list[Message]()
     ladder = Ladder(solver, index.value)
     is_bounded = problem.noise.is_bounded
@@ -261,13 +262,6 @@ def _without_index(reason: Message) -> Message:
     return Message(Code.EXCURSION_NO_INDEX, reason=reason)
 
 
-def _no_eigenfunction(problem: Problem) -> Message | None:
-    """Why T is not looked at, or None."""
-    if problem.dimension > 2:
-        return Message(Code.EXCURSION_PLANE, count=problem.dimension)
-    return Message(Code.EXCURSION_RAY, phase=problem.invariant_rays[0]) if problem.classes else None
-
-
 class Crossing(NamedTuple):
     """How ‖x‖ passes a level.
 
@@ -302,9 +296,9 @@ class Ladder:
         for number in range(1 + MOST_ROUNDS):
             if number == len(self._pairs):
                 last = self._pairs[-1]
-                try:
-                    self._pairs.append(self._solver.whole.finer_pair(last))
-                except NotConverged:
+                with unless_over_budget():
+                    self._pairs.append(self._solver.method.finer_pair(last))
+                if number == len(self._pairs):
                     return
             yield self._pairs[number]
 

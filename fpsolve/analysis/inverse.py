@@ -1,8 +1,8 @@
 """Design: the values of parameters at which λ, Λ(p) or δ_p has a wanted value, by its exact derivatives.
 
-One parameter: Newton's iteration on F(θ) = 0 of `Distance`, within a bracket as soon as F has both signs. Where it
-leads out of the range, or F cannot be solved on its way, F is scanned over the range, and where it turns between two
-points the least |F| is sought, at which the slope is 0. If F has one sign everywhere, the target cannot be reached.
+One parameter: F of `Distance` is scanned over the range, from the value of the problem outwards, until it changes its
+sign; Brent's method finds F = 0 there. Where it turns between two points the least |F| is sought. If F has one sign
+everywhere, the target cannot be reached.
 
 Several parameters: of all θ with F(θ) = 0 the one that is nearest to the θ⁰ of the problem,
 
@@ -23,20 +23,19 @@ from itertools import pairwise, product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.optimize import brentq, minimize
+from scipy.optimize import brentq, minimize, minimize_scalar
 
 from fpsolve.analysis.scan import TOLERANCE, Sample
-from fpsolve.analysis.target import Distance, Target, start_and_stop, target_of
-from fpsolve.analysis.zero import Axis, is_none, said
+from fpsolve.analysis.target import Distance, Target, said, target_of
+from fpsolve.analysis.zero import Axis, is_none
 from fpsolve.arrays import FloatArray, real_number, shown
 from fpsolve.data import Result, dataset, written
-from fpsolve.errors import NoSuchExponent, NotConverged
-from fpsolve.exponent.adapt import Budget
+from fpsolve.errors import FpsolveError, NoSuchExponent, NotConverged
 from fpsolve.exponent.error import Absent, Estimate
+from fpsolve.exponent.method import Budget
 from fpsolve.messages import Code, Message
 from fpsolve.model.problem import Problem, checked_problem
 from fpsolve.model.quantity import Quantity
-from fpsolve.roots import Missing, Value, increasing_root
 
 if TYPE_CHECKING:
     import xarray
@@ -51,8 +50,6 @@ MOST_STEPS = 60
 """Largest number of quadratic problems."""
 MOST_REFINEMENTS = 12
 """Largest number of points between two of a scan where |F| is least."""
-TURN = 1e-4
-"""Error of the place of the least |F|, over the distance of these two points."""
 MOST_PARAMETERS = 6
 """Largest number of parameters, as all corners of their ranges are points of a scan."""
 SAME = 1e-8
@@ -102,10 +99,10 @@ class Design(Result):
             for each in (*self.values.values(), self.found)
             for quantity, number in ((each.quantity, each.value), (each.quantity.error(), each.error_estimate))
         }
-        return dataset(f"design with {self.target}", "finite elements", numbers, {}, self.problem.values)
+        return dataset(f"design with {self.target.equation}", "finite elements", numbers, {}, self.problem.values)
 
     def _said(self) -> str:
-        return f"{self.target} at {', '.join(f'{key} = {each}' for key, each in self.values.items())}"
+        return f"{self.target.equation} at {', '.join(f'{key} = {each}' for key, each in self.values.items())}"
 
 
 def design(
@@ -120,8 +117,8 @@ def design(
     """The values of parameters with which λ, Λ(p) or δ_p has a wanted value, or that it cannot be reached.
 
     With several parameters it is the nearest point to the values of the problem: that with the least √(Σ xᵢ²), x the
-    changes of the parameters in their units. Where several points serve it is one that Newton's iteration finds from
-    the values of the problem.
+    changes of the parameters in their units. Where several points serve it is one that the steps find from the
+    values of the problem.
 
     >>> design(problem, "moment(2) = -0.008", "oscillator.c1")
     Design(...)
@@ -143,18 +140,20 @@ def design(
     """
     wanted, axes = target_of(target), axes_of(problem, by)
     measures = units_of(problem, axes, units or {})
-    distance = Distance(problem, wanted, [axis.key for axis in axes], budget or Budget(), progress)
-    found = (
-        _along_axis(distance, axes[0]) if len(axes) == 1 else _nearest(distance, axes, np.array([*measures.values()]))
-    )
+    distance = Distance(problem, wanted, [axis.key for axis in axes], budget or Budget())
+    tried, here = _Tried(distance, progress), np.array([float(problem.values[axis.key]) for axis in axes])
+    unit = np.array([*measures.values()])
+    if len(axes) == 1:
+        found = _along_axis(tried, wanted, axes[0], here[0])
+    else:
+        found = _nearest(tried, wanted, axes, here, unit)
     if isinstance(found, Absent):
         return found
-    unit = np.array([*measures.values()])
     scaled = found.gradient * unit
     errors = (abs(found.value) + found.error) * np.abs(scaled) / float(scaled @ scaled) * unit
     if len(axes) > 1:  # how near to the nearest point of F = 0
         errors += SAME * np.maximum(unit, np.abs(found.at))
-    parameters, solved = problem.parameters, distance.ratio.at(found.at)
+    parameters, solved = problem.parameters, distance.at(found.at)
     return Design(
         target=wanted,
         problem=solved,
@@ -166,7 +165,7 @@ def design(
         },
         found=distance.found(found),
         units=measures,
-        solves=distance.solves,
+        solves=tried.solves,
     )
 
 
@@ -207,176 +206,168 @@ def units_of(problem: Problem, axes: Sequence[Axis], stated: Mapping[str, float]
     return found
 
 
-def _limits(sample: Sample) -> tuple[float, float]:
-    """|F| at which a point is taken at once, and at which it is if the next one is no better."""
-    return max(EXACT * sample.scale, 0.1 * sample.error), max(TOLERANCE * sample.scale, sample.error)
+def start_and_stop(problem: Problem, key: str) -> Axis | None:
+    """The range from half to twice the value of a parameter, within its range; None where the value is 0."""
+    value, field = float(problem.values[key]), problem.parameters[key].field
+    if value == 0:
+        return None
+    start, stop = sorted((0.5 * value, 2.0 * value))
+    for limit in () if field is None else field.metadata:
+        start = max(start, getattr(limit, "ge", start))
+        stop = min(stop, getattr(limit, "le", stop), math.nextafter(getattr(limit, "lt", math.inf), -math.inf))
+    return Axis(key, start, stop)
 
 
 def _is_met(sample: Sample) -> bool:
-    return abs(sample.value) <= _limits(sample)[0]
+    """Whether F is 0 to all digits that it has."""
+    return abs(sample.value) <= max(EXACT * sample.scale, 0.1 * sample.error)
 
 
 def _is_close(sample: Sample) -> bool:
-    return abs(sample.value) <= _limits(sample)[1]
+    return abs(sample.value) <= max(TOLERANCE * sample.scale, sample.error)
 
 
-class _Path:
-    """F along a path θ(u), 0 ≤ u ≤ 1.
-
-    Args:
-        distance: F.
-        value: gives θ, shape (n,).
-        slope: gives dθ/du, shape (n,).
+class _Tried:
+    """F, solved once at each θ.
 
     Attributes:
-        known: the samples by u; None where there is none.
+        samples: where it has a value.
+        reasons: why it has none elsewhere.
+        solves: how many there were.
     """
 
-    def __init__(
-        self, distance: Distance, value: Callable[[float], FloatArray], slope: Callable[[float], FloatArray]
-    ) -> None:
-        self._distance, self._value, self._slope = distance, value, slope
-        self.known = dict[float, Sample | None]()
-
-    def at(self, u: float) -> Sample | None:
-        """F at u; None where there is none."""
-        if u not in self.known:
-            self.known[u] = self._distance.tried(self._value(u))
-        return self.known[u]
-
-    def rise(self, u: float) -> float:
-        """dF/du at a point that is known."""
-        sample = self.known[u]
-        return math.nan if sample is None else float(sample.gradient @ self._slope(u))
+    def __init__(self, distance: Distance, progress: Callable[[], None]) -> None:
+        self._distance, self._progress, self.reasons = distance, progress, list[Message]()
+        self._known = dict[tuple[float, ...], Sample | None]()
 
     @property
-    def samples(self) -> list[tuple[float, Sample]]:
-        """The samples in the order of u."""
-        return [(u, sample) for u, sample in sorted(self.known.items()) if sample is not None]
+    def samples(self) -> list[Sample]:
+        return [each for each in self._known.values() if each is not None]
 
-    def crossing(self, near: float) -> tuple[float, float] | None:
-        """Two neighbours at which F has both signs, those nearest to some u; None where there are none."""
-        pairs = [(a, b) for (a, one), (b, other) in pairwise(self.samples) if (one.value < 0) != (other.value < 0)]
-        return min(pairs, key=lambda pair: max(pair[0] - near, near - pair[1]), default=None)
+    @property
+    def solves(self) -> int:
+        return len(self._known)
 
-    def root(self, u: float) -> Sample | None:
-        """F = 0 by Newton's iteration from u, in a bracket as soon as there is one; None where it leads nowhere."""
-        start = u
-        while (bracket := self.crossing(start)) is None:
-            if (sample := self.at(u)) is None or _is_met(sample):
-                return sample
-            if self.crossing(start) is None:
-                rise = self.rise(u)
-                u = min(max(u - sample.value / rise, 0.0), 1.0) if rise else math.nan
-                if math.isnan(u) or u in self.known:
-                    return sample if _is_close(sample) else None
-        sign = -math.copysign(1.0, self._size(bracket[0]))  # so that it increases
+    def __call__(self, theta: FloatArray) -> Sample | None:
+        """F at θ; None where there is none."""
+        key = tuple(theta.tolist())
+        if key not in self._known:
+            self._known[key] = None
+            try:
+                self._known[key] = self._distance(theta)
+            except FpsolveError as failure:
+                self.reasons.append(failure.message)
+            self._progress()
+        return self._known[key]
 
-        def signed(u: float) -> Value:
-            if (sample := self.at(u)) is None:
-                raise Missing(u)
-            exact, close = _limits(sample)
-            return Value(sign * sample.value, sign * self.rise(u), exact, close)
+    def root(self, at: Callable[[float], FloatArray], low: float, high: float) -> Sample | None:
+        """F = 0 on a path between two points at which it has both signs; None where it jumps there, or has no value."""
 
-        with suppress(Missing):
-            better = min(bracket, key=lambda end: abs(self._size(end)))
-            sample = self.known[increasing_root(signed, better, bracket, bracket)]
-            return sample if sample is not None and _is_close(sample) else None
-        return None
-
-    def _size(self, u: float) -> float:
-        sample = self.known[u]
-        return math.inf if sample is None else sample.value
-
-    def scan(self, near: float) -> Sample | None:
-        """F = 0 from a scan of the whole path; None where F has one sign on it."""
-        for u in np.linspace(0, 1, NODES).tolist():
-            self.at(u)
-        if (pair := self.crossing(near)) is not None:
-            return self.root(pair[0])
-        for (a, _), (b, _) in list(pairwise(self.samples)):
-            self._refine(a, b)
-            if (pair := self.crossing(near)) is not None:
-                return self.root(pair[0])
-        return None
-
-    def _refine(self, a: float, b: float) -> None:
-        """Look for the value of F next to 0 between two neighbours, where its slope is 0, until F changes its sign."""
-        sign = math.copysign(1.0, self._size(a))
-
-        def rise(u: float) -> float:
-            sample = self.at(u)
-            if sample is None or sign * sample.value <= 0:
+        def value(u: float) -> float:
+            if (sample := self(at(u))) is None:
                 raise StopIteration
-            return sign * self.rise(u)
+            return 0.0 if _is_met(sample) else sample.value
 
         with suppress(StopIteration):
-            if rise(a) < 0 < rise(b):
-                brentq(rise, a, b, xtol=TURN * (b - a), maxiter=MOST_REFINEMENTS, disp=False)
+            sample = self(at(brentq(value, low, high, xtol=EXACT)))
+            return sample if sample and _is_close(sample) else None
+        return None
 
 
-def _along_axis(distance: Distance, axis: Axis) -> Sample | Absent:
-    """F = 0 over one parameter."""
-    path = _Path(distance, lambda u: np.array([axis.value(u)]), lambda u: np.array([axis.slope(u)]))
-    here = min(max(axis.share(float(distance.ratio.problem.values[axis.key])), 0.0), 1.0)
-    found = path.root(here) or path.scan(here)
-    if found is not None:
-        return found
-    return _unreached(distance, (axis,), path.crossing(here) is not None)
+def _along_axis(tried: _Tried, target: Target, axis: Axis, start: float) -> Sample | Absent:
+    """F = 0 over one parameter, next to its value: from a scan, and between two points where |F| is least there."""
+
+    def at(u: float) -> FloatArray:
+        return np.array([axis.value(u)])
+
+    here, is_crossed = min(max(axis.share(start), 0.0), 1.0), False
+    nodes, known = np.unique([here, *np.linspace(0, 1, NODES)]).tolist(), dict[float, Sample]()
+    for u in sorted(nodes, key=lambda u: abs(u - here)):
+        if (sample := tried(at(u))) is None:
+            continue
+        known[u] = sample
+        if _is_met(sample):
+            return sample
+        for low, high in pairwise(nodes):
+            if u in (low, high) and low in known and high in known and known[low].value * known[high].value < 0:
+                is_crossed = True
+                if found := tried.root(at, low, high):
+                    return found
+    for low, high in pairwise(sorted(known)):
+        sign = math.copysign(1.0, known[low].value)
+        rises = [sign * float(known[u].gradient[0]) * axis.slope(u) for u in (low, high)]
+        if sign * known[high].value > 0 and rises[0] < 0 < rises[1] and (turn := _turn(tried, at, sign, low, high)):
+            is_crossed = True
+            if found := tried.root(at, low, turn):
+                return found
+    return _unreached(tried, target, (axis,), is_crossed)
 
 
-def _unreached(distance: Distance, axes: Sequence[Axis], is_crossed: bool) -> Absent:
+def _turn(tried: _Tried, at: Callable[[float], FloatArray], sign: float, low: float, high: float) -> float | None:
+    """A point between two others where F has the other sign, sought where |F| is least."""
+    passed = list[float]()
+
+    def size(u: float) -> float:
+        if (sample := tried(at(u))) is None or sign * sample.value <= 0:
+            passed.extend([u] if sample else [])
+            raise StopIteration
+        return sign * sample.value
+
+    with suppress(StopIteration):
+        minimize_scalar(size, bounds=(low, high), method="bounded", options={"maxiter": MOST_REFINEMENTS})
+    return passed[0] if passed else None
+
+
+def _unreached(tried: _Tried, target: Target, axes: Sequence[Axis], is_crossed: bool) -> Absent:
     """That F is nowhere 0. Raises `FpsolveError` where that is not known, as F is missing, or changes its sign."""
-    samples, reasons = distance.samples, distance.reasons
-    target = distance.target
+    samples, reasons = tried.samples, tried.reasons
     if not samples:
         raise NoSuchExponent(reasons[0]) if all(map(is_none, reasons)) else NotConverged(reasons[0])
     missing = [reason for reason in reasons if not is_none(reason)]
     if missing or is_crossed:
         reason = missing[0] if missing else Message(Code.NEWTON_UNSETTLED)
-        raise NotConverged(Message(Code.DESIGN_GAPS, target=str(target), count=len(missing) or None, reason=reason))
+        raise NotConverged(Message(Code.DESIGN_GAPS, target=target.equation, count=len(missing) or None, reason=reason))
     nearest = min(samples, key=lambda each: abs(each.value))
     place = ", ".join(f"{axis.key} = {written(float(value))}" for axis, value in zip(axes, nearest.at, strict=True))
     frame = ", ".join(f"{axis.key} from {axis.start:g} to {axis.stop:g}" for axis in axes)
-    about: dict[str, Any] = {"target": str(target), "frame": frame, "place": place}
+    about: dict[str, Any] = {"target": target.equation, "frame": frame, "place": place}
     if target.kind == "stability_index":
-        about["side"] = f"{target.quantity.symbol} {'>' if nearest.value < 0 else '<'} {target.value:g}"
+        about["side"] = target.side(nearest.value)
     else:
         values = [target.level + each.value for each in samples]
         about |= {"symbol": target.quantity.symbol, "least": min(values), "most": max(values)}
     return Absent(Message(Code.UNREACHED, **about))
 
 
-def _nearest(distance: Distance, axes: Sequence[Axis], units: FloatArray) -> Sample | Absent:
+def _nearest(
+    tried: _Tried, target: Target, axes: Sequence[Axis], here: FloatArray, units: FloatArray
+) -> Sample | Absent:
     """The point F = 0 that is nearest to the problem."""
-    here = np.array([float(distance.ratio.problem.values[axis.key]) for axis in axes])
     start = np.clip(here, *np.array([(axis.start, axis.stop) for axis in axes]).T)
-    if (found := _nearest_from(distance, start, axes, here, units)) is not None:
+    if (found := _nearest_from(tried, start, axes, here, units)) is not None:
         return found
     from scipy.stats import qmc  # not before it is needed, as it takes a while
 
     corners, inner = product((0.0, 1.0), repeat=len(axes)), qmc.LatinHypercube(len(axes), seed=0)
     for each in (*corners, *inner.random(POINTS * len(axes)).tolist()):
-        distance.tried(np.array([axis.value(u) for axis, u in zip(axes, each, strict=True)]))
-    samples = distance.samples
+        tried(np.array([axis.value(u) for axis, u in zip(axes, each, strict=True)]))
+    samples = tried.samples
     best = min(samples, key=lambda each: abs(each.value), default=None)
     others = [each for each in samples if best is not None and (each.value < 0) != (best.value < 0)]
     if best is not None and others:
         step = min((each.at - best.at for each in others), key=lambda step: float(np.linalg.norm(step / units)))
         first = best.at
-        path = _Path(distance, lambda u: first + u * step, lambda u: step)
-        path.at(1.0)
-        best = path.root(0.0) or best
-    if best is not None and (found := _nearest_from(distance, best.at, axes, here, units)) is not None:
+        best = tried.root(lambda u: first + u * step, 0.0, 1.0) or best
+    if best is not None and (found := _nearest_from(tried, best.at, axes, here, units)) is not None:
         return found
-    return _unreached(distance, axes, bool(others))
+    return _unreached(tried, target, axes, bool(others))
 
 
 def _nearest_from(
-    distance: Distance, start: FloatArray, axes: Sequence[Axis], origin: FloatArray, units: FloatArray
+    tried: _Tried, start: FloatArray, axes: Sequence[Axis], origin: FloatArray, units: FloatArray
 ) -> Sample | None:
     """The nearest point to θ⁰, the origin, by steps from θ; None where they lead nowhere."""
-    if (first := distance.tried(start)) is None:
+    if (first := tried(start)) is None:
         return None
     low, high = (
         (np.array(ends) - origin) / units for ends in zip(*((axis.start, axis.stop) for axis in axes), strict=True)
@@ -387,7 +378,7 @@ def _nearest_from(
         return (sample.at - origin) / units
 
     def at(x: FloatArray) -> Sample | None:
-        return distance.tried(origin + np.clip(x, low, high) * units)
+        return tried(origin + np.clip(x, low, high) * units)
 
     def value(x: FloatArray) -> float:
         """F; where there is none more than at the last point, so that a step to there is made shorter."""

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fpsolve.analysis.stability import Boundary
-from fpsolve.analysis.zero import Zero
+from fpsolve.analysis.target import Target
 from fpsolve.arrays import FloatArray
 
 FINE = 16
@@ -28,7 +28,7 @@ class Region:
 
     Attributes:
         name: "almost surely stable, second moment unstable".
-        signs: that of F for each line, by the name of its `Zero`.
+        signs: that of F for each line, by its `Target` as it is written.
         share: of the frame.
         at: a point well inside, in shares of the sides of the frame.
     """
@@ -72,29 +72,32 @@ def regions(lines: Sequence[Boundary]) -> Regions:
         depth = distance_transform_edt(np.pad(insides[k], 1))[1:-1, 1:-1]
         deepest = np.array(np.unravel_index(int(np.argmax(depth)), depth.shape))
         u, v = ((deepest + 0.5) / exists.shape).tolist()
-        name = name_of([line.zero for line in lines], kinds[k].tolist())
-        by_name = {line.zero.name: int(sign) for line, sign in zip(lines, kinds[k], strict=True)}
+        name = name_of([line.target for line in lines], kinds[k].tolist())
+        by_name = {str(line.target): int(sign) for line, sign in zip(lines, kinds[k], strict=True)}
         each.append(Region(name, by_name, float(shares[k]), (u, v)))
     return Regions(tuple(each), index)
 
 
-def name_of(zeros: Sequence[Zero], signs: Sequence[int]) -> str:
+def name_of(targets: Sequence[Target], signs: Sequence[int]) -> str:
     """What the signs of F mean: almost surely stable, second moment unstable, -2 < δ_p < -1.
 
     The bounds of δ_p are left out where λ < 0 says as much.
     """
     parts, below, above = [], -math.inf, math.inf
-    for zero, sign in sorted(zip(zeros, signs, strict=True), key=lambda each: (each[0].kind == "moment", each[0].p)):
-        if zero.kind == "lyapunov_exponent":
+    pairs = sorted(zip(targets, signs, strict=True), key=lambda pair: (pair[0].kind == "moment", pair[0].order))
+    for target, sign in pairs:
+        if target.level:
+            parts.append(target.side(sign))
+        elif target.kind == "lyapunov_exponent":
             parts.append("almost surely " + ("unstable" if sign > 0 else "stable"))
             below = below if sign > 0 else 0.0
-        elif zero.kind == "moment":
-            name = f"{_ORDINALS[zero.p]} moment" if zero.p in _ORDINALS else f"moment {zero.p:g}"
-            parts.append(f"{name} {'unstable' if (sign > 0) == (zero.p > 0) else 'stable'}")
+        elif target.kind == "moment":
+            name = f"{_ORDINALS[target.p]} moment" if target.p in _ORDINALS else f"moment {target.p:g}"
+            parts.append(f"{name} {'unstable' if sign > 0 else 'stable'}")
         elif sign > 0:
-            above = min(above, zero.p)
+            above = min(above, target.value)
         else:
-            below = max(below, zero.p)
+            below = max(below, target.value)
     low, high = (f"{below:g} < " if math.isfinite(below) else ""), (f" < {above:g}" if math.isfinite(above) else "")
     if (low or high) and below != 0:
         parts.append(f"{low}δ_p{high}" if high else f"δ_p > {below:g}")

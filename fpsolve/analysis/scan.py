@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from time import thread_time
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from fpsolve.arrays import FloatArray
-from fpsolve.budget import Countdown
 from fpsolve.errors import FpsolveError
 from fpsolve.messages import Message
 
@@ -176,17 +175,16 @@ class ScannedRow:
 
 def scan_row(row: Row) -> ScannedRow:
     """F on a row from one end to the other, so that each node is close to the one before."""
-    whole, field, reasons = Countdown(math.inf), row.begin(), dict[Message, None]()
+    started, field, reasons = thread_time(), row.begin(), dict[Message, None]()
     values, gradients = np.full(row.count, np.nan), np.full((row.count, 2), np.nan)
     shares = np.linspace(0, 1, row.count)
     for k in range(row.count):
         try:
-            with whole.running():
-                sample = field(shares[[row.number, k]])
+            sample = field(shares[[row.number, k]])
             values[k], gradients[k] = sample.value, sample.gradient
         except FpsolveError as failure:
             reasons.setdefault(failure.message)
-    return ScannedRow(values, gradients, tuple(reasons), whole.spent)
+    return ScannedRow(values, gradients, tuple(reasons), thread_time() - started)
 
 
 def scanned(rows: Sequence[Row], found: Iterator[ScannedRow], progress: Callable[[], None] = lambda: None) -> Scan:

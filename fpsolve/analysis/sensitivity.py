@@ -25,19 +25,18 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fpsolve.arrays import FloatArray
-from fpsolve.budget import one_number
 from fpsolve.data import Result, dataset
 from fpsolve.drawing import add_legend, draw_bars
 from fpsolve.errors import NoSuchExponent, NotConverged
-from fpsolve.exponent.adapt import Budget
+from fpsolve.exponent.changed import SMALL_P, Changed
 from fpsolve.exponent.eigen import PairDerivatives
 from fpsolve.exponent.error import Estimate
+from fpsolve.exponent.method import Budget, checked_moments
 from fpsolve.exponent.root import nonzero_root
 from fpsolve.exponent.solver import ExponentSolver, solver_of
-from fpsolve.fem.axis import KroneckerSum
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import Code, Message, Remedy
-from fpsolve.model.problem import ParameterDerivative, Problem, checked_moments
+from fpsolve.model.problem import ParameterDerivative, Problem
 from fpsolve.model.quantity import (
     LYAPUNOV_EXPONENT,
     MOMENT,
@@ -54,8 +53,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _EPS = sys.float_info.epsilon
-SMALL_P = 1e-4
-"""For smaller |p| ∂Λ/∂θ / p is taken from its derivatives at p = 0."""
 RECORDS = {each.name: each for each in (LYAPUNOV_EXPONENT, STABILITY_INDEX, VARIANCE_RATE)}
 """The quantities besides Λ(p) that have sensitivities, by their names."""
 DIFFERENTIATED = tuple(RECORDS)
@@ -129,65 +126,6 @@ class Sensitivities(Result):
         return f"of {', '.join(what) or 'nothing'} by {len(self.theta)} parameters"
 
 
-class Changed:
-    """∂/∂θ of what a pair says, on its discretisation.
-
-    Args:
-        around: the pair; its derivatives by p are used where they are needed.
-        by: the direction of θ.
-    """
-
-    def __init__(self, around: PairDerivatives, by: ParameterDerivative) -> None:
-        self._around, self._pair, self._by = around, around.pair, by
-        self._operators: dict[int, KroneckerSum] = {}
-
-    @cached_property
-    def value(self) -> Estimate:
-        """∂Λ/∂θ with the error of rounding, also in T and T*; the scale is that of the terms of L − Λ."""
-        pair = self._pair
-        x, y, turns = pair.right, pair.left, pair.space.turns
-        parts = turns * np.array([y @ (KroneckerSum([term]) @ x) for term in self._operator(0).terms])
-        sizes, scale = turns * float(abs(y) @ (abs(self._operator(0)) @ abs(x))), float(np.sum(np.abs(parts)))
-        of_pair = (pair.residual + _EPS) * self._around.size / pair.generator.problem.unit_rate
-        return Estimate(float(np.sum(parts)), _EPS * sizes + of_pair * scale, scale)
-
-    @cached_property
-    def slope(self) -> Estimate:
-        """∂Λ′/∂θ."""
-        around, x, y = self._around, self._pair.right, self._pair.left
-        parts = [y @ self.image(x, 1), y @ self.image(around.by_p, 0, self.value.value)]
-        if self._pair.p:  # for p = 0 BT = 0
-            parts.append(around.adjoint_by_p @ self.image(x, 0, self.value.value))
-        return _summed(parts, around.norm)
-
-    @cached_property
-    def curvature(self) -> Estimate:
-        """∂Λ″/∂θ at p = 0."""
-        around, x, y = self._around, self._pair.right, self._pair.left
-        image, more = self.image(around.by_p, 0, self.value.value), self.slope.value
-        parts = (
-            y @ self.image(x, 2),
-            2 * (y @ self.image(around.by_p, 1, more)),
-            2 * (around.adjoint_by_p @ self.image(x, 1, more)),
-            2 * (around.adjoint_by_p @ image),
-            y @ self.image(around.second_by_p, 0, self.value.value),
-        )
-        return _summed(parts, around.norm)
-
-    def image(self, v: FloatArray, k: int, change: float = 0.0) -> FloatArray:
-        """(∂L⁽ᵏ⁾ − Λ⁽ᵏ⁾∂M − change M)v."""
-        found = self._operator(k) @ v
-        return found - change * self._pair.space.weighed(v) if change else found
-
-    def _operator(self, k: int) -> KroneckerSum:
-        """∂L⁽ᵏ⁾ − Λ⁽ᵏ⁾∂M."""
-        if k not in self._operators:
-            pair = self._pair
-            rate = (pair.eigenvalue, pair.derivative)[k] if k < 2 else self._around.second_derivative
-            self._operators[k] = pair.generator.changed(self._by, pair.p, rate, derivative=k)
-        return self._operators[k]
-
-
 def sensitivities(
     problem: Problem,
     p: ArrayLike = (),
@@ -215,8 +153,8 @@ def sensitivities(
         NoSuchExponent: Λ(p) is infinite for one of the p.
     """
     solver = solver_of(problem, mesh, rtol, budget)
-    points = checked_moments(p, problem, may_be_empty=True)
-    indices = () if problem.is_closed_only else DIFFERENTIATED
+    points = checked_moments(p, solver.method, may_be_empty=True)
+    indices = DIFFERENTIATED if solver.method.has_pairs else ()
     return solve_sensitivities(solver, points, problem.derivatives(), indices=indices, progress=progress)
 
 
@@ -241,7 +179,7 @@ def solve_sensitivities(
     """
     problem, parameters = solver.problem, solver.problem.parameters
     notes = [Message(Code.NO_DERIVATIVE, key=key, value=value) for key, value in problem.undifferentiable.items()]
-    closing = {key: by.theta for key, by in along.items() if problem.couples_blocks(key)}
+    closing = {key: by.theta for key, by in along.items() if solver.method.closes(key)}
     notes += [Message(Code.CLOSES_BLOCKS, key=key, value=theta) for key, theta in closing.items()]
     along = {key: by for key, by in along.items() if key not in closing}
     found = Gradient(solver, along)
@@ -282,28 +220,6 @@ def solve_sensitivities(
     )
 
 
-def held_by(
-    solver: ExponentSolver, p: float, along: Mapping[str, ParameterDerivative]
-) -> tuple[ExponentSolver, Mapping[str, ParameterDerivative]]:
-    """The solver of the block of a system whose Λ(p) is that of the system, and the directions for it.
-
-    Raises:
-        NoSuchExponent: Λ(p) is that of two blocks.
-        NotConverged: it is that of no block alone, or that of the block is not what a direction changes.
-    """
-    while solver.classes:
-        for key, by in along.items():
-            if solver.problem.couples_blocks(key):
-                raise NotConverged(Message(Code.CLOSES_BLOCKS, key=key, value=by.theta))
-        solver = solver.leading(p)
-        own = solver.problem
-        along = {
-            key: own.derivative(key) if key in own.differentiable else ParameterDerivative(by.theta)
-            for key, by in along.items()
-        }
-    return solver, along
-
-
 class Gradient:
     """The derivatives along some directions on a finer discretisation, with errors from the differences to it.
 
@@ -315,58 +231,55 @@ class Gradient:
     """
 
     def __init__(self, solver: ExponentSolver, along: Mapping[str, ParameterDerivative]) -> None:
-        self._solver, self._along, self.budget = solver, along, solver.budget
+        self._method, self._along = solver.method, along
         self._slope_errors: dict[float, float] = {}  # of Λ′(p)
 
-    @one_number("∂Λ({:g})/∂θ")
     def moment(self, p: float) -> Slopes:
         """∂Λ(p)/∂θ. Raises `NotConverged`, `NoSuchExponent`."""
         if p == 0:
             return dict.fromkeys(self._along, Estimate(0.0, 0.0, 0.0))
         if abs(p) < SMALL_P:
             return {key: _times(p, each) for key, each in self._by_small_p(p).items()}
-        solver, along = held_by(self._solver, p, self._along)
-        if known := solver.by_moments(p):
+        if known := self._method.number(p):
+            along = self._along
             slopes = {key: known.slope(key) for key in along}
             sizes = {key: known.scale / abs(by.theta) if by.theta else abs(slopes[key][0]) for key, by in along.items()}
-            return {key: Estimate(*slopes[key], scale=sizes[key]) for key in along}
-        pair = solver.solution(p).pair
-        finer = solver.whole.finer_pair(pair)
+            return {key: Estimate(slopes[key][0], slopes[key][1], sizes[key]) for key in along}
+        method, along = self._method.held(p, self._along)
+        pair = method.pair(p)
+        finer = method.finer_pair(pair)
         self._slope_errors[p] = 2 * abs(finer.derivative - pair.derivative)
         coarse, fine = (
             {key: each.value for key, each in _changed(PairDerivatives(of), along).items()} for of in (pair, finer)
         )
-        return _compared(coarse, fine, abs(finer.value - pair.value) / solver.scale(p))
+        return _compared(coarse, fine, abs(finer.value - pair.value) / method.scale(p))
 
-    @one_number("∂λ/∂θ")
     def lyapunov_exponent(self) -> dict[str, Estimate]:
         """∂λ/∂θ. Raises `NotConverged`, `NoSuchExponent`."""
-        solver, _ = held_by(self._solver, 0.0, self._along)
+        method, _ = self._method.held(0.0, self._along)
         coarse, fine = ({key: each.slope for key, each in at.items()} for at in (self._at_zero, self._finer_at_zero))
-        return _compared(coarse, fine, solver.ratio_alone(0.0)[1] / solver.scales.linear)
+        return _compared(coarse, fine, method.ratio_alone(0.0)[1] / method.scales.linear)
 
-    @one_number("∂Λ″(0)/∂θ")
     def variance_rate(self) -> Slopes:
         """∂Λ″(0)/∂θ. Raises `NotConverged`, `NoSuchExponent`."""
-        rate = self._solver.variance_rate()
+        rate = self._method.variance_rate()
         coarse, fine = (
             {key: each.curvature for key, each in at.items()} for at in (self._at_zero, self._finer_at_zero)
         )
         return _compared(coarse, fine, rate.relative_error)
 
-    @one_number("∂δ_p/∂θ")
     def root(self, p: float) -> Slopes:
         """∂δ_p/∂θ, p being δ_p: that of Λ(p)/p, for small p from its derivatives at p = 0, over that by p.
 
         With its own error each has twice the relative one of δ_p, and that of the slope.
         """
-        _, slope_by_p, error = self._solver.ratio(p)
-        lost = 2 * error / abs(slope_by_p) / max(abs(p), SMALL_P)
         if abs(p) >= SMALL_P:
             slopes: Slopes = {key: _times(1 / p, each) for key, each in self.moment(p).items()}
-            lost += self._slope_errors.get(p, 0.0) / abs(p * slope_by_p)
+            doubt = self._slope_errors.get(p, 0.0) / abs(p)
         else:
-            slopes = self._by_small_p(p)
+            slopes, doubt = self._by_small_p(p), 0.0
+        _, slope_by_p, error = self._method.ratio(p)  # now, as there is none where two parts of the motion are even
+        lost = (2 * error / max(abs(p), SMALL_P) + doubt) / abs(slope_by_p)
         found = {key: _times(-1 / slope_by_p, each) for key, each in slopes.items()}
         return {
             key: replace(each, error_estimate=each.error_estimate + lost * abs(each.value))
@@ -384,13 +297,13 @@ class Gradient:
 
     @cached_property
     def _at_zero(self) -> Mapping[str, Changed]:
-        solver, along = held_by(self._solver, 0.0, self._along)
-        return _changed(solver.around_zero, along)
+        method, along = self._method.held(0.0, self._along)
+        return _changed(method.around_zero, along)
 
     @cached_property
     def _finer_at_zero(self) -> Mapping[str, Changed]:
-        solver, along = held_by(self._solver, 0.0, self._along)
-        return _changed(solver.finer_around_zero, along)
+        method, along = self._method.held(0.0, self._along)
+        return _changed(method.finer_around_zero, along)
 
 
 def _changed(around: PairDerivatives, along: Mapping[str, ParameterDerivative]) -> dict[str, Changed]:
@@ -409,12 +322,6 @@ def _compared(coarse: Slopes, fine: Slopes, share: float) -> dict[str, Estimate]
         )
         for key, each in fine.items()
     }
-
-
-def _summed(parts: Sequence[Any], norm: float) -> Estimate:
-    """The sum of some parts over a norm, with about what rounding may change in it."""
-    size = float(np.sum(np.abs(parts))) / norm
-    return Estimate(float(np.sum(parts)) / norm, 1e3 * _EPS * size, size)
 
 
 def _times(factor: float, estimate: Estimate) -> Estimate:

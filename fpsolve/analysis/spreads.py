@@ -25,11 +25,11 @@ from fpsolve.analysis.sensitivity import RECORDS, Sensitivities, solve_sensitivi
 from fpsolve.arrays import FloatArray, is_whole, shown
 from fpsolve.data import Result, dataset
 from fpsolve.errors import NotConverged
-from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.error import Absent, Estimate
+from fpsolve.exponent.method import Budget, checked_moments
 from fpsolve.exponent.root import nonzero_root
 from fpsolve.exponent.solver import solver_of
-from fpsolve.model.problem import Problem, checked_moments, checked_problem
+from fpsolve.model.problem import Problem, checked_problem
 from fpsolve.model.quantity import LYAPUNOV_EXPONENT, MOMENT, STABILITY_INDEX, P, Quantity
 
 if TYPE_CHECKING:
@@ -255,12 +255,12 @@ def uncertainty(
     """
     laws = laws_of(problem, uncertain)
     solver = solver_of(problem, rtol=rtol, budget=budget)
-    points = checked_moments(p, problem, may_be_empty=True)
+    points = checked_moments(p, solver.method, may_be_empty=True)
     values: dict[str, Callable[[], Estimate | Absent]] = {
         LYAPUNOV_EXPONENT.name: solver.lyapunov_exponent,
         STABILITY_INDEX.name: partial(nonzero_root, solver),
     }
-    values = {} if problem.is_closed_only else values
+    values = values if solver.method.has_pairs else {}
     found = {name: each for name, solve in values.items() if (each := solve())}
     root = found.get(STABILITY_INDEX.name)
     along = {key: problem.derivative(key) for key in laws}

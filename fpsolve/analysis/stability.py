@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import combinations, product
@@ -19,11 +19,13 @@ import numpy as np
 from fpsolve.analysis.continuation import LONGEST, SHORTEST, Trace, find_branches, with_branch
 from fpsolve.analysis.scan import Row, Scan, ScannedRow, scan_row, scanned
 from fpsolve.analysis.special_points import Placed, crossings, with_folds, with_points, with_values
-from fpsolve.analysis.zero import Axis, Known, Zero, ZeroField, check_axes, is_dear, is_none, line_rtol, zero_of
+from fpsolve.analysis.target import Target, target_of
+from fpsolve.analysis.zero import Axis, Known, ZeroField, check_axes, is_none
 from fpsolve.arrays import FloatArray, is_whole, real_number, shown
 from fpsolve.data import Result, brief, dataset
 from fpsolve.drawing import add_legend, coloured, label_axes, scale_axis
-from fpsolve.exponent.adapt import Budget
+from fpsolve.exponent.kinds import choose
+from fpsolve.exponent.method import Budget
 from fpsolve.messages import Code, Message
 from fpsolve.model.problem import Problem
 from fpsolve.model.quantity import POINTS
@@ -53,8 +55,8 @@ class Branch:
     Attributes:
         x, y: the values of the two parameters, shape (n,).
         width: how far the line may be off, |error of F|/|∇F|, as a share of the sides of the frame, shape (n,).
-        labels: what is special about a point: "leaves the frame", "fold in x", "fold in y", "crossing with moment 2",
-            "at noise.D0 = 1"; empty for ordinary ones.
+        labels: what is special about a point: "leaves the frame", "fold in x", "fold in y", "at noise.D0 = 1",
+            "crossing with moment(2) = 0"; empty for ordinary ones.
         closed: whether the last point is followed by the first.
         obstacles: why it ends inside of the frame, if it does.
     """
@@ -81,7 +83,7 @@ class Boundary(Result):
     """A line F = 0 in a frame of two parameters; it pickles.
 
     Attributes:
-        zero: what F is.
+        target: what F is.
         x, y: the frame.
         problem: with the values of the other parameters.
         scan: F on the grid in which its branches are looked for.
@@ -94,7 +96,7 @@ class Boundary(Result):
         known: points that need not be solved again.
     """
 
-    zero: Zero
+    target: Target
     x: Axis
     y: Axis
     problem: Problem
@@ -125,7 +127,7 @@ class Boundary(Result):
     @property
     def rtol(self) -> float:
         """The error of F on the line that is wanted, relative to its scale."""
-        return line_rtol(self.problem, self.zero)
+        return choose(self.problem).line_rtol(self.target.order)
 
     @property
     def scan_rtol(self) -> float:
@@ -136,24 +138,24 @@ class Boundary(Result):
     def zero_field(self) -> ZeroField:
         """F over the unit square, with the time that is left for the line."""
         most = math.inf if self.budget.line_seconds is None else self.budget.line_seconds
-        frame, spent = (self.zero, self.problem, (self.x, self.y)), Message(Code.LINE_SPENT, most=most)
+        frame, spent = (self.target, self.problem, (self.x, self.y)), Message(Code.LINE_SPENT, most=most)
         return ZeroField(*frame, self.budget, None, most - self.seconds, spent, self.known)
 
     def remark(self) -> str:
         """That there is no line, or not all of it, as a `Message`, or an empty text."""
         exists = np.isfinite(self.scan.values)
         if self.obstacles and exists.any():
-            return Message(Code.LINE_STOPPED, line=self.zero.equation, reason=self.obstacles[0])
+            return Message(Code.LINE_STOPPED, line=self.target.equation, reason=self.obstacles[0])
         if self.obstacles:
-            return Message(Code.UNSOLVED, symbol=self.zero.symbol, reason=self.obstacles[0])
+            return Message(Code.UNSOLVED, symbol=self.target.symbol, reason=self.obstacles[0])
         if self.traces:
             return ""
         values = self.scan.values[exists]
         if not values.size:
-            return Message(Code.NOWHERE, symbol=self.zero.symbol)
+            return Message(Code.NOWHERE, symbol=self.target.symbol)
         if np.any(values > 0) and np.any(values < 0):
-            return Message(Code.NO_LINE, line=self.zero.equation, symbol=self.zero.symbol)
-        return Message(Code.ONE_SIGN, side=self.zero.side(float(values[0])), is_whole=bool(exists.all()))
+            return Message(Code.NO_LINE, line=self.target.equation, symbol=self.target.symbol)
+        return Message(Code.ONE_SIGN, side=self.target.side(float(values[0])), is_whole=bool(exists.all()))
 
     @property
     def nodes(self) -> int:
@@ -166,7 +168,7 @@ class Boundary(Result):
         share = math.inf if most is None else SCAN_SHARE * most / count
         seconds, key = min((self.budget.seconds, "budget.seconds"), (share, LINE_KEY))
         spent = Message(Code.ROW_SPENT, most=seconds, key=key)
-        frame = self.zero, self.problem, (self.x, self.y)
+        frame = self.target, self.problem, (self.x, self.y)
         rough = partial(ZeroField, *frame, self.budget, self.scan_rtol, seconds, spent, self.known)
         return [Row(rough, count, number) for number in range(count)]
 
@@ -216,19 +218,19 @@ class Boundary(Result):
             for quantity, of in ((x, "x"), (y, "y"), (POINTS["width"], "width"))
         }
         coordinates = {
-            POINTS["line"]: np.full(numbers.size, self.zero.name),
+            POINTS["line"]: np.full(numbers.size, str(self.target)),
             POINTS["branch"]: numbers,
             POINTS["label"]: np.array([label for branch in branches for label in branch.labels], dtype=str),
         }
         held = {key: value for key, value in self.problem.values.items() if key not in (self.x.key, self.y.key)}
         closed = ", ".join(str(number) for number, branch in enumerate(branches, start=1) if branch.closed)
-        more = {"line": self.zero.equation, "closed_branches": closed, "remark": self.remark()}
+        more = {"line": self.target.equation, "closed_branches": closed, "remark": self.remark()}
         found = dataset("line of stability", "finite elements", variables, coordinates, held, **more)
         found.x.attrs["key"], found.y.attrs["key"] = self.x.key, self.y.key
         return found
 
     def _draw(self, found: xarray.Dataset, axes: Axes, **kwargs: Any) -> None:
-        style = {"linewidth": 2, "label": self.zero.latex, **coloured(axes, kwargs)}
+        style = {"linewidth": 2, "label": self.target.latex, **coloured(axes, kwargs)}
         for branch in self.branches:
             axes.plot(*branch.path, **style)
             style.pop("label", None)
@@ -241,12 +243,12 @@ class Boundary(Result):
 
     def _said(self) -> str:
         branches = f"{len(self.traces)} branch{'es' * (len(self.traces) != 1)}"
-        return f"{self.zero.equation}: {branches} over {self.x.key} and {self.y.key}"
+        return f"{self.target.equation}: {branches} over {self.x.key} and {self.y.key}"
 
 
 def boundary(
     problem: Problem,
-    zero: str | Mapping[str, float],
+    target: str,
     x: Axis,
     y: Axis,
     *,
@@ -258,12 +260,13 @@ def boundary(
     """The line λ = 0, Λ(p) = 0 or δ_p = v in a frame of two parameters.
 
     >>> from fpsolve.analysis import Axis
-    >>> boundary(problem, "lyapunov_exponent", Axis("oscillator.c1", -2.0, 2.0), Axis("noise.sigma", 0.5, 2.0), nodes=5)
+    >>> x, y = Axis("oscillator.c1", -2.0, 2.0), Axis("noise.sigma", 0.5, 2.0)
+    >>> boundary(problem, "lyapunov_exponent = 0", x, y, nodes=5)
     Boundary(λ = 0: 1 branch over oscillator.c1 and noise.sigma)
 
     Args:
         problem: a motion and its noise, whose other parameters are held.
-        zero: "lyapunov_exponent", {"moment": p} or {"stability_index": v}.
+        target: such as "lyapunov_exponent = 0", "moment(2) = 0" or "stability_index = -1".
         x, y: the frame.
         step: the longest step between two points, in sides of the frame; if omitted 0.02, or 0.05 where F takes
             elements of three axes or more.
@@ -272,28 +275,35 @@ def boundary(
         progress: called once for each node of the grid, and once for each point of a branch.
 
     Raises:
-        ValueError: an axis is no parameter of the problem or out of its range, both are the same, or `zero`, `step` or
-            `nodes` is none of these.
+        ValueError: an axis is no parameter of the problem or out of its range, both are the same, or `target`, `step`
+            or `nodes` is none of these.
     """
     check_axes(problem, x, y)
     if nodes is not None and not is_whole(nodes, 2):
         raise ValueError(f"got nodes = {shown(nodes)}; must be a whole number from 2")
-    line = begun(zero_of(zero), x, y, problem, step=step, nodes=nodes, budget=budget or Budget())
+    line = begun(target_of(target), x, y, problem, step=step, nodes=nodes, budget=budget or Budget())
     *_, whole = line.solve(progress=progress, stepped=progress)
     return whole
 
 
 def begun(
-    zero: Zero, x: Axis, y: Axis, problem: Problem, *, step: float | None = None, nodes: int | None = None, **more: Any
+    target: Target,
+    x: Axis,
+    y: Axis,
+    problem: Problem,
+    *,
+    step: float | None = None,
+    nodes: int | None = None,
+    **more: Any,
 ) -> Boundary:
     """A line of which nothing is traced, with the usual step and nodes where they are None. Raises `ValueError`."""
-    dear = is_dear(problem, zero)
+    dear = choose(problem).is_dear(target.order)
     step = (DEAR_STEP if dear else LONGEST) if step is None else step
     if not SHORTEST < real_number(step, "step") <= LARGEST:
         raise ValueError(f"got step = {step:g}; must be above {SHORTEST:g} and up to {LARGEST:g} sides of the frame")
     count = nodes or (DEAR_NODES if dear else NODES)
     scan = Scan(np.linspace(0, 1, count), np.zeros((0, 0)), np.zeros((0, 0, 2)))
-    return Boundary(zero, x, y, problem, scan, step=float(step), **more)
+    return Boundary(target, x, y, problem, scan, step=float(step), **more)
 
 
 def is_of_line(reason: Message) -> bool:
@@ -309,7 +319,7 @@ def crossed(lines: Sequence[Boundary]) -> list[Boundary]:
         for (a, trace), (b, crossing) in product(enumerate(first.traces), enumerate(second.traces)):
             for on_first, on_second in crossings(trace, crossing, fields):
                 for key, (place, point), other in (((i, a), on_first, second), ((j, b), on_second, first)):
-                    new[key].append((place, replace(point, label=f"crossing with {other.zero.name}")))
+                    new[key].append((place, replace(point, label=f"crossing with {other.target}")))
     return [
         replace(line, traces=tuple(with_points(trace, new[i, a]) for a, trace in enumerate(line.traces)))
         for i, line in enumerate(lines)

@@ -1,32 +1,36 @@
-"""What a design wants, as "stability_index = 1", and how far a problem is from it, with the exact derivatives."""
+"""What is wanted of a system, as "stability_index = 1": how far a problem is from it, with the exact derivatives."""
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Sequence
-from contextlib import suppress
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
+
+from pydantic import ValidationError
 
 from fpsolve.analysis.scan import Sample
-from fpsolve.analysis.zero import Axis, Ratio, line_rtol, zero_of
 from fpsolve.arrays import FloatArray, shown
 from fpsolve.errors import FpsolveError
-from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.error import Estimate
-from fpsolve.messages import Message
+from fpsolve.exponent.kinds import choose
+from fpsolve.exponent.method import Budget, Method, refuse
+from fpsolve.exponent.solver import ExponentSolver
+from fpsolve.messages import Code, Message
 from fpsolve.model.problem import Problem
 from fpsolve.model.quantity import LYAPUNOV_EXPONENT, STABILITY_INDEX, Quantity, moment_at
 
-EXAMPLES = '"lyapunov_exponent = -0.01", "moment(2) = 0" or "stability_index = 1"'
+EXAMPLES = '"lyapunov_exponent = 0", "moment(2) = 0" or "stability_index = -1"'
 _NUMBER = r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)"
 _TARGET = re.compile(rf"\s*(?:(lyapunov_exponent|stability_index)|moment\s*\(\s*{_NUMBER}\s*\))\s*=\s*{_NUMBER}\s*")
+ITS_SIGN = 0.3
+"""Largest error of a dear F, over F, where its sign is sure."""
 
 
 @dataclass(frozen=True)
 class Target:
-    """A quantity and the value that is wanted of it.
+    """A quantity and the value that is wanted of it; F is by how much it is larger, of δ_p Λ(p)/p at the value.
 
     Attributes:
         kind: of the quantity.
@@ -35,7 +39,7 @@ class Target:
     """
 
     kind: Literal["lyapunov_exponent", "moment", "stability_index"]
-    value: float
+    value: float = 0.0
     p: float = 0.0
 
     @property
@@ -55,38 +59,68 @@ class Target:
         """What Λ(p), λ or, for a stability index, Λ(p)/p must be."""
         return 0.0 if self.kind == "stability_index" else self.value
 
+    @property
+    def symbol(self) -> str:
+        """What F is of, as a sentence has it."""
+        return f"Λ({self.value:g})/({self.value:g})" if self.kind == "stability_index" else self.quantity.symbol
+
+    def side(self, value: float) -> str:
+        """What F of this sign means: Λ(2) < 0, δ_p > -1, as Λ(p)/p increases from −∞ through 0 at δ_p."""
+        is_more = (value > 0) != (self.kind == "stability_index")
+        return f"{self.quantity.symbol} {'>' if is_more else '<'} {self.value:g}"
+
     def __str__(self) -> str:
+        """As it is written: "moment(2) = 0"."""
+        return f"{self.kind}{f'({self.p:g})' * (self.kind == 'moment')} = {self.value:.10g}"
+
+    @property
+    def equation(self) -> str:
+        """What holds: λ = 0, Λ(2) = 0, δ_p = -1."""
         return f"{self.quantity.symbol} = {self.value:.10g}"
+
+    @property
+    def latex(self) -> str:
+        """`equation` in LaTeX, with dollars."""
+        symbols = {"lyapunov_exponent": r"\lambda", "stability_index": r"\delta_p", "moment": rf"\Lambda({self.p:g})"}
+        return f"${symbols[self.kind]} = {self.value:g}$"
 
 
 def target_of(text: str) -> Target:
     """What "stability_index = 1", "lyapunov_exponent = -0.01" or "moment(2) = 0" says. Raises `ValueError`."""
     found = _TARGET.fullmatch(text) if isinstance(text, str) else None
     if found is not None:
-        name, order, value = found[1], found[2], float(found[3]) + 0.0
-        with suppress(ValueError):
-            p = zero_of({"moment": float(order)}).p if order else 0.0
-            if math.isfinite(value):
-                return Target(name or "moment", value, p)  # type: ignore[arg-type]
+        order, value = float(found[2] or math.nan), float(found[3]) + 0.0
+        if math.isfinite(value) and (found[1] or (order and math.isfinite(order))):
+            return Target(found[1] or "moment", value, 0.0 if found[1] else order)  # type: ignore[arg-type]
     raise ValueError(f"got {shown(text)}; must be {EXAMPLES}, all numbers finite and the order of a moment not 0")
 
 
-class Distance:
-    """F(θ): Λ(p) or λ less the value that is wanted, or Λ(p)/p at the wanted δ_p; with ∂F/∂θ.
+def line_of_value(method: Method, target: Target) -> float:
+    """The error of F that is enough away from a line, over F."""
+    return ITS_SIGN if method.is_dear(target.order) and not target.level else 0.0
 
-    Λ(p)/p increases with p and is 0 at δ_p. So F < 0 where δ_p is larger than wanted, and one p is solved for each θ.
+
+def said(failure: Exception) -> str:
+    """What is wrong with the parameters of a problem, in one line."""
+    if not isinstance(failure, ValidationError):
+        return str(failure)
+    texts = []
+    for fault in failure.errors():
+        text = str(fault.get("ctx", {}).get("error", fault["msg"]))
+        texts.append(": ".join(filter(None, (".".join(map(str, fault["loc"])), text))))
+    return "; ".join(texts)
+
+
+class Distance:
+    """F over some parameters θ, with ∂F/∂θ; each solve starts from the one before.
 
     Args:
         problem: with the values of all other parameters.
         target: what is wanted.
-        keys: of the parameters θ.
+        keys: of the parameters.
         budget: for a solve.
-        progress: called after each solve.
-
-    Attributes:
-        ratio: Λ(p)/p, or λ.
-        solves: how many there were.
-        reasons: why F has no value where it was `tried`.
+        rtol: of F, relative to its scale; that of lines if None.
+        of_value: see `ExponentSolver`.
     """
 
     def __init__(
@@ -95,56 +129,40 @@ class Distance:
         target: Target,
         keys: Sequence[str],
         budget: Budget,
-        progress: Callable[[], None] = lambda: None,
+        rtol: float | None = None,
+        of_value: float = 0.0,
     ) -> None:
-        self.target, self._progress, self.solves = target, progress, 0
-        zero = zero_of({"moment": target.order}) if target.order else zero_of("lyapunov_exponent")
-        self.ratio = Ratio(problem, target.order, keys, budget, line_rtol(problem, zero))
-        self._known, self.reasons = dict[tuple[float, ...], Sample | None](), list[Message]()
+        self.problem, self.target, self.keys = problem, target, tuple(keys)
+        rtol = choose(problem).line_rtol(target.order) if rtol is None else rtol
+        self._own: Any = {"rtol": rtol, "of_value": of_value, "budget": budget}
+        self._starts: Mapping[float, Any] = {}
 
-    @property
-    def samples(self) -> list[Sample]:
-        """F wherever it was `tried` and has a value."""
-        return [each for each in self._known.values() if each is not None]
-
-    def tried(self, theta: FloatArray) -> Sample | None:
-        """F at θ, once; None where there is none."""
-        key = tuple(theta.tolist())
-        if key not in self._known:
-            self._known[key] = None
-            try:
-                self._known[key] = self(theta)
-            except FpsolveError as failure:
-                self.reasons.append(failure.message)
-        return self._known[key]
-
-    def __call__(self, theta: FloatArray) -> Sample:
-        """F at θ, shape (n,). Raises `FpsolveError` where there is none."""
-        self.solves += 1
+    def at(self, theta: FloatArray) -> Problem:
+        """The problem at θ. Raises `FpsolveError` where there is none."""
         try:
-            found = self.ratio(theta)
-        finally:
-            self._progress()
-        factor = self.target.order if self.target.kind == "moment" else 1.0
-        value, scale = factor * found.value - self.target.level, max(abs(factor) * found.scale, 1e-300)
-        return Sample(theta, value, factor * found.gradient, abs(factor) * found.error, scale)
+            return self.problem.at(dict(zip(self.keys, theta.tolist(), strict=True)))
+        except ValueError as failure:
+            raise FpsolveError(Message(Code.NO_PROBLEM, reason=said(failure))) from failure
+
+    def solver(self, theta: FloatArray, *, is_near: bool = True) -> ExponentSolver:
+        """A solver at θ; its starts are those of the last θ if this is near."""
+        return ExponentSolver(self.at(theta), starts=self._starts if is_near else {}, **self._own)
+
+    def __call__(self, theta: FloatArray, *, is_near: bool = True) -> Sample:
+        """F at θ, shape (n,). Raises `FpsolveError` where there is none."""
+        p, solver = self.target.order, self.solver(theta, is_near=is_near)
+        method = solver.method
+        refuse(method.reason(p))
+        (value, error), slopes = method.ratio_alone(p), method.gradient(p, self.keys)
+        self._starts = method.known
+        scale, factor = method.scale(p) / abs(p) if p else method.scales.linear, self.target.p or 1.0
+        size = abs(factor)
+        return Sample(theta, factor * value - self.target.level, factor * slopes, size * error, size * scale)
 
     def found(self, sample: Sample) -> Estimate:
         """The quantity at θ. Raises `NotConverged`."""
         value, error, scale = self.target.level + sample.value, sample.error, sample.scale
-        if self.target.kind == "stability_index":
-            ratio, slope, error = self.ratio.solver(sample.at).ratio(self.target.value)
+        if self.target.kind == "stability_index" and self.target.value:
+            ratio, slope, error = self.solver(sample.at).method.ratio(self.target.value)
             value, error, scale = self.target.value - ratio / slope, error / slope, 1.0
         return Estimate(value, error, scale, quantity=self.target.quantity)
-
-
-def start_and_stop(problem: Problem, key: str) -> Axis | None:
-    """The range from half to twice the value of a parameter, within its range; None where the value is 0."""
-    value, field = float(problem.values[key]), problem.parameters[key].field
-    if value == 0:
-        return None
-    start, stop = sorted((0.5 * value, 2.0 * value))
-    for limit in () if field is None else field.metadata:
-        start = max(start, getattr(limit, "ge", start))
-        stop = min(stop, getattr(limit, "le", stop), math.nextafter(getattr(limit, "lt", math.inf), -math.inf))
-    return Axis(key, start, stop)

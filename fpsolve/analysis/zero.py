@@ -1,38 +1,25 @@
-"""What is zero on a line of stability: λ, or Λ(p)/p, over a frame of two parameters, with its exact gradient."""
+"""F of a target over a frame of two parameters, with its exact gradient."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import suppress
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
 from typing import Any, Literal, Protocol
 
 import numpy as np
 from pydantic import ValidationError
 
 from fpsolve.analysis.scan import Sample
-from fpsolve.analysis.sensitivity import SMALL_P, Changed, held_by
-from fpsolve.arrays import FloatArray, real_number, shown
-from fpsolve.budget import Countdown, OverBudget, one_number
+from fpsolve.analysis.target import Distance, Target, line_of_value, said
+from fpsolve.arrays import FloatArray, shown
+from fpsolve.budget import Meter, OverBudget
 from fpsolve.errors import FpsolveError, NotConverged
-from fpsolve.exponent.adapt import Budget
-from fpsolve.exponent.eigen import PairDerivatives
-from fpsolve.exponent.solver import ExponentSolver
+from fpsolve.exponent.kinds import choose
+from fpsolve.exponent.method import Budget
 from fpsolve.messages import Code, Message
 from fpsolve.model.faults import strict_dataclass
-from fpsolve.model.problem import Problem, checked_problem, refuse_infinite
+from fpsolve.model.problem import Problem, checked_problem
 
-RTOL = 1e-10
-"""Error of F that is wanted of two variables, relative to its scale."""
-RTOL_OF_CLOSED = 1e-7
-"""Error of F that is wanted where even moments are all, relative to its scale."""
-RTOL_OF_DEAR = 1e-3
-"""Error of F that is wanted where it is dear, relative to its scale."""
-RTOL_AT_STOP = 3e-3
-"""The same of four variables with a stop, where the error falls slowly."""
-ITS_SIGN = 0.3
-"""Largest error of a dear F, over F, where its sign is sure."""
 HALF = 0.5
 """Share of the time that is left for one value."""
 NEAR = 0.1
@@ -100,73 +87,6 @@ class Axis:
         return self.stop - self.start
 
 
-@dataclass(frozen=True)
-class Zero:
-    """What is zero on a line.
-
-    Attributes:
-        kind: of the quantity.
-        p: the order of the moment, or the value of δ_p; 0 for λ.
-    """
-
-    kind: Literal["lyapunov_exponent", "moment", "stability_index"]
-    p: float = 0.0
-
-    @property
-    def name(self) -> str:
-        """ "lyapunov_exponent", "moment 2", "stability_index -1"."""
-        return self.kind if self.kind == "lyapunov_exponent" else f"{self.kind} {self.p:g}"
-
-    @property
-    def symbol(self) -> str:
-        """F, as a sentence has it."""
-        return "λ" if self.p == 0 else f"Λ({self.p:g})" if self.kind == "moment" else f"Λ({self.p:g})/({self.p:g})"
-
-    def side(self, value: float) -> str:
-        """What F of this sign means: Λ(2) < 0, δ_p > -1."""
-        if self.kind == "stability_index":  # Λ(p)/p increases from −∞ through 0 at δ_p
-            return f"δ_p {'>' if value < 0 else '<'} {self.p:g}"
-        return f"{self.symbol} {'<' if value * (self.p or 1.0) < 0 else '>'} 0"
-
-    @property
-    def equation(self) -> str:
-        """What holds on the line: λ = 0, Λ(2) = 0, δ_p = -1."""
-        return f"δ_p = {self.p:g}" if self.kind == "stability_index" else f"{self.symbol} = 0"
-
-    @property
-    def latex(self) -> str:
-        """`equation` in LaTeX, with dollars."""
-        if self.kind == "stability_index":
-            return rf"$\delta_p = {self.p:g}$"
-        return rf"$\Lambda({self.p:g}) = 0$" if self.p else r"$\lambda = 0$"
-
-
-def zero_of(value: str | Mapping[str, float]) -> Zero:
-    """What "lyapunov_exponent", {"moment": 2.0} or {"stability_index": -1.0} says. Raises `ValueError`."""
-    if value == "lyapunov_exponent":
-        return Zero("lyapunov_exponent")
-    if isinstance(value, Mapping) and len(value) == 1:
-        [(kind, p)] = value.items()
-        with suppress(ValueError):
-            if kind in ("moment", "stability_index") and real_number(p, kind) != 0:
-                return Zero(kind, float(p))  # type: ignore[arg-type]
-    raise ValueError(
-        f'got {shown(value)}; must be "lyapunov_exponent", {{"moment": p}} or {{"stability_index": v}}, with a number '
-        "!= 0"
-    )
-
-
-def said(failure: Exception) -> str:
-    """What is wrong with the parameters of a problem, in one line."""
-    if not isinstance(failure, ValidationError):
-        return str(failure)
-    texts = []
-    for fault in failure.errors():
-        text = str(fault.get("ctx", {}).get("error", fault["msg"]))
-        texts.append(": ".join(filter(None, (".".join(map(str, fault["loc"])), text))))
-    return "; ".join(texts)
-
-
 def check_axes(problem: Problem, x: Axis, y: Axis) -> None:
     """Refuse axes that span no frame. Raises `ValueError`."""
     known = checked_problem(problem).differentiable
@@ -187,88 +107,9 @@ def check_axes(problem: Problem, x: Axis, y: Axis) -> None:
         raise ValueError(f"both axes are {x.key}; choose another parameter for one of them")
 
 
-def line_rtol(problem: Problem, zero: Zero) -> float:
-    """The error of F that is wanted on a line, over its scale."""
-    if problem.dimension > 2 and problem.system.stop:
-        return RTOL_AT_STOP
-    return RTOL_OF_CLOSED if problem.is_closed_only else RTOL_OF_DEAR if is_dear(problem, zero) else RTOL
-
-
-def line_of_value(problem: Problem, zero: Zero) -> float:
-    """The error of F that is enough away from a line, over F."""
-    return ITS_SIGN if is_dear(problem, zero) else 0.0
-
-
 def is_none(reason: Message) -> bool:
     """Whether there is no F for a reason, and it is not only not resolved."""
     return reason.tells_of(Code.NO_PROBLEM) or reason.code in (Code.TAILS, Code.INFINITE_VARIANCE)
-
-
-def is_dear(problem: Problem, zero: Zero) -> bool:
-    """Whether F takes elements of three axes or more, and so seconds for each point."""
-    if problem.dimension > 2:
-        return not (problem.is_closed_only or (zero.p > 0 and zero.p % 2 == 0))
-    return len(problem.coloured.parts) > 1
-
-
-@one_number("Λ at p = {:g}, and its slopes")
-def ratio_with_slopes(solver: ExponentSolver, p: float, keys: Sequence[str]) -> tuple[float, float, FloatArray]:
-    """Λ(p)/p, at p = 0 λ, with its error, and its derivatives by some parameters.
-
-    Raises:
-        NotConverged: it is not resolved, or see `held_by`.
-        NoSuchExponent: see `held_by`.
-    """
-    value, error = solver.ratio_alone(p)
-    if known := solver.by_moments(p):
-        return value, error, known.gradient(keys) / p
-    held, by_key = held_by(solver, p, {key: solver.problem.derivative(key) for key in keys})
-    along = [by_key[key] for key in keys]
-    around = PairDerivatives(held.whole.solution(p).pair) if abs(p) >= SMALL_P else held.around_zero
-    changed = [Changed(around, by) for by in along]
-    if abs(p) >= SMALL_P:
-        return value, error, np.array([each.value.value / p for each in changed])
-    more = [0.5 * p * each.curvature.value if p else 0.0 for each in changed]
-    return value, error, np.array([each.slope.value for each in changed]) + more
-
-
-class Ratio:
-    """Λ(p)/p, at p = 0 λ, over some parameters θ, with its gradient; each solve starts from the one before.
-
-    Args:
-        problem: with the values of all other parameters.
-        p: the order of the moment; 0 for λ.
-        keys: of the parameters.
-        budget: for a solve.
-        rtol: of Λ(p)/p, relative to its scale.
-        of_value: see `ExponentSolver`.
-    """
-
-    def __init__(
-        self, problem: Problem, p: float, keys: Sequence[str], budget: Budget, rtol: float, of_value: float = 0.0
-    ) -> None:
-        self.problem, self.p, self.keys = problem, p, tuple(keys)
-        self._own: Any = {"rtol": rtol, "of_value": of_value, "budget": budget}
-        self._starts: Mapping[float, Any] = {}
-
-    def at(self, theta: FloatArray) -> Problem:
-        """The problem at θ. Raises `FpsolveError` where there is none."""
-        try:
-            return self.problem.at(dict(zip(self.keys, theta.tolist(), strict=True)))
-        except ValueError as failure:
-            raise FpsolveError(Message(Code.NO_PROBLEM, reason=said(failure))) from failure
-
-    def solver(self, theta: FloatArray, *, is_near: bool = True) -> ExponentSolver:
-        """A solver at θ; its starts are those of the last θ if this is near."""
-        return ExponentSolver(self.at(theta), starts=self._starts if is_near else {}, **self._own)
-
-    def __call__(self, theta: FloatArray, *, is_near: bool = True) -> Sample:
-        """Λ(p)/p at θ. Raises `FpsolveError` where there is none."""
-        p, solver = self.p, self.solver(theta, is_near=is_near)
-        refuse_infinite(solver.problem, p)
-        value, error, slopes = ratio_with_slopes(solver, p, self.keys)
-        self._starts = solver.known
-        return Sample(theta, value, slopes, error, solver.scale(p) / abs(p) if p else solver.scales.linear)
 
 
 class Known(Protocol):
@@ -282,14 +123,14 @@ class Known(Protocol):
 
 
 class ZeroField:
-    """F over the unit square: λ or Λ(p)/p, with its gradient.
+    """F of a target over the unit square, with its gradient.
 
     Args:
-        zero: which of them.
+        target: what F is.
         problem: the problem with the values of all other parameters.
         axes: the parameters.
         budget: for a solve.
-        rtol: of F, relative to its scale; `line_rtol` if None.
+        rtol: of F, relative to its scale; that of lines if None.
         seconds: of the processor for all values together; each may take half of what is left.
         spent: what is said where they do not suffice.
         known: points that need not be solved again.
@@ -301,7 +142,7 @@ class ZeroField:
 
     def __init__(
         self,
-        zero: Zero,
+        target: Target,
         problem: Problem,
         axes: tuple[Axis, Axis],
         budget: Budget,
@@ -310,9 +151,9 @@ class ZeroField:
         spent: Message | None = None,
         known: Known | None = None,
     ) -> None:
-        rtol = line_rtol(problem, zero) if rtol is None else rtol
-        keys = [axis.key for axis in axes]
-        self._axes, self._ratio = axes, Ratio(problem, zero.p, keys, budget, rtol, line_of_value(problem, zero))
+        method, keys = choose(problem), [axis.key for axis in axes]
+        rtol, of_value = method.line_rtol(target.order) if rtol is None else rtol, line_of_value(method, target)
+        self._axes, self._distance = axes, Distance(problem, target, keys, budget, rtol, of_value)
         self._seconds, self._spent = seconds, spent or Message(Code.LINE_SPENT, most=seconds)
         self.spent_seconds, self.stopped = 0.0, None if seconds > 0 else self._spent
         self._before, self._rtol, self._known = np.full(2, math.inf), rtol, known
@@ -337,13 +178,11 @@ class ZeroField:
         left = self._seconds - self.spent_seconds
         if left <= 0:
             return self._stop()
-        share = Countdown(HALF * left)
+        share = Meter(HALF * left, number=self._distance.target.symbol)
         try:
             with share.running():
                 return self._at(at)
-        except OverBudget as failure:
-            if failure.countdown is not share:
-                raise
+        except OverBudget:
             return self._stop()
         except FpsolveError as failure:
             return failure.message
@@ -359,6 +198,6 @@ class ZeroField:
         places = list(zip(self._axes, at.tolist(), strict=True))
         theta = np.array([axis.value(share) for axis, share in places])
         slopes = np.array([axis.slope(share) for axis, share in places])
-        found = self._ratio(theta, is_near=bool(np.linalg.norm(at - self._before) <= NEAR))
+        found = self._distance(theta, is_near=bool(np.linalg.norm(at - self._before) <= NEAR))
         self._before = at
         return found._replace(at=at, gradient=found.gradient * slopes, rtol=self._rtol)

@@ -55,7 +55,8 @@ from fpsolve.case.uncertain import Uncertain, uncertain_of
 from fpsolve.case.vary import Vary, assignments
 from fpsolve.errors import CaseError, Fault
 from fpsolve.explain import explain, refuse, shortened
-from fpsolve.exponent.adapt import Budget
+from fpsolve.exponent.kinds import choose
+from fpsolve.exponent.method import Budget, Method
 from fpsolve.exponent.quantities import (
     CRITICAL_IMPACT_FACTOR,
     IMPACT_RATE,
@@ -194,7 +195,7 @@ class Case(Section):
     budget: Annotated[
         Budget,
         BeforeValidator(lambda value: Budget(**value) if isinstance(value, dict) else value),
-        parameter("the limits of the cost of one p", "[budget]"),
+        parameter("the limits of the cost of a parameter set", "[budget]"),
     ] = Budget()
     vary: Annotated[
         InstanceOf[Vary], BeforeValidator(vary_of), parameter("the parameter sets, with a curve for each", EXAMPLE)
@@ -278,15 +279,20 @@ class Case(Section):
     @property
     def rtol(self) -> float:
         """The relative error wanted of Λ(p), as the case states it, or else what is usual for its problem."""
-        return self.moments.rtol if "rtol" in self.moments.model_fields_set else self.problem.usual_rtol
+        return self.moments.rtol if "rtol" in self.moments.model_fields_set else self.method.usual_rtol
+
+    @cached_property
+    def method(self) -> Method:
+        """How Λ(p) of its first set is found."""
+        return choose(self.problem)
 
     @cached_property
     def asked(self) -> tuple[str, ...]:
         """The names of what is computed: those of [output], or else what is cheap and what other sections name."""
         if self.output.names is not None:
-            has_all = self.output.lists_quantities or not self.problem.is_closed_only
+            has_all = self.output.lists_quantities or self.method.has_pairs
             return self.output.names if has_all else (MOMENT.name, SENSITIVITIES)
-        named = {MOMENT.name} if self.problem.is_closed_only else {*CHEAP}
+        named = {*CHEAP} if self.method.has_pairs else {MOMENT.name}
         named |= {*(CHEAP_OF_WALLS if self.problem.system.jumps else ())}
         named |= {RESPONSE if each.of_response else each.quantity for each in self.expect}
         named |= self.model_fields_set & {EXCURSIONS, RESPONSE}
@@ -303,9 +309,9 @@ class Case(Section):
         """What else there is of this case, where it leaves open what is computed."""
         if self.output.names is not None:
             return ()
-        is_there = {RESPONSE: self.responds, EIGENFUNCTIONS: not self.problem.no_picture}
+        is_there = {RESPONSE: self.responds, EIGENFUNCTIONS: not self.method.no_picture}
         is_there |= dict.fromkeys(OF_IMPACTS, bool(self.problem.system.jumps)) | {DERIVATIVE.name: False}
-        if self.problem.is_closed_only:
+        if not self.method.has_pairs:
             is_there |= dict.fromkeys({*QUANTITY_NAMES} - {MOMENT.name, SENSITIVITIES}, False)
         known = {*self.asked} - ({EIGENFUNCTIONS} if not self.output.asks_for_eigenfunctions else set())
         return tuple(name for name in QUANTITY_NAMES if name not in known and is_there.get(name, True))
@@ -316,7 +322,7 @@ class Case(Section):
         spread, of more than two variables at most three; unasked that next to 2, of the first curve alone.
         """
         wanted = self.output.eigenfunctions
-        if EIGENFUNCTIONS not in self.asked or self.problem.no_picture:
+        if EIGENFUNCTIONS not in self.asked or self.method.no_picture:
             wanted = ()
         elif not self.output.asks_for_eigenfunctions:
             wanted = (USUAL_P,)

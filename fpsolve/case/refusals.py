@@ -18,7 +18,8 @@ from pydantic import ValidationError
 from pydantic.fields import FieldInfo
 
 from fpsolve.analysis.excursions import STATIONARY, check_start
-from fpsolve.analysis.zero import axis_faults, said
+from fpsolve.analysis.target import said
+from fpsolve.analysis.zero import axis_faults
 from fpsolve.arrays import FloatArray, is_log_spaced
 from fpsolve.case.kinds import parameters_of, problem_of
 from fpsolve.case.read_vary import values_of
@@ -40,13 +41,14 @@ from fpsolve.case.sections import (
     same,
 )
 from fpsolve.case.vary import Vary, assignments, map_key
-from fpsolve.errors import FpsolveError, MeshError, NoSuchExponent
+from fpsolve.errors import FpsolveError, MeshError
 from fpsolve.explain import Refusal, faults_in, nearest, quoted, shown
+from fpsolve.exponent.kinds import choose
 from fpsolve.exponent.quantities import INDICES
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.fem.space import Space
 from fpsolve.model.parameters import Section
-from fpsolve.model.problem import Problem, even_only, refuse_infinite
+from fpsolve.model.problem import Problem
 from fpsolve.simulation.setup import obstacles, simulated_parts
 from fpsolve.theory.perturbation import second_order_or_none
 
@@ -58,8 +60,9 @@ _MODERATE = "parameters and p must have moderate sizes; bring the extreme ones n
 def _of_moments(moments: Moments, valid: Known, context: Known) -> Iterator[Refusal]:
     """One of the first curve; where keys are varied each has those that exist, but even ones alone are so for all."""
     problem = problem_of(valid)
-    is_told = not context.get("varies", False) or (problem is not None and problem.is_closed_only)
-    is_told &= problem is None or not problem.is_simulated_only
+    method = None if problem is None else choose(problem)
+    is_told = not context.get("varies", False) or (method is not None and not method.has_pairs)
+    is_told &= method is None or method.is_computed
     if text := _unsolvable({**valid, "moments": moments}, {}, with_moments=is_told):
         yield (), None, text
 
@@ -102,11 +105,11 @@ def obstacle(base: Problem, varied: Varied, p: FloatArray, *, with_moments: bool
         sizes = np.array([math.inf])
     if not np.all(np.isfinite(sizes)):
         return f"Eqs. (37)-(38) or R^p overflow; {_MODERATE}"
-    try:
-        for each in (p.tolist() if problem.is_closed_only else extremes) if with_moments else ():
-            refuse_infinite(problem, each)
-    except NoSuchExponent as error:
-        return error.message.words(CASE_WORDS)
+    if with_moments:
+        method = choose(problem)
+        for each in extremes if method.has_pairs else p.tolist():
+            if told := method.reason(each):
+                return told.words(CASE_WORDS)
     return ""
 
 
@@ -162,7 +165,7 @@ def _of_monte_carlo(section: MonteCarloSection, valid: Known, context: Known) ->
     vary: Vary = valid["vary"]
     varied, place = vary.sets[0], vary.line_of(1) + _with(vary.sets[0])
     is_known = section.p is None and "moments" in valid  # then there are such curves, and λ is finite
-    reason, faults = "" if is_known else obstacle(base, varied, p, with_moments=not base.is_closed_only), {}
+    reason, faults = "" if is_known else obstacle(base, varied, p, with_moments=choose(base).has_pairs), {}
     with suppress(ValueError):  # that is the reason
         try:
             faults = obstacles(*simulated_parts(base.at(varied)), time=section.time, step=section.step)
@@ -206,7 +209,7 @@ def _of_output(output: OutputSection, valid: Known, context: Known) -> Iterator[
     problem = problem_of(valid)
     if problem and output.lists_quantities:
         for name in {*(output.names or ())} & INDICES.keys():
-            if told := even_only(problem, INDICES[name].symbol):
+            if told := choose(problem).reason(0.0, INDICES[name].symbol):
                 yield ("quantities",), output.quantities, told.words(CASE_WORDS)
     wanted = ((("eigenfunctions", i), p) for i, p in enumerate(output.eigenfunctions or ()))
     yield from _of_orders(valid, wanted, f"choose one of them, {_without('output.eigenfunctions')}")
@@ -306,7 +309,7 @@ def _of_chart(chart: ChartSection | None, valid: Known, context: Known) -> Itera
                 )
                 yield (next(iter(stops)), "stop") if stops else (), highest, text
                 return
-    p = np.array([zero.p for zero in chart.zero])
+    p = np.array([target.order for target in chart.lines])
     for corner in corners:
         if reason := obstacle(problem, corner, p):
             yield (), None, f"{_with(corner)}{reason}; choose another frame"

@@ -11,6 +11,7 @@ REMOVED: Mapping[tuple[str, ...], str] = {
     ("uncertain", "sample"): _SETS,
     ("uncertain", "seed"): _SETS,
     ("budget", "memory"): "write unknowns = 80000, which bounds the memory",
+    ("chart", "zero"): 'write lines = ["lyapunov_exponent = 0", "moment(2) = 0", "stability_index = -1"]',
     ("vary", "reduced"): "each set is solved by itself: list fewer where that takes long",
 }
 """What to write instead of each of them."""

@@ -25,7 +25,8 @@ from pydantic import (
 )
 
 from fpsolve.analysis.excursions import STATIONARY
-from fpsolve.analysis.zero import Axis, Zero, zero_of
+from fpsolve.analysis.target import EXAMPLES, Target, target_of
+from fpsolve.analysis.zero import Axis
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import MeshError
 from fpsolve.explain import (
@@ -41,12 +42,13 @@ from fpsolve.explain import (
     shown,
     shown_with_kind,
 )
+from fpsolve.exponent.method import RTOL, RTOL_BEYOND_PLANE, RTOL_OF_SEVERAL
 from fpsolve.exponent.quantities import INDICES, MOMENT, QUANTITIES, DrawnName, QuantityName
 from fpsolve.fem.mesh import MAX_CELLS, MAX_DEGREE, CylinderMesh, make_mesh, read_mesh, vertices_at
 from fpsolve.messages import is_control
 from fpsolve.model.faults import table_of
 from fpsolve.model.parameters import Section, parameter
-from fpsolve.model.problem import RTOL, RTOL_BEYOND_PLANE, RTOL_OF_SEVERAL, RTOLS
+from fpsolve.model.problem import RTOLS
 from fpsolve.model.quantity import DERIVATIVE, RATE_FUNCTION, Quantity, moment_at
 from fpsolve.simulation.setup import BATCHES, MAX_PATHS, PATHS, Estimator
 
@@ -80,7 +82,7 @@ _MOST_PLACES = 4_000_000
 """Largest number of places at which it is written."""
 MOST_NAMED = 8
 """Curves that a legend can tell apart; of more, and of a map, colours tell the value of a key."""
-_ZERO = 'zero = ["lyapunov_exponent", { moment = 2.0 }]'
+_LINES = 'lines = ["lyapunov_exponent = 0", "moment(2) = 0"]'
 
 Values = tuple[float, ...]
 Value = float | str
@@ -463,32 +465,23 @@ class ChartAxis(Section):
         return Axis(self.key, self.start, self.stop, self.scale, self.at)
 
 
-def _zeros(value: Any) -> Any:
-    """The entries of `zero` as `Zero`s; those already made are left."""
+def _targets(value: Any) -> Any:
+    """The entries of `lines` as `Target`s; those already made are left."""
     if not is_list(value) or not value:
-        raise ValueError(f"got {shown(value)}; must be a list with one entry at least; write, for example, {_ZERO}")
-    made, refusals = list[Zero](), list[Refusal]()
+        raise ValueError(f"got {shown(value)}; must be a list with one entry at least; write, for example, {_LINES}")
+    made, refusals = list[Target](), list[Refusal]()
     for i, entry in enumerate(value):
         try:
-            zero = entry if isinstance(entry, Zero) else zero_of(entry)
+            target = entry if isinstance(entry, Target) else target_of(entry)
         except (ValueError, TypeError):
-            known = '"lyapunov_exponent", { moment = 2.0 } or { stability_index = -1.0 }, the number finite and not 0'
-            refusals.append(((i,), entry, f"got {shown(entry)}; must be {known}; write one of these"))
+            known = f"must be {EXAMPLES}, all numbers finite and the order of a moment not 0"
+            refusals.append(((i,), entry, f"got {shown(entry)}; {known}; write one of these"))
             continue
-        if zero in made:
+        if target in made:
             refusals.append(((i,), entry, f"got {shown(entry)} twice; lines must differ; remove one of them"))
-        made.append(zero)
+        made.append(target)
     refuse(refusals)
     return tuple(made)
-
-
-class IndexAt(Section):
-    """{ stability_index = p }: where δ_p has a value."""
-
-    stability_index: Annotated[float, parameter("value of the stability index", "stability_index = -1.0")]
-
-
-Zeros = Annotated[tuple[Literal["lyapunov_exponent"] | MomentAt | IndexAt, ...], Field(min_length=1)]
 
 
 class ChartSection(Section):
@@ -496,10 +489,10 @@ class ChartSection(Section):
 
     x: Annotated[ChartAxis, parameter("the abscissa", 'x = { key = "oscillator.omega", start = 0.3, stop = 5.0 }')]
     y: Annotated[ChartAxis, parameter("the ordinate", 'y = { key = "noise.D0", start = 0.01, stop = 2.0 }')]
-    zero: Annotated[
-        tuple[Zero, ...],
-        BeforeValidator(_zeros, json_schema_input_type=Zeros),
-        parameter("what is zero on a line", _ZERO),
+    lines: Annotated[
+        tuple[Target, ...],
+        BeforeValidator(_targets, json_schema_input_type=Annotated[tuple[str, ...], Field(min_length=1)]),
+        parameter("what holds on each line", _LINES),
     ]
     nodes: Annotated[
         int | None,

@@ -30,7 +30,7 @@ def prove(
 ) -> int:
     """Prove bounds on the exponents that hold with certainty; write them with certificates into OUT/<case>/proof.json.
 
-    A bound takes at most [budget] seconds of processor time and a third more.
+    A bound takes at most half of [budget] seconds of processor time and a third more.
     The bounds on δ_p together take at most twice as much.
     Needs python-flint: pip install 'fpsolve[proof]'.
 

@@ -8,17 +8,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import nullcontext
 from dataclasses import KW_ONLY, dataclass, field, replace
 from functools import cached_property, partial
-from typing import Annotated, NamedTuple, NoReturn, TypeVar
+from typing import NamedTuple, NoReturn, TypeVar
 
 import numpy as np
 
-from fpsolve.budget import Countdown, OverBudget, counted, under_way
+from fpsolve.budget import Meter, OverBudget
 from fpsolve.errors import FpsolveError, MeshError, NotConverged, SingularMatrix
 from fpsolve.exponent.eigen import PairDerivatives, PrincipalPair, pair_at_zero, principal_pair
 from fpsolve.exponent.error import Solution
+from fpsolve.exponent.method import Budget, Tolerance, spent_remedy
 from fpsolve.exponent.starts import Question, Start, first_place, other_centers, other_places, refined
 from fpsolve.fem.factors import FEW_UNKNOWNS, one_thread
 from fpsolve.fem.generator import SMALL_P, Generator
@@ -27,8 +27,6 @@ from fpsolve.fem.noise_axes import PolynomialAxis
 from fpsolve.fem.phase import PhaseAxis
 from fpsolve.fem.space import Space
 from fpsolve.messages import Code, Message, Remedy
-from fpsolve.model.faults import strict_dataclass
-from fpsolve.model.parameters import parameter
 from fpsolve.model.problem import Problem
 from fpsolve.theory.frozen import frozen_noise
 
@@ -56,44 +54,9 @@ MOST_HALVED = 20_000
 """Unknowns of a system on halved cells that is solved for that: beyond, cells are many, and it takes long."""
 A_THIRD_MORE = 4 / 3
 """What a budget may be exceeded by."""
-Tolerance = Callable[[float, float], float]
-"""The largest error allowed, from p and a value of Λ(p)."""
 UNSOLVED = MeshError, NotConverged, SingularMatrix, np.linalg.LinAlgError
 """What is raised where a discretisation does not have the principal pair, so that another one is tried."""
 Found = TypeVar("Found")
-
-
-@strict_dataclass
-class Budget:
-    """What one number may cost, and a line of a chart. A number that is given does not depend on it.
-
-    Args:
-        unknowns: of the largest system; None for as many as 1.5 GB hold, see `Space.most_unknowns`.
-        seconds: of a processor for one number, such as Λ(2), λ or Λ″(0), with all that it takes, asked before each
-            factorisation. The nodes of a row of a scan share it, and each may take half of what is left.
-        line_seconds: of a processor for a line of a chart, its scan, which may take half of them, and its branches;
-            None for any time.
-
-    Raises:
-        ParameterError: a number is out of its range.
-    """
-
-    unknowns: Annotated[
-        int | None,
-        parameter("number of unknowns of the largest system; if omitted, what 1.5 GB hold", "unknowns = 80000", ge=100),
-    ] = None
-    seconds: Annotated[float, parameter("seconds of processor time for one number", "seconds = 60.0", gt=0)] = 60.0
-    line_seconds: Annotated[
-        float | None, parameter("seconds of processor time for a line of a chart", "line_seconds = 600.0", gt=0)
-    ] = None
-
-    def most(self, space: Space) -> int:
-        """Number of unknowns that a space may have."""
-        return space.most_unknowns if self.unknowns is None else self.unknowns
-
-    def countdown(self, name: str) -> Countdown:
-        """For one number."""
-        return Countdown(self.seconds, name)
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,6 +69,7 @@ class WholeProblem:
         rtol: about what the tolerance is relative to the size of Λ(p).
         budget: what the choice of a discretisation may cost.
         tolerance: the usual one.
+        meter: of all numbers of the problem.
         starts: solutions of a problem with parameters close by, by their p.
 
     Attributes:
@@ -118,9 +82,10 @@ class WholeProblem:
     rtol: float
     budget: Budget
     tolerance: Tolerance
+    meter: Meter
     starts: Mapping[float, Solution] = field(default_factory=dict)
     known: dict[float, Solution] = field(init=False, default_factory=dict)
-    _failed: dict[float, Message] = field(init=False, default_factory=dict)
+    _failed: dict[float, tuple[type[NotConverged], Message]] = field(init=False, default_factory=dict)
 
     def solution(self, p: float, tolerance: Tolerance | None = None) -> Solution:
         """The principal eigenpair at p and its error, within a tolerance, the usual one if none is given.
@@ -134,16 +99,16 @@ class WholeProblem:
         """
         p = solved_p(p)
         if tolerance is None and p in self._failed:
-            raise NotConverged(self._failed[p])
+            kind, message = self._failed[p]
+            raise kind(message)
         allowed = tolerance or self.tolerance
         if p not in self.known or (self.mesh is None and not self.is_accurate(self.known[p], allowed)):
             try:
-                with one_thread():
-                    countdown = under_way() or self.budget.countdown(f"Λ({p:g})")
-                    self.known[p] = Search(self, p, allowed, countdown, not under_way()).solve()
+                with one_thread(), self.meter.running() as meter:
+                    self.known[p] = Search(self, p, allowed, meter).solve()
             except NotConverged as failure:
                 if tolerance is None:  # a tighter one may be out of reach where this is not
-                    self._failed[p] = failure.message
+                    self._failed[p] = type(failure), failure.message
                 raise failure from None
             except MeshError as failure:
                 if self.mesh is not None:
@@ -168,6 +133,8 @@ class WholeProblem:
         """The principal pair; where it is not found, the failure has the remedy of this place."""
         try:
             return principal_pair(generator, p, start=start)
+        except OverBudget:
+            raise
         except NotConverged as failure:
             remedy = Remedy.BESIDE if is_at_corner(self.problem, p) else self.remedy
             raise NotConverged(failure.reason, failure.partial, remedy) from failure
@@ -191,7 +158,7 @@ class WholeProblem:
             reason = Message(Code.UNKNOWNS_SPENT, unknowns=chosen.size, most=self.budget.most(chosen))
         else:
             try:
-                with one_thread(), counted(self.budget.countdown(f"a finer Λ({pair.p:g})")):
+                with one_thread(), self.meter.running():
                     return self.pair_on(Generator(self.problem, chosen), pair.p, pair)
             except (MeshError, SingularMatrix, np.linalg.LinAlgError) as failure:
                 reason = getattr(failure, "message", str(failure))
@@ -206,7 +173,8 @@ class WholeProblem:
         try:
             return self.solution(q, tolerance)
         except NotConverged as failure:
-            raise NotConverged(Message(Code.NEAR_ZERO, p=q, reason=failure.message), failure.partial) from failure
+            told = Message(Code.NEAR_ZERO, p=q, reason=failure.message)
+            raise type(failure)(told, failure.partial) from failure
 
     @cached_property
     def given(self) -> tuple[Generator, Generator]:
@@ -283,7 +251,6 @@ class Search:
 
     Attributes:
         whole: where known solutions are, and what is usual for the problem.
-        is_own: whether the countdown is of this p, and not of another number that needs it.
         stages: how many discretisations were solved.
         failure: why the last discretisation had no solution.
         last: seconds spent before the last stage, and its unknowns.
@@ -292,39 +259,28 @@ class Search:
     whole: WholeProblem
     p: float
     tolerance: Tolerance
-    countdown: Countdown
-    is_own: bool
+    meter: Meter
     stages: int = 0
     failure: Exception | None = None
     last: tuple[float, int] = (0.0, 0)
 
     def solve(self) -> Solution:
         """A solution within the tolerance, or the one on the given mesh."""
-        try:
-            with self.countdown.running() if self.is_own else nullcontext():
-                if self.whole.mesh is not None:
-                    coarse, fine = self.whole.given
-                    pair = self.solve_with(coarse).pair
-                    finer = self.whole.pair_on(fine, self.p, pair)
-                    return Solution(pair, measured=(abs(finer.value - pair.value),))
-                if abs(self.p) < SMALL_P:
-                    near = self.whole.near_zero(self.p, self.tolerance).pair
-                    at_zero = pair_at_zero(near) if self.p == 0 else None
-                    return Solution(at_zero) if at_zero else self.solve_with(near.generator)
-                known = None
-                for attempt in (self.try_problem_close_by, self.try_nearest_p):
-                    known = attempt() or known
-                    if known and self.whole.is_accurate(known, self.tolerance) and not other_centers(known.pair):
-                        return self.confirm(known)
-                return self.confirm(self.solve_places(known))
-        except OverBudget as failure:
-            if not self.has_spent(failure):
-                raise
-            return self.stop(failure.reason, None)
-
-    def has_spent(self, failure: OverBudget) -> bool:
-        """Whether it is the budget of this p that has ended, and not that of another number."""
-        return self.is_own and failure.countdown is self.countdown
+        if self.whole.mesh is not None:
+            coarse, fine = self.whole.given
+            pair = self.solve_with(coarse).pair
+            finer = self.whole.pair_on(fine, self.p, pair)
+            return Solution(pair, measured=(abs(finer.value - pair.value),))
+        if abs(self.p) < SMALL_P:
+            near = self.whole.near_zero(self.p, self.tolerance).pair
+            at_zero = pair_at_zero(near) if self.p == 0 else None
+            return Solution(at_zero) if at_zero else self.solve_with(near.generator)
+        known = None
+        for attempt in (self.try_problem_close_by, self.try_nearest_p):
+            known = attempt() or known
+            if known and self.whole.is_accurate(known, self.tolerance) and not other_centers(known.pair):
+                return self.confirm(known)
+        return self.confirm(self.solve_places(known))
 
     def solve_places(self, known: Solution | None) -> Solution:
         """The largest of all places where the moment may be carried, the first from a solution that does not suffice.
@@ -404,6 +360,8 @@ class Search:
         """What is solved, or None where a discretisation does not have it, and the `failure` tells why."""
         try:
             return solve()
+        except OverBudget:
+            raise
         except UNSOLVED as failure:
             self.failure = failure.with_traceback(None)  # which would keep this search, and all that it has found
             return None
@@ -439,24 +397,22 @@ class Search:
         except (OverBudget, Ended) as failure:
             if best is not None and best.share <= 1:  # within the tolerance, but for its slope
                 return best.solution
-            if isinstance(failure, OverBudget) and not self.has_spent(failure):
-                raise
-            return self.stop(failure.reason, best)
+            return self.stop(failure, best)
 
     def check(self, chosen: Space) -> None:
         """Refuse a stage beyond the budget, and count it."""
-        size, spent, most = chosen.size, self.countdown.spent, self.whole.budget.most(chosen)
+        size, spent, most = chosen.size, self.meter.spent, self.whole.budget.most(chosen)
         if size > most:
             raise Ended(Message(Code.UNKNOWNS_SPENT, unknowns=size, most=most))
-        seconds = spent + (spent - self.last[0]) * size / max(self.last[1], 1)  # what it takes at least
-        if self.last[1] and seconds > self.countdown.seconds:
-            raise OverBudget(self.countdown, Message(Code.SECONDS_SPENT, seconds=seconds, most=self.countdown.seconds))
+        if self.last[1]:  # what it takes at least
+            self.meter.refuse(spent + (spent - self.last[0]) * size / self.last[1])
         if self.stages >= MAX_STAGES:
             raise Ended(Message(Code.MESHES_SPENT, count=MAX_STAGES))
         self.last, self.stages = (spent, size), self.stages + 1
 
-    def stop(self, reason: Message, best: Best | None) -> NoReturn:
-        """Raise `NotConverged` with the best solution."""
+    def stop(self, ended: OverBudget | Ended, best: Best | None) -> NoReturn:
+        """Raise `NotConverged`, or `OverBudget`, with the best solution."""
+        reason, kind = ended.reason, OverBudget if isinstance(ended, OverBudget) else NotConverged
         if best is not None:
             pair, error = best.solution.pair, best.solution.error
             told = Message(Code.BUDGET_SPENT, p=self.p, reason=reason, value=pair.value, error=error, size=best.share)
@@ -465,12 +421,7 @@ class Search:
             said = last.message.advising(None) if isinstance(last, FpsolveError) else last and str(last)
             told = Message(Code.NOTHING_RESOLVED, p=self.p, reason=reason, is_thin=is_thin, last=said)
         remedy = None if reason.code is Code.ROUNDED else spent_remedy(self.whole.problem)
-        raise NotConverged(told, best and best.solution, remedy)
-
-
-def spent_remedy(problem: Problem) -> Remedy:
-    """What to do where a budget does not suffice."""
-    return Remedy.BUDGET if problem.dimension == 2 else Remedy.MANY
+        raise kind(told, best and best.solution, remedy)
 
 
 def is_at_corner(problem: Problem, p: float) -> bool:

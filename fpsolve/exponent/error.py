@@ -180,6 +180,16 @@ class Solution:
     measured: tuple[float, ...] | None = None
     start: Any = None
 
+    @property
+    def value(self) -> float:
+        """Λ(p)."""
+        return self.pair.value
+
+    @property
+    def derivative(self) -> float:
+        """Λ′(p)."""
+        return self.pair.derivative
+
     @cached_property
     def effects(self) -> tuple[ModeEffects | None, ...]:
         """Those of φ, and those of ξ if it has elements."""

@@ -10,6 +10,7 @@ from fpsolve.arrays import FloatArray
 from fpsolve.errors import OutputError
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.fem.noise_axes import Samples
+from fpsolve.model.problem import Problem
 
 MOST_TILT = 1.5
 """Slope of the tilt in z beyond which rounding leaves nothing of T around the mean of the noise."""
@@ -77,5 +78,19 @@ def refuse_more(pair: PrincipalPair) -> None:
         why = f"T of {problem.dimension} variables is no function of phase and noise"
         remedy = "use `draw_eigenfunction`, `tilted_density`, or a case, whose run writes files for ParaView"
         raise OutputError(f"{why}; {remedy}")
-    if why := problem.no_picture:
+    if why := no_picture_of(problem):
         raise OutputError(why)
+
+
+def no_picture_of(problem: Problem) -> str:
+    """Why T of two variables cannot be drawn over phase and noise; empty where it can."""
+    noise = problem.coloured
+    if len(noise.parts) > 1:
+        several = "an eigenfunction of the phase and of several noises that are not white cannot be drawn"
+        return f"{several}; make all of these noises white but one"
+    if noise.is_drawn:
+        return ""
+    return (
+        f"{noise.kind} noise is no Markov process by itself, so that an eigenfunction is not a function of phase and "
+        "noise, which could be drawn; look at Λ(p), or at densities of a simulation"
+    )

@@ -14,9 +14,10 @@ from scipy.interpolate import BPoly
 from fpsolve.arrays import FloatArray, real_array, real_numbers
 from fpsolve.data import Result, dataset
 from fpsolve.errors import NotConverged
-from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.curve import Curve, Node, Values, values
 from fpsolve.exponent.error import Absent, Estimate
+from fpsolve.exponent.kinds import choose
+from fpsolve.exponent.method import Budget, checked_moments
 from fpsolve.exponent.root import SEARCH_INTERVAL, nonzero_root
 from fpsolve.exponent.solver import (
     ExponentSolver,
@@ -27,7 +28,7 @@ from fpsolve.exponent.solver import (
     solver_of,
 )
 from fpsolve.fem.mesh import CylinderMesh
-from fpsolve.model.problem import Problem, checked_moments
+from fpsolve.model.problem import Problem
 from fpsolve.model.quantity import DERIVATIVE, MOMENT, SECOND_DERIVATIVE, P
 
 if TYPE_CHECKING:
@@ -80,7 +81,7 @@ class MomentLyapunovFunction(Result):
         budget: Budget | None = None,
         solver: ExponentSolver | None = None,
     ) -> None:
-        low, high = (float(end) for end in checked_moments(list(interval), problem))
+        low, high = (float(end) for end in checked_moments(list(interval), choose(problem)))
         if not low < high:
             raise ValueError(f"the interval of p is {interval}; its ends must increase")
         self.interval = low, high
@@ -89,7 +90,7 @@ class MomentLyapunovFunction(Result):
         self.nodes = np.unique([p for curve in self._curves for p in curve.nodes])
         at = self._values(self.nodes)
         if obstacle := broken_convexity(self.nodes, at.value, at.derivative, at.error, lambda: at.derivative_error):
-            raise NotConverged(obstacle, remedy=self.solver.refinement)
+            raise NotConverged(obstacle, remedy=self.solver.method.refinement)
 
     def __call__(self, p: ArrayLike) -> FloatArray:
         """Λ(p), per unit time, of the shape of p. Raises `ValueError` outside the interval."""
@@ -113,7 +114,7 @@ class MomentLyapunovFunction(Result):
 
     def moments(self, p: ArrayLike) -> MomentLyapunov:
         """Λ(p) at several p; the residual is the largest of the nodes. Raises `NotConverged` if they contradict."""
-        return interpolated(self.solver, self._curves, checked_moments(p, self.solver.problem))
+        return interpolated(self.solver, self._curves, checked_moments(p, self.solver.method))
 
     def root(self) -> float | None:
         """Where Λ(p)/p changes its sign in the interval, or None."""

@@ -25,14 +25,14 @@ from fpsolve.arrays import FloatArray
 from fpsolve.errors import NoHierarchy
 from fpsolve.exponent.eigen import PrincipalPair, principal_pair
 from fpsolve.exponent.error import Solution, ladders, mode_effects
+from fpsolve.exponent.moments import even_moment
+from fpsolve.exponent.powers import moment_form
 from fpsolve.exponent.starts import SHARE, Question, Start
 from fpsolve.fem.generator import SMALL_P, Generator
 from fpsolve.fem.noise_axes import CountedAxis
 from fpsolve.fem.space import Space, first_axis
 from fpsolve.fem.sphere import Coordinates, SphereAxis, group_dimensions
 from fpsolve.model.problem import Problem
-from fpsolve.theory.moments import even_moment
-from fpsolve.theory.powers import moment_form
 
 FIRST_WAVES = 2
 """Number of waves of the first space in each angle."""

@@ -31,10 +31,9 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from fpsolve.arrays import is_whole, shown
-from fpsolve.budget import one_number
-from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.error import Absent, Estimate, checked
+from fpsolve.exponent.method import Budget
 from fpsolve.exponent.root import SEARCH_INTERVAL, nonzero_root
 from fpsolve.exponent.solver import ExponentSolver, solver_of
 from fpsolve.fem.mesh import CylinderMesh
@@ -53,7 +52,6 @@ DrawnName = Literal["moment", "lyapunov_exponent", "stability_index"]
 QuantityName = Literal[DrawnName, "variance_rate", "impact_rate", "critical_impact_factor", "critical_restitution"]
 
 
-@one_number("N")
 def impact_rate(solver: ExponentSolver, jump: int | None = None) -> Estimate | Absent:
     """N = ∂λ/∂ ln R, the mean number of impacts per unit time; it does not depend on R.
 
@@ -69,15 +67,14 @@ def impact_rate(solver: ExponentSolver, jump: int | None = None) -> Estimate | A
     """
     if (number := _ray(solver, jump)) is None:
         return _not_one_ray(solver)
-    value, better = (_flux(each.pair, number) for each in (solver.around_zero, solver.finer_around_zero))
-    generator = solver.finer_around_zero.pair.generator
+    value, better = (_flux(each.pair, number) for each in (solver.method.around_zero, solver.method.finer_around_zero))
+    generator = solver.method.finer_around_zero.pair.generator
     usual = generator.problem.unit_rate / math.pi
     rounding, lost = 10 * _EPS * max(usual, better), _EPS * generator.loss * usual
     error = abs(better - value) + (rounding if better > lost else lost)
-    return checked(Estimate(better, error, usual, quantity=quantity.IMPACT_RATE), solver.refinement)
+    return checked(Estimate(better, error, usual, quantity=quantity.IMPACT_RATE), solver.method.refinement)
 
 
-@one_number("R_c")
 def critical_impact_factor(solver: ExponentSolver, jump: int | None = None) -> Estimate | Absent:
     """R_c = R exp(−λ/N), with which λ = 0: more loss makes almost every path decay. It is > 1 if they do without loss.
 
@@ -96,10 +93,9 @@ def critical_impact_factor(solver: ExponentSolver, jump: int | None = None) -> E
     value = math.exp(log.value)
     error = value * math.expm1(min(log.error_estimate, LARGEST_LOG))
     found = Estimate(value, error, value * max(1.0, log.scale), quantity=quantity.CRITICAL_IMPACT_FACTOR)
-    return checked(found, solver.refinement)
+    return checked(found, solver.method.refinement)
 
 
-@one_number("r_c")
 def critical_restitution(solver: ExponentSolver, jump: int | None = None) -> Estimate | Absent:
     """r_c, the coefficient of restitution with which λ = 0, by the impact law of the system; or why there is none.
 
@@ -127,7 +123,7 @@ def critical_restitution(solver: ExponentSolver, jump: int | None = None) -> Est
         return Absent(Message(Code.ALWAYS_UNSTABLE, symbol=system.impact_symbol, value=value))
     slope = system.impact_slope(log.value)
     error, scale = slope * log.error_estimate + _EPS, max(1.0, slope * log.scale)
-    return checked(Estimate(value, error, scale, quantity=quantity.CRITICAL_RESTITUTION), solver.refinement)
+    return checked(Estimate(value, error, scale, quantity=quantity.CRITICAL_RESTITUTION), solver.method.refinement)
 
 
 def _ray(solver: ExponentSolver, jump: int | None) -> int | None:

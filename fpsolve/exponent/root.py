@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import math
-from contextlib import suppress
 from functools import partial
 from typing import Any
 
 import numpy as np
 
-from fpsolve.budget import OverBudget, one_number, under_way
+from fpsolve.budget import OverBudget, unless_over_budget
 from fpsolve.errors import NotConverged
-from fpsolve.exponent.adapt import Tolerance
 from fpsolve.exponent.error import Absent, Estimate, checked
+from fpsolve.exponent.method import Tolerance, refuse
 from fpsolve.exponent.solver import ExponentSolver, contradiction, share_of
-from fpsolve.messages import Code, Message, Remedy
-from fpsolve.model.problem import negative_refused, tails_refused
-from fpsolve.model.quantity import STABILITY_INDEX, moment_at
+from fpsolve.messages import Code, Message
+from fpsolve.model.quantity import STABILITY_INDEX
 from fpsolve.roots import Missing, NoRoot, Value, increasing_root
 
 SEARCH_INTERVAL: tuple[float, float] = (-20.0, 20.0)
@@ -28,7 +26,6 @@ PRECISE = 0.5
 """Of what rtol allows δ_p, for the error of the last Λ(p)/p."""
 
 
-@one_number("δ_p")
 def nonzero_root(
     solver: ExponentSolver, interval: tuple[float, float] = SEARCH_INTERVAL, guess: float | None = None
 ) -> Estimate | Absent:
@@ -42,37 +39,35 @@ def nonzero_root(
     """
     if not solver.problem.is_driven:
         return Absent(Message(Code.NOT_DRIVEN))
-    if told := tails_refused(solver.problem, STABILITY_INDEX.symbol):
+    method = solver.method
+    refuse(method.reason(0.0, STABILITY_INDEX.symbol))
+    if told := method.reason(1.0, STABILITY_INDEX.symbol):
         return Absent(told)
     noise = solver.problem.noise
-    low, high = (float(end) for end in np.clip(interval, *solver.problem.moments))
+    low, high = (float(end) for end in np.clip(interval, *method.interval))
     ends = low, high
-    if solver.classes:  # for p > 0 Λ(p) is the largest of theirs
-        if len(solver.classes) > 1 and solver.lyapunov_exponent().value > 0:
-            return Absent(negative_refused(solver.problem))
-        roots = [nonzero_root(each, interval) for each in solver.classes if each.problem.system.driven_by]
-        if known := [each for each in roots if each]:
-            return min(known, key=lambda each: each.value)
-        return Absent(Message(Code.NO_ROOT, low=ends[0], high=ends[1], is_bounded=noise.is_bounded))
+    nowhere = Absent(Message(Code.NO_ROOT, low=low, high=high, is_bounded=noise.is_bounded))
+    of_parts = method.index_of_parts(lambda part: nonzero_root(solver.of(part), interval), nowhere)
+    if of_parts is not None:
+        return of_parts
     solved, outward = dict[float, tuple[float, float, float]](), {*ends}  # where the sign is wanted
+    cause: Any
 
     def at(p: float, tolerance: Tolerance | None = None) -> Value:
         is_rough = p in outward and solver.mesh is None and tolerance is None
         try:
             solved[p] = _rough_ratio(solver, p) if is_rough else _precise_ratio(solver, p, tolerance)
-        except (NotConverged, OverBudget) as failure:
+        except NotConverged as failure:
             raise Missing(p) from failure
         ratio, slope, error = solved[p]
         if not slope > 0:
-            raise NotConverged(Message(Code.NOT_INCREASING, p=p), remedy=solver.refinement)
+            raise NotConverged(Message(Code.NOT_INCREASING, p=p), remedy=method.refinement)
         outward.update((-max(OUTWARD, 2 * abs(p)), max(OUTWARD, 2 * abs(p))))
         return Value(ratio, slope, 0.1 * error)
 
     signed: tuple[float, ...] = ()
     if guess is None:
-        if "λ" in solver.spent:  # where this begins
-            raise NotConverged(solver.spent["λ"])
-        ratio, slope, error = solver.ratio(0.0)
+        ratio, slope, error = solver.method.ratio(0.0)
         if slope <= error and _is_linear(solver, low, high):
             return Absent(Message(Code.LINEAR, value=ratio if abs(ratio) > error else 0.0))
         guess = -ratio / slope if slope > 0 else math.copysign(1.0, -ratio)
@@ -88,25 +83,26 @@ def nonzero_root(
             p = increasing_root(partial(at, tolerance=tolerance), p, ends)
             found = _index(p, *solved[p])
     except Missing as missing:
-        cause: Any = missing.__cause__
+        cause = missing.__cause__
         raise cause from None
     except NoRoot as none:
         if none.missing is None:
-            return Absent(Message(Code.NO_ROOT, low=ends[0], high=ends[1], is_bounded=noise.is_bounded))
-        if isinstance(none.missing.__cause__, OverBudget):
-            raise none.missing.__cause__ from None
+            return nowhere
+        cause = none.missing.__cause__
+        if isinstance(cause, OverBudget):
+            raise cause from None
         low, high = (ends[0], none.last) if none.is_negative else (none.last, ends[1])
-        return Absent(Message(Code.NO_ROOT_REACHED, low=low, high=high, reason=_not_resolved(none.missing)))
+        return Absent(Message(Code.NO_ROOT_REACHED, low=low, high=high, reason=cause.message))
     ratio, slope, error = solved[p]
     place, value, steep, off = (np.array([number]) for number in (p, p * ratio, ratio + p * slope, abs(p) * error))
     if obstacle := contradiction(solver, place, value, steep, off, lambda: np.array([solver.slope_error(p)])):
-        raise NotConverged(obstacle, remedy=solver.refinement)
-    return checked(found, solver.refinement)
+        raise NotConverged(obstacle, remedy=method.refinement)
+    return checked(found, method.refinement)
 
 
 def _is_linear(solver: ExponentSolver, low: float, high: float) -> bool:
     """Whether Λ(p)/p, which increases, is the same far out on both sides, to its errors."""
-    sides = [solver.ratio_alone(float(np.clip(p, low, high))) for p in (-OUTWARD, OUTWARD)]
+    sides = [solver.method.ratio_alone(float(np.clip(p, low, high))) for p in (-OUTWARD, OUTWARD)]
     return abs(sides[1][0] - sides[0][0]) <= sides[0][1] + sides[1][1]
 
 
@@ -117,24 +113,14 @@ def _index(p: float, ratio: float, slope: float, error: float) -> Estimate:
 
 def _rough_ratio(solver: ExponentSolver, p: float) -> tuple[float, float, float]:
     """Λ(p)/p, its slope and error, which tell the sign; as `_precise_ratio` does where that is not enough."""
-    ratio, slope, error = solver.ratio(p, lambda p, value: max(ROUGH * abs(value), solver.tolerance(p, value)))
+    ratio, slope, error = solver.method.ratio(
+        p, lambda p, value: max(ROUGH * abs(value), solver.method.tolerance(p, value))
+    )
     return (ratio, slope, error) if abs(ratio) > 2 * error and slope > 0 else _precise_ratio(solver, p, None)
-
-
-def _not_resolved(missing: Missing) -> Message:
-    """Why Λ(p) is not. Raises `OverBudget` where that is of more than δ_p."""
-    failure = missing.__cause__
-    if isinstance(failure, NotConverged):
-        return failure.message
-    assert isinstance(failure, OverBudget)
-    if failure.countdown is not under_way():
-        raise failure
-    told = Message(Code.NUMBER_SPENT, symbol=moment_at(missing.args[0]).symbol, reason=failure.reason)
-    return NotConverged(told, remedy=Remedy.BUDGET).message
 
 
 def _precise_ratio(solver: ExponentSolver, p: float, tolerance: Tolerance | None) -> tuple[float, float, float]:
     """Λ(p)/p, its slope and error within a tolerance; within that of rtol where that of δ_p is out of reach."""
-    with suppress(NotConverged):
-        return solver.ratio(p, tolerance)
-    return solver.ratio(p)
+    with unless_over_budget():
+        return solver.method.ratio(p, tolerance)
+    return solver.method.ratio(p)

@@ -98,6 +98,10 @@ class NoiseAxis(Axis):
         """The functions at points of their own."""
         raise NotImplementedError
 
+    def of_degree(self, count: int) -> Self:
+        """Functions up to a degree, where they have one."""
+        return self
+
     def of(self, noise: Noise, p: float) -> Self:
         """The functions for a noise, which may be of a problem close by, with the tilt for p; no tables are kept."""
         return replace(self, noise=noise, **({"p": p} if self.slope else {}))
@@ -157,6 +161,9 @@ class CountedAxis(NoiseAxis):
     @cached_property
     def cells(self) -> IntArray:
         return np.zeros(self.size, dtype=int)
+
+    def of_degree(self, count: int) -> Self:
+        return replace(self, count=count)
 
     def enriched(self) -> Self:
         return replace(self, count=self.count + max(3, self.count // 8))

@@ -11,8 +11,8 @@ import numpy as np
 from fpsolve.analysis.sensitivity import Sensitivities, solve_sensitivities
 from fpsolve.analysis.spreads import Spread
 from fpsolve.errors import FpsolveError, NoSuchExponent, NotConverged
-from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.error import Estimate
+from fpsolve.exponent.method import Budget
 from fpsolve.exponent.solver import solver_of
 from fpsolve.measured.fit import NoiseFit
 from fpsolve.messages import Code, Message
@@ -70,13 +70,13 @@ def verdict(
     name = LYAPUNOV_EXPONENT.name
 
     def moment() -> Spread:
-        if even := solver.even(2.0):
+        if even := solver.method.even(2.0):
             progress()
             return _spread(even.value, even.error, {key: even.slope(key)[0] for key in keys}, fit, keys)
         found = solver.solution(2.0)
         progress()
         slopes = _slopes(solve_sensitivities(solver, np.array([2.0]), along, indices=[], progress=progress))
-        return _spread(found.pair.value, found.error, _values(slopes.moments[0]), fit, keys)
+        return _spread(found.value, found.error, _values(slopes.moments[0]), fit, keys)
 
     def exponent() -> Spread:
         found = solver.lyapunov_exponent()

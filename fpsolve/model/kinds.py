@@ -8,7 +8,6 @@ from importlib import import_module
 from typing import Any, Literal
 
 from fpsolve.model.noise import Noise
-from fpsolve.model.parameters import Parametrised
 from fpsolve.model.plane import System
 
 SYSTEMS: Mapping[str, str] = {
@@ -45,11 +44,6 @@ def kind_classes(room: Literal["systems", "noises"]) -> tuple[type[Any], ...]:
     """The classes of all kinds, with their variants."""
     kinds = map(system_kind, SYSTEMS) if room == "systems" else map(noise_kind, NOISES)
     return tuple(each for kind in kinds for each in (kind, *kind.variants))
-
-
-def is_ours(half: Parametrised) -> bool:
-    """Whether a system or a noise is of one of these kinds itself, and not of a class that is derived from it."""
-    return type(half) in (*kind_classes("systems"), *kind_classes("noises"))
 
 
 @cache

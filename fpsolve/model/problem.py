@@ -12,11 +12,10 @@ from textwrap import wrap
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from fpsolve.arrays import ROUNDED, FloatArray, real_numbers, shown
+from fpsolve.arrays import ROUNDED, FloatArray, shown
 from fpsolve.data import plain_unit, written
-from fpsolve.errors import NoSuchExponent
 from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.expressions import TIME
 from fpsolve.model.frame import Frame, own_frame
@@ -45,20 +44,10 @@ from fpsolve.model.subsystem import Subsystem, components, couplings, hidden_blo
 
 RATE = "1/time"
 """Unit of ξ for which the units of parameters of noises are stated."""
-MOST_BY_DIRECTIONS = 4
-"""Largest number of variables of which functions of a direction are discretised."""
 PHASES = 360
 """Number of φ at which the direction of the phase is looked at."""
 RTOLS = {"gt": 1e-13, "lt": 1}
 """The range of rtol."""
-RTOL = 1e-8
-"""Relative error that is wanted of two variables where a case names none."""
-RTOL_OF_SEVERAL = 1e-6
-"""Relative error that is wanted of two variables under two noises that are not white."""
-RTOL_BEYOND_PLANE = 1e-5
-"""Relative error that is wanted of three and four variables."""
-RTOL_AT_STOP = 1e-3
-"""Relative error that is wanted of four variables with a stop, where T is a root."""
 SUPPORT = np.linspace(-12, 12, 2401)
 """Values of ξ at which a coefficient is looked at that is no a + bξ, in standard deviations."""
 OF_ENTRIES = 1e-15
@@ -227,30 +216,6 @@ class Problem:
         """The noise, or of several those that have values; where all are white, the first of them."""
         return self.noise if len(self.noise.parts) == 1 else self.noise.coloured  # type: ignore[attr-defined]
 
-    @property
-    def usual_rtol(self) -> float:
-        """The relative error that is wanted where none is named."""
-        if self.dimension > 2:
-            return RTOL_BEYOND_PLANE if self.system.stop is None else RTOL_AT_STOP
-        return RTOL_OF_SEVERAL if len(self.coloured.parts) > 1 else RTOL
-
-    @property
-    def no_picture(self) -> str:
-        """Why functions of it cannot be drawn; empty where they can, of more than two variables over directions."""
-        if self.is_closed_only:
-            return "functions of the directions of so many variables are not computed; look at Λ(2)"
-        if self.dimension > 2:
-            return ""
-        if len(self.coloured.parts) > 1:
-            several = "an eigenfunction of the phase and of several noises that are not white cannot be drawn"
-            return f"{several}; make all of these noises white but one"
-        if self.coloured.is_drawn:
-            return ""
-        return (
-            f"{self.coloured.kind} noise is no Markov process by itself, so that an eigenfunction is not a function of "
-            "phase and noise, which could be drawn; look at Λ(p), or at densities of a simulation"
-        )
-
     def named_noise(self, name: str) -> Noise:
         """The noise that terms name so; with one noise that one, whatever its name."""
         return self.noise.parts.get(name, self.noise)
@@ -343,25 +308,6 @@ class Problem:
         rays = self._resting
         return rays if self.frame is None or not rays else tuple((self.frame.own_phase(rays) % math.pi).tolist())
 
-    @cached_property
-    def is_closed_only(self) -> bool:
-        """Whether Λ(p) is found for even p > 0 alone, from closed equations of moments: directions are too many, or
-        impulses move them, or the state is that of a whole delay, with p = 2 alone.
-        """
-        is_large = bool(self.system.pasts) or self.dimension > MOST_BY_DIRECTIONS
-        is_large = is_large or (self.system.stop is not None and self.dimension < MOST_BY_DIRECTIONS)
-        return is_large or (self.dimension > 2 and bool(self._moved.impulses))
-
-    @property
-    def method(self) -> str:
-        """What its numbers come from."""
-        return "closed equations of moments" if self.is_closed_only else "finite elements"
-
-    @property
-    def is_simulated_only(self) -> bool:
-        """Whether no Λ(p) is computed at all, as at a wall where there are no elements."""
-        return self.is_closed_only and self.system.stop is not None
-
     @property
     def unit_rate(self) -> float:
         """Its own unit of rates: ω or the size of the order 0, or of all where there is none."""
@@ -421,8 +367,6 @@ class Problem:
         show more, if there are any. Of two variables ‖x‖ on the first of the `invariant_rays`, and on the second one,
         or else the distance from the first.
         """
-        if self.is_closed_only:
-            return ()
         if self.dimension > 2:
             matrices, n, stop = self._by_noise(self.system.terms), self.dimension, self.system.stop
             basis, rounded, names, pattern = np.eye(n), 0.0, self.system.states, np.sum(np.abs(matrices), axis=0)
@@ -450,14 +394,6 @@ class Problem:
     def classes(self) -> tuple[Problem, ...]:
         """The `blocks`, each with the noises that drive it."""
         return tuple(Problem(block, self._noise_of(block)) for block in self.blocks)
-
-    @property
-    def block_names(self) -> tuple[str, ...]:
-        """The blocks as sentences have them: "(x, v)", "along the ray at phi = 1.5708"."""
-        if not (rays := self.invariant_rays):
-            return tuple(f"({', '.join(block.names)})" for block in self.blocks)
-        sides = [("along", phase) for phase in rays] + [("across", rays[0])]
-        return tuple(f"{side} the ray at phi = {phase:.6g}" for side, phase in sides[: len(self.blocks)])
 
     def _noise_of(self, system: System) -> Noise:
         """The noises that drive a part of the system; the first one where none does."""
@@ -508,13 +444,6 @@ class Problem:
     def has_algebraic_tails(self) -> bool:
         """Whether the noise that moves the state has such tails, so that no Λ(p), p ≠ 0, is computed."""
         return self.noise.has_algebraic_tails and self.is_driven
-
-    @property
-    def moments(self) -> tuple[float, float]:
-        """The p for which Λ(p) is computed, as a closed interval."""
-        if self.has_algebraic_tails:
-            return 0.0, 0.0
-        return (0.0 if len(self.blocks) > 1 and self.is_driven else -math.inf), math.inf
 
     @property
     def sections(self) -> Mapping[str, Parametrised]:
@@ -693,62 +622,16 @@ def checked_problem(problem: object) -> Problem:
     raise TypeError(f"got problem = {shown(problem)}; {remedy}")
 
 
-def tails_refused(problem: Problem, what: str) -> Message | None:
-    """Why a quantity other than λ and what is at p = 0 is not computed for noise with algebraic tails; None for others.
+def infinite(problem: Problem, p: float, symbol: str = "") -> Message | None:
+    """Why there is no finite Λ(p), at p = 0 no λ: algebraic tails of the noise, or jumps on a ray that is never left.
 
     Args:
         problem: a motion and its noise.
-        what: the symbol of the quantity, or its name.
+        p: the moment.
+        symbol: what the number is called; that of Λ(p) if none is given.
     """
-    return Message(Code.TAILS, what=what, remedy=Remedy.REDUCTION) if problem.has_algebraic_tails else None
-
-
-def refuse_tails(problem: Problem, what: str) -> None:
-    """Refuse such a quantity. Raises `NoSuchExponent`."""
-    if told := tails_refused(problem, what):
-        raise NoSuchExponent(told)
-
-
-def even_only(problem: Problem, what: str) -> Message | None:
-    """Why a quantity other than Λ(p) of even p > 0, or p = 2, is not computed where that is all: `is_closed_only`."""
-    if not problem.is_closed_only:
-        return None
-    if problem.system.stop is not None:
-        return Message(Code.WALL_SIMULATED, what=what, remedy=Remedy.SIMULATION)
-    if problem.system.pasts:
-        return Message(Code.DELAY_ONLY, what=what, remedy=Remedy.SIMULATION)
-    count = problem.dimension
-    is_struck = count <= MOST_BY_DIRECTIONS
-    return Message(Code.EVEN_ONLY, what=what, count=count, is_struck=is_struck, remedy=Remedy.SIMULATION)
-
-
-def refuse_infinite(problem: Problem, p: float) -> None:
-    """Refuse a p for which E‖x‖^p is infinite, or not computed.
-
-    Raises:
-        NoSuchExponent: p ≠ 0, and the noise has algebraic tails; or jumps, and the phase never leaves some ray; or p is
-            not even, and the problem `is_closed_only`.
-    """
-    if problem.is_closed_only or problem.has_algebraic_tails:
-        symbol = moment_at(p).symbol if p else "λ"
-        is_closed = p == 2 if problem.system.pasts else p > 0 and p % 2 == 0 and problem.system.stop is None
-        if not is_closed and (told := even_only(problem, symbol)):
-            raise NoSuchExponent(told)
-        if p:
-            refuse_tails(problem, symbol)
-    if problem.invariant_rays and any(jump.log_factor for jump in problem.motion.jumps):
-        raise NoSuchExponent(Message(Code.INVARIANT_RAY, p=p, phase=problem.invariant_rays[0]))
-
-
-def negative_refused(problem: Problem) -> Message:
-    """Why Λ(p) for p < 0 is not computed where a problem has several `blocks`."""
-    return Message(Code.NEGATIVE_OF_SEVERAL, parts=problem.block_names)
-
-
-def checked_moments(p: ArrayLike, problem: Problem, *, may_be_empty: bool = False) -> FloatArray:
-    """p as an array of shape (n,), every one finite and with a finite Λ(p). Raises `ValueError`, `NoSuchExponent`."""
-    points = real_numbers(p, "p", may_be_empty=may_be_empty)
-    checked_problem(problem)
-    for point in points:
-        refuse_infinite(problem, float(point))
-    return points
+    if p and problem.has_algebraic_tails:
+        return Message(Code.TAILS, what=symbol or moment_at(p).symbol, remedy=Remedy.REDUCTION)
+    if any(jump.log_factor for jump in problem.motion.jumps) and (rays := problem.invariant_rays):
+        return Message(Code.INVARIANT_RAY, p=p, phase=rays[0])
+    return None

@@ -17,12 +17,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fpsolve.arrays import FloatArray, is_whole, one, shown
-from fpsolve.budget import counted
 from fpsolve.data import Quantity, Result, dataset
 from fpsolve.drawing import canvas_of, draw_line, draw_plane, finish
 from fpsolve.errors import FpsolveError
-from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.error import Estimate
+from fpsolve.exponent.method import Budget
 from fpsolve.exponent.quantities import lyapunov_exponent, stability_index
 from fpsolve.messages import Code, Message
 from fpsolve.model.problem import Problem, checked_problem
@@ -228,7 +227,7 @@ def stationary_response(problem: Problem, *, rtol: float = 1e-6, budget: Budget 
     budget = budget or Budget()
     rate, index = _linear(problem, budget)
     search = Search(Flow(problem), -index, rate, _numbers, rtol)
-    with counted(budget.countdown("the stationary response")):
+    with budget.meter().running():
         settled, found, errors = search.settled()
     scales = np.append(np.abs(found[:-1]), rate)
     errors[-1] *= AT_ONE_PHASE

@@ -349,7 +349,7 @@ def _draw_few(axes: Any, case: Case, series: Sequence[Series], equation: str) ->
         axes.plot(item.line_x, item.line_y, color=colour, linestyle=line)
         axes.plot(item.x, item.y, linestyle="none", markevery=item.every, **hollow)
         axes.plot([], [], linestyle=line, label=legend(item.varied, case.about), **hollow)
-    words = case.problem.method + " (not all marked)" * any(item.every > 1 for item in series)
+    words = case.method.name + " (not all marked)" * any(item.every > 1 for item in series)
     axes.plot([], [], "o", markerfacecolor="none", label=words, **_GREY)
     if any(np.any(np.isfinite(item.line_y)) for item in series):
         axes.plot([], [], "-", label=f"perturbation, Eq. {equation}", **_GREY)

@@ -21,7 +21,6 @@ from fpsolve.analysis.directions import (
     settled_directions,
 )
 from fpsolve.arrays import FloatArray
-from fpsolve.budget import counted
 from fpsolve.case.case import Case, Curve
 from fpsolve.data import Quantity, dataset
 from fpsolve.drawing import Format, figure_for
@@ -81,7 +80,7 @@ def _solve(job: Job, settings: Settings) -> tuple[Message, ...]:
 
 
 def _at(solver: ExponentSolver, pair: PrincipalPair) -> SettledDirections:
-    with counted(solver.budget.countdown(f"the density of directions at p = {pair.p:g}")):
+    with solver.meter.running():
         return settled_directions(pair)
 
 

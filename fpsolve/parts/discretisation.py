@@ -5,6 +5,8 @@ from __future__ import annotations
 from functools import partial
 from typing import Any
 
+import numpy as np
+
 from fpsolve.case.case import Case
 from fpsolve.model.quantity import LYAPUNOV_EXPONENT, MOMENT
 from fpsolve.parts.part import Job, Part, Settings, attempt
@@ -16,14 +18,13 @@ def _settings(case: Case, number: int) -> Settings:
 
 
 def _solve(job: Job, settings: Settings) -> dict[str, Any]:
-    """z in noise units; nothing where no p was solved. One is solved where all numbers are from an earlier run."""
-    if job.curve.problem.is_closed_only:
-        return {}
-    known = job.solver.whole.known
+    """z in noise units; nothing where no p is by elements. One is solved where all numbers are from an earlier run."""
+    known = job.solver.method.spaces
     if not known:
-        has_moment = settings["p"] in job.found(MOMENT.name).columns.p
-        if has_moment or job.found(LYAPUNOV_EXPONENT.name):
-            attempt(partial(job.solver.solution, settings["p"] if has_moment else 0.0), "")
+        found = job.found(MOMENT.name).columns
+        has_pair = settings["p"] in found.p[np.isfinite(found.residual)]  # by elements
+        if has_pair or job.found(LYAPUNOV_EXPONENT.name):
+            attempt(partial(job.solver.solution, settings["p"] if has_pair else 0.0), "")
     p = max(known, key=abs, default=None)
     if p is None:
         return {}

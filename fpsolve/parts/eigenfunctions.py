@@ -66,7 +66,7 @@ def shown_of(case: Case, number: int) -> Settings | None:
     """The p that are shown of a curve, of the first also unasked, and whether its stationary density goes with them."""
     is_named = case.output.asks_for_eigenfunctions
     p = case.shown.tolist() if is_named or number == 1 else []
-    has_density = is_named and not case.problem.no_picture and (number == 1 or bool(p))
+    has_density = is_named and not case.method.no_picture and (number == 1 or bool(p))
     return {"p": p, "density": has_density} if p or has_density else None
 
 
@@ -92,7 +92,7 @@ def _solve(job: Job, settings: Settings) -> tuple[Message, ...]:
             stationary_density(stationary)
     except NotConverged as failure:
         stationary = None
-        said.append(Message(Code.NOTHING_DRAWN, reason=failure.reason, remedy=job.solver.refinement))
+        said.append(Message(Code.NOTHING_DRAWN, reason=failure.reason, remedy=job.solver.method.refinement))
     for pair in () if said else known:
         limits = {
             "T": (pair.sign_defects[0], UNRESOLVED),

@@ -12,11 +12,11 @@ import numpy as np
 from fpsolve.case.case import Case, Curve
 from fpsolve.case.sections import OF_MOMENTS
 from fpsolve.data import Quantity
-from fpsolve.errors import NoSuchExponent
+from fpsolve.exponent.blocks import InvariantClass
 from fpsolve.exponent.error import Failure, Moment, digits
-from fpsolve.exponent.solver import InvariantClass, solve_moments
+from fpsolve.exponent.solver import solve_moments
 from fpsolve.messages import Code, Message
-from fpsolve.model.problem import Problem, refuse_infinite
+from fpsolve.model.problem import Problem
 from fpsolve.model.quantity import LYAPUNOV_EXPONENT, MOMENT, OVER_P
 from fpsolve.page.page import Column, Grid
 from fpsolve.parts.intervals import INTERVAL, spreads_of
@@ -58,7 +58,7 @@ def _settings(case: Case, number: int) -> Settings:
 def _solve(job: Job, settings: Settings) -> Moments:
     """Λ(p), with errors of Λ′(p) if `slopes` says so, and with Λ′ that take a solve of their own if `every_slope`."""
     problem, has_slopes = job.curve.problem, settings["slopes"]
-    refused = _refused(problem, settings["p"])
+    refused = {p: told for p in settings["p"] if (told := job.solver.method.reason(p))}
     for _ in refused:
         job.advance()
     computed = [p for p in settings["p"] if p not in refused]
@@ -81,17 +81,6 @@ def _solve(job: Job, settings: Settings) -> Moments:
         tuple(found.warnings),
         tuple(note for note in notes if note is not None),
     )
-
-
-def _refused(problem: Problem, p: Sequence[float]) -> dict[float, Message]:
-    """The p of a set of a sweep of which there is no Λ(p), as for other sets, and why."""
-    found = dict[float, Message]()
-    for each in p:
-        try:
-            refuse_infinite(problem, each)
-        except NoSuchExponent as failure:
-            found[each] = failure.message
-    return found
 
 
 def unfinished(problem: Problem, begun: Mapping[float, Moment]) -> Moments:
@@ -169,7 +158,9 @@ def _said_of_classes(classes: Sequence[InvariantClass], curve: Curve, numerics: 
     problem, rates = curve.problem, [each.lyapunov_exponent.value for each in classes]
     if classes[0].phase is None:
         is_hidden = not set(classes[0].variables) <= set(problem.system.states)
-        yield Message(Code.BLOCKS, blocks=problem.block_names, is_hidden=is_hidden, rates=rates)
+        yield Message(
+            Code.BLOCKS, blocks=[f"({', '.join(each.variables)})" for each in classes], is_hidden=is_hidden, rates=rates
+        )
     else:
         along, across = rates
         yield Message(Code.INVARIANT_CLASSES, phase=classes[0].phase, along=along, across=across)

@@ -13,8 +13,8 @@ from typing import Any, Literal
 from fpsolve.case.case import Case, Curve
 from fpsolve.data import Quantity
 from fpsolve.errors import FpsolveError
-from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.error import Moment
+from fpsolve.exponent.method import Budget
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import Code, Message, Remedy
@@ -121,6 +121,7 @@ class Job:
 
     Attributes:
         pictures: what is drawn and not recorded, by the names of parts.
+        meter: of all numbers of the curve.
     """
 
     def __init__(
@@ -135,6 +136,7 @@ class Job:
         self.curve, self.numerics = curve, numerics
         self.entries, self.begun = dict(entries or {}), dict(begun or {})
         self.pictures: dict[str, Any] = {}
+        self.meter = numerics.budget.meter()
         self._progress, self._keep, self._kept_at = progress, keep, monotonic()
 
     @cached_property

@@ -16,8 +16,9 @@ from fpsolve.case.case import Case
 from fpsolve.case.sections import RESPONSE
 from fpsolve.data import Quantity
 from fpsolve.drawing import COLOURS, Format, draw_colours, draw_dots, figure_for, label_axes, points
-from fpsolve.exponent.adapt import Budget
 from fpsolve.exponent.error import Estimate
+from fpsolve.exponent.forced import stationary_moments
+from fpsolve.exponent.method import Budget
 from fpsolve.files import write_csv
 from fpsolve.model.noise import Noise
 from fpsolve.model.plane import System
@@ -28,7 +29,6 @@ from fpsolve.parts.part import Job, Part, Settings
 from fpsolve.results.curve import CurveResponse, CurveResult, ResponseDensity, SimulatedCurve
 from fpsolve.results.table import Row, pair
 from fpsolve.results.text import NUMBER_COLUMNS, row_of
-from fpsolve.theory.forced import stationary_moments
 from fpsolve.vtk import field_data, write_between
 
 if TYPE_CHECKING:

@@ -17,10 +17,10 @@ import numpy as np
 from pydantic import Field, model_validator
 from scipy.linalg import cholesky
 
+from fpsolve.exponent.moments import even_moment
+from fpsolve.exponent.powers import moment_form
 from fpsolve.proofs.balls import Balls, ball, balls, inverse, matrix_product, precision, rounded
 from fpsolve.proofs.statement import LinearRecord, Record, SquareMatrix
-from fpsolve.theory.moments import even_moment
-from fpsolve.theory.powers import moment_form
 
 SEARCHES, RIDGE = 3, 1e-10
 """How often the form is sought, first in the variables and then where it is about 1, but for a share of its size."""

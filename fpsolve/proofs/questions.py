@@ -8,7 +8,8 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 
 from fpsolve.errors import NoHierarchy, NotConverged
-from fpsolve.exponent.adapt import Budget
+from fpsolve.exponent.kinds import choose
+from fpsolve.exponent.method import Budget
 from fpsolve.exponent.root import nonzero_root
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.model.problem import Problem
@@ -20,6 +21,8 @@ from fpsolve.theory.perturbation import scale_of
 
 SHARE = 1e-7
 """The width that is sought if none is given, as a share of the scale of what is bounded."""
+BOUND = 0.5
+"""Share of the seconds of a budget for one bound."""
 GUESS_SHARE = 0.25
 """Of the time of a bound, for one of the two guesses of the number."""
 INDEX_WIDTH, WIDENINGS = 1e-6, 4
@@ -77,7 +80,7 @@ def prove(
             that multiple. A coefficient that is a function counts as the a + bξ that its values show.
         p: order of the moment, as it stands.
         width: wanted upper − lower, in 1/time; 1e-7 of the scale of Λ(p) if None.
-        budget: its `seconds` of the processor are for the bounds, all in all; they may take a third more.
+        budget: half of its `seconds` of the processor are for a bound, which may take a third more.
         progress: called after each trial function.
 
     Returns:
@@ -124,8 +127,8 @@ def prove_bounds(
     budget: Budget,
     progress: Callable[[], None] = lambda: None,
 ) -> Enclosure:
-    """Bounds on Λ(p), or on λ where p is None, within the seconds of a budget."""
-    timer, guess = Timer(budget.seconds), None
+    """Bounds on Λ(p), or on λ where p is None, within a share of the seconds of a budget."""
+    timer, guess = Timer(BOUND * budget.seconds), None
     if p is not None and not math.isfinite(p):
         raise ValueError(f"got p = {p}; must be finite")
     check_width(width)
@@ -134,7 +137,7 @@ def prove_bounds(
     if p == 0:
         return trivial(stated)
     for rtol in (1e-8, 1e-3):  # what finite elements find, at a smaller accuracy if need be
-        solver = ExponentSolver(problem, rtol=rtol, budget=replace(budget, seconds=GUESS_SHARE * budget.seconds))
+        solver = ExponentSolver(problem, rtol=rtol, budget=replace(budget, seconds=GUESS_SHARE * timer.seconds))
         with suppress(NotConverged):
             guess = solver.lyapunov_exponent().value if p is None else solver.solution(p).pair.value
             break
@@ -148,7 +151,7 @@ def prove_bounds(
 
 def _of_second_moments(problem: Problem, stated: LinearRecord, p: float | None, width: float | None) -> Enclosure:
     """Bounds on Λ(2) of more than two variables; nothing for other p, or where the form is not positive."""
-    wanted = float(scale_of(problem).moment(2.0)) * SHARE if width is None else width
+    wanted = choose(problem).scale(2.0) * SHARE if width is None else width
     certificate = None
     if p == 2:
         with suppress(NoHierarchy):
@@ -161,12 +164,12 @@ def prove_index(
 ) -> IndexEnclosure:
     """Bounds on δ_p; none where there is none, or where it is not found.
 
-    They may take twice the seconds of a budget, as they need bounds at two p.
+    They may take twice as long, as they need bounds at two p.
     """
     if isinstance(stated, LinearRecord):
         return NO_INDEX
-    timer = Timer(2 * budget.seconds)
-    solver = ExponentSolver(problem, budget=replace(budget, seconds=2 * GUESS_SHARE * budget.seconds))
+    timer = Timer(2 * BOUND * budget.seconds)
+    solver = ExponentSolver(problem, budget=replace(budget, seconds=GUESS_SHARE * timer.seconds))
     try:
         found = nonzero_root(solver)
         if not found:
@@ -183,7 +186,7 @@ def prove_index(
                 seconds = (timer.seconds - timer.elapsed) / left
                 if seconds <= 0:
                     return NO_INDEX
-                most = replace(budget, seconds=seconds)
+                most = replace(budget, seconds=seconds / BOUND)
                 moments.append((p, prove_bounds(problem, stated, p, slope * half / 2, most, progress)))
                 if not moments[-1][1].sign:  # the time is for wider ones
                     break

@@ -19,7 +19,7 @@ import scipy.sparse as sp
 from scipy.special import roots_jacobi
 
 from fpsolve.arrays import FloatArray
-from fpsolve.exponent.adapt import Budget
+from fpsolve.exponent.method import Budget
 from fpsolve.proofs.balls import above, ball, balls, below, precision
 from fpsolve.proofs.basis import OTHERS, Basis, Core, Whole, hermite_table
 from fpsolve.proofs.bounds import LOWER, UPPER, Bounder, Bounds, HeldBounds, Trial

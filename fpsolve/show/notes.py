@@ -79,7 +79,7 @@ def left_out(case: Case, *, monte_carlo: bool) -> Iterator[Note]:
     told = list[str]()
     if monte_carlo and case.figure.y == STABILITY_INDEX.name:
         told.append("a simulation gives no stability index, so that the figure has no dots")
-    if case.output.asks_for_eigenfunctions and (why := case.problem.no_picture):
+    if case.output.asks_for_eigenfunctions and (why := case.method.no_picture):
         told.append(f"no eigenfunctions are written: {why}")
     if case.leaves_out_response:
         why = f"no stationary response is computed, as there are more than {MOST_DRAWN} curves"

@@ -389,8 +389,7 @@ def _settling(
         values = np.log(np.linalg.eigvals(turn).astype(complex)) / (h * _PARTS)
     else:
         values = np.linalg.eigvals(rates)
-    first = int(np.argmax(values.real))
-    rate = float(np.min(np.abs(np.delete(values, first) - values[first].real)))
+    rate = float(np.sort(abs(values - values.real.max()))[1])  # the nearest is real; others may be as far to the right
     return min(_FORGOTTEN / rate if rate else math.inf, _LONGEST * half_turn)
 
 

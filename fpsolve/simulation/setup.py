@@ -9,11 +9,11 @@ from typing import Literal, get_args
 import numpy as np
 
 from fpsolve.arrays import FloatArray, is_whole, real_numbers, shown
-from fpsolve.errors import FpsolveError
+from fpsolve.errors import FpsolveError, NoSuchExponent
 from fpsolve.model.noise import Noise
 from fpsolve.model.noises.clock import waves_apart
 from fpsolve.model.plane import SAME_DELAY, System, affine, common_delay, written_coefficient
-from fpsolve.model.problem import Problem, checked_problem, refuse_infinite
+from fpsolve.model.problem import Problem, checked_problem, infinite
 from fpsolve.simulation.coefficients import ROUGHER, SplitCoefficients, coefficients
 
 Estimator = Literal["direct", "population"]
@@ -70,8 +70,9 @@ def check_settings(problem: Problem, p: float | Sequence[float], estimator: Esti
     if not (problem.noise.is_white or math.isfinite(problem.noise.standard_deviation)):
         raise ValueError("got a noise of infinite variance; must be finite, as for r0 < 5/3")
     orders = real_numbers(p, "p", may_be_empty=True)
-    for order in () if problem.is_closed_only else orders:  # where paths know more than equations
-        refuse_infinite(problem, order)
+    for order in orders.tolist():
+        if told := infinite(problem, order):
+            raise NoSuchExponent(told)
     is_possible = is_whole(paths, BATCHES, MAX_PATHS) and is_whole(seed, 0)
     if estimator not in get_args(Estimator) or not is_possible:
         raise ValueError(

@@ -15,13 +15,16 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from fpsolve.budget import begin
 from fpsolve.case.case import Case, Curve
 from fpsolve.case.refusals import obstacle
 from fpsolve.case.sections import Varied
 from fpsolve.exponent.error import Failure, Moment
+from fpsolve.exponent.kinds import choose
 from fpsolve.exponent.quantities import INDICES
 from fpsolve.messages import Code, Message, Severity, message_of
 from fpsolve.model.problem import Problem
+from fpsolve.model.quantity import LYAPUNOV_EXPONENT
 from fpsolve.parts.every import BY_NAME, PARTS
 from fpsolve.parts.moments import CLASSES, Moments, unfinished
 from fpsolve.parts.moments import PART as MOMENTS
@@ -79,24 +82,31 @@ def solve_curve(
         keep: takes the job as it grows, every `SOON` seconds at most, and when the work is interrupted.
     """
     job = Job(curve, numerics, entries, begun, progress, keep)
-    solved = dict[str, Entry]()
+    solved, planned = dict[str, Entry](), [part for part in PARTS if part.symbol and part.name in asked]
+    job.meter.planned = len(asked[MOMENTS.name]["p"]) + len(planned)
     try:
-        for part in PARTS:
-            is_known = part.name in job.entries
-            if part.solve is None or part.name not in asked or (is_known and not part.is_drawn):
-                continue
-            started = process_time()
-            found = attempt(partial(part.solve, job, asked[part.name]), part.symbol)
-            if is_known:  # it was drawn again, and its numbers stay as they are
-                continue
-            is_missing = isinstance(found, Reason)
-            seconds = process_time() - started
-            job.entries[part.name] = solved[part.name] = Entry(
-                None if is_missing else found, found if is_missing else None, seconds
-            )
-            if part is MOMENTS and is_missing:  # nor will there be anything else
-                break
-            job.grow()
+        with job.meter.running():
+            if MOMENTS.name not in job.entries:  # moments of even order take little
+                attempt(lambda: [job.solver.method.even(p) for p in asked[MOMENTS.name]["p"]], MOMENTS.symbol)
+            first = [BY_NAME[LYAPUNOV_EXPONENT.name]] if choose(curve.problem).is_dear(0.0) else []
+            for part in dict.fromkeys((*first, *PARTS)):
+                is_known = part.name in job.entries
+                if part.solve is None or part.name not in asked or (is_known and not part.is_drawn):
+                    continue
+                if part is not MOMENTS:
+                    begin(part.symbol)
+                started = process_time()
+                found = attempt(partial(part.solve, job, asked[part.name]), part.symbol)
+                if is_known:  # it was drawn again, and its numbers stay as they are
+                    continue
+                is_missing = isinstance(found, Reason)
+                seconds = process_time() - started
+                job.entries[part.name] = solved[part.name] = Entry(
+                    None if is_missing else found, found if is_missing else None, seconds
+                )
+                if part is MOMENTS and is_missing:  # nor will there be anything else
+                    break
+                job.grow()
     except KeyboardInterrupt:
         job.keep()
         raise

@@ -1,10 +1,5 @@
-from .forced import StationaryMoments as StationaryMoments
-from .forced import stationary_moments as stationary_moments
 from .frozen import FrozenNoise as FrozenNoise
 from .frozen import frozen_noise as frozen_noise
-from .moments import EvenMoment as EvenMoment
-from .moments import even_moment as even_moment
-from .moments import hierarchy_exponent as hierarchy_exponent
 from .perturbation import Scale as Scale
 from .perturbation import SecondOrder as SecondOrder
 from .perturbation import first_order_eigenfunction as first_order_eigenfunction

@@ -279,10 +279,6 @@ def scale_of(problem: Problem) -> Scale:
             typical = np.asarray(term.g(noise.mean + noise.standard_deviation * np.array([-1.0, 1.0])))
             driven = size * float(np.sqrt(np.mean(typical**2)))
         of_noises[term.noise] = of_noises.get(term.noise, 0.0) + driven
-    if problem.is_closed_only:  # the size of the noise is that of what it does to the fastest modes
-        now = len(steady) - len(problem.system.pasts)
-        abscissa = abs(float(np.max(np.linalg.eigvals(steady[:now, :now]).real)))
-        return Scale(abscissa or problem.unit_rate, 0.0)
     jumps = sum(abs(jump.log_factor) for jump in system.jumps) * problem.unit_rate / math.pi
     driven = 0.0
     for name, size in of_noises.items():

@@ -14,7 +14,6 @@ from fpsolve.case.remedies import CASE_WORDS
 from fpsolve.errors import FpsolveError, NotConverged, WorkersDied
 from fpsolve.files import writable
 from fpsolve.messages import Code, Message
-from fpsolve.model.problem import even_only
 from fpsolve.pool import Pool, cluster, parallel, serial
 from fpsolve.results.curve import CurveResult, SimulatedCurve
 from fpsolve.show import results
@@ -128,7 +127,7 @@ def run_case(
         FpsolveError: a curve cannot be simulated, or only that; nothing is solved.
         KeyboardInterrupt: a curve was being solved, or nothing was simulated yet; its text says what is kept.
     """
-    if case.problem.is_simulated_only and (refused := even_only(case.problem, "Λ(p)")):
+    if not case.method.is_computed and (refused := case.method.reason(0.0, "Λ(p)")):
         raise FpsolveError(f"{case.path}: {refused.words(CASE_WORDS)}")
     if monte_carlo:
         refuse_obstacles(case)

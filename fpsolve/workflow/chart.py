@@ -18,13 +18,15 @@ import numpy as np
 from fpsolve.analysis.regions import P_BIFURCATIONS, Region, Regions, regions
 from fpsolve.analysis.scan import Row, Sample, ScannedRow, scan_row
 from fpsolve.analysis.stability import Boundary, begun, crossed, is_of_line
-from fpsolve.analysis.zero import Axis, Zero, is_dear, line_of_value
+from fpsolve.analysis.target import Target, line_of_value
+from fpsolve.analysis.zero import Axis
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case
 from fpsolve.case.sections import ChartSection
 from fpsolve.data import short_names
 from fpsolve.drawing import COLOURS, Format, figure_for, label_axes, scale_axis
 from fpsolve.errors import FpsolveError, NoPerturbationTheory
+from fpsolve.exponent.kinds import choose
 from fpsolve.files import writable, write_csv, write_json
 from fpsolve.messages import Code, Message, message_of
 from fpsolve.model.problem import Problem
@@ -67,9 +69,9 @@ class Chart:
     """What a case says of stability in a plane of two parameters.
 
     Attributes:
-        lines: one for each entry of `zero` that is begun, in their order.
-        closed_forms: for each entry of `zero` the branches of its closed form, Eqs. (38)-(39), each of shape (n, 2), in
-            the parameters themselves.
+        lines: one for each entry of `lines` that is begun, in their order.
+        closed_forms: for each of them the branches of its closed form, Eqs. (38)-(39), each of shape (n, 2), in the
+            parameters themselves.
         regions: once all lines are traced.
         complete: whether they are, none stopped by the budget.
     """
@@ -93,8 +95,8 @@ class Chart:
             reasons = (text for trace in line.traces for text in trace.obstacles)
             ends = dict.fromkeys(each for each in reasons if each not in line.obstacles)
             holes = [each for each in line.scan.reasons if each not in line.obstacles]
-            found += [Message(Code.LINE_ENDS, line=line.zero.equation, reason=each) for each in ends]
-            found += [Message(Code.HOLES, symbol=line.zero.symbol, reason=each) for each in holes]
+            found += [Message(Code.LINE_ENDS, line=line.target.equation, reason=each) for each in ends]
+            found += [Message(Code.HOLES, symbol=line.target.symbol, reason=each) for each in holes]
         return tuple(message_of(each) for each in found if each)
 
 
@@ -104,7 +106,7 @@ def charted(case: Case) -> ChartSection:
         return case.chart
     raise FpsolveError(
         f'{case.path}: chart: missing; add [chart] with x = {{ key = "oscillator.omega", start = 0.3, '
-        'stop = 5.0 }, y like it, and zero = ["lyapunov_exponent", { moment = 2.0 }]'
+        'stop = 5.0 }, y like it, and lines = ["moment(2) = 0"]'
     )
 
 
@@ -124,10 +126,10 @@ def chart_work(case: Case) -> int:
 
 def dear_lines(case: Case) -> Message | None:
     """What the lines of a chart cost whose points take seconds; None where there are none."""
-    if not (dear := [line for line in begun_lines(case) if is_dear(line.problem, line.zero)]):
+    if not (dear := [line for line in begun_lines(case) if choose(line.problem).is_dear(line.target.order)]):
         return None
     nodes, few = sum(line.nodes**2 for line in dear), round(1 / dear[0].step)
-    equations = [line.zero.equation for line in dear]
+    equations = [line.target.equation for line in dear]
     return Message(Code.DEAR_CHART, lines=equations, nodes=nodes, few=few, many=3 * few)
 
 
@@ -135,7 +137,7 @@ def begun_lines(case: Case) -> list[Boundary]:
     """The lines of a chart, of which nothing is traced."""
     frame, problem = charted(case), case.curve({}).problem
     own: dict[str, Any] = {"step": frame.step, "nodes": frame.nodes, "budget": case.budget}
-    return [begun(zero, frame.x.axis, frame.y.axis, problem, **own) for zero in frame.zero]
+    return [begun(target, frame.x.axis, frame.y.axis, problem, **own) for target in frame.lines]
 
 
 def solve_chart(
@@ -159,7 +161,7 @@ def solve_chart(
     """
     lines = [replace(line, known=known(line)) for line in begun_lines(case)]
     x, y = lines[0].x, lines[0].y
-    chart = Chart((), _closed_forms(lines[0].problem, charted(case).zero, (x, y)) if has_closed_forms else ())
+    chart = Chart((), _closed_forms(lines[0].problem, charted(case).lines, (x, y)) if has_closed_forms else ())
     rows = iter(map(scan_row, [row for line in lines for row in line.rows()]))
     for each in lines:
         done = chart.lines
@@ -171,7 +173,7 @@ def solve_chart(
 
 
 def _closed_forms(
-    problem: Problem, zeros: Sequence[Zero], axes: tuple[Axis, Axis]
+    problem: Problem, targets: Sequence[Target], axes: tuple[Axis, Axis]
 ) -> tuple[tuple[FloatArray, ...], ...]:
     """The lines ε²Λ₂(p)/p = 0 in the parameters themselves, for noise that is reduced as in the paper."""
     from contourpy import contour_generator
@@ -188,8 +190,9 @@ def _closed_forms(
                 continue
             linear[j, i], quadratic[j, i] = theory.lyapunov_exponent, theory.quadratic
     found = []
-    for zero in zeros:
-        values = np.ma.masked_invalid(linear + zero.p * quadratic)
+    for target in targets:
+        ratio = linear + target.order * quadratic
+        values = np.ma.masked_invalid((target.p or 1.0) * ratio - target.level)
         lines: list[FloatArray] = contour_generator(shares, shares, values, line_type="Separate").lines(0.0)  # type: ignore[assignment]
         found.append(tuple(np.stack([x.value(line[:, 0]), y.value(line[:, 1])], axis=1) for line in lines))
     return tuple(found)
@@ -215,7 +218,9 @@ class Points:
     """
 
     def __init__(self, folder: Path, case: Case, line: Boundary) -> None:
-        frame = [repr(each) for each in (line.zero, *(replace(axis, at=()) for axis in (line.x, line.y)), line.budget)]
+        frame = [
+            repr(each) for each in (line.target, *(replace(axis, at=()) for axis in (line.x, line.y)), line.budget)
+        ]
         self._folder = folder.resolve() / LINE_RECORDS
         self._key = key_of(Point, case.curve({}), frame=frame)
         self._found: dict[tuple[float, ...], Sample | Message | None] | None = None
@@ -242,18 +247,18 @@ class Points:
 def write_chart(case: Case, chart: Chart, folder: Path) -> None:
     """Write chart.csv, and chart.json, which says whether all is there."""
     rows = (
-        [line.zero.name, number, *map(float, point), label]
+        [str(line.target), number, *map(float, point), label]
         for line in chart.lines
         for number, branch in enumerate(line.branches, start=1)
         for *point, label in zip(branch.x, branch.y, branch.width, branch.labels, strict=True)
     )
     write_csv(folder / "chart.csv", ["line", "branch", "x", "y", "width", "label"], rows)
-    zeros, frame = charted(case).zero, {"x": charted(case).x.axis, "y": charted(case).y.axis}
+    targets, frame = charted(case).lines, {"x": charted(case).x.axis, "y": charted(case).y.axis}
     keys = [axis.key for axis in frame.values()]
     summary = {
         **head(case),
         "complete": chart.complete,
-        "planned": len(zeros),
+        "planned": len(targets),
         "done": sum(line.complete for line in chart.lines),
         "parameters": {key: value for key, value in case.curve({}).parameters.items() if key not in keys},
         **{
@@ -262,14 +267,14 @@ def write_chart(case: Case, chart: Chart, folder: Path) -> None:
         },
         "lines": [
             {
-                "line": line.zero.name,
-                "equation": line.zero.equation,
-                "appears": _appears(line.zero),
+                "line": str(line.target),
+                "equation": line.target.equation,
+                "appears": _appears(line.target),
                 "rtol": line.rtol,
                 "scan": {
                     "nodes": [line.scan.nodes.size] * 2,
                     "rtol": line.scan_rtol,
-                    "of_value": line_of_value(line.problem, line.zero),
+                    "of_value": line_of_value(choose(line.problem), line.target),
                 },
                 "branches": [
                     {"points": branch.x.size, "closed": branch.closed, "obstacles": list(branch.obstacles)}
@@ -280,8 +285,8 @@ def write_chart(case: Case, chart: Chart, folder: Path) -> None:
             for line in chart.lines
         ],
         "closed_forms": [
-            {"line": zero.name, "equation": "(38)-(39)", "branches": [branch.tolist() for branch in branches]}
-            for zero, branches in zip(zeros, chart.closed_forms, strict=True)
+            {"line": str(target), "equation": "(38)-(39)", "branches": [branch.tolist() for branch in branches]}
+            for target, branches in zip(targets, chart.closed_forms, strict=True)
         ],
         "regions": [
             {"name": each.name, "signs": each.signs, "share": each.share}
@@ -311,7 +316,7 @@ def _draw(case: Case, chart: Chart, paths: Sequence[Path], heading: str) -> None
             scale_axis(axis, side.scale, (side.start, side.stop))
         small = {} if chart.regions is None else _shade(axes, chart.regions, frame, list(chain(*chart.closed_forms)))
         for i, line in enumerate(chart.lines):
-            colour, appears = COLOURS[i % len(COLOURS)], _appears(line.zero)
+            colour, appears = COLOURS[i % len(COLOURS)], _appears(line.target)
             for branch in line.branches:
                 axes.plot(*branch.path, color=colour, linewidth=2)
                 for start, (_, marker) in SPECIAL.items():
@@ -319,7 +324,7 @@ def _draw(case: Case, chart: Chart, paths: Sequence[Path], heading: str) -> None
                     hollow = {"color": colour, "markersize": 7, "markerfacecolor": "white"}
                     axes.plot(branch.x[chosen], branch.y[chosen], marker, **hollow)
             if line.branches:
-                name = f"{line.zero.latex}: {appears}" if appears else line.zero.latex
+                name = f"{line.target.latex}: {appears}" if appears else line.target.latex
                 axes.plot([], [], color=colour, linewidth=2, label=name)
             for points in chart.closed_forms[i]:
                 axes.plot(points[:, 0], points[:, 1], color=colour, **CLOSED_FORM)
@@ -395,17 +400,17 @@ def _room(words: Any, inside: FloatArray) -> tuple[float, float] | None:
     return (float(u) + 0.5) / n, (float(v) + 0.5) / n
 
 
-def _appears(zero: Zero) -> str | None:
+def _appears(target: Target) -> str | None:
     """Which bifurcation a value of δ_p is, if one."""
-    return P_BIFURCATIONS.get(zero.p) if zero.kind == "stability_index" else None
+    return P_BIFURCATIONS.get(target.value) if target.kind == "stability_index" else None
 
 
 def show(case: Case, chart: Chart) -> Iterator[Block]:
     """The regions from the largest to the smallest, and the lines with their special points."""
-    zeros = [line.zero for line in chart.lines]
+    targets = [line.target for line in chart.lines]
     yield Sentence("", case.headline)
     for each in () if chart.regions is None else chart.regions.each:
-        yield Sentence(f"{each.share:.1%} of the frame: {each.name}.{region_meaning(each, zeros)}")
+        yield Sentence(f"{each.share:.1%} of the frame: {each.name}.{region_meaning(each, targets)}")
     if chart.lines:
         yield chart_figure(case, chart)
     yield chart_grid(case, chart)
@@ -421,7 +426,7 @@ def chart_grid(case: Case, chart: Chart) -> Grid:
     for line in chart.lines:
         for number, branch in enumerate(line.branches, start=1):
             count = f"{branch.x.size}{', closed' if branch.closed else ''}"
-            grid.rows.append([line.zero.equation, str(number), count, "", "", ""])
+            grid.rows.append([line.target.equation, str(number), count, "", "", ""])
             for i, label in enumerate(branch.labels):
                 if label:
                     for key, name in zip(keys, names, strict=True):
@@ -431,15 +436,15 @@ def chart_grid(case: Case, chart: Chart) -> Grid:
     return grid
 
 
-def region_meaning(region: Region, zeros: Iterable[Zero]) -> str:
+def region_meaning(region: Region, targets: Iterable[Target]) -> str:
     """What becomes in a region of a chart: "Almost every path decays and the mean square grows."."""
     told, signs = list[str](), set[int]()
-    for zero in sorted(zeros, key=lambda each: (each.kind == "moment", each.p)):
-        sign = region.signs.get(zero.name, 0)
-        if sign and zero.kind in ("lyapunov_exponent", "moment"):
-            moment = "the mean square" if zero.p == 2 else f"E‖x‖^{zero.p:g}"
+    for target in sorted(targets, key=lambda each: (each.kind == "moment", each.p)):
+        sign = region.signs.get(str(target), 0)
+        if sign and target.kind != "stability_index" and not target.level:
+            moment = "the mean square" if target.p == 2 else f"E‖x‖^{target.p:g}"
             told.append(
-                f"{moment if zero.kind == 'moment' else 'almost every path'} {'grows' if sign > 0 else 'decays'}"
+                f"{moment if target.kind == 'moment' else 'almost every path'} {'grows' if sign > 0 else 'decays'}"
             )
             signs.add(sign)
     carried = ", which rare paths carry" if len(signs) == 2 and told[0].endswith("path decays") else ""

@@ -8,13 +8,14 @@ from functools import partial
 
 import numpy as np
 
-from fpsolve.analysis.zero import said
+from fpsolve.analysis.target import said
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case, Curve
 from fpsolve.case.sections import RESPONSE, Expectation, Varied
 from fpsolve.data import short_names, written
 from fpsolve.errors import FpsolveError, NoHierarchy
 from fpsolve.exponent.error import digits
+from fpsolve.exponent.moments import hierarchy_exponent, refuse_open_hierarchy
 from fpsolve.exponent.quantities import INDICES
 from fpsolve.messages import Message
 from fpsolve.page.limits import EACH, ROWS
@@ -24,7 +25,6 @@ from fpsolve.parts.part import Numerics, Settings
 from fpsolve.pool import Pool, serial
 from fpsolve.results.curve import CurveResult
 from fpsolve.study.solve import Asked, Order, Solved, batches, solve_batch
-from fpsolve.theory.moments import hierarchy_exponent, refuse_open_hierarchy
 from fpsolve.workflow.folders import ANEW, kept, of_curves, saying_if_interrupted
 from fpsolve.workflow.progress import SETS, SILENT, Phase, Watch
 

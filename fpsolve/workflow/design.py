@@ -8,9 +8,9 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from fpsolve.analysis.inverse import Design, axes_of, units_of
+from fpsolve.analysis.inverse import Design, axes_of, start_and_stop, units_of
 from fpsolve.analysis.inverse import design as nearest_design
-from fpsolve.analysis.target import Target, start_and_stop, target_of
+from fpsolve.analysis.target import Target, target_of
 from fpsolve.analysis.zero import Axis
 from fpsolve.case.case import Case
 from fpsolve.case.remedies import CASE_WORDS
@@ -20,7 +20,6 @@ from fpsolve.errors import FpsolveError
 from fpsolve.exponent.error import Absent, digits
 from fpsolve.files import writable, write_json, write_text
 from fpsolve.messages import Code, Message
-from fpsolve.model.problem import even_only
 from fpsolve.output.tables import head
 from fpsolve.page.page import Block, Column, Grid, Sentence
 from fpsolve.results.text import plural
@@ -92,8 +91,8 @@ def wanted_of(
     problem, ranges = case.problem, list[str | Axis]()
     try:
         wanted = target_of(target)
-        named = {"lyapunov_exponent": "λ", "stability_index": "δ_p"}.get(wanted.kind) or f"Λ({wanted.p:g})"
-        if (named[0] != "Λ" or wanted.p % 2) and (told := even_only(problem, named)):
+        p = wanted.p if wanted.kind == "moment" else 0.0
+        if told := case.method.reason(p, wanted.quantity.symbol):
             raise ValueError(told.words(CASE_WORDS))
         for i, key in enumerate(by):
             if start and stop:

@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
-from fpsolve.budget import Countdown, watched
+from fpsolve.budget import Meter, watched
 from fpsolve.case.case import CHEAP, CHEAP_OF_WALLS, Case, load_case
 from fpsolve.case.refusals import obstacle
 from fpsolve.case.remedies import CASE_WORDS
@@ -34,6 +34,7 @@ from fpsolve.case.vary import Vary
 from fpsolve.data import plain_unit
 from fpsolve.errors import FpsolveError
 from fpsolve.explain import UNBOUNDED, explain
+from fpsolve.exponent.kinds import choose
 from fpsolve.exponent.quantities import INDICES, MOMENT
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.messages import message_of
@@ -94,12 +95,12 @@ class Explorer:
     def __init__(self, case: Case, code: str) -> None:
         first = next(case.curves(0, 1)).problem
         kinds = CHEAP + CHEAP_OF_WALLS * bool(first.system.jumps)
-        coloured, p = first.coloured, case.p
+        coloured, p, method = first.coloured, case.p, choose(first)
         self.moves = first.dimension == 2 and len(coloured.parts) == 1 and coloured.basis != "pairs"
         if not first.has_algebraic_tails:
             more = USUAL_P if p.size < FEW and self.moves else FEWEST_P
-            p = np.union1d(p, more[1:] if first.is_closed_only else more[more >= first.moments[0]])
-        quantities = kinds[:1] if first.is_closed_only else kinds
+            p = np.union1d(p, more[more >= method.interval[0]] if method.has_pairs else more[1:])
+        quantities = kinds if method.has_pairs else kinds[:1]
         self.source, self.code, self.first, self.quantities = case, code, first, quantities
         is_same = np.array_equal(np.sort(case.p), p)
         changed = {"vary": Vary(), "figure": FigureSection(), "uncertain": Uncertain(), "expect": (), "chart": None}
@@ -150,10 +151,10 @@ class Explorer:
         except Exception as failure:
             return {"refused": str(fault(failure))}
 
-    def _wait(self, asked: tuple[str, str], number: float, countdown: Countdown) -> None:
+    def _wait(self, asked: tuple[str, str], number: float, meter: Meter) -> None:
         """Let the page know what it waits for, before the next factorisation."""
         self._look(asked, number)
-        self._so_far.setdefault(asked[0], {})["waits"] = waiting(countdown) if countdown.name else ""
+        self._so_far.setdefault(asked[0], {})["waits"] = waiting(meter) if meter.number else ""
 
     def _look(self, asked: tuple[str, str], number: float) -> None:
         """End what is not wanted any more."""
@@ -345,7 +346,7 @@ class _Moving(Numerics):
             old, new = (np.array([each.values[key] for key in keys], dtype=float) for each in (before.problem, problem))
             is_near = bool(np.all(np.abs(new - old) <= NEAR * np.abs(new)))
             if is_near:
-                found = replace(found, starts=before.known)
+                found = replace(found, starts=before.method.known)
         self.last[:] = [found]
         return found
 
@@ -394,7 +395,7 @@ def explore(problem: Problem | Case | str | Path) -> Explored:
     if isinstance(problem, Case):
         return Explored(Explorer(problem, f"load_case({problem.path.name!r}).problem"))
     own, many = checked_problem(problem), Moments(p=tuple(USUAL_P.tolist()))
-    moments = many if own.dimension == 2 and own.moments[0] < 0 else Moments(p=(2.0,))
+    moments = many if choose(own).is_function and choose(own).interval[0] < 0 else Moments(p=(2.0,))
     make: Any = Case.model_construct  # the other sections are as where none is stated
     case = make(title="", system=own.system, noise=own.noise, moments=moments)
     return Explored(Explorer(case, "problem"))

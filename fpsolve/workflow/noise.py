@@ -20,7 +20,8 @@ from fpsolve.case.remedies import CASE_WORDS
 from fpsolve.case.rewrite import with_noise
 from fpsolve.drawing import COLOURS, figure_for, label_axes, plain_numbers
 from fpsolve.errors import FpsolveError, NotConverged
-from fpsolve.exponent.adapt import Budget
+from fpsolve.exponent.kinds import choose
+from fpsolve.exponent.method import Budget
 from fpsolve.fem.factors import one_thread
 from fpsolve.files import alone, writable, write_json, write_text
 from fpsolve.measured import (
@@ -212,7 +213,7 @@ def measure(data: Spectrum | Record, wanted: Wanted, progress: Callable[[], None
     if system is not None:
         try:
             problem = Problem(system, scaled.noise)
-            rtol, budget = max(problem.usual_rtol, wanted.rtol), Budget(seconds=wanted.seconds)
+            rtol, budget = max(choose(problem).usual_rtol, wanted.rtol), Budget(seconds=wanted.seconds)
             known = verdict(problem, scaled, rtol=rtol, budget=budget, progress=progress)
             found |= {"verdict": known, "failure": known.failure}
         except NotConverged as failure:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
@@ -14,7 +13,7 @@ from rich.progress import BarColumn, Progress, ProgressColumn, Task
 from rich.table import Column
 from rich.text import Text
 
-from fpsolve.budget import Countdown, watched
+from fpsolve.budget import Meter, watched
 from fpsolve.page.page import Block
 
 SETS, MOMENTS, NODES, POINTS, BOUNDS, PERCENT, SOLVES = "sets", "p", "nodes", "points", "bounds", "%", "solves"
@@ -132,11 +131,11 @@ class Bars:
                 print(f"{phase.case}, {phase.name}: {counted(task)}{left}", file=self.console.file, flush=True)
                 printed, printed_at = int(task.completed), self.clock()
 
-        def wait(countdown: Countdown) -> None:
+        def wait(meter: Meter) -> None:
             nonlocal printed_at
-            if not countdown.name or not math.isfinite(countdown.seconds):
+            if not meter.number:
                 return
-            text = waiting(countdown)
+            text = waiting(meter)
             display.update(number, waits=text)
             if not self.is_live and phase.total and self.clock() - printed_at >= LINE_SECONDS:
                 print(f"{phase.case}, {phase.name}: {text}", file=self.console.file, flush=True)
@@ -157,9 +156,10 @@ class Bars:
                 display.stop()
 
 
-def waiting(countdown: Countdown) -> str:
-    """What is solved, and what it waits for: "Λ″(0), 12,400 unknowns, 40 s of 60 s"."""
-    return f"{countdown.name}, {countdown.unknowns:,} unknowns, {countdown.spent:.0f} s of {countdown.seconds:g} s"
+def waiting(meter: Meter) -> str:
+    """Which number is solved, and what is left for it and the others: "Λ″(0), 3 of 5, 12,400 unknowns, 80 s left"."""
+    of = f", {meter.begun} of {meter.planned}" * (meter.planned > 1)
+    return f"{meter.number}{of}, {meter.unknowns:,} unknowns, {max(meter.seconds - meter.spent, 0):.0f} s left"
 
 
 def counted(task: Task) -> str:

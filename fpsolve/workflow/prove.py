@@ -16,7 +16,7 @@ from typing import Any, TypeAlias, cast
 from pydantic import TypeAdapter
 
 from fpsolve import __version__
-from fpsolve.analysis.zero import said
+from fpsolve.analysis.target import said
 from fpsolve.case.case import Case, Curve
 from fpsolve.errors import FpsolveError, NoSuchExponent
 from fpsolve.exponent.quantities import LYAPUNOV_EXPONENT, STABILITY_INDEX

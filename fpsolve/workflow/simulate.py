@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from fpsolve.analysis.zero import said
+from fpsolve.analysis.target import said
 from fpsolve.case.case import Case, Curve
 from fpsolve.case.sections import MonteCarloSection
 from fpsolve.drawing import Format, figure_for

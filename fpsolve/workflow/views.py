@@ -10,7 +10,8 @@ import numpy as np
 from pydantic import ValidationError
 
 from fpsolve.analysis.density import stationary_density, tilted_density
-from fpsolve.analysis.zero import check_axes, said
+from fpsolve.analysis.target import said
+from fpsolve.analysis.zero import check_axes
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case
 from fpsolve.case.sections import ChartSection
@@ -43,11 +44,11 @@ def map_of(case: Case, axes: object, tell: Callable[[Answer], None]) -> Answer:
         axes: two tables such as those of [chart].
         tell: takes what there is so far, of the grid that is searched for a line its rows.
     """
-    zero: list[Any] = [{"moment": 2.0}] if not case.problem.has_algebraic_tails else []
-    zero = zero if case.problem.is_closed_only else ["lyapunov_exponent", *zero]
+    lines = ["moment(2) = 0"] if not case.problem.has_algebraic_tails else []
+    lines = lines if not case.method.has_pairs else ["lyapunov_exponent = 0", *lines]
     x, y = axes if isinstance(axes, list) and len(axes) == 2 else (None, None)
     try:
-        frame = ChartSection.model_validate({"x": x, "y": y, "zero": zero})
+        frame = ChartSection.model_validate({"x": x, "y": y, "lines": lines})
         sides = frame.x.axis, frame.y.axis
         check_axes(case.problem, *sides)
     except ValidationError as failure:
@@ -62,7 +63,7 @@ def map_of(case: Case, axes: object, tell: Callable[[Answer], None]) -> Answer:
             "axes": axes,
             "grid": [*grid],
             "lines": [
-                {"name": line.zero.equation, "branches": [[*map(listed, each.path)] for each in line.branches]}
+                {"name": line.target.equation, "branches": [[*map(listed, each.path)] for each in line.branches]}
                 for line in chart.lines
             ],
             "regions": [
@@ -93,7 +94,7 @@ def field_of(case: Case, p: Any) -> Answer:
     if not is_number(p):
         raise FpsolveError(f"got p = {p!r}; must be a finite number; write, for example, 2")
     problem = case.problem
-    if why := problem.no_picture:
+    if why := case.method.no_picture:
         raise FpsolveError(why)
     solver = Numerics.of(case).solver(problem)
     stationary = solver.pair(0.0)

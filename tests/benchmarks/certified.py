@@ -29,17 +29,10 @@ class CertifiedFourierHermite:
         size: harmonics and Hermite functions that sufficed last; the values are from `larger` ones.
     """
 
-    name = "Fourier-Hermite, certified"
-
     def __init__(self, problem: Problem, tolerance: Callable[[float, float], float]) -> None:
         self.problem, self.tolerance, self.size = problem, tolerance, START
         self._codes: dict[Size, FourierHermite] = {}
         self._solved: set[tuple[Size, float]] = set()
-
-    @property
-    def unknowns(self) -> int:
-        """Of the largest eigenproblem."""
-        return max(code.unknowns for code in self._codes.values())
 
     def moments(self, p: FloatArray) -> FloatArray:
         """Λ at every p."""

@@ -17,14 +17,12 @@ from rich.console import Console
 from rich.table import Table
 from threadpoolctl import threadpool_limits
 
-from fpsolve import ExponentSolver, NonGaussianNoise, Problem, VibroImpactOscillator
-from fpsolve.exponent import solve_moments
+from fpsolve import NonGaussianNoise, Problem, VibroImpactOscillator, moment_lyapunov
 from tests.benchmarks.certified import CertifiedFourierHermite
-from tests.benchmarks.fourier_hermite import FourierHermite
+from tests.benchmarks.fourier_hermite import TUNED, FourierHermite
 from tests.benchmarks.problem import CASES, Case, FloatArray
 from tests.benchmarks.references import REFERENCES
 from tests.oracles.perturbation import moment_scale
-from tests.random_problems import RTOL, problems
 
 FIG1 = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=0.1)
 ALONE = {
@@ -37,7 +35,7 @@ ROUNDS = {"weak": 15, "strong": 5}
 
 def fpsolve_curve(problem: Problem, p: FloatArray, rtol: float) -> FloatArray:
     """Λ at every p."""
-    return solve_moments(ExponentSolver(problem, rtol=rtol), p).value
+    return moment_lyapunov(problem, p, rtol=rtol).value
 
 
 def contenders(case: Case) -> dict[str, Callable[[], FloatArray]]:
@@ -48,7 +46,7 @@ def contenders(case: Case) -> dict[str, Callable[[], FloatArray]]:
 
     return {
         "fpsolve": partial(fpsolve_curve, Problem(case.oscillator, case.noise), case.p, case.rtol),
-        "tuned": lambda: FourierHermite(case.problem, FourierHermite.tuned[case.name]).moments(case.p),
+        "tuned": lambda: FourierHermite(case.problem, TUNED[case.name]).moments(case.p),
         "certified": lambda: CertifiedFourierHermite(case.problem, tolerance).moments(case.p),
     }
 
@@ -65,44 +63,28 @@ def cpu_seconds(functions: Mapping[str, Callable[[], Any]], rounds: int) -> dict
     return best
 
 
-def race(case: Case) -> dict[str, float]:
+def race(case: Case, reference: FloatArray, rounds: int) -> dict[str, float]:
     """CPU time of each contender, all of which must be as accurate as the case demands."""
     functions = contenders(case)
     for name, curve in functions.items():
-        error = case.relative_error(curve(), REFERENCES[case.name])
+        error = case.relative_error(curve(), reference)
         if error > case.rtol:
             raise ArithmeticError(f"{name} misses the accuracy of the {case.name} case: {error:.1e}")
-    return cpu_seconds(functions, ROUNDS[case.name])
-
-
-def random_times() -> dict[str, FloatArray]:
-    """CPU time of each of the 300 random problems, by the treatment of the noise."""
-    times: dict[str, list[float]] = {"reduced": [], "exact": []}
-    with threadpool_limits(1):
-        for problem in problems(300):
-            started = time.thread_time()
-            ExponentSolver(problem.solved, rtol=RTOL).solution(problem.p)
-            kind = "exact" if isinstance(problem.noise, NonGaussianNoise) else "reduced"
-            times[kind].append(time.thread_time() - started)
-    return {name: np.array(values) for name, values in times.items()}
+    return cpu_seconds(functions, rounds)
 
 
 def main() -> None:
     """Print everything."""
     table = Table("33 moments", "fpsolve / ms", "tuned / ms", "certified / ms", "to tuned", "to certified")
     for name, case in CASES.items():
-        found = race(case)
+        found = race(case, REFERENCES[name], ROUNDS[name])
         own = found["fpsolve"]
         ratios = (f"{own / found[peer]:.2f}" for peer in ("tuned", "certified"))
         table.add_row(f"{name}, rtol {case.rtol:g}", *(f"{1e3 * each:.1f}" for each in found.values()), *ratios)
     alone = {name: partial(fpsolve_curve, problem, p, 1e-8) for name, (problem, p) in ALONE.items()}
     for name, seconds in cpu_seconds(alone, 5).items():
         table.add_row(f"{name}, rtol 1e-08", f"{1e3 * seconds:.1f}", *[""] * 4)
-    console = Console(width=110)
-    console.print(table)
-    for name, values in random_times().items():
-        numbers = f"median {1e3 * np.median(values):.1f} ms, longest {1e3 * values.max():.0f} ms"
-        console.print(f"{values.size} random problems, {name} noise: {numbers}, together {values.sum():.2f} s")
+    Console(width=110).print(table)
 
 
 if __name__ == "__main__":

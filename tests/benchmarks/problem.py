@@ -19,16 +19,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fpsolve import NonGaussianNoise, OrnsteinUhlenbeck, VibroImpactOscillator
 from tests.oracles.perturbation import moment_scale
-
-if TYPE_CHECKING:
-    from tests.benchmarks.pencil import Pencil
 
 FloatArray = NDArray[np.float64]
 
@@ -54,16 +50,6 @@ class Problem:
         """β = ε std/2α."""
         return self.epsilon * self.std / (2 * self.alpha)
 
-    def terms(self, y: Any, sin2: Any, cos2: Any, tilt: float) -> tuple[tuple[Any, Any], tuple[Any, Any]]:
-        """(v₀, v₁) and (r₁, r₂) from y, sin 2φ, cos 2φ and β: arrays, or coefficient functions of NGSolve."""
-        h1, q1, gauge = sin2 / 2, (1 - cos2) / 2, self.log_R / math.pi
-        strength = self.epsilon * self.std * y + self.epsilon**2 * self.c1
-        moved = 2 * tilt * self.epsilon * self.std
-        v0 = self.omega + strength * h1
-        r1 = v0 * gauge + strength * q1 - self.alpha * tilt * y
-        r2 = moved * (h1 * gauge + q1) - self.alpha * tilt**2
-        return (v0, moved * h1), (r1, r2)
-
     def bound(self, p: float) -> float:
         """A number right of Λ(p), and of the numerical range of L̃(p) in the inner product weighted by P_s(y).
 
@@ -73,39 +59,6 @@ class Problem:
         F = abs(p) / 2 + math.hypot((p + 1) / 2, p * self.log_R / (2 * math.pi))
         noisy = (self.epsilon * F * self.std) ** 2 / self.alpha
         return p * self.omega * self.log_R / math.pi + noisy + self.epsilon**2 * abs(self.c1) * F + 0.01 * self.omega
-
-
-class Peer:
-    """A method with everything that does not depend on p assembled.
-
-    Attributes:
-        name: what the table calls it.
-        sizes: a ladder of discretisations for each case, from small to large.
-        tuned: the first of them that meets the accuracy of the case, or else the best within the limits, as found
-            by `python -m tests.benchmarks.tune`.
-        pencil: the eigenproblem.
-    """
-
-    name: ClassVar[str]
-    sizes: ClassVar[dict[str, tuple[Any, ...]]]
-    tuned: ClassVar[dict[str, Any]]
-    pencil: Pencil
-
-    def __init__(self, problem: Problem, size: Any) -> None:
-        raise NotImplementedError
-
-    @property
-    def unknowns(self) -> int:
-        """Size of the eigenproblem."""
-        return self.pencil.unknowns
-
-    def moment(self, p: float) -> float:
-        """Λ(p), for one p by itself."""
-        return self.pencil.moment(p)
-
-    def moments(self, p: FloatArray) -> FloatArray:
-        """Λ at every p of a curve, each from those before: faster."""
-        return self.pencil.moments(p)
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,8 @@
 """Λ(p) for even p and a state of any dimension, from the moments of order p: monomials of the state.
 
-E x^a, |a| = p, obey a linear equation, as d/dt x^a = Σ aᵢ x^(a − eᵢ) Aᵢⱼ xⱼ; white noise by B adds half the
-square of the matrix of B, a chain and Ornstein-Uhlenbeck noise have such moments for each state or Hermite polynomial.
+E x^a, |a| = p, obey a linear equation, as d/dt x^a = Σ aᵢ x^(a − eᵢ) Aᵢⱼ xⱼ; white noise by B adds half the square of
+the matrix of B, impulses add rate (exp(matrix of C) − 1), and coloured noises have such moments for each function of
+them. Their rightmost eigenvalue is Λ(p).
 """
 
 from itertools import combinations_with_replacement
@@ -11,7 +12,9 @@ from scipy import sparse
 from scipy.linalg import expm
 from scipy.sparse.linalg import eigs
 
-from tests.oracles.filtered import equations
+from tests.oracles import planar
+
+MOST_DENSE = 700
 
 
 def power(matrix, p):
@@ -28,30 +31,19 @@ def power(matrix, p):
 
 def white(steady, driven, p):
     """Stratonovich, S = 1."""
-    return _largest(power(steady, p) + 0.5 * power(driven, p) @ power(driven, p))
+    return several(steady, [], [(driven, "stratonovich")], p=p)
 
 
 def chain(steady, driven, states, rates, p):
     """A₀ + ξA₁ for a chain; rates[i][j] from i to j, whatever the diagonal is."""
     rates = np.array(rates, dtype=float)
     np.fill_diagonal(rates, 0.0)
-    rates -= np.diag(rates.sum(axis=1))
-    still, moved = power(steady, p), power(driven, p)
-    return _largest(
-        np.kron(rates.T, np.eye(len(still))) + np.kron(np.eye(len(states)), still) + np.kron(np.diag(states), moved)
-    )
+    return several(steady, [(driven, *jumping(states, rates))], p=p)
 
 
 def ornstein_uhlenbeck(steady, driven, alpha, deviation, p, count):
-    """A₀ + ξA₁, ξ = deviation He₁: ξ He_k = deviation (He_{k+1} + k He_{k−1})."""
-    k = np.arange(count)
-    ladder = np.diag(np.sqrt(k[1:]), 1) + np.diag(np.sqrt(k[1:]), -1)
-    still, moved = power(steady, p), power(driven, p)
-    return _largest(
-        np.kron(np.diag(-alpha * k), np.eye(len(still)))
-        + np.kron(np.eye(count), still)
-        + deviation * np.kron(ladder, moved)
-    )
+    """A₀ + ξA₁."""
+    return several(steady, [(driven, *gaussian(alpha, deviation, count))], p=p)
 
 
 def gaussian(alpha, deviation, count):
@@ -61,7 +53,7 @@ def gaussian(alpha, deviation, count):
 
 
 def jumping(states, rates):
-    """Those of a chain by its states; rates[i][j] from i to j."""
+    """Those of a chain by its states; rates[i][j] from i to j, 0 on the diagonal."""
     return np.transpose(rates) - np.diag(np.sum(rates, axis=1)), np.diag(states)
 
 
@@ -74,13 +66,12 @@ def turning(amplitude, nu, sigma, count, is_sine):
 
 
 def filtering(law, count):
-    """Those of a filter (ω, ζ, s, c₀, c₁), by Hermite polynomials of both of its states."""
-    none, one = np.zeros((1, 1)), np.ones((1, 1))
-    own = equations(none, none, law, 2, count, lambda matrix, _: np.asarray(matrix)).toarray()
-    return own, equations(none, one, law, 2, count, lambda matrix, _: np.asarray(matrix)).toarray() - own
+    """Those of a filter (ω, ζ, s, c₀, c₁), by Hermite polynomials of both of its states below a degree."""
+    own, xi = planar.filtered(*law).made(count)
+    return own.T.toarray(), xi.T.toarray()  # of E[m h], the transpose of what moves h
 
 
-def several(steady, coloured, white, impulses, p, near):
+def several(steady, coloured, white=(), impulses=(), p=2, near=None):
     """Λ(p) of ẋ = (A₀ + Σ ξ A) x with A x dW and x⁺ = exp(C) x⁻.
 
     Args:
@@ -89,12 +80,22 @@ def several(steady, coloured, white, impulses, p, near):
         white: A, and "stratonovich" or "ito".
         impulses: rates and C.
         p: even.
-        near: about Λ(p); of more than 1500 equations the eigenvalues next to 0.01 more are looked at.
+        near: about Λ(p), or none; of more than `MOST_DENSE` equations the eigenvalues next to 0.01 more are looked at.
     """
+    total = equations(steady, coloured, white, impulses, p)
+    if near is None or total.shape[0] <= MOST_DENSE:
+        return largest(total.toarray())
+    return float(np.max(eigs(total, 6, sigma=near + 0.01, v0=np.ones(total.shape[0]))[0].real))
+
+
+def equations(steady, coloured, white=(), impulses=(), p=2):
+    """Their sparse matrix, monomials fastest."""
     total = power(steady, p).astype(complex)
     for matrix, sense in white:
         moved = power(matrix, p)
-        total += 0.5 * moved @ moved - (0.5 * power(matrix @ matrix, p) if sense == "ito" else 0.0)
+        total += 0.5 * moved @ moved
+        if sense == "ito":
+            total -= 0.5 * power(np.asarray(matrix) @ np.asarray(matrix), p)
     for rate, matrix in impulses:
         total += rate * (expm(power(matrix, p)) - np.eye(len(total)))
     size = len(total)
@@ -105,10 +106,9 @@ def several(steady, coloured, white, impulses, p, near):
         driven.append(sparse.kron(xi, sparse.kron(one, power(matrix, p))))
         total = sparse.kron(sparse.eye_array(len(own)), total) + sparse.kron(own, sparse.eye_array(total.shape[0]))
     total = sparse.csc_array(sum(driven, total))
-    if total.shape[0] <= 1500:
-        return _largest(total.toarray())
-    return float(np.max(eigs(total, 4, sigma=near + 0.01, v0=np.ones(total.shape[0]))[0].real))
+    return total if np.any(total.data.imag) else total.real
 
 
-def _largest(matrix):
+def largest(matrix):
+    """The largest real part of an eigenvalue."""
     return float(np.max(np.linalg.eigvals(matrix).real))

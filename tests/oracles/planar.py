@@ -77,21 +77,21 @@ def chain(states, rates):
 
 
 def circle(amplitude, nu, sigma):
-    """ξ = amplitude cos θ, dθ = ν dt + σ dW, by 1, √2 cos kθ, √2 sin kθ."""
+    """ξ = amplitude cos θ, dθ = ν dt + σ dW."""
+    return Law(lambda size: waves(amplitude, nu, sigma, 2 + size // 2))
 
-    def made(size):
-        size = 2 + size // 2
-        decay, turn, up = np.zeros(2 * size + 1), np.zeros((2 * size + 1,) * 2), np.zeros((2 * size + 1,) * 2)
-        for k in range(1, size + 1):
-            c, s = 2 * k - 1, 2 * k
-            decay[[c, s]] = -0.5 * (sigma * k) ** 2
-            turn[s, c], turn[c, s] = -nu * k, nu * k
-            if k < size:
-                up[c + 2, c] = up[s + 2, s] = 0.5
-        up[1, 0] = math.sqrt(0.5)
-        return np.diag(decay) + turn, amplitude * (up + up.T)
 
-    return Law(made)
+def waves(amplitude, nu, sigma, size):
+    """(L, ξ) of it on 1, √2 cos kθ, √2 sin kθ, k ≤ size."""
+    decay, turn, up = np.zeros(2 * size + 1), np.zeros((2 * size + 1,) * 2), np.zeros((2 * size + 1,) * 2)
+    for k in range(1, size + 1):
+        c, s = 2 * k - 1, 2 * k
+        decay[[c, s]] = -0.5 * (sigma * k) ** 2
+        turn[s, c], turn[c, s] = -nu * k, nu * k
+        if k < size:
+            up[c + 2, c] = up[s + 2, s] = 0.5
+    up[1, 0] = math.sqrt(0.5)
+    return np.diag(decay) + turn, amplitude * (up + up.T)
 
 
 def filtered(omega, zeta, s, c0, c1):
@@ -124,12 +124,15 @@ class Planar:
         coloured: pairs (A_k, `Law`).
         white: the B_k; Itô's sense is for the caller to turn into this one.
         impulses: (C, rate, the w, how likely each is).
+        log_factor: ln R of a wall at x = 0, that is φ = π/2, where noise does not move φ: T = R^{ps} u, s rising from 0
+            to 1 around the half circle, turns ∂φ into ∂φ + p ln R/π.
     """
 
     drift: np.ndarray
     coloured: tuple = ()
     white: tuple = ()
     impulses: tuple = ()
+    log_factor: float = 0.0
 
     def balanced(self):
         """In the coordinates (x, y/μ) in which the rates are least."""
@@ -150,16 +153,17 @@ class Planar:
             tuple((change(matrix, mu), law) for matrix, law in self.coloured),
             tuple(change(matrix, mu) for matrix in self.white),
             tuple((change(c, mu), *rest) for c, *rest in self.impulses),
+            self.log_factor,
         )
 
     def moved(self, p, modes):
         """What no coloured noise has a part in: its matrix and that of ∂/∂p on the phases."""
-        total, slope = phases(self.drift, p, modes)
+        total, slope = phases(self.drift, p, modes, self.log_factor)
         for matrix in self.white:
-            x, dx = phases(matrix, p, modes)
+            x, dx = phases(matrix, p, modes, self.log_factor)
             total, slope = total + 0.5 * x @ x, slope + 0.5 * (x @ dx + dx @ x)
         for matrix, rate, sizes, shares in self.impulses:
-            struck, longer = jumps(matrix, sizes, shares, p, modes)
+            struck, longer = jumps(matrix, sizes, shares, p, modes, self.log_factor)
             total, slope = total + rate * (struck - np.eye(2 * modes + 1)), slope + rate * longer
         return sparse.csr_array(total), sparse.csr_array(slope)
 
@@ -176,7 +180,7 @@ class Planar:
         total, slope = (sparse.kron(each, ones) for each in self.moved(p, modes))
         constant = np.ones(1)
         for place, ((matrix, law), (own, xi)) in enumerate(zip(self.coloured, laws, strict=True)):
-            x, dx = phases(matrix, p, modes)
+            x, dx = phases(matrix, p, modes, self.log_factor)
             lifted = of_noises(place, xi)
             total = total + sparse.kron(x, lifted) + sparse.kron(one, of_noises(place, own))
             slope = slope + sparse.kron(dx, lifted)
@@ -186,7 +190,7 @@ class Planar:
         return sparse.csc_array(total), sparse.csc_array(slope), np.kron(middle, constant)
 
 
-def phases(matrix, p, modes):
+def phases(matrix, p, modes, log_factor=0.0):
     """X of A and its ∂/∂p on 1, √2 cos 2nφ, √2 sin 2nφ, n ≤ modes."""
     (a, b), (c, d) = np.asarray(matrix, dtype=float)
     count, n = 2 * modes + 1, np.arange(1, modes + 1)
@@ -199,6 +203,7 @@ def phases(matrix, p, modes):
     one, cosine, sine = sparse.eye_array(count, format="csr"), up + up.T, over + over.T
     h = 0.5 * ((b - c) * one - (b + c) * cosine + (d - a) * sine)
     q = 0.5 * ((a + d) * one + (a - d) * cosine - (b + c) * sine)
+    q = q + log_factor / math.pi * h
     # at the highest mode h ∂ + p q leaves these functions but for even p = 2·modes
     return sparse.csr_array(h @ derivative + p * q), sparse.csr_array(q)
 
@@ -209,10 +214,10 @@ def _entries(count, parts):
     return sparse.csr_array((values, (rows, columns)), shape=(count, count))
 
 
-def jumps(matrix, sizes, shares, p, modes):
+def jumps(matrix, sizes, shares, p, modes, log_factor=0.0):
     """⟨|Me|^p u(ψ)⟩, M = exp(wC), and its ∂/∂p, by values at as many even points of φ as there are functions."""
     count = 2 * modes + 1
-    phi = math.pi * (np.arange(count) + 0.25) / count
+    phi = math.pi * (0.5 + (np.arange(count) + 0.25) / count)
 
     def values(at):
         n = np.arange(1, modes + 1)
@@ -223,7 +228,9 @@ def jumps(matrix, sizes, shares, p, modes):
     back, total, slope = values(phi).T / count, 0.0, 0.0
     for size, share in zip(sizes, shares, strict=True):
         x, y = linalg.expm(size * np.asarray(matrix, dtype=float)) @ [np.cos(phi), -np.sin(phi)]
-        logs, moved = np.log(np.hypot(x, y)), values(np.arctan2(-y, x))
+        psi = np.arctan2(-y, x)
+        rise = (np.mod(psi - math.pi / 2, math.pi) - (phi - math.pi / 2)) / math.pi
+        logs, moved = np.log(np.hypot(x, y)) + log_factor * rise, values(psi)
         total = total + share * back @ (np.exp(p * logs)[:, None] * moved)
         slope = slope + share * back @ ((logs * np.exp(p * logs))[:, None] * moved)
     return total, slope
@@ -268,6 +275,11 @@ def rightmost(matrix, near=None):
     return complex(values[k]), 2e-16 * norm / max(float(angle), 1e-16)
 
 
+def nearest(matrix, value, count=3):
+    """The eigenvalues of a large matrix that are next to a value."""
+    return eigs(matrix, count, sigma=value, v0=np.ones(matrix.shape[0]), return_eigenvectors=False)
+
+
 SIZES = {0: (1,), 1: (10, 20, 40, 80, 160), 2: (6, 9, 14, 21, 32, 44, 62, 88)}
 """Functions of a noise, by how many dimensions all noises have together."""
 MODES = (16, 32, 64, 128, 256, 512, 1024, 2048, 4096, 8192)
@@ -296,13 +308,17 @@ def lyapunov_exponent(system: Planar, dimensions):
         total, slope, one = system.generator(0.0, modes, sizes[min(i, len(sizes) - 1)])
         if total.shape[0] > MOST_IN_BAND or values.is_settled:
             break
-        at, size, count = int(np.argmax(np.abs(one))), float(np.abs(total).max()), one.size
-        # one of the equations follows from the others, and ⟨u*, 1⟩ = 1 stands in its place
-        kept = sparse.diags_array((np.arange(count) != at).astype(float))
-        row = sparse.csr_array((one * size, (np.full(count, at), np.arange(count))), shape=total.shape)
-        left = splu(sparse.csc_array(kept @ total.T + row)).solve(size * np.eye(1, count, at)[0])
-        values.add(float(left @ (slope @ one)))
+        values.add(slope_at_zero(total, slope, one))
     return values.last, values.doubt
+
+
+def slope_at_zero(total, slope, one):
+    """⟨u*, (dL/dp) 1⟩ with u*L = 0 and ⟨u*, 1⟩ = 1, which stands for the equation that follows from the others."""
+    at, size, count = int(np.argmax(np.abs(one))), float(np.abs(total).max()), one.size
+    kept = sparse.diags_array((np.arange(count) != at).astype(float))
+    row = sparse.csr_array((one * size, (np.full(count, at), np.arange(count))), shape=total.shape)
+    left = splu(sparse.csc_array(kept @ total.T + row)).solve(size * np.eye(1, count, at)[0])
+    return float(left @ (slope @ one))
 
 
 def _modes(system):

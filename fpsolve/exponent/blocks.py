@@ -1,0 +1,213 @@
+"""Λ(p) of a problem that falls into parts: blocks of variables of which each drives later ones, or invariant rays.
+
+Over a unit of time a block has x_i⁺ = Φ_i x_i + Σ R_ij x_j, with finite moments of all of these. So x_i is a sum of
+what others drove at each time and Φ_i has carried on since, E‖Φ_i R_ij x_j‖^p ~ exp(Λ_i(p)(t − s) + Λ_j(p) s) at most,
+and by Minkowski's inequality for p ≥ 1, or |a + b|^p ≤ |a|^p + |b|^p for p < 1, E‖x_i‖^p grows as the largest of these,
+but for powers of t. It grows no slower: two starts that differ in x_i alone differ by Φ_i of that for ever, so that
+E‖x‖^p of one of them grows as Λ_i(p). For p < 0 it depends on how the x_i grow together, and is refused.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from fpsolve.arrays import FloatArray
+from fpsolve.errors import NoSuchExponent, NotConverged
+from fpsolve.exponent.eigen import PairDerivatives, PrincipalPair
+from fpsolve.exponent.error import Absent, Estimate, Moment
+from fpsolve.exponent.method import RTOL_BEYOND_PLANE, Along, Method, Tolerance
+from fpsolve.messages import Code, Message
+from fpsolve.model.problem import ParameterDerivative, Problem
+
+TINIEST_P = 1e-9
+"""For smaller |p| the part of the largest λ counts, and p < 0 is 0 but for rounding."""
+
+
+@dataclass(frozen=True, eq=False)
+class InvariantClass:
+    """The growth of a block of variables, or on a ray that the phase never leaves, or of the distance from it.
+
+    Attributes:
+        name: what tables call it: "along the ray at phi = 1.5708", "x, v".
+        phase: φ of the ray; None for a block of variables.
+        variables: the names of those of the block; none for a ray.
+        lyapunov_exponent: its λ.
+        p: the moments, shape (n,).
+        value, error_estimate: its Λ(p), shape (n,).
+    """
+
+    name: str
+    phase: float | None
+    variables: tuple[str, ...]
+    lyapunov_exponent: Estimate
+    p: FloatArray
+    value: FloatArray
+    error_estimate: FloatArray
+
+
+class Blocks(Method):
+    """Λ(p), p ≥ 0, is the largest of the parts."""
+
+    goes_on = False
+
+    @classmethod
+    def takes(cls, problem: Problem) -> bool:
+        return bool(problem.blocks)
+
+    @cached_property
+    def parts(self) -> tuple[Method, ...]:
+        """The methods of the parts."""
+        return tuple(self.choose(each, self.settings) for each in self.problem.classes)
+
+    @property
+    def usual_rtol(self) -> float:  # type: ignore[override]
+        return max(0.0 if self._rays else RTOL_BEYOND_PLANE, *(part.usual_rtol for part in self.parts))
+
+    @property
+    def no_picture(self) -> str:  # type: ignore[override]
+        return self.parts[0].no_picture
+
+    @property
+    def is_function(self) -> bool:  # type: ignore[override]
+        return len(self.parts) == 1 and self.parts[0].is_function
+
+    def is_dear(self, p: float) -> bool:
+        return any(part.is_dear(p) for part in self.parts)
+
+    def line_rtol(self, p: float) -> float:
+        return max(part.line_rtol(p) for part in self.parts)
+
+    @property
+    def _rays(self) -> tuple[float, ...]:
+        return self.problem.invariant_rays
+
+    @property
+    def ray(self) -> float | None:  # type: ignore[override]
+        return self._rays[0] if self._rays else None
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """The parts as sentences have them: "(x, v)", "along the ray at phi = 1.5708"."""
+        if not (rays := self._rays):
+            return tuple(f"({', '.join(block.names)})" for block in self.problem.blocks)
+        sides = [("along", phase) for phase in rays] + [("across", rays[0])]
+        return tuple(f"{side} the ray at phi = {phase:.6g}" for side, phase in sides[: len(self.problem.blocks)])
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        low, high = super().interval
+        return (0.0 if len(self.parts) > 1 and self.problem.is_driven else low), high
+
+    @property
+    def refused(self) -> Message:
+        """Why Λ(p) for p < 0 is not computed."""
+        return Message(Code.NEGATIVE_OF_SEVERAL, parts=self.names)
+
+    def _refuse_negative(self, p: float) -> None:
+        if p < self.interval[0] - TINIEST_P:
+            raise NotConverged(self.refused)
+
+    def solution(self, p: float, tolerance: Tolerance | None = None) -> Any:
+        self._refuse_negative(p)
+        found, is_zero = [part.solution(p, tolerance) for part in self.parts], abs(p) < TINIEST_P
+        return max(found, key=lambda each: each.derivative if is_zero else each.value / p)
+
+    def row(self, p: float) -> tuple[Moment, PrincipalPair | None]:
+        self._refuse_negative(p)
+        rows = [part.row(p) for part in self.parts]
+        if abs(p) < TINIEST_P:
+            return max(rows, key=lambda row: row[0].derivative)
+        return max(rows, key=lambda row: row[0].value / p)
+
+    def pair(self, p: float) -> PrincipalPair:
+        if self._rays:
+            raise NotConverged(Message(Code.NO_EIGENFUNCTION, p=p, phase=self._rays[0]))
+        raise NotConverged(Message(Code.NO_EIGENFUNCTION_OF_BLOCKS, p=p, blocks=self.names))
+
+    def ratio_alone(self, p: float, tolerance: Tolerance | None = None) -> tuple[float, float]:
+        self._refuse_negative(p)
+        return max(part.ratio_alone(p, tolerance) for part in self.parts)
+
+    def ratio(self, p: float, tolerance: Tolerance | None = None) -> tuple[float, float, float]:
+        self._refuse_negative(p)
+        return max(part.ratio(p, tolerance) for part in self.parts)
+
+    def slope_error(self, p: float) -> float:
+        return float(np.max([part.slope_error(p) for part in self.parts]))
+
+    def leading(self, p: float) -> Method:
+        """The part whose Λ(p), or for p = 0 whose λ, that of the problem is.
+
+        Raises:
+            NoSuchExponent: it is that of two parts, so that Λ(p) has no derivatives by parameters.
+            NotConverged: it is not resolved.
+        """
+        if len(self.parts) == 1:
+            return self.parts[0]
+        self._refuse_negative(p)
+        rates = [part.ratio_alone(p) for part in self.parts]
+        best, second = sorted(range(len(rates)), key=lambda k: -rates[k][0])[:2]
+        if rates[best][0] - rates[second][0] <= rates[best][1] + rates[second][1]:
+            raise NoSuchExponent(Message(Code.KINK, p=p or None))
+        return self.parts[best]
+
+    def held(self, p: float, along: Along) -> tuple[Method, Along]:
+        for key, by in along.items():
+            if self.closes(key):
+                raise NotConverged(Message(Code.CLOSES_BLOCKS, key=key, value=by.theta))
+        part = self.leading(p)
+        own = part.problem
+        known = {
+            key: own.derivative(key) if key in own.differentiable else ParameterDerivative(by.theta)
+            for key, by in along.items()
+        }
+        return part.held(p, known)
+
+    def closes(self, key: str) -> bool:
+        return self.problem.couples_blocks(key)
+
+    def gradient(self, p: float, keys: Sequence[str]) -> FloatArray:
+        part, along = self.held(p, {key: self.problem.derivative(key) for key in keys})
+        return part.gradient_along(p, [along[key] for key in keys])
+
+    def variance_rate(self) -> Estimate:
+        rates = sorted((part.lyapunov_exponent() for part in self.parts), key=lambda each: -each.value)
+        if len(rates) > 1 and rates[0].value - rates[1].value <= rates[0].error_estimate + rates[1].error_estimate:
+            raise NoSuchExponent(Message(Code.NO_COMMON_RATE, value=rates[0].value))
+        return self._fastest.variance_rate()
+
+    @property
+    def _fastest(self) -> Method:
+        """The part of the largest λ."""
+        return max(self.parts, key=lambda part: part.lyapunov_exponent().value)
+
+    @property
+    def around_zero(self) -> PairDerivatives:
+        return self._fastest.around_zero
+
+    @property
+    def finer_around_zero(self) -> PairDerivatives:
+        return self._fastest.finer_around_zero
+
+    def by_part(self, p: FloatArray) -> tuple[InvariantClass, ...]:
+        """λ and Λ(p) of each, for p < 0 too. Raises `NotConverged`."""
+        found = list[InvariantClass]()
+        for name, block, part in zip(self.names, self.problem.blocks, self.parts, strict=True):
+            rows = np.array([part.row(point)[0] for point in p.tolist()]).reshape(-1, len(Moment._fields))
+            phase = None if not self._rays else self._rays[min(len(found), len(self._rays) - 1)]
+            variables = () if self._rays else block.names
+            told = ", ".join(variables) or name
+            found.append(InvariantClass(told, phase, variables, part.lyapunov_exponent(), p, rows[:, 0], rows[:, 3]))
+        return tuple(found)
+
+    def index_of_parts(self, index: Callable[[Method], Estimate | Absent], nowhere: Absent) -> Estimate | Absent | None:
+        """The least of theirs, as for p > 0 Λ(p) is the largest of them."""
+        if len(self.parts) > 1 and self.lyapunov_exponent().value > 0:
+            return Absent(self.refused)
+        roots = [index(part) for part in self.parts if part.problem.system.driven_by]
+        return min((each for each in roots if each), key=lambda each: each.value, default=nowhere)

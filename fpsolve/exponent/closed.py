@@ -1,0 +1,140 @@
+"""Λ(p) of even p alone, by closed equations of moments: of many variables, of impulses, and of delays, for p = 2."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from types import MappingProxyType
+
+import numpy as np
+
+from fpsolve.arrays import FloatArray
+from fpsolve.budget import unless_over_budget
+from fpsolve.errors import NoHierarchy, NotConverged
+from fpsolve.exponent.eigen import PrincipalPair
+from fpsolve.exponent.error import Estimate, Moment, checked
+from fpsolve.exponent.method import RTOL_BEYOND_PLANE, Method, Tolerance, refuse
+from fpsolve.exponent.moments import EvenMoment, constant_scale, even_moment, moment_row
+from fpsolve.fem.factors import one_thread
+from fpsolve.messages import Code, Message, Remedy
+from fpsolve.model.problem import Problem, infinite
+from fpsolve.model.quantity import moment_at
+from fpsolve.theory.perturbation import Scale
+
+MOST_BY_DIRECTIONS = 4
+"""Largest number of variables of which functions of a direction are discretised."""
+OF_CLOSED = 1e-4
+"""Share of rtol that moments lack of the terms of their equations, as ω is one of these, and Λ a share of ζω."""
+
+
+class EvenMoments(Method):
+    """Λ(p) of even p > 0: directions are too many, or impulses move them."""
+
+    name = "closed equations of moments"
+    usual_rtol = RTOL_BEYOND_PLANE
+    no_picture = "functions of the directions of so many variables are not computed; look at Λ(2)"
+    code = Code.EVEN_ONLY
+
+    @classmethod
+    def takes(cls, problem: Problem) -> bool:
+        return problem.dimension > MOST_BY_DIRECTIONS or (problem.dimension > 2 and bool(problem.impulses))
+
+    def has(self, p: float) -> bool:
+        """Whether there is a Λ(p)."""
+        return p > 0 and p % 2 == 0
+
+    def reason(self, p: float, symbol: str = "") -> Message | None:
+        if not self.has(p):
+            symbol = symbol or (moment_at(p).symbol if p else "λ")
+            return Message(self.code, what=symbol, **self._about, remedy=Remedy.SIMULATION)
+        return infinite(self.problem, p, symbol)
+
+    @property
+    def _about(self) -> Mapping[str, float]:
+        count = self.problem.dimension
+        return {"count": count, "is_struck": count <= MOST_BY_DIRECTIONS}
+
+    def line_rtol(self, p: float) -> float:
+        return 1e-7
+
+    @cached_property
+    def scales(self) -> Scale:
+        """The size of the noise is that of what it does to the fastest modes."""
+        return constant_scale(self.problem)
+
+    def number(self, p: float) -> EvenMoment | None:
+        return self.solution(p) if self.has(p) else None
+
+    def even(self, p: float) -> EvenMoment | None:
+        with unless_over_budget():  # of a witness nothing is told
+            return self.number(p)
+        return None
+
+    @cached_property
+    def _solved(self) -> dict[float, EvenMoment]:
+        return {}
+
+    def solution(self, p: float, tolerance: Tolerance | None = None) -> EvenMoment:
+        if p not in self._solved:
+            try:
+                with one_thread(), self.settings.meter.running():
+                    found = even_moment(self.problem, p, rtol=OF_CLOSED * self.settings.rtol)
+            except (NoHierarchy, ArithmeticError) as failure:
+                raise NotConverged(Message(Code.NOT_CONVERGED, p=p, reason=str(failure))) from failure
+            checked(Estimate(found.value, found.error, self.scale(p)), self.refinement, p)
+            self._solved[p] = found
+        return self._solved[p]
+
+    def row(self, p: float) -> tuple[Moment, PrincipalPair | None]:
+        return moment_row(self.solution(p)), None
+
+    def pair(self, p: float) -> PrincipalPair:
+        refuse(self.reason(0.0, "an eigenfunction"))
+        return super().pair(p)
+
+    def ratio(self, p: float, tolerance: Tolerance | None = None) -> tuple[float, float, float]:
+        refuse(self.reason(0.0, "λ, or another number that follows from eigenfunctions,"))
+        return super().ratio(p, tolerance)
+
+    def gradient(self, p: float, keys: Sequence[str]) -> FloatArray:
+        return self.solution(p).gradient(keys) / p
+
+    def bounds(self, p: FloatArray, value: FloatArray, error: FloatArray) -> tuple[Message, ...]:
+        """What even moments say of λ, of Λ between them, and of δ_p; or nothing."""
+        if not p.size:
+            return ()
+        at, order = int(np.argmin(p)), np.argsort(p)
+        low = float(p[order][value[order] < -error[order]].max(initial=0.0))
+        high = float(p[value > error].min(initial=np.inf))
+        root = f"> {low:g}" * (low > 0) + " and " * (low > 0 and high < np.inf) + f"< {high:g}" * (high < np.inf)
+        bound = float(value[at] + error[at]) / float(p[at])
+        return (Message(Code.CONVEX_BOUNDS, p=p[at], bound=bound, root=root or None),)
+
+
+class DelayMoments(EvenMoments):
+    """Λ(2) of a state that its past moves."""
+
+    code = Code.DELAY_ONLY
+    _about = MappingProxyType[str, float]({})
+
+    @classmethod
+    def takes(cls, problem: Problem) -> bool:
+        return bool(problem.system.pasts)
+
+    def has(self, p: float) -> bool:
+        return p == 2
+
+
+class Simulated(EvenMoments):
+    """No Λ(p) is computed: a wall for one of several variables, of which there are no elements."""
+
+    code = Code.WALL_SIMULATED
+    is_computed = False
+    _about = MappingProxyType[str, float]({})
+
+    @classmethod
+    def takes(cls, problem: Problem) -> bool:
+        return problem.system.stop is not None and (problem.dimension != MOST_BY_DIRECTIONS or bool(problem.impulses))
+
+    def has(self, p: float) -> bool:
+        return False

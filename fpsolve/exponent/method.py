@@ -1,0 +1,309 @@
+"""How Λ(p) of one kind of problem is found: what each kind has, and how accurately and at what cost it is asked for."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property, partial
+from types import MappingProxyType
+from typing import Annotated, Any, ClassVar
+
+from numpy.typing import ArrayLike
+
+from fpsolve.arrays import FloatArray, real_numbers
+from fpsolve.budget import Meter
+from fpsolve.errors import NoSuchExponent
+from fpsolve.exponent.eigen import PairDerivatives, PrincipalPair
+from fpsolve.exponent.error import Absent, Estimate, Moment, checked
+from fpsolve.fem.mesh import CylinderMesh
+from fpsolve.fem.space import Space
+from fpsolve.messages import ALMOST_EVERY, Code, Message, Remedy
+from fpsolve.model.faults import strict_dataclass
+from fpsolve.model.parameters import parameter
+from fpsolve.model.problem import ParameterDerivative, Problem, infinite
+from fpsolve.model.quantity import LYAPUNOV_EXPONENT, VARIANCE_RATE
+from fpsolve.theory.perturbation import Scale, scale_of
+
+RTOL = 1e-8
+"""Relative error that is wanted of two variables where a case names none."""
+RTOL_OF_SEVERAL = 1e-6
+"""Relative error that is wanted of two variables under two noises that are not white."""
+RTOL_BEYOND_PLANE = 1e-5
+"""Relative error that is wanted of three and four variables."""
+Tolerance = Callable[[float, float], float]
+"""The largest error allowed, from p and a value of Λ(p)."""
+Along = Mapping[str, ParameterDerivative]
+"""Directions in which a problem changes, by name."""
+
+
+@strict_dataclass
+class Budget:
+    """What the numbers of a parameter set may cost, and a line of a chart. A number that is given depends on neither.
+
+    Args:
+        unknowns: of the largest system; None for as many as 1.5 GB hold, see `Space.most_unknowns`.
+        seconds: of a processor for all numbers of a parameter set together, asked before each factorisation. The nodes
+            of a row of a scan share it, and each may take half of what is left.
+        line_seconds: of a processor for a line of a chart, its scan, which may take half of them, and its branches;
+            None for any time.
+
+    Raises:
+        ParameterError: a number is out of its range.
+    """
+
+    unknowns: Annotated[
+        int | None,
+        parameter("number of unknowns of the largest system; if omitted, what 1.5 GB hold", "unknowns = 80000", ge=100),
+    ] = None
+    seconds: Annotated[
+        float, parameter("seconds of processor time for all numbers of a parameter set", "seconds = 120.0", gt=0)
+    ] = 120.0
+    line_seconds: Annotated[
+        float | None, parameter("seconds of processor time for a line of a chart", "line_seconds = 600.0", gt=0)
+    ] = None
+
+    def most(self, space: Space) -> int:
+        """Number of unknowns that a space may have."""
+        return space.most_unknowns if self.unknowns is None else self.unknowns
+
+    def meter(self) -> Meter:
+        """For the numbers of a parameter set."""
+        return Meter(self.seconds)
+
+
+@dataclass(frozen=True, eq=False)
+class Settings:
+    """How accurately Λ(p) is found, and at what cost.
+
+    Attributes:
+        rtol: |error| ≤ rtol·max(|Λ|, the terms of Eq. (37) before they cancel).
+        of_value: |error| ≤ of_value·|Λ| is enough, too, as for a sign.
+        mesh: for all p; None chooses a discretisation for each p.
+        budget: what it may cost.
+        meter: of all numbers of the problem.
+        starts: solutions of a problem with parameters close by, by their p.
+    """
+
+    rtol: float = RTOL
+    of_value: float = 0.0
+    mesh: CylinderMesh | None = None
+    budget: Budget = field(default_factory=Budget)
+    meter: Meter = field(default_factory=lambda: Meter(math.inf))
+    starts: Mapping[float, Any] = field(default_factory=dict)
+
+
+class Method:
+    """How Λ(p) of one kind of problem is found.
+
+    A kind of one's own is a class with `takes`, `solution` and, for charts and designs, `gradient`. It stands before
+    the others in `kinds.METHODS`.
+
+    Args:
+        problem: of this kind.
+        settings: how accurately, and at what cost.
+        choose: gives the method of another problem, such as a part of this one.
+
+    Attributes:
+        name: what the numbers come from, as tables say it.
+        usual_rtol: the error that is wanted where none is named.
+        no_picture: why functions of it cannot be drawn; empty where they can.
+        known: what a problem next to it starts from, by p.
+        goes_on: whether numbers of an earlier run do in place of solutions, which others need for their messages.
+        is_function: whether Λ may be interpolated over p.
+        ray: φ of a ray that the phase never leaves; None where there is none.
+        is_computed: whether there is any Λ(p).
+        spaces: solutions on elements, by p.
+    """
+
+    name: ClassVar[str] = "finite elements"
+    usual_rtol: float = RTOL
+    no_picture: str = ""
+    known: Mapping[float, Any] = MappingProxyType({})
+    goes_on: bool = True
+    is_function: bool = False
+    ray: float | None = None
+    is_computed: bool = True
+    spaces: Mapping[float, Any] = MappingProxyType({})
+
+    def __init__(self, problem: Problem, settings: Settings, choose: Callable[[Problem, Settings], Method]) -> None:
+        self.problem, self.settings, self.choose = problem, settings, choose
+
+    @classmethod
+    def takes(cls, problem: Problem) -> bool:
+        """Whether a problem is of this kind."""
+        raise NotImplementedError
+
+    def reason(self, p: float, symbol: str = "") -> Message | None:
+        """Why there is no Λ(p), at p = 0 no λ, nor another number of eigenfunctions; None where it is computed.
+
+        Args:
+            p: the moment.
+            symbol: what the number is called; that of Λ(p) or λ if none is given.
+        """
+        return infinite(self.problem, p, symbol)
+
+    @property
+    def has_pairs(self) -> bool:
+        """Whether there are eigenfunctions, and what follows from them, as λ."""
+        return self.reason(0.0) is None
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """The p for which Λ(p) is computed, as a closed interval."""
+        return (0.0, 0.0) if self.problem.has_algebraic_tails else (-math.inf, math.inf)
+
+    def is_dear(self, p: float) -> bool:
+        """Whether Λ(p) takes elements of three axes or more, and so seconds."""
+        return False
+
+    def line_rtol(self, p: float) -> float:
+        """The error of Λ(p) on a line of a chart, over its scale."""
+        return 1e-3 if self.is_dear(p) else 1e-10
+
+    @cached_property
+    def scales(self) -> Scale:
+        """What errors are measured by: the sizes of the terms of Eq. (37) before they cancel."""
+        return scale_of(self.problem)
+
+    def scale(self, p: float) -> float:
+        """The sum of the absolute values of the terms of Eq. (37)."""
+        return float(self.scales.moment(p))
+
+    @cached_property
+    def tolerance(self) -> Tolerance:
+        """The largest error allowed of a value of Λ(p); no method, as a cycle would keep matrices for long."""
+        return partial(tolerated, self.settings.rtol, self.settings.of_value, self.scales)
+
+    @property
+    def refinement(self) -> Remedy:
+        """What to do where it should be resolved better."""
+        return Remedy.SMALLER_RTOL if self.settings.mesh is None else Remedy.MESH
+
+    def solution(self, p: float, tolerance: Tolerance | None = None) -> Any:
+        """What is solved at p, within a tolerance, that of rtol if none is given.
+
+        It has `value`, `error` and `derivative`.
+
+        Raises:
+            NotConverged: it is not resolved, or the budget does not suffice.
+        """
+        raise NotImplementedError
+
+    def row(self, p: float) -> tuple[Moment, PrincipalPair | None]:
+        """Λ(p), its slope and error, and the eigenpair if there is one. Raises `NotConverged`."""
+        found = self.solution(p)
+        return Moment(found.value, found.derivative, math.nan, found.error, math.nan), None
+
+    def pair(self, p: float) -> PrincipalPair:
+        """The principal eigenpair at p. Raises `NotConverged`, `NoSuchExponent`."""
+        raise NoSuchExponent(Message(Code.NO_PAIR, p=p))
+
+    def even(self, p: float) -> Any:
+        """Λ(p) of an even p by equations without directions, as a witness; None where there is none."""
+        return None
+
+    def number(self, p: float) -> Any:
+        """Λ(p) by these equations, where that is its number; None for others."""
+        return None
+
+    def ratio_alone(self, p: float, tolerance: Tolerance | None = None) -> tuple[float, float]:
+        """Λ(p)/p, at p = 0 λ, and its error."""
+        found = self.solution(p, tolerance)
+        return (found.value / p, found.error / abs(p)) if p else (found.derivative, found.error)
+
+    def ratio(self, p: float, tolerance: Tolerance | None = None) -> tuple[float, float, float]:
+        """Λ(p)/p, its derivative in p, and the error of the first."""
+        value, error = self.ratio_alone(p, tolerance)
+        return value, (self.solution(p, tolerance).derivative - value) / p if p else math.nan, error
+
+    def slope_error(self, p: float) -> float:
+        """Estimate of |error of Λ′(p)|; NaN where none is known. Raises `NotConverged`."""
+        return math.nan
+
+    def lyapunov_exponent(self) -> Estimate:
+        """λ, Eq. (2), the growth rate of almost every path: Λ′(0) but for algebraic tails. Raises `NotConverged`."""
+        value, error = self.ratio_alone(0.0)
+        meaning = ALMOST_EVERY if self.problem.has_algebraic_tails else ""
+        return checked(Estimate(value, error, self.scales.linear, meaning, LYAPUNOV_EXPONENT), self.refinement)
+
+    def variance_rate(self) -> Estimate:
+        """Λ″(0). Raises `NotConverged`, `NoSuchExponent`."""
+        raise NoSuchExponent(Message(Code.NO_PAIR, p=0.0))
+
+    def finer_pair(self, pair: PrincipalPair) -> PrincipalPair:
+        """That at the same p on a finer discretisation. Raises `NotConverged`."""
+        raise NoSuchExponent(Message(Code.NO_PAIR, p=pair.p))
+
+    def gradient(self, p: float, keys: Sequence[str]) -> FloatArray:
+        """∂/∂θ of Λ(p)/p, at p = 0 of λ, by parameters. Raises `NotConverged`, `NoSuchExponent`."""
+        return self.gradient_along(p, [self.problem.derivative(key) for key in keys])
+
+    def gradient_along(self, p: float, along: Sequence[ParameterDerivative]) -> FloatArray:
+        """The same along some directions."""
+        raise NoSuchExponent(Message(Code.NO_PAIR, p=p))
+
+    def held(self, p: float, along: Along) -> tuple[Method, Along]:
+        """The part whose Λ(p), at p = 0 whose λ, is that of the problem, and directions for it.
+
+        Raises:
+            NoSuchExponent: Λ(p) is that of two parts, so that it has no derivatives by parameters.
+            NotConverged: it is that of no part alone, or that of the part is not what a direction changes.
+        """
+        return self, along
+
+    def closes(self, key: str) -> bool:
+        """Whether another value of a parameter makes parts that are solved apart one."""
+        return False
+
+    def by_part(self, p: FloatArray) -> tuple[Any, ...]:
+        """λ and Λ(p) of each part, where there are several."""
+        return ()
+
+    def index_of_parts(self, index: Callable[[Method], Estimate | Absent], nowhere: Absent) -> Estimate | Absent | None:
+        """δ_p by those of parts, or that it is nowhere; None where there are no parts."""
+        return None
+
+    @property
+    def around_zero(self) -> PairDerivatives:
+        """The pair at p = 0 and its derivatives. Raises `NotConverged`."""
+        raise NoSuchExponent(Message(Code.NO_PAIR, p=0.0))
+
+    @property
+    def finer_around_zero(self) -> PairDerivatives:
+        """That of a finer discretisation. Raises `NotConverged`."""
+        return self.around_zero
+
+    def bounds(self, p: FloatArray, value: FloatArray, error: FloatArray) -> tuple[Message, ...]:
+        """What is known of other numbers."""
+        return ()
+
+
+def refuse(reason: Message | None) -> None:
+    """Raise `NoSuchExponent` for a reason."""
+    if reason:
+        raise NoSuchExponent(reason)
+
+
+def refuse_tails(problem: Problem, symbol: str = VARIANCE_RATE.symbol) -> None:
+    """Refuse a number that noise with algebraic tails has not. Raises `NoSuchExponent`."""
+    if problem.has_algebraic_tails:
+        refuse(infinite(problem, 1.0, symbol))
+
+
+def tolerated(rtol: float, of_value: float, scales: Scale, p: float, value: float) -> float:
+    """rtol of the terms of Eq. (37) before they cancel, or it or `of_value` of Λ(p), whichever is the largest."""
+    return max(rtol * float(scales.moment(p)), max(rtol, of_value) * abs(value))
+
+
+def checked_moments(p: ArrayLike, method: Method, *, may_be_empty: bool = False) -> FloatArray:
+    """p as an array of shape (n,), each finite, with a Λ(p) that is computed. Raises `ValueError`, `NoSuchExponent`."""
+    points = real_numbers(p, "p", may_be_empty=may_be_empty)
+    for point in points.tolist():
+        refuse(method.reason(point))
+    return points
+
+
+def spent_remedy(problem: Problem) -> Remedy:
+    """What to do where a budget does not suffice."""
+    return Remedy.BUDGET if problem.dimension == 2 else Remedy.MANY

@@ -1,0 +1,445 @@
+"""Λ(p) for even p without directions: the moments of order p of the state obey a closed set of linear equations.
+
+Without walls the functions √(p!/α!) x^α, |α| = p, are moved by ẋ = Ax with a matrix K(A), the symmetric power of A,
+linear in A and skew-symmetric for a rotation. For functions f_k of noise, g f_k = Σ Ξ_lk f_l, L_ξ f_k = Σ G_lk f_l,
+
+    H = Σ K(A) ⊗ Ξᵀ + (½ ΣK(B)² + Σ ν (exp K(C) − 1)) ⊗ 1 + 1 ⊗ Gᵀ
+
+moves E[x^α f_k], for terms g(ξ)A, white noises Bx ∘ dW and impulses exp(C) at the rates ν. Λ(p) is its rightmost
+eigenvalue. The right vector is of moments, the left one of T, a polynomial of the degree p in x. As moments stay
+moments, no eigenvalue is nearer to a real σ > Λ than Λ: the search begins at a bound by the rows of H, from the right.
+The functions of the noise end somewhere; what the next ones change, with the last two of these to all orders and the
+others to the first, is added, and is the error, with what it is by the last one alone.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from functools import cached_property, reduce
+from typing import Any, NamedTuple, cast
+
+import numpy as np
+from scipy import sparse
+from scipy.linalg import solve_triangular
+
+from fpsolve.arrays import Coefficient, FloatArray, one
+from fpsolve.data import brief
+from fpsolve.errors import NoHierarchy
+from fpsolve.exponent.delays import Delayed
+from fpsolve.exponent.error import Moment
+from fpsolve.exponent.matrices import MOST_NUMBERS, Matrices
+from fpsolve.exponent.powers import Moving, Powers, ladder, moment_form, multinomials
+from fpsolve.exponent.rightmost import REMEDY, ROUNDING
+from fpsolve.fem.space import FIRST as AXES
+from fpsolve.fem.space import first_axis
+from fpsolve.model.noise import Noise
+from fpsolve.model.parameters import cached_by_problem
+from fpsolve.model.plane import affine
+from fpsolve.model.problem import Problem
+from fpsolve.theory.perturbation import Scale
+
+MOST_AS_POWERS = 1000
+"""Largest number of second moments that are one vector, times the first functions of the noises."""
+MOST = 20_000
+"""Largest number of equations."""
+MOST_MOMENTS = 1000
+"""Largest number of moments for each function of the noise."""
+FIRST = 4
+"""Degree of the functions of each noise to begin with."""
+NEXT = 2
+"""Number of degrees more that tell the error."""
+GROWTH = 1.4
+"""Factor from one degree to the next."""
+TOLERANCE = 1e-13
+"""Error that is wanted where none is named, over the terms that Λ is the sum of."""
+LOOSEST = 1e-4
+"""Largest error that ends the search, over these terms: with fewer functions the effects may be small by chance."""
+MEANINGLESS = 1e-3
+"""Error over these terms that leaves nothing of a value."""
+STEP = 1e-4
+"""Share of a parameter by which it is varied to differentiate H."""
+STEEPNESS = 5.0
+"""Relative change of what the next functions add, with a parameter, over their degree: 3.5 to 4 was measured."""
+NEGATIVE = 1e-6
+"""Share of the largest number by which one may be negative that should not be."""
+CLEAN = 1e-14
+"""Share of the largest entry of a matrix of a noise that is rounding."""
+MOST_DEGREES = 160
+"""Highest degree of functions of one noise: with twice as many points the weights of a rule underflow."""
+
+
+class Functions(NamedTuple):
+    """Orthonormal functions f_k of a noise in its law, nested by their degree.
+
+    Attributes:
+        degrees: of each, shape (n,).
+        generator: G, L_ξ f_k = Σ G_lk f_l, shape (n, n).
+        mass: Ξ of a coefficient g, g f_k = Σ Ξ_lk f_l.
+        unit: the coefficients of 1, which are E f_k, shape (n,).
+    """
+
+    degrees: Any
+    generator: FloatArray
+    mass: Callable[[Coefficient], FloatArray]
+    unit: FloatArray
+
+
+@cached_by_problem(64)  # derivatives by parameters of the system have the same
+def functions_of(noise: Noise, count: int) -> Functions:
+    """Those of degrees below a count: the functions of elements, by a Cholesky factor C of their products ∫ f_k f_l."""
+    axis = first_axis(noise, 0.0).of_degree(count)
+    at = np.flatnonzero(axis.modes < count)
+    factor = np.linalg.cholesky(axis.matrix(one)[np.ix_(at, at)])
+
+    def of_own(matrix: Any) -> FloatArray:
+        """C⁻¹ M C⁻ᵀ, without what rounding leaves of zeros."""
+        half = solve_triangular(factor, matrix[np.ix_(at, at)], lower=True)
+        found = solve_triangular(factor, half.T, lower=True).T
+        return np.where(np.abs(found) > CLEAN * np.max(np.abs(found)), found, 0.0)
+
+    return Functions(
+        axis.modes[at], of_own(axis.generator()), lambda g: of_own(axis.mass(g)), factor.T @ axis.constant[at]
+    )
+
+
+def hierarchy_exponent(problem: Problem, p: float) -> tuple[float, float]:
+    """Λ(p) of an even p by the equations of the moments, and its error.
+
+    Raises:
+        NoHierarchy: the equations do not close for this problem and this p, or are too many.
+    """
+    found = even_moment(problem, p)
+    return found.value, found.error
+
+
+def even_moment(
+    problem: Problem,
+    p: float,
+    tolerance: float | None = None,
+    most: int = MOST,
+    *,
+    rtol: float = TOLERANCE,
+) -> EvenMoment:
+    """Λ(p) of an even p.
+
+    Args:
+        problem: a motion and its noise.
+        p: even.
+        tolerance: its largest error; None for the smallest that there is, down to rtol.
+        most: number of equations, of moments that are no matrices.
+        rtol: error over the terms that Λ is the sum of.
+
+    Raises:
+        NoHierarchy: the equations do not close for this problem and this p, or are too many.
+    """
+    refuse_open_hierarchy(problem, p)
+    equations = Equations(problem, int(p))
+    counts, before = [FIRST] * len(equations.noises), cast(EvenMoment | None, None)
+    failure = NoHierarchy(
+        f"got p = {p:g}; {most} equations, or {MOST_DEGREES} functions of each noise, are too few for moments "
+        f"under noise so strong or slow; use a smaller p, or {REMEDY}"
+    )
+    while True:
+        try:
+            level = equations.moment(counts, most)
+        except NoHierarchy as refusal:
+            level, failure = None, refusal
+        if level is None:
+            break
+        allowed = rtol * level.scale if tolerance is None else min(tolerance, LOOSEST * level.scale)
+        if any(level.effects):
+            change = abs(before.value - level.value) if before else math.inf
+            told = level.error + before.error - before.change if before else 0.0
+            level = replace(level, change=level.change + (change if change > told else 0.0))
+        if level.is_positive and level.error <= max(allowed, 2 * level.rounding):
+            return level
+        before = level
+        worst = max(map(abs, level.effects), default=0.0)
+        counts = [
+            math.ceil(GROWTH * count) if abs(effect) >= 0.1 * worst else count
+            for count, effect in zip(counts, level.effects, strict=True)
+        ]
+        if not worst:
+            break
+    if before is None or not before.is_positive:
+        raise failure
+    if before.error > (MEANINGLESS * before.scale if tolerance is None else tolerance):
+        raise failure
+    return before
+
+
+def constant_scale(problem: Problem) -> Scale:
+    """The scale of Λ(p) where even p alone are computed: constant terms, with the mean of the noise."""
+    steady = np.zeros((problem.dimension, problem.dimension))
+    for term in problem.motion.terms:
+        if line := affine(term.g):
+            at_mean = line[0] + (line[1] and line[1] * problem.named_noise(term.noise).mean)
+            steady += problem.motion.epsilon**term.order * at_mean * np.array(term.matrix)
+    now = len(steady) - len(problem.system.pasts)
+    abscissa = abs(float(np.max(np.linalg.eigvals(steady[:now, :now]).real)))
+    return Scale(abscissa or problem.unit_rate, 0.0)
+
+
+def moment_row(found: EvenMoment) -> Moment:
+    """What a record holds of it."""
+    return Moment(found.value, math.nan, math.nan, found.error, math.nan)
+
+
+def refuse_open_hierarchy(problem: Problem, p: float) -> None:
+    """Refuse a problem whose moments of order p do not close, or are too many. Raises `NoHierarchy`."""
+    if not (p > 0 and p % 2 == 0):
+        raise NoHierarchy(f"got p = {p:g}; the equations of the moments close for even p > 0 only; choose p = 2, 4, …")
+    for noise in problem.coloured.parts.values():
+        if noise.basis not in AXES:
+            raise NoHierarchy(
+                f"moments of even order are infinite under {noise.kind} noise with algebraic tails; take r0 <= 1"
+            )
+    if problem.system.stop or any(jump.log_factor for jump in problem.system.jumps):
+        raise NoHierarchy(
+            "the equations of the moments do not close where a wall changes the state, as that happens at one phase; "
+            f"{REMEDY}, or remove the wall"
+        )
+    if problem.system.pasts and p != 2:
+        raise NoHierarchy(f"got p = {p:g}; with a delay the equations of the moments are for p = 2; {REMEDY}")
+    moments = math.comb(int(p) + problem.dimension - 1, problem.dimension - 1)
+    count = moments
+    for noise in problem.coloured.parts.values():
+        count *= len(noise.states) if noise.has_states else FIRST  # type: ignore[attr-defined]
+    limits = (MOST_MOMENTS, MOST) if p > 2 else (math.inf, MOST_NUMBERS)
+    for number, what, limit in zip((moments, count), ("moments", "equations"), limits, strict=True):
+        if number > limit:
+            raise NoHierarchy(f"got p = {p:g}; its {number:.12g} {what} are more than {limit}; use a smaller p")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class EvenMoment:
+    """Λ(p) of an even p, the rightmost eigenvalue with some functions of the noises.
+
+    Attributes:
+        equations: what it is the eigenvalue of.
+        counts: the degrees of the functions of each noise are below these.
+        eigenvalue: without the next functions.
+        effects: what the next functions of each noise change in it.
+        scale: of the terms that it is the sum of.
+        x, y: the right and the left vector, yᵀx = 1.
+        moments: of √(p!/α!) x^α, |α| = p, the right vector in the mean over the noise.
+        polynomial: the coefficients of T at the same, in the mean over the noise.
+        change: by the last step, from `effects` where only the last functions move with the next ones, and from fewer
+            functions, where that is beyond the errors of both: then `effects` are no errors.
+    """
+
+    equations: Equations
+    counts: Sequence[int]
+    eigenvalue: float
+    effects: Sequence[float]
+    scale: float
+    x: FloatArray
+    y: FloatArray
+    moments: FloatArray
+    polynomial: FloatArray
+    change: float = 0.0
+
+    def __repr__(self) -> str:
+        return brief(self, f"Λ({self.equations.p}) = {self.value:.10g} ± {self.error:.0e}, {self.x.size} equations")
+
+    @property
+    def value(self) -> float:
+        """Λ(p), per unit time."""
+        return self.eigenvalue + sum(self.effects)
+
+    @property
+    def derivative(self) -> float:
+        """Λ′(p) leads to other degrees and is not known."""
+        return math.nan
+
+    @property
+    def rounding(self) -> float:
+        """A bound of what rounding changes, also in what moves the state: by its size, and the condition of Λ."""
+        condition = float(np.linalg.norm(self.x) * np.linalg.norm(self.y))
+        return ROUNDING * self.scale + sys.float_info.epsilon * self.equations.state.largest * condition
+
+    @property
+    def error(self) -> float:
+        """Estimate of |error of `value`|."""
+        return sum(map(abs, self.effects)) + self.rounding + self.change
+
+    def slope(self, key: str) -> tuple[float, float]:
+        """∂Λ(p)/∂θ of a parameter such as "noise.alpha", and its error: ⟨y, ∂H/∂θ x⟩ by differences of H.
+
+        The error is what two lengths of the step tell of one, rounding in the differences, and how fast what Λ(p)
+        lacks may change.
+
+        Raises:
+            ValueError: there is no such parameter.
+        """
+        problem = self.equations.problem
+        at = float(problem.values[key])
+        step = STEP * (abs(at) or 1.0)
+        for offsets in (1, -1, 2, -2), (0, -1, -2, -4), (0, 1, 2, 4):
+            with suppress(ValueError, NoHierarchy):
+                values = {offset: self._with(problem.at({key: at + step * offset})) for offset in offsets}
+                if offsets[0]:
+                    value, longer = (0.5 * (values[k] - values[-k]) / k for k in (1, 2))
+                else:
+                    steps = offsets[1], offsets[2]
+                    value, longer = ((2 * values[k] - 1.5 * values[0] - 0.5 * values[2 * k]) / k for k in steps)
+                lacking = STEEPNESS * max(self.counts) * abs(step / at if at else 1.0) * self.error
+                error = abs(value - longer) / 3 + self.rounding + self.change + lacking
+                return (4 * value - longer) / 3 / step, error / step
+        raise ValueError(f"got {key}; Λ(p) has no slope by it")
+
+    def gradient(self, keys: Sequence[str]) -> FloatArray:
+        """∂Λ(p)/∂θ of some parameters, as `slope` for half of the work, to a share of some ``STEP`` squared."""
+        found = list[float]()
+        for key in keys:
+            at = float(self.equations.problem.values[key])
+            step = STEP * (abs(at) or 1.0)
+            try:
+                ends = [self._with(self.equations.problem.at({key: at + side * step})) for side in (1, -1)]
+                found.append(0.5 * (ends[0] - ends[1]) / step)
+            except (ValueError, NoHierarchy):
+                found.append(self.slope(key)[0])
+        return np.array(found)
+
+    def _with(self, problem: Problem) -> float:
+        """⟨y, Hx⟩ of a problem next to it."""
+        refuse_open_hierarchy(problem, self.equations.p)
+        near = Equations(problem, self.equations.p, self.equations)
+        return float(self.y @ near.state.image(*near.over_noise(self.counts), self.x, self.eigenvalue))
+
+    @cached_property
+    def is_positive(self) -> bool:
+        """Whether E x^α are moments, and T is positive, as far as it is seen: both but for a common sign."""
+        form, t = (
+            moment_form(self.moments, self.equations.dimension, self.equations.p),
+            self._polynomial_values(),
+        )
+        return _has_one_sign(np.asarray(np.linalg.eigvalsh(form))) and _has_one_sign(t)
+
+    def _polynomial_values(self) -> FloatArray:
+        """T at some directions; of p = 2 the eigenvalues of its matrix."""
+        n, p = self.equations.dimension, self.equations.p
+        if p == 2:
+            return np.asarray(np.linalg.eigvalsh(moment_form(self.polynomial, n, 2)))
+        x = np.random.default_rng(0).standard_normal((200, n))
+        x /= np.linalg.norm(x, axis=1)[:, None]
+        alphas, _ = ladder(n, p)
+        return np.prod(x[:, None] ** alphas, axis=2) @ (self.polynomial * np.sqrt(multinomials(alphas)))
+
+
+def _has_one_sign(values: FloatArray) -> bool:
+    values = values * np.sign(values[np.argmax(np.abs(values))])
+    return bool(values.min() >= -NEGATIVE * values.max())
+
+
+class Equations:
+    """H of a problem and an even p, with any number of functions of each noise.
+
+    Args:
+        problem: the problem.
+        p: even.
+        like: equations of a problem next to it, whose units of the state are taken.
+
+    Raises:
+        NoHierarchy: numbers in it are beyond floating-point numbers.
+    """
+
+    def __init__(self, problem: Problem, p: int, like: Equations | None = None) -> None:
+        self.problem, self.p = problem, p
+        named = problem.coloured.parts
+        self.noises, names = list(named.values()), list(named)
+        drift, diffusions, impulses = problem.noise.motion(problem.system)
+        steady, self._loads = np.zeros(2 * (problem.dimension,)), list[tuple[Any, int]]()
+        matrices, strengths = list[FloatArray](), list[float]()
+        for term in drift.terms:
+            matrix = drift.epsilon**term.order * np.array(term.matrix)
+            if term.g == one:
+                steady += matrix
+                continue
+            at = names.index(term.noise) if term.noise in named else 0
+            noise = self.noises[at]
+            z = np.array([-1.0, 0.0, 1.0]) * (0.0 if noise.is_white else noise.standard_deviation)
+            self._loads.append((term.g, at))
+            matrices.append(matrix)
+            strengths.append(float(np.max(np.abs(term.g(noise.mean + z)))))
+        squares = [drift.epsilon**each.order * np.array(each.matrix) for each in diffusions]
+        jolts = [(each.rate, np.array(each.exponent)) for each in impulses]
+        moving = Moving(steady, matrices, strengths, squares, jolts)
+        self.state: Matrices | Powers | Delayed
+        if pasts := problem.system.pasts:
+            self.state = Delayed(moving, pasts, like.state.units if like else None)
+        else:
+            form: type[Matrices | Powers] = Matrices if p == 2 and self._first_size > MOST_AS_POWERS else Powers
+            self.state = form(moving, p, like.state.units if like else None)
+        self.dimension = problem.dimension - len(pasts)
+
+    @property
+    def _first_size(self) -> int:
+        """Of the second moments, with the first functions of each noise."""
+        axes = self._axes([FIRST] * len(self.noises))
+        return math.comb(self.problem.dimension + 1, 2) * math.prod(each.degrees.size for each in axes)
+
+    def moment(self, counts: Sequence[int], most: int) -> EvenMoment | None:
+        """Λ(p) with functions of degrees below these; None where they are too many."""
+        if max(counts) > MOST_DEGREES:
+            return None
+        more = [count + NEXT for count in counts]
+        axes = self._axes(more)
+        is_old = [each.degrees < count for each, count in zip(axes, counts, strict=True)]
+        size = math.prod(int(each.sum()) for each in is_old)
+        if self.state.size * size > max(most, self.state.most):
+            return None
+        h, old = self.state.rates(*self.over_noise(more)), _outer(is_old)
+        mean = self.means(counts)
+        own = h.on(old)
+        starts: Any = (np.kron(mean, each) for each in self.state.starts)
+        value, x, y, change, scale = own.rightmost(*starts)
+        h = h.at(value)
+        whole = np.zeros((2, old.size, x.size // size))
+        whole[:, old] = x.reshape(size, -1), y.reshape(size, -1)
+        images = [each.reshape(old.size, -1) for each in (h @ whole[0].ravel(), h.T @ whole[1].ravel())]
+        effects = []
+        for k, (axis, count) in enumerate(zip(axes, counts, strict=True)):
+            new = _outer([~each if k == j else each for j, each in enumerate(is_old)])
+            told = [0.0, 0.0]
+            for last in (1, 2) if new.any() else ():
+                moved = _outer([axis.degrees >= count - last if k == j else each for j, each in enumerate(is_old)])
+                right, left = ((each * new[:, None])[moved].ravel() for each in images)
+                told[last - 1] = float(left @ h.on(moved).solver(value)(right))
+            effects.append(told[1])
+            change += abs(told[1] - told[0])
+        moments = self.state.moments(mean @ x.reshape(size, -1))
+        polynomial = self.state.polynomial(mean @ y.reshape(size, -1))
+        return EvenMoment(self, tuple(counts), value, effects, scale, x, y, moments, polynomial, change)
+
+    def _axes(self, counts: Sequence[int]) -> list[Functions]:
+        return [functions_of(noise, count) for noise, count in zip(self.noises, counts, strict=True)]
+
+    def means(self, counts: Sequence[int]) -> FloatArray:
+        """The coefficients of 1 in functions of degrees below these, which are the means of these, too."""
+        return _outer([axis.unit for axis in self._axes(counts)])
+
+    def over_noise(self, counts: Sequence[int]) -> tuple[Any, list[Any]]:
+        """Gᵀ, and Ξᵀ of each load, with functions of degrees below these."""
+        axes = self._axes(counts)
+        ones = [sparse.eye_array(each.degrees.size) for each in axes]
+
+        def over(of_noise: Any, at: int) -> Any:
+            """The transpose of a matrix of one noise, for functions of all."""
+            factors = [sparse.csr_array(of_noise.T) if k == at else each for k, each in enumerate(ones)]
+            return sparse.csr_array(reduce(sparse.kron, factors))
+
+        generator = sum((over(axis.generator, k) for k, axis in enumerate(axes[1:], 1)), over(axes[0].generator, 0))
+        return generator, [over(axes[at].mass(g), at) for g, at in self._loads]
+
+
+def _outer(factors: Sequence[Any]) -> Any:
+    """The product of all combinations, in one row."""
+    found = np.ones(1, dtype=factors[0].dtype)
+    for each in factors:
+        found = np.multiply.outer(found, each).ravel()
+    return found

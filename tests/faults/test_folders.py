@@ -1,0 +1,203 @@
+"""What lies in the folder of a case: files of other parameters go, and what is none of fpsolve's harms nothing."""
+
+import json
+import os
+import shutil
+
+import pytest
+
+from tests.kit import case_text, files, read_json, run
+
+SECTIONS = "[moments]\np = [2.0]\n[output]\nfigure = false\nquantities = ['lyapunov_exponent']\n"
+CASE = case_text(SECTIONS + "[monte_carlo]\npaths = 6400\ntime = 20.0\n")
+OF_RUN = {"summary.json", "moments.csv", "curves.csv", "results.nc"}
+TABLES = {
+    # what states the parameters: what goes with it, and the command that looks at it
+    "summary.json": (OF_RUN, "simulate"),
+    "monte_carlo.json": ({"monte_carlo.json"}, "run"),
+    "chart.json": ({"chart.json", "chart.csv", "chart.png"}, "run"),
+    "proof.json": ({"proof.json"}, "run"),
+}
+AXES = {"x": {"key": "noise.D0"}, "y": {"key": "oscillator.c1"}}
+
+
+@pytest.fixture(scope="module")
+def good(tmp_path_factory):
+    """A folder with a file of each kind, which agree with the case."""
+    place = tmp_path_factory.mktemp("good")
+    for command in ("run", "simulate"):
+        ended = run(place, command, "case.toml", case=CASE)
+        assert ended.code == 0, ended.err
+    folder = place / "results/case"
+    parameters = read_json(folder / "monte_carlo.json")["parameters"]
+    held = {key: value for key, value in parameters.items() if key not in ("noise.D0", "oscillator.c1")}
+    (folder / "chart.json").write_text(json.dumps({"parameters": held, **AXES}), encoding="utf-8")
+    (folder / "proof.json").write_text(json.dumps({"curves": [{"parameters": parameters}]}), encoding="utf-8")
+    for name in ("chart.csv", "chart.png"):
+        (folder / name).write_text("", encoding="utf-8")
+    return place
+
+
+@pytest.fixture
+def place(good, tmp_path):
+    return shutil.copytree(good, tmp_path / "place", symlinks=True)
+
+
+def after(place, command, *options):
+    """The names of the files beside records that a command leaves, which goes on with what is known."""
+    ended = run(place, command, "case.toml", *options)
+    assert ended.code == 0, ended.err
+    return {name for name in files(place / "results/case") if not name.startswith("records/")}
+
+
+ALL = {name for names, _ in TABLES.values() for name in names}
+
+
+@pytest.mark.parametrize("command", ["run", "simulate"])
+def test_files_of_the_parameters_of_a_case_stay(place, command):
+    assert after(place, command) >= ALL
+
+
+def as_pipe(path):
+    path.unlink()
+    os.mkfifo(path)
+
+
+def as_link_to(target):
+    def put(path):
+        path.unlink()
+        path.symlink_to(target or path)
+
+    return put
+
+
+def as_huge(path):
+    with path.open("wb") as file:
+        file.truncate(2**40)
+
+
+def as_text(text):
+    return lambda path: path.write_text(text, encoding="utf-8")
+
+
+def without(key):
+    def put(path):
+        data = read_json(path)
+        del data.get("curves", [data])[0]["parameters"][key]
+        path.write_text(json.dumps(data), encoding="utf-8")
+
+    return put
+
+
+NESTED = as_text("[" * 100_000)
+FAULTS = [
+    ("summary.json", as_link_to("/dev/zero")),
+    ("monte_carlo.json", as_pipe),
+    ("monte_carlo.json", without("noise.tau0")),
+    *[("monte_carlo.json", as_text(text)) for text in ("[]", '{"parameters": NaN}', '{"curves": 1}')],
+    ("chart.json", as_huge),
+    ("chart.json", as_text("{}")),
+    ("chart.json", without("noise.r0")),
+    ("chart.json", lambda path: path.unlink()),
+    ("proof.json", as_link_to("")),
+    ("proof.json", without("noise.r0")),
+    *[("proof.json", as_text(text)) for text in ("", '{"parameters": {}}', '{"curves": []}')],
+    *[(name, NESTED) for name in TABLES],
+]
+
+
+@pytest.mark.parametrize(("name", "fault"), FAULTS)
+def test_table_that_is_not_of_the_case_goes_alone_and_unread(place, name, fault):
+    fault(place / "results/case" / name)
+    names, command = TABLES[name]
+    left = after(place, command)
+    assert not left & names
+    others = {each for other, (more, _) in TABLES.items() if other != name for each in more}
+    assert left >= others
+
+
+@pytest.mark.parametrize("command", ["run", "simulate"])
+def test_files_of_an_earlier_run_with_other_parameters_are_removed(place, command):
+    left = after(place, command, "--set", "noise.r0=0.9")
+    assert not left & (ALL - (OF_RUN if command == "run" else {"monte_carlo.json"}))
+
+
+def test_run_removes_the_responses_of_an_earlier_one_and_no_file_of_another(place):
+    folder = place / "results/case"
+    stale = {"response.csv", "response.png", "response-10.pdf", "response.vtu", "response_3d-2.vtu"}
+    own = {"response.txt", "my_response.csv"}
+    for name in stale | own:
+        (folder / name).write_text("", encoding="utf-8")
+    left = after(place, "run")
+    assert not left & stale
+    assert left > own
+
+
+def as_folder(path):
+    path.unlink(missing_ok=True)
+    path.mkdir(parents=True)
+
+
+def as_link_to_elsewhere(path):
+    path.parent.mkdir(exist_ok=True)
+    shutil.rmtree(path, ignore_errors=True)
+    elsewhere = path.parents[len(path.parts) - path.parts.index("place") - 2] / "elsewhere"
+    elsewhere.mkdir()
+    (elsewhere / "p+2.0.vtu").write_text("mine", encoding="utf-8")
+    path.symlink_to(elsewhere)
+
+
+def as_file(path):
+    shutil.rmtree(path, ignore_errors=True)
+    path.parent.mkdir(exist_ok=True)
+    path.write_text("", encoding="utf-8")
+
+
+IN_THE_WAY = [
+    *[
+        (name, as_folder, "cannot be written: Is a directory; choose another --out")
+        for name in ("summary.json", "figure.png", "eigenfunctions/p+2.0.vtu", "results.nc")
+    ],
+    *[
+        (name, put, f"{name} cannot be written to: it is no folder, or a link to one; choose")
+        for name in ("records", "records/solved", "eigenfunctions", "eigenfunctions-2")
+        for put in (as_link_to_elsewhere, as_file)
+    ],
+]
+
+
+@pytest.mark.parametrize(("name", "put", "said"), IN_THE_WAY)
+def test_what_is_in_the_way_of_a_file_or_a_folder_is_refused_before_anything_is_removed(place, name, put, said):
+    put(place / "results/case" / name)
+    before = files(place)
+    ended = run(place, "run", "case.toml")
+    assert ended.code == 2
+    assert said in ended.err
+    assert files(place) == before
+
+
+@pytest.fixture
+def nobody(place):
+    """Whom the rights of files hold for, as they do not for root; the folder is theirs."""
+    if os.geteuid():
+        yield
+        return
+    for each in (place, *place.rglob("*")):
+        os.chown(each, 65534, 65534)
+    for each in place.parents[: len(place.parents) - 2]:
+        each.chmod(0o755)
+    os.seteuid(65534)
+    yield
+    os.seteuid(0)
+
+
+@pytest.mark.usefixtures("nobody")
+@pytest.mark.parametrize(("name", "mode", "code"), [("case/private", 0o000, 0), ("case", 0o555, 2)])
+def test_folder_that_may_not_be_read_is_left_alone_and_a_read_only_one_is_refused(place, name, mode, code):
+    folder = place / "results" / name
+    folder.mkdir(exist_ok=True)
+    folder.chmod(mode)
+    ended = run(place, "run", "case.toml")
+    folder.chmod(0o755)
+    assert (ended.code, "cannot be written" in ended.err) == (code, bool(code))
+    assert folder.exists()

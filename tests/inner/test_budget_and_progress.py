@@ -1,0 +1,115 @@
+"""Internals of budgets, which end a number and never change it, and of the progress that shows them."""
+
+import io
+import re
+
+import pytest
+from rich.console import Console
+
+from fpsolve import ExponentSolver, NotConverged, Problem
+from fpsolve.budget import Meter, begin, charge, watched
+from fpsolve.exponent import Budget, critical_restitution, impact_rate
+from fpsolve.exponent.root import nonzero_root
+from fpsolve.workflow import Phase
+from fpsolve.workflow.progress import MOMENTS, SETS, Bars
+from tests.conftest import FIG1, FIG1_NOISE, sampled
+
+
+class Clock:
+    """A time that passes as it is told, or by `tick` whenever it is asked for."""
+
+    now, tick = 100.0, 0.0
+
+    def __call__(self):
+        self.now += self.tick
+        return self.now
+
+
+@pytest.fixture
+def clock():
+    return Clock()
+
+
+@pytest.fixture(autouse=True)
+def processor(monkeypatch):
+    found = Clock()
+    monkeypatch.setattr("fpsolve.budget.time.thread_time", found)
+    return found
+
+
+NUMBERS = {
+    "Λ(2)": lambda solver: solver.solution(2.0).pair.value,
+    "λ": lambda solver: solver.lyapunov_exponent().value,
+    "Λ″(0)": lambda solver: solver.variance_rate().value,
+    "δ_p": lambda solver: nonzero_root(solver).value,
+    "N": lambda solver: impact_rate(solver).value,
+    "r_c": lambda solver: critical_restitution(solver).value,
+}
+
+
+@pytest.mark.parametrize("name", sampled(*NUMBERS, keep=3))
+def test_budget_ends_a_number_and_never_changes_it(name, processor):
+    processor.tick, begin, problem = 1.0, processor.now, Problem(FIG1, FIG1_NOISE)
+    value = NUMBERS[name](ExponentSolver(problem, budget=Budget(seconds=1e6)))
+    spent = processor.now - begin
+    assert NUMBERS[name](ExponentSolver(problem, budget=Budget(seconds=spent))) == value
+    with pytest.raises(
+        NotConverged, match=r"take some .* s of processor time together, more than budget\.seconds = .*budget$"
+    ):
+        NUMBERS[name](ExponentSolver(problem, budget=Budget(seconds=0.1 * spent)))
+
+
+def test_numbers_of_a_set_have_one_meter_and_its_watch_sees_which_is_solved(processor):
+    seen, meter = [], Meter(5.0, planned=2)
+    with watched(lambda each: seen.append((each.number, each.begun, each.unknowns))), meter.running():
+        begin("λ")
+        with Meter(1.0).running() as inner:  # a part of it
+            processor.now += 2.0
+            charge(70)
+        begin("Λ(2)")
+        processor.now += 4.0
+        with pytest.raises(NotConverged, match=r" 6 s .* budget\.seconds = 5; use a larger"):
+            charge(80)
+    assert (inner, meter.spent, seen) == (meter, 6.0, [("λ", 1, 70)])
+
+
+SOLVING = Phase("case", "solving", 400, SETS)
+
+
+def bars_of(clock, **options):
+    return Bars(Console(file=io.StringIO(), **options), clock)
+
+
+def test_file_gets_a_line_each_tenth_of_a_long_phase_and_none_of_a_short_one(clock):
+    for seconds, expected in ((1.0, (240, 280, 320, 360)), (0.02, ())):
+        bars = bars_of(clock)
+        with bars.bar(SOLVING) as advance:
+            advance(200, known=True)  # of an earlier run, which tell nothing of the time to go
+            for number in range(200):
+                clock.now += seconds
+                advance(failed=number == 3)
+        left = [(n, divmod(400 - n, 60)) for n in expected]
+        told = [f"case, solving: {n} of 400 sets, 1 failed, 0:0{m}:{s:02} left" for n, (m, s) in left]
+        assert bars.console.file.getvalue().splitlines() == told
+
+
+@pytest.mark.parametrize("width", [60, 80, 120])
+def test_terminal_shows_a_phase_and_what_a_number_waits_for_in_lines_that_fit(clock, processor, width, monkeypatch):
+    monkeypatch.setenv("TERM", "xterm")
+    lines = []
+    for phase in (SOLVING, Phase("mathieu", "solving", 11, MOMENTS)):
+        bars = bars_of(clock, width=width, force_terminal=True, color_system=None, legacy_windows=False)
+        with bars.bar(phase) as advance, Meter(60.0, planned=5, begun=2).running():
+            begin("Λ″(0)")
+            if phase == SOLVING:
+                advance(100, known=True)
+                clock.now += 60.0
+                advance(30, failed=3)
+            else:
+                processor.now += 39.0
+                charge(12_400)
+            bars._display.refresh()
+        lines += re.split(r"[\r\n]+", re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", bars.console.file.getvalue()))
+    assert any("130 of 400 sets, 3 failed" in line and "0:09:00 left" in line for line in lines)
+    assert any("Λ″(0), 3 of 5, 12,400 unknowns, 21 s left" in line for line in lines) == (width > 60)
+    assert max(map(len, lines)) <= width

@@ -1,0 +1,140 @@
+"""Parts of results: those of one's own, records of simulations to the last bit, and parts that fail."""
+
+import json
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fpsolve import ExponentSolver, load_case
+from fpsolve.errors import NotConverged
+from fpsolve.exponent import INDICES
+from fpsolve.messages import Code, Message
+from fpsolve.output.records import record_of
+from fpsolve.parts import PARTS, indices
+from fpsolve.results.curve import SimulatedCurve, Status
+from fpsolve.simulation.estimators import MomentEstimate, MonteCarlo
+from fpsolve.simulation.response import Response
+from fpsolve.study import columns, solve
+from fpsolve.workflow import run_case, simulate
+from tests.contract.test_cases import CASES, ROOT
+from tests.contract.test_docs import typed
+from tests.kit import case_in, case_text, from_record, solve_case, solve_sets
+
+MINIMAL = CASES / "minimal.toml"
+
+
+@pytest.mark.slow
+def test_quantity_and_part_of_the_page_on_contributing_are_solved_and_tabulated(monkeypatch):
+    """The chance that Gaussian noise is above a level, as the complementary error function has it."""
+    names, _ = typed(ROOT / "docs/contributing.md")
+    index, chance = names["index"], names["part"]
+    part = indices.part_of(index)
+    monkeypatch.setitem(INDICES, index.name, index)
+    for module in (solve, columns):
+        monkeypatch.setattr(module, "PARTS", (*PARTS, part, chance))
+    for each in (part, chance):
+        monkeypatch.setitem(solve.BY_NAME, each.name, each)
+    case = load_case(MINIMAL)
+    output = case.output.model_copy(update={"quantities": (index.name, chance.name)})
+    case = case.model_copy(update={"output": output})
+    [solved] = solve_sets(case)
+    expected = 0.5 * math.erfc(1.0 / (math.sqrt(2) * case.problem.noise.standard_deviation))
+    for result in (solved.result, from_record(case, solved)):
+        assert result.parts[chance.name].value == pytest.approx(expected, rel=1e-8)
+        row, solver = columns.row_of(case, result), ExponentSolver(case.problem)
+        assert {each.name for each in columns.columns_of(case)} >= {index.name, f"{index.name}_error", chance.name}
+        assert row[index.name] == pytest.approx(index.solve(solver, None).value, rel=1e-6)
+
+
+RESULT = MonteCarlo(
+    estimates=(
+        MomentEstimate(1.0, 0.1, 1 / 3, "direct", 5e-324),
+        MomentEstimate(-0.5, None, None, "population", 0.0),
+        MomentEstimate(2.0, math.nan, math.inf, "population", -0.0),
+    ),
+    lyapunov_exponent=-math.inf,
+    lyapunov_exponent_error=math.nan,
+    variance_rate=1.7976931348623157e308,
+    variance_rate_error=math.pi,
+    paths=64,
+    time=0.1 + 0.2,
+    step=1e-300,
+    seed=2**63,
+    impacts=0,
+    warnings=("Λ(p) at p = 2", 'a "quoted" one\nof two lines'),
+    interrupted=True,
+    parameters={"noise.treatment": "exact"},
+)
+
+
+def bits(thing):
+    """All that something is made of, to the last bit."""
+    if isinstance(thing, np.ndarray):
+        return thing.dtype, thing.shape, thing.tobytes()
+    if isinstance(thing, tuple | list):
+        return [bits(each) for each in thing]
+    return bits([*vars(thing).items()]) if hasattr(thing, "__dataclass_fields__") else repr(thing)
+
+
+@pytest.mark.parametrize("interrupted", [True, False])
+def test_a_simulation_comes_back_from_its_record_to_the_last_bit(interrupted, rng):
+    curve = next(load_case(MINIMAL).curves())
+    density = rng.normal(size=(3, 6)) * 10.0 ** rng.integers(-300, 300, size=(3, 6))
+    density[0, :4] = math.nan, math.inf, -math.inf, -0.0
+    edges = np.arange(4.0), np.linspace(-1, 1, 7), density, np.zeros(0), rng.normal(size=3), np.full(3, 5e-324)
+    more = {"outside": 1e-17, "impact_rate": math.inf, "time": 2.5, "interrupted": True}
+    response = Response({"x": (1.0, math.nan), "energy": (0.1, 0.2)}, *edges, **more)
+    for found in (response, None):
+        simulated = SimulatedCurve(curve, RESULT, found, RESULT.warnings, interrupted)
+        text = json.dumps(record_of(simulated), allow_nan=False)
+        again = simulate.simulated_of(json.loads(text), curve)
+        for name in ("result", "response", "warnings", "interrupted"):
+            assert bits(getattr(again, name)) == bits(getattr(simulated, name)), name
+    numpy = replace(RESULT, time=np.float64(0.3), paths=np.int64(64))
+    record = json.loads(json.dumps(record_of(SimulatedCurve(curve, numpy, None, ()))))
+    assert bits(simulate.simulated_of(record, curve).result) == bits(replace(RESULT, time=0.3))
+    row = record["result"]
+    wrong = [{"result": each} for each in ({}, row[:-1], [*row, 0], [[{}], *row[1:]])]
+    wrong += [{"response": {}}, {"response": [{"shape": [2], "data": "AAAA"}] * 12}]
+    for each in (*wrong, *({"warnings": each} for each in ("a text", [1]))):
+        with pytest.raises(ValueError, match="this is no record of a SimulatedCurve: "):
+            simulate.simulated_of(record | each, curve)
+
+
+@pytest.mark.parametrize(
+    ("raised", "code"),
+    [
+        (NotConverged(Message(Code.RESPONSE_OPEN, size=0.1)), Code.RESPONSE_OPEN),
+        (MemoryError(), Code.NO_MEMORY),
+        (ZeroDivisionError("a fault"), Code.FAULT),
+    ],
+)
+def test_a_response_that_fails_costs_no_other_number(tmp_path, monkeypatch, raised, code):
+    def failing(*arguments):
+        raise raised
+
+    monkeypatch.setattr("fpsolve.parts.response.solve_response", failing)
+    text = case_text("[moments]\np = [1.0]\n[output]\nquantities = ['moment', 'response']", c2=0.5)
+    [found] = solve_case(case_in(tmp_path, text))
+    [failure] = found.failures
+    assert failure.reason.tells_of(code)
+    assert str(failure.reason).startswith("no response: ")
+    assert (found.status, found.moments.p.tolist()) == (Status.PARTLY, [1.0])
+
+
+def test_a_simulation_that_fails_keeps_the_curves_before_it(tmp_path, monkeypatch):
+    original = simulate.simulate_curve
+
+    def failing(curve, *others):
+        if curve.number == 2:
+            raise NotConverged("the simulation overflowed")
+        return original(curve, *others)
+
+    monkeypatch.setattr(simulate, "simulate_curve", failing)
+    text = "[moments]\np = [1.0]\n[output]\nquantities = ['moment']\n[monte_carlo]\npaths = 32\ntime = 40.0\n"
+    case = case_in(tmp_path, case_text(f'{text}[vary]\n"noise.D0" = [0.1, 0.2]', epsilon=0.5))
+    with pytest.raises(NotConverged, match="the simulation overflowed"):
+        run_case(case, tmp_path / "out", monte_carlo=True)
+    assert [path.name for path in (tmp_path / "out/test").glob("monte_carlo*")] == ["monte_carlo.json"]

@@ -1,0 +1,158 @@
+"""What a run does where something fails or is interrupted between its steps."""
+
+import errno
+from contextlib import nullcontext
+
+import pytest
+
+from fpsolve import FpsolveError
+from fpsolve.case.sections import MonteCarloSection
+from fpsolve.exponent.adapt import Budget
+from fpsolve.files import alone, atomic
+from fpsolve.output.records import part_key, set_key
+from fpsolve.parts.every import BY_NAME
+from fpsolve.parts.part import Numerics
+from fpsolve.workflow.simulate import simulation_key
+from tests.kit import COSTLY, LEAN, TEXT, case_in, read_json, run
+
+ASKED = {
+    "moment": {"p": [1.0, 2.0]},
+    "excursions": {"phi": 0.0},
+    "response": {"rtol": 1e-6},
+    "eigenfunctions": {"p": [1.0]},
+}
+
+
+@pytest.mark.parametrize(
+    ("change", "parts"),
+    [
+        ({"rtol": 1e-9}, {*ASKED} - {"response"}),
+        ({"budget": Budget(unknowns=500)}, set()),
+        ({"is_stated": False}, set()),
+    ],
+)
+def test_key_of_a_part_follows_from_what_its_numbers_follow_from(change, parts):
+    """A budget decides what it has limited alone."""
+    numerics = {"rtol": 1e-8, "budget": Budget(), "mesh": None}
+
+    def keys(asked=ASKED, **more):
+        return {name: part_key(BY_NAME[name], each, Numerics(**numerics | more)) for name, each in asked.items()}
+
+    assert {name for name in ASKED if keys()[name] != keys(**change)[name]} == parts
+    for name in ASKED:
+        other = keys({**ASKED, name: {**ASKED[name], "p": [7.0]}})
+        assert {each for each in ASKED if keys()[each] != other[each]} == {name}
+
+
+def test_keys_of_sets_and_simulations_differ(tmp_path):
+    curve, other = case_in(tmp_path, TEXT).curves()
+    setting = MonteCarloSection()
+    settings = [setting, *(setting.model_copy(update=each) for each in ({"seed": 7}, {"paths": 5000}))]
+    found = [simulation_key(curve, (1.0, 2.0), each) for each in settings]
+    found += [
+        simulation_key(curve, (1.0,), setting),
+        simulation_key(other, (1.0, 2.0), setting),
+        set_key(curve),
+        set_key(other),
+    ]
+    assert len(set(found)) == len(found)
+
+
+def raising(failure):
+    def fail(*_, **__):
+        raise failure
+
+    return fail
+
+
+@pytest.mark.parametrize(
+    ("place", "command", "message"),
+    [
+        ("fpsolve.workflow.cases.Sweep", "run", "interrupted before the first curve; run it again to go on"),
+        ("fpsolve.study.solve.solve_curve", "run", "interrupted after 0 of 2 curves; run it again to go on"),
+        ("fpsolve.study.solve.solve_curve", "check", "interrupted after 0 of 2 curves; run it again to start over"),
+        (
+            "fpsolve.workflow.sets.write_dataset",
+            "run",
+            "interrupted after 2 of 2 curves; what was done is kept in results/case; run it again to go on",
+        ),
+        (
+            "fpsolve.page.terminal.print_blocks",
+            "run",
+            "interrupted; what was solved is kept in results/case; run it again to go on",
+        ),
+        (
+            "fpsolve.show.results.write_figures",
+            "run",
+            "interrupted; what was solved is kept in results/case; run it again to go on",
+        ),
+    ],
+)
+def test_an_interrupt_says_what_is_kept_in_every_phase(tmp_path, monkeypatch, place, command, message):
+    monkeypatch.setattr(place, raising(KeyboardInterrupt))
+    done = run(tmp_path, command, "case.toml", "--jobs", "1", "--set", LEAN, case=TEXT)
+    assert (done.code, done.err.splitlines()[-1]) == (130, message)
+
+
+@pytest.mark.parametrize(
+    ("failure", "said"),
+    [
+        (
+            OSError(errno.ENOSPC, "No space left on device", "cache/a.nbi"),
+            "cache/a.nbi cannot be written: No space left",
+        ),
+        (OSError("encoder error"), "the output cannot be written: encoder error; send it to another place\n"),
+    ],
+)
+def test_a_failure_to_write_is_one_sentence(tmp_path, monkeypatch, failure, said):
+    monkeypatch.setattr("fpsolve.study.solve.solve_curve", raising(failure))
+    done = run(tmp_path, "check", "case.toml", case=TEXT)
+    assert (done.code, done.err.count("\n"), done.err.startswith(said)) == (2, 1, True)
+
+
+@pytest.mark.parametrize("failure", [ZeroDivisionError("x"), MemoryError(), FpsolveError("no")])
+def test_a_quantity_that_fails_takes_no_other_with_it(tmp_path, monkeypatch, failure):
+    for place in (*COSTLY, "fpsolve.exponent.solver.ExponentSolver.variance_rate"):
+        monkeypatch.setattr(place, raising(failure))
+    done = run(tmp_path, "run", "case.toml", "--all", "--set", "vary={}", "--set", "moments.p=[2.0]", case=TEXT)
+    [curve] = read_json(tmp_path / "results/case/summary.json")["curves"]
+    assert (done.code, curve["status"], curve["variance_rate"]) == (3, "partly", None)
+    assert all(curve[name] for name in ("lyapunov_exponent", "stability_index", "moments"))
+
+
+def test_many_curves_leave_their_numbers_to_results_nc(tmp_path, monkeypatch):
+    """summary.json has state and messages of each; the next command still knows whose files these are."""
+    asked = ["run", "case.toml", "--quiet", "--jobs", "1", "--set", "output={ figure=false, quantities=['moment'] }"]
+    place = tmp_path / "results/case/summary.json"
+    assert run(tmp_path, *asked, case=TEXT).code == 0
+    few = read_json(place)
+    monkeypatch.setattr("fpsolve.output.tables.MOST_SUMMARISED", 1)
+    assert run(tmp_path, *asked).code == 0
+    many = read_json(place)
+    assert many["curves"] == [
+        {key: each[key] for key in ("varied", "status", "warnings", "notes")} for each in few["curves"]
+    ]
+    for short, each in zip(many["curves"], few["curves"], strict=True):
+        assert many["parameters"] | short["varied"] == each["parameters"]
+    simulated = ["simulate", "case.toml", "--quiet", "--paths", "32", "--time", "20"]
+    for sets, is_kept in ([], True), (["--set", "noise.tau0=0.6"], False):
+        run(tmp_path, *simulated, *sets)
+        assert place.exists() == is_kept
+
+
+@pytest.mark.parametrize("failure", [OSError(errno.ENOSPC, "No space left on device"), OSError("encoder error")])
+def test_a_failure_to_write_a_file_names_it_and_leaves_nothing(tmp_path, failure):
+    path = tmp_path / "table.csv"
+    with pytest.raises(OSError, match=r"table\.csv") as raised, atomic(path):
+        raise failure
+    assert (raised.value.filename, list(tmp_path.iterdir())) == (str(path), [])
+
+
+@pytest.mark.parametrize("name", ["ENOSYS", "ENOLCK", "EIO", ""])
+def test_a_lock_keeps_out_all_but_where_the_file_system_has_none(tmp_path, monkeypatch, name):
+    if name:
+        monkeypatch.setattr("fcntl.flock", raising(OSError(getattr(errno, name), "no locks")))
+    told = {"": "another run", "EIO": "no locks"}.get(name, "")
+    with pytest.raises(FpsolveError, match=told) if told else nullcontext(), alone(tmp_path), alone(tmp_path):
+        assert not told
+    assert name == "EIO" or list(tmp_path.iterdir()) == []
