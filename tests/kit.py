@@ -178,6 +178,17 @@ def read_csv(path: Path) -> list[dict[str, str]]:
         return list(csv.DictReader(file))
 
 
+def records_in(folder: Path) -> list[bytes]:
+    """All records of sets in a folder of results, the torn ones too."""
+    paths = [path for path in (folder / "records/solved").glob("*") if path.is_file()]
+    return [line for path in paths for line in path.read_bytes().splitlines(keepends=True)]
+
+
+def sets(records: list[bytes]) -> set[bytes]:
+    """The keys of the sets of whole records; one that takes long has several, of its parts."""
+    return {line.split(b'"')[3] for line in records if line.startswith(b'{"key"') and line.endswith(b"\n")}
+
+
 def files(folder: Path) -> set[str]:
     """All files below a folder, by their paths from there."""
     return {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}

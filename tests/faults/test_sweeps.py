@@ -18,6 +18,7 @@ import xarray as xr
 
 from tests import kit
 from tests.conftest import heed_signals, started
+from tests.kit import sets
 
 SIZE = 3
 """Sets each way."""
@@ -62,14 +63,7 @@ def begun(folder, out, *options, before=heed_signals):
 
 
 def lines(folder, out):
-    """All records that were written, the torn ones too."""
-    paths = (folder / out / "sweep/records/solved").glob("*")
-    return [line for path in paths if path.is_file() for line in path.read_bytes().splitlines(keepends=True)]
-
-
-def sets(found):
-    """The keys of the sets of whole records; one that takes long has several, of its parts."""
-    return {line.split(b'"')[3] for line in found if line.startswith(b'{"key"') and line.endswith(b"\n")}
+    return kit.records_in(folder / out / "sweep")
 
 
 def summary(folder, out):
