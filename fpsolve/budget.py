@@ -21,6 +21,10 @@ _watch: ContextVar[Callable[[Meter], object] | None] = ContextVar("watch", defau
 class OverBudget(NotConverged):
     """The seconds of a meter have passed; no number goes on without what it ends, see `unless_over_budget`."""
 
+    def advising(self, remedy: str) -> OverBudget:
+        """It has a remedy."""
+        return self
+
 
 @dataclass(eq=False)
 class Meter:
@@ -73,14 +77,20 @@ def begin(symbol: str) -> None:
 
 
 @contextmanager
-def unless_over_budget() -> Iterator[None]:
-    """What is not resolved in the body is done without, but for what a budget has ended: no number depends on that."""
+def unless_over_budget(instead: Exception | None = None) -> Iterator[None]:
+    """What is not resolved in the body is done without, but for what a budget has ended: no number depends on that.
+
+    Raises:
+        OverBudget: it was ended.
+        Exception: `instead`, if it is given, where the body is not resolved.
+    """
     try:
         yield
     except OverBudget:
         raise
-    except NotConverged:
-        pass
+    except NotConverged as failure:
+        if instead is not None:
+            raise instead from failure
 
 
 @contextmanager
@@ -93,10 +103,16 @@ def watched(watch: Callable[[Meter], object]) -> Iterator[None]:
         _watch.reset(token)
 
 
-def charge(unknowns: int) -> None:
-    """Ask whether a factorisation of so many unknowns may begin. Raises `OverBudget`."""
+def seconds_spent() -> float:
+    """By the numbers of the meter that is running; 0 where none is."""
+    meter = _meter.get()
+    return meter.spent if meter else 0.0
+
+
+def charge(unknowns: int, seconds: float = 0.0) -> None:
+    """Ask whether work on so many unknowns, which takes so many seconds at least, may begin. Raises `OverBudget`."""
     if meter := _meter.get():
-        meter.refuse(meter.spent)
+        meter.refuse(meter.spent + seconds)
         meter.unknowns = unknowns
         if watch := _watch.get():
             watch(meter)

@@ -71,6 +71,10 @@ class NotConverged(FpsolveError):
         """What happened, without what to do."""
         return self.message.advising(None)
 
+    def advising(self, remedy: str) -> NotConverged:
+        """The same with another remedy."""
+        return type(self)(self.reason, self.partial, remedy)
+
 
 class NumericalFailure(ArithmeticError):
     """Numbers became too large, or are none."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
@@ -15,10 +16,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fpsolve.arrays import FloatArray
-from fpsolve.budget import OverBudget
+from fpsolve.budget import unless_over_budget
 from fpsolve.data import Quantity, Result, dataset
 from fpsolve.drawing import QUARTERS, draw_colours, label_axes
-from fpsolve.errors import MeshError, NotConverged, SingularMatrix
+from fpsolve.errors import MeshError, SingularMatrix
 from fpsolve.exponent.directions import DirectionFields, DirectionGrid, Directions
 from fpsolve.exponent.eigen import PrincipalPair, principal_pair
 from fpsolve.fem.generator import Generator
@@ -70,11 +71,10 @@ def settled_directions(pair: PrincipalPair) -> SettledDirections:
         finer = generator.chosen.with_axis(0, generator.chosen.phi.enriched())
         if finer.phi.size > MOST_DIRECTIONS or finer.size > MOST_UNKNOWNS:
             return found
-        try:
+        new = None
+        with suppress(SingularMatrix, MeshError), unless_over_budget():
             new = principal_pair(Generator(generator.problem, finer), pair.p, start=found.pair)
-        except OverBudget:
-            raise
-        except (NotConverged, SingularMatrix, MeshError):  # what there is stands, with its error
+        if new is None:  # what there is stands, with its error
             return found
         fields = Directions(new).fields
         before = found.on(fields.grid).fields

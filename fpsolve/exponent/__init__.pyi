@@ -1,10 +1,10 @@
-from .blocks import InvariantClass as InvariantClass
 from .eigen import PrincipalPair as PrincipalPair
 from .eigen import principal_pair as principal_pair
 from .eigen import second_derivative as second_derivative
 from .eigen import spectrum as spectrum
 from .error import Estimate as Estimate
 from .error import Failure as Failure
+from .error import InvariantClass as InvariantClass
 from .forced import StationaryMoments as StationaryMoments
 from .forced import stationary_moments as stationary_moments
 from .function import MomentLyapunovFunction as MomentLyapunovFunction

@@ -10,7 +10,6 @@ E‖x‖^p of one of them grows as Λ_i(p). For p < 0 it depends on how the x_i 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -19,35 +18,13 @@ import numpy as np
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import NoSuchExponent, NotConverged
 from fpsolve.exponent.eigen import PairDerivatives, PrincipalPair
-from fpsolve.exponent.error import Absent, Estimate, Moment
+from fpsolve.exponent.error import Absent, Estimate, InvariantClass, Moment
 from fpsolve.exponent.method import RTOL_BEYOND_PLANE, Along, Method, Tolerance
 from fpsolve.messages import Code, Message
 from fpsolve.model.problem import ParameterDerivative, Problem
 
 TINIEST_P = 1e-9
 """For smaller |p| the part of the largest λ counts, and p < 0 is 0 but for rounding."""
-
-
-@dataclass(frozen=True, eq=False)
-class InvariantClass:
-    """The growth of a block of variables, or on a ray that the phase never leaves, or of the distance from it.
-
-    Attributes:
-        name: what tables call it: "along the ray at phi = 1.5708", "x, v".
-        phase: φ of the ray; None for a block of variables.
-        variables: the names of those of the block; none for a ray.
-        lyapunov_exponent: its λ.
-        p: the moments, shape (n,).
-        value, error_estimate: its Λ(p), shape (n,).
-    """
-
-    name: str
-    phase: float | None
-    variables: tuple[str, ...]
-    lyapunov_exponent: Estimate
-    p: FloatArray
-    value: FloatArray
-    error_estimate: FloatArray
 
 
 class Blocks(Method):

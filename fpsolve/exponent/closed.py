@@ -11,6 +11,7 @@ import numpy as np
 from fpsolve.arrays import FloatArray
 from fpsolve.budget import unless_over_budget
 from fpsolve.errors import NoHierarchy, NotConverged
+from fpsolve.exponent.delays import present
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.error import Estimate, Moment, checked
 from fpsolve.exponent.method import RTOL_BEYOND_PLANE, Method, Tolerance, refuse
@@ -119,7 +120,7 @@ class DelayMoments(EvenMoments):
 
     @classmethod
     def takes(cls, problem: Problem) -> bool:
-        return bool(problem.system.pasts)
+        return present(problem) < problem.dimension
 
     def has(self, p: float) -> bool:
         return p == 2

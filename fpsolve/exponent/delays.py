@@ -25,11 +25,11 @@ from scipy.linalg import eig, eigvals, expm
 from scipy.optimize import brentq
 
 from fpsolve.arrays import FloatArray, dense, finite
-from fpsolve.budget import charge
 from fpsolve.errors import NoHierarchy
 from fpsolve.exponent.powers import Moving, PowerRates, moment_form, upper
 from fpsolve.exponent.rightmost import REMEDY, ROUNDING, Eigenpair
 from fpsolve.model.plane import common_delay
+from fpsolve.model.problem import Problem
 
 MOST_SIZE = 1200
 """Largest number of second moments at two times, times that multiple."""
@@ -59,12 +59,17 @@ TINY = 1e-20
 """Imaginary part of a σ that differentiates."""
 
 
+def present(problem: Problem) -> int:
+    """How many variables are no past values of others."""
+    return problem.dimension - len(problem.system.pasts)
+
+
 class Delayed:
     """The second moments of what moves a state with delays.
 
     Args:
         moving: what does, for the state and its past values as one vector, with rates of the state alone.
-        pasts: which variable each of the last ones is, and how long ago.
+        problem: tells which variable each of the last ones is, and how long ago.
         units: of the state; None for those in which what moves it is balanced.
 
     Raises:
@@ -73,10 +78,10 @@ class Delayed:
 
     most = MOST_SIZE
 
-    def __init__(self, moving: Moving, pasts: Sequence[tuple[int, float]], units: FloatArray | None = None) -> None:
-        self._pasts, self.n = pasts, len(moving.steady) - len(pasts)
+    def __init__(self, moving: Moving, problem: Problem, units: FloatArray | None = None) -> None:
+        self._pasts, self.n = problem.system.pasts, present(problem)
         try:
-            self.unit, self.count = common_delay(pasts)
+            self.unit, self.count = common_delay(self._pasts)
         except ValueError as failure:
             raise NoHierarchy(str(failure)) from failure
         if (size := self.n**2 * self.count) > MOST_SIZE:
@@ -197,7 +202,6 @@ class DelayRates:
         drift[0] -= 0.5 * sigma * one
         moving = _outer([(functions, drift), *zip(self.masses, (load * fall for load in own.loads), strict=True)], one)
         generator = _kron(self.generator, np.eye(n * n))
-        charge(2 * count * len(generator))
         ends = self._collocated(moving, generator) if generator.any() else self._carried(moving)
         same, size = np.eye(len(ends)), len(generator)
         starts = np.linalg.solve(same - np.eye(len(ends), k=-size) @ ends, same[:, :size])  # each is where one ends
@@ -244,7 +248,6 @@ class DelayRates:
         degree = math.ceil((FEWEST + slow) * GROWTH**self.finer)
         x = np.cos(np.pi * np.arange(degree, -1, -1) / degree)
         slopes = _differentiating(x)
-        charge(count * width * (degree + 1))
         whole = np.zeros((count, degree + 1, width, count, degree + 1, width), dtype=np.result_type(*moving))
         for j, i in np.ndindex(count, degree + 1):
             rows, time = whole[j, i], 0.5 * (1 + x[i]) * unit

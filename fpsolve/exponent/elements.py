@@ -1,11 +1,16 @@
-"""Λ(p) by the principal eigenpair on elements: of the phase of two variables, or of directions of three and four."""
+"""Λ(p) by the principal eigenpair on elements: of the phase of two variables, or of directions of three and four.
+
+A discretisation is chosen for each p, each solve goes on from the nearest p. It is refined until Λ(p) meets a
+tolerance, or the budget is spent.
+"""
 
 from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from functools import cached_property
 from types import MappingProxyType
 from typing import Any
@@ -14,21 +19,62 @@ import numpy as np
 
 from fpsolve.arrays import FloatArray
 from fpsolve.budget import unless_over_budget
-from fpsolve.errors import NoHierarchy, NotConverged
-from fpsolve.exponent.adapt import AT_CORNER, WIDER, WholeProblem, is_at_corner, solved_p, widened
+from fpsolve.errors import MeshError, NoHierarchy, NotConverged, SingularMatrix
 from fpsolve.exponent.changed import SMALL_P as SMALLEST
 from fpsolve.exponent.changed import Changed
-from fpsolve.exponent.eigen import PairDerivatives, PrincipalPair, second_derivative, slope_rounding
+from fpsolve.exponent.eigen import (
+    PairDerivatives,
+    PrincipalPair,
+    pair_at_zero,
+    principal_pair,
+    second_derivative,
+    slope_rounding,
+)
 from fpsolve.exponent.error import Estimate, Moment, Solution, checked, slope_error
 from fpsolve.exponent.fields import no_picture_of
-from fpsolve.exponent.method import RTOL, RTOL_BEYOND_PLANE, RTOL_OF_SEVERAL, Method, Tolerance, refuse_tails
+from fpsolve.exponent.method import (
+    RTOL,
+    RTOL_BEYOND_PLANE,
+    RTOL_OF_SEVERAL,
+    Method,
+    Search,
+    Tolerance,
+    refuse_tails,
+)
 from fpsolve.exponent.moments import EvenMoment, even_moment, moment_row
-from fpsolve.fem.factors import one_thread
-from fpsolve.fem.generator import SMALL_P
-from fpsolve.messages import Code, Message
+from fpsolve.exponent.starts import Start, first, other_centers, refined
+from fpsolve.fem.factors import FEW_UNKNOWNS, one_thread
+from fpsolve.fem.generator import SMALL_P, Generator
+from fpsolve.fem.noise_axes import PolynomialAxis
+from fpsolve.fem.phase import PhaseAxis
+from fpsolve.fem.space import Space
+from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model import quantity
 from fpsolve.model.problem import ParameterDerivative, Problem
+from fpsolve.theory.frozen import frozen_noise
 
+WORTH_A_TRY = FEW_UNKNOWNS
+"""Unknowns of a system that takes less time than finding another one."""
+MOST_TILT_AWAY = 0.7
+"""How far the tilt of a space may be from the best one at another p."""
+TRIM = 0.8
+"""A smaller space must have at most this share of the unknowns."""
+NEGLIGIBLE_P = 1e-30
+"""Pairs at smaller |p| are those at p = 0, from which they differ by less than by rounding."""
+NEIGHBOURS = 6
+"""How many known eigenfunctions those of another p are interpolated from."""
+WIDER = 4.0
+"""Factor by which the interval of noise with algebraic tails is wider where it tells the error of a narrower one."""
+SURELY_SEEN = 1e-6
+"""A tolerance down from which cells are small enough for their highest modes to show what is in them."""
+AT_CORNER = 1e-3
+"""Distance from p = −1, where Λ(p) of a saddle with two variables has a corner, or nearly one: two eigenvalues meet."""
+MIXED = 100.0
+"""‖T′‖ over ‖T‖ from which on T is thought to be a mixture of those of two eigenvalues that meet."""
+MOST_HALVED = 20_000
+"""Unknowns of a system on halved cells that is solved for that: beyond, cells are many, and it takes long."""
+A_THIRD_MORE = 4 / 3
+"""What a budget may be exceeded by."""
 MOST_EQUATIONS = 8000
 """Of even moments."""
 SURELY = 10.0
@@ -42,13 +88,23 @@ TINIEST_P = 1e-9
 
 
 class Elements(Method):
-    """Λ(p) of two variables."""
+    """Λ(p) of two variables.
+
+    Attributes:
+        spaces: what was solved, by p.
+        remedy: what to do where it is not resolved.
+    """
 
     is_function = True
+    spends: Remedy = Remedy.BUDGET
 
     def __init__(self, *args: Any) -> None:
         super().__init__(*args)
         self._even = dict[float, EvenMoment | None]()
+        self.spaces: dict[float, Solution] = {}
+        self._failed = dict[float, tuple[type[NotConverged], Message]]()
+        self.is_given = self.settings.mesh is not None
+        self.remedy = Remedy.MESH if self.is_given else self.spends
 
     @classmethod
     def takes(cls, problem: Problem) -> bool:
@@ -67,45 +123,232 @@ class Elements(Method):
 
     @property
     def goes_on(self) -> bool:  # type: ignore[override]
-        return self.settings.mesh is None and not self.problem.noise.has_algebraic_tails
-
-    @cached_property
-    def whole(self) -> WholeProblem:
-        """What solves the eigenproblem."""
-        own = self.settings
-        return WholeProblem(
-            self.problem,
-            mesh=own.mesh,
-            rtol=own.rtol,
-            budget=own.budget,
-            tolerance=self.tolerance,
-            meter=own.meter,
-            starts=self._starts,
-        )
-
-    @property
-    def _starts(self) -> Mapping[float, Any]:
-        return self.settings.starts
+        return not self.is_given and not self.problem.noise.has_algebraic_tails
 
     @property
     def known(self) -> Mapping[float, Any]:  # type: ignore[override]
-        return self.whole.known
+        return self.spaces
 
-    @property
-    def spaces(self) -> Mapping[float, Any]:  # type: ignore[override]
-        return self.whole.known
+    def places(self, p: float, found: Sequence[Solution]) -> Iterator[Start]:
+        """The first stage of each place where Λ(p) may be carried, in order, from what was found in those before: where
+        slow noise carries the moment, or around the mean of other noise, and others far from there."""
+        if not found:
+            yield Start(self.problem, first(self.problem, p, self.settings.rtol))
+        for center in other_centers(found[0].pair):
+            yield Start(self.problem, first(self.problem, p, self.settings.rtol, center))
 
     def solution(self, p: float, tolerance: Tolerance | None = None) -> Solution:
         """The principal eigenpair at p and its error, which no even moment contradicts. Raises `NotConverged`."""
         point = solved_p(p)
         try:
-            found = self.whole.solution(point, tolerance)
+            found = self._found(point, tolerance)
         except NotConverged as failure:
             if failure.reason.code is Code.BUDGET_SPENT:  # which tells a value
                 self._witness(point, failure.reason.data["value"], failure.reason.data["error"])
             raise
         self._witness(point, found.value, found.error)
         return found
+
+    def _found(self, p: float, tolerance: Tolerance | None = None) -> Solution:
+        """The principal eigenpair at p and its error, within a tolerance, the usual one if none is given.
+
+        Raises:
+            NotConverged: the mesh does not resolve the problem, or the budget does not suffice to find one.
+        """
+        p = solved_p(p)
+        if tolerance is None and p in self._failed:
+            kind, message = self._failed[p]
+            raise kind(message)
+        allowed = tolerance or self.tolerance
+        if p not in self.spaces or (not self.is_given and not self.is_accurate(self.spaces[p], allowed)):
+            try:
+                with one_thread(), self.settings.meter.running():
+                    self.spaces[p] = self._searched(p, allowed)
+            except NotConverged as failure:
+                if tolerance is None:  # a tighter one may be out of reach where this is not
+                    self._failed[p] = type(failure), failure.message
+                raise failure from None
+            except MeshError as failure:
+                if self.is_given:
+                    raise
+                told = Message(Code.NOT_CONVERGED, p=p, reason=failure.message, remedy=self.remedy)
+                raise NotConverged(told) from failure
+            except (SingularMatrix, np.linalg.LinAlgError) as failure:
+                told = Message(Code.NOT_SOLVED, p=p, reason=str(failure), remedy=self.remedy)
+                raise NotConverged(told) from failure
+            except MemoryError as failure:
+                raise NotConverged(Message(Code.NO_MEMORY, remedy=Remedy.MEMORY)) from failure
+            except ArithmeticError as failure:
+                raise NotConverged(Message(Code.OUT_OF_RANGE, p=p, reason=str(failure))) from failure
+        return self.spaces[p]
+
+    def _searched(self, p: float, tolerance: Tolerance) -> Solution:
+        """A solution within the tolerance, or the one on the given mesh."""
+        if self.is_given:
+            coarse, fine = self.given
+            pair = self._solved_with(coarse, p).pair
+            finer = self.pair_on(fine, p, pair)
+            return Solution(pair, measured=(abs(finer.value - pair.value),))
+        if abs(p) < SMALL_P:
+            near = self.near_zero(p, tolerance).pair
+            at_zero = pair_at_zero(near) if p == 0 else None
+            return Solution(at_zero) if at_zero else self._solved_with(near.generator, p)
+        search = Search(p, lambda found: tolerance(p, found.value), self.settings.budget, self.spends)
+        known = None
+        for attempt in (self._try_problem_close_by, self._try_nearest_p):
+            known = attempt(search, tolerance) or known
+            if known and self.is_accurate(known, tolerance) and not self._other_places(known):
+                return self._confirmed(search, known, tolerance)
+        found = [] if known is None else [search.settle(self._after(known, tolerance), known.pair)]
+        for start in self.places(p, found):
+            found.append(search.settle(start))
+        return self._confirmed(search, max(found, key=lambda each: each.pair.value), tolerance)
+
+    def _after(self, known: Solution, tolerance: Tolerance) -> Start:
+        """The place of a solution, with a space that should be within the tolerance."""
+        start: Start = known.start or Start(self.problem, known.pair.generator.chosen)
+        return start.refined(known, tolerance(known.pair.p, known.pair.value), 0, self.settings.budget.most(start))
+
+    def _confirmed(self, search: Search, found: Solution, tolerance: Tolerance) -> Solution:
+        """A solution that agrees with that of halved cells of φ within its error, or within what is allowed.
+
+        At a coarse tolerance a thin layer of T, as where the phase rests, may lie within a cell that is so large that
+        none of its modes shows it. Where two eigenvalues meet, modes of a mixture of both T tell little.
+        """
+        chosen, p = found.pair.generator.chosen, search.p
+        if self.is_at_corner(p) and is_mixed(found.pair):
+            change = self.finer_pair(found.pair).value - found.pair.value
+            return replace(found, search=2 * abs(change))
+        if self.settings.rtol <= SURELY_SEEN or not isinstance(chosen.phi, PhaseAxis):
+            return found
+        halved = chosen.with_axis(0, chosen.phi.doubled())
+        if halved.size > min(MOST_HALVED, self.settings.budget.most(halved)):
+            return found
+        start = Start(self.problem, halved)
+        finer = search.attempt(lambda: Solution(start.solved(p, found.pair))) or search.settle(start)
+        change = abs(finer.pair.value - found.pair.value)
+        if change <= found.error:
+            return found
+        if change + finer.error <= tolerance(p, finer.pair.value):
+            return replace(finer, search=finer.search + change)
+        return self._confirmed(search, finer, tolerance)
+
+    def _try_problem_close_by(self, search: Search, tolerance: Tolerance) -> Solution | None:
+        """The solution with what was chosen for this p in the problem close by, or None."""
+        start, problem, p = self.settings.starts.get(search.p), self.problem, search.p
+        if start is None or _bases(start.pair.generator.problem) != _bases(problem):
+            return None
+        coarsened = Start(problem, self._coarsened(start, tolerance))
+        if coarsened.size > WORTH_A_TRY and not self._tilt_fits(coarsened.space, p):
+            return None
+        return search.attempt(lambda: Solution(coarsened.solved(p, start.pair)))
+
+    def _try_nearest_p(self, search: Search, tolerance: Tolerance) -> Solution | None:
+        """The solution with what was chosen for the nearest p, where that is likely to do."""
+        p = search.p
+        nearest = min(self.spaces, key=lambda q: abs(q - p), default=None)
+        if nearest is None:
+            return None
+        known = self.spaces[nearest]
+        generator, chosen = known.pair.generator, self._coarsened(known, tolerance)
+        is_same = chosen is generator.chosen
+        if nearest == p and is_same:
+            return known
+        if not self._may_reuse(chosen, nearest, p):
+            return None
+        return search.attempt(lambda: self._solved_with(generator if is_same else Generator(self.problem, chosen), p))
+
+    def _solved_with(self, generator: Generator, p: float) -> Solution:
+        """The solution with a generator, from those around p, or from the nearest one."""
+        near = sorted((each.pair for each in self.spaces.values()), key=lambda pair: abs(pair.p - p))[:NEIGHBOURS]
+        return Solution(self.pair_on(generator, p, near))
+
+    def pair_on(self, generator: Generator, p: float, start: PrincipalPair | Sequence[PrincipalPair]) -> PrincipalPair:
+        """The principal pair; where it is not found, the failure has the remedy of this place."""
+        try:
+            return principal_pair(generator, p, start=start)
+        except NotConverged as failure:
+            raise failure.advising(Remedy.BESIDE if self.is_at_corner(p) else self.remedy) from None
+
+    def finer_pair(self, pair: PrincipalPair) -> PrincipalPair:
+        """That at the same p on a finer discretisation, which tells the errors of what the other says.
+
+        It has two degrees more each way; for algebraic tails its interval is wider, too. Raises as `pair_among`.
+        """
+        return self.pair_among(widened(pair.generator).enriched(), pair)
+
+    def pair_among(self, chosen: Space, pair: PrincipalPair) -> PrincipalPair:
+        """That at the same p on other functions.
+
+        Raises:
+            NotConverged: it cannot be made, has a third more unknowns than the budget allows, or does not resolve it.
+        """
+        limit = math.inf if self.is_given else A_THIRD_MORE * self.settings.budget.most(chosen)
+        reason: Message | str
+        if chosen.size > limit:
+            reason = Message(Code.UNKNOWNS_SPENT, unknowns=chosen.size, most=self.settings.budget.most(chosen))
+        else:
+            try:
+                with one_thread(), self.settings.meter.running():
+                    return self.pair_on(Generator(self.problem, chosen), pair.p, pair)
+            except (MeshError, SingularMatrix, np.linalg.LinAlgError) as failure:
+                reason = getattr(failure, "message", str(failure))
+            except MemoryError:
+                raise NotConverged(Message(Code.NO_MEMORY), remedy=Remedy.MEMORY) from None
+        raise NotConverged(Message(Code.NOT_FINER, p=pair.p, reason=reason, remedy=self.remedy))
+
+    def near_zero(self, p: float, tolerance: Tolerance | None = None) -> Solution:
+        """The solution at ±`SMALL_P` that a smaller p goes with."""
+        side = p or (-1.0 if self.problem.coloured.has_algebraic_tails else 1.0)  # on which Λ is finite
+        q = math.copysign(SMALL_P, side)
+        try:
+            return self._found(q, tolerance)
+        except NotConverged as failure:
+            told = Message(Code.NEAR_ZERO, p=q, reason=failure.message)
+            raise type(failure)(told, failure.partial) from failure
+
+    @cached_property
+    def given(self) -> tuple[Generator, Generator]:
+        """That of the given mesh, and one of four degrees more, whose error hardly counts beside it."""
+        assert self.settings.mesh is not None
+        generator = Generator(self.problem, self.settings.mesh)
+        return generator, generator.enriched().enriched()
+
+    def is_accurate(self, solution: Solution, tolerance: Tolerance) -> bool:
+        """Whether an error is within a tolerance; for small p, where Λ has no scale, always."""
+        pair = solution.pair
+        return abs(pair.p) < SMALL_P or solution.error <= tolerance(pair.p, pair.value)
+
+    def is_at_corner(self, p: float) -> bool:
+        """Whether p is where Λ may have a corner."""
+        return abs(p + 1) <= AT_CORNER
+
+    def _other_places(self, solution: Solution) -> Sequence[float]:
+        """Where other places may carry the moment, too."""
+        return other_centers(solution.pair)
+
+    def _coarsened(self, solution: Solution, tolerance: Tolerance) -> Space:
+        """The discretisation of a solution, or a much smaller one that would do."""
+        pair, generator = solution.pair, solution.pair.generator
+        is_small = abs(pair.p) < SMALL_P or generator.size <= WORTH_A_TRY
+        if is_small:
+            return generator.chosen
+        smaller = refined(solution, tolerance(pair.p, pair.value), 0)
+        return smaller if smaller.size <= TRIM * generator.size else generator.chosen
+
+    def _may_reuse(self, chosen: Space, q: float, p: float) -> bool:
+        """Whether what serves q is likely to serve p, or so small that it is worth a try."""
+        if chosen.size > WORTH_A_TRY and abs(p - q) > max(0.5, 0.4 * min(abs(p), abs(q))):
+            return False
+        return self._tilt_fits(chosen, p)
+
+    def _tilt_fits(self, chosen: Space, p: float) -> bool:
+        """Whether the tilt of a space is about that at p."""
+        axis, frozen = chosen.xi, frozen_noise(self.problem)
+        if frozen is None or not isinstance(axis, PolynomialAxis):
+            return True
+        away = abs(frozen.tilt(frozen.center(p)) - axis.slope * p) if self.problem.coloured.may_tilt else 0.0
+        return away <= MOST_TILT_AWAY
 
     def _witness(self, p: float, value: float, error: float) -> None:
         """Refuse a value with this error that contradicts the even moment of the same p."""
@@ -168,21 +411,21 @@ class Elements(Method):
         if known := self.number(p):
             return known.value / p, known.error / p
         if abs(p) >= TINY_P:
-            solution = self.whole.solution(p, tolerance)
+            solution = self._found(p, tolerance)
             return solution.value / p, solution.error / abs(p)
         points = {p * (0.5 + shift) for shift in (-0.5 / math.sqrt(3), 0.5 / math.sqrt(3))}
-        pairs = [self.whole.solution(point, tolerance).pair for point in points]
+        pairs = [self._found(point, tolerance).pair for point in points]
         if self.problem.has_algebraic_tails:  # of which Λ(p) for p < 0 hardly tells: their moments are finite
             return self._among_tails(pairs[0])
-        near = self.whole.near_zero(p, tolerance)
+        near = self.near_zero(p, tolerance)
         error = near.error / abs(near.pair.p) + slope_rounding(pairs[0])
         return float(np.mean([pair.derivative for pair in pairs])) + near.pair.correction / near.pair.p, error
 
     def ratio(self, p: float, tolerance: Tolerance | None = None) -> tuple[float, float, float]:
         value, error = self.ratio_alone(p, tolerance)
         if abs(p) < TINY_P:  # ∫₀¹ s Λ″(sp) ds, by one point of Gauss
-            return value, 0.5 * second_derivative(self.whole.solution(p * 2 / 3, tolerance).pair), error
-        return value, (self.whole.solution(p, tolerance).derivative - value) / p, error
+            return value, 0.5 * second_derivative(self._found(p * 2 / 3, tolerance).pair), error
+        return value, (self._found(p, tolerance).derivative - value) / p, error
 
     def _among_tails(self, pair: PrincipalPair) -> tuple[float, float]:
         """λ from a pair at p = 0, on ever wider intervals of the noise, and what its modes and the ends leave.
@@ -193,9 +436,9 @@ class Elements(Method):
         ends = pair.space.xi.lines[[0, -1]]
         change = math.inf if np.any(pair.space.xi.weight(ends) * ends**2 > sys.float_info.epsilon) else 0.0
         while change > (WIDER - 1) * self.tolerance(SMALL_P, 0.0) / SMALL_P:
-            wider = self.whole.pair_among(widened(pair.generator), pair)
+            wider = self.pair_among(widened(pair.generator), pair)
             change = abs(wider.derivative - pair.derivative)
-            if self.settings.mesh is not None:
+            if self.is_given:
                 return pair.derivative, change * WIDER / (WIDER - 1) + slope_error(pair)
             pair = wider
         return pair.derivative, change / (WIDER - 1) + slope_error(pair)
@@ -208,11 +451,11 @@ class Elements(Method):
             return self.ratio_alone(0.0)[1]
         solution = self.solution(p)
         with one_thread():
-            jump = self._jump() if is_at_corner(self.problem, p) else 0.0
+            jump = self._jump() if self.is_at_corner(p) else 0.0
             if solution.measured is None:
                 return slope_error(solution.pair) + jump
             coarser = [each.pair for each in getattr(solution.start, "before", ())]
-            other = coarser[-1] if coarser else self.whole.finer_pair(solution.pair)
+            other = coarser[-1] if coarser else self.finer_pair(solution.pair)
             return 2 * abs(other.derivative - solution.derivative) + slope_rounding(solution.pair) + jump
 
     def _jump(self) -> float:
@@ -232,26 +475,23 @@ class Elements(Method):
         value, better = self.around_zero.second_derivative, self.finer_around_zero.second_derivative
         error = 2 * abs(better - value)
         with unless_over_budget():
-            finest = PairDerivatives(self.whole.finer_pair(self.finer_around_zero.pair)).second_derivative
+            finest = PairDerivatives(self.finer_pair(self.finer_around_zero.pair)).second_derivative
             error, better = abs(finest - better) + 0.5 * error, finest
         error += 10 * sys.float_info.epsilon * max(scale, abs(better))
         return checked(Estimate(better, error, scale, quantity=quantity.VARIANCE_RATE), self.refinement)
 
     @cached_property
     def around_zero(self) -> PairDerivatives:
-        return PairDerivatives(self.whole.solution(0.0).pair)
+        return PairDerivatives(self._found(0.0).pair)
 
     @cached_property
     def finer_around_zero(self) -> PairDerivatives:
         """For algebraic tails of a wider one. Raises `NotConverged`."""
-        return PairDerivatives(self.whole.finer_pair(self.around_zero.pair))
-
-    def finer_pair(self, pair: PrincipalPair) -> PrincipalPair:
-        return self.whole.finer_pair(pair)
+        return PairDerivatives(self.finer_pair(self.around_zero.pair))
 
     def gradient_along(self, p: float, along: Sequence[ParameterDerivative]) -> FloatArray:
         is_large = abs(p) >= SMALLEST
-        around = PairDerivatives(self.whole.solution(p).pair) if is_large else self.around_zero
+        around = PairDerivatives(self._found(p).pair) if is_large else self.around_zero
         changed = [Changed(around, by) for by in along]
         if is_large:
             return np.array([each.value.value / p for each in changed])
@@ -264,22 +504,39 @@ class Directions(Elements):
 
     is_function = False
     _has_witness = True
-    _starts = known = MappingProxyType[float, Any]({})
+    known = MappingProxyType[float, Any]({})
     no_picture = ""
+    usual_rtol = RTOL_BEYOND_PLANE
+    spends = Remedy.MANY
 
     @classmethod
     def takes(cls, problem: Problem) -> bool:
         return problem.dimension > 2
 
-    @property
-    def usual_rtol(self) -> float:  # type: ignore[override]
-        return 1e-3 if self.problem.system.stop else RTOL_BEYOND_PLANE  # where T is a root
+    def places(self, p: float, found: Sequence[Solution]) -> Iterator[Start]:
+        from fpsolve.exponent.modes import sphere_start  # with scikit-fem, which takes long to import
+
+        if not found:
+            yield sphere_start(self.problem, p, self.settings.rtol, self.spaces)
 
     def is_dear(self, p: float) -> bool:
         return p <= 0 or p % 2 != 0
 
-    def line_rtol(self, p: float) -> float:
-        return 3e-3 if self.problem.system.stop else super().line_rtol(p)
+    def is_at_corner(self, p: float) -> bool:
+        return False
+
+    def _other_places(self, solution: Solution) -> Sequence[float]:
+        return ()
+
+    def _try_problem_close_by(self, search: Search, tolerance: Tolerance) -> None:
+        """Each has coordinates of its own."""
+
+    def _coarsened(self, solution: Solution, tolerance: Tolerance) -> Space:
+        return solution.pair.generator.chosen
+
+    def _may_reuse(self, chosen: Space, q: float, p: float) -> bool:
+        """Every p has waves of its own."""
+        return False
 
     def number(self, p: float) -> EvenMoment | None:
         return self.even(p)
@@ -291,6 +548,50 @@ class Directions(Elements):
         return known.gradient(keys) / p if (known := self.even(p)) else super().gradient(p, keys)
 
 
+class Stopped(Directions):
+    """Λ(p) of four variables with a stop, at which T is a root."""
+
+    usual_rtol = 1e-3
+
+    @classmethod
+    def takes(cls, problem: Problem) -> bool:
+        return super().takes(problem) and problem.system.stop is not None
+
+    def places(self, p: float, found: Sequence[Solution]) -> Iterator[Start]:
+        from fpsolve.exponent.stopped import stop_start
+
+        if not found:
+            yield stop_start(self.problem, p, self.settings.rtol, self.spaces)
+
+    def line_rtol(self, p: float) -> float:
+        return 3e-3
+
+
 def doubt(error: float, known: Any) -> float:
     """The difference beyond which a value with this error contradicts an even moment."""
     return SURELY * (error + float(known.error)) + ROUNDED * abs(float(known.value))
+
+
+def is_mixed(pair: PrincipalPair) -> bool:
+    """Whether another eigenvalue is so near, and of another slope, that T changes all at once."""
+    return bool(np.linalg.norm(PairDerivatives(pair).by_p) > MIXED * np.linalg.norm(pair.right))
+
+
+def widened(generator: Generator) -> Space:
+    """That of a generator, on an interval `WIDER` times as wide for algebraic tails."""
+    chosen, lines = generator.chosen, generator.chosen.xi.lines
+    if not (lines.size and generator.problem.coloured.has_algebraic_tails):
+        return chosen
+    steps = WIDER ** np.linspace(0, 1, 4)[1:]
+    wide = np.concatenate([(lines[0] * steps)[::-1], lines, lines[-1] * steps])
+    return chosen.with_axis(1, chosen.xi.between(wide))
+
+
+def _bases(problem: Problem) -> list[str]:
+    """What the functions of each noise are made of."""
+    return [noise.basis for noise in problem.coloured.parts.values()]
+
+
+def solved_p(p: float) -> float:
+    """The p at which the pair for a p is solved."""
+    return p if abs(p) >= NEGLIGIBLE_P else 0.0

@@ -125,6 +125,28 @@ class Moment(NamedTuple):
     residual: float
 
 
+@dataclass(frozen=True, eq=False)
+class InvariantClass:
+    """The growth of a block of variables, or on a ray that the phase never leaves, or of the distance from it.
+
+    Attributes:
+        name: what tables call it: "along the ray at phi = 1.5708", "x, v".
+        phase: φ of the ray; None for a block of variables.
+        variables: the names of those of the block; none for a ray.
+        lyapunov_exponent: its λ.
+        p: the moments, shape (n,).
+        value, error_estimate: its Λ(p), shape (n,).
+    """
+
+    name: str
+    phase: float | None
+    variables: tuple[str, ...]
+    lyapunov_exponent: Estimate
+    p: FloatArray
+    value: FloatArray
+    error_estimate: FloatArray
+
+
 @dataclass(frozen=True)
 class Failure:
     """Why there is no Λ(p), or none to be trusted.

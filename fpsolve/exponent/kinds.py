@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from fpsolve.exponent.blocks import Blocks
 from fpsolve.exponent.closed import DelayMoments, EvenMoments, Simulated
-from fpsolve.exponent.elements import Directions, Elements
+from fpsolve.exponent.elements import Directions, Elements, Stopped
 from fpsolve.exponent.method import Method, Settings
 from fpsolve.model.problem import Problem, checked_problem
 
-METHODS: list[type[Method]] = [Simulated, DelayMoments, EvenMoments, Blocks, Directions, Elements]
+METHODS: list[type[Method]] = [Simulated, DelayMoments, EvenMoments, Blocks, Stopped, Directions, Elements]
 """The first that takes a problem is its method."""
 
 

@@ -168,12 +168,11 @@ class MatrixRates:
         """Without what noise drives, (σ − Gᵀ)X − A X − X Aᵀ = F for X, from the last function to the first."""
         t, u, s, z = self._schur
         given = u.conj().T @ _over(z.conj().T, given) @ u.conj()
-        found = np.empty_like(given)
+        found, one = np.zeros_like(given), np.eye(len(t))
+        [trsyl] = get_lapack_funcs(("trsyl",), (given,))
         for k in reversed(range(len(s))):
-            moved = t - 0.5 * (sigma - s[k, k]) * np.eye(len(t))
-            right = given[k] + sum(s[k, each] * found[each] for each in k + 1 + np.flatnonzero(s[k, k + 1 :]))
-            [trsyl] = get_lapack_funcs(("trsyl",), (moved,))
-            x, scale, _ = trsyl(moved, moved.conj(), -right, tranb="C")
+            moved = t - 0.5 * (sigma - s[k, k]) * one
+            x, scale, _ = trsyl(moved, moved.conj(), -given[k] - np.tensordot(s[k], found, 1), tranb="C")
             found[k] = x / scale
         return np.ascontiguousarray(_over(z, u @ found @ u.T).real)
 

@@ -7,13 +7,14 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from types import MappingProxyType
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, NamedTuple, NoReturn, Protocol, TypeVar
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from fpsolve.arrays import FloatArray, real_numbers
-from fpsolve.budget import Meter
-from fpsolve.errors import NoSuchExponent
+from fpsolve.budget import Meter, OverBudget, charge, seconds_spent
+from fpsolve.errors import FpsolveError, MeshError, NoHierarchy, NoSuchExponent, NotConverged, SingularMatrix
 from fpsolve.exponent.eigen import PairDerivatives, PrincipalPair
 from fpsolve.exponent.error import Absent, Estimate, Moment, checked
 from fpsolve.fem.mesh import CylinderMesh
@@ -31,6 +32,11 @@ RTOL_OF_SEVERAL = 1e-6
 """Relative error that is wanted of two variables under two noises that are not white."""
 RTOL_BEYOND_PLANE = 1e-5
 """Relative error that is wanted of three and four variables."""
+MAX_STAGES = 60
+"""Number of stages of a search, of all its places."""
+UNSOLVED = MeshError, NoHierarchy, NotConverged, SingularMatrix, np.linalg.LinAlgError
+"""What is raised where functions do not have the principal pair, so that others are tried."""
+Found = TypeVar("Found")
 Tolerance = Callable[[float, float], float]
 """The largest error allowed, from p and a value of Λ(p)."""
 Along = Mapping[str, ParameterDerivative]
@@ -63,9 +69,9 @@ class Budget:
         float | None, parameter("seconds of processor time for a line of a chart", "line_seconds = 600.0", gt=0)
     ] = None
 
-    def most(self, space: Space) -> int:
-        """Number of unknowns that a space may have."""
-        return space.most_unknowns if self.unknowns is None else self.unknowns
+    def most(self, stage: Stage | Space) -> int:
+        """Number of unknowns that a space, or a stage, may have."""
+        return stage.most_unknowns if self.unknowns is None else self.unknowns
 
     def meter(self) -> Meter:
         """For the numbers of a parameter set."""
@@ -304,6 +310,135 @@ def checked_moments(p: ArrayLike, method: Method, *, may_be_empty: bool = False)
     return points
 
 
-def spent_remedy(problem: Problem) -> Remedy:
-    """What to do where a budget does not suffice."""
-    return Remedy.BUDGET if problem.dimension == 2 else Remedy.MANY
+class Stage(Protocol):
+    """The functions that Λ(p) is sought among at one place, and which come next. What is found has `value`, `error`."""
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns."""
+
+    @property
+    def most_unknowns(self) -> int:
+        """How many are within reach."""
+
+    def solved(self, p: float, near: Any) -> Any:
+        """What is found among them, from what was found among others; one of `UNSOLVED` is raised where it is not."""
+
+    def judged(self, found: Any, allowed: float) -> Any:
+        """What is found with its error, of which no part much less than what is allowed need be known."""
+
+    def is_enough(self, found: Any) -> bool:
+        """Whether what is found within the tolerance needs no more, as for its slope."""
+
+    def doubled(self, failure: Exception | None) -> Stage | None:
+        """More functions, where nothing is found among these; None where that is no use."""
+
+    def refined(self, found: Any, goal: float, stages: int, most: int) -> Stage | None:
+        """Functions that should have an error of about a goal, after so many stages, with so many unknowns at most."""
+
+
+class Best(NamedTuple):
+    """What is found at a place that is nearest to the tolerance, and its error over what is allowed."""
+
+    found: Any
+    share: float
+
+
+class Ended(Exception):
+    """No larger space may be solved on, for a reason other than time."""
+
+    def __init__(self, reason: Message) -> None:
+        super().__init__(str(reason))
+        self.reason = reason
+
+
+@dataclass
+class Search:
+    """The search for Λ(p) at one p, at one place after the other, and what it has cost.
+
+    Attributes:
+        p: the moment.
+        allowed: the largest error, of what is found.
+        budget: of the number of unknowns.
+        remedy: what to do where the budget does not suffice.
+        stages: how many stages were solved.
+        failure: why the last stage had no solution.
+        best: what the last place has.
+        last: seconds spent before the last stage, and its unknowns.
+    """
+
+    p: float
+    allowed: Callable[[Any], float]
+    budget: Budget
+    remedy: Remedy
+    stages: int = 0
+    failure: Exception | None = None
+    best: Best | None = None
+    last: tuple[float, int] = (0.0, 0)
+
+    def settle(self, stage: Stage | None, near: Any = None) -> Any:
+        """What is found within the tolerance at one place: solve, judge, and stop or refine.
+
+        Args:
+            stage: the first one.
+            near: what was found elsewhere, to begin with.
+
+        Raises:
+            NotConverged: the budget does not suffice, or rounding is larger than the tolerance; `partial` is the best
+                that is found, or None.
+        """
+        self.best = None
+        try:
+            while True:
+                stage = self._begun(stage)
+                near = self.attempt(partial(stage.solved, self.p, near))
+                if near is None:
+                    stage = stage.doubled(self.failure)
+                    continue
+                allowed = self.allowed(near)
+                found = stage.judged(near, allowed)
+                if found.error <= allowed and stage.is_enough(found):
+                    return found
+                if found.error / allowed < (self.best.share if self.best else math.inf):
+                    self.best = Best(found, found.error / allowed)
+                if near.rounding > allowed:
+                    raise Ended(Message(Code.ROUNDED, size=near.rounding))
+                stage = stage.refined(found, allowed, self.stages, self.budget.most(stage))
+        except (OverBudget, Ended) as failure:
+            if self.best is not None and self.best.share <= 1:  # within the tolerance, but for its slope
+                return self.best.found
+            return self._stop(failure)
+
+    def attempt(self, solve: Callable[[], Found]) -> Found | None:
+        """What is solved, or None where some functions do not have it, and the `failure` tells why."""
+        try:
+            return solve()
+        except OverBudget:
+            raise
+        except UNSOLVED as failure:
+            self.failure = failure.with_traceback(None)  # which would keep this search, and all that it has found
+            return None
+
+    def _begun(self, stage: Stage | None) -> Stage:
+        """A stage, which is counted. Raises `Ended`, `OverBudget`: it is beyond the budget, or there is none."""
+        if stage is None or self.stages >= MAX_STAGES:
+            raise Ended(Message(Code.MESHES_SPENT, count=self.stages))
+        size, spent, most = stage.size, seconds_spent(), self.budget.most(stage)
+        if size > most:
+            raise Ended(Message(Code.UNKNOWNS_SPENT, unknowns=size, most=most))
+        charge(size, (spent - self.last[0]) * size / self.last[1] if self.last[1] else 0.0)
+        self.last, self.stages = (spent, size), self.stages + 1
+        return stage
+
+    def _stop(self, ended: OverBudget | Ended) -> NoReturn:
+        """Raise `NotConverged`, or `OverBudget`, with the best that is found."""
+        reason, kind = ended.reason, OverBudget if isinstance(ended, OverBudget) else NotConverged
+        if self.best is not None:
+            number = {"value": self.best.found.value, "error": self.best.found.error, "size": self.best.share}
+            told = Message(Code.BUDGET_SPENT, p=self.p, reason=reason, **number)
+        else:
+            last, is_thin = self.failure, isinstance(self.failure, NotConverged)
+            said = last.message.advising(None) if isinstance(last, FpsolveError) else last and str(last)
+            told = Message(Code.NOTHING_RESOLVED, p=self.p, reason=reason, is_thin=is_thin, last=said)
+        remedy = None if reason.code is Code.ROUNDED else self.remedy
+        raise kind(told, self.best and self.best.found, remedy)

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -27,7 +27,7 @@ from fpsolve.exponent.eigen import PrincipalPair, principal_pair
 from fpsolve.exponent.error import Solution, ladders, mode_effects
 from fpsolve.exponent.moments import even_moment
 from fpsolve.exponent.powers import moment_form
-from fpsolve.exponent.starts import SHARE, Question, Start
+from fpsolve.exponent.starts import SHARE, Start
 from fpsolve.fem.generator import SMALL_P, Generator
 from fpsolve.fem.noise_axes import CountedAxis
 from fpsolve.fem.space import Space, first_axis
@@ -171,7 +171,7 @@ class SphereStart(Start):
         waves = max(self.space.phi.waves + more, FIRST_WAVES)
         return replace(self, space=self.space.with_axis(0, replace(self.space.phi, waves=waves)), **changes)
 
-    def pair(self, p: float, near: PrincipalPair | None) -> PrincipalPair:
+    def solved(self, p: float, near: PrincipalPair | None) -> PrincipalPair:
         """The pair, from that of waves of a lower degree, or from p to p since p = 0."""
         generator = self.generator
         if near is not None:
@@ -186,7 +186,7 @@ class SphereStart(Start):
         self.pairs[:] = known
         return min(known, key=lambda pair: abs(pair.p - p))
 
-    def with_error(self, pair: PrincipalPair, allowed: float) -> Solution:
+    def judged(self, pair: PrincipalPair, allowed: float) -> Solution:
         """The pair, corrected by what the next waves change, with what is left then; first the other parts of it.
 
         What is left is `OF_CHANGES` times the last change of the corrected value and the correction, from two spaces:
@@ -269,10 +269,10 @@ class SphereStart(Start):
         return tuple(errors)
 
 
-def sphere_start(question: Question) -> SphereStart:
+def sphere_start(problem: Problem, p: float, rtol: float, known: Mapping[float, Solution]) -> SphereStart:
     """The coarsest waves, with the elements and functions of the noise of the nearest p if one is known."""
-    for _, known in sorted(question.known.items(), key=lambda each: abs(each[0] - question.p)):
-        if isinstance(start := known.start, SphereStart):
+    for _, solution in sorted(known.items(), key=lambda each: abs(each[0] - p)):
+        if isinstance(start := solution.start, SphereStart):
             return start._with(-start.space.phi.waves)
-    noises = (first_axis(noise, -math.log10(question.rtol)) for noise in question.problem.coloured.parts.values())
-    return SphereStart(question.problem, Space((first_directions(question.problem), *noises)))
+    noises = (first_axis(noise, -math.log10(rtol)) for noise in problem.coloured.parts.values())
+    return SphereStart(problem, Space((first_directions(problem), *noises)))

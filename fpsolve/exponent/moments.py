@@ -20,22 +20,25 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property, reduce
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy import sparse
 from scipy.linalg import solve_triangular
 
 from fpsolve.arrays import Coefficient, FloatArray, one
+from fpsolve.budget import unless_over_budget
 from fpsolve.data import brief
 from fpsolve.errors import NoHierarchy
-from fpsolve.exponent.delays import Delayed
+from fpsolve.exponent.delays import Delayed, present
 from fpsolve.exponent.error import Moment
 from fpsolve.exponent.matrices import MOST_NUMBERS, Matrices
+from fpsolve.exponent.method import Budget, Search
 from fpsolve.exponent.powers import Moving, Powers, ladder, moment_form, multinomials
 from fpsolve.exponent.rightmost import REMEDY, ROUNDING
 from fpsolve.fem.space import FIRST as AXES
 from fpsolve.fem.space import first_axis
+from fpsolve.messages import Remedy
 from fpsolve.model.noise import Noise
 from fpsolve.model.parameters import cached_by_problem
 from fpsolve.model.plane import affine
@@ -138,38 +141,25 @@ def even_moment(
     """
     refuse_open_hierarchy(problem, p)
     equations = Equations(problem, int(p))
-    counts, before = [FIRST] * len(equations.noises), cast(EvenMoment | None, None)
-    failure = NoHierarchy(
+
+    def allowed(found: EvenMoment) -> float:
+        loosest = rtol if tolerance is None else LOOSEST
+        return max(min(loosest * found.scale, math.inf if tolerance is None else tolerance), 2 * found.rounding)
+
+    search = Search(p, allowed, Budget(), Remedy.BUDGET)
+    with unless_over_budget():
+        found: EvenMoment = search.settle(Level(equations, (FIRST,) * len(equations.noises), most))
+        return found
+    if search.best is not None:
+        found = search.best.found
+        if found.error <= (MEANINGLESS * found.scale if tolerance is None else tolerance):
+            return found
+    if isinstance(search.failure, NoHierarchy):
+        raise search.failure
+    raise NoHierarchy(
         f"got p = {p:g}; {most} equations, or {MOST_DEGREES} functions of each noise, are too few for moments "
         f"under noise so strong or slow; use a smaller p, or {REMEDY}"
     )
-    while True:
-        try:
-            level = equations.moment(counts, most)
-        except NoHierarchy as refusal:
-            level, failure = None, refusal
-        if level is None:
-            break
-        allowed = rtol * level.scale if tolerance is None else min(tolerance, LOOSEST * level.scale)
-        if any(level.effects):
-            change = abs(before.value - level.value) if before else math.inf
-            told = level.error + before.error - before.change if before else 0.0
-            level = replace(level, change=level.change + (change if change > told else 0.0))
-        if level.is_positive and level.error <= max(allowed, 2 * level.rounding):
-            return level
-        before = level
-        worst = max(map(abs, level.effects), default=0.0)
-        counts = [
-            math.ceil(GROWTH * count) if abs(effect) >= 0.1 * worst else count
-            for count, effect in zip(counts, level.effects, strict=True)
-        ]
-        if not worst:
-            break
-    if before is None or not before.is_positive:
-        raise failure
-    if before.error > (MEANINGLESS * before.scale if tolerance is None else tolerance):
-        raise failure
-    return before
 
 
 def constant_scale(problem: Problem) -> Scale:
@@ -179,7 +169,7 @@ def constant_scale(problem: Problem) -> Scale:
         if line := affine(term.g):
             at_mean = line[0] + (line[1] and line[1] * problem.named_noise(term.noise).mean)
             steady += problem.motion.epsilon**term.order * at_mean * np.array(term.matrix)
-    now = len(steady) - len(problem.system.pasts)
+    now = present(problem)
     abscissa = abs(float(np.max(np.linalg.eigvals(steady[:now, :now]).real)))
     return Scale(abscissa or problem.unit_rate, 0.0)
 
@@ -203,7 +193,7 @@ def refuse_open_hierarchy(problem: Problem, p: float) -> None:
             "the equations of the moments do not close where a wall changes the state, as that happens at one phase; "
             f"{REMEDY}, or remove the wall"
         )
-    if problem.system.pasts and p != 2:
+    if present(problem) < problem.dimension and p != 2:
         raise NoHierarchy(f"got p = {p:g}; with a delay the equations of the moments are for p = 2; {REMEDY}")
     moments = math.comb(int(p) + problem.dimension - 1, problem.dimension - 1)
     count = moments
@@ -263,9 +253,14 @@ class EvenMoment:
         return ROUNDING * self.scale + sys.float_info.epsilon * self.equations.state.largest * condition
 
     @property
+    def told(self) -> float:
+        """What its own functions tell of the error."""
+        return sum(map(abs, self.effects)) + self.rounding
+
+    @property
     def error(self) -> float:
-        """Estimate of |error of `value`|."""
-        return sum(map(abs, self.effects)) + self.rounding + self.change
+        """Estimate of |error of `value`|; infinite where moments, or T, are not positive."""
+        return self.told + self.change if self.is_positive else math.inf
 
     def slope(self, key: str) -> tuple[float, float]:
         """∂Λ(p)/∂θ of a parameter such as "noise.alpha", and its error: ⟨y, ∂H/∂θ x⟩ by differences of H.
@@ -336,6 +331,59 @@ def _has_one_sign(values: FloatArray) -> bool:
     return bool(values.min() >= -NEGATIVE * values.max())
 
 
+@dataclass(frozen=True)
+class Level:
+    """The functions of each noise of degrees below some counts, as a `Stage`.
+
+    Attributes:
+        equations: of the moments.
+        counts: of each noise.
+        most: number of equations, of moments that are no matrices.
+        before: with fewer functions.
+    """
+
+    equations: Equations
+    counts: tuple[int, ...]
+    most: int
+    before: EvenMoment | None = None
+
+    @property
+    def size(self) -> int:
+        if max(self.counts) > MOST_DEGREES:
+            return sys.maxsize
+        return self.equations.state.size * math.prod(int(each.sum()) for each in self.equations.are_old(self.counts))
+
+    @property
+    def most_unknowns(self) -> int:
+        return max(self.most, self.equations.state.most)
+
+    def solved(self, p: float, near: EvenMoment | None) -> EvenMoment:
+        return self.equations.moment(self.counts)
+
+    def judged(self, found: EvenMoment, allowed: float) -> EvenMoment:
+        """With what the last step changed, where that is beyond the errors of both."""
+        if self.before is None or not any(found.effects):
+            return found
+        step = abs(self.before.value - found.value)
+        return replace(found, change=found.change + step * (step > found.told + found.change + self.before.told))
+
+    def is_enough(self, found: EvenMoment) -> bool:
+        return True
+
+    def doubled(self, failure: Exception | None) -> None:
+        """Where these are not solved, more are not."""
+
+    def refined(self, found: EvenMoment, goal: float, stages: int, most: int) -> Level | None:
+        """More functions of the noises of which the next ones change most; None where there are no others."""
+        if not (worst := max(map(abs, found.effects), default=0.0)):
+            return None
+        more = [
+            math.ceil(GROWTH * count) if abs(effect) >= 0.1 * worst else count
+            for count, effect in zip(self.counts, found.effects, strict=True)
+        ]
+        return replace(self, counts=tuple(more), before=found)
+
+
 class Equations:
     """H of a problem and an even p, with any number of functions of each noise.
 
@@ -370,12 +418,12 @@ class Equations:
         jolts = [(each.rate, np.array(each.exponent)) for each in impulses]
         moving = Moving(steady, matrices, strengths, squares, jolts)
         self.state: Matrices | Powers | Delayed
-        if pasts := problem.system.pasts:
-            self.state = Delayed(moving, pasts, like.state.units if like else None)
+        self.dimension, units = present(problem), like.state.units if like else None
+        if self.dimension < problem.dimension:
+            self.state = Delayed(moving, problem, units)
         else:
             form: type[Matrices | Powers] = Matrices if p == 2 and self._first_size > MOST_AS_POWERS else Powers
-            self.state = form(moving, p, like.state.units if like else None)
-        self.dimension = problem.dimension - len(pasts)
+            self.state = form(moving, p, units)
 
     @property
     def _first_size(self) -> int:
@@ -383,16 +431,16 @@ class Equations:
         axes = self._axes([FIRST] * len(self.noises))
         return math.comb(self.problem.dimension + 1, 2) * math.prod(each.degrees.size for each in axes)
 
-    def moment(self, counts: Sequence[int], most: int) -> EvenMoment | None:
-        """Λ(p) with functions of degrees below these; None where they are too many."""
-        if max(counts) > MOST_DEGREES:
-            return None
+    def are_old(self, counts: Sequence[int]) -> list[Any]:
+        """Which functions of each noise, with the next ones, are of degrees below these."""
+        axes = self._axes([count + NEXT for count in counts])
+        return [each.degrees < count for each, count in zip(axes, counts, strict=True)]
+
+    def moment(self, counts: Sequence[int]) -> EvenMoment:
+        """Λ(p) with functions of degrees below these. Raises `NoHierarchy`: it does not settle."""
         more = [count + NEXT for count in counts]
-        axes = self._axes(more)
-        is_old = [each.degrees < count for each, count in zip(axes, counts, strict=True)]
+        axes, is_old = self._axes(more), self.are_old(counts)
         size = math.prod(int(each.sum()) for each in is_old)
-        if self.state.size * size > max(most, self.state.most):
-            return None
         h, old = self.state.rates(*self.over_noise(more)), _outer(is_old)
         mean = self.means(counts)
         own = h.on(old)

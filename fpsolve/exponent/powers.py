@@ -18,7 +18,6 @@ from scipy.linalg import matrix_balance
 from scipy.sparse.linalg import expm, norm
 
 from fpsolve.arrays import FloatArray, dense
-from fpsolve.budget import charge
 from fpsolve.errors import NoHierarchy
 from fpsolve.exponent.rightmost import EXACTLY, Eigenpair, Solve, rightmost
 from fpsolve.superlu import sparse_lu
@@ -239,6 +238,5 @@ class PowerRates:
     def solver(self, sigma: float, tolerance: float = EXACTLY) -> Solve:
         """(σ − H)⁻¹. Raises `SingularMatrix`."""
         matrix = (sigma * sparse.eye_array(self.matrix.shape[0]) - self.matrix).tocsc()
-        charge(matrix.shape[0])
         factors = sparse_lu(matrix, permc_spec="COLAMD")
         return lambda x, trans=0: np.asarray(factors.solve(x, "T" if trans else "N"))

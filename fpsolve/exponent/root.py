@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from fpsolve.budget import OverBudget, unless_over_budget
+from fpsolve.budget import unless_over_budget
 from fpsolve.errors import NotConverged
 from fpsolve.exponent.error import Absent, Estimate, checked
 from fpsolve.exponent.method import Tolerance, refuse
@@ -55,10 +55,8 @@ def nonzero_root(
 
     def at(p: float, tolerance: Tolerance | None = None) -> Value:
         is_rough = p in outward and solver.mesh is None and tolerance is None
-        try:
+        with unless_over_budget(Missing(p)):
             solved[p] = _rough_ratio(solver, p) if is_rough else _precise_ratio(solver, p, tolerance)
-        except NotConverged as failure:
-            raise Missing(p) from failure
         ratio, slope, error = solved[p]
         if not slope > 0:
             raise NotConverged(Message(Code.NOT_INCREASING, p=p), remedy=method.refinement)
@@ -89,8 +87,6 @@ def nonzero_root(
         if none.missing is None:
             return nowhere
         cause = none.missing.__cause__
-        if isinstance(cause, OverBudget):
-            raise cause from None
         low, high = (ends[0], none.last) if none.is_negative else (none.last, ends[1])
         return Absent(Message(Code.NO_ROOT_REACHED, low=low, high=high, reason=cause.message))
     ratio, slope, error = solved[p]

@@ -18,14 +18,10 @@ from fpsolve.arrays import FloatArray, real_number, real_numbers, shown
 from fpsolve.budget import Meter, begin
 from fpsolve.data import Result, dataset
 from fpsolve.errors import NoSuchExponent, NotConverged
-from fpsolve.exponent.adapt import (
-    solved_p,
-)
-from fpsolve.exponent.blocks import InvariantClass
 from fpsolve.exponent.curve import Curve, Node, polynomial, values
 from fpsolve.exponent.eigen import PrincipalPair
-from fpsolve.exponent.elements import doubt
-from fpsolve.exponent.error import Estimate, Failure, Moment, checked
+from fpsolve.exponent.elements import doubt, solved_p
+from fpsolve.exponent.error import Estimate, Failure, InvariantClass, Moment, checked
 from fpsolve.exponent.kinds import choose
 from fpsolve.exponent.method import Budget, Method, Settings, Tolerance, checked_moments, refuse
 from fpsolve.exponent.starts import warnings_of_other_places

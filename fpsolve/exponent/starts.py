@@ -1,13 +1,13 @@
-"""Where a moment may be carried: functions that yield the places where a search for Λ(p) starts, see `adapt.STARTS`.
+"""Where a moment of two variables may be carried: the stages at each of the places, see `method.Search`.
 
-Λ(p) is the largest over these places. A place has a first space, small, for the values of the noise, or the directions,
-that carry the moment there, and says how what is found on a space is judged, and which space is next.
+Λ(p) is the largest over these places. A place has a first space, small, for the values of the noise that carry the
+moment there.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -41,26 +41,9 @@ COMPARABLE = 0.6
 """Paths that hold the noise elsewhere are looked at if they grow at this share of Λ (less by the rest, for Λ < 0)."""
 
 
-@dataclass(frozen=True)
-class Question:
-    """Λ(p) of a problem that is asked for.
-
-    Attributes:
-        problem: a motion and its noise.
-        p: the moment.
-        rtol: about what the tolerance is relative to the size of Λ(p).
-        known: solutions at other p, or less accurate ones.
-    """
-
-    problem: Problem
-    p: float
-    rtol: float
-    known: Mapping[float, Solution]
-
-
 @dataclass(frozen=True, eq=False)
 class Start:
-    """A place where a moment may be carried, by the functions that Λ(p) is sought among; here for two variables.
+    """A `Stage` at a place of two variables, by the functions that Λ(p) is sought among.
 
     Attributes:
         problem: a motion and its noise.
@@ -75,20 +58,26 @@ class Start:
         """L(p) on the space."""
         return Generator(self.problem, self.space)
 
-    def pair(self, p: float, near: PrincipalPair | None) -> PrincipalPair:
+    @property
+    def size(self) -> int:
+        return self.space.size
+
+    @property
+    def most_unknowns(self) -> int:
+        return self.space.most_unknowns
+
+    def solved(self, p: float, near: PrincipalPair | None) -> PrincipalPair:
         """The principal pair on the space, from one of a space before, or none. Raises as `principal_pair`."""
         return principal_pair(self.generator, p, start=near)
 
-    def with_error(self, pair: PrincipalPair, allowed: float) -> Solution:
-        """The pair with its error, here by its highest modes; no part much less than what is allowed need be known."""
+    def judged(self, pair: PrincipalPair, allowed: float) -> Solution:
+        """The pair with its error by its highest modes."""
         return Solution(pair)
 
     def is_enough(self, solution: Solution) -> bool:
-        """Whether a solution within the tolerance needs no finer space for its slope."""
         return True
 
     def doubled(self, failure: Exception | None) -> Start:
-        """A place with more functions, where the space has no principal pair."""
         return replace(self, space=self.space.doubled(_effects_of(failure)))
 
     def refined(self, solution: Solution, goal: float, stages: int, most: int) -> Start:
@@ -106,19 +95,6 @@ class Start:
         if found.size > most:
             found = refined(solution, ALONE / SHARE * goal, stages)
         return replace(self, space=found)
-
-
-def first_place(question: Question, found: Sequence[Solution]) -> Iterator[Start]:
-    """Where slow noise carries the moment of two variables, or around the mean of other noise."""
-    if question.problem.dimension == 2 and not found:
-        yield Start(question.problem, first(question.problem, question.p, question.rtol))
-
-
-def other_places(question: Question, found: Sequence[Solution]) -> Iterator[Start]:
-    """Other places of slow noise, far from the one where the moment was found to be carried."""
-    if question.problem.dimension == 2:
-        for center in other_centers(found[0].pair):
-            yield Start(question.problem, first(question.problem, question.p, question.rtol, center))
 
 
 def refined(solution: Solution, tolerance: float, stages: int) -> Space:

@@ -18,7 +18,7 @@ what is stated in 58 comparisons.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -28,7 +28,7 @@ from fpsolve.arrays import FloatArray
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.error import Solution
 from fpsolve.exponent.modes import THINNEST, SphereStart, first_order_changes, second_moments
-from fpsolve.exponent.starts import SHARE, Question
+from fpsolve.exponent.starts import SHARE
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.half_sphere import HalfSphereAxis
 from fpsolve.fem.space import Space, first_axis
@@ -110,7 +110,7 @@ class StopStart(SphereStart):
     changes: tuple[float, ...] = ()
     is_first: bool = True
 
-    def with_error(self, pair: PrincipalPair, allowed: float) -> Solution:
+    def judged(self, pair: PrincipalPair, allowed: float) -> Solution:
         _, *of_noises = self._of_axes(pair, allowed)
         phi, found = self.space.phi, list[float]()
         for finer in phi.finer:
@@ -160,11 +160,11 @@ class StopStart(SphereStart):
         return StopStart(self.problem, found, before=(solution,), is_first=False)
 
 
-def stop_start(question: Question) -> StopStart:
+def stop_start(problem: Problem, p: float, rtol: float, known: Mapping[float, Solution]) -> StopStart:
     """The coarsest functions, or those before the ones that were enough for the nearest p."""
-    for _, known in sorted(question.known.items(), key=lambda each: abs(each[0] - question.p)):
-        if isinstance(start := known.start, StopStart):
+    for _, solution in sorted(known.items(), key=lambda each: abs(each[0] - p)):
+        if isinstance(start := solution.start, StopStart):
             start = (*(each.start for each in start.before), start)[0]
-            return StopStart(question.problem, start.space, is_first=start.is_first)
-    noises = (first_axis(noise, -math.log10(question.rtol) - 1) for noise in question.problem.coloured.parts.values())
-    return StopStart(question.problem, Space((stopped_directions(question.problem), *noises)))
+            return StopStart(problem, start.space, is_first=start.is_first)
+    noises = (first_axis(noise, -math.log10(rtol) - 1) for noise in problem.coloured.parts.values())
+    return StopStart(problem, Space((stopped_directions(problem), *noises)))

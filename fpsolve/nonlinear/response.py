@@ -21,6 +21,7 @@ from fpsolve.data import Quantity, Result, dataset
 from fpsolve.drawing import canvas_of, draw_line, draw_plane, finish
 from fpsolve.errors import FpsolveError
 from fpsolve.exponent.error import Estimate
+from fpsolve.exponent.kinds import choose
 from fpsolve.exponent.method import Budget
 from fpsolve.exponent.quantities import lyapunov_exponent, stability_index
 from fpsolve.messages import Code, Message
@@ -245,8 +246,8 @@ def _linear(problem: Problem, budget: Budget) -> tuple[float, float]:
     reason = no_response(checked_problem(problem))
     if reason is None and problem.coloured.has_algebraic_tails:
         reason = Message(Code.RESPONSE_TAILS)
-    if reason is None and (rays := problem.invariant_rays):
-        reason = Message(Code.RESPONSE_RAYS, phase=rays[0])
+    if reason is None and (ray := choose(problem).ray) is not None:
+        reason = Message(Code.RESPONSE_RAYS, phase=ray)
     if reason is not None:
         raise FpsolveError(reason)
     rate = lyapunov_exponent(problem, budget=budget)

@@ -12,8 +12,7 @@ import numpy as np
 from fpsolve.case.case import Case, Curve
 from fpsolve.case.sections import OF_MOMENTS
 from fpsolve.data import Quantity
-from fpsolve.exponent.blocks import InvariantClass
-from fpsolve.exponent.error import Failure, Moment, digits
+from fpsolve.exponent.error import Failure, InvariantClass, Moment, digits
 from fpsolve.exponent.solver import solve_moments
 from fpsolve.messages import Code, Message
 from fpsolve.model.problem import Problem

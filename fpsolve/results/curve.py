@@ -16,8 +16,7 @@ from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Curve
 from fpsolve.case.sections import EXCURSIONS, RESPONSE, SENSITIVITIES
 from fpsolve.data import Quantity, Result, dataset
-from fpsolve.exponent.blocks import InvariantClass
-from fpsolve.exponent.error import Estimate, Failure
+from fpsolve.exponent.error import Estimate, Failure, InvariantClass
 from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, STABILITY_INDEX, VARIANCE_RATE
 from fpsolve.messages import Code, Message, Severity, message_of
 from fpsolve.model.quantity import MOMENT, OVER_P, P, moment_at

@@ -9,7 +9,7 @@ from scipy.sparse.linalg import eigs
 
 from fpsolve import ExponentSolver, NonGaussianNoise, NotConverged, OrnsteinUhlenbeck, Problem, VibroImpactOscillator
 from fpsolve.errors import MeshError, SingularMatrix
-from fpsolve.exponent import adapt, principal_pair, starts
+from fpsolve.exponent import elements, principal_pair, starts
 from fpsolve.model import Telegraph
 from tests.kit import matrices, rates
 
@@ -20,7 +20,7 @@ WEAK = Problem(OSCILLATOR, NonGaussianNoise(D0=1.0, tau0=0.5, r0=0.95).ou_reduct
 @pytest.mark.parametrize("kind", [SingularMatrix, np.linalg.LinAlgError, MeshError, NotConverged])
 @pytest.mark.parametrize("place", ["alone", "after another p", "next to another problem", "on halved cells"])
 def test_one_space_that_fails_is_passed_by(monkeypatch, kind, place):
-    alone, known, count = ExponentSolver(WEAK).solution(2.0), adapt.principal_pair, [0]
+    alone, known, count = ExponentSolver(WEAK).solution(2.0), elements.principal_pair, [0]
     close_by = {2.0: alone} if place == "next to another problem" else {}
     solver = ExponentSolver(WEAK, rtol=1e-5 if place == "on halved cells" else 1e-8, starts=close_by)
     if place == "after another p":
@@ -32,7 +32,7 @@ def test_one_space_that_fails_is_passed_by(monkeypatch, kind, place):
             raise kind("pivot")
         return known(*given, **named)
 
-    for module in (adapt, starts):
+    for module in (elements, starts):
         monkeypatch.setattr(module, "principal_pair", failing_once)
     found = solver.solution(2.0)
     assert count[0] > 1

@@ -24,7 +24,7 @@ def on_sphere(problem, waves=4, **changes):
 def test_what_finer_waves_change_is_told_to_first_order():
     start, finer = (on_sphere(random_system(0, 3), waves) for waves in (4, 6))
     found = [principal_pair(each.generator, 1.0) for each in (start, finer)]
-    change, solution = found[1].value - found[0].value, start.with_error(found[0], 1.0)
+    change, solution = found[1].value - found[0].value, start.judged(found[0], 1.0)
     assert start.change(found[0]) == pytest.approx(change, rel=0.1)
     assert abs(solution.pair.value - found[1].value) < min(0.1 * abs(change), solution.search)
 
@@ -32,9 +32,9 @@ def test_what_finer_waves_change_is_told_to_first_order():
 def test_what_polynomials_of_the_noise_lack_is_told():
     start = on_sphere(random_system(1, 3, OrnsteinUhlenbeck(alpha=1.2, sigma=1.6)), count=6)
     finer = replace(start, space=start.space.with_axis(1, start.space.xi.enriched()), generators={}, pairs=[])
-    pair = start.pair(0.5, None)
-    lacking = abs(finer.pair(0.5, pair).eigenvalue - pair.eigenvalue)
-    assert lacking < start.with_error(pair, 1e-12).measured[1] < 50 * lacking
+    pair = start.solved(0.5, None)
+    lacking = abs(finer.solved(0.5, pair).eigenvalue - pair.eigenvalue)
+    assert lacking < start.judged(pair, 1e-12).measured[1] < 50 * lacking
 
 
 @pytest.mark.parametrize("seed", range(4))

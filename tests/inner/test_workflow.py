@@ -7,7 +7,7 @@ import pytest
 
 from fpsolve import FpsolveError
 from fpsolve.case.sections import MonteCarloSection
-from fpsolve.exponent.adapt import Budget
+from fpsolve.exponent.method import Budget
 from fpsolve.files import alone, atomic
 from fpsolve.output.records import part_key, set_key
 from fpsolve.parts.every import BY_NAME

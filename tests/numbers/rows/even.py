@@ -162,7 +162,7 @@ ROWS = [
     beside(1, NOISES["white"], "white", 50),
     beside(2, NOISES["OU"], "OU", 24),
     beside(3, NOISES["chain"], "chain", 30),
-    beside(4, NOISES["filter"], "filter", 16),
+    beside(4, Filter(omega=1.5, zeta=0.2, s=0.1, c0=1.0, c1=0.3), "filter", 16),
     masses(OrnsteinUhlenbeck(1.0, 0.1 * math.sqrt(2)), -0.0394544357),
     masses(White(math.sqrt(0.02 / 5)), -0.0389353938),
     patches(2, -0.8554694689402464, 9.993744373604739e-05, 1.7072315886796916),
