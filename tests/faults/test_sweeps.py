@@ -178,7 +178,7 @@ def test_sweep_killed_at_any_moment_leaves_whole_files(place):
     rng, out = random.Random(9), "any"
     for kind in (signal.SIGKILL, signal.SIGTERM, signal.SIGKILL):
         before, process = {*lines(place, out)}, begun(place, out, "--jobs", "2")
-        time.sleep(rng.uniform(0.5, 6))
+        time.sleep(rng.uniform(0.5, 4))
         process.send_signal(kind)
         _, said = process.communicate(timeout=120)
         assert process.returncode in (0, -kind, 143)  # -kind as Python itself begins or ends
