@@ -36,6 +36,7 @@ class Meter:
         begun: how many of them were begun.
         number: the symbol of the one that is being solved.
         unknowns: of the factorisation that is under way.
+        before: seconds that passed before this number began.
     """
 
     seconds: float
@@ -43,6 +44,7 @@ class Meter:
     begun: int = 0
     number: str = ""
     unknowns: int = 0
+    before: float = 0.0
     _before: float = 0.0
     _since: float | None = None
 
@@ -65,15 +67,21 @@ class Meter:
             _meter.reset(token)
 
     def refuse(self, seconds: float) -> None:
-        """Raise `OverBudget` if so many seconds are more than there are."""
+        """Raise `OverBudget` if so many seconds are more than there are.
+
+        It tells about how many all numbers take, if those that are left take as long as those that are done.
+        """
         if seconds > self.seconds:
-            raise OverBudget(Message(Code.SECONDS_SPENT, seconds=seconds, most=self.seconds), remedy=Remedy.BUDGET)
+            each = self.before / max(self.begun - 1, 1)
+            left = max(self.planned - self.begun, 0) * each
+            told = self.before + max(seconds - self.before, each) + left
+            raise OverBudget(Message(Code.SECONDS_SPENT, seconds=told, most=self.seconds), remedy=Remedy.BUDGET)
 
 
 def begin(symbol: str) -> None:
     """Let the meter know which number comes next."""
     if meter := _meter.get():
-        meter.number, meter.begun = symbol, meter.begun + 1
+        meter.number, meter.begun, meter.before = symbol, meter.begun + 1, meter.spent
 
 
 @contextmanager
