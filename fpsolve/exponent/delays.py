@@ -175,7 +175,7 @@ class DelayRates:
     def at(self, sigma: float) -> PowerRates:
         """σ − Z(σ), whose eigenvalue Λ is for σ = Λ."""
         z = np.eye(self._even.shape[1]) if self.state.is_still else self.matrix(sigma)
-        return PowerRates(sparse.csr_array(sigma * np.eye(len(z)) - z), self.state.size)
+        return PowerRates(sparse.csc_array(sigma * np.eye(len(z)) - z), self.state.size)
 
     def matrix(self, sigma: Any) -> Any:
         """Z(σ)."""

@@ -174,7 +174,7 @@ class Powers:
         one = sparse.eye_array(generator.shape[0])
         h = sparse.kron(generator, sparse.eye_array(self.size)) + sparse.kron(one, self._steady)
         h = h + sum(sparse.kron(xi, k) for k, xi in zip(self._loads, masses, strict=True))
-        return PowerRates(h.tocsr(), self.size)
+        return PowerRates(h.tocsc(), self.size)
 
     def image(self, generator: Any, masses: Sequence[Any], x: FloatArray, value: float) -> FloatArray:
         """Hx, without H."""
@@ -190,7 +190,7 @@ class PowerRates:
     """H as a sparse matrix, whose rows are functions of the noise times functions of the state.
 
     Attributes:
-        matrix: H.
+        matrix: H, by columns.
         of_state: number of functions of the state.
     """
 
@@ -207,7 +207,7 @@ class PowerRates:
     @property
     def T(self) -> PowerRates:
         """The transpose."""
-        return PowerRates(self.matrix.T, self.of_state)
+        return PowerRates(self.matrix.T.tocsc(), self.of_state)
 
     def on(self, functions: Any) -> PowerRates:
         """H of some functions of the noise."""
@@ -217,6 +217,10 @@ class PowerRates:
     @cached_property
     def _absolute(self) -> Any:
         return abs(self.matrix)
+
+    @cached_property
+    def _one(self) -> Any:
+        return sparse.eye_array(self.matrix.shape[0], format="csc")
 
     def sizes(self, x: FloatArray, y: FloatArray) -> float:
         return float(np.abs(y) @ (self._absolute @ np.abs(x)))
@@ -237,6 +241,5 @@ class PowerRates:
 
     def solver(self, sigma: float, tolerance: float = EXACTLY) -> Solve:
         """(σ − H)⁻¹. Raises `SingularMatrix`."""
-        matrix = (sigma * sparse.eye_array(self.matrix.shape[0]) - self.matrix).tocsc()
-        factors = sparse_lu(matrix, permc_spec="COLAMD")
+        factors = sparse_lu(sigma * self._one - self.matrix, permc_spec="COLAMD")
         return lambda x, trans=0: np.asarray(factors.solve(x, "T" if trans else "N"))
