@@ -1,7 +1,7 @@
 """Where stability ends: the lines λ = 0, Λ(p) = 0 and δ_p = v in a frame of two parameters.
 
-F is λ, or Λ(p)/p; δ_p = v is the line Λ(v) = 0. Its gradient is exact, see `analysis.sensitivity`, and every solve
-starts from that at the point before; the rows of a scan begin anew, so that other processes may compute them.
+F is λ, or Λ(p)/p; δ_p = v is the line Λ(v) = 0. Its gradient is exact, see `analysis.sensitivity`. Other processes may
+compute rows of a scan.
 """
 
 from __future__ import annotations

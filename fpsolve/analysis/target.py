@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -112,7 +112,7 @@ def said(failure: Exception) -> str:
 
 
 class Distance:
-    """F over some parameters θ, with ∂F/∂θ; each solve starts from the one before.
+    """F over some parameters θ, with ∂F/∂θ.
 
     Args:
         problem: with the values of all other parameters.
@@ -135,7 +135,6 @@ class Distance:
         self.problem, self.target, self.keys = problem, target, tuple(keys)
         rtol = choose(problem).line_rtol(target.order) if rtol is None else rtol
         self._own: Any = {"rtol": rtol, "of_value": of_value, "budget": budget}
-        self._starts: Mapping[float, Any] = {}
 
     def at(self, theta: FloatArray) -> Problem:
         """The problem at θ. Raises `FpsolveError` where there is none."""
@@ -144,17 +143,15 @@ class Distance:
         except ValueError as failure:
             raise FpsolveError(Message(Code.NO_PROBLEM, reason=said(failure))) from failure
 
-    def solver(self, theta: FloatArray, *, is_near: bool = True) -> ExponentSolver:
-        """A solver at θ; its starts are those of the last θ if this is near."""
-        return ExponentSolver(self.at(theta), starts=self._starts if is_near else {}, **self._own)
+    def method(self, theta: FloatArray) -> Method:
+        """What solves F at θ."""
+        return ExponentSolver(self.at(theta), **self._own).method
 
-    def __call__(self, theta: FloatArray, *, is_near: bool = True) -> Sample:
+    def __call__(self, theta: FloatArray) -> Sample:
         """F at θ, shape (n,). Raises `FpsolveError` where there is none."""
-        p, solver = self.target.order, self.solver(theta, is_near=is_near)
-        method = solver.method
+        p, method = self.target.order, self.method(theta)
         refuse(method.reason(p))
         (value, error), slopes = method.ratio_alone(p), method.gradient(p, self.keys)
-        self._starts = method.known
         scale, factor = method.scale(p) / abs(p) if p else method.scales.linear, self.target.p or 1.0
         size = abs(factor)
         return Sample(theta, factor * value - self.target.level, factor * slopes, size * error, size * scale)
@@ -163,6 +160,6 @@ class Distance:
         """The quantity at θ. Raises `NotConverged`."""
         value, error, scale = self.target.level + sample.value, sample.error, sample.scale
         if self.target.kind == "stability_index" and self.target.value:
-            ratio, slope, error = self.solver(sample.at).method.ratio(self.target.value)
+            ratio, slope, error = self.method(sample.at).ratio(self.target.value)
             value, error, scale = self.target.value - ratio / slope, error / slope, 1.0
         return Estimate(value, error, scale, quantity=self.target.quantity)

@@ -22,8 +22,6 @@ from fpsolve.model.problem import Problem, checked_problem
 
 HALF = 0.5
 """Share of the time that is left for one value."""
-NEAR = 0.1
-"""Distance, in sides of the square, up to which a solve starts from that before; farther away its mesh fits no more."""
 
 
 def axis_faults(
@@ -156,7 +154,7 @@ class ZeroField:
         self._axes, self._distance = axes, Distance(problem, target, keys, budget, rtol, of_value)
         self._seconds, self._spent = seconds, spent or Message(Code.LINE_SPENT, most=seconds)
         self.spent_seconds, self.stopped = 0.0, None if seconds > 0 else self._spent
-        self._before, self._rtol, self._known = np.full(2, math.inf), rtol, known
+        self._rtol, self._known = rtol, known
 
     def __call__(self, at: FloatArray) -> Sample:
         """F at (u, v).
@@ -198,6 +196,5 @@ class ZeroField:
         places = list(zip(self._axes, at.tolist(), strict=True))
         theta = np.array([axis.value(share) for axis, share in places])
         slopes = np.array([axis.slope(share) for axis, share in places])
-        found = self._distance(theta, is_near=bool(np.linalg.norm(at - self._before) <= NEAR))
-        self._before = at
+        found = self._distance(theta)
         return found._replace(at=at, gradient=found.gradient * slopes, rtol=self._rtol)

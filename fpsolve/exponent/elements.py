@@ -8,11 +8,10 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import cached_property
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -125,10 +124,6 @@ class Elements(Method):
     def goes_on(self) -> bool:  # type: ignore[override]
         return not self.is_given and not self.problem.noise.has_algebraic_tails
 
-    @property
-    def known(self) -> Mapping[float, Any]:  # type: ignore[override]
-        return self.spaces
-
     def places(self, p: float, found: Sequence[Solution]) -> Iterator[Start]:
         """The first stage of each place where Λ(p) may be carried, in order, from what was found in those before: where
         slow noise carries the moment, or around the mean of other noise, and others far from there."""
@@ -194,11 +189,9 @@ class Elements(Method):
             at_zero = pair_at_zero(near) if p == 0 else None
             return Solution(at_zero) if at_zero else self._solved_with(near.generator, p)
         search = Search(p, lambda found: tolerance(p, found.value), self.settings.budget, self.spends)
-        known = None
-        for attempt in (self._try_problem_close_by, self._try_nearest_p):
-            known = attempt(search, tolerance) or known
-            if known and self.is_accurate(known, tolerance) and not self._other_places(known):
-                return self._confirmed(search, known, tolerance)
+        known = self._try_nearest_p(search, tolerance)
+        if known and self.is_accurate(known, tolerance) and not self._other_places(known):
+            return self._confirmed(search, known, tolerance)
         found = [] if known is None else [search.settle(self._after(known, tolerance), known.pair)]
         for start in self.places(p, found):
             found.append(search.settle(start))
@@ -232,16 +225,6 @@ class Elements(Method):
         if change + finer.error <= tolerance(p, finer.pair.value):
             return replace(finer, search=finer.search + change)
         return self._confirmed(search, finer, tolerance)
-
-    def _try_problem_close_by(self, search: Search, tolerance: Tolerance) -> Solution | None:
-        """The solution with what was chosen for this p in the problem close by, or None."""
-        start, problem, p = self.settings.starts.get(search.p), self.problem, search.p
-        if start is None or _bases(start.pair.generator.problem) != _bases(problem):
-            return None
-        coarsened = Start(problem, self._coarsened(start, tolerance))
-        if coarsened.size > WORTH_A_TRY and not self._tilt_fits(coarsened.space, p):
-            return None
-        return search.attempt(lambda: Solution(coarsened.solved(p, start.pair)))
 
     def _try_nearest_p(self, search: Search, tolerance: Tolerance) -> Solution | None:
         """The solution with what was chosen for the nearest p, where that is likely to do."""
@@ -504,7 +487,6 @@ class Directions(Elements):
 
     is_function = False
     _has_witness = True
-    known = MappingProxyType[float, Any]({})
     no_picture = ""
     usual_rtol = RTOL_BEYOND_PLANE
     spends = Remedy.MANY
@@ -527,9 +509,6 @@ class Directions(Elements):
 
     def _other_places(self, solution: Solution) -> Sequence[float]:
         return ()
-
-    def _try_problem_close_by(self, search: Search, tolerance: Tolerance) -> None:
-        """Each has coordinates of its own."""
 
     def _coarsened(self, solution: Solution, tolerance: Tolerance) -> Space:
         return solution.pair.generator.chosen
@@ -585,11 +564,6 @@ def widened(generator: Generator) -> Space:
     steps = WIDER ** np.linspace(0, 1, 4)[1:]
     wide = np.concatenate([(lines[0] * steps)[::-1], lines, lines[-1] * steps])
     return chosen.with_axis(1, chosen.xi.between(wide))
-
-
-def _bases(problem: Problem) -> list[str]:
-    """What the functions of each noise are made of."""
-    return [noise.basis for noise in problem.coloured.parts.values()]
 
 
 def solved_p(p: float) -> float:

@@ -88,7 +88,6 @@ class Settings:
         mesh: for all p; None chooses a discretisation for each p.
         budget: what it may cost.
         meter: of all numbers of the problem.
-        starts: solutions of a problem with parameters close by, by their p.
     """
 
     rtol: float = RTOL
@@ -96,7 +95,6 @@ class Settings:
     mesh: CylinderMesh | None = None
     budget: Budget = field(default_factory=Budget)
     meter: Meter = field(default_factory=lambda: Meter(math.inf))
-    starts: Mapping[float, Any] = field(default_factory=dict)
 
 
 class Method:
@@ -114,7 +112,6 @@ class Method:
         name: what the numbers come from, as tables say it.
         usual_rtol: the error that is wanted where none is named.
         no_picture: why functions of it cannot be drawn; empty where they can.
-        known: what a problem next to it starts from, by p.
         goes_on: whether numbers of an earlier run do in place of solutions, which others need for their messages.
         is_function: whether Λ may be interpolated over p.
         ray: φ of a ray that the phase never leaves; None where there is none.
@@ -125,7 +122,6 @@ class Method:
     name: ClassVar[str] = "finite elements"
     usual_rtol: float = RTOL
     no_picture: str = ""
-    known: Mapping[float, Any] = MappingProxyType({})
     goes_on: bool = True
     is_function: bool = False
     ray: float | None = None

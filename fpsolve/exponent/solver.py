@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import KW_ONLY, dataclass, field, replace
 from functools import cached_property, partial
@@ -150,7 +150,6 @@ class ExponentSolver:
         rtol: |error| ≤ rtol·max(|Λ|, the terms of Eq. (37) before they cancel).
         of_value: |error| ≤ of_value·|Λ| is enough, too, as for a sign.
         budget: what the choice of a discretisation may cost.
-        starts: solutions of a problem with parameters close by, by their p, see `WholeProblem`; in the plane alone.
 
     Attributes:
         slope_errors: of Λ′(p), by p.
@@ -167,7 +166,6 @@ class ExponentSolver:
     rtol: float = 1e-8
     of_value: float = 0.0
     budget: Budget = field(default_factory=Budget)
-    starts: Mapping[float, Any] = field(default_factory=dict, repr=False)
     slope_errors: dict[float, float] = field(init=False, default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:
@@ -194,12 +192,12 @@ class ExponentSolver:
     @cached_property
     def method(self) -> Method:
         """How Λ(p) of such a problem is found."""
-        settings = Settings(self.rtol, self.of_value, self.mesh, self.budget, self.meter, self.starts)
+        settings = Settings(self.rtol, self.of_value, self.mesh, self.budget, self.meter)
         return choose(self.problem, settings)
 
     def of(self, method: Method) -> ExponentSolver:
         """That of a part of the problem."""
-        found = replace(self, problem=method.problem, starts={})
+        found = replace(self, problem=method.problem)
         found.__dict__.update(method=method, meter=self.meter)
         return found
 

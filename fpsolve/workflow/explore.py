@@ -11,7 +11,7 @@ import re
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextvars import ContextVar
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from datetime import UTC, datetime
 from functools import partial
 from html import unescape
@@ -36,7 +36,6 @@ from fpsolve.errors import FpsolveError
 from fpsolve.explain import UNBOUNDED, explain
 from fpsolve.exponent.kinds import choose
 from fpsolve.exponent.quantities import INDICES, MOMENT
-from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.messages import message_of
 from fpsolve.model.equation import equations_of
 from fpsolve.model.plane import BELOW
@@ -61,8 +60,6 @@ MOVING_RTOL = 1e-6
 """Relative error of Λ(p) while a slider moves, at least; a larger one takes a second solve of each p to be sure."""
 APART = 1 / 6
 """Share of the interval of p between those that are solved while a slider moves, at least; 0, 2 and the ends are."""
-NEAR = 0.2
-"""Share of the value of a parameter, by which it is near the last one."""
 FEW = 9
 """A case with fewer p is shown at others, too."""
 USUAL_P = np.linspace(-2.0, 4.0, 13)
@@ -111,7 +108,7 @@ class Explorer:
         for each in p:
             if np.min(np.abs(few - each)) >= APART * np.ptp(p):
                 few.append(each)
-        self._few, self._last, self._drawing = np.unique(few).tolist(), list[ExponentSolver](), threading.Lock()
+        self._few, self._drawing = np.unique(few).tolist(), threading.Lock()
         self._newest, self._so_far = dict[tuple[str, str], float](), dict[str, dict[str, Any]]()
         self._answers: dict[str, tuple[str, Callable[[Mapping[str, Any]], Answer]]] = {
             "start": ("start", self._start),
@@ -233,7 +230,7 @@ class Explorer:
         numerics = Numerics.of(case)
         if is_moving:
             asked[MOMENT.name] = {"p": self._few, "slopes": False}
-            numerics = _Moving(max(numerics.rtol, MOVING_RTOL), numerics.budget, numerics.mesh, last=self._last)
+            numerics = replace(numerics, rtol=max(numerics.rtol, MOVING_RTOL))
         found = solve_curve(next(case.curves()), asked, numerics).result
         if not found.moments.p.size:
             raise FpsolveError(message_of(found.failures[0].reason))
@@ -327,28 +324,6 @@ def _letters(latex: str) -> str:
     text = unescape(re.sub(r"\\(?:var)?([A-Za-z]+)", r"&\1;", latex.strip("$")))
     text = re.sub(r"_(\d)", lambda digit: digit[1].translate(BELOW), text)
     return "" if re.search(r"[&_^{}]", text) else text
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class _Moving(Numerics):
-    """Solving begins with the eigenfunctions of the last position, if that is near.
-
-    Attributes:
-        last: what solved that.
-    """
-
-    last: list[ExponentSolver]
-
-    def solver(self, problem: Problem) -> ExponentSolver:
-        found = super().solver(problem)
-        for before in self.last:
-            keys = [*problem.differentiable, *problem.undifferentiable]
-            old, new = (np.array([each.values[key] for key in keys], dtype=float) for each in (before.problem, problem))
-            is_near = bool(np.all(np.abs(new - old) <= NEAR * np.abs(new)))
-            if is_near:
-                found = replace(found, starts=before.method.known)
-        self.last[:] = [found]
-        return found
 
 
 class Explored:
