@@ -309,21 +309,19 @@ def _jumps(line: LineSpace, degree: int, speeds: FloatArray) -> FloatArray:
 class HalfSphereTerms(SphereTerms):
     """L(p) of a system with a stop, and ∂L(p)/∂θ, term by term. Args as those of `SphereTerms`."""
 
-    def whole(self) -> Iterator[Term]:
-        """L(p)."""
-        yield from super().whole()
+    def _loads(self) -> Iterator[Term]:
+        yield from super()._loads()
         yield self._load(self.phi.struck, "ω (ρ^p T(η′, π/2, θ₂) − T) δ(θ₁ + π/2)")
 
-    def changed(self, by: ParameterDerivative) -> Iterator[Term]:
-        """∂L(p)/∂θ; ω is held, as it is that of the coordinates."""
-        yield from super().changed(by)
+    def _changed_loads(self, by: ParameterDerivative) -> Iterator[Term]:
+        """ω is held, as it is that of the coordinates."""
         for log_factor in by.jumps:
             yield self._load(self.phi.changed_impacts, "∂/∂θ", log_factor)
 
     def _load(self, struck: Callable[[float, float, int], Matrix], text: str, size: float = 1.0) -> Term:
-        stop, motion = self._problem.system.stop, self._problem.motion
+        stop = self._problem.system.stop
         assert stop is not None
-        free = [self.matrix(term)[0, 1] * float(term.g(0.0)) for term in motion.terms if not is_driven(term.g)]
+        free = [self.matrix(term)[0, 1] * float(term.g(0.0)) for term in self.system.terms if not is_driven(term.g)]
         log_factor = math.log(stop.restitution)
         words = f"{text}, ω = {sum(free):.6g}, R = {stop.restitution:.6g}"
 

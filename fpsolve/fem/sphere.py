@@ -18,8 +18,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property, lru_cache, reduce
-from operator import add
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -35,7 +34,7 @@ from fpsolve.fem.mesh import halved
 from fpsolve.fem.space import Space
 from fpsolve.fem.terms import NoiseTerms, OfMoment, Term
 from fpsolve.model.plane import CoefficientMatrix, written_coefficient
-from fpsolve.model.problem import ParameterDerivative, Problem
+from fpsolve.model.problem import Problem
 
 PENALTY = 0.02
 """Factor γ of the penalty on jumps of ∂u/∂η."""
@@ -488,42 +487,26 @@ def waves_at(dimensions: tuple[int, int], most: int, points: FloatArray) -> list
 
 
 class SphereTerms(NoiseTerms):
-    """L(p) of a system of dimension 3 or 4, and ∂L(p)/∂θ, term by term.
-
-    Args:
-        problem: whose motion it is, and what white noise adds to it.
-        space: the trial and test functions.
-    """
+    """Those of three and four variables. Args as those of `NoiseTerms`."""
 
     def __init__(self, problem: Problem, space: Space) -> None:
-        super().__init__(problem)
-        self._problem, self.phi = problem, space.phi
+        super().__init__(problem, space)
         coordinates = np.array(self.phi.coordinates)
         self._coordinates, self._inverse = coordinates, np.linalg.inv(coordinates)
 
+    def _own(self, term: CoefficientMatrix) -> FloatArray:
+        """S⁻¹AS."""
+        return np.asarray(self._inverse @ np.array(term.matrix) @ self._coordinates)
+
     def matrix(self, term: CoefficientMatrix) -> FloatArray:
         """ε^n S⁻¹AS."""
-        size = self._problem.motion.epsilon**term.order
-        return np.asarray(size * self._inverse @ np.array(term.matrix) @ self._coordinates)
+        return self.system.epsilon**term.order * self._own(term)
 
-    def whole(self) -> Iterator[Term]:
-        """L(p)."""
-        yield from self._generators(self.phi.identity)
-        free = np.zeros_like(self._coordinates)
-        for term in self._problem.motion.terms:
-            yield from self._driven(term)
-            free += self.matrix(term) * (term.order == 0)
-        for each in self._problem.diffusions:
-            yield from self._diffused([(0.5, each, each)])
+    def _loads(self) -> Iterator[Term]:
+        """The penalty, as ∂u/∂η jumps by the error of the elements alone."""
+        free = sum(self._own(term) for term in self.system.terms if term.order == 0) + 0.0 * self._inverse
         size = float(np.linalg.norm(free + free.T, 2)) / 2
         yield self._term(size * self.phi.penalty(), one, "penalty on jumps of ∂u/∂η")
-
-    def changed(self, by: ParameterDerivative) -> Iterator[Term]:
-        """∂L(p)/∂θ; the penalty is held, as ∂u/∂η jumps by the error of the elements alone."""
-        for term in by.terms:
-            yield from self._driven(term)
-        for own, other in zip(self._problem.diffusions, by.diffusions, strict=bool(by.diffusions)):
-            yield from self._diffused([(0.5, own, other), (0.5, other, own)])
 
     def _driven(self, term: CoefficientMatrix) -> Iterator[Term]:
         """h·∇ + p q."""
@@ -531,13 +514,3 @@ class SphereTerms(NoiseTerms):
         text = written_coefficient(term.g)
         yield self._term(moved, term.g, f"{text}h·∇", order=term.order, of=term.noise)
         yield self._term(growth, term.g, f"p {text}q", OfMoment(1), term.order, term.noise)
-
-    def _diffused(self, pairs: Sequence[tuple[float, CoefficientMatrix, CoefficientMatrix]]) -> Iterator[Term]:
-        """Σ c (h_a·∇ + p q_a)(h_b·∇ + p q_b)."""
-        order = min(a.order + b.order for _, a, b in pairs)
-        parts = [self.phi.diffusion(c * self.matrix(a), self.matrix(b)) for c, a, b in pairs]
-        for power, of_pairs in enumerate(zip(*parts, strict=True)):
-            total = reduce(add, of_pairs)
-            yield self._term(
-                total, one, f"{('', 'p ', 'p² ')[power]}½ (h·∇ + p q)² of white noise", OfMoment(power), order
-            )

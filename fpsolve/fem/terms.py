@@ -20,7 +20,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import reduce
 from itertools import product
+from operator import add
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -174,14 +176,63 @@ class Wall(NamedTuple):
 
 
 class NoiseTerms:
-    """What lists of terms share: which noise each of them has a function of.
+    """L(p) of a system, and ∂L(p)/∂θ, term by term, on whatever functions of directions.
 
     Args:
-        problem: whose motion it is.
+        problem: whose motion it is, and what white noise adds to it.
+        space: the trial and test functions.
     """
 
-    def __init__(self, problem: Problem) -> None:
-        self._names = tuple(problem.coloured.parts)
+    def __init__(self, problem: Problem, space: Space) -> None:
+        self._names, self._problem, self.phi = tuple(problem.coloured.parts), problem, space.phi
+        self.system, self._diffusions = problem.motion, problem.diffusions
+
+    def whole(self) -> Iterator[Term]:
+        """L(p) of Eq. (19)."""
+        yield from self._generators(self.phi.identity)
+        for term in self.system.terms:
+            yield from self._driven(term)
+        for each in self._diffusions:
+            yield from self._diffused([(0.5, each, each)])
+        yield from self._loads()
+
+    def changed(self, by: ParameterDerivative) -> Iterator[Term]:
+        """∂L(p)/∂θ of the same terms; what makes functions smooth is held."""
+        for term in by.terms:
+            yield from self._driven(term)
+        for own, other in zip(self._diffusions, by.diffusions, strict=bool(by.diffusions)):
+            yield from self._diffused([(0.5, own, other), (0.5, other, own)])
+        yield from self._changed_loads(by)
+
+    def _driven(self, term: CoefficientMatrix) -> Iterator[Term]:
+        """A term of the motion."""
+        raise NotImplementedError
+
+    def _loads(self) -> Iterator[Term]:
+        """Walls, impulses, and what makes functions smooth."""
+        raise NotImplementedError
+
+    def _changed_loads(self, by: ParameterDerivative) -> Iterator[Term]:
+        """∂/∂θ of these."""
+        return iter(())
+
+    def _own(self, term: CoefficientMatrix) -> Any:
+        """A matrix as the functions of directions take it."""
+        return term
+
+    def _text(self, term: CoefficientMatrix) -> str:
+        """An operator of white noise as a reader would write it."""
+        return "(h·∇ + p q)² of white noise"
+
+    def _diffused(self, pairs: Sequence[tuple[float, CoefficientMatrix, CoefficientMatrix]]) -> Iterator[Term]:
+        """Σ c (h_a·∇ + p q_a)(h_b·∇ + p q_b) of matrices a and b, written by the first one."""
+        order, parts = min(a.order + b.order for _, a, b in pairs), list[Any]()
+        for c, a, b in pairs:
+            size = c * self.system.epsilon ** (a.order + b.order)
+            parts.append([size * part for part in self.phi.diffusion(self._own(a), self._own(b))])
+        text = f"½ {self._text(pairs[0][1])}"
+        for power, of_pairs in enumerate(zip(*parts, strict=True)):
+            yield self._term(reduce(add, of_pairs), one, ("", "p ", "p² ")[power] + text, OfMoment(power), order)
 
     def _term(
         self,
@@ -203,19 +254,11 @@ class NoiseTerms:
 
 
 class Terms(NoiseTerms):
-    """L(p) of a system, and ∂L(p)/∂θ, term by term; what is of φ alone is the same with any tilt.
-
-    Args:
-        problem: whose motion it is, and what white noise adds to it.
-        space: the trial and test functions.
-    """
+    """Those of two variables; what is of φ alone is the same with any tilt. Args as those of `NoiseTerms`."""
 
     def __init__(self, problem: Problem, space: Space) -> None:
-        super().__init__(problem)
-        self._problem = problem
-        system = self.system = problem.motion
-        self._diffusions, self.phi, self.noises = problem.diffusions, space.phi, space.noises
-        self._impulses = problem.impulses
+        super().__init__(problem, space)
+        system, self.noises, self._impulses = self.system, space.noises, problem.impulses
         self._vertices, self._jump = self.phi.lines[:-1], self.phi.jump
         brought = 0.0 * self._jump  # to a wall
         # where θ = |v|, and the sign of v where that is the same for all ξ, otherwise 0
@@ -237,13 +280,7 @@ class Terms(NoiseTerms):
         # nothing is left of the other side: where ξ is large that would count
         self._trace = 0.5 * (self.phi.right_trace + self.phi.left_trace) - by_rows(0.5 * direction, self._jump)
 
-    def whole(self) -> Iterator[Term]:
-        """L(p) of Eq. (19)."""
-        yield from self._generators(self.phi.identity)
-        for term in self.system.terms:
-            yield from self._driven(term)
-        for each in self._diffusions:
-            yield from self._diffused(each, [(0.5, each, each)])
+    def _loads(self) -> Iterator[Term]:
         for struck in self._impulses:
             yield self._struck(struck)
         # −½ ∫ P_s θ [w] [T] at the φ-vertices where the phase runs both ways, or θ is not |v|
@@ -256,16 +293,9 @@ class Terms(NoiseTerms):
             text = f"(R^p − 1) |dφ/dt| δ(φ − {ray.phase:.6g} mod π), R = {math.exp(ray.log_factor):.6g}"
             yield self._term(abs(v) * delta, one, text, OfMoment(0, ray.log_factor, is_change=True), order=2)
 
-    def changed(self, by: ParameterDerivative) -> Iterator[Term]:
-        """∂L(p)/∂θ of the same terms where the motion and its jumps change with θ.
-
-        Where θ is the size of the speed for the typical ξ it is held: [T] = 0 there but for the error of the elements.
-        """
+    def _changed_loads(self, by: ParameterDerivative) -> Iterator[Term]:
+        """The size of the speed for the typical ξ is held: [T] = 0 there but for the error of the elements."""
         text, moved = "∂/∂θ", LinearMotion(self.system.epsilon, by.terms)
-        for term in by.terms:
-            yield from self._driven(term)
-        for own, other in zip(self._diffusions, by.diffusions, strict=bool(by.diffusions)):
-            yield from self._diffused(own, [(0.5, own, other), (0.5, other, own)])
         for struck, moved_by in zip(self._impulses, by.impulses, strict=bool(by.impulses)):
             yield self._struck(struck, moved_by)
         yield from self._upwind(
@@ -290,17 +320,8 @@ class Terms(NoiseTerms):
             along = size * self.phi.mass(term.q)
             yield self._term(along, term.g, f"p {text}{_written(term.q)}", OfMoment(1), term.order, term.noise)
 
-    def _diffused(
-        self, own: CoefficientMatrix, pairs: Sequence[tuple[float, CoefficientMatrix, CoefficientMatrix]]
-    ) -> Iterator[Term]:
-        """Σ c (h_a ∂φ + p q_a)(h_b ∂φ + p q_b) of matrices a and b, written by the one of the noise itself."""
-        order, epsilon, totals = min(a.order + b.order for _, a, b in pairs), self.system.epsilon, [0.0, 0.0, 0.0]
-        for c, a, b in pairs:
-            size = c * epsilon ** (a.order + b.order)
-            totals = [total + size * part for total, part in zip(totals, self.phi.diffusion(a, b), strict=True)]
-        text = f"½ (h ∂φ + p q)² of white noise, h = {_written(own.h)}, q = {_written(own.q)}"
-        for power, total in enumerate(totals):
-            yield self._term(total, one, ("", "p ", "p² ")[power] + text, OfMoment(power), order)
+    def _text(self, term: CoefficientMatrix) -> str:
+        return f"(h ∂φ + p q)² of white noise, h = {_written(term.h)}, q = {_written(term.q)}"
 
     def _struck(self, of: Impulse, by: Impulse | None = None) -> Term:
         """An impulse, or ∂/∂θ of it."""
