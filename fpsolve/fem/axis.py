@@ -33,7 +33,7 @@ class Axis:
 
     Attributes:
         lines: the vertices of cells; none where the functions are of the whole axis.
-        most_unknowns: of a space with this first axis and no chain, of which SuperLU's factors take 1.5 GB.
+        most_unknowns: of a space with this first axis and no chain, with which a process takes 1.5 GB.
         is_chain: whether each function is coupled to few next to it alone, as polynomials of noise are.
         slowest: the least share of the effect of the highest modes that two more may leave, see `ModeEffects`.
         slope: s/p of the factor exp(s z) that moves with p.
@@ -41,7 +41,7 @@ class Axis:
 
     __dataclass_fields__: ClassVar[dict[str, Any]]
     lines = NO_LINES
-    most_unknowns = 50_000
+    most_unknowns = 35_000
     is_chain = False
     slowest, slope = 0.0, 0.0
 

@@ -22,8 +22,8 @@ from fpsolve.fem.phase import PhaseAxis
 from fpsolve.model.frame import Frame
 from fpsolve.model.noise import Noise
 
-MOST_BYTES = 1.5e9
-"""Of the factors of a generator."""
+MOST_BYTES = 1.1e9
+"""Of the factors of a generator: with what else is held, and libraries, a process takes 1.5 GB."""
 LITTLE = 1e-2
 """Share of the largest effect of an axis below which others are left as they are, while nothing is resolved."""
 FIRST: dict[str, Callable[[Noise, int], NoiseAxis]] = {
@@ -105,7 +105,7 @@ class Space:
 
     @property
     def most_unknowns(self) -> int:
-        """So many that their factors take 1.5 GB: three squares of a block for each level, otherwise as measured."""
+        """So many that a process takes 1.5 GB: three squares of a block for each level, otherwise as measured."""
         if self.chain is None:
             return int(self.phi.most_unknowns)
         return int(math.sqrt(MOST_BYTES / 24 * self.shape[self.chain]))
