@@ -22,7 +22,7 @@ class OverBudget(NotConverged):
     """The seconds of a meter have passed; no number goes on without what it ends, see `unless_over_budget`."""
 
     def advising(self, remedy: str) -> OverBudget:
-        """It has a remedy."""
+        """Itself: its remedy is a larger budget."""
         return self
 
 
@@ -36,7 +36,8 @@ class Meter:
         begun: how many of them were begun.
         number: the symbol of the one that is being solved.
         unknowns: of the factorisation that is under way.
-        before: seconds that passed before this number began.
+        at_begin: seconds that had passed when that number began.
+        needed: about what all numbers take, once they are more than there is; the same for each that is left out.
     """
 
     seconds: float
@@ -44,7 +45,8 @@ class Meter:
     begun: int = 0
     number: str = ""
     unknowns: int = 0
-    before: float = 0.0
+    at_begin: float = 0.0
+    needed: float = 0.0
     _before: float = 0.0
     _since: float | None = None
 
@@ -72,16 +74,16 @@ class Meter:
         It tells about how many all numbers take, if those that are left take as long as those that are done.
         """
         if seconds > self.seconds:
-            each = self.before / max(self.begun - 1, 1)
-            left = max(self.planned - self.begun, 0) * each
-            told = self.before + max(seconds - self.before, each) + left
-            raise OverBudget(Message(Code.SECONDS_SPENT, seconds=told, most=self.seconds), remedy=Remedy.BUDGET)
+            own, done = seconds - self.at_begin, self.begun - 1
+            each = self.at_begin / done if done > 0 else own
+            self.needed = self.needed or self.at_begin + max(own, each) + max(self.planned - self.begun, 0) * each
+            raise OverBudget(Message(Code.SECONDS_SPENT, seconds=self.needed, most=self.seconds), remedy=Remedy.BUDGET)
 
 
 def begin(symbol: str) -> None:
     """Let the meter know which number comes next."""
     if meter := _meter.get():
-        meter.number, meter.begun, meter.before = symbol, meter.begun + 1, meter.spent
+        meter.number, meter.begun, meter.at_begin = symbol, meter.begun + 1, meter.spent
 
 
 @contextmanager

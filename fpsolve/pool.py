@@ -36,7 +36,7 @@ SUBMITTED = 64
 """Least number of tasks that are submitted at once, so that no worker waits while the caller is busy with a result."""
 START_SECONDS = 1.5
 """Seconds of work that this process does itself before it starts others, as their start takes as long."""
-CONNECT_SECONDS = 10
+CONNECT_SECONDS = 20
 """Seconds after which a scheduler that does not answer, or that has no worker any more, is given up."""
 LOOK_SECONDS = 1.0
 """Seconds after which one looks whether a scheduler has workers, as long as no result comes."""

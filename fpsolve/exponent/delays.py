@@ -25,6 +25,7 @@ from scipy.linalg import eig, eigvals, expm
 from scipy.optimize import brentq
 
 from fpsolve.arrays import FloatArray, dense, finite
+from fpsolve.budget import charge
 from fpsolve.errors import NoHierarchy
 from fpsolve.exponent.powers import Moving, PowerRates, moment_form, upper
 from fpsolve.exponent.rightmost import REMEDY, ROUNDING, Eigenpair
@@ -202,6 +203,7 @@ class DelayRates:
         drift[0] -= 0.5 * sigma * one
         moving = _outer([(functions, drift), *zip(self.masses, (load * fall for load in own.loads), strict=True)], one)
         generator = _kron(self.generator, np.eye(n * n))
+        charge(2 * count * len(generator))
         ends = self._collocated(moving, generator) if generator.any() else self._carried(moving)
         same, size = np.eye(len(ends)), len(generator)
         starts = np.linalg.solve(same - np.eye(len(ends), k=-size) @ ends, same[:, :size])  # each is where one ends

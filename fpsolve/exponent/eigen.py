@@ -290,8 +290,6 @@ def _carried(pairs: Sequence[PrincipalPair], pencil: Pencil, generator: Generato
     p, space, kept = pencil.p, pencil.space, [pair for pair in pairs if pair.generator is generator]
     if not kept:
         nearest = min(pairs, key=lambda pair: abs(pair.p - p))
-        if nearest.generator.chosen is generator.chosen:  # the same functions, of a problem close by
-            return nearest.right, nearest.left
         right, left = space.carry(np.array([nearest.right, nearest.left]), nearest.space)
         return right, left
     nodes = np.array([pair.p for pair in kept])

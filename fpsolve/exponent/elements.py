@@ -91,6 +91,7 @@ class Elements(Method):
 
     Attributes:
         spaces: what was solved, by p.
+        spends: what to do where a budget does not suffice.
         remedy: what to do where it is not resolved.
     """
 

@@ -20,7 +20,6 @@ from scipy.linalg import expm, get_lapack_funcs, rsf2csf, schur
 from scipy.sparse.linalg import LinearOperator, gmres
 
 from fpsolve.arrays import FloatArray, dense
-from fpsolve.budget import charge
 from fpsolve.errors import NoHierarchy
 from fpsolve.exponent.powers import Moving, upper
 from fpsolve.exponent.rightmost import EXACTLY, REMEDY, ROUGHLY, ROUNDING, Eigenpair, Solve, rightmost
@@ -168,11 +167,13 @@ class MatrixRates:
         """Without what noise drives, (σ − Gᵀ)X − A X − X Aᵀ = F for X, from the last function to the first."""
         t, u, s, z = self._schur
         given = u.conj().T @ _over(z.conj().T, given) @ u.conj()
-        found, one = np.zeros_like(given), np.eye(len(t))
+        found, one = np.empty_like(given), np.eye(len(t))
         [trsyl] = get_lapack_funcs(("trsyl",), (given,))
         for k in reversed(range(len(s))):
             moved = t - 0.5 * (sigma - s[k, k]) * one
-            x, scale, _ = trsyl(moved, moved.conj(), -given[k] - np.tensordot(s[k], found, 1), tranb="C")
+            rest = k + 1 + np.flatnonzero(s[k, k + 1 :])
+            right = given[k] + np.tensordot(s[k, rest], found[rest], 1)
+            x, scale, _ = trsyl(moved, moved.conj(), -right, tranb="C")
             found[k] = x / scale
         return np.ascontiguousarray(_over(z, u @ found @ u.T).real)
 
@@ -184,7 +185,6 @@ class MatrixRates:
             shape = (-1, *self.steady.shape)
 
             def image(z: FloatArray) -> FloatArray:
-                charge(z.size)
                 return z - h._alone(sigma, h._driven(z.reshape(shape))).ravel()
 
             operator = LinearOperator(2 * x.shape, matvec=image, dtype=float)

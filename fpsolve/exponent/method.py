@@ -341,7 +341,7 @@ class Best(NamedTuple):
 
 
 class Ended(Exception):
-    """No larger space may be solved on, for a reason other than time."""
+    """No stage may follow, for a reason other than time."""
 
     def __init__(self, reason: Message) -> None:
         super().__init__(str(reason))
@@ -360,6 +360,7 @@ class Search:
         stages: how many stages were solved.
         failure: why the last stage had no solution.
         best: what the last place has.
+        judged: what the last stage has.
         last: seconds spent before the last stage, and its unknowns.
     """
 
@@ -370,6 +371,7 @@ class Search:
     stages: int = 0
     failure: Exception | None = None
     best: Best | None = None
+    judged: Any = None
     last: tuple[float, int] = (0.0, 0)
 
     def settle(self, stage: Stage | None, near: Any = None) -> Any:
@@ -383,7 +385,7 @@ class Search:
             NotConverged: the budget does not suffice, or rounding is larger than the tolerance; `partial` is the best
                 that is found, or None.
         """
-        self.best = None
+        self.best = self.judged = None
         try:
             while True:
                 stage = self._begun(stage)
@@ -392,7 +394,7 @@ class Search:
                     stage = stage.doubled(self.failure)
                     continue
                 allowed = self.allowed(near)
-                found = stage.judged(near, allowed)
+                self.judged = found = stage.judged(near, allowed)
                 if found.error <= allowed and stage.is_enough(found):
                     return found
                 if found.error / allowed < (self.best.share if self.best else math.inf):

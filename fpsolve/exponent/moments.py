@@ -35,7 +35,7 @@ from fpsolve.exponent.error import Moment
 from fpsolve.exponent.matrices import MOST_NUMBERS, Matrices
 from fpsolve.exponent.method import Budget, Search
 from fpsolve.exponent.powers import Moving, Powers, ladder, moment_form, multinomials
-from fpsolve.exponent.rightmost import REMEDY, ROUNDING
+from fpsolve.exponent.rightmost import REMEDY, ROUNDING, inverse
 from fpsolve.fem.space import FIRST as AXES
 from fpsolve.fem.space import first_axis
 from fpsolve.messages import Remedy
@@ -147,15 +147,14 @@ def even_moment(
         return max(min(loosest * found.scale, math.inf if tolerance is None else tolerance), 2 * found.rounding)
 
     search = Search(p, allowed, Budget(), Remedy.BUDGET)
+    last: EvenMoment | None
     with unless_over_budget():
-        found: EvenMoment = search.settle(Level(equations, (FIRST,) * len(equations.noises), most))
-        return found
-    if search.best is not None:
-        found = search.best.found
-        if found.error <= (MEANINGLESS * found.scale if tolerance is None else tolerance):
-            return found
-    if isinstance(search.failure, NoHierarchy):
-        raise search.failure
+        last = search.settle(Level(equations, (FIRST,) * len(equations.noises), most))
+        return last
+    if (last := search.judged) and last.error <= (MEANINGLESS * last.scale if tolerance is None else tolerance):
+        return last
+    if search.failure:
+        raise NoHierarchy(str(search.failure))
     raise NoHierarchy(
         f"got p = {p:g}; {most} equations, or {MOST_DEGREES} functions of each noise, are too few for moments "
         f"under noise so strong or slow; use a smaller p, or {REMEDY}"
@@ -353,8 +352,10 @@ class Level:
 
     def judged(self, found: EvenMoment, allowed: float) -> EvenMoment:
         """With what the last step changed, where that is beyond the errors of both."""
-        if self.before is None or not any(found.effects):
+        if not any(found.effects):
             return found
+        if self.before is None:  # effects may be small by chance
+            return replace(found, change=math.inf)
         step = abs(self.before.value - found.value)
         return replace(found, change=found.change + step * (step > found.told + found.change + self.before.told))
 
@@ -448,7 +449,7 @@ class Equations:
             for last in (1, 2) if new.any() else ():
                 moved = _outer([axis.degrees >= count - last if k == j else each for j, each in enumerate(is_old)])
                 right, left = ((each * new[:, None])[moved].ravel() for each in images)
-                told[last - 1] = float(left @ h.on(moved).solver(value)(right))
+                told[last - 1] = float(left @ inverse(h.on(moved), value, right.size)(right))
             effects.append(told[1])
             change += abs(told[1] - told[0])
         moments = self.state.moments(mean @ x.reshape(size, -1))

@@ -14,6 +14,7 @@ import numpy as np
 from scipy.sparse.linalg import ArpackError, LinearOperator, eigs
 
 from fpsolve.arrays import FloatArray
+from fpsolve.budget import charge
 from fpsolve.errors import NoHierarchy, SingularMatrix
 
 ROUNDING = 10 * sys.float_info.epsilon
@@ -87,7 +88,7 @@ def rightmost(h: Rates, x: FloatArray, y: FloatArray) -> Eigenpair:
     value, away = -np.inf, np.inf
     for _ in range(MOST_STEPS):
         last, start = value, x
-        share, x = _largest(h.solver(sigma, ROUGHLY), x)
+        share, x = _largest(inverse(h, sigma, x.size, ROUGHLY), x)
         value = sigma - 1 / share
         if last - value > PASSED * away:
             x, value, sigma = start, last, last + away
@@ -100,7 +101,7 @@ def rightmost(h: Rates, x: FloatArray, y: FloatArray) -> Eigenpair:
     for _ in range(MOST_POLISHES):
         before = x, y
         try:
-            solve = h.solver(sigma, EXACTLY)
+            solve = inverse(h, sigma, x.size)
         except SingularMatrix:  # it is an eigenvalue to the last digit
             break
         for _ in range(2):
@@ -113,6 +114,18 @@ def rightmost(h: Rates, x: FloatArray, y: FloatArray) -> Eigenpair:
             break
         sigma = value + max(1e-3 * ROUNDING * size, NEARER * (sigma - value))
     return Eigenpair(value, x, y / (y @ x), change if change > ROUNDING * size else 0.0, size)
+
+
+def inverse(h: Rates, sigma: float, size: int, tolerance: float = EXACTLY) -> Solve:
+    """(σ − H)⁻¹ of so many numbers, within the budget. Raises as `Rates.solver`, and `OverBudget`."""
+    charge(size)
+    solve = h.solver(sigma, tolerance)
+
+    def asked(x: FloatArray, trans: int = 0) -> FloatArray:
+        charge(size)
+        return np.asarray(solve(x, trans))
+
+    return asked
 
 
 def _largest(solve: Solve, x: FloatArray) -> tuple[float, FloatArray]:

@@ -103,7 +103,7 @@ class NoiseAxis(Axis):
         return self
 
     def of(self, noise: Noise, p: float) -> Self:
-        """The functions for a noise, which may be of a problem close by, with the tilt for p; no tables are kept."""
+        """The functions for a noise, with the tilt for p; no tables are kept."""
         return replace(self, noise=noise, **({"p": p} if self.slope else {}))
 
     @property

@@ -22,8 +22,8 @@ from fpsolve.fem.phase import PhaseAxis
 from fpsolve.model.frame import Frame
 from fpsolve.model.noise import Noise
 
-MOST_BYTES = 1.1e9
-"""Of the factors of a generator: with what else is held, and libraries, a process takes 1.5 GB."""
+MOST_BYTES = 1.2e9
+"""Of the factors of a generator: with what else is held, and libraries, a process takes about 1.5 GB."""
 LITTLE = 1e-2
 """Share of the largest effect of an axis below which others are left as they are, while nothing is resolved."""
 FIRST: dict[str, Callable[[Noise, int], NoiseAxis]] = {
@@ -121,7 +121,7 @@ class Space:
         return any(axis.slope for axis in self.axes)
 
     def at(self, p: float, noises: Iterable[Noise]) -> Space:
-        """The space of noises, which may be of a problem close by, with the tilt for p; each has tables of its own."""
+        """The space with the tilt for p; each axis has tables of its own."""
         return Space((self.phi, *(axis.of(noise, p) for axis, noise in zip(self.noises, noises, strict=True))))
 
     def with_axis(self, k: int, axis: Axis) -> Space:

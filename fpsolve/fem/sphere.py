@@ -487,7 +487,7 @@ def waves_at(dimensions: tuple[int, int], most: int, points: FloatArray) -> list
 
 
 class SphereTerms(NoiseTerms):
-    """Those of three and four variables. Args as those of `NoiseTerms`."""
+    """L(p) of three and four variables. Args as those of `NoiseTerms`."""
 
     def __init__(self, problem: Problem, space: Space) -> None:
         super().__init__(problem, space)
@@ -504,7 +504,7 @@ class SphereTerms(NoiseTerms):
 
     def _loads(self) -> Iterator[Term]:
         """The penalty, as ∂u/∂η jumps by the error of the elements alone."""
-        free = sum(self._own(term) for term in self.system.terms if term.order == 0) + 0.0 * self._inverse
+        free = sum((self._own(term) for term in self.system.terms if term.order == 0), 0.0 * self._inverse)
         size = float(np.linalg.norm(free + free.T, 2)) / 2
         yield self._term(size * self.phi.penalty(), one, "penalty on jumps of ∂u/∂η")
 

@@ -254,7 +254,7 @@ class NoiseTerms:
 
 
 class Terms(NoiseTerms):
-    """Those of two variables; what is of φ alone is the same with any tilt. Args as those of `NoiseTerms`."""
+    """L(p) of two variables; what is of φ alone is the same with any tilt. Args as those of `NoiseTerms`."""
 
     def __init__(self, problem: Problem, space: Space) -> None:
         super().__init__(problem, space)

@@ -73,7 +73,7 @@ def test_numbers_of_a_set_have_one_meter_and_its_watch_sees_which_is_solved(proc
         with refused(match=r" 10 s .* budget\.seconds = 5; use a larger"):  # two are left, of 2 s each as λ
             charge(80)
         begin("Λ(3)")
-        with refused(match=r" 12 s "):  # it and another one, of 3 s each as those before
+        with refused(match=r" 10 s "):  # as before
             charge(80)
     assert (inner, meter.spent, seen) == (meter, 6.0, [("λ", 1, 70)])
 

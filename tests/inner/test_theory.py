@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from fpsolve import ExponentSolver, OrnsteinUhlenbeck, Problem, VibroImpactOscillator, moment_lyapunov
+from fpsolve.errors import NoHierarchy
 from fpsolve.exponent import even_moment
 from fpsolve.exponent.fields import fields
 from fpsolve.messages import Code
@@ -11,7 +12,7 @@ from fpsolve.model import Bounded, White
 from fpsolve.theory.perturbation import perturbed_moments, weak_noise_note
 from tests.conftest import sampled
 from tests.kit import matrices, run
-from tests.numbers.rows.even import NOISES, drawn
+from tests.numbers.rows.even import NOISES, WAVY, drawn
 from tests.numbers.second import LOAD, even, spring
 from tests.oracles import perturbation
 
@@ -52,6 +53,12 @@ def test_error_of_moments_is_what_few_functions_lack(rng):
         for tolerance in (1e-2, 1e-7):
             found = even_moment(problem, 4, tolerance)
             assert abs(found.value - exact) <= found.error <= tolerance
+
+
+@pytest.mark.parametrize("most", [30, 70])
+def test_functions_that_see_little_of_the_noise_and_are_too_many_give_no_moment(most):
+    with pytest.raises(NoHierarchy, match="are too few"):
+        even_moment(WAVY, 2, most=most)
 
 
 def test_command_compares_with_the_moments_and_tells_what_differs(tmp_path, monkeypatch):

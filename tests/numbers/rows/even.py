@@ -4,9 +4,12 @@ import math
 
 import numpy as np
 
+from fpsolve import Problem, moment_lyapunov
 from fpsolve.model import (
     Bounded,
+    CoefficientMatrix,
     Filter,
+    LinearSystem,
     MarkovChain,
     OrnsteinUhlenbeck,
     Poisson,
@@ -130,7 +133,28 @@ def random(seed, n, *names, p=2, quantity=None, **more):
 
 
 ELEMENTS = (4, "white"), (2, "Ito's"), (2, "impulses"), (4, "OU"), (2, "chain"), (4, "bounded"), (2, "sine-Wiener")
+WAVY = Problem(
+    LinearSystem(
+        [
+            CoefficientMatrix(0, spring().tolist()),
+            CoefficientMatrix(1, (0.5 * LOAD).tolist(), lambda xi: np.cos(4 * xi)),
+        ]
+    ),
+    OrnsteinUhlenbeck(alpha=1.0, sigma=math.sqrt(2)),
+)
+"""Of cos 4ξ the first functions of ξ see little, and the next ones hardly change that."""
 ROWS = [
+    *(
+        Row(
+            WAVY,
+            closed(2, tolerance),
+            lambda: float(moment_lyapunov(WAVY, 2.0).value[0]),
+            1e-9,
+            most,
+            "elements, cos 4ξ",
+        )
+        for tolerance, most in ((1e-4, 1e-4), (1e-3, 1e-3), (None, 1e-12))
+    ),
     *(
         against(closed(p), p, spring(), [LOAD], [noise], f"spring, {what}")
         for p in (2, 4)
