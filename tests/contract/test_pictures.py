@@ -64,6 +64,34 @@ def test_eigenfunction_has_a_picture_in_python(pictures, tmp_path):
     assert picture.save(tmp_path / "picture.png").read_bytes() == picture.png == picture._repr_png_()
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("field", ["T", "tilted_density"])
+def test_eigenfunction_of_directions_has_a_picture_in_python(pictures, field):
+    turning = rates("x' = -x + y; y' = -x - y + xi*z; z' = -z + xi*x", White(s=1.0))
+    assert colours(BytesIO(draw_eigenfunction(ExponentSolver(turning, rtol=1e-3).pair(1.0), field).png))[0] > 300
+
+
+def test_figure_over_a_parameter_has_what_is_simulated(tmp_path):
+    """Of a moment, and of λ."""
+    text = TEXT.replace("figure = false", "figure = true") + "[monte_carlo]\npaths = 64\ntime = 40.0\n"
+    for y in ("{ moment = 2.0 }", '"lyapunov_exponent"'):
+        figure = f'--set=figure={{ x = "noise.D0", y = {y} }}'
+        assert run(tmp_path, "run", "case.toml", "--jobs", "1", "--monte-carlo", figure, case=text).code == 0
+    assert {"figure.png", "figure.pdf"} <= files(tmp_path / "results/case")
+    impossible = "vary={ 'oscillator.epsilon' = [0.1, 1.5], 'oscillator.restitution' = [0.1] }"
+    figure = '--set=figure={ x = "oscillator.epsilon", y = { moment = 2.0 } }'
+    more = "--set", "oscillator.impact='restitution'", "--set", impossible, "--out", "other"
+    assert run(tmp_path, "run", "case.toml", "--jobs", "1", figure, *more, case=text).code == 3
+    assert {"figure.png", "figure.pdf"} <= files(tmp_path / "other/case")
+
+
+def test_many_curves_of_one_moment_are_dots(tmp_path):
+    text = TEXT.replace("figure = false", "figure = true")
+    many = ['--set=vary."noise.D0"={ start = 0.1, stop = 1.0, num = 12 }', "--set=moments.p=[2.0]"]
+    assert run(tmp_path, "run", "case.toml", "--jobs", "1", *many, case=text).code == 0
+    assert {"figure.png", "figure.pdf"} <= files(tmp_path / "results/case")
+
+
 def test_eigenfunction_of_states_has_a_picture_in_python(pictures):
     telegraph = rates(
         "x' = v; v' = -x - 0.2*v - xi*x", Telegraph(a=0.5, k=1.0), walls=[{"at": "x = 0", "restitution": 0.8}]

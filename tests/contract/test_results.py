@@ -39,6 +39,7 @@ RESPONSE = Response(
     time=500.0,
 )  # fmt: skip
 ESTIMATES = MomentEstimate(1.0, 0.004, 1e-4, "direct", 6000.0), MomentEstimate(9.0, None, None, "direct", 3.0)
+JUMPING = rates("x' = v; v' = -x - 0.16*v - xi*x", Telegraph(a=0.8, k=1.0))
 MAIN = {
     "moments": ("moment", 3),
     "no moment": ("moment", 0),
@@ -61,6 +62,7 @@ MAIN = {
     "design": ("oscillator.c1", None),
     "uncertain": ("moment", None),
     "excursion": ("level", None),
+    "states": ("density", None),
 }
 """Results, each with its main variable, and the rows of its table."""
 
@@ -97,7 +99,8 @@ def results(tmp_path_factory):
         "directions": fpsolve.tilted_density(fpsolve.ExponentSolver(TURNING, rtol=1e-3).pair(1.0)),
         "design": design(HIT, "moment(2) = 0.02", Axis("oscillator.c1", -2.0, 2.0)),
         "uncertain": uncertainty(HIT, {"noise.D0": 0.05}, [1.0, 2.0]),
-        "excursion": excursion(rates("x' = v; v' = -x - 0.16*v - xi*x", Telegraph(a=0.8, k=1.0))),
+        "excursion": excursion(JUMPING),
+        "states": fpsolve.tilted_density(fpsolve.ExponentSolver(JUMPING).pair(2.0)),
     }
     assert set(found) == set(MAIN)
     return found

@@ -417,7 +417,7 @@ def test_why_there_is_no_response_is_told(tmp_path, changes, words):
 
 CUBIC = """title = "A cubic oscillator"
 moments.p = [1.0]
-output = { quantities = ["moment", "response"], figure = false }
+output.quantities = ["moment", "response"]
 response = { rtol = 0.1, grid = { amplitude = 40, phi = 25, xi = 8 } }
 monte_carlo = { paths = 256, time = 100.0 }
 [system]
@@ -435,6 +435,7 @@ sigma = 3.0
 def test_response_of_equations_has_the_names_of_their_variables_and_agrees_with_paths(tmp_path):
     [curve] = curves(tmp_path, CUBIC, "--monte-carlo")
     folder, means = tmp_path / "results/case", curve["response"]["means"]
+    assert {"response.png", "response.pdf", "figure.png"} <= files(folder)
     names = ["amplitude", "amplitude_squared", "amplitude_fourth", "q_squared", "w_squared"]
     assert [*means] == [f"{name}{end}" for name in names for end in ("", "_error")]
     assert means["amplitude_squared"] == pytest.approx(means["q_squared"] + means["w_squared"] / 4, rel=1e-12)

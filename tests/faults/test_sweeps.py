@@ -1,5 +1,6 @@
 """Sweeps: a fault of each kind loses nothing that is finished, and results do not depend on who worked."""
 
+import json
 import os
 import random
 import re
@@ -9,6 +10,7 @@ import socket
 import subprocess
 import sys
 import time
+import zlib
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -198,11 +200,16 @@ def test_torn_and_damaged_records_are_solved_again_and_what_is_no_record_is_left
     folder = tmp_path / "torn/sweep/records/solved"
     [path] = folder.glob("*")
     content = path.read_bytes().splitlines(keepends=True)
+    key, _, record = content[0].removesuffix(b"}\n").partition(b', "record": ')
+    strange = json.dumps({name: [0] for name in json.loads(record)}).encode()
+    key = re.sub(rb'"crc32": \d+', b'"crc32": %d' % zlib.crc32(strange), key)
     content[0] = content[0].replace(b"0.", b"1.", 1)
     content[1] = b"\0" * 40 + b"\n"
     content[2] = content[2][: len(content[2]) // 2]
     path.unlink()
-    path.with_name("another.jsonl").write_bytes(b"".join(content))  # as another process left it
+    path.with_name("another.jsonl").write_bytes(  # as another process left it; the first is whole, and of another form
+        key + b', "record": ' + strange + b"}\n" + b"".join(content)
+    )
     (folder / "folder.jsonl").mkdir()
     (folder / "lost.jsonl").symlink_to(tmp_path / "nowhere")
     os.mkfifo(folder / "pipe.jsonl")
@@ -267,6 +274,9 @@ def test_cluster_gives_the_same_results_and_a_run_ends_where_it_loses_all_worker
             _, said = process.communicate(timeout=240)
             assert process.returncode == code, said
             assert words in said
+            if not code:
+                run(place, "again", *FEW, "--scheduler", address)
+    assert len(sets(lines(place, "again"))) == 3
     assert_same_results(place, "cluster")
     shutil.copytree(place / "deserted", place / "gone on")
     assert 3 <= len(sets(lines(place, "gone on"))) < SIZE**2
