@@ -104,11 +104,6 @@ def slow(tau0: float, std: float, moments: Sequence[float]) -> dict[str, float]:
     return {f"p = {p:g}": one_moment(slow_noise(tau0, std).ou_reduction(), p) for p in moments}
 
 
-def nearly_gaussian() -> dict[str, float]:
-    """Slow noise of D₀ = 1."""
-    return {"p = 1": one_moment(NonGaussianNoise(D0=1.0, tau0=100.0, r0=0.95).ou_reduction(), 1.0)}
-
-
 def all_slow(taus: Sequence[float] = (1.0, 10.0, 100.0), sizes: Sequence[float] = (0.3, 1.0, 2.0)) -> dict[str, float]:
     """The median and the longest of 54 problems: p = −3, 1, 4, exact and reduced."""
     noises = [slow_noise(tau0, std) for tau0, std in itertools.product(taus, sizes)]
@@ -176,7 +171,6 @@ ROWS: Mapping[str, Callable[[], Mapping[str, float]]] = {
     "one set: ε = 0.6, ω = 1.7, r = 0.9, exact noise": numbers_of_a_set,
     "reduced noise, τ₀ = 10, standard deviation 0.3": partial(slow, 10.0, 0.3, (1.0,)),
     "layers: reduced noise, τ₀ = 100, standard deviation 2": partial(slow, 100.0, 2.0, (-3.0, 1.0, 4.0)),
-    "reduced noise, τ₀ = 100, D₀ = 1, r₀ = 0.95": nearly_gaussian,
     "54 problems of slow noise": all_slow,
     "starts": starts,
     "another set in a sweep, one p in weak noise": sweep,
