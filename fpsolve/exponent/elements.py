@@ -314,8 +314,7 @@ class Elements(Method):
     def _coarsened(self, solution: Solution, tolerance: Tolerance) -> Space:
         """The discretisation of a solution, or a much smaller one that would do."""
         pair, generator = solution.pair, solution.pair.generator
-        is_small = abs(pair.p) < SMALL_P or generator.size <= WORTH_A_TRY
-        if is_small:
+        if abs(pair.p) < SMALL_P or generator.size <= WORTH_A_TRY:
             return generator.chosen
         smaller = refined(solution, tolerance(pair.p, pair.value), 0)
         return smaller if smaller.size <= TRIM * generator.size else generator.chosen

@@ -175,9 +175,7 @@ def record_of(noise: Noise, rng: np.random.Generator, n: int = 20_000, step: flo
         kicks = noise.sigma * math.sqrt(step) * rng.standard_normal(n)
         return Record(noise.mu * np.cos(rng.uniform(0, 2 * math.pi) + np.cumsum(noise.nu * step + kicks)), step)
     if isinstance(noise, NonGaussianNoise):
-        b, h = (1 - noise.r0) * noise.tau0 / (2 * noise.D0), step / 20
-        kick = math.sqrt(2 * noise.D0 * h) / noise.tau0
-        return Record(_path_of_eq_7()(n, 20, h, b, noise.tau0, kick, int(rng.integers(2**31))), step)
+        return of_eq_7(noise, n, step, int(rng.integers(2**31)))
     if isinstance(noise, OrnsteinUhlenbeck):
         matrix, unit, output = np.array([[-noise.alpha]]), np.array([noise.standard_deviation]), np.ones(1)
     else:
@@ -191,6 +189,13 @@ def record_of(noise: Noise, rng: np.random.Generator, n: int = 20_000, step: flo
         state = flow @ state + kicks[i]
         values[i] = state @ output
     return Record(values, step)
+
+
+def of_eq_7(noise: NonGaussianNoise, n: int, step: float, seed: int) -> Record:
+    """A record by implicit Euler steps of −ξ/(τ₀(1 − bξ²)), 20 for one."""
+    b, h = (1 - noise.r0) * noise.tau0 / (2 * noise.D0), step / 20
+    kick = math.sqrt(2 * noise.D0 * h) / noise.tau0
+    return Record(_path_of_eq_7()(n, 20, h, b, noise.tau0, kick, seed), step)
 
 
 @functools.cache

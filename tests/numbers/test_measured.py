@@ -23,6 +23,7 @@ from fpsolve.measured import (
     weak_moment,
 )
 from fpsolve.model import Bounded, Filter, ParametricOscillator
+from tests.campaign.paths import of_eq_7
 
 OMEGA = np.linspace(0.05, 20, 200)
 OU = OrnsteinUhlenbeck(alpha=1.5, sigma=0.4)
@@ -111,31 +112,6 @@ def test_standard_errors_of_spectra_cover():
 def test_standard_errors_of_records_cover(noise, n, step, seeds, least, frequency):
     """Of 100 records 95 ± 5."""
     assert np.all(coverage(lambda rng: gaussian(noise, n, step, rng), seeds, frequency, noise) >= least)
-
-
-def of_eq_7(noise, n, step, seed, parts=20):
-    """A record by implicit Euler steps of −ξ/(τ₀(1 − bξ²)), which hold ξ inside, 20 for one."""
-    from numba import njit
-
-    @njit
-    def path(b, h, tau, kick):
-        np.random.seed(seed)  # noqa: NPY002
-        xi, values = 0.0, np.empty(n)
-        for i in range(n * parts):
-            xi += kick * np.random.standard_normal()  # noqa: NPY002
-            low, high = -1 / math.sqrt(b), 1 / math.sqrt(b)
-            for _ in range(50):
-                middle = 0.5 * (low + high)
-                if middle + h / tau * middle / (1 - b * middle**2) < xi:
-                    low = middle
-                else:
-                    high = middle
-            xi = 0.5 * (low + high)
-            values[i // parts] = xi
-        return values
-
-    h, b = step / parts, (1 - noise.r0) * noise.tau0 / (2 * noise.D0)
-    return Record(path(b, h, noise.tau0, math.sqrt(2 * noise.D0 * h) / noise.tau0), step)
 
 
 @pytest.mark.slow
