@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.linalg
-from scipy.sparse.linalg import ArpackError, ArpackNoConvergence, LinearOperator, eigs, gmres
+from scipy.sparse.linalg import ArpackError, ArpackNoConvergence, LinearOperator, eigs
 
 from fpsolve.arrays import FloatArray, finite, one
 from fpsolve.data import brief
@@ -51,18 +51,10 @@ MOSTLY = 0.5
 DOUBT = 1e-3
 """Share of its terms by which a tangent of Λ may lie too high: the errors of its p."""
 _EPS = float(np.finfo(float).eps)
-BESIDE = 1e-2
-"""Distance of the shift of kept factors from an eigenvalue, over a rate, up to which they serve for its derivatives."""
 REFINEMENTS = 16
 """Number of times that T′ is improved by its residual, at most."""
-RESOLVED = 1e-5
-"""Residual of GMRES: signs count from `SURELY_POSITIVE` on."""
-MOST_STEPS = 20
-"""Number of steps of GMRES that take less than other factors."""
 REFINED = 1e-14
-"""Share of T′ of a step that is the last one, where no other one is enough."""
-KNOWN = 1e-11
-"""Share of T* at p = 0 of the last step by factors of another p."""
+"""Share of T′ of a step that is the last one."""
 MAX_ITERATIONS = 12
 """Number of LU factors in an iteration."""
 MAX_SHIFTS = 12
@@ -193,8 +185,6 @@ def principal_pair(
         if has_others and rightmost - pair.value > 1e-6 * max(abs(rightmost), generator.problem.unit_rate):
             told = Message(Code.LARGER_EIGENVALUE, p=p, rightmost=rightmost, value=pair.value)
             raise NotConverged(told, pair, Remedy.PHASE)
-    if not pencil.keeps_factors:
-        pencil.kept.clear()
     return pair
 
 
@@ -217,15 +207,18 @@ def _is_rightmost(pair: PrincipalPair, space: Space) -> bool:
         values = space.on_grid(pair.right)
         if np.min(values) > LEAST_OF_MOST * np.max(values):
             return True
-    around, judged = PairDerivatives(pair), any if problem.system.stop else all
+    pencil, source = pair.generator.at(pair.p), space.weighed(space.constant)
+    judged = any if problem.system.stop else all
     seen = [side for side in (0, 1) if problem.dimension == 2 or pair.sign_defects[side] <= POSITIVE]
 
-    def is_positive(shift: float, side: int) -> bool:
-        both = [pair.right, pair.left]
-        both[side] = around.resolvent(shift * problem.unit_rate, adjoint=bool(side))
-        return _sign_defects(space, *both)[side] <= SURELY_POSITIVE
+    def is_positive(shift: float) -> bool:
+        factor, both = pencil.factorised(pair.eigenvalue + shift * problem.unit_rate), [pair.right, pair.left]
+        for side in seen:
+            both[side] = -factor.solve(source, transposed=bool(side))
+        defects = _sign_defects(space, *both)
+        return not seen or judged(defects[side] <= SURELY_POSITIVE for side in seen)
 
-    return all(not seen or judged(is_positive(shift, side) for side in seen) for shift in BESIDE_IT)
+    return all(map(is_positive, BESIDE_IT))
 
 
 def _has_other_positive(generator: Generator, p: float) -> bool:
@@ -465,15 +458,15 @@ def _sign_defects(space: Space, x: FloatArray, y: FloatArray) -> tuple[float, fl
 class PairDerivatives:
     """(L − Λ)v = f with ⟨T*, v⟩ = 0, where ⟨T*, f⟩ = 0, and the same with the adjoint of L.
 
-    A system is solved with a shift a little off Λ, and what that leaves of T in v is removed.
+    A system is solved with a shift a little off Λ, what that leaves of T in v is removed, and v is improved by its
+    residual.
 
     Args:
-        pair: Λ(p), T and T*; its generator may keep factors next to Λ.
+        pair: Λ(p), T and T*.
 
     Attributes:
         norm: ⟨T*, T⟩ on the domain.
         size: a bound on ‖L − Λ‖.
-        kept: shifts and factors that serve.
     """
 
     def __init__(self, pair: PrincipalPair) -> None:
@@ -482,60 +475,26 @@ class PairDerivatives:
         self._pencil = pair.generator.at(pair.p)
         self._operator = self._pencil.matrix.shifted(pair.eigenvalue)
         self.size = self._operator.norm
-        self.kept = [each for each in self._pencil.kept if abs(each[0] - pair.eigenvalue) <= BESIDE * self._rate]
-
-    @property
-    def _rate(self) -> float:
-        return self.pair.generator.problem.unit_rate
 
     @cached_property
     def _factor(self) -> Factors:
-        return self.kept[0][1] if self.kept else self._pencil.factorised(self.pair.eigenvalue + 1e-6 * self._rate)
+        return self._pencil.factorised(self.pair.eigenvalue + BESIDE_IT[0] * self.pair.generator.problem.unit_rate)
 
-    @cached_property
-    def _of_factor(self) -> tuple[tuple[FloatArray, FloatArray], ...]:
-        """w and Mv/⟨w, Mv⟩ of the pair that the factors themselves have next to Λ, and the same of the adjoint.
-
-        Factors of another p have another one than L, so close to the shift that solutions would be full of it.
-        """
-        space, (of_right, of_left) = self.pair.space, self._weighed
-        v, w = self._factor.solve(of_right), self._factor.solve(of_left, transposed=True)
-        images = space.weighed(v), space.weighed(w)
-        return (w, images[0] / (w @ images[0])), (v, images[1] / (v @ images[1]))
-
-    def resolvent(self, shift: float, *, adjoint: bool = False) -> FloatArray:
-        """(Λ + shift − L)⁻¹1 by factors next to Λ: the share of T as it is, the rest by GMRES, of a few steps."""
-        space, (own, other) = self.pair.space, (self.pair.right, self.pair.left)
-        if adjoint:
-            own, other = other, own
-        source = space.weighed(space.constant)
-
-        def carried(load: FloatArray) -> FloatArray:
-            return self.solve(load, adjoint=adjoint, enough=0.1 * RESOLVED)
-
-        moved = LinearOperator(2 * own.shape, lambda v: v - shift * carried(space.weighed(v)), dtype=float)
-        rest, failed = gmres(moved, -carried(source), rtol=RESOLVED, restart=MOST_STEPS, maxiter=1)
-        if failed:
-            return -self._pencil.factorised(self.pair.eigenvalue + shift).solve(source, transposed=adjoint)
-        return float(other @ source) / (self.norm * shift) * own + rest
-
-    def solve(
-        self, source: FloatArray, *, adjoint: bool = False, refinements: int = REFINEMENTS, enough: float = REFINED
-    ) -> FloatArray:
-        """v from the load f, in `one_thread`; each refinement leaves 1e-6 of a rate over the gap of the spectrum."""
+    def solve(self, source: FloatArray, *, adjoint: bool = False) -> FloatArray:
+        """v from the load f; each refinement leaves 1e-6 of a rate over the gap of the spectrum."""
         own, other = self.pair.right, self.pair.left
         weighed, operator, change = self._weighed[0], self._operator, 0.0 * own
         if adjoint:
             own, other, weighed, operator = other, own, self._weighed[1], operator.T
-        dual, image = self._of_factor[adjoint]
-        for _ in range(refinements):
-            rest = source - operator @ change
-            rest -= (other @ rest) / self.norm * weighed
-            step = self._factor.solve(rest - (dual @ rest) * image, transposed=adjoint)
-            change += step
-            change -= (other @ self.pair.space.weighed(change)) / self.norm * own
-            if length(step) <= enough * length(change):
-                break
+        with one_thread():
+            for _ in range(REFINEMENTS):
+                rest = source - operator @ change
+                rest -= (other @ rest) / self.norm * weighed
+                step = self._factor.solve(rest, transposed=adjoint)
+                step -= (other @ self.pair.space.weighed(step)) / self.norm * own
+                change += step
+                if length(step) <= REFINED * length(change):
+                    break
         return change
 
     @cached_property
@@ -556,46 +515,22 @@ class PairDerivatives:
     @cached_property
     def by_p(self) -> FloatArray:
         """T′: (L − Λ)T′ = −(L′ − Λ′)T."""
-        with one_thread():
-            return self.solve(self.pair.derivative * self._weighed[0] - self._slope @ self.pair.right)
+        return self.solve(self.pair.derivative * self._weighed[0] - self._slope @ self.pair.right)
 
     @cached_property
     def adjoint_by_p(self) -> FloatArray:
         """T*′/P_s."""
-        with one_thread():
-            return self.solve(self.pair.derivative * self._weighed[1] - self._slope.T @ self.pair.left, adjoint=True)
+        return self.solve(self.pair.derivative * self._weighed[1] - self._slope.T @ self.pair.left, adjoint=True)
 
     @cached_property
     def second_by_p(self) -> FloatArray:
         """T″: (L − Λ)T″ = −(L″ − Λ″)T − 2(L′ − Λ′)T′."""
-        with one_thread():
-            return self.solve(self.second_derivative * self._weighed[0] - self._curved - self._mixed)
+        return self.solve(self.second_derivative * self._weighed[0] - self._curved - self._mixed)
 
     @cached_property
     def second_derivative(self) -> float:
         """Λ″(p) = ⟨T*, L″T⟩ + 2⟨T*, (L′ − Λ′)T′⟩."""
         return float(self.pair.left @ (self._curved + self._mixed) / self.norm)
-
-
-def pair_at_zero(near: PrincipalPair) -> PrincipalPair | None:
-    """The pair at p = 0, where Λ = 0 and T = 1, from one at a small p by its factors; None where none are kept, or it
-    does not converge.
-
-    T* of that is improved by v from (L_p − Λ_p)ᵀv = −L₀ᵀT*, whose error is about p times the one before.
-    """
-    around, pencil = PairDerivatives(near), near.generator.at(0.0)
-    if not around.kept:
-        return None
-    y, size, last = near.left, math.inf, math.inf
-    with one_thread():
-        while REFINED * length(y) < size <= 0.5 * last or last == math.inf:
-            step = around.solve(-(pencil.matrix.T @ y), adjoint=True, refinements=1)
-            y, size, last = y + step, length(step), size
-    if not size <= KNOWN * length(y):
-        return None
-    x = pencil.space.constant
-    found = Iterate(0.0, 0.0, x, y, pencil.space.weighed(x), pencil.space.weighed(y))
-    return _pair(near.generator, pencil, found)
 
 
 def second_derivative(pair: PrincipalPair) -> float:

@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -24,12 +24,11 @@ from fpsolve.exponent.changed import Changed
 from fpsolve.exponent.eigen import (
     PairDerivatives,
     PrincipalPair,
-    pair_at_zero,
     principal_pair,
     second_derivative,
     slope_rounding,
 )
-from fpsolve.exponent.error import Estimate, Moment, Solution, checked, slope_error
+from fpsolve.exponent.error import Estimate, Moment, Solution, checked
 from fpsolve.exponent.fields import no_picture_of
 from fpsolve.exponent.method import (
     RTOL,
@@ -37,6 +36,7 @@ from fpsolve.exponent.method import (
     RTOL_OF_SEVERAL,
     Method,
     Search,
+    Stage,
     Tolerance,
     refuse_tails,
 )
@@ -86,6 +86,13 @@ TINIEST_P = 1e-9
 """For smaller |p| the error of Λ(p), which falls as p, has no scale, which may fall as p²."""
 
 
+class Place(NamedTuple):
+    """The first stage of a place, and what was found elsewhere, to begin with."""
+
+    start: Stage
+    near: Any = None
+
+
 class Elements(Method):
     """Λ(p) of two variables.
 
@@ -125,13 +132,33 @@ class Elements(Method):
     def goes_on(self) -> bool:  # type: ignore[override]
         return not self.is_given and not self.problem.noise.has_algebraic_tails
 
-    def places(self, p: float, found: Sequence[Solution]) -> Iterator[Start]:
-        """The first stage of each place where Λ(p) may be carried, in order, from what was found in those before: where
-        slow noise carries the moment, or around the mean of other noise, and others far from there."""
-        if not found:
-            yield Start(self.problem, first(self.problem, p, self.settings.rtol))
+    def places(self, p: float, tolerance: Tolerance, found: Sequence[Solution]) -> Iterator[Place]:
+        """The places where Λ(p) may be carried, in order, from what was found in those before.
+
+        The first one is that of the nearest p, if what was chosen there is likely to do, else where slow noise carries
+        the moment, or the mean of other noise. Others are far from there.
+        """
+        yield self._nearby(p, tolerance) or Place(Start(self.problem, first(self.problem, p, self.settings.rtol)))
         for center in other_centers(found[0].pair):
-            yield Start(self.problem, first(self.problem, p, self.settings.rtol, center))
+            yield Place(Start(self.problem, first(self.problem, p, self.settings.rtol, center)))
+
+    def _nearby(self, p: float, tolerance: Tolerance) -> Place | None:
+        """The discretisation of the nearest p, or one that should be within the tolerance there, and pairs around p."""
+        near = self._near(p)
+        if not near:
+            return None
+        q, space = near[0].p, near[0].generator.chosen
+        if abs(q) >= SMALL_P:
+            new = refined(self.spaces[q], tolerance(q, near[0].value), 0)
+            is_large = space.size > WORTH_A_TRY and new.size < TRIM * space.size
+            space = new if is_large or new.size > space.size else space
+        if space.size > WORTH_A_TRY and abs(p - q) > max(0.5, 0.4 * min(abs(p), abs(q))):
+            return None
+        return Place(Start(self.problem, space), near) if self._tilt_fits(space, p) else None
+
+    def _near(self, p: float) -> list[PrincipalPair]:
+        """Some pairs at the nearest p, the nearest first."""
+        return sorted((each.pair for each in self.spaces.values()), key=lambda pair: abs(pair.p - p))[:NEIGHBOURS]
 
     def solution(self, p: float, tolerance: Tolerance | None = None) -> Solution:
         """The principal eigenpair at p and its error, which no even moment contradicts. Raises `NotConverged`."""
@@ -186,22 +213,12 @@ class Elements(Method):
             finer = self.pair_on(fine, p, pair)
             return Solution(pair, measured=(abs(finer.value - pair.value),))
         if abs(p) < SMALL_P:
-            near = self.near_zero(p, tolerance).pair
-            at_zero = pair_at_zero(near) if p == 0 else None
-            return Solution(at_zero) if at_zero else self._solved_with(near.generator, p)
+            return self._solved_with(self.near_zero(p, tolerance).pair.generator, p)
         search = Search(p, lambda found: tolerance(p, found.value), self.settings.budget, self.spends)
-        known = self._try_nearest_p(search, tolerance)
-        if known and self.is_accurate(known, tolerance) and not self._other_places(known):
-            return self._confirmed(search, known, tolerance)
-        found = [] if known is None else [search.settle(self._after(known, tolerance), known.pair)]
-        for start in self.places(p, found):
-            found.append(search.settle(start))
+        found = list[Solution]()
+        for place in self.places(p, tolerance, found):
+            found.append(search.settle(*place))
         return self._confirmed(search, max(found, key=lambda each: each.pair.value), tolerance)
-
-    def _after(self, known: Solution, tolerance: Tolerance) -> Start:
-        """The place of a solution, with a space that should be within the tolerance."""
-        start: Start = known.start or Start(self.problem, known.pair.generator.chosen)
-        return start.refined(known, tolerance(known.pair.p, known.pair.value), 0, self.settings.budget.most(start))
 
     def _confirmed(self, search: Search, found: Solution, tolerance: Tolerance) -> Solution:
         """A solution that agrees with that of halved cells of φ within its error, or within what is allowed.
@@ -227,25 +244,9 @@ class Elements(Method):
             return replace(finer, search=finer.search + change)
         return self._confirmed(search, finer, tolerance)
 
-    def _try_nearest_p(self, search: Search, tolerance: Tolerance) -> Solution | None:
-        """The solution with what was chosen for the nearest p, where that is likely to do."""
-        p = search.p
-        nearest = min(self.spaces, key=lambda q: abs(q - p), default=None)
-        if nearest is None:
-            return None
-        known = self.spaces[nearest]
-        generator, chosen = known.pair.generator, self._coarsened(known, tolerance)
-        is_same = chosen is generator.chosen
-        if nearest == p and is_same:
-            return known
-        if not self._may_reuse(chosen, nearest, p):
-            return None
-        return search.attempt(lambda: self._solved_with(generator if is_same else Generator(self.problem, chosen), p))
-
     def _solved_with(self, generator: Generator, p: float) -> Solution:
         """The solution with a generator, from those around p, or from the nearest one."""
-        near = sorted((each.pair for each in self.spaces.values()), key=lambda pair: abs(pair.p - p))[:NEIGHBOURS]
-        return Solution(self.pair_on(generator, p, near))
+        return Solution(self.pair_on(generator, p, self._near(p)))
 
     def pair_on(self, generator: Generator, p: float, start: PrincipalPair | Sequence[PrincipalPair]) -> PrincipalPair:
         """The principal pair; where it is not found, the failure has the remedy of this place."""
@@ -306,24 +307,6 @@ class Elements(Method):
     def is_at_corner(self, p: float) -> bool:
         """Whether p is where Λ may have a corner."""
         return abs(p + 1) <= AT_CORNER
-
-    def _other_places(self, solution: Solution) -> Sequence[float]:
-        """Where other places may carry the moment, too."""
-        return other_centers(solution.pair)
-
-    def _coarsened(self, solution: Solution, tolerance: Tolerance) -> Space:
-        """The discretisation of a solution, or a much smaller one that would do."""
-        pair, generator = solution.pair, solution.pair.generator
-        if abs(pair.p) < SMALL_P or generator.size <= WORTH_A_TRY:
-            return generator.chosen
-        smaller = refined(solution, tolerance(pair.p, pair.value), 0)
-        return smaller if smaller.size <= TRIM * generator.size else generator.chosen
-
-    def _may_reuse(self, chosen: Space, q: float, p: float) -> bool:
-        """Whether what serves q is likely to serve p, or so small that it is worth a try."""
-        if chosen.size > WORTH_A_TRY and abs(p - q) > max(0.5, 0.4 * min(abs(p), abs(q))):
-            return False
-        return self._tilt_fits(chosen, p)
 
     def _tilt_fits(self, chosen: Space, p: float) -> bool:
         """Whether the tilt of a space is about that at p."""
@@ -422,21 +405,22 @@ class Elements(Method):
             wider = self.pair_among(widened(pair.generator), pair)
             change = abs(wider.derivative - pair.derivative)
             if self.is_given:
-                return pair.derivative, change * WIDER / (WIDER - 1) + slope_error(pair)
+                return pair.derivative, change * WIDER / (WIDER - 1) + self._lacked(pair)
             pair = wider
-        return pair.derivative, change / (WIDER - 1) + slope_error(pair)
+        return pair.derivative, change / (WIDER - 1) + self._lacked(pair)
+
+    def _lacked(self, pair: PrincipalPair) -> float:
+        """Estimate of |error of Λ′| on the interval of a noise: twice what a finer discretisation changes."""
+        finer = self.pair_among(pair.generator.chosen.enriched(), pair)
+        return 2 * abs(finer.derivative - pair.derivative) + slope_rounding(pair)
 
     def slope_error(self, p: float) -> float:
-        """It is from the highest modes, see `error.slope_error`; where these do not tell, twice what a finer
-        discretisation changes, or what has changed since a coarser one of the same place.
-        """
+        """Twice what a finer discretisation changes, or what has changed since a coarser one of the same place."""
         if abs(p) < TINIEST_P:
             return self.ratio_alone(0.0)[1]
         solution = self.solution(p)
         with one_thread():
             jump = self._jump() if self.is_at_corner(p) else 0.0
-            if solution.measured is None:
-                return slope_error(solution.pair) + jump
             coarser = [each.pair for each in getattr(solution.start, "before", ())]
             other = coarser[-1] if coarser else self.finer_pair(solution.pair)
             return 2 * abs(other.derivative - solution.derivative) + slope_rounding(solution.pair) + jump
@@ -495,26 +479,25 @@ class Directions(Elements):
     def takes(cls, problem: Problem) -> bool:
         return problem.dimension > 2
 
-    def places(self, p: float, found: Sequence[Solution]) -> Iterator[Start]:
+    def places(self, p: float, tolerance: Tolerance, found: Sequence[Solution]) -> Iterator[Place]:
+        """One: that of the nearest p; where it is p itself, a finer one than before."""
+        if p in self.spaces:
+            known = self.spaces[p]
+            most = self.settings.budget.most(known.start)
+            yield Place(known.start.refined(known, tolerance(p, known.value), 0, most), known.pair)
+        else:
+            yield Place(self.start(p))
+
+    def start(self, p: float) -> Stage:
+        """The first functions of directions."""
         from fpsolve.exponent.modes import sphere_start  # with scikit-fem, which takes long to import
 
-        if not found:
-            yield sphere_start(self.problem, p, self.settings.rtol, self.spaces)
+        return sphere_start(self.problem, p, self.settings.rtol, self.spaces)
 
     def is_dear(self, p: float) -> bool:
         return p <= 0 or p % 2 != 0
 
     def is_at_corner(self, p: float) -> bool:
-        return False
-
-    def _other_places(self, solution: Solution) -> Sequence[float]:
-        return ()
-
-    def _coarsened(self, solution: Solution, tolerance: Tolerance) -> Space:
-        return solution.pair.generator.chosen
-
-    def _may_reuse(self, chosen: Space, q: float, p: float) -> bool:
-        """Every p has waves of its own."""
         return False
 
     def number(self, p: float) -> EvenMoment | None:
@@ -536,11 +519,10 @@ class Stopped(Directions):
     def takes(cls, problem: Problem) -> bool:
         return super().takes(problem) and problem.system.stop is not None
 
-    def places(self, p: float, found: Sequence[Solution]) -> Iterator[Start]:
+    def start(self, p: float) -> Stage:
         from fpsolve.exponent.stopped import stop_start
 
-        if not found:
-            yield stop_start(self.problem, p, self.settings.rtol, self.spaces)
+        return stop_start(self.problem, p, self.settings.rtol, self.spaces)
 
     def line_rtol(self, p: float) -> float:
         return 3e-3

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 from html import escape
@@ -21,8 +21,8 @@ import numpy as np
 from fpsolve.arrays import FloatArray
 from fpsolve.data import Quantity, Result, brief, dataset
 from fpsolve.errors import NotConverged
-from fpsolve.exponent.eigen import PairDerivatives, PrincipalPair, slope_rounding
-from fpsolve.fem.axis import KroneckerSum, along
+from fpsolve.exponent.eigen import PrincipalPair
+from fpsolve.fem.axis import along
 from fpsolve.fem.effects import ModeEffects
 from fpsolve.fem.space import Space
 from fpsolve.messages import Code, Message, Remedy
@@ -272,44 +272,18 @@ def ladders(space: Space) -> Iterator[Ladder | None]:
         yield Ladder(at, axis.cells, axis.modes, degrees, nested)
 
 
-def smoother_first(pair: PrincipalPair) -> tuple[FloatArray, FloatArray, KroneckerSum]:
-    """T, T* and L − Λ; for p < −1 T*, T and the adjoint: whichever of both is the smoother one comes first.
+def mode_effects(pair: PrincipalPair) -> tuple[ModeEffects | None, ...]:
+    """The effects ⟨Q T*, (L − Λ) Q T⟩/⟨T*, T⟩ of the highest modes along every axis; None along one without cells.
 
-    T for p and T* for −2 − p solve the same equation but for the direction of time: that of the paths for p < −1 has
-    layers where the paths for p > −1 leave.
+    L − Λ is applied to the smoother function of both. T for p and T* for −2 − p solve the same equation but for the
+    direction of time: that of the paths for p < −1 has layers where the paths for p > −1 leave.
     """
     operator = pair.generator.at(pair.p).matrix.shifted(pair.eigenvalue)
-    return (pair.left, pair.right, operator.T) if pair.p < -1 else (pair.right, pair.left, operator)
-
-
-def mode_effects(pair: PrincipalPair) -> tuple[ModeEffects | None, ...]:
-    """The effects along every axis; None along one without cells, as of states."""
-    smooth, rough, operator = smoother_first(pair)
-    return effects_on(pair, [(smooth, rough, operator)])
-
-
-def slope_error(pair: PrincipalPair) -> float:
-    """Estimate of |error of Λ′(p)|, from the derivatives by p of the effects of the highest modes.
-
-    These are the effects on ⟨T*, LT⟩ of T′ beside T*, of T beside T*′, and of both beside L′. A space that has T to the
-    last digit, as for even p, may lack T* and T′.
-    """
-    smooth, rough, operator = smoother_first(pair)
-    around, slope = PairDerivatives(pair), pair.generator.matrix(pair.p, derivative=1).shifted(pair.derivative)
-    by_p, slope = (
-        ((around.adjoint_by_p, around.by_p), slope.T) if pair.p < -1 else ((around.by_p, around.adjoint_by_p), slope)
-    )
-    found = effects_on(pair, [(by_p[0], rough, operator), (smooth, by_p[1], operator), (smooth, rough, slope)])
-    return sum(each.error for each in found if each) + slope_rounding(pair)
-
-
-def effects_on(
-    pair: PrincipalPair, products: Sequence[tuple[FloatArray, FloatArray, KroneckerSum]]
-) -> tuple[ModeEffects | None, ...]:
-    """Those of the highest modes on the sum of some ⟨rough, operator smooth⟩ over ⟨T*, T⟩."""
+    smooth, rough = pair.right, pair.left
+    if pair.p < -1:
+        smooth, rough, operator = rough, smooth, operator.T
     space, found = pair.space, list[ModeEffects | None]()
     norm = abs(float(pair.left @ space.weighed(pair.right)))
-    tables = [(space.table(smooth), space.table(rough), operator) for smooth, rough, operator in products]
     for ladder in ladders(space):
         if ladder is None:
             found.append(None)
@@ -318,11 +292,9 @@ def effects_on(
         masks = (ladder.cells >= 0) & (height == np.arange(DEPTH)[:, None])
         kept = np.stack([ladder.along(mask) for mask in masks])
         others = tuple(1 + k for k in range(len(space.axes)) if k != ladder.at)
-        shares: Any = 0.0
-        for smooth, rough, operator in tables:
-            first, last = (along(ladder.nested, table) for table in (smooth, rough))
-            parts = last * np.cumsum(operator.images(first * kept), axis=0)
-            shares = shares + np.abs(parts).sum(axis=others) * np.cumsum(masks, axis=0)
+        first, last = (along(ladder.nested, space.table(each)) for each in (smooth, rough))
+        parts = last * np.cumsum(operator.images(first * kept), axis=0)
+        shares = np.abs(parts).sum(axis=others) * np.cumsum(masks, axis=0)
         inside = np.flatnonzero(ladder.cells >= 0)
         effects = [np.bincount(ladder.cells[inside], each[inside], ladder.degrees.size) / norm for each in shares]
         highest = np.maximum.accumulate(effects)  # in those of more modes, parts of these may cancel

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -54,11 +55,6 @@ class Start:
     space: Space
 
     @property
-    def generator(self) -> Generator:
-        """L(p) on the space."""
-        return Generator(self.problem, self.space)
-
-    @property
     def size(self) -> int:
         return self.space.size
 
@@ -66,9 +62,11 @@ class Start:
     def most_unknowns(self) -> int:
         return self.space.most_unknowns
 
-    def solved(self, p: float, near: PrincipalPair | None) -> PrincipalPair:
-        """The principal pair on the space, from one of a space before, or none. Raises as `principal_pair`."""
-        return principal_pair(self.generator, p, start=near)
+    def solved(self, p: float, near: Any) -> PrincipalPair:
+        """The principal pair on the space, from that of a space before, or pairs of other p. As `principal_pair`."""
+        pairs = near if isinstance(near, Sequence) else [near] if near else []
+        known = (pair.generator for pair in pairs if pair.generator.chosen is self.space)
+        return principal_pair(next(known, None) or Generator(self.problem, self.space), p, start=pairs)
 
     def judged(self, pair: PrincipalPair, allowed: float) -> Solution:
         """The pair with its error by its highest modes."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -25,8 +25,7 @@ if TYPE_CHECKING:
     from fpsolve.fem.sphere import SphereTerms
 
 SMALL_P = 1e-2
-"""For smaller |p| the discretisation is chosen at this one, as Λ and its error go to zero together; its factors
-are kept for p = 0."""
+"""For smaller |p| the discretisation is chosen at this one, as Λ and its error go to zero together."""
 KEPT_SPACES = 40
 """Number of spaces, of the last p, whose matrices are kept."""
 LANCZOS_STEPS = 16
@@ -45,16 +44,12 @@ class Pencil:
         space: the trial and test functions.
         matrix: that of L(p), its first term with the matrices of noise that `space.mass` has.
         chain: the axis of noise along which L(p) is eliminated; None where there is none.
-        keeps_factors: whether the last factors are kept when a pair is found, for its derivatives.
-        kept: the shift and the factors of the last one.
     """
 
     p: float
     space: Space
     matrix: KroneckerSum
     chain: int | None
-    keeps_factors: bool = False
-    kept: list[tuple[float, Factors]] = field(init=False, default_factory=list)
 
     def on(self, axis: int, kept: Mask) -> Pencil:
         """What it is on some functions of an axis, where a mask is true."""
@@ -82,10 +77,7 @@ class Pencil:
 
     def factorised(self, shift: float) -> Factors:
         """LU factors of L(p) − σM."""
-        self.kept.clear()
-        found = factorised(self.matrix.shifted(shift), self.chain)
-        self.kept.append((shift, found))
-        return found
+        return factorised(self.matrix.shifted(shift), self.chain)
 
 
 class Generator:
@@ -133,7 +125,7 @@ class Generator:
         """What is solved at p; the last one is kept."""
         if self._last is None or self._last.p != p:
             space = self.space(p)
-            self._last = Pencil(p, space, self.matrix(p), space.chain, keeps_factors=abs(p) == SMALL_P)
+            self._last = Pencil(p, space, self.matrix(p), space.chain)
         return self._last
 
     def forget(self) -> None:
