@@ -1,73 +1,17 @@
-"""Orthonormal polynomials and rules of quadrature: of Legendre on the cell [0, 1], and of any weight.
+"""Orthonormal polynomials of any weight and their rules of quadrature.
 
-Those of a weight follow from their three-term recurrence b_(k+1) P_(k+1) = (x − a_k) P_k − b_k P_(k−1).
+They follow from their three-term recurrence b_(k+1) P_(k+1) = (x − a_k) P_k − b_k P_(k−1).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import NamedTuple
 
 import numpy as np
-from numpy.polynomial.legendre import leggauss, legval, legvander
 from scipy.linalg import eigh_tridiagonal
 
 from fpsolve.arrays import FloatArray, finite
-
-EXTRA_POINTS = 12
-"""Quadrature points beyond what the product of two functions needs: for sin 2φ, cos 2φ and P_s."""
-
-
-class Rule(NamedTuple):
-    """A quadrature rule on [0, 1]."""
-
-    points: FloatArray
-    weights: FloatArray
-
-
-class Orthonormal(NamedTuple):
-    """The polynomials up to some degree at the points of a rule and at both ends.
-
-    Attributes:
-        rule: of n points.
-        products: values of all pairs of functions, shape (n, (degree + 1)²), the first function slowest.
-        convections: values of a function times the slope of another, in the same order.
-        stiffnesses: slopes of all pairs of functions, in the same order.
-        ends, end_slopes: values and slopes at 0 and at 1, shape (2, degree + 1).
-    """
-
-    rule: Rule
-    products: FloatArray
-    convections: FloatArray
-    stiffnesses: FloatArray
-    ends: FloatArray
-    end_slopes: FloatArray
-
-
-@lru_cache(maxsize=64)
-def gauss_legendre(count: int) -> Rule:
-    """The Gauss-Legendre rule of so many points."""
-    x, w = leggauss(count)
-    return Rule(0.5 * (1 + x), 0.5 * w)
-
-
-def legendre(x: FloatArray, degree: int) -> FloatArray:
-    """Values at points of [0, 1], shape (len(x), degree + 1)."""
-    return np.asarray(legvander(2 * x - 1, degree) * np.sqrt(2 * np.arange(degree + 1) + 1), dtype=float)
-
-
-@lru_cache(maxsize=64)
-def orthonormal(degree: int) -> Orthonormal:
-    """The polynomials up to a degree, 1 at least."""
-    rule = gauss_legendre(degree + EXTRA_POINTS)
-    values, sizes = legendre(rule.points, degree), np.sqrt(2 * np.arange(degree + 1) + 1)
-    derivatives = np.polynomial.legendre.legder(np.eye(degree + 1))
-    slopes, end_slopes = (2 * sizes * legval(2 * x - 1, derivatives).T for x in (rule.points, np.array([0.0, 1.0])))
-    ends = legendre(np.array([0.0, 1.0]), degree)
-    factors = (values, values), (values, slopes), (slopes, slopes)
-    pairs = [(first[:, :, None] * last[:, None, :]).reshape(len(values), -1) for first, last in factors]
-    return Orthonormal(rule, pairs[0], pairs[1], pairs[2], ends, end_slopes)
 
 
 @dataclass(frozen=True, eq=False)

@@ -65,6 +65,10 @@ NEAR_ENOUGH = 1e-3
 """Change of the value, over its distance from the shift, at which a search from the right ends."""
 NEIGHBOURS = 6
 """Eigenvalues nearest to a shift among which the real one is looked for."""
+SUBSPACES = 24, 48, 96
+"""Dimensions of the Krylov space of the Arnoldi iteration, each tried where a smaller one finds no eigenvalue."""
+RESTARTS = 20
+"""Number of restarts of an Arnoldi iteration: far from eigenvalues that are close to each other more do not help."""
 STEPS_PER_FACTOR = 5
 """Number of steps of an iteration with the same LU factors."""
 SLOW = 1e-2
@@ -319,14 +323,19 @@ def _nearest(
     operator = LinearOperator((start.size, start.size), matvec=resolvent, dtype=float)
     count = min(NEIGHBOURS, start.size - 2)
     mixed = start + 1e-8 * np.linalg.norm(start) * np.sin(np.arange(start.size))  # beyond spaces that L keeps to itself
-    try:
-        inverses, vectors = eigs(operator, k=count, v0=mixed, ncv=min(4 * count, start.size), tol=1e-3, maxiter=200)
-    except ArpackNoConvergence as failure:
-        inverses, vectors = failure.eigenvalues, failure.eigenvectors
-        if not inverses.size:
-            raise NotConverged(Message(Code.NO_ARNOLDI, p=p), remedy=Remedy.DEGREES) from failure
-    except ArpackError as failure:
-        raise SingularMatrix(*failure.args) from failure
+    for dimension in SUBSPACES:
+        try:
+            inverses, vectors = eigs(
+                operator, k=count, v0=mixed, ncv=min(dimension, start.size), tol=1e-3, maxiter=RESTARTS
+            )
+        except ArpackNoConvergence as failure:
+            inverses, vectors = failure.eigenvalues, failure.eigenvectors
+        except ArpackError as failure:
+            raise SingularMatrix(*failure.args) from failure
+        if inverses.size:
+            break
+    else:
+        raise NotConverged(Message(Code.NO_ARNOLDI, p=p), remedy=Remedy.DEGREES)
     found = shift - 1 / inverses
     is_real = np.abs(inverses.imag) <= 1e-6 * np.abs(inverses)
     is_real |= not np.any(is_real)  # the mesh does not resolve the problem, as what is found will tell

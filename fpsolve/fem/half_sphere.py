@@ -27,13 +27,13 @@ from scipy.sparse.linalg import LinearOperator
 
 from fpsolve.arrays import FloatArray, IntArray, Matrix, one
 from fpsolve.fem.axis import along
+from fpsolve.fem.element import gauss_legendre
 from fpsolve.fem.line import LineSpace
 from fpsolve.fem.mesh import halved
 from fpsolve.fem.sphere import MOST_DEGREE, PENALTY, DirectionAxis, Group, SphereTerms, assembled, group, waves_at
 from fpsolve.fem.terms import OfMoment, Term
 from fpsolve.model.plane import is_driven
 from fpsolve.model.problem import ParameterDerivative
-from fpsolve.polynomials import gauss_legendre
 
 MORE_POINTS = 12
 """Number of Gauss points between two lines, or what an impact takes to these, beyond the degree."""

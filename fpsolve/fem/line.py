@@ -8,17 +8,15 @@ constants lie in the vertex functions alone, and the mass matrix is well conditi
 from __future__ import annotations
 
 from functools import cached_property, lru_cache
-from typing import Any
 
 import numpy as np
-import skfem
 from scipy.sparse import csr_matrix, identity
 from scipy.special import beta, roots_jacobi
 
 from fpsolve.arrays import Coefficient, FloatArray, IntArray, Mask, one
 from fpsolve.errors import MeshError
+from fpsolve.fem.element import EXTRA_POINTS, Rule, element, functions, gauss_legendre, numbered
 from fpsolve.messages import Code, Message
-from fpsolve.polynomials import EXTRA_POINTS, Rule, gauss_legendre
 
 
 @lru_cache(maxsize=512)
@@ -48,7 +46,6 @@ class LineSpace:
         points: points of the quadrature rules, increasing, shape (n,).
         measure: their weights times w, shape (n,).
         cells: for each unknown the cell that it belongs to, -1 for one shared by two, shape (size,).
-        first_cells: for each unknown the first cell that it belongs to, shape (size,).
         modes: for each unknown the degree of its polynomial, 1 for vertex functions, shape (size,).
         ends: the two unknowns whose functions do not vanish at the ends.
 
@@ -67,17 +64,14 @@ class LineSpace:
     ) -> None:
         self.lines, self._sizes, degrees = lines, np.diff(lines), np.broadcast_to(degree, lines.size - 1)
         self.degree = degree = int(np.max(degrees))
-        dofs = skfem.Dofs(skfem.MeshLine(lines), _element(degree))
-        numbers, cells, modes = dofs.element_dofs.T, np.full(int(dofs.N), -2), np.ones(int(dofs.N), dtype=int)
-        for j, own in enumerate(numbers):  # in each cell skfem numbers two vertex functions, then bubbles by degree
-            cells[own] = np.where(cells[own] == -2, j, -1)
-            modes[own[2:]] = np.arange(2, own.size)
-        kept = (modes == 1) | (modes <= degrees[cells])
-        self.cells, self.modes, self.size = cells[kept], modes[kept], int(np.count_nonzero(kept))
-        self._own = kept[numbers]  # those that there are not are zero, and go by the number 0
-        self._dofs = np.where(self._own, (np.cumsum(kept) - 1)[numbers], 0)
-        self.first_cells = np.full(self.size, lines.size)
-        np.minimum.at(self.first_cells, self._dofs, np.arange(lines.size - 1)[:, None])
+        self._own, self._dofs = numbered(lines, degrees, element(degree))  # in each cell two of vertices, then bubbles
+        cell, function = np.nonzero(self._own)
+        number = self._dofs[self._own]
+        shared = np.bincount(number) > 1
+        self.size = shared.size
+        self.modes, self.cells = np.ones(self.size, dtype=int), np.zeros(self.size, dtype=int)
+        self.modes[number], self.cells[number] = np.maximum(function, 1), cell
+        self.cells[shared] = -1
         self.ends = self._dofs[[0, -1], [0, 1]]
         count, (left, right), last = degree + EXTRA_POINTS, end_exponents, lines.size - 2
         rules = [_gauss_rule(count, left * (j == 0), right * (j == last)) for j in range(last + 1)]
@@ -85,7 +79,7 @@ class LineSpace:
         weights = np.stack([rule.weights for rule in rules]) * self._sizes[:, None]
         self.points = points.ravel()
         self._measure = weights * weight(points)
-        tables = [_reference(degree, rule.points.tobytes()) for rule in rules]
+        tables = [functions(degree, rule.points.tobytes()) for rule in rules]
         values = np.stack([table[0] for table in tables])
         slopes = np.stack([table[1] for table in tables]) / self._sizes[:, None, None]
         self._transform, shares = _orthogonalised(slopes, self._measure, self._own[:, 2:])
@@ -128,7 +122,7 @@ class LineSpace:
 
     def _slopes_at_ends(self) -> FloatArray:
         """Slopes of the functions of each cell at both of its ends, shape (m, 2, k + 1)."""
-        _, slopes = _reference(self.degree, np.array([0.0, 1.0]).tobytes())
+        _, slopes = functions(self.degree, np.array([0.0, 1.0]).tobytes())
         return np.asarray((slopes / self._sizes[:, None, None]) @ self._transform)
 
     def constant(self) -> FloatArray:
@@ -170,7 +164,7 @@ class LineSpace:
         """
         cell = np.clip(np.searchsorted(self.lines, x, side="right") - 1, 0, self.lines.size - 2)
         local = np.clip((x - self.lines[cell]) / self._sizes[cell], 0, 1)
-        table = _reference(self.degree, local.tobytes())[derivative] / self._sizes[cell, None] ** derivative
+        table = functions(self.degree, local.tobytes())[derivative] / self._sizes[cell, None] ** derivative
         values = table[:, None, :] @ self._transform[cell]
         rows = np.repeat(np.arange(x.size), self.degree + 1)
         return csr_matrix((values.ravel(), (rows, self._dofs[cell].ravel())), shape=(x.size, self.size))
@@ -209,19 +203,3 @@ def _orthogonalised(slopes: FloatArray, measure: FloatArray, kept: Mask) -> tupl
     shares = np.where(kept[:, :, None], -q.transpose(0, 2, 1) @ slopes[:, :, :2], 0.0)
     transform[:, 2:, :2] = inverse @ shares
     return transform, shares
-
-
-def _element(degree: int) -> Any:
-    """Hierarchical (integrated Legendre) element."""
-    fixed = {1: skfem.ElementLineP1, 2: skfem.ElementLineP2}
-    return fixed[degree]() if degree in fixed else skfem.ElementLinePp(degree)
-
-
-@lru_cache(maxsize=512)
-def _reference(degree: int, points: bytes) -> tuple[FloatArray, FloatArray]:
-    """Values and slopes of the elements' own functions on the cell [0, 1] at some points, shape (n, degree + 1)."""
-    x = np.frombuffer(points)
-    basis = skfem.CellBasis(skfem.MeshLine([0.0, 1.0]), _element(degree), quadrature=(x[None], np.zeros_like(x)))
-    functions = [function[0] for function in basis.basis]
-    values = np.stack([np.ravel(np.asarray(function)) for function in functions], axis=-1)
-    return values, np.stack([np.ravel(function.grad[0]) for function in functions], axis=-1)

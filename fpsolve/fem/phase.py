@@ -8,12 +8,13 @@ from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
+import skfem
 from scipy.sparse import csr_matrix, diags, issparse
 
 from fpsolve.arrays import FloatArray, IntArray, Mask, Matrix, one
 from fpsolve.fem.axis import MAX_DENSE_UNKNOWNS, DividedAxis
+from fpsolve.fem.element import Orthonormal, element, gauss_legendre, numbered, orthonormal
 from fpsolve.model.plane import CoefficientMatrix, Harmonics, Impulse, changed_exponential
-from fpsolve.polynomials import Orthonormal, gauss_legendre, legendre, orthonormal
 
 PENALTY = 2.0
 """Factor η·size/(degree + 1)² of the interior penalty method."""
@@ -63,9 +64,17 @@ class PhaseAxis(DividedAxis):
         return orthonormal(int(self.degrees.max()))
 
     @cached_property
+    def _numbers(self) -> tuple[Mask, IntArray]:
+        """Which modes each cell has, and their numbers, shapes (m, largest degree + 1)."""
+        return numbered(self.lines, self.degrees, skfem.ElementDG(element(int(self.degrees.max()))))
+
+    @property
     def _kept(self) -> Mask:
-        """Which modes each cell has, shape (m, largest degree + 1)."""
-        return np.arange(self.degrees.max() + 1) <= self.degrees[:, None]
+        return self._numbers[0]
+
+    @property
+    def _number(self) -> IntArray:
+        return self._numbers[1]
 
     @cached_property
     def cells(self) -> IntArray:
@@ -74,10 +83,6 @@ class PhaseAxis(DividedAxis):
     @cached_property
     def modes(self) -> IntArray:
         return np.nonzero(self._kept)[1]
-
-    @cached_property
-    def _number(self) -> IntArray:
-        return np.cumsum(self._kept).reshape(self._kept.shape) - 1
 
     @cached_property
     def _pairs(self) -> Mask:
@@ -243,8 +248,7 @@ class PhaseAxis(DividedAxis):
         where = np.searchsorted(self.lines, phi if inside is None else inside, side="right") - 1
         cell = np.clip(where, 0, self._sizes.size - 1)
         local = np.clip((phi - self.lines[cell]) / self._sizes[cell], 0, 1)
-        values = legendre(local, int(self.degrees.max())) / np.sqrt(self._sizes[cell])[:, None]
-        kept = np.arange(values.shape[1]) <= self.degrees[cell, None]
+        values, kept = self._table.at(local) / np.sqrt(self._sizes[cell])[:, None], self._kept[cell]
         return self._matrix(values[kept], np.nonzero(kept)[0], self._number[cell][kept], (phi.size, self.size))
 
     def finer_rule(self, parts: int) -> tuple[FloatArray, FloatArray]:
