@@ -146,49 +146,61 @@ def principal_pair(
     pairs, pencil = [start] if isinstance(start, PrincipalPair) else start or [], generator.at(p)
     if not pencil.matrix.norm < LARGEST_NORM:
         raise NumericalFailure(f"L(p) has the size {pencil.matrix.norm:.0e}")
-    has_others, has_states = _has_other_positive(generator, p), _has_states(generator.problem)
-    tangents, found = _tangents(generator.problem, p, pairs), list[PrincipalPair]()
-    is_known = p == 0 and generator.keeps_constants  # Λ(0) = 0, T = 1
-
-    def solved(x: FloatArray, y: FloatArray) -> PrincipalPair:
-        pair = _pair(generator, pencil, rayleigh_iteration(pencil, x, y, generator.problem.unit_rate))
-        if pair.residual <= BACKWARD_ERROR_LIMIT:
-            found.append(pair)
-        return pair
-
-    def from_a_start() -> PrincipalPair | None:
+    pair = None
+    if pairs or _is_constant(generator, p) or not _has_other_positive(generator, p):
         x = y = pencil.space.constant  # of weak noise, Eqs. (26) and (28)
         if pairs:
             x, y = _carried(pairs, pencil, generator)
-        pair = solved(x, y)
-        goes_on = bool(pairs) and _share(pencil.space, pair, x, y) > MOSTLY
-        is_told = goes_on or not has_others or is_known or math.isfinite(tangents)
-        most = POSITIVE if goes_on else SURELY_POSITIVE
-        is_right = is_told and pair.value >= tangents and min(pair.sign_defects) <= most
-        return pair if is_right and pair.residual <= BACKWARD_ERROR_LIMIT else None
+        pair = _solved(pencil, generator, x, y)
+        if _is_principal(pair, pairs, goes_on=bool(pairs) and _share(pencil.space, pair, x, y) > MOSTLY):
+            return pair
+    return _rightmost_pair(pencil, generator, pair)
 
-    def from_the_right() -> PrincipalPair:
-        right, left, value, distance = _from_the_right(pencil, generator)
-        pair = solved(right, left)
-        defect = min(pair.sign_defects)
-        if not (pair.residual <= BACKWARD_ERROR_LIMIT and defect <= POSITIVE and abs(pair.value - value) < distance):
-            limits = {"limit": BACKWARD_ERROR_LIMIT, "most": POSITIVE}
-            told = Message(Code.NO_EIGENVALUE, p=p, residual=pair.residual, size=defect, **limits)
-            raise NotConverged(told, pair, Remedy.BOTH_AXES)
-        return pair
 
-    pair = None
-    if pairs or is_known or not has_others:
-        pair = from_a_start()
-    if pair is None or (has_states and not is_known and not _is_rightmost(pair, pencil.space)):
-        pair = from_the_right()
-        others = [each.value for each in found]
-        if has_states and generator.size <= SURVEYED_UNKNOWNS:
-            others.append(float(spectrum(generator, p, 1)[0].real))
-        rightmost = max(others)
-        if has_others and rightmost - pair.value > 1e-6 * max(abs(rightmost), generator.problem.unit_rate):
-            told = Message(Code.LARGER_EIGENVALUE, p=p, rightmost=rightmost, value=pair.value)
-            raise NotConverged(told, pair, Remedy.PHASE)
+def _solved(pencil: Pencil, generator: Generator, x: FloatArray, y: FloatArray) -> PrincipalPair:
+    """The pair that the iteration reaches from vectors T and T*."""
+    return _pair(generator, pencil, rayleigh_iteration(pencil, x, y, generator.problem.unit_rate))
+
+
+def _is_constant(generator: Generator, p: float) -> bool:
+    """Whether Λ(p) = 0 and T = 1 are known."""
+    return p == 0 and generator.keeps_constants
+
+
+def _is_principal(pair: PrincipalPair, pairs: Sequence[PrincipalPair], goes_on: bool) -> bool:
+    """Whether a pair that was reached from others, or from T = 1, is the principal one.
+
+    Where other pairs may seem positive, too, it must go on from the others, or reach the tangent of Λ at their p.
+    """
+    generator, tangent = pair.generator, _tangents(pair.generator.problem, pair.p, pairs)
+    most = POSITIVE if goes_on else SURELY_POSITIVE
+    if pair.residual > BACKWARD_ERROR_LIMIT or pair.value < tangent or min(pair.sign_defects) > most:
+        return False
+    if _is_constant(generator, pair.p):
+        return True
+    if not goes_on and math.isinf(tangent) and _has_other_positive(generator, pair.p):
+        return False
+    return not _has_states(generator.problem) or _is_rightmost(pair, pair.space)
+
+
+def _rightmost_pair(pencil: Pencil, generator: Generator, reached: PrincipalPair | None) -> PrincipalPair:
+    """The pair that is found from the right, of which no eigenvalue lies further to the right, nor that of a pair that
+    was reached before. Raises `NotConverged`."""
+    p, problem = pencil.p, generator.problem
+    right, left, value, distance = _from_the_right(pencil, generator)
+    pair = _solved(pencil, generator, right, left)
+    defect = min(pair.sign_defects)
+    if not (pair.residual <= BACKWARD_ERROR_LIMIT and defect <= POSITIVE and abs(pair.value - value) < distance):
+        limits = {"limit": BACKWARD_ERROR_LIMIT, "most": POSITIVE}
+        told = Message(Code.NO_EIGENVALUE, p=p, residual=pair.residual, size=defect, **limits)
+        raise NotConverged(told, pair, Remedy.BOTH_AXES)
+    others = [reached.value] if reached and reached.residual <= BACKWARD_ERROR_LIMIT else []
+    if _has_states(problem) and generator.size <= SURVEYED_UNKNOWNS:
+        others.append(float(spectrum(generator, p, 1)[0].real))
+    rightmost = max(others, default=-math.inf)
+    if _has_other_positive(generator, p) and rightmost - pair.value > 1e-6 * max(abs(rightmost), problem.unit_rate):
+        told = Message(Code.LARGER_EIGENVALUE, p=p, rightmost=rightmost, value=pair.value)
+        raise NotConverged(told, pair, Remedy.PHASE)
     return pair
 
 
