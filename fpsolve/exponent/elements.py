@@ -98,20 +98,17 @@ class Elements(Method):
 
     Attributes:
         spaces: what was solved, by p.
-        spends: what to do where a budget does not suffice.
-        remedy: what to do where it is not resolved.
+        remedy: what to do where it is not resolved, or a budget does not suffice.
     """
 
     is_function = True
-    spends: Remedy = Remedy.BUDGET
+    remedy: Remedy = Remedy.BUDGET
 
     def __init__(self, *args: Any) -> None:
         super().__init__(*args)
         self._even = dict[float, EvenMoment | None]()
         self.spaces: dict[float, Solution] = {}
         self._failed = dict[float, tuple[type[NotConverged], Message]]()
-        self.is_given = self.settings.mesh is not None
-        self.remedy = Remedy.MESH if self.is_given else self.spends
 
     @classmethod
     def takes(cls, problem: Problem) -> bool:
@@ -130,7 +127,7 @@ class Elements(Method):
 
     @property
     def goes_on(self) -> bool:  # type: ignore[override]
-        return not self.is_given and not self.problem.noise.has_algebraic_tails
+        return not self.problem.noise.has_algebraic_tails
 
     def places(self, p: float, tolerance: Tolerance, found: Sequence[Solution]) -> Iterator[Place]:
         """The places where Λ(p) may be carried, in order, from what was found in those before.
@@ -183,7 +180,7 @@ class Elements(Method):
             kind, message = self._failed[p]
             raise kind(message)
         allowed = tolerance or self.tolerance
-        if p not in self.spaces or (not self.is_given and not self.is_accurate(self.spaces[p], allowed)):
+        if p not in self.spaces or not self.is_accurate(self.spaces[p], allowed):
             try:
                 with one_thread(), self.settings.meter.running():
                     self.spaces[p] = self._searched(p, allowed)
@@ -192,8 +189,6 @@ class Elements(Method):
                     self._failed[p] = type(failure), failure.message
                 raise failure from None
             except MeshError as failure:
-                if self.is_given:
-                    raise
                 told = Message(Code.NOT_CONVERGED, p=p, reason=failure.message, remedy=self.remedy)
                 raise NotConverged(told) from failure
             except (SingularMatrix, np.linalg.LinAlgError) as failure:
@@ -207,14 +202,9 @@ class Elements(Method):
 
     def _searched(self, p: float, tolerance: Tolerance) -> Solution:
         """A solution within the tolerance, or the one on the given mesh."""
-        if self.is_given:
-            coarse, fine = self.given
-            pair = self._solved_with(coarse, p).pair
-            finer = self.pair_on(fine, p, pair)
-            return Solution(pair, measured=(abs(finer.value - pair.value),))
         if abs(p) < SMALL_P:
             return self._solved_with(self.near_zero(p, tolerance).pair.generator, p)
-        search = Search(p, lambda found: tolerance(p, found.value), self.settings.budget, self.spends)
+        search = Search(p, lambda found: tolerance(p, found.value), self.settings.budget, self.remedy)
         found = list[Solution]()
         for place in self.places(p, tolerance, found):
             found.append(search.settle(*place))
@@ -268,10 +258,9 @@ class Elements(Method):
         Raises:
             NotConverged: it cannot be made, has a third more unknowns than the budget allows, or does not resolve it.
         """
-        limit = math.inf if self.is_given else A_THIRD_MORE * self.settings.budget.most(chosen)
         reason: Message | str
-        if chosen.size > limit:
-            reason = Message(Code.UNKNOWNS_SPENT, unknowns=chosen.size, most=self.settings.budget.most(chosen))
+        if chosen.size > A_THIRD_MORE * (most := self.most(chosen)):
+            reason = Message(Code.UNKNOWNS_SPENT, unknowns=chosen.size, most=most)
         else:
             try:
                 with one_thread(), self.settings.meter.running():
@@ -292,12 +281,9 @@ class Elements(Method):
             told = Message(Code.NEAR_ZERO, p=q, reason=failure.message)
             raise type(failure)(told, failure.partial) from failure
 
-    @cached_property
-    def given(self) -> tuple[Generator, Generator]:
-        """That of the given mesh, and one of four degrees more, whose error hardly counts beside it."""
-        assert self.settings.mesh is not None
-        generator = Generator(self.problem, self.settings.mesh)
-        return generator, generator.enriched().enriched()
+    def most(self, space: Space) -> float:
+        """Number of unknowns that a finer space may have."""
+        return self.settings.budget.most(space)
 
     def is_accurate(self, solution: Solution, tolerance: Tolerance) -> bool:
         """Whether an error is within a tolerance; for small p, where Λ has no scale, always."""
@@ -397,16 +383,12 @@ class Elements(Method):
         """λ from a pair at p = 0, on ever wider intervals of the noise, and what its modes and the ends leave.
 
         As the variance is finite, an interval twice as wide leaves less than half of λ that the noise makes beyond it.
-        On a given mesh it is that of the mesh.
         """
         ends = pair.space.xi.lines[[0, -1]]
         change = math.inf if np.any(pair.space.xi.weight(ends) * ends**2 > sys.float_info.epsilon) else 0.0
         while change > (WIDER - 1) * self.tolerance(SMALL_P, 0.0) / SMALL_P:
             wider = self.pair_among(widened(pair.generator), pair)
-            change = abs(wider.derivative - pair.derivative)
-            if self.is_given:
-                return pair.derivative, change * WIDER / (WIDER - 1) + self._lacked(pair)
-            pair = wider
+            change, pair = abs(wider.derivative - pair.derivative), wider
         return pair.derivative, change / (WIDER - 1) + self._lacked(pair)
 
     def _lacked(self, pair: PrincipalPair) -> float:
@@ -466,6 +448,44 @@ class Elements(Method):
         return np.array([each.slope.value for each in changed]) + more
 
 
+class GivenMesh(Elements):
+    """Λ(p) of two variables on a given mesh, with the error that a finer one tells."""
+
+    goes_on = False
+    remedy = Remedy.MESH
+
+    @cached_property
+    def generators(self) -> tuple[Generator, Generator]:
+        """That of the mesh, and one of four degrees more, whose error hardly counts beside it. Raises `MeshError`."""
+        assert self.settings.mesh is not None
+        generator = Generator(self.problem, self.settings.mesh)
+        return generator, generator.enriched().enriched()
+
+    def _found(self, p: float, tolerance: Tolerance | None = None) -> Solution:
+        _ = self.generators  # refuses a mesh that cannot be used
+        return super()._found(p, tolerance)
+
+    def _searched(self, p: float, tolerance: Tolerance) -> Solution:
+        pair, finer = self._solved_with(self.generators[0], p).pair, self.generators[1]
+        return Solution(pair, measured=(abs(self.pair_on(finer, p, pair).value - pair.value),))
+
+    def is_accurate(self, solution: Solution, tolerance: Tolerance) -> bool:
+        return True
+
+    def most(self, space: Space) -> float:
+        return math.inf
+
+    def _among_tails(self, pair: PrincipalPair) -> tuple[float, float]:
+        """λ, on the interval of the mesh, and what a wider one would change."""
+        change = abs(self.pair_among(widened(pair.generator), pair).derivative - pair.derivative)
+        return pair.derivative, change * WIDER / (WIDER - 1) + self._lacked(pair)
+
+    def doubts(self, pairs: Sequence[PrincipalPair]) -> tuple[Message, ...]:
+        """That slow noise may carry a moment elsewhere, where the mesh does not show it."""
+        elsewhere = ((pair.p, z) for pair in pairs for z in other_centers(pair))
+        return tuple(Message(Code.CARRIED_ELSEWHERE, p=p, z=z, remedy=Remedy.REACH) for p, z in elsewhere)[:1]
+
+
 class Directions(Elements):
     """Λ(p) of three and four variables; of even p it is that of the equations of the moments, where these close."""
 
@@ -473,7 +493,7 @@ class Directions(Elements):
     _has_witness = True
     no_picture = ""
     usual_rtol = RTOL_BEYOND_PLANE
-    spends = Remedy.MANY
+    remedy = Remedy.MANY
 
     @classmethod
     def takes(cls, problem: Problem) -> bool:

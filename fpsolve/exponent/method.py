@@ -178,9 +178,14 @@ class Method:
         return partial(tolerated, self.settings.rtol, self.settings.of_value, self.scales)
 
     @property
+    def adapts(self) -> bool:
+        """Whether a discretisation is chosen for each p."""
+        return self.settings.mesh is None
+
+    @property
     def refinement(self) -> Remedy:
         """What to do where it should be resolved better."""
-        return Remedy.SMALLER_RTOL if self.settings.mesh is None else Remedy.MESH
+        return Remedy.SMALLER_RTOL if self.adapts else Remedy.MESH
 
     def solution(self, p: float, tolerance: Tolerance | None = None) -> Any:
         """What is solved at p, within a tolerance, that of rtol if none is given.
@@ -278,6 +283,10 @@ class Method:
 
     def bounds(self, p: FloatArray, value: FloatArray, error: FloatArray) -> tuple[Message, ...]:
         """What is known of other numbers."""
+        return ()
+
+    def doubts(self, pairs: Sequence[PrincipalPair]) -> tuple[Message, ...]:
+        """Warnings about some pairs."""
         return ()
 
 

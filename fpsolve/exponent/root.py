@@ -54,7 +54,7 @@ def nonzero_root(
     cause: Any
 
     def at(p: float, tolerance: Tolerance | None = None) -> Value:
-        is_rough = p in outward and solver.mesh is None and tolerance is None
+        is_rough = p in outward and method.adapts and tolerance is None
         with unless_over_budget(Missing(p)):
             solved[p] = _rough_ratio(solver, p) if is_rough else _precise_ratio(solver, p, tolerance)
         ratio, slope, error = solved[p]
@@ -76,7 +76,7 @@ def nonzero_root(
     try:
         p = increasing_root(at, guess, (low, high), signed, OUTWARD)
         found = _index(p, *solved[p])
-        if found.relative_error > solver.rtol and solver.mesh is None:
+        if found.relative_error > solver.rtol and method.adapts:
             tolerance = partial(share_of, PRECISE * solver.rtol * solved[p][1] * max(1.0, abs(p)))
             p = increasing_root(partial(at, tolerance=tolerance), p, ends)
             found = _index(p, *solved[p])

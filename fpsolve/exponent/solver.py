@@ -24,7 +24,6 @@ from fpsolve.exponent.elements import doubt, solved_p
 from fpsolve.exponent.error import Estimate, Failure, InvariantClass, Moment, checked
 from fpsolve.exponent.kinds import choose
 from fpsolve.exponent.method import Budget, Method, Settings, Tolerance, checked_moments, refuse
-from fpsolve.exponent.starts import warnings_of_other_places
 from fpsolve.fem.factors import one_thread
 from fpsolve.fem.generator import SMALL_P
 from fpsolve.fem.mesh import CylinderMesh
@@ -313,7 +312,7 @@ class ExponentSolver:
             error_estimate=errors,
             residual=residuals,
             solver=self,
-            warnings=(*missed(self, found, value, errors), *warnings_of_other_places(self.mesh, pairs)),
+            warnings=(*missed(self, found, value, errors), *self.method.doubts(pairs)),
             failures=tuple(failures),
             notes=(*of_the_start(self, found), *self.method.bounds(found, value, errors)),
         )
@@ -370,7 +369,7 @@ def missed(solver: ExponentSolver, p: FloatArray, value: FloatArray, error: Floa
     count = np.count_nonzero(shares > solver.rtol)
     if not count:
         return ()
-    worst, remedy = int(np.argmax(shares)), Remedy.ROUNDING if solver.mesh is None else Remedy.MESH
+    worst, remedy = int(np.argmax(shares)), Remedy.ROUNDING if solver.method.adapts else Remedy.MESH
     found = {"p": p[worst], "size": shares[worst]}
     return (Message(Code.RTOL_MISSED, rtol=solver.rtol, count=count, of=p.size, **found, remedy=remedy),)
 
@@ -449,7 +448,7 @@ def solve_moments(
     if points.size > FEW_MOMENTS:
         with suppress(NotConverged):
             result = interpolated(solver, solver.curves(float(points.min()), float(points.max())), points)
-            if result.warnings and solver.mesh is None:  # single solves round less
+            if result.warnings and solver.method.adapts:  # single solves round less
                 result = None
     result = result or _one_by_one(solver, points, report, known)
     for each in reports:
@@ -507,7 +506,7 @@ def interpolated(solver: ExponentSolver, curves: tuple[Curve, ...], p: FloatArra
         error_estimate=error,
         residual=np.full(p.size, max(pair.residual for pair in pairs)),
         solver=solver,
-        warnings=(*missed(solver, p, value, error), *warnings_of_other_places(solver.mesh, pairs)),
+        warnings=(*missed(solver, p, value, error), *solver.method.doubts(pairs)),
         curves=curves,
         root=sign_change(p, value, derivative),
         notes=of_the_start(solver, p),

@@ -18,12 +18,10 @@ from fpsolve.exponent.error import Solution, mode_effects
 from fpsolve.exponent.fields import noise_marginal
 from fpsolve.fem.effects import MOST_DEGREE, ModeEffects
 from fpsolve.fem.generator import Generator
-from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.fem.noise_axes import CellAxis, PolynomialAxis
 from fpsolve.fem.pairs import PairAxis
 from fpsolve.fem.phase import PhaseAxis
 from fpsolve.fem.space import Space, first_axis
-from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.plane import System, Xi, phase_speed
 from fpsolve.model.problem import Problem
 from fpsolve.theory.frozen import frozen_noise, steady_places, swing
@@ -183,16 +181,6 @@ def other_centers(pair: PrincipalPair) -> list[float]:
     width = math.sqrt(float((at - mean) ** 2 @ density / density.sum()))
     far = (np.abs(z - mean) > 3 * width + 2) & (rate > comparable(pair.value))
     return [float(z[far][np.argmax(rate[far])])] if np.any(far) else []
-
-
-def warnings_of_other_places(mesh: CylinderMesh | None, pairs: Sequence[PrincipalPair]) -> tuple[Message, ...]:
-    """A warning about a pair on a given mesh whose moment slow noise may carry elsewhere, or nothing."""
-    if mesh is None:  # then both places have been looked at
-        return ()
-    for pair in pairs:
-        for z in other_centers(pair):
-            return (Message(Code.CARRIED_ELSEWHERE, p=pair.p, z=z, remedy=Remedy.REACH),)
-    return ()
 
 
 def comparable(value: float) -> float:
