@@ -1,7 +1,7 @@
 """Polynomials on the cell [0, 1] and their numbers in all cells, by scikit-fem.
 
-`skfem.ElementLinePp` has the two functions of the vertices and the integrals of Legendre polynomials, which vanish at
-both. Continuous elements take them as they are; discontinuous ones take what is orthonormal among them, by degree.
+`skfem.ElementLinePp` has the two functions of the vertices and bubbles, the integrals of Legendre polynomials, which
+vanish at both. Continuous elements are made of these, discontinuous ones of their slopes, the Legendre polynomials.
 """
 
 from __future__ import annotations
@@ -34,17 +34,17 @@ def gauss_legendre(count: int) -> Rule:
 
 
 def element(degree: int) -> Any:
-    """The continuous element of a degree."""
+    """A continuous element of a degree, for its numbers."""
     fixed = {1: skfem.ElementLineP1, 2: skfem.ElementLineP2}
     return fixed[degree]() if degree in fixed else skfem.ElementLinePp(degree)
 
 
 @lru_cache(maxsize=512)
 def functions(degree: int, points: bytes) -> tuple[FloatArray, FloatArray]:
-    """Values and slopes of the functions of `element` at some points of the cell, shape (n, degree + 1)."""
-    x = np.frombuffer(points)
-    basis = skfem.CellBasis(skfem.MeshLine([0.0, 1.0]), element(degree), quadrature=(x[None], np.zeros_like(x)))
-    found = [function[0] for function in basis.basis]
+    """Values and slopes of both functions of vertices and of bubbles up to a degree, shape (n, degree + 1)."""
+    x, of = np.frombuffer(points), skfem.ElementLinePp(max(degree, 3))  # lower ones warn that others are faster
+    basis = skfem.CellBasis(skfem.MeshLine([0.0, 1.0]), of, quadrature=(x[None], np.zeros_like(x)))
+    found = [function[0] for function in basis.basis[: degree + 1]]
     values = np.stack([np.ravel(np.asarray(function)) for function in found], axis=-1)
     return values, np.stack([np.ravel(function.grad[0]) for function in found], axis=-1)
 
@@ -68,6 +68,15 @@ def numbered(lines: FloatArray, degrees: IntArray, of: Any) -> tuple[Mask, IntAr
     return own, np.where(own, (np.cumsum(kept) - 1)[numbers], 0)
 
 
+def legendre(degree: int, points: FloatArray) -> FloatArray:
+    """The orthonormal polynomials up to a degree at points of the cell, shape (n, degree + 1): slopes of `functions`.
+
+    The bubbles of `skfem.ElementLinePp` are integrals of Legendre polynomials, with slopes of the norm √2.
+    """
+    _, slopes = functions(degree + 1, points.tobytes())
+    return slopes[:, 1:] / np.sqrt([1.0, *[2.0] * degree])
+
+
 class Orthonormal(NamedTuple):
     """The orthonormal polynomials up to some degree at the points of a rule and at both ends.
 
@@ -77,7 +86,6 @@ class Orthonormal(NamedTuple):
         convections: values of a function times the slope of another, in the same order.
         stiffnesses: slopes of all pairs of functions, in the same order.
         ends, end_slopes: values and slopes at 0 and at 1, shape (2, degree + 1).
-        transform: the functions by those of `element`, shape (degree + 1, degree + 1).
     """
 
     rule: Rule
@@ -86,24 +94,14 @@ class Orthonormal(NamedTuple):
     stiffnesses: FloatArray
     ends: FloatArray
     end_slopes: FloatArray
-    transform: FloatArray
-
-    def at(self, x: FloatArray) -> FloatArray:
-        """Values at points of [0, 1], shape (len(x), degree + 1)."""
-        return np.asarray(functions(len(self.transform) - 1, x.tobytes())[0] @ self.transform)
 
 
 @lru_cache(maxsize=64)
 def orthonormal(degree: int) -> Orthonormal:
-    """The polynomials up to a degree, 1 at least: 1, those of the vertices, and each further one less those before."""
+    """The polynomials up to a degree; ∫ P_j P_k′ is P_j P_k at 1 less that at 0 for j < k, and 0 for others."""
     rule = gauss_legendre(degree + EXTRA_POINTS)
-    by_degree = np.eye(degree + 1)
-    by_degree[:2, :2] = [[1.0, -1.0], [1.0, 1.0]]  # 1 and 2x − 1
-    values, slopes = functions(degree, rule.points.tobytes())
-    factor = np.linalg.qr(np.sqrt(rule.weights)[:, None] * (values @ by_degree), mode="r")
-    transform = by_degree @ np.linalg.inv(factor * np.sign(np.diagonal(factor))[:, None])
-    values, slopes = values @ transform, slopes @ transform
-    pairs = ((values, values), (values, slopes), (slopes, slopes))
-    tables = [(first[:, :, None] * last[:, None, :]).reshape(len(values), -1) for first, last in pairs]
-    ends, end_slopes = (each @ transform for each in functions(degree, np.array([0.0, 1.0]).tobytes()))
-    return Orthonormal(rule, tables[0], tables[1], tables[2], ends, end_slopes, transform)
+    values, ends = legendre(degree, rule.points), legendre(degree, np.array([0.0, 1.0]))
+    derivative = np.triu(np.outer(ends[1], ends[1]) - np.outer(ends[0], ends[0]), 1)
+    factors = (values, values), (values, values @ derivative), (values @ derivative, values @ derivative)
+    pairs = [(first[:, :, None] * last[:, None, :]).reshape(len(values), -1) for first, last in factors]
+    return Orthonormal(rule, pairs[0], pairs[1], pairs[2], ends, ends @ derivative)

@@ -13,7 +13,7 @@ from scipy.sparse import csr_matrix, diags, issparse
 
 from fpsolve.arrays import FloatArray, IntArray, Mask, Matrix, one
 from fpsolve.fem.axis import MAX_DENSE_UNKNOWNS, DividedAxis
-from fpsolve.fem.element import Orthonormal, element, gauss_legendre, numbered, orthonormal
+from fpsolve.fem.element import Orthonormal, element, gauss_legendre, legendre, numbered, orthonormal
 from fpsolve.model.plane import CoefficientMatrix, Harmonics, Impulse, changed_exponential
 
 PENALTY = 2.0
@@ -248,7 +248,8 @@ class PhaseAxis(DividedAxis):
         where = np.searchsorted(self.lines, phi if inside is None else inside, side="right") - 1
         cell = np.clip(where, 0, self._sizes.size - 1)
         local = np.clip((phi - self.lines[cell]) / self._sizes[cell], 0, 1)
-        values, kept = self._table.at(local) / np.sqrt(self._sizes[cell])[:, None], self._kept[cell]
+        values = legendre(int(self.degrees.max()), local) / np.sqrt(self._sizes[cell])[:, None]
+        kept = self._kept[cell]
         return self._matrix(values[kept], np.nonzero(kept)[0], self._number[cell][kept], (phi.size, self.size))
 
     def finer_rule(self, parts: int) -> tuple[FloatArray, FloatArray]:
