@@ -40,8 +40,10 @@ from fpsolve.exponent.method import (
     Tolerance,
     refuse_tails,
 )
+from fpsolve.exponent.modes import sphere_start
 from fpsolve.exponent.moments import EvenMoment, even_moment, moment_row
 from fpsolve.exponent.starts import Start, first, other_centers, refined
+from fpsolve.exponent.stopped import stop_start
 from fpsolve.fem.factors import FEW_UNKNOWNS, one_thread
 from fpsolve.fem.generator import SMALL_P, Generator
 from fpsolve.fem.noise_axes import PolynomialAxis
@@ -510,8 +512,6 @@ class Directions(Elements):
 
     def start(self, p: float) -> Stage:
         """The first functions of directions."""
-        from fpsolve.exponent.modes import sphere_start  # with scikit-fem, which takes long to import
-
         return sphere_start(self.problem, p, self.settings.rtol, self.spaces)
 
     def is_dear(self, p: float) -> bool:
@@ -540,8 +540,6 @@ class Stopped(Directions):
         return super().takes(problem) and problem.system.stop is not None
 
     def start(self, p: float) -> Stage:
-        from fpsolve.exponent.stopped import stop_start
-
         return stop_start(self.problem, p, self.settings.rtol, self.spaces)
 
     def line_rtol(self, p: float) -> float:

@@ -14,18 +14,16 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
-from typing import TYPE_CHECKING, Any, NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
 from fpsolve.arrays import Coefficient, FloatArray, IntArray, Matrix, dense, one
 from fpsolve.fem.axis import Axis, DividedAxis
 from fpsolve.fem.effects import ModeEffects
+from fpsolve.fem.line import LineSpace
 from fpsolve.model.noise import Noise, NoiseDerivative
 from fpsolve.polynomials import Polynomials, gegenbauer, hermite, logarithm, stieltjes
-
-if TYPE_CHECKING:
-    from fpsolve.fem.line import LineSpace
 
 REACH = 9.0
 """Distance from its centre, in standard deviations, beyond which nothing is left of a weight like a Gaussian."""
@@ -386,8 +384,6 @@ class CellAxis(DividedAxis, LineAxis):
     @cached_property
     def line(self) -> LineSpace:
         """The elements, in the weight P_s. Raises `MeshError` where those of a cell cannot be told apart."""
-        from fpsolve.fem.line import LineSpace  # scikit-fem takes a while to import
-
         end, exponent = self.noise.half_width / self.unit, self.noise.end_exponent
         reaches = (self.lines[0] <= -end * (1 - 1e-12), self.lines[-1] >= end * (1 - 1e-12))
         ends = (exponent * reaches[0], exponent * reaches[1])
