@@ -28,10 +28,10 @@ from fpsolve.exponent.error import Solution, ladders, mode_effects
 from fpsolve.exponent.moments import even_moment
 from fpsolve.exponent.powers import moment_form
 from fpsolve.exponent.starts import SHARE, Start
+from fpsolve.fem.directions import SphereAxis, group_dimensions
 from fpsolve.fem.generator import SMALL_P, Generator
 from fpsolve.fem.noise_axes import CountedAxis
 from fpsolve.fem.space import Space, first_axis
-from fpsolve.fem.sphere import Coordinates, SphereAxis, group_dimensions
 from fpsolve.model.problem import Problem
 
 FIRST_WAVES = 2
@@ -74,7 +74,7 @@ def second_moments(problem: Problem) -> tuple[float, FloatArray, FloatArray]:
     return found.value, q * np.sign(np.trace(q)), moments * np.sign(np.trace(moments))
 
 
-def modal_coordinates(problem: Problem) -> tuple[Coordinates, tuple[float, float]]:
+def modal_coordinates(problem: Problem) -> tuple[FloatArray, tuple[float, float]]:
     """S of y = S⁻¹x whose directions are solved for, and where T and T* have their layers.
 
     Between the groups 1 and 2 of y these lie at ln tan η = ½ ln(q₁/q₂) and ½ ln(p₂/p₁), q and p the sizes of Q and of
@@ -116,7 +116,7 @@ def modal_coordinates(problem: Problem) -> tuple[Coordinates, tuple[float, float
         one_group, other = (np.mean(each) for each in np.split(np.maximum(np.diagonal(form), 0.0), [first]))
         share = one_group / max(other, 1e-300)
         places.append(sign * math.log(min(max(share, THINNEST**2), THINNEST**-2)))
-    return tuple(map(tuple, found.tolist())), (places[0], places[1])
+    return found, (places[0], places[1])
 
 
 def first_directions(problem: Problem) -> SphereAxis:
@@ -221,7 +221,7 @@ class SphereStart(Start):
             enough = self.enough or (solution if solution.error <= goal else None)
             return self._with(2, before=(*self.before, solution), enough=enough)
         phi, noises = self.space.phi, self._finer_noises(solution, of_axes[1:], MINOR * goal)
-        found = Space((phi.finer_elements() if of_axes[0] > MINOR * goal else phi, *noises))
+        found = Space((phi.finer(["degree"]) if of_axes[0] > MINOR * goal else phi, *noises))
         found = found if found.size > self.space.size else self.space.enriched()
         self.generators.clear()
         self.pairs.clear()
@@ -238,7 +238,7 @@ class SphereStart(Start):
     def change(self, pair: PrincipalPair) -> float:
         """What waves of the next degree change in Λ(p), to first order."""
         finer = self._with(2).generator
-        return float(np.sum(first_order_changes(pair, finer, 0, finer.phi.degrees > pair.space.phi.waves)))
+        return float(np.sum(first_order_changes(pair, finer, 0, finer.phi.new_in(pair.space.phi))))
 
     def _rounding(self, pair: PrincipalPair) -> float:
         """Of the rates of growth: an entry of S⁻¹AS is a sum of products twice, which may cancel."""
@@ -259,7 +259,7 @@ class SphereStart(Start):
                 continue
             if k and not isinstance(axis, CountedAxis):
                 continue
-            finer = self.space.with_axis(k, axis.raised() if k else replace(axis, degree=axis.degree + 2))
+            finer = self.space.with_axis(k, axis.raised() if k else axis.deeper("degree"))
             ladder = list(ladders(finer))[k]
             assert ladder is not None
             changes = first_order_changes(pair, Generator(self.problem, finer), k, ladder.highest(2))
