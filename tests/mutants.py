@@ -234,7 +234,7 @@ DEFECTS: tuple[Defect, ...] = (
     ),
     Defect(
         "L6 R^p is left out where the speed at a wall changes",
-        "fem/terms.py",
+        "fem/phase.py",
         "of_p = OfMoment(0, ray.log_factor)\n",
         "of_p = OfMoment(0)\n",
         "sensitivit",

@@ -28,10 +28,10 @@ from fpsolve.exponent.error import Solution, ladders, mode_effects
 from fpsolve.exponent.moments import even_moment
 from fpsolve.exponent.powers import moment_form
 from fpsolve.exponent.starts import SHARE, Start
+from fpsolve.fem.directions import SphereAxis, group_dimensions
 from fpsolve.fem.generator import SMALL_P, Generator
 from fpsolve.fem.noise_axes import CountedAxis
 from fpsolve.fem.space import Space, first_axis
-from fpsolve.fem.sphere import Coordinates, SphereAxis, group_dimensions
 from fpsolve.model.problem import Problem
 
 FIRST_WAVES = 2
@@ -74,58 +74,38 @@ def second_moments(problem: Problem) -> tuple[float, FloatArray, FloatArray]:
     return found.value, q * np.sign(np.trace(q)), moments * np.sign(np.trace(moments))
 
 
-def modal_coordinates(problem: Problem) -> tuple[Coordinates, tuple[float, float]]:
-    """S of y = S⁻¹x whose directions are solved for, and where T and T* have their layers.
+def balanced_coordinates(problem: Problem) -> tuple[FloatArray, float]:
+    """S of y = S⁻¹x whose directions are solved for, and ln tan η of a layer of T; that of T* has the other sign.
 
-    Between the groups 1 and 2 of y these lie at ln tan η = ½ ln(q₁/q₂) and ½ ln(p₂/p₁), q and p the sizes of Q and of
-    E yyᵀ on each: T is about (yᵀQy)^½p there, and T* a power of yᵀ(E yyᵀ)⁻¹y. Each mode of the motion without noise
-    has a unit in which q = p before, so that y is the same, but for rotations, whatever the coordinates x are.
+    In them Q and E yyᵀ are the same diagonal matrix, as balanced realisations of control theory have it. T is about
+    (yᵀQy)^½p, and T* a power of yᵀ(E yyᵀ)⁻¹y, so that the layer lies at ½ ln(q₁/q₂), q being the mean of Q on each of
+    the two groups of y. Both matrices are told in the modes of the motion without noise, where what is hardly there is
+    given `THINNEST`² of all.
     """
-    free = sum(
-        problem.motion.epsilon**term.order * problem.named_noise(term.noise).mean_of(term.g) * np.array(term.matrix)
-        for term in problem.motion.terms
-    )
-    values, vectors = np.linalg.eig(free)
-    modes = [
-        np.column_stack([vector.real, vector.imag] if value.imag else [vector.real])
-        for value, vector in zip(values, vectors.T, strict=True)
-        if value.imag >= 0
-    ]
-    own = np.column_stack(modes)
-    _, q, p = second_moments(problem)
-    frame = np.eye(len(q)) if problem.frame is None else np.array(problem.frame.matrix)
-    inverse = np.linalg.inv(frame)
-    q, p = frame.T @ q @ frame, inverse @ p @ inverse.T
-    if np.linalg.cond(own) < WORST_CONDITION:
-        rows = np.split(np.linalg.inv(own), np.cumsum([each.shape[1] for each in modes])[:-1])
-        moments = [
-            (np.trace(back @ p @ back.T), np.trace(mode.T @ q @ mode)) for back, mode in zip(rows, modes, strict=True)
-        ]
-        of_p, of_q = (np.maximum(each, THINNEST**2 * np.sum(each)) for each in np.transpose(moments))
-        own = np.column_stack([unit * mode for unit, mode in zip((of_p / of_q) ** 0.25, modes, strict=True)])
-    else:
+    free = problem.mean(problem.motion)
+    _, own = scipy.linalg.cdf2rdf(*np.linalg.eig(free))
+    if np.linalg.cond(own) > WORST_CONDITION:
         _, own = scipy.linalg.matrix_balance(free, permute=False)
-    sizes, axes = np.linalg.eigh(own.T @ q @ own)
-    sizes, axes = np.maximum(sizes[::-1], 1e-300), axes[:, ::-1]
-    if len(sizes) == 3 and sizes[0] * sizes[2] < sizes[1] ** 2:  # the weakest one is by itself
-        axes = axes[:, [2, 0, 1]]
-    found = own @ axes
-    inverse, first = np.linalg.inv(found), group_dimensions(len(sizes))[0]
-    places = []
-    for form, sign in ((found.T @ q @ found, 0.5), (inverse @ p @ inverse.T, -0.5)):
-        one_group, other = (np.mean(each) for each in np.split(np.maximum(np.diagonal(form), 0.0), [first]))
-        share = one_group / max(other, 1e-300)
-        places.append(sign * math.log(min(max(share, THINNEST**2), THINNEST**-2)))
-    return tuple(map(tuple, found.tolist())), (places[0], places[1])
+    _, q, p = second_moments(problem)
+    frame = np.eye(len(own)) if problem.frame is None else np.array(problem.frame.matrix)
+    own = frame @ own
+    back = np.linalg.inv(own)
+    q, p = (each / np.trace(each) + THINNEST**2 * np.eye(len(own)) for each in (own.T @ q @ own, back @ p @ back.T))
+    root = np.linalg.cholesky(p)
+    axes, squares, _ = np.linalg.svd(root.T @ q @ root)
+    if len(squares) == 3 and squares[0] * squares[2] < squares[1] ** 2:  # the weakest one is by itself
+        axes, squares = axes[:, [2, 0, 1]], squares[[2, 0, 1]]
+    first, second = (np.mean(each) for each in np.split(np.sqrt(squares), [group_dimensions(len(squares))[0]]))
+    return np.linalg.solve(frame, own @ root @ axes / squares**0.25), 0.5 * math.log(first / second)
 
 
 def first_directions(problem: Problem) -> SphereAxis:
     """The coarsest functions of directions."""
-    coordinates, places = modal_coordinates(problem)
+    coordinates, place = balanced_coordinates(problem)
     lines = np.linspace(0, math.pi / 2, 3)
-    if max(map(abs, places)) > math.log(1 / WEAK):
-        low, high = min(places) - 1, max(places) + 1
-        inner = np.linspace(low, high, max(2, round((high - low) / GRADED_STEP)) + 1)
+    if abs(place) > math.log(1 / WEAK):
+        high = abs(place) + 1
+        inner = np.linspace(-high, high, max(2, round(2 * high / GRADED_STEP)) + 1)
         lines = np.concatenate([[0.0], np.arctan(np.exp(inner)), [math.pi / 2]])
     return SphereAxis(coordinates, lines, FIRST_DEGREE, FIRST_WAVES)
 
@@ -221,7 +201,7 @@ class SphereStart(Start):
             enough = self.enough or (solution if solution.error <= goal else None)
             return self._with(2, before=(*self.before, solution), enough=enough)
         phi, noises = self.space.phi, self._finer_noises(solution, of_axes[1:], MINOR * goal)
-        found = Space((phi.finer_elements() if of_axes[0] > MINOR * goal else phi, *noises))
+        found = Space((phi.finer(["degree"]) if of_axes[0] > MINOR * goal else phi, *noises))
         found = found if found.size > self.space.size else self.space.enriched()
         self.generators.clear()
         self.pairs.clear()
@@ -238,7 +218,7 @@ class SphereStart(Start):
     def change(self, pair: PrincipalPair) -> float:
         """What waves of the next degree change in Λ(p), to first order."""
         finer = self._with(2).generator
-        return float(np.sum(first_order_changes(pair, finer, 0, finer.phi.degrees > pair.space.phi.waves)))
+        return float(np.sum(first_order_changes(pair, finer, 0, finer.phi.new_in(pair.space.phi))))
 
     def _rounding(self, pair: PrincipalPair) -> float:
         """Of the rates of growth: an entry of S⁻¹AS is a sum of products twice, which may cancel."""
@@ -259,7 +239,7 @@ class SphereStart(Start):
                 continue
             if k and not isinstance(axis, CountedAxis):
                 continue
-            finer = self.space.with_axis(k, axis.raised() if k else replace(axis, degree=axis.degree + 2))
+            finer = self.space.with_axis(k, axis.raised() if k else axis.deeper("degree"))
             ladder = list(ladders(finer))[k]
             assert ladder is not None
             changes = first_order_changes(pair, Generator(self.problem, finer), k, ladder.highest(2))

@@ -20,6 +20,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import compress
 
 import numpy as np
 import scipy.linalg
@@ -29,8 +30,8 @@ from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.error import Solution
 from fpsolve.exponent.modes import THINNEST, SphereStart, first_order_changes, second_moments
 from fpsolve.exponent.starts import SHARE
+from fpsolve.fem.directions import HalfSphereAxis
 from fpsolve.fem.generator import Generator
-from fpsolve.fem.half_sphere import HalfSphereAxis
 from fpsolve.fem.space import Space, first_axis
 from fpsolve.model.plane import CoefficientMatrix, LinearMotion, rotating_coordinates
 from fpsolve.model.problem import Problem
@@ -81,12 +82,12 @@ def stopped_directions(problem: Problem) -> HalfSphereAxis:
     coordinates = np.linalg.solve(rows, own @ np.diag(np.repeat(units, 2)))
     in_theta = np.linspace(-0.5, 0.5, 3) * math.pi
     return HalfSphereAxis(
-        tuple(map(tuple, coordinates.tolist())),
+        coordinates,
         0.5 * math.pi * np.array(AT_STOP),
         FIRST_DEGREE,
+        FIRST_WAVES,
         in_theta,
         FIRST_DEGREE,
-        FIRST_WAVES,
     )
 
 
@@ -109,11 +110,12 @@ class StopStart(SphereStart):
 
     changes: tuple[float, ...] = ()
     is_first: bool = True
+    tried: tuple[str, ...] = ()
 
     def judged(self, pair: PrincipalPair, allowed: float) -> Solution:
         _, *of_noises = self._of_axes(pair, allowed)
         phi, found = self.space.phi, list[float]()
-        for finer in phi.finer:
+        for finer in map(phi.deeper, phi.ways):
             generator = Generator(self.problem, self.space.with_axis(0, finer))
             changes = first_order_changes(pair, generator, 0, finer.new_in(phi))
             found.append(float(abs(np.sum(changes))))
@@ -125,16 +127,12 @@ class StopStart(SphereStart):
 
     def _left(self, changes: Sequence[float]) -> FloatArray:
         """What is left over the change in each direction."""
-        tried = [self.space.phi.differs(each.pair.space.phi) for each in self.before] or [(False,) * 3]
-        left = np.where(tried[-1], OF_TRIED, OF_ONE)
+        left = np.array([OF_TRIED if way in self.tried else OF_ONE for way in self.space.phi.ways])
         return np.append(OF_STALLED if self._stalls(changes) else left[0], left[1:])
 
     def _stalls(self, changes: Sequence[float]) -> bool:
         """Whether the last step made functions in η finer and left more than `STALLED` of what these change."""
-        return any(
-            self.space.phi.differs(each.pair.space.phi)[0] and changes[0] > STALLED * each.start.changes[0]
-            for each in self.before
-        )
+        return any("degree" in self.tried and changes[0] > STALLED * each.start.changes[0] for each in self.before)
 
     def is_enough(self, solution: Solution) -> bool:
         return bool(self.before)
@@ -145,7 +143,7 @@ class StopStart(SphereStart):
     def refined(self, solution: Solution, goal: float, stages: int, most: int) -> StopStart:
         """Two degrees more where they change most, if they are to, and other functions of the noise."""
         assert solution.measured is not None
-        phi, changes = self.space.phi, np.array(solution.start.changes)
+        phi, changes, tried = self.space.phi, np.array(solution.start.changes), ()
         if not self.before or solution.measured[0] > 0.5 * goal:
             left, raised = OF_ONE * changes, changes >= WORTH * np.max(changes)
             for at in np.argsort(-changes):
@@ -153,11 +151,12 @@ class StopStart(SphereStart):
                 if float(np.sum(left)) <= goal:
                     raised &= changes >= changes[at]
                     break
-            phi = phi.raised_in(raised, is_halved=self._stalls(solution.start.changes))
+            tried = tuple(compress(phi.ways, raised))
+            phi = phi.finer(tried, ["degree"] if self._stalls(solution.start.changes) else [])
         share = max(SHARE * goal, MINOR_NOISE * solution.measured[0])
         found = Space((phi, *self._finer_noises(solution, solution.measured[1:], share)))
         found = found if found.size > self.space.size else self.space.enriched()
-        return StopStart(self.problem, found, before=(solution,), is_first=False)
+        return StopStart(self.problem, found, before=(solution,), is_first=False, tried=tried)
 
 
 def stop_start(problem: Problem, p: float, rtol: float, known: Mapping[float, Solution]) -> StopStart:

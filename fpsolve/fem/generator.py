@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import scipy.linalg
@@ -20,9 +20,6 @@ from fpsolve.fem.space import Space
 from fpsolve.fem.terms import ALL_ORDERS, Term, Terms, TermSum, power_of_epsilon
 from fpsolve.model.problem import ParameterDerivative, Problem
 from fpsolve.superlu import sparse_lu
-
-if TYPE_CHECKING:
-    from fpsolve.fem.sphere import SphereTerms
 
 SMALL_P = 1e-2
 """For smaller |p| the discretisation is chosen at this one, as Λ and its error go to zero together."""
@@ -147,16 +144,9 @@ class Generator:
         return tuple(self._own_terms.whole())
 
     @cached_property
-    def _own_terms(self) -> Terms | SphereTerms:
-        if self.problem.dimension == 2:
-            return Terms(self.problem, self.space(0.0))
-        if self.problem.system.stop:
-            from fpsolve.fem.half_sphere import HalfSphereTerms
-
-            return HalfSphereTerms(self.problem, self.space(0.0))
-        from fpsolve.fem.sphere import SphereTerms  # scikit-fem takes a while to import
-
-        return SphereTerms(self.problem, self.space(0.0))
+    def _own_terms(self) -> Terms:
+        found: Terms = self.phi.terms(self.problem, self.space(0.0).noises)
+        return found
 
     def matrix(self, p: float, *, derivative: int = 0, orders: slice = ALL_ORDERS) -> KroneckerSum:
         """The matrix of dᵏL/dpᵏ in the space for p, from the terms of some orders in ε, the ξ-matrix of 1 first.
@@ -166,7 +156,7 @@ class Generator:
             derivative: k; the tilt is held.
             orders: slice(1, None) leaves out L₀.
         """
-        return self._sum.matrix(self.space(p), p, derivative, orders)
+        return self._sum.matrix(self.space(p).axes, p, derivative, orders)
 
     def changed(self, by: ParameterDerivative, p: float, rate: float, *, derivative: int = 0) -> KroneckerSum:
         """The matrix of ∂/∂θ (dᵏL/dpᵏ − rate M), the functions of φ and ξ held, M = `mass`; that of P_s is in it."""

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
-from typing import Any
+from itertools import product
+from typing import Any, NamedTuple
 
 import numpy as np
 import skfem
@@ -14,7 +16,22 @@ from scipy.sparse import csr_matrix, diags, issparse
 from fpsolve.arrays import FloatArray, IntArray, Mask, Matrix, one
 from fpsolve.fem.axis import MAX_DENSE_UNKNOWNS, DividedAxis
 from fpsolve.fem.element import Orthonormal, element, gauss_legendre, legendre, numbered, orthonormal
-from fpsolve.model.plane import CoefficientMatrix, Harmonics, Impulse, changed_exponential
+from fpsolve.fem.mesh import vertices_at
+from fpsolve.fem.terms import At, OfMoment, Term, Terms
+from fpsolve.model.plane import (
+    CoefficientMatrix,
+    Harmonics,
+    Impulse,
+    Jump,
+    LinearMotion,
+    Xi,
+    changed_exponential,
+    is_driven,
+    matrix_at,
+    phase_speed,
+    turning,
+)
+from fpsolve.model.problem import ParameterDerivative, Problem
 
 PENALTY = 2.0
 """Factor η·size/(degree + 1)² of the interior penalty method."""
@@ -290,6 +307,10 @@ class PhaseAxis(DividedAxis):
         mean, cosine, sine = blocks / self._sizes[:, None]
         return self._assembled(mean), self._assembled(cosine), self._assembled(sine)
 
+    def terms(self, problem: Problem, noises: Sequence[Any]) -> PlaneTerms:
+        """L(p) on these functions times those of each noise."""
+        return PlaneTerms(problem, self, noises)
+
     def _combined(self, f: Harmonics, parts: tuple[Matrix, Matrix, Matrix]) -> Matrix:
         total = f.mean * parts[0]
         for factor, part in ((f.cosine, parts[1]), (f.sine, parts[2])):
@@ -319,6 +340,146 @@ class PhaseAxis(DividedAxis):
         matrix = np.zeros(shape)
         matrix[rows, columns] = entries
         return matrix
+
+
+class Wall(NamedTuple):
+    """A jump, the speed v of the phase at its ray φ_j, and δ(φ − φ_j): w(φ⁻) T(φ⁺) for v > 0, else w(φ⁺) T(φ⁻)."""
+
+    jump: Jump
+    speed: float
+    delta: Matrix
+
+
+class PlaneTerms(Terms):
+    """L(p) of two variables. Args as those of `Terms`.
+
+    Of a term of the motion h = e′ᵀA e, and at each φ-vertex there is the point load
+
+        ∫ P_s (v {w} − ½θ [w]) [T]
+
+    with the phase speed v = Σ ε^n g h, the mean {w} and the jump [w] = w(φ⁺) − w(φ⁻) of its two traces. θ = |v| is
+    upwinding; for polynomials of ξ, which cannot follow its kink, θ is its size for the typical ξ, |Σ ε^n h| over what
+    no noise drives + Σ ε^n |h| (mean of g²)^½ over the rest. At a wall v is one number for all ξ, and θ = |v|. The wall
+    is the point load (R^p − 1)|v| δ(φ − φ_j) T of the trace of T that v brings, T(φ⁺) on w(φ⁻) for v > 0 and T(φ⁻) on
+    w(φ⁺) for v < 0, so that T jumps by R^p. The vertex has |v| times the same trace: it is left out there, and the wall
+    has R^p, as a tiny R^p would be rounded beside 1.
+
+    White noise: see `PhaseAxis.diffusion`. Impulses exp(B) add their rate times |exp(B)e|^p T(ψ) − T, ψ being where
+    they take φ, see `PhaseAxis.impulses`.
+    """
+
+    def __init__(self, problem: Problem, phi: PhaseAxis, noises: Sequence[Any]) -> None:
+        super().__init__(problem, phi, noises)
+        system = self.system
+        self._vertices, self._jump = self.phi.lines[:-1], self.phi.jump
+        brought = 0.0 * self._jump  # to a wall
+        # where θ = |v|, and the sign of v where that is the same for all ξ, otherwise 0
+        is_exact, direction = np.full(self._vertices.size, False), np.zeros(self._vertices.size)
+        if all(axis.is_local for axis in self.noises):
+            rates = matrix_at(system, problem.at_values([axis.samples().xi for axis in self.noises]))
+            speed = turning(rates.reshape(-1, 1, 2, 2))(self._vertices)
+            is_exact, direction = ~is_exact, 1.0 * np.all(speed > 0, axis=0) - np.all(speed < 0, axis=0)
+        self._walls = list[Wall]()
+        for jump, v in zip(system.jumps, problem.wall_speeds(system), strict=True):
+            at = vertices_at(self.phi.lines, jump.phase)
+            is_exact[at], direction[at] = True, math.copysign(1.0, v)
+            left, right = self.phi.left_trace[at], self.phi.right_trace[at]
+            self._walls.append(Wall(jump, v, left.T @ right if v > 0 else right.T @ left))
+            at_wall = np.isin(np.arange(self._vertices.size), at).astype(float)
+            brought = brought + by_rows(at_wall, self.phi.right_trace if v > 0 else -self.phi.left_trace)
+        self._step = self._jump - brought
+        self._is_exact, self._two_way = is_exact, np.flatnonzero(is_exact & (direction == 0))
+        # nothing is left of the other side: where ξ is large that would count
+        self._trace = 0.5 * (self.phi.right_trace + self.phi.left_trace) - by_rows(0.5 * direction, self._jump)
+
+    def _loads(self) -> Iterator[Term]:
+        for struck in self._problem.impulses:
+            yield self._struck(struck)
+        # −½ ∫ P_s θ [w] [T] at the φ-vertices where the phase runs both ways, or θ is not |v|
+        text, jump = "upwind loads between cells", self._jump
+        if not np.all(self._is_exact):
+            typical = np.where(self._is_exact, 0.0, self.typical_speed())
+            yield self._term(-0.5 * jump.T @ by_rows(typical, jump), one, text)
+        yield from self._upwind(lambda phi, xi: np.abs(phase_speed(self.system, xi)(phi)), text)
+        for ray, v, delta in self._walls:
+            text = f"(R^p − 1) |dφ/dt| δ(φ − {ray.phase:.6g} mod π), R = {math.exp(ray.log_factor):.6g}"
+            yield self._term(abs(v) * delta, one, text, OfMoment(0, ray.log_factor, is_change=True), order=2)
+
+    def _changed_loads(self, by: ParameterDerivative) -> Iterator[Term]:
+        """The size of the speed for the typical ξ is held: [T] = 0 there but for the error of the elements."""
+        text, moved = "∂/∂θ", LinearMotion(self.system.epsilon, by.terms)
+        for struck, moved_by in zip(self._problem.impulses, by.impulses, strict=bool(by.impulses)):
+            yield self._struck(struck, moved_by)
+        yield from self._upwind(
+            lambda phi, xi: np.sign(phase_speed(self.system, xi)(phi)) * phase_speed(moved, xi)(phi), text
+        )
+        faster = self._problem.wall_speeds(moved)
+        for k, (ray, v, delta) in enumerate(self._walls):
+            if by.jumps:
+                yield self._term(by.jumps[k] * abs(v) * delta, one, text, OfMoment(1, ray.log_factor), order=2)
+            of_p = OfMoment(0, ray.log_factor)
+            yield self._term(math.copysign(1.0, v) * faster[k] * delta, one, text, of_p, order=2)
+
+    def _matrices(self, term: CoefficientMatrix) -> tuple[Matrix, Matrix]:
+        """h ∂φ with the loads at the φ-vertices, and q."""
+        loads = self._trace.T @ by_rows(term.h(self._vertices), self._step)
+        return self.phi.convection(term.h) + loads, self.phi.mass(term.q)
+
+    def _written(self, term: CoefficientMatrix) -> tuple[str, str, str]:
+        h, q = _written(term.h), _written(term.q)
+        return f"{h} ∂φ", q, f"(h ∂φ + p q)² of white noise, h = {h}, q = {q}"
+
+    def _struck(self, of: Impulse, by: Impulse | None = None) -> Term:
+        """An impulse, or ∂/∂θ of it."""
+
+        def phase_at(p: float, derivative: int) -> Matrix:
+            rate = of.rate if by is None else by.rate
+            total = 0.0 if by is None else of.rate * self.phi.changed_impulses(of, by, p, derivative)
+            if rate:
+                total = total + rate * self.phi.impulses(of, p, derivative)
+                total = total if derivative else total - rate * self.phi.identity
+            return total
+
+        stretch = ", ".join(f"{size:.3g}" for size in np.linalg.svd(of.matrix, compute_uv=False))
+        text = f"{of.rate:.6g} (|Me|^p T(ψ) − T) of impulses M, which stretch by {stretch}"
+        return self._at(phase_at, text, order=1)
+
+    def typical_speed(self) -> FloatArray:
+        """θ at the φ-vertices for the typical ξ, shape (m,)."""
+        steady, driven = np.zeros(self._vertices.size), np.zeros(self._vertices.size)
+        for term in self.system.terms:
+            speed = self.system.epsilon**term.order * term.h(self._vertices)
+            if not is_driven(term.g):
+                steady += float(term.g(0.0)) * speed
+            else:
+                xi = self.noises[self._names.index(term.noise) if term.noise in self._names else 0]
+                constant, square = xi.constant, xi.mass(lambda xi, g=term.g: g(xi) ** 2)
+                total = constant @ (xi.matrix(one) @ constant)
+                driven = driven + abs(speed) * math.sqrt(constant @ (square @ constant) / total)
+        return np.asarray(abs(steady) + driven)
+
+    def _upwind(self, theta: Callable[[float, Xi], FloatArray], text: str) -> Iterator[Term]:
+        """−½ ∫ P_s θ(φ, ξ) [w] [T] where the phase runs both ways: of several noises, chains, for each other state."""
+        first, *others = self._names
+        for j in self._two_way:
+            phi, phase = float(self._vertices[j]), -0.5 * self._jump[[j]].T @ self._jump[[j]]
+            for values in product(*(np.unique(axis.support) for axis in self.noises[1:])):
+                held = dict(zip(others, values, strict=True))
+
+                def of_first(xi: Any, phi: float = phi, held: dict[str, float] = held) -> Any:
+                    return theta(phi, {**held, first: xi} if held else xi)
+
+                yield Term(0, OfMoment(0), phase, (of_first, *map(At, values)), text)
+
+
+def _written(harmonics: Harmonics) -> str:
+    """(0.5 − 0.5 cos 2φ), or one number."""
+    values = harmonics.mean, harmonics.cosine, harmonics.sine
+    names = ("", " cos 2φ", " sin 2φ")
+    parts = [(float(value), name) for value, name in zip(values, names, strict=True) if value]
+    text = "".join(f" {'−' if value < 0 else '+'} {abs(value):g}{name}" for value, name in parts)
+    text = text.removeprefix(" + ").removeprefix(" ")
+    return text if parts == [(values[0], "")] else f"({text})"
 
 
 def by_rows(factors: FloatArray, matrix: Matrix) -> Matrix:

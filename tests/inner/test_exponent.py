@@ -7,7 +7,7 @@ import pytest
 
 from fpsolve.exponent import principal_pair
 from fpsolve.exponent.curve import Node, polynomial, values
-from fpsolve.exponent.modes import SphereStart, first_directions, modal_coordinates
+from fpsolve.exponent.modes import SphereStart, balanced_coordinates, first_directions
 from fpsolve.exponent.solver import broken_convexity
 from fpsolve.fem.space import Space, first_axis
 from fpsolve.model import OrnsteinUhlenbeck
@@ -40,7 +40,7 @@ def test_what_polynomials_of_the_noise_lack_is_told():
 @pytest.mark.parametrize("seed", range(4))
 def test_layers_of_directions_are_those_of_the_system_in_other_coordinates(seed):
     problem, turn = random_system(seed, 4), np.random.default_rng(seed).standard_normal((4, 4))
-    assert modal_coordinates(changed(problem, turn))[1] == pytest.approx(modal_coordinates(problem)[1], rel=1e-3)
+    assert balanced_coordinates(changed(problem, turn))[1] == pytest.approx(balanced_coordinates(problem)[1], rel=1e-3)
 
 
 @pytest.mark.parametrize("size", [1e-9, 1e-6, 1e-3])

@@ -1,0 +1,550 @@
+"""Functions of the directions of three and four variables, with a stop or without, and what a motion does to them.
+
+With x = r e and T = r^p u(e), ẋ = Xx gives ė = h and d ln r/dt = q. A direction is written by one angle between two
+groups of coordinates and by a unit vector of each, e = (cos η e₁, sin η e₂), 0 ≤ η ≤ π/2, of the dimensions (2, 2) for
+n = 4, Hopf's coordinates with e_i = (cos θ_i, sin θ_i), and (1, 2) for n = 3, where e₁ = ±1. With the blocks X_ij of a
+matrix, t_i = de_i/dθ_i, a_ij = e_iᵀX_ij e_j, b_ij = t_iᵀX_ij e_j, c = cos η and s = sin η,
+
+    h·∇ = (c² a₂₁ + cs (a₂₂ − a₁₁) − s² a₁₂) ∂η + (b₁₁ + b₁₂ tan η) ∂θ₁ + (b₂₂ + b₂₁ cot η) ∂θ₂
+    q = c² a₁₁ + cs (a₁₂ + a₂₁) + s² a₂₂,      measure c^(n₁ − 1) s^(n₂ − 1) dη dθ₁ dθ₂,      div h = tr X − n q.
+
+The functions are continuous elements in η times functions of e₁ times functions of e₂. Those of e₂ that are not
+constant vanish at η = 0, where e₂ has no say, those of e₁ at η = π/2. Without upwinding pairs that no path has may lie
+on the right: jumps of ∂u/∂η between elements are penalised by γ h² N⁻³ β (cs)², β the norm of the growth.
+
+On the whole sphere u is even, as x and −x are one direction: waves of θ₁ and θ₂ of even total degree.
+
+With a stop, in its coordinates (q₁, v₁, q₂, v₂), q₁ ≥ 0, and v₁ becomes −R v₁ where q₁ falls to 0. With
+−π/2 ≤ θ₁ ≤ π/2, q̇₁ = ω v₁ whatever the noise is, so that dθ₁/dt = −ω at both ends: paths leave at −π/2, where they
+hit the wall, and come back at π/2,
+
+    u(η, −π/2, θ₂) = ρ^p u(η′, π/2, θ₂),      ρ² = R² cos² η + sin² η,      tan η′ = tan η/R.
+
+The functions of e₁ are continuous elements in θ₁, both of whose ends have values of their own. The wall is the point
+load ω δ(θ₁ + π/2) (ρ^p u(η′, π/2, θ₂) − u): as the noise moves no path over it, one flux. Where the first mass is at
+rest at the stop, η = π/2, impacts come ever faster, and T is a root of the distance. Jumps of ∂u/∂θ₁ are penalised,
+too; the bounds on the speeds across the jumps are 1 and 1/cos η here.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Collection, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any, ClassVar
+
+import numpy as np
+from scipy.linalg import block_diag
+from scipy.sparse import csc_matrix, csr_matrix, diags, identity, kron
+from scipy.sparse.linalg import LinearOperator
+
+from fpsolve.arrays import Coefficient, FloatArray, IntArray, Matrix, one
+from fpsolve.fem.axis import Axis, KroneckerSum, along
+from fpsolve.fem.element import gauss_legendre
+from fpsolve.fem.line import LineSpace
+from fpsolve.fem.mesh import halved
+from fpsolve.fem.terms import Term, Terms
+from fpsolve.model.plane import CoefficientMatrix
+from fpsolve.model.problem import ParameterDerivative, Problem
+
+PENALTY = 0.02
+"""Factor γ of the penalty on jumps of slopes."""
+MOST_DEGREE = 10
+"""Highest degree of an element: beyond, elements are halved."""
+POINTS = 32
+"""Least number of points of a rule on a circle; every second one is looked at for signs."""
+MORE_POINTS = 12
+"""Number of Gauss points between two lines, or what an impact takes to these, beyond the degree."""
+Parts = list[tuple[FloatArray, csr_matrix]]
+"""Σ f(η) g(θ₁, θ₂): values at points of η, shape (points, nodes), and images of functions of both angles."""
+
+
+@dataclass(frozen=True, eq=False)
+class Angle:
+    """Functions of a unit vector e, and their images in a space in which integrals are products.
+
+    The space holds two factors of the components of e beside a function, too.
+
+    Attributes:
+        degrees: of each function; the first one is the constant 1, shape (size,).
+        at: gives values at vectors along e, shape (m, size), from these, shape (dimension, m).
+        points: unit vectors of a rule, shape (dimension, m).
+        fitted: the matrix from values at these points to coefficients, shape (size, m).
+        values, slopes: the images of the functions and of their ∂θ, shape (images, size).
+        unit, tangent: what multiplies images by each component of e, and of de/dθ, shape (images, images).
+        length: of all angles.
+        jumps: the penalty on jumps of slopes, shape (size, size).
+    """
+
+    degrees: IntArray
+    at: Callable[[FloatArray], FloatArray]
+    points: FloatArray
+    fitted: FloatArray
+    values: FloatArray
+    slopes: FloatArray
+    unit: Sequence[Matrix]
+    tangent: Sequence[Matrix]
+    length: float
+    jumps: FloatArray
+
+    @property
+    def size(self) -> int:
+        return self.degrees.size
+
+
+def circle(dimension: int, most: int) -> Angle:
+    """Waves up to a degree, orthonormal in the mean; the constant and the sign of e = ±1."""
+    k = np.arange(1, most + 3)
+    if dimension == 1:
+        points, degrees, slope = np.array([[1.0, -1.0]]), np.arange(2), np.zeros((2, 2))
+    else:
+        theta = np.linspace(0, 2 * math.pi, max(POINTS, 2 * most + 8), endpoint=False)
+        points, degrees = np.stack([np.cos(theta), np.sin(theta)]), np.append(0, np.repeat(k, 2))
+        slope = block_diag(0.0, np.kron(np.diag(k), [[0.0, 1.0], [-1.0, 0.0]]))
+
+    def every(e: FloatArray) -> FloatArray:
+        ones = np.ones(e.shape[1])
+        if dimension == 1:
+            return np.column_stack([ones, np.copysign(ones, e[0])])
+        waves = np.exp(1j * np.outer(np.arctan2(e[1], e[0]), k))
+        return np.column_stack([ones, math.sqrt(2) * waves.view(float)])
+
+    def multiplied(f: FloatArray) -> FloatArray:
+        product = table.T @ (f[:, None] * table)
+        return np.where(np.abs(product) > 1e-14, product, 0.0)
+
+    table = every(points) / math.sqrt(points.shape[1])
+    size, unit = int(np.count_nonzero(degrees <= most)), [multiplied(each) for each in points]
+    return Angle(
+        degrees[:size],
+        lambda e: every(e)[:, :size],
+        points,
+        table.T[:size] / math.sqrt(points.shape[1]),
+        np.eye(degrees.size, size),
+        slope[:, :size],
+        unit,
+        [-unit[1], unit[0]] if dimension == 2 else [slope],
+        2 * math.pi ** (dimension / 2) / math.gamma(dimension / 2),
+        np.zeros((size, size)),
+    )
+
+
+def arc(lines: FloatArray, degree: int) -> Angle:
+    """Elements on a part of a circle, with the constant in place of the function of the last vertex."""
+    line, length = LineSpace(lines, degree, is_flat=True), float(lines[-1] - lines[0])
+    own = np.column_stack([line.constant(), np.delete(np.eye(line.size), line.ends[1], axis=1)])
+    root = np.sqrt(line.measure / length)[:, None]
+    values, unit = root * (line.values @ own), np.stack([np.cos(line.points), np.sin(line.points)])
+    return Angle(
+        np.append(0, np.delete(line.modes, line.ends[1])),
+        lambda e: line.at(np.arctan2(e[1], e[0])) @ own,
+        unit,
+        np.linalg.solve(values.T @ values, (root * values).T),
+        values,
+        root * (line.slopes @ own),
+        [diags(each) for each in unit],
+        [diags(-unit[1]), diags(unit[0])],
+        length,
+        own.T @ _jumps(line, np.ones(lines.size - 2)) @ own / length,
+    )
+
+
+def _jumps(line: LineSpace, speeds: FloatArray) -> FloatArray:
+    """Σ γ h² N⁻³ speed [u′] [v′] over the inner vertices."""
+    sizes, jump = np.diff(line.lines), line.jumps_of_slope().toarray()
+    weights = PENALTY * (0.5 * (sizes[1:] + sizes[:-1])) ** 2 / line.degree**3 * speeds
+    return np.asarray(jump.T @ (weights[:, None] * jump))
+
+
+@dataclass(frozen=True, eq=False)
+class DirectionAxis(Axis):
+    """Elements in η times functions of e₁ and of e₂, see the module.
+
+    Attributes:
+        coordinates: S of y = S⁻¹x, whose directions they are of, n rows; the first group of coordinates first.
+        lines: the vertices in η, shape (m + 1,).
+        degree: of the elements in η.
+        waves: the largest degree of a wave.
+        ways: the names of the degrees by which functions are made finer.
+    """
+
+    coordinates: FloatArray
+    lines: FloatArray = field()
+    degree: int
+    waves: int
+    ways: ClassVar[tuple[str, ...]] = "degree", "waves"
+    most_unknowns = 20_000
+
+    @cached_property
+    def angles(self) -> tuple[Angle, Angle]:
+        """The functions of e₁ and of e₂."""
+        raise NotImplementedError
+
+    @cached_property
+    def _own(self) -> IntArray:
+        """Which products of these there are."""
+        raise NotImplementedError
+
+    @property
+    def levels(self) -> Sequence[IntArray]:
+        """The degree of each function in each of the ways."""
+        raise NotImplementedError
+
+    @property
+    def dimensions(self) -> tuple[int, int]:
+        """Of the two groups of coordinates."""
+        return group_dimensions(len(self.coordinates))
+
+    @property
+    def size(self) -> int:
+        return self._kept.size
+
+    @property
+    def facts(self) -> dict[str, Any]:
+        return {"eta_cells": self.lines.size - 1, "eta_degree": self.degree, "waves": self.waves}
+
+    def enriched(self) -> DirectionAxis:
+        return self.finer(self.ways)
+
+    def deeper(self, *ways: str) -> DirectionAxis:
+        """Two degrees more in some ways."""
+        return replace(self, **{way: getattr(self, way) + 2 for way in ways})
+
+    def finer(self, ways: Collection[str], halved_ways: Collection[str] = ()) -> DirectionAxis:
+        """The same, but elements of the highest degree, and some others, are halved."""
+        found = self.deeper(*ways)
+        for way, lines in (("degree", "lines"), ("first_degree", "first_lines")):
+            if way in ways and (way in halved_ways or getattr(found, way) > MOST_DEGREE):
+                halves = {way: getattr(found, way) // 2, lines: halved(getattr(self, lines))}
+                found = replace(found, **halves)
+        return found
+
+    def new_in(self, coarse: DirectionAxis) -> Any:
+        """Which functions one of lower degrees does not have, shape (size,)."""
+        pairs = zip(self.ways, self.levels, strict=True)
+        return np.any([level > getattr(coarse, way) for way, level in pairs], axis=0)
+
+    @cached_property
+    def line(self) -> LineSpace:
+        """The elements in η."""
+        first, second = (each - 1 for each in self.dimensions)
+
+        def weight(eta: FloatArray) -> FloatArray:
+            return np.cos(eta) ** first * np.sin(eta) ** second
+
+        return LineSpace(self.lines, self.degree, weight, end_exponents=(second, first), is_flat=True)
+
+    @cached_property
+    def _degrees(self) -> IntArray:
+        """Of the functions of e₁ and of e₂ in each of their products, shape (2, products)."""
+        degrees = np.meshgrid(*(each.degrees for each in self.angles), indexing="ij")
+        return np.reshape(degrees, (2, -1))[:, self._own]
+
+    @cached_property
+    def _kept(self) -> IntArray:
+        """Which functions of η times which of these products there are: where a vector has no say they are constant."""
+        first, second = self._degrees
+        kept = np.ones((self.line.size, first.size), dtype=bool)
+        kept[self.line.ends[0], second > 0] = kept[self.line.ends[1], first > 0] = False
+        return np.flatnonzero(kept)
+
+    @cached_property
+    def _places(self) -> tuple[IntArray, IntArray]:
+        """The function of η, and the product of functions of e₁ and e₂, of each unknown."""
+        node, product = np.divmod(self._kept, self._own.size)
+        return node, product
+
+    @cached_property
+    def constant(self) -> FloatArray:
+        constant = np.zeros((self.line.size, self._own.size))
+        constant[:, 0] = self.line.constant()
+        return constant.ravel()[self._kept]
+
+    @cached_property
+    def identity(self) -> Matrix:
+        """∫ u v."""
+        return self._form((self._itself, self._itself))
+
+    @property
+    def unit(self) -> Matrix:
+        return self.identity
+
+    def mass(self, g: Coefficient = one) -> Matrix:
+        return self.identity
+
+    @cached_property
+    def _images(self) -> tuple[csr_matrix, list[list[csr_matrix]], list[list[csr_matrix]]]:
+        """Of u, of e_k e_m u and of t_k e_m ∂θ u, e and t with the components of both vectors."""
+        first, second = self.angles
+        ones = identity(len(first.values)), identity(len(second.values))
+
+        def image(of_first: Matrix, of_second: Matrix) -> csr_matrix:
+            return csr_matrix(csc_matrix(kron(of_first, of_second))[:, self._own])
+
+        itself = image(first.values, second.values)
+        unit = [kron(e, ones[1], "csr") for e in first.unit] + [kron(ones[0], e, "csr") for e in second.unit]
+        turned = [kron(t, ones[1], "csr") @ image(first.slopes, second.values) for t in first.tangent]
+        turned += [kron(ones[0], t, "csr") @ image(first.values, second.slopes) for t in second.tangent]
+        both = [[e @ each for e in unit] for each in (itself, *turned)]
+        return itself, [[e @ each for each in both[0]] for e in unit], both[1:]
+
+    @cached_property
+    def _tables(self) -> tuple[FloatArray, FloatArray]:
+        """Values and slopes of the functions of η at its points."""
+        return self.line.values.toarray(), self.line.slopes.toarray()
+
+    @property
+    def _itself(self) -> Parts:
+        """u."""
+        return [(self._tables[0], self._images[0])]
+
+    def _moved(self, matrix: FloatArray) -> tuple[Parts, Parts]:
+        """h·∇u and q u of a matrix."""
+        itself, along, across = self._images
+        first = self.dimensions[0]
+        groups = range(first), range(first, len(matrix))
+
+        def part(images: list[list[csr_matrix]], i: int, j: int) -> csr_matrix:
+            return sum(
+                (matrix[k, m] * images[k][m] for k in groups[i] for m in groups[j] if matrix[k, m]),
+                csr_matrix(itself.shape),
+            )
+
+        a, b = ([[part(images, i, j) for j in (0, 1)] for i in (0, 1)] for images in (along, across))
+        c, s = np.cos(self.line.points)[:, None], np.sin(self.line.points)[:, None]
+        values, slopes = self._tables
+        moved = [
+            (c * c * slopes, a[1][0]),
+            (c * s * slopes, a[1][1] - a[0][0]),
+            (-s * s * slopes, a[0][1]),
+            (values, b[0][0] + b[1][1]),
+            (s / c * values, b[0][1]),
+            (c / s * values, b[1][0]),
+        ]
+        return moved, [(c * c * values, a[0][0]), (c * s * values, a[0][1] + a[1][0]), (s * s * values, a[1][1])]
+
+    def _form(self, *pairs: tuple[Parts, Parts]) -> csr_matrix:
+        """∫ Σ v̂ û of functions of v and of u."""
+        measure = self.line.measure[:, None]
+        return self._assembled(
+            [
+                (of_v.T @ (measure * of_u), image_of_v.T @ image_of_u)
+                for left, right in pairs
+                for of_v, image_of_v in left
+                for of_u, image_of_u in right
+                if image_of_v.nnz and image_of_u.nnz
+            ]
+        )
+
+    def _assembled(self, terms: Sequence[tuple[Matrix, Matrix]]) -> csr_matrix:
+        """Σ A ⊗ B of matrices in η and in both angles, on the functions that there are."""
+        return csr_matrix(KroneckerSum(terms).tocsc()[:, self._kept])[self._kept]
+
+    def inside(self, term: CoefficientMatrix) -> FloatArray:
+        """S⁻¹AS."""
+        return np.asarray(np.linalg.solve(self.coordinates, np.array(term.matrix) @ self.coordinates))
+
+    def driven(self, term: CoefficientMatrix) -> tuple[Matrix, Matrix]:
+        """∫ v h·∇u and ∫ v q u."""
+        moved, growth = self._moved(self.inside(term))
+        return self._form((self._itself, moved)), self._form((self._itself, growth))
+
+    def diffusion(self, a: CoefficientMatrix, b: CoefficientMatrix) -> tuple[Matrix, Matrix, Matrix]:
+        """∫ v D_a D_b u, D = h·∇ + p q of two matrices, D* v = −h·∇v − tr v + (p + n) q v: by p⁰, p¹ and p²."""
+        (moved, growth), (right, grown) = (self._moved(self.inside(each)) for each in (a, b))
+        factors = (-1.0, moved), (len(self.coordinates), growth), (-float(np.trace(a.matrix)), self._itself)
+        adjoint = [(factor * of_eta, image) for factor, parts in factors for of_eta, image in parts]
+        return (
+            self._form((adjoint, right)),
+            self._form((growth, right), (adjoint, grown)),
+            self._form((growth, grown)),
+        )
+
+    def penalty(self) -> Matrix:
+        """What is added against pairs that no path has."""
+        inner, (first, second), values = self.lines[1:-1], self.angles, self._tables[0]
+        in_eta, itself = _jumps(self.line, self._speeds(np.cos(inner), np.sin(inner))), self._images[0]
+        of_eta = values.T @ ((self.line.measure / np.cos(self.line.points))[:, None] * values)
+        in_theta = kron(first.jumps, identity(second.size), "csc")[:, self._own][self._own]
+        return -self._assembled([(in_eta, itself.T @ itself), (of_eta, in_theta)])
+
+    def _speeds(self, c: FloatArray, s: FloatArray) -> FloatArray:
+        """The measure times the bound on the speed across jumps of ∂u/∂η, over β."""
+        first, second = self.dimensions
+        return c ** (first + 1) * s ** (second + 1)
+
+    @property
+    def area(self) -> float:
+        """dσ/dμ of the surface of the sphere and the measure of the inner products, in which those of angles are 1."""
+        first, second = self.angles
+        return first.length * second.length
+
+    @property
+    def inner_values(self) -> LinearOperator:
+        """Values at points of η and of both angles."""
+        of_theta = np.kron(*(each.at(each.points[:, ::2]) for each in self.angles))
+        return self._along(self._tables[0][:: max(1, self.degree // 4)], of_theta[:, self._own])
+
+    def projection(self, other: DirectionAxis) -> LinearOperator:
+        mixed = self.line.values.T @ diags(self.line.measure) @ other.line.at(self.line.points)
+        of_eta = np.asarray(np.linalg.solve(self.line.mass().toarray(), mixed.toarray()))
+        of_theta = np.kron(
+            *(new.fitted @ old.at(new.points) for new, old in zip(self.angles, other.angles, strict=True))
+        )
+        return other._along(of_eta, of_theta[np.ix_(self._own, other._own)], self._kept)
+
+    def _along(self, of_eta: FloatArray, of_theta: Any, kept: IntArray | slice = slice(None)) -> LinearOperator:
+        """What matrices in η and in both angles make of functions, as far as it is kept."""
+
+        def of_columns(columns: FloatArray) -> FloatArray:
+            table = np.zeros((self.line.size * self._own.size, columns.shape[1]))
+            table[self._kept] = columns
+            table = along((of_eta, of_theta, None), table.reshape(self.line.size, self._own.size, -1))
+            return table.reshape(-1, columns.shape[1])[kept]
+
+        shape = np.arange(len(of_eta) * len(of_theta))[kept].size, self.size
+        return LinearOperator(shape, matvec=lambda v: of_columns(v.reshape(-1, 1)), matmat=of_columns, dtype=float)
+
+    def at(self, points: FloatArray) -> FloatArray:
+        """Values at any directions y, shape (n, m), as rows of E with u(y) = E @ coefficients, shape (m, size)."""
+        groups = np.split(points, [self.dimensions[0]])
+        first, second = (np.linalg.norm(each, axis=0) for each in groups)
+        of_eta = self.line.at(np.arctan2(second, first)).toarray()
+        of_first, of_second = (angle.at(each) for angle, each in zip(self.angles, groups, strict=True))
+        of_theta = np.einsum("xi,xj->xij", of_first, of_second).reshape(len(of_eta), -1)[:, self._own]
+        return np.einsum("xi,xj->xij", of_eta, of_theta).reshape(len(of_eta), -1)[:, self._kept]
+
+    def terms(self, problem: Problem, noises: Sequence[Any]) -> DirectionTerms:
+        """L(p) on these functions times those of each noise."""
+        return DirectionTerms(problem, self, noises)
+
+
+def group_dimensions(n: int) -> tuple[int, int]:
+    """Of the two groups of coordinates."""
+    return n // 2, (n + 1) // 2
+
+
+@dataclass(frozen=True, eq=False)
+class SphereAxis(DirectionAxis):
+    """Those on the whole sphere, even ones."""
+
+    @cached_property
+    def angles(self) -> tuple[Angle, Angle]:
+        first, second = (circle(each, self.waves) for each in self.dimensions)
+        return first, second
+
+    @cached_property
+    def _own(self) -> IntArray:
+        sums = np.add.outer(*(each.degrees for each in self.angles)).ravel()
+        return np.flatnonzero((sums % 2 == 0) & (sums <= self.waves))
+
+    @property
+    def levels(self) -> Sequence[IntArray]:
+        return self.modes, self._degrees.sum(axis=0)[self._places[1]]
+
+    @cached_property
+    def cells(self) -> IntArray:
+        """Elements in η: of the waves what two degrees more change tells."""
+        return np.where(self.modes == 1, -1, self.line.cells[self._places[0]])
+
+    @cached_property
+    def modes(self) -> IntArray:
+        return self.line.modes[self._places[0]]
+
+    @cached_property
+    def nested(self) -> csr_matrix:
+        return self._assembled([(self.line.nested, identity(self._own.size))])
+
+
+@dataclass(frozen=True, eq=False)
+class HalfSphereAxis(DirectionAxis):
+    """Those on the half sphere of a stop.
+
+    Attributes:
+        first_lines: the vertices in θ₁, from −π/2 to π/2.
+        first_degree: of the elements in θ₁.
+    """
+
+    first_lines: FloatArray
+    first_degree: int
+    ways = "degree", "first_degree", "waves"
+
+    @property
+    def facts(self) -> dict[str, Any]:
+        return super().facts | {"theta_cells": self.first_lines.size - 1, "theta_degree": self.first_degree}
+
+    @cached_property
+    def angles(self) -> tuple[Angle, Angle]:
+        return arc(self.first_lines, self.first_degree), circle(2, self.waves)
+
+    @cached_property
+    def _own(self) -> IntArray:
+        return np.arange(math.prod(each.size for each in self.angles))
+
+    @property
+    def levels(self) -> Sequence[IntArray]:
+        node, product = self._places
+        return self.line.modes[node], *self._degrees[:, product]
+
+    def _speeds(self, c: FloatArray, s: FloatArray) -> FloatArray:
+        return c * s**3
+
+    def struck(self, log_factor: float, p: float, derivative: int = 0) -> Matrix:
+        """∂ᵏ/∂pᵏ of ∫ v (ρ^p u(η′, π/2, θ₂) − u) over θ₁ = −π/2."""
+        eta, weights, after, logs = self._impacts(log_factor)
+        found = self._at_wall(eta, weights * np.exp(p * logs) * logs**derivative, self.line.at(after), 1)
+        return found if derivative else found - self._at_wall(eta, weights, self.line.at(eta), 0)
+
+    def changed_impacts(self, log_factor: float, p: float, derivative: int = 0) -> Matrix:
+        """The derivative by ln R of what `struck` gives."""
+        eta, weights, after, logs = self._impacts(log_factor)
+        longer = np.cos(after) ** 2 * (p * logs**derivative + derivative * logs ** max(derivative - 1, 0))
+        turned = -np.sin(after) * np.cos(after) * logs**derivative
+        moved = diags(longer) @ self.line.at(after) + diags(turned) @ self.line.at(after, 1)
+        return self._at_wall(eta, weights * np.exp(p * logs), moved, 1)
+
+    def _impacts(self, log_factor: float) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """η of a rule between the lines and what is taken to them, its weights, η′, and ln ρ."""
+        r = math.exp(log_factor)
+        cuts = np.unique(np.concatenate([self.lines, np.arctan2(r * np.sin(self.lines), np.cos(self.lines))]))
+        cuts = cuts[np.append(True, np.diff(cuts) > 1e-12)]
+        local, weights = gauss_legendre(self.degree + MORE_POINTS)
+        sizes = np.diff(cuts)[:, None]
+        eta = (cuts[:-1, None] + sizes * local).ravel()
+        c, s = np.cos(eta), np.sin(eta)
+        return eta, (sizes * weights).ravel() * c * s, np.arctan2(s, r * c), np.log(np.hypot(r * c, s))
+
+    def _at_wall(self, eta: FloatArray, weights: FloatArray, of_u: csr_matrix, end: int) -> csr_matrix:
+        """∫ v(η, −π/2, θ₂) u over η and θ₂, of values of u at points of η and at an end of θ₁."""
+        first, second = self.angles
+        ends = first.at(np.array([[0.0, 0.0], [-1.0, 1.0]])) / math.sqrt(first.length)
+        of_theta = kron(np.outer(ends[0], ends[end]), identity(second.size))
+        return self._assembled([(self.line.at(eta).T @ diags(weights) @ of_u, of_theta)])
+
+
+class DirectionTerms(Terms):
+    """L(p) of three and four variables. Args as those of `Terms`."""
+
+    def _written(self, term: CoefficientMatrix) -> tuple[str, str, str]:
+        return "h·∇", "q", "(h·∇ + p q)² of white noise"
+
+    def _loads(self) -> Iterator[Term]:
+        """The penalty, as slopes jump by the error of the elements alone, and the stop."""
+        free = sum((self.phi.inside(term) for term in self.system.terms if term.order == 0), 0.0 * self.phi.coordinates)
+        size = float(np.linalg.norm(free + free.T, 2)) / 2
+        yield self._term(size * self.phi.penalty(), one, "penalty on jumps of ∂u/∂η")
+        if self._problem.system.stop:
+            yield self._stop(self.phi.struck, "ω (ρ^p T(η′, π/2, θ₂) − T) δ(θ₁ + π/2)")
+
+    def _changed_loads(self, by: ParameterDerivative) -> Iterator[Term]:
+        """ω is held, as it is that of the coordinates."""
+        for log_factor in by.jumps:
+            yield self._stop(self.phi.changed_impacts, "∂/∂θ", log_factor)
+
+    def _stop(self, struck: Callable[[float, float, int], Matrix], text: str, size: float = 1.0) -> Term:
+        stop, terms = self._problem.system.stop, self.system.terms
+        assert stop is not None
+        omega = sum(self.system.epsilon**each.order * each.g(0.0) * self.phi.inside(each)[0, 1] for each in terms)
+        words = f"{text}, ω = {omega:.6g}, R = {stop.restitution:.6g}"
+        return self._at(lambda p, k: size * omega * struck(math.log(stop.restitution), p, k), words)
