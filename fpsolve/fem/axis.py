@@ -14,7 +14,7 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 import scipy.sparse
-from scipy.sparse import coo_matrix, csc_matrix, csr_matrix, identity, issparse
+from scipy.sparse import csc_matrix, identity, issparse
 
 from fpsolve.arrays import Coefficient, FloatArray, IntArray, Mask, Matrix, dense, one
 from fpsolve.fem.effects import ModeEffects, split
@@ -280,32 +280,5 @@ class KroneckerSum:
         return products.reshape(m, m, n, n).transpose(0, 2, 1, 3).reshape(m * n, m * n)
 
     def tocsc(self) -> csc_matrix:
-        """The sparse matrix, with an entry wherever factors of both sides may have one."""
-        (before, befores), (last, lasts) = (on_one_pattern([pair[side] for pair in self.pairs]) for side in (0, 1))
-        order, rows, starts = product_pattern(before, last)
-        return csc_matrix(((befores.T @ lasts).ravel()[order], rows, starts), shape=(self.size, self.size))
-
-
-def product_pattern(first: csc_matrix, last: csc_matrix) -> tuple[IntArray, IntArray, IntArray]:
-    """Where first ⊗ last has entries, column by column: the places in the table of all products, rows, and starts."""
-    kind: Any = np.int32 if first.nnz * last.nnz < 2**31 else np.int64
-    starts, last_starts = (np.repeat(each.indptr[:-1], np.diff(each.indptr)).astype(kind) for each in (first, last))
-    counts, last_counts = (np.repeat(each, each).astype(kind) for each in map(np.diff, (first.indptr, last.indptr)))
-    own, other = np.arange(first.nnz, dtype=kind), np.arange(last.nnz, dtype=kind)[:, None]
-    at = counts * last_starts[:, None]
-    at += (own - starts) * last_counts[:, None]
-    at += starts * last.nnz + other - last_starts[:, None]
-    order, rows = np.empty(at.size, dtype=kind), np.empty(at.size, dtype=kind)
-    order[at] = own * last.nnz + other
-    rows[at] = first.indices.astype(kind) * last.shape[0] + last.indices[:, None].astype(kind)
-    return order, rows, np.append(0, np.cumsum(np.outer(np.diff(first.indptr), np.diff(last.indptr))))
-
-
-def on_one_pattern(matrices: Sequence[Matrix]) -> tuple[csc_matrix, FloatArray]:
-    """Where any of some matrices has an entry, and the entries of each of them there, one row for each."""
-    table = scipy.sparse.vstack([coo_matrix(each).T.reshape(1, -1) for each in matrices], format="csr")
-    places, at = np.unique(table.indices, return_inverse=True)
-    (rows, columns), shape = matrices[0].shape, (len(matrices), places.size)
-    starts = np.searchsorted(places, rows * np.arange(columns + 1))
-    pattern = csc_matrix((np.ones(places.size), places % rows, starts), shape=(rows, columns))
-    return pattern, csr_matrix((table.data, at, table.indptr), shape=shape).toarray()
+        """The sparse matrix."""
+        return csc_matrix(sum(reduce(scipy.sparse.kron, term) for term in self.terms))
