@@ -228,8 +228,8 @@ DEFECTS: tuple[Defect, ...] = (
     Defect(
         "L5 what lies beyond the interval of ξ is not in the error of λ",
         "exponent/elements.py",
-        "return pair.derivative, change / (WIDER - 1) + self._lacked(pair)",
-        "return pair.derivative, self._lacked(pair)",
+        "return pair.derivative, change / (WIDER - 1) + lacked",
+        "return pair.derivative, lacked",
         "tails",
     ),
     Defect(

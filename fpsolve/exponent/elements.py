@@ -382,16 +382,16 @@ class Elements(Method):
         return value, (self._found(p, tolerance).derivative - value) / p, error
 
     def _among_tails(self, pair: PrincipalPair) -> tuple[float, float]:
-        """λ from a pair at p = 0, on ever wider intervals of the noise, and what its modes and the ends leave.
+        """λ from a pair at p = 0, on ever wider intervals of the noise, with what the ends and the first cells leave.
 
         As the variance is finite, an interval twice as wide leaves less than half of λ that the noise makes beyond it.
         """
-        ends = pair.space.xi.lines[[0, -1]]
+        lacked, ends = self._lacked(pair), pair.space.xi.lines[[0, -1]]
         change = math.inf if np.any(pair.space.xi.weight(ends) * ends**2 > sys.float_info.epsilon) else 0.0
         while change > (WIDER - 1) * self.tolerance(SMALL_P, 0.0) / SMALL_P:
             wider = self.pair_among(widened(pair.generator), pair)
             change, pair = abs(wider.derivative - pair.derivative), wider
-        return pair.derivative, change / (WIDER - 1) + self._lacked(pair)
+        return pair.derivative, change / (WIDER - 1) + lacked
 
     def _lacked(self, pair: PrincipalPair) -> float:
         """Estimate of |error of Λ′| on the interval of a noise: twice what a finer discretisation changes."""
