@@ -132,7 +132,7 @@ def circle(dimension: int, most: int) -> Angle:
 
 def arc(lines: FloatArray, degree: int) -> Angle:
     """Elements on a part of a circle, with the constant in place of the function of the last vertex."""
-    line, length = LineSpace(lines, degree, is_flat=True), float(lines[-1] - lines[0])
+    line, length = LineSpace(lines, degree), float(lines[-1] - lines[0])
     own = np.column_stack([line.constant(), np.delete(np.eye(line.size), line.ends[1], axis=1)])
     root = np.sqrt(line.measure / length)[:, None]
     values, unit = root * (line.values @ own), np.stack([np.cos(line.points), np.sin(line.points)])
@@ -233,7 +233,7 @@ class DirectionAxis(Axis):
         def weight(eta: FloatArray) -> FloatArray:
             return np.cos(eta) ** first * np.sin(eta) ** second
 
-        return LineSpace(self.lines, self.degree, weight, end_exponents=(second, first), is_flat=True)
+        return LineSpace(self.lines, self.degree, weight, end_exponents=(second, first))
 
     @cached_property
     def _degrees(self) -> IntArray:

@@ -37,8 +37,6 @@ class LineSpace:
         degree: polynomial degree, or that in each cell, shape (m,).
         weight: the weight w(x) > 0 of every integral.
         end_exponents: powers with which the weight vanishes at the two ends, honoured by Gauss-Jacobi rules.
-        is_flat: whether the function of a vertex has no slope at the next vertices, by what it has of the first
-            bubble: jumps of slopes then only couple the functions of one vertex and the bubbles beside it.
 
     Attributes:
         degree: the highest one.
@@ -60,7 +58,6 @@ class LineSpace:
         weight: Coefficient = one,
         *,
         end_exponents: tuple[float, float] = (0.0, 0.0),
-        is_flat: bool = False,
     ) -> None:
         self.lines, self._sizes, degrees = lines, np.diff(lines), np.broadcast_to(degree, lines.size - 1)
         self.degree = degree = int(np.max(degrees))
@@ -89,12 +86,6 @@ class LineSpace:
         self._transform /= self._norms[self._dofs][:, None, :]
         norms = self._norms[self._dofs]
         self._shares = shares * norms[:, 2:, None] / norms[:, None, :2]
-        self._flat = np.zeros((lines.size - 1, 2))
-        if is_flat:
-            sides = self._slopes_at_ends()
-            self._flat = -sides[:, [1, 0], [0, 1]] / sides[:, [1, 0], 2]
-            self._transform[:, :, :2] += self._transform[:, :, 2:3] * self._flat[:, None, :]
-            self._shares[:, 0] += self._flat
         self._values, self._slopes = values @ self._transform, slopes @ self._transform
 
     @cached_property
@@ -112,7 +103,8 @@ class LineSpace:
 
     def jumps_of_slope(self) -> csr_matrix:
         """u′(x⁺) − u′(x⁻) at the inner vertices, shape (m − 1, size)."""
-        sides = self._slopes_at_ends()
+        _, slopes = functions(self.degree, np.array([0.0, 1.0]).tobytes())
+        sides = (slopes / self._sizes[:, None, None]) @ self._transform
         rows = np.repeat(np.arange(self.lines.size - 2), self.degree + 1)
         right, left = (
             csr_matrix((values.ravel(), (rows, dofs.ravel())), shape=(self.lines.size - 2, self.size))
@@ -120,18 +112,9 @@ class LineSpace:
         )
         return right - left
 
-    def _slopes_at_ends(self) -> FloatArray:
-        """Slopes of the functions of each cell at both of its ends, shape (m, 2, k + 1)."""
-        _, slopes = functions(self.degree, np.array([0.0, 1.0]).tobytes())
-        return np.asarray((slopes / self._sizes[:, None, None]) @ self._transform)
-
     def constant(self) -> FloatArray:
-        """Coefficients of the function 1, shape (size,): the vertex functions add up to it, but for first bubbles."""
-        found = np.where(self.modes == 1, self._norms, 0.0)
-        if self.degree > 1:
-            loads, own = -np.sum(self._flat * self._norms[self._dofs[:, :2]], axis=1), self._own[:, 2]
-            found[self._dofs[own, 2]] = loads[own]
-        return found
+        """Coefficients of the function 1, shape (size,): the vertex functions add up to it."""
+        return np.where(self.modes == 1, self._norms, 0.0)
 
     @cached_property
     def nested(self) -> csr_matrix:
