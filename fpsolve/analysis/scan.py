@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from itertools import chain, islice
 from time import thread_time
 from typing import Any, NamedTuple
 
@@ -106,39 +106,23 @@ class Scan:
         cells = np.arange(self.nodes.size - 1)[:, None, None]
         return self.between(cells[:, None], cells, shares[:, None], shares)
 
-    def at(self, points: FloatArray) -> Iterator[Sample]:
-        """Interpolated F at some points, shape (n, 2)."""
-        cells = np.clip(np.searchsorted(self.nodes, points, side="right") - 1, 0, self.nodes.size - 2)
-        size, step = self.nodes[cells + 1] - self.nodes[cells], 1e-5
-        aside = step * np.array([[0, 1, -1, 0, 0], [0, 0, 0, 1, -1]])
-        shares = ((points - self.nodes[cells]) / size)[:, :, None] + aside
-        i, j = cells.T[:, :, None]
-        value, right, left, up, down = self.between(i, j, shares[:, 0], shares[:, 1]).T
-        gradients = np.stack([right - left, up - down], axis=1) / (2 * step * size)
-        for point, of, gradient in zip(points, value.tolist(), gradients, strict=True):
-            yield Sample(point, of, gradient, 0.0, self._largest)
-
-    @cached_property
-    def _largest(self) -> float:
-        return float(np.nanmax(np.abs(self.values)))
-
-    def __call__(self, at: FloatArray) -> Sample:
-        """Interpolated F."""
-        return next(self.at(at[None]))
-
     def seeds(self) -> Iterator[Sample]:
-        """F near where it changes its sign: inside the cells, or beside missing nodes on their edges."""
-        shares, found = np.linspace(0, 1, FINE), list[FloatArray]()
+        """Points next to changes of sign, with about the gradient there, inside the cells.
+
+        Of a cell beside a missing node that is on the edges between two nodes alone.
+        """
+        shares = np.linspace(0, 1, FINE)
         inside, whole = self.fine(shares), np.diff(self.nodes)
         for i, j in np.ndindex(inside.shape[:2]):
-            values, steps = inside[i, j], shares
+            values, gradients, steps = inside[i, j], np.stack(np.gradient(inside[i, j]), axis=-1), shares
             if np.isnan(values).any():
-                values, steps = self.values[i : i + 2, j : j + 2], shares[[0, -1]]
-            signs, middles = np.sign(values), steps[:-1] + 0.5 * steps[1]  # where one is 0, too
-            for axis, (in_u, in_v) in enumerate(((middles, steps), (steps, middles))):
-                u, v = np.nonzero(np.abs(np.diff(signs, axis=axis)) > 0)
-                found.append(self.nodes[[i, j]] + whole[[i, j]] * np.stack([in_u[u], in_v[v]], axis=1))
-        yield from self.at(np.concatenate(found))
+                corners = slice(i, i + 2), slice(j, j + 2)
+                values, gradients, steps = self.values[corners], self.gradients[corners], shares[[0, -1]]
+            for axis, (a, b) in enumerate(((1, 0), (0, 1))):
+                changes = np.nonzero(np.abs(np.diff(np.sign(values), axis=axis)) > 0)  # where one is 0, too
+                for u, v in zip(*changes, strict=True):
+                    at = self.nodes[[i, j]] + whole[[i, j]] * 0.5 * (steps[[u, v]] + steps[[u + a, v + b]])
+                    yield Sample(at, 0.0, gradients[u, v] + gradients[u + a, v + b], 0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -192,16 +176,18 @@ def scanned(rows: Sequence[Row], found: Iterator[ScannedRow], progress: Callable
 
     `progress` is called for each node.
     """
-    count, seconds = len(rows), 0.0
-    values, gradients, reasons = np.empty((count, count)), np.empty((count, count, 2)), dict[Message, None]()
-    for row in rows:
-        result = next(found)
-        values[row.number], gradients[row.number] = result.values, result.gradients
-        reasons.update(dict.fromkeys(result.reasons))
-        seconds += result.seconds
-        for _ in range(count):
+    results = list[ScannedRow]()
+    for result in islice(found, len(rows)):
+        results.append(result)
+        for _ in rows:
             progress()
-    return Scan(np.linspace(0, 1, count), values, gradients, tuple(reasons), seconds)
+    return Scan(
+        np.linspace(0, 1, len(rows)),
+        np.stack([each.values for each in results]),
+        np.stack([each.gradients for each in results]),
+        tuple(dict.fromkeys(chain.from_iterable(each.reasons for each in results))),
+        sum(each.seconds for each in results),
+    )
 
 
 def _hermite(x: FloatArray) -> list[tuple[FloatArray, FloatArray]]:

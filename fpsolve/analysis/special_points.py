@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any, TypeVar
 
 import numpy as np
+from scipy.optimize import brentq
 
 from fpsolve.analysis.continuation import PIECES, Point, Trace, correct, correct_on_line
 from fpsolve.analysis.scan import Field, Sample
@@ -27,13 +28,17 @@ Placed = tuple[float, Point]
 def with_folds(field: Field, trace: Trace, names: tuple[str, str]) -> Trace:
     """A branch with the points at which it turns back in u, or in v, for which it has names."""
     new: list[Placed] = []
+
+    def along(place: float, axis: int) -> float:
+        return float(_on(field, trace, place).tangent[axis])
+
     for axis in (0, 1):
-        along = np.array([point.sample.tangent[axis] for point in trace.points])
-        along[np.abs(along) < FLAT] = 0
-        for span in _sign_changes(along, trace.closed):
-            fold = _or_none(_sign_change, field, trace, span, lambda sample, axis=axis: float(sample.tangent[axis]))
-            if fold is not None:
-                new.append((fold[0], Point(fold[1], f"fold in {names[axis]}")))
+        tangents = np.array([point.sample.tangent[axis] for point in trace.points])
+        tangents[np.abs(tangents) < FLAT] = 0
+        for span in _sign_changes(tangents, trace.closed):
+            place = _or_none(brentq, along, *span, (axis,), EQUAL)
+            if place is not None:
+                new.append((place % len(trace.points), Point(_on(field, trace, place), f"fold in {names[axis]}")))
     return with_points(trace, new)
 
 
@@ -45,10 +50,15 @@ def with_values(field: Field, trace: Trace, axis: int, values: Sequence[tuple[fl
         beyond[np.abs(beyond) < EQUAL] = 0
         new += [(float(i), Point(trace.points[i].sample, label)) for i in np.flatnonzero(beyond == 0)]
         for i, j in _sign_changes(beyond, trace.closed):
-            share = beyond[i] / (beyond[i] - beyond[j % beyond.size])
-            found = _or_none(_value_on, field, trace, i, share, axis, value) if j == i + 1 else None
-            if found is not None:
-                new.append((found[0], Point(found[1], label)))
+            if j > i + 1:  # by way of one of these
+                continue
+            place = brentq(lambda place, value=value: trace.between(place)[axis] - value, i, j)
+            guess = trace.between(place)
+            sample = _or_none(correct_on_line, field, axis, value, guess)
+            if sample is not None and np.linalg.norm(sample.at - guess) < 0.1 * np.linalg.norm(
+                trace.between(j) - trace.between(i)
+            ):
+                new.append((place, Point(sample, label)))
     return with_points(trace, new)
 
 
@@ -82,40 +92,12 @@ def with_points(trace: Trace, new: Sequence[Placed]) -> Trace:
     return replace(trace, points=tuple(point for _, point in sorted(placed, key=lambda each: each[0])))
 
 
-def _sign_change(
-    field: Field, trace: Trace, span: tuple[int, int], component: Callable[[Sample], float]
-) -> tuple[float, Sample] | None:
-    """The place between two points of a branch where something changes its sign, and F there."""
-    from scipy.optimize import brentq  # which takes long to import
-
-    def at(place: float) -> Sample:
-        i = min(int(place), span[1] - 1)
-        k = i % len(trace.points)
-        sample = correct(field, trace.between(k, place - i), trace.points[k].sample.tangent)
-        if sample is None:
-            raise NotConverged("Newton's method does not settle")
-        return sample
-
-    if component(at(span[0])) * component(at(span[1])) >= 0:
-        return None
-    place = float(brentq(lambda place: component(at(place)), *span, xtol=EQUAL))
-    return place % len(trace.points), at(place)
-
-
-def _value_on(field: Field, trace: Trace, i: int, share: float, axis: int, value: float) -> tuple[float, Sample] | None:
-    """The point where u, or v, has a value, about at a share of the way from the point i to the next."""
-    guess = trace.between(i, share)
-    size = float(np.linalg.norm(trace.between(i, 1.0) - trace.between(i, 0.0)))
-    direct = _or_none(correct_on_line, field, axis, value, guess)
-    if direct is not None and np.linalg.norm(direct.at - guess) < 0.1 * size:
-        return i + share, direct
-    found = _sign_change(field, trace, (i, i + 1), lambda sample: float(sample.at[axis]) - value)
-    if found is None:
-        return None
-    exact = _or_none(correct_on_line, field, axis, value, found[1].at)
-    if exact is not None and np.linalg.norm(exact.at - found[1].at) < 0.1 * size:
-        return found[0], exact
-    return found
+def _on(field: Field, trace: Trace, place: float) -> Sample:
+    """F at a place of a branch. Raises `FpsolveError`."""
+    tangent = trace.points[int(place) % len(trace.points)].sample.tangent
+    if (sample := correct(field, trace.between(place), tangent)) is None:
+        raise NotConverged("Newton's method does not settle")
+    return sample
 
 
 def _crossing(fields: tuple[Field, Field], at: FloatArray) -> tuple[Sample, Sample] | None:
@@ -133,7 +115,7 @@ def _or_none(search: Callable[..., Found | None], *arguments: Any) -> Found | No
     """What a search finds; None where F does not exist on its way."""
     try:
         return search(*arguments)
-    except (FpsolveError, np.linalg.LinAlgError):
+    except (FpsolveError, ValueError):  # no value, one sign at both ends, or lines that are parallel
         return None
 
 
