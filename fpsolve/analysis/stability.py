@@ -138,8 +138,12 @@ class Boundary(Result):
     def zero_field(self) -> ZeroField:
         """F over the unit square, with the time that is left for the line."""
         most = math.inf if self.budget.line_seconds is None else self.budget.line_seconds
-        frame, spent = (self.target, self.problem, (self.x, self.y)), Message(Code.LINE_SPENT, most=most)
-        return ZeroField(*frame, self.budget, None, most - self.seconds, spent, self.known)
+        return self._field(self.rtol, most - self.seconds, Message(Code.LINE_SPENT, most=most))()
+
+    def _field(self, rtol: float, seconds: float, spent: Message) -> Callable[[], ZeroField]:
+        """Gives F over the unit square; it pickles."""
+        frame = self.target, self.problem, (self.x, self.y)
+        return partial(ZeroField, *frame, self.budget, rtol, seconds, spent, self.known)
 
     def remark(self) -> str:
         """That there is no line, or not all of it, as a `Message`, or an empty text."""
@@ -168,8 +172,7 @@ class Boundary(Result):
         share = math.inf if most is None else SCAN_SHARE * most / count
         seconds, key = min((self.budget.seconds, "budget.seconds"), (share, LINE_KEY))
         spent = Message(Code.ROW_SPENT, most=seconds, key=key)
-        frame = self.target, self.problem, (self.x, self.y)
-        rough = partial(ZeroField, *frame, self.budget, self.scan_rtol, seconds, spent, self.known)
+        rough = self._field(self.scan_rtol, seconds, spent)
         return [Row(rough, count, number) for number in range(count)]
 
     def solve(

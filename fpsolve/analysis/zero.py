@@ -93,16 +93,21 @@ def check_axes(problem: Problem, x: Axis, y: Axis) -> None:
             raise ValueError(f"got {shown(axis)} as an axis; must be an Axis")
         if axis.key not in known:
             raise ValueError(f"got {axis.key} as an axis; the parameters are {', '.join(known) or 'none'}")
-        for name, value in (("start", axis.start), ("stop", axis.stop)):
-            try:
-                problem.at({axis.key: value})
-            except ValidationError as failure:
-                if failure.errors()[0]["loc"]:  # of this parameter alone
-                    raise ValueError(f"got {axis.key} with {name} = {value:g}: {said(failure)}") from failure
-            except ValueError:  # elsewhere in the frame it may be one
-                continue
+        check_ends(problem, axis)
     if x.key == y.key:
         raise ValueError(f"both axes are {x.key}; choose another parameter for one of them")
+
+
+def check_ends(problem: Problem, axis: Axis) -> None:
+    """Refuse an axis that ends where its parameter may not be. Raises `ValueError`."""
+    for name, value in (("start", axis.start), ("stop", axis.stop)):
+        try:
+            problem.at({axis.key: value})
+        except ValidationError as failure:
+            if failure.errors()[0]["loc"]:  # of this parameter alone
+                raise ValueError(f"got {axis.key} with {name} = {value:g}: {said(failure)}") from failure
+        except ValueError:  # with other values of the other parameters it may be one
+            continue
 
 
 def is_none(reason: Message) -> bool:
@@ -128,7 +133,7 @@ class ZeroField:
         problem: the problem with the values of all other parameters.
         axes: the parameters.
         budget: for a solve.
-        rtol: of F, relative to its scale; that of lines if None.
+        rtol: of F, relative to its scale.
         seconds: of the processor for all values together; each may take half of what is left.
         spent: what is said where they do not suffice.
         known: points that need not be solved again.
@@ -144,17 +149,16 @@ class ZeroField:
         problem: Problem,
         axes: tuple[Axis, Axis],
         budget: Budget,
-        rtol: float | None = None,
-        seconds: float = math.inf,
-        spent: Message | None = None,
-        known: Known | None = None,
+        rtol: float,
+        seconds: float,
+        spent: Message,
+        known: Known | None,
     ) -> None:
-        method, keys = choose(problem), [axis.key for axis in axes]
-        rtol, of_value = method.line_rtol(target.order) if rtol is None else rtol, line_of_value(method, target)
-        self._axes, self._distance = axes, Distance(problem, target, keys, budget, rtol, of_value)
-        self._seconds, self._spent = seconds, spent or Message(Code.LINE_SPENT, most=seconds)
-        self.spent_seconds, self.stopped = 0.0, None if seconds > 0 else self._spent
-        self._rtol, self._known = rtol, known
+        self._axes, self._rtol, self._known = axes, rtol, known
+        settings = {"rtol": rtol, "of_value": line_of_value(choose(problem), target), "budget": budget}
+        self._distance = Distance(problem, target, [axis.key for axis in axes], **settings)
+        self._seconds, self._spent = seconds, spent
+        self.spent_seconds, self.stopped = 0.0, None if seconds > 0 else spent
 
     def __call__(self, at: FloatArray) -> Sample:
         """F at (u, v).
@@ -174,27 +178,23 @@ class ZeroField:
     def _solved(self, at: FloatArray) -> Sample | Message:
         """F, or why there is none."""
         left = self._seconds - self.spent_seconds
-        if left <= 0:
-            return self._stop()
         share = Meter(HALF * left, number=self._distance.target.symbol)
         try:
-            with share.running():
-                return self._at(at)
+            if left > 0:
+                with share.running():
+                    return self._at(at)
         except OverBudget:
-            return self._stop()
+            pass
         except FpsolveError as failure:
             return failure.message
         finally:
             self.spent_seconds += share.spent
-
-    def _stop(self) -> Message:
         self.stopped = self._spent
         return self.stopped
 
     def _at(self, at: FloatArray) -> Sample:
         """F at (u, v), from a solve. Raises `FpsolveError`."""
         places = list(zip(self._axes, at.tolist(), strict=True))
-        theta = np.array([axis.value(share) for axis, share in places])
-        slopes = np.array([axis.slope(share) for axis, share in places])
-        found = self._distance(theta)
+        found = self._distance(np.array([axis.value(share) for axis, share in places]))
+        slopes = [axis.slope(share) for axis, share in places]
         return found._replace(at=at, gradient=found.gradient * slopes, rtol=self._rtol)
