@@ -203,12 +203,12 @@ class Uncertainty(Result):
     def to_xarray(self) -> xarray.Dataset:
         """The values, and the ends of their intervals."""
         numbers = dict[Quantity, Any]()
-        rows = [(RECORDS[name], [spread], ()) for name, spread in self.indices.items()]
-        for quantity, spreads, dims in [(MOMENT, self.moments, MOMENT.dims), *rows]:
+        rows = [(RECORDS[name], [spread]) for name, spread in self.indices.items()]
+        for quantity, spreads in [(MOMENT, self.moments), *rows]:
             ends = {which: quantity.end(which, LEVEL) for which in ("low", "high")}
             for part, record in {"value": quantity, **ends}.items():
                 column = np.array([math.nan if each is None else getattr(each, part) for each in spreads])
-                numbers[record] = column if dims else column[0]
+                numbers[record] = column if quantity.dims else column[0]
         held = self.sensitivities.theta
         return dataset("uncertainty to first order", "finite elements", numbers, {P: self.p}, held, level=LEVEL)
 
