@@ -55,7 +55,7 @@ SAME = 1e-8
 BEYOND = 0.1
 """Rise of |F| with the distance from the last point, over |∇F|, that is assumed where F has no value."""
 NEAREST = 1e-6
-"""Largest component of x + μ ∇F, but for what leads out of a range, at the nearest point."""
+"""Largest component of x + μ ∇F at the nearest point, where the steps end before it is `SAME`."""
 FALL = 1e-15
 """Change of ½|x|² with which the quadratic problems end."""
 
@@ -346,22 +346,30 @@ def _nearest_from(
     def at(x: FloatArray) -> Sample | None:
         return tried(origin + np.clip(x, low, high) * units)
 
+    def off(sample: Sample) -> float:
+        """The largest component of x + μ ∇F, but for what leads out of a range."""
+        x, gradient = x_of(sample), sample.gradient * units
+        free = gradient * ((x > low) & (x < high))
+        if not free.any():
+            return 0.0
+        return float(np.max(np.abs(x - np.clip((x @ free) / (free @ free) * gradient, low, high))))
+
     def value(x: FloatArray) -> float:
         """F; where there is none more than at the last point, so that a step to there is made shorter.
 
         Raises:
-            StopIteration: the steps take too many points.
+            StopIteration: it is the nearest point, or the steps take too many.
         """
-        if tried.solves >= most:
-            raise StopIteration
         if (here := at(x)) is None:
             return abs(taken[-1].value) / size + BEYOND * float(np.linalg.norm(x - x_of(taken[-1])))
+        if tried.solves >= most or (_is_met(here) and off(here) <= SAME):
+            taken.append(here)
+            raise StopIteration
         return 0.0 if _is_met(here) else here.value / size
 
     def slope(x: FloatArray) -> FloatArray:
         """∇F at a point that is taken. Raises `StopIteration` where there is none."""
-        here = at(x)
-        if here is None:
+        if (here := at(x)) is None:
             raise StopIteration
         taken.append(here)
         return here.gradient * units / size
@@ -376,8 +384,4 @@ def _nearest_from(
             constraints={"type": "eq", "fun": value, "jac": slope},
             options={"ftol": FALL, "maxiter": MOST_SOLVES},
         )
-    x, gradient = x_of(taken[-1]), taken[-1].gradient * units
-    free = gradient * ((x > low) & (x < high))
-    multiplier = -(x @ free) / ((free @ free) or 1.0)
-    is_nearest = not free.any() or np.max(np.abs(x - np.clip(-multiplier * gradient, low, high))) <= NEAREST
-    return taken[-1] if is_nearest and _is_close(taken[-1]) else None
+    return taken[-1] if _is_close(taken[-1]) and off(taken[-1]) <= NEAREST else None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import chain, islice
+from itertools import chain, islice, pairwise, product
 from time import thread_time
 from typing import Any, NamedTuple
 
@@ -16,8 +16,8 @@ from fpsolve.messages import Message
 
 TOLERANCE = 1e-10
 """|F| over its scale up to which it is 0, unless more is allowed."""
-FINE = 13
-"""Number of points along a cell of a scan at which its interpolation is looked at."""
+FINE = 12
+"""Number of pieces, each way, of a cell of a scan in which its interpolation is looked at."""
 
 
 class Sample(NamedTuple):
@@ -82,47 +82,43 @@ class Scan:
     reasons: tuple[Message, ...] = ()
     seconds: float = 0.0
 
-    def between(self, i: Any, j: Any, s: FloatArray, t: FloatArray) -> FloatArray:
-        """F in the cells of the nodes (i, j) to (i + 1, j + 1), s and t in [0, 1], by bicubic interpolation.
+    def on(self, points: FloatArray) -> FloatArray:
+        """F on the grid of these points of both sides, shape (n, n), u first, by bicubic interpolation.
 
-        The mixed derivatives are those by which it is exact for all cubic F (A. Adini, 1960). All four are broadcast.
+        The mixed derivatives are those by which it is exact for all cubic F (A. Adini, 1960).
         """
-        along, across = self.nodes[i + 1] - self.nodes[i], self.nodes[j + 1] - self.nodes[j]
-        ends = (0, 0), (0, 1), (1, 0), (1, 1)
-        values = {(a, b): self.values[i + a, j + b] for a, b in ends}
-        by_s = {(a, b): along * self.gradients[i + a, j + b, 0] for a, b in ends}
-        by_t = {(a, b): across * self.gradients[i + a, j + b, 1] for a, b in ends}
-        flat = values[1, 1] - values[1, 0] - values[0, 1] + values[0, 0]
-        in_s, in_t, total = _hermite(s), _hermite(t), np.zeros(1)
-        for a, b in ends:
-            (hold_s, rise_s), (hold_t, rise_t) = in_s[a], in_t[b]
-            twist = by_t[1, b] - by_t[0, b] + by_s[a, 1] - by_s[a, 0] - flat
-            total = total + (values[a, b] * hold_s + by_s[a, b] * rise_s) * hold_t
-            total = total + (twist * rise_s + by_t[a, b] * hold_s) * rise_t
+        size = 1 / (self.nodes.size - 1)
+        cells = np.minimum((points / size).astype(int), self.nodes.size - 2)
+        i, j = cells[:, None], cells
+        f, (by_u, by_v) = self.values, size * np.moveaxis(self.gradients, 2, 0)
+        flat = f[i + 1, j + 1] - f[i + 1, j] - f[i, j + 1] + f[i, j]
+        ends, total = _hermite(points / size - cells), np.zeros(1)
+        for (a, (hold_u, rise_u)), (b, (hold_v, rise_v)) in product(enumerate(ends), repeat=2):
+            hold_u, rise_u, at = hold_u[:, None], rise_u[:, None], (i + a, j + b)
+            twist = by_v[i + 1, j + b] - by_v[i, j + b] + by_u[i + a, j + 1] - by_u[i + a, j] - flat
+            total = total + (f[at] * hold_u + by_u[at] * rise_u) * hold_v
+            total = total + (twist * rise_u + by_v[at] * hold_u) * rise_v
         return total
 
-    def fine(self, shares: FloatArray) -> FloatArray:
-        """F at shares of the sides of every cell, shape (cells, cells, shares, shares), in both u first."""
-        cells = np.arange(self.nodes.size - 1)[:, None, None]
-        return self.between(cells[:, None], cells, shares[:, None], shares)
-
     def seeds(self) -> Iterator[Sample]:
-        """Points next to changes of sign, with about the gradient there, inside the cells.
+        """Points on the lines F = 0 of the interpolated F, each with a gradient that tells their direction.
 
-        Of a cell beside a missing node that is on the edges between two nodes alone.
+        Beside missing nodes they are those of F on the nodes.
         """
-        shares = np.linspace(0, 1, FINE)
-        inside, whole = self.fine(shares), np.diff(self.nodes)
-        for i, j in np.ndindex(inside.shape[:2]):
-            values, gradients, steps = inside[i, j], np.stack(np.gradient(inside[i, j]), axis=-1), shares
-            if np.isnan(values).any():
-                corners = slice(i, i + 2), slice(j, j + 2)
-                values, gradients, steps = self.values[corners], self.gradients[corners], shares[[0, -1]]
-            for axis, (a, b) in enumerate(((1, 0), (0, 1))):
-                changes = np.nonzero(np.abs(np.diff(np.sign(values), axis=axis)) > 0)  # where one is 0, too
-                for u, v in zip(*changes, strict=True):
-                    at = self.nodes[[i, j]] + whole[[i, j]] * 0.5 * (steps[[u, v]] + steps[[u + a, v + b]])
-                    yield Sample(at, 0.0, gradients[u, v] + gradients[u + a, v + b], 0.0, 0.0)
+        from contourpy import contour_generator  # not before it is needed, as it takes a while
+
+        finer = np.linspace(0, 1, FINE * (self.nodes.size - 1) + 1)
+        for points, values in ((finer, self.on(finer)), (self.nodes, self.values)):
+            holes = np.isnan(values)
+            lines: Any = contour_generator(
+                points, points, np.ma.array(values, mask=holes).T, line_type="Separate"
+            ).lines(0.0)
+            for line in lines:
+                for start, end in pairwise(line):
+                    if (along := end - start).any():
+                        yield Sample(0.5 * (start + end), 0.0, np.array([-along[1], along[0]]), 0.0, 0.0)
+            if not holes.any():
+                return
 
 
 @dataclass(frozen=True)
