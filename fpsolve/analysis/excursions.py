@@ -68,8 +68,6 @@ PARTS = 32
 """Number of parts into which a cell of φ is cut for the integral of q⁺, which has kinks."""
 POINTS = 2000
 """Number of points of ξ in this integral."""
-LEAST_SHOWN = 1e-12
-"""Smallest probability that is shown."""
 SHOWN_LEVELS = (2.0, 4.0, 8.0, 16.0, 32.0)
 
 
@@ -146,9 +144,9 @@ class Excursion(Result):
         levels = np.geomspace(1.01, 100.0, 101)
         low, high = self.bounds(levels)
         style = {"label": "bounds", **coloured(axes, kwargs)}
-        axes.plot(levels, np.maximum(low, LEAST_SHOWN), **style)
+        axes.plot(levels, low, **style)
         axes.plot(levels, high, **{**style, "label": None})
-        axes.fill_between(levels, np.maximum(low, LEAST_SHOWN), high, color=style["color"], alpha=0.2, linewidth=0)
+        axes.fill_between(levels, low, high, color=style["color"], alpha=0.2, linewidth=0)
         if self.upcrossings is not None:
             count = self.expected_upcrossings(levels)
             axes.plot(levels, count, linestyle="--", color=style["color"], label="upcrossings for large A")

@@ -89,10 +89,10 @@ class Sensitivities(Result):
         single = [(RECORDS[name], (self.indices[name],)) for name in RECORDS if name in self.indices]
         for record, rows in [(MOMENT, self.moments), *single]:
             slope = record.by(THETA)
-            shape = (len(rows), len(self.theta))[2 - len(slope.dims) :]  # without p there is one row
             for quantity, of in ((slope, "value"), (slope.error(), "error_estimate")):
-                flat = [getattr(row[key], of) if key in row else np.nan for row in rows for key in self.theta]
-                numbers[quantity] = np.array(flat, dtype=float).reshape(shape)
+                table = [[getattr(row[key], of) if key in row else np.nan for key in self.theta] for row in rows]
+                shape = (len(rows), len(self.theta))
+                numbers[quantity] = np.reshape(table, shape if record is MOMENT else shape[1:])
         key = replace(THETA, name="parameter", words="key of a parameter", latex="", unit="1")
         unit = replace(THETA, name="theta_unit", words="unit of theta", latex="", unit="1")
         coordinates = {

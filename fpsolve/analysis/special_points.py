@@ -20,6 +20,8 @@ FLAT = 1e-6
 """Largest component of a tangent that has no sign: along a straight line it is rounding."""
 MOST_STEPS = 12
 """Largest number of steps of Newton's method to a crossing."""
+BY_A_HAIR = 0.01
+"""How far two pieces may miss each other, over their lengths."""
 Found = TypeVar("Found")
 Placed = tuple[float, Point]
 """A point, and its place: 2.5 is half way between the points 2 and 3 of a branch."""
@@ -64,17 +66,15 @@ def with_values(field: Field, trace: Trace, axis: int, values: Sequence[tuple[fl
 
 def crossings(one: Trace, other: Trace, fields: tuple[Field, Field]) -> Iterator[tuple[Placed, Placed]]:
     """The points that two branches have in common: the place and F on each of them, without labels."""
-    a, b = one.fine, other.fine
     known: list[FloatArray] = []
-    for i in range(len(a) - 1):
-        for j, shares in _meetings(a[i], a[i + 1] - a[i], b):
-            guess, way = a[i] + shares[0] * (a[i + 1] - a[i]), PIECES * float(np.linalg.norm(a[i + 1] - a[i]))
-            samples = _or_none(_crossing, fields, guess)
-            if samples is None or np.linalg.norm(samples[0].at - guess) > 0.5 * way:
-                continue
-            if all(np.linalg.norm(samples[0].at - at) > 10 * EQUAL for at in known):
-                known.append(samples[0].at)
-                yield ((i + shares[0]) / PIECES, Point(samples[0])), ((j + shares[1]) / PIECES, Point(samples[1]))
+    for i, j in _meetings(one.fine, other.fine):
+        guess, step = one.between(i), np.linalg.norm(one.between(int(i) + 1) - one.between(int(i)))
+        samples = _or_none(_crossing, fields, guess)
+        if samples is None or np.linalg.norm(samples[0].at - guess) > 0.5 * step:
+            continue
+        if all(np.linalg.norm(samples[0].at - at) > 10 * EQUAL for at in known):
+            known.append(samples[0].at)
+            yield (i, Point(samples[0])), (j, Point(samples[1]))
 
 
 def with_points(trace: Trace, new: Sequence[Placed]) -> Trace:
@@ -128,14 +128,16 @@ def _sign_changes(values: FloatArray, closed: bool) -> Iterator[tuple[int, int]]
             yield int(i), int(j)
 
 
-def _meetings(start: FloatArray, way: FloatArray, line: FloatArray) -> Iterator[tuple[int, tuple[float, float]]]:
-    """The segments of a polyline that cross a segment, or hardly miss it, and where on both."""
-    starts, ways = line[:-1], np.diff(line, axis=0)
+def _meetings(one: FloatArray, other: FloatArray) -> Iterator[tuple[float, float]]:
+    """The places on both where pieces of two polylines cross, or hardly miss each other."""
+    start, way = one[:-1, None], np.diff(one, axis=0)[:, None]
+    gap, ways = other[:-1] - start, np.diff(other, axis=0)[None]
     with np.errstate(divide="ignore", invalid="ignore"):
-        across = way[0] * ways[:, 1] - way[1] * ways[:, 0]
-        gap = starts - start
-        first = (gap[:, 0] * ways[:, 1] - gap[:, 1] * ways[:, 0]) / across
-        second = (gap[:, 0] * way[1] - gap[:, 1] * way[0]) / across
-    low, high = -0.01, 1.01
-    for j in np.flatnonzero((first >= low) & (first <= high) & (second >= low) & (second <= high)):
-        yield int(j), (float(np.clip(first[j], 0, 1)), float(np.clip(second[j], 0, 1)))
+        first, second = (_cross(gap, each) / _cross(way, ways) for each in (ways, way))
+    is_near = np.all([(share >= -BY_A_HAIR) & (share <= 1 + BY_A_HAIR) for share in (first, second)], axis=0)
+    for i, j in np.argwhere(is_near):
+        yield tuple((k + np.clip(share[i, j], 0, 1)) / PIECES for k, share in ((i, first), (j, second)))
+
+
+def _cross(one: FloatArray, other: FloatArray) -> FloatArray:
+    return np.asarray(one[..., 0] * other[..., 1] - one[..., 1] * other[..., 0])

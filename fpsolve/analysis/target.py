@@ -80,8 +80,7 @@ class Target:
     @property
     def latex(self) -> str:
         """`equation` in LaTeX, with dollars."""
-        symbols = {"lyapunov_exponent": r"\lambda", "stability_index": r"\delta_p", "moment": rf"\Lambda({self.p:g})"}
-        return f"${symbols[self.kind]} = {self.value:g}$"
+        return f"${self.quantity.latex.strip('$')} = {self.value:g}$"
 
 
 def target_of(text: str) -> Target:

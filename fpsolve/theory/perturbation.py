@@ -265,7 +265,7 @@ def scale_of(problem: Problem) -> Scale:
     steady = np.zeros((problem.dimension, problem.dimension))
     for term in system.terms:
         size = system.epsilon**term.order * term.fastest[1]
-        noise, driven = problem.named_noise(term.noise), 0.0
+        noise = problem.named_noise(term.noise)
         if line := affine(term.g):
             at_mean = line[0] + (line[1] and line[1] * noise.mean)
             steady += system.epsilon**term.order * at_mean * np.array(term.matrix)
