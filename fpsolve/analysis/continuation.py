@@ -103,6 +103,10 @@ class Trace:
         one, other = (self.points[k % len(self.points)].sample for k in (i, i + 1))
         return cubic(one.at, other.at, one.tangent, other.tangent, place - i)
 
+    def step(self, place: float) -> float:
+        """The distance of the points before and after a place."""
+        return float(np.linalg.norm(self.between(int(place) + 1) - self.between(int(place))))
+
     def holds(self, sample: Sample, within: float = SAME) -> bool:
         """Whether it runs through a point of a curve, or near to it the same way; F > 0 left of both."""
         start, way = self.fine[:-1], np.diff(self.fine, axis=0)

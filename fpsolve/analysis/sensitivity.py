@@ -16,7 +16,7 @@ in which B T = 0 at p = 0, where T = 1 whatever θ. And ∂δ_p/∂θ = −∂Λ
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -54,9 +54,7 @@ if TYPE_CHECKING:
 
 _EPS = sys.float_info.epsilon
 RECORDS = {each.name: each for each in (LYAPUNOV_EXPONENT, STABILITY_INDEX, VARIANCE_RATE)}
-"""The quantities besides Λ(p) that have sensitivities, by their names."""
-DIFFERENTIATED = tuple(RECORDS)
-"""The quantities that are no function of p."""
+"""The quantities besides Λ(p) that have sensitivities, by their names: those that are no function of p."""
 MOST_BARS = 4
 """Largest number of p whose sensitivities are drawn."""
 Slopes = Mapping[str, Estimate]
@@ -154,7 +152,7 @@ def sensitivities(
     """
     solver = solver_of(problem, mesh, rtol, budget)
     points = checked_moments(p, solver.method, may_be_empty=True)
-    indices = DIFFERENTIATED if solver.method.has_pairs else ()
+    indices = tuple(RECORDS) if solver.method.has_pairs else ()
     return solve_sensitivities(solver, points, problem.derivatives(), indices=indices, progress=progress)
 
 
@@ -163,7 +161,7 @@ def solve_sensitivities(
     p: FloatArray,
     along: Mapping[str, ParameterDerivative],
     *,
-    indices: Sequence[str] = DIFFERENTIATED,
+    indices: Iterable[str] = RECORDS,
     root: float | None = None,
     progress: Callable[[], None] = lambda: None,
 ) -> Sensitivities:

@@ -30,17 +30,11 @@ Placed = tuple[float, Point]
 def with_folds(field: Field, trace: Trace, names: tuple[str, str]) -> Trace:
     """A branch with the points at which it turns back in u, or in v, for which it has names."""
     new: list[Placed] = []
-
-    def along(place: float, axis: int) -> float:
-        return float(_on(field, trace, place).tangent[axis])
-
     for axis in (0, 1):
         tangents = np.array([point.sample.tangent[axis] for point in trace.points])
         tangents[np.abs(tangents) < FLAT] = 0
-        for span in _sign_changes(tangents, trace.closed):
-            place = _or_none(brentq, along, *span, (axis,), EQUAL)
-            if place is not None:
-                new.append((place % len(trace.points), Point(_on(field, trace, place), f"fold in {names[axis]}")))
+        for place in _roots(trace, tangents, lambda place, axis=axis: _on(field, trace, place).tangent[axis]):
+            new.append((place, Point(_on(field, trace, place), f"fold in {names[axis]}")))
     return with_points(trace, new)
 
 
@@ -51,15 +45,10 @@ def with_values(field: Field, trace: Trace, axis: int, values: Sequence[tuple[fl
         beyond = np.array([point.sample.at[axis] for point in trace.points]) - value
         beyond[np.abs(beyond) < EQUAL] = 0
         new += [(float(i), Point(trace.points[i].sample, label)) for i in np.flatnonzero(beyond == 0)]
-        for i, j in _sign_changes(beyond, trace.closed):
-            if j > i + 1:  # by way of one of these
-                continue
-            place = brentq(lambda place, value=value: trace.between(place)[axis] - value, i, j)
+        for place in _roots(trace, beyond, lambda place, value=value: trace.between(place)[axis] - value):
             guess = trace.between(place)
             sample = _or_none(correct_on_line, field, axis, value, guess)
-            if sample is not None and np.linalg.norm(sample.at - guess) < 0.1 * np.linalg.norm(
-                trace.between(j) - trace.between(i)
-            ):
+            if sample is not None and np.linalg.norm(sample.at - guess) < 0.1 * trace.step(place):
                 new.append((place, Point(sample, label)))
     return with_points(trace, new)
 
@@ -68,9 +57,9 @@ def crossings(one: Trace, other: Trace, fields: tuple[Field, Field]) -> Iterator
     """The points that two branches have in common: the place and F on each of them, without labels."""
     known: list[FloatArray] = []
     for i, j in _meetings(one.fine, other.fine):
-        guess, step = one.between(i), np.linalg.norm(one.between(int(i) + 1) - one.between(int(i)))
+        guess = one.between(i)
         samples = _or_none(_crossing, fields, guess)
-        if samples is None or np.linalg.norm(samples[0].at - guess) > 0.5 * step:
+        if samples is None or np.linalg.norm(samples[0].at - guess) > 0.5 * one.step(i):
             continue
         if all(np.linalg.norm(samples[0].at - at) > 10 * EQUAL for at in known):
             known.append(samples[0].at)
@@ -119,13 +108,15 @@ def _or_none(search: Callable[..., Found | None], *arguments: Any) -> Found | No
         return None
 
 
-def _sign_changes(values: FloatArray, closed: bool) -> Iterator[tuple[int, int]]:
-    """The neighbours between which a sequence changes its sign, passing over zeros; of a closed one beyond its end."""
+def _roots(trace: Trace, values: FloatArray, value: Callable[[float], float]) -> Iterator[float]:
+    """The places of a branch where something changes its sign, passing over zeros, from its values at the points."""
     signed = np.flatnonzero(values)
-    ahead = [*signed[1:], *(signed[:1] + values.size)] if closed else signed[1:]
+    ahead = [*signed[1:], *(signed[:1] + values.size)] if trace.closed else signed[1:]
     for i, j in zip(signed, ahead, strict=False):
         if values[i] * values[j % values.size] < 0:
-            yield int(i), int(j)
+            place = _or_none(brentq, value, i, j, (), EQUAL)
+            if place is not None:
+                yield place % values.size
 
 
 def _meetings(one: FloatArray, other: FloatArray) -> Iterator[tuple[float, float]]:

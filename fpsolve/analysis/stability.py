@@ -199,7 +199,7 @@ class Boundary(Result):
         obstacles = [] if zero_field.stopped is None else [zero_field.stopped]
         is_empty = not np.isfinite(scan.values).any()
         obstacles += [each for each in scan.reasons if is_of_line(each) or (is_empty and not is_none(each))]
-        seconds = now.seconds + zero_field.spent_seconds
+        seconds = now.seconds + zero_field.seconds
         yield replace(now, seconds=seconds, obstacles=tuple(obstacles), complete=not obstacles)
 
     def _special(self, zero_field: ZeroField, trace: Trace) -> Trace:

@@ -20,9 +20,6 @@ from fpsolve.messages import Code, Message
 from fpsolve.model.faults import strict_dataclass
 from fpsolve.model.problem import Problem, checked_problem
 
-HALF = 0.5
-"""Share of the time that is left for one value."""
-
 
 def axis_faults(
     start: float, stop: float, scale: str, at: Sequence[float]
@@ -134,12 +131,11 @@ class ZeroField:
         axes: the parameters.
         budget: for a solve.
         rtol: of F, relative to its scale.
-        seconds: of the processor for all values together; each may take half of what is left.
+        seconds: of the processor for all values together.
         spent: what is said where they do not suffice.
         known: points that need not be solved again.
 
     Attributes:
-        spent_seconds: of the processor, so far.
         stopped: what was said, or None.
     """
 
@@ -157,8 +153,8 @@ class ZeroField:
         self._axes, self._rtol, self._known = axes, rtol, known
         settings = {"rtol": rtol, "of_value": line_of_value(choose(problem), target), "budget": budget}
         self._distance = Distance(problem, target, [axis.key for axis in axes], **settings)
-        self._seconds, self._spent = seconds, spent
-        self.spent_seconds, self.stopped = 0.0, None if seconds > 0 else spent
+        self._meter, self._spent = Meter(seconds, number=target.symbol), spent
+        self.stopped: Message | None = None
 
     def __call__(self, at: FloatArray) -> Sample:
         """F at (u, v).
@@ -177,20 +173,19 @@ class ZeroField:
 
     def _solved(self, at: FloatArray) -> Sample | Message:
         """F, or why there is none."""
-        left = self._seconds - self.spent_seconds
-        share = Meter(HALF * left, number=self._distance.target.symbol)
         try:
-            if left > 0:
-                with share.running():
-                    return self._at(at)
+            with self._meter.running():
+                return self._at(at)
         except OverBudget:
-            pass
+            self.stopped = self._spent
+            return self.stopped
         except FpsolveError as failure:
             return failure.message
-        finally:
-            self.spent_seconds += share.spent
-        self.stopped = self._spent
-        return self.stopped
+
+    @property
+    def seconds(self) -> float:
+        """Of the processor, so far."""
+        return self._meter.spent
 
     def _at(self, at: FloatArray) -> Sample:
         """F at (u, v), from a solve. Raises `FpsolveError`."""
