@@ -31,6 +31,8 @@ MOST_CORRECTIONS = 6
 """Largest number of corrections; at a zero without a gradient each leaves a quarter of F."""
 FARTHEST = 0.1
 """Longest way of Newton's method to a first point, in sides of the square."""
+CLOSED = 0.1
+"""Distance from the first point at which a curve has come back to it, in steps."""
 MOST_AWAY = 0.2
 """Largest distance of a point from where it was predicted, in steps, beyond what both points may be off."""
 EXTRAPOLATED = 28
@@ -232,10 +234,11 @@ def _half(
             if step < SHORTEST:
                 return points, False, reason if sample is None else Message(Code.TOO_SHARP)
             continue
-        if len(points) > 2 and _passes(last.at, sample, start):
+        way = float(np.linalg.norm(sample.at - last.at))
+        if len(points) > 2 and Trace((Point(last), Point(sample))).holds(start, CLOSED * way):
             return points, True, None
         if is_leaving:
-            if np.linalg.norm(sample.at - last.at) < BESIDE:
+            if way < BESIDE:
                 points.pop()
             else:
                 stepped()
@@ -284,11 +287,3 @@ def _inside(at: FloatArray) -> bool:
 
 def _angle(one: FloatArray, other: FloatArray) -> float:
     return math.acos(float(np.clip(one @ other, -1, 1)))
-
-
-def _passes(last: FloatArray, sample: Sample, start: Sample) -> bool:
-    """Whether the way from a point to a sample passes a start in the direction in which the curve left it."""
-    way = sample.at - last
-    along, size = float((start.at - last) @ way), float(way @ way)
-    is_near = np.linalg.norm(size * (start.at - last) - along * way) < 0.1 * size**1.5
-    return 0 <= along <= size and bool(is_near) and _angle(sample.tangent, start.tangent) < 2 * MOST_TURN

@@ -24,9 +24,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.optimize import brentq, minimize
 
+from fpsolve.analysis.axis import Axis, check_ends
 from fpsolve.analysis.scan import TOLERANCE, Sample
-from fpsolve.analysis.target import Distance, Target, target_of
-from fpsolve.analysis.zero import Axis, check_ends, is_none
+from fpsolve.analysis.target import Distance, Target, is_none, target_of
 from fpsolve.arrays import FloatArray, real_number, shown
 from fpsolve.data import Result, dataset, written
 from fpsolve.errors import FpsolveError, NoSuchExponent, NotConverged

@@ -123,15 +123,15 @@ class Scan:
 
 @dataclass(frozen=True)
 class Row:
-    """A row of a grid as a task: it begins anew, so that what it finds does not depend on who scans the others.
+    """A row of a grid as a task, with an F of its own, so that what it finds does not depend on who scans the others.
 
     Attributes:
-        begin: gives F; a task for another process needs one that pickles.
+        field: F; a task for another process needs one that pickles.
         count: of the nodes of the grid, each way.
         number: of the row, from 0 on: it runs along v.
     """
 
-    begin: Callable[[], Field]
+    field: Field
     count: int
     number: int
 
@@ -155,12 +155,12 @@ class ScannedRow:
 
 def scan_row(row: Row) -> ScannedRow:
     """F on a row from one end to the other, so that each node is close to the one before."""
-    started, field, reasons = thread_time(), row.begin(), dict[Message, None]()
+    started, reasons = thread_time(), dict[Message, None]()
     values, gradients = np.full(row.count, np.nan), np.full((row.count, 2), np.nan)
     shares = np.linspace(0, 1, row.count)
     for k in range(row.count):
         try:
-            sample = field(shares[[row.number, k]])
+            sample = row.field(shares[[row.number, k]])
             values[k], gradients[k] = sample.value, sample.gradient
         except FpsolveError as failure:
             reasons.setdefault(failure.message)

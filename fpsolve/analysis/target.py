@@ -93,6 +93,11 @@ def target_of(text: str) -> Target:
     raise ValueError(f"got {shown(text)}; must be {EXAMPLES}, all numbers finite and the order of a moment not 0")
 
 
+def is_none(reason: Message) -> bool:
+    """Whether there is no F for a reason, and it is not only not resolved."""
+    return reason.tells_of(Code.NO_PROBLEM) or reason.code in (Code.TAILS, Code.INFINITE_VARIANCE)
+
+
 def line_of_value(method: Method, target: Target) -> float:
     """The error of F that is enough away from a line, over F."""
     return ITS_SIGN if method.is_dear(target.order) and not target.level else 0.0

@@ -1,22 +1,16 @@
-"""F of a target over a frame of two parameters, with its exact gradient."""
+"""The range of a parameter: a side of a chart, or what a design may change."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import Any, Literal, Protocol
+from typing import Any, Literal
 
 import numpy as np
 from pydantic import ValidationError
 
-from fpsolve.analysis.scan import Sample
-from fpsolve.analysis.target import Distance, Target, line_of_value, said
-from fpsolve.arrays import FloatArray, shown
-from fpsolve.budget import Meter, OverBudget
-from fpsolve.errors import FpsolveError, NotConverged
-from fpsolve.exponent.kinds import choose
-from fpsolve.exponent.method import Budget
-from fpsolve.messages import Code, Message
+from fpsolve.analysis.target import said
+from fpsolve.arrays import shown
 from fpsolve.model.faults import strict_dataclass
 from fpsolve.model.problem import Problem, checked_problem
 
@@ -105,91 +99,3 @@ def check_ends(problem: Problem, axis: Axis) -> None:
                 raise ValueError(f"got {axis.key} with {name} = {value:g}: {said(failure)}") from failure
         except ValueError:  # with other values of the other parameters it may be one
             continue
-
-
-def is_none(reason: Message) -> bool:
-    """Whether there is no F for a reason, and it is not only not resolved."""
-    return reason.tells_of(Code.NO_PROBLEM) or reason.code in (Code.TAILS, Code.INFINITE_VARIANCE)
-
-
-class Known(Protocol):
-    """The points of a line that were solved, also by an earlier run."""
-
-    def find(self, rtol: float, at: FloatArray) -> Sample | Message | None:
-        """F at (u, v), or why there is none."""
-
-    def keep(self, rtol: float, at: FloatArray, found: Sample | Message) -> None:
-        """Keep it."""
-
-
-class ZeroField:
-    """F of a target over the unit square, with its gradient.
-
-    Args:
-        target: what F is.
-        problem: the problem with the values of all other parameters.
-        axes: the parameters.
-        budget: for a solve.
-        rtol: of F, relative to its scale.
-        seconds: of the processor for all values together.
-        spent: what is said where they do not suffice.
-        known: points that need not be solved again.
-
-    Attributes:
-        stopped: what was said, or None.
-    """
-
-    def __init__(
-        self,
-        target: Target,
-        problem: Problem,
-        axes: tuple[Axis, Axis],
-        budget: Budget,
-        rtol: float,
-        seconds: float,
-        spent: Message,
-        known: Known | None,
-    ) -> None:
-        self._axes, self._rtol, self._known = axes, rtol, known
-        settings = {"rtol": rtol, "of_value": line_of_value(choose(problem), target), "budget": budget}
-        self._distance = Distance(problem, target, [axis.key for axis in axes], **settings)
-        self._meter, self._spent = Meter(seconds, number=target.symbol), spent
-        self.stopped: Message | None = None
-
-    def __call__(self, at: FloatArray) -> Sample:
-        """F at (u, v).
-
-        Raises:
-            FpsolveError: there is none, or the time does not suffice.
-        """
-        found = self._known.find(self._rtol, at) if self._known else None
-        if found is None:
-            found = self._solved(at)
-            if self._known:
-                self._known.keep(self._rtol, at, found)
-        if isinstance(found, Message):
-            raise NotConverged(found)
-        return found
-
-    def _solved(self, at: FloatArray) -> Sample | Message:
-        """F, or why there is none."""
-        try:
-            with self._meter.running():
-                return self._at(at)
-        except OverBudget:
-            self.stopped = self._spent
-            return self.stopped
-        except FpsolveError as failure:
-            return failure.message
-
-    @property
-    def seconds(self) -> float:
-        """Of the processor, so far."""
-        return self._meter.spent
-
-    def _at(self, at: FloatArray) -> Sample:
-        """F at (u, v), from a solve. Raises `FpsolveError`."""
-        places = list(zip(self._axes, at.tolist(), strict=True))
-        found = self._distance(np.array([axis.value(share) for axis, share in places]))
-        slopes = [axis.slope(share) for axis, share in places]
-        return found._replace(at=at, gradient=found.gradient * slopes, rtol=self._rtol)
