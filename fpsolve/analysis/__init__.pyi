@@ -1,3 +1,4 @@
+from .axis import Axis as Axis
 from .density import Density as Density
 from .density import adjoint_density as adjoint_density
 from .density import furstenberg_khasminskii as furstenberg_khasminskii
@@ -18,4 +19,3 @@ from .spreads import laws_of as laws_of
 from .spreads import uncertainty as uncertainty
 from .stability import Boundary as Boundary
 from .stability import boundary as boundary
-from .zero import Axis as Axis

@@ -27,12 +27,12 @@ SHORTEST = 1e-5
 """Step, in sides of the square, below which a branch ends."""
 MOST_TURN = 0.15
 """Largest turn of the tangent in one step, in radians."""
-MOST_CORRECTIONS = 5
-"""Number of corrections after which F must fall to `SHARE_LEFT` with each."""
-SHARE_LEFT = 0.1
-"""Largest share of F that a further correction leaves; at a zero without a gradient it is a quarter."""
+MOST_CORRECTIONS = 6
+"""Largest number of corrections; at a zero without a gradient each leaves a quarter of F."""
 FARTHEST = 0.1
 """Longest way of Newton's method to a first point, in sides of the square."""
+CLOSED = 0.1
+"""Distance from the first point at which a curve has come back to it, in steps."""
 MOST_AWAY = 0.2
 """Largest distance of a point from where it was predicted, in steps, beyond what both points may be off."""
 EXTRAPOLATED = 28
@@ -45,6 +45,8 @@ SAME = 1e-3
 """Distance, in sides of the square, in which a curve that runs the same way is taken for one that is known."""
 DOUBT = 10.0
 """What the second derivatives of F are, over those along a curve, at most."""
+NEGLIGIBLE = 0.1
+"""Share of |F| up to which it is 0 that may be left without being solved."""
 PIECES = 8
 """Number of pieces into which the cubic between two points of a branch is divided."""
 
@@ -97,35 +99,22 @@ class Trace:
         pieces = [cubic(at[i], at[i + 1], tangents[i], tangents[i + 1], shares) for i in range(len(at) - 1)]
         return np.concatenate([*pieces, at[-1:]])
 
-    def between(self, i: int, share: float) -> FloatArray:
-        """About the point at a share of the way from the point i to the next."""
-        one, other = self.points[i].sample, self.points[(i + 1) % len(self.points)].sample
-        return cubic(one.at, other.at, one.tangent, other.tangent, share)
+    def between(self, place: float) -> FloatArray:
+        """About the point at a place: 2.5 is half way between the points 2 and 3."""
+        i = int(place)
+        one, other = (self.points[k % len(self.points)].sample for k in (i, i + 1))
+        return cubic(one.at, other.at, one.tangent, other.tangent, place - i)
+
+    def step(self, place: float) -> float:
+        """The distance of the points before and after a place."""
+        return float(np.linalg.norm(self.between(int(place) + 1) - self.between(int(place))))
 
     def holds(self, sample: Sample, within: float = SAME) -> bool:
         """Whether it runs through a point of a curve, or near to it the same way; F > 0 left of both."""
-        return bool(np.any((self._gaps(sample.at) < within) & (self._ways @ sample.tangent >= 0)))
-
-    def nearest(self, at: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Its point nearest to another, and the direction there, of length 1 or 0."""
-        feet, k = self._feet(at), int(np.argmin(self._gaps(at)))
-        way = self._ways[k]
-        return feet[k], np.asarray(way / max(float(np.linalg.norm(way)), 1e-300))
-
-    def _gaps(self, at: FloatArray) -> FloatArray:
-        """Distances of a point from the pieces."""
-        return np.asarray(np.linalg.norm(self._feet(at) - at, axis=1))
-
-    def _feet(self, at: FloatArray) -> FloatArray:
-        """The points of the pieces that are nearest to a point."""
-        start, way = self.fine[:-1], self._ways
-        share = np.clip(np.sum((at - start) * way, axis=1) / np.maximum(np.sum(way**2, axis=1), 1e-300), 0, 1)
-        return np.asarray(start + share[:, None] * way)
-
-    @cached_property
-    def _ways(self) -> FloatArray:
-        """From each point of `fine` to the next."""
-        return np.diff(self.fine, axis=0)
+        start, way = self.fine[:-1], np.diff(self.fine, axis=0)
+        share = np.sum((sample.at - start) * way, axis=1) / np.maximum(np.sum(way**2, axis=1), 1e-300)
+        gaps = np.linalg.norm(start + np.clip(share, 0, 1)[:, None] * way - sample.at, axis=1)
+        return bool(np.any((gaps < within) & (way @ sample.tangent >= 0)))
 
 
 def cubic(
@@ -146,21 +135,16 @@ def find_branches(
     A closed one is seen for certain if a circle inside it is wider than the diagonal of a cell of the finer grid, 1/100
     of the square for 13 nodes, and its cell misses no node.
     """
-    known, off = list[Trace](), list[Sample]()  # where the scan is off by more, so that branches are farther
+    known, tried = list[Trace](), list[Sample]()
     near = 0.25 / (scan.nodes.size - 1)
     for seed in scan.seeds():
         if any(trace.holds(seed, 0.5 * near) for trace in known):
             continue
-        rough = find_zero(scan, seed.at)
-        if rough is not None and any(trace.holds(rough, near) or _shows(scan, trace, rough, near) for trace in known):
+        if any(np.linalg.norm(each.at - seed.at) < near and each.gradient @ seed.gradient > 0 for each in tried):
             continue
-        guess = rough or seed
-        if any(np.linalg.norm(each.at - guess.at) < near and each.gradient @ guess.gradient > 0 for each in off):
-            continue
-        start = find_zero(field, guess.at)
-        if start is not None and any(trace.holds(start) for trace in known):
-            off.append(guess)
-        elif start is not None:
+        tried.append(seed)
+        start = find_zero(field, seed.at)
+        if start is not None and not any(trace.holds(start) for trace in known):
             known.append(trace_branch(field, start, longest, stepped))
             yield known[-1]
 
@@ -171,60 +155,39 @@ def with_branch(known: tuple[Trace, ...], trace: Trace) -> tuple[Trace, ...]:
     return (*left, trace)
 
 
-def _shows(scan: Scan, trace: Trace, rough: Sample, within: float) -> bool:
-    """Whether a zero of a scan, off as F is interpolated, shows a branch: it is next to one, on its normal."""
-    at, along = trace.nearest(rough.at)
-    seen = correct(scan, at, along) if along @ rough.tangent > 0 else None
-    return seen is not None and float(np.linalg.norm(seen.at - rough.at)) < within
-
-
 def find_zero(field: Field, at: FloatArray) -> Sample | None:
     """A point F = 0 near a point: on the gradient, or where that leads out of the square, beside it or above it."""
-    first = None
-    with suppress(FpsolveError):
-        first = field(np.clip(at, 0, 1)) if _inside(at) else None
-    for along in () if first is None else (None, np.array([1.0, 0.0]), np.array([0.0, 1.0])):
+    for along in (None, np.array([1.0, 0.0]), np.array([0.0, 1.0])):
         with suppress(FpsolveError):
-            if (sample := correct(field, at, along, first)) is not None:
+            if (sample := correct(field, at, along)) is not None:
                 return sample
     return None
 
 
-def correct(
-    field: Field,
-    at: FloatArray,
-    along: FloatArray | None = None,
-    first: Sample | None = None,
-    bend: float = math.inf,
-) -> Sample | None:
+def correct(field: Field, at: FloatArray, along: FloatArray | None = None, last: Sample | None = None) -> Sample | None:
     """The point F = 0 near a point, on the normal to `along`, or without it on the gradient; None where there is none.
 
-    `first` is F at the point, where that is known, and `bend` a bound on half of the second derivatives of F: where a
-    step of Newton's method leaves hardly anything by that, or F is 0 to its error, it is the last one.
+    A step of Newton's method is the last one where F is 0 to its error before it; or where hardly anything is left
+    after it, by the second derivatives of F that its change of gradient from the last point of the curve shows.
 
     Raises:
         FpsolveError: F does not exist on the way.
     """
-    start, number, before = at, 0, math.inf
-    while True:
+    start = at
+    for _ in range(MOST_CORRECTIONS):
         if not _inside(at) or np.linalg.norm(at - start) > FARTHEST:
             return None
-        sample = field(np.clip(at, 0, 1)) if first is None or number else first
+        sample = field(np.clip(at, 0, 1))
         direction = sample.gradient if along is None else np.array([-along[1], along[0]])
-        slope = float(sample.gradient @ direction)
-        if slope == 0:
+        if (slope := float(sample.gradient @ direction)) == 0:
             return sample if sample.is_zero and np.any(sample.gradient) else None
         step = sample.value / slope
-        at = sample.at - step * direction
-        is_inside = bool(np.all((at >= 0) & (at <= 1)))
-        if sample.is_zero:  # so near that F is linear
-            return sample._replace(at=at, value=0.0) if is_inside else sample
-        number += 1
-        if number >= MOST_CORRECTIONS and abs(sample.value) > SHARE_LEFT * before:
-            return None
-        before, left = abs(sample.value), bend * step**2
-        if is_inside and left <= SHARE_LEFT * sample.nothing:
-            return sample._replace(at=at, value=0.0, error=sample.error + left)
+        at, left = sample.at - step * direction, 0.0
+        if not sample.is_zero:  # beyond that F is linear
+            left = _bend(last, sample) * step**2
+        if left <= NEGLIGIBLE * sample.nothing and _inside(at):
+            return sample._replace(at=np.clip(at, 0, 1), value=0.0, error=sample.error + left)
+    return None
 
 
 def correct_on_line(field: Field, axis: int, value: float, guess: FloatArray) -> Sample | None:
@@ -260,15 +223,9 @@ def _half(
         else:
             share = 1 + step / float(np.linalg.norm(last.at - before.at))
             at = cubic(before.at, last.at, sign * before.tangent, sign * last.tangent, share)
-        reason = Message(Code.NEWTON_UNSETTLED)
+        is_leaving, reason = not _inside(at), Message(Code.NEWTON_UNSETTLED)
         try:
-            sample = correct(field, at, last.tangent, bend=_bend(before, last))
-            if sample is not None and np.linalg.norm(sample.at - at) > (
-                MOST_AWAY * np.linalg.norm(at - last.at) + last.width + sample.width
-            ):
-                sample = None  # perhaps of another curve
-            if is_leaving := sample is None and bool(np.any((at < 0) | (at > 1))):
-                sample = _exit(field, last, at)
+            sample = _exit(field, last, at) if is_leaving else _next(field, last, at)
         except FpsolveError as failure:
             sample, reason = None, failure.message
         turn = 0.0 if sample is None else _angle(last.tangent, sample.tangent)
@@ -277,10 +234,11 @@ def _half(
             if step < SHORTEST:
                 return points, False, reason if sample is None else Message(Code.TOO_SHARP)
             continue
-        if len(points) > 2 and _passes(last.at, sample, start):
+        way = float(np.linalg.norm(sample.at - last.at))
+        if len(points) > 2 and Trace((Point(last), Point(sample))).holds(start, CLOSED * way):
             return points, True, None
         if is_leaving:
-            if np.linalg.norm(sample.at - last.at) < BESIDE:
+            if way < BESIDE:
                 points.pop()
             else:
                 stepped()
@@ -293,19 +251,27 @@ def _half(
     return points, False, Message(Code.TOO_LONG, count=MOST_POINTS)
 
 
-def _bend(before: Sample | None, last: Sample) -> float:
-    """More than half of the second derivatives of F is likely to be, by two points of a curve; infinite for one."""
-    if before is None:
+def _next(field: Field, last: Sample, at: FloatArray) -> Sample | None:
+    """The point that is predicted at a place; None where it is so far that it may be one of another curve."""
+    sample = correct(field, at, last.tangent, last)
+    if sample is None:
+        return None
+    most = MOST_AWAY * np.linalg.norm(at - last.at) + last.width + sample.width
+    return sample if np.linalg.norm(sample.at - at) <= most else None
+
+
+def _bend(last: Sample | None, sample: Sample) -> float:
+    """More than half of the second derivatives of F is likely to be, by two points near a curve; infinite for one."""
+    if last is None:
         return math.inf
-    change = np.linalg.norm(last.gradient - before.gradient) / np.linalg.norm(last.at - before.at)
-    return DOUBT * max(float(change), float(np.linalg.norm(last.gradient)))
+    change = np.linalg.norm(sample.gradient - last.gradient) / np.linalg.norm(sample.at - last.at)
+    return DOUBT * max(float(change), float(np.linalg.norm(sample.gradient)))
 
 
 def _exit(field: Field, last: Sample, beyond: FloatArray) -> Sample | None:
     """The point where a curve leaves the square on its way to a point beyond; None where that is not clear."""
     way = beyond - last.at
-    least = 0.0 if _inside(beyond) else 0.5 * BESIDE
-    sides = [(k, float(side)) for k in (0, 1) for side in (0, 1) if (beyond[k] - side) * (side - 0.5) > least]
+    sides = [(k, float(side)) for k in (0, 1) for side in (0, 1) if (beyond[k] - side) * (2 * side - 1) > BESIDE]
     for share, axis, side in sorted(((side - last.at[axis]) / way[axis], axis, side) for axis, side in sides):
         guess = np.clip(last.at + share * way, 0, 1)
         sample = correct_on_line(field, axis, side, guess)
@@ -321,11 +287,3 @@ def _inside(at: FloatArray) -> bool:
 
 def _angle(one: FloatArray, other: FloatArray) -> float:
     return math.acos(float(np.clip(one @ other, -1, 1)))
-
-
-def _passes(last: FloatArray, sample: Sample, start: Sample) -> bool:
-    """Whether the way from a point to a sample passes a start in the direction in which the curve left it."""
-    way = sample.at - last
-    along, size = float((start.at - last) @ way), float(way @ way)
-    is_near = np.linalg.norm(size * (start.at - last) - along * way) < 0.1 * size**1.5
-    return 0 <= along <= size and bool(is_near) and _angle(sample.tangent, start.tangent) < 2 * MOST_TURN

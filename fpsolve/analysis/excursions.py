@@ -23,10 +23,10 @@ of what is solved for y, see `model.frame`.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial, reduce
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from functools import reduce
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -68,8 +68,6 @@ PARTS = 32
 """Number of parts into which a cell of φ is cut for the integral of q⁺, which has kinks."""
 POINTS = 2000
 """Number of points of ξ in this integral."""
-LEAST_SHOWN = 1e-12
-"""Smallest probability that is shown."""
 SHOWN_LEVELS = (2.0, 4.0, 8.0, 16.0, 32.0)
 
 
@@ -146,9 +144,9 @@ class Excursion(Result):
         levels = np.geomspace(1.01, 100.0, 101)
         low, high = self.bounds(levels)
         style = {"label": "bounds", **coloured(axes, kwargs)}
-        axes.plot(levels, np.maximum(low, LEAST_SHOWN), **style)
+        axes.plot(levels, low, **style)
         axes.plot(levels, high, **{**style, "label": None})
-        axes.fill_between(levels, np.maximum(low, LEAST_SHOWN), high, color=style["color"], alpha=0.2, linewidth=0)
+        axes.fill_between(levels, low, high, color=style["color"], alpha=0.2, linewidth=0)
         if self.upcrossings is not None:
             count = self.expected_upcrossings(levels)
             axes.plot(levels, count, linestyle="--", color=style["color"], label="upcrossings for large A")
@@ -218,17 +216,20 @@ def solve_excursion(
         return replace(found, notes=(Message(Code.EXCURSION_PLANE, count=problem.dimension),))
     if (phase := solver.method.ray) is not None:
         return replace(found, notes=(Message(Code.EXCURSION_RAY, phase=phase),))
-    crossing, notes = Crossing.of(problem), list[Message]()
-    ladder = Ladder(solver, index.value)
-    is_bounded = problem.noise.is_bounded
-    if is_bounded:
-        low, high, flat = _prefactors(ladder, partial(_at_start, phi=phi, xi=xi), crossing)
-        found = replace(found, lower=low, upper=high)
-        notes += flat
+    overshoot, is_smooth = _crossing(problem)
+    p, notes = index.value, list[Message]()
+    if problem.noise.is_bounded:
+        least, most = _settled(solver, p, lambda pair: _extremes(pair, is_smooth) / _at_start(pair, phi, xi))
+        found = replace(found, lower=_inverse(most, overshoot**-p), upper=_inverse(least))
+        if found.upper is None:
+            notes.append(Message(Code.EXCURSION_NO_UPPER, value=least.value, error=least.error_estimate))
     else:
         notes.append(Message(Code.EXCURSION_UNBOUNDED))
-    if crossing.is_smooth:
-        found = replace(found, upcrossings=_upcrossings(ladder, partial(_at_start, phi=phi, xi=xi)))
+    if is_smooth:
+        [many] = _settled(solver, p, lambda pair: _flux(pair) * _at_start(pair, phi, xi) / pair.derivative)
+        if not many.error_estimate <= many.value:
+            raise NotConverged(Message(Code.EXCURSION_UNRESOLVED), remedy=Remedy.BUDGET)
+        found = replace(found, upcrossings=replace(many, quantity=UPCROSSINGS))
     return replace(found, notes=tuple(notes))
 
 
@@ -262,86 +263,43 @@ def _without_index(reason: Message) -> Message:
     return Message(Code.EXCURSION_NO_INDEX, reason=reason)
 
 
-class Crossing(NamedTuple):
-    """How ‖x‖ passes a level.
+def _crossing(problem: Problem) -> tuple[float, bool]:
+    """How ‖x‖ passes a level: g, the largest factor of a jump, and whether it is differentiable, so that q ≥ 0."""
+    factors = [math.exp(jump.log_factor) for jump in problem.system.jumps]
+    _, diffusions, impulses = problem.noise.motion(problem.system)
+    factors += [float(np.linalg.norm(each.matrix, 2)) for each in impulses]
+    overshoot = max([1.0, *factors])
+    diffuses = any(not each.q.vanishes for each in diffusions)
+    return overshoot, overshoot == 1.0 and not impulses and not diffuses
 
-    Attributes:
-        overshoot: g, the largest factor of a jump.
-        is_smooth: whether ‖x‖ is differentiable there, so that it passes with q ≥ 0.
+
+def _settled(solver: ExponentSolver, p: float, numbers: Callable[[PrincipalPair], FloatArray]) -> list[Estimate]:
+    """Some numbers by the pair at p, each with what its points miss, and its difference from a coarser pair.
+
+    Raises:
+        NotConverged: there is no finer discretisation within the budget.
     """
-
-    overshoot: float
-    is_smooth: bool
-
-    @classmethod
-    def of(cls, problem: Problem) -> Crossing:
-        factors = [math.exp(jump.log_factor) for jump in problem.system.jumps]
-        _, diffusions, impulses = problem.noise.motion(problem.system)
-        factors += [float(np.linalg.norm(each.matrix, 2)) for each in impulses]
-        overshoot = max(1.0, *factors, 1.0)
-        diffuses = any(not each.q.vanishes for each in diffusions)
-        return cls(overshoot, overshoot == 1.0 and not impulses and not diffuses)
-
-
-class Ladder:
-    """The pair at p, and on ever finer discretisations; each is solved once.
-
-    One of them there is at least, if it has not too many unknowns.
-    """
-
-    def __init__(self, solver: ExponentSolver, p: float) -> None:
-        self._solver, self._pairs = solver, [solver.pair(p)]
-
-    def __iter__(self) -> Iterator[PrincipalPair]:
-        for number in range(1 + MOST_ROUNDS):
-            if number == len(self._pairs):
-                last = self._pairs[-1]
-                with unless_over_budget():
-                    self._pairs.append(self._solver.method.finer_pair(last))
-                if number == len(self._pairs):
-                    return
-            yield self._pairs[number]
+    pair = solver.pair(p)
+    last, found = numbers(pair)[:, 0], None
+    with unless_over_budget():
+        for _ in range(MOST_ROUNDS):
+            pair = solver.method.finer_pair(pair)
+            value, missed = numbers(pair).T
+            error, last = missed + abs(value - last), value
+            found = list(map(Estimate, value.tolist(), error.tolist(), abs(value).tolist()))
+            if np.all(error <= CLOSE * abs(value)):
+                break
+    if found is None:
+        raise NotConverged(Message(Code.EXCURSION_UNRESOLVED), remedy=Remedy.BUDGET)
+    return found
 
 
-class Grid(NamedTuple):
-    """Points at which T is looked at, with the ends of all cells of φ, seen from inside, and of the noise.
-
-    Attributes:
-        psi, inside: points of φ in the coordinates of the solve, and the cells they are seen from, shape (cells, n).
-        counts: points of every noise.
-    """
-
-    psi: FloatArray
-    inside: FloatArray
-    counts: tuple[int, ...]
-
-    @classmethod
-    def of(cls, pair: PrincipalPair) -> Grid:
-        space = pair.space
-        counts = [FINE * (int(np.max(axis.modes)) + 1) for axis in space.axes]
-        many = math.prod(counts) * (space.phi.lines.size - 1)
-        share = min(1.0, (MOST_POINTS / many) ** (1 / len(counts)))
-        phases, *noises = (max(16, math.ceil(share * count)) for count in counts)
-        lines = space.phi.lines
-        t = np.linspace(0, 1, phases + 1)
-        psi = lines[:-1, None] * (1 - t) + lines[1:, None] * t
-        return cls(psi, np.broadcast_to(0.5 * (lines[:-1, None] + lines[1:, None]), psi.shape), tuple(noises))
-
-    def values(self, pair: PrincipalPair) -> tuple[FloatArray, FloatArray]:
-        """T in the coordinates of the system, and q, both of shape (cells, n, ...)."""
-        space, problem = pair.space, pair.generator.problem
-        at_phi = space.phi.at(self.psi.ravel(), self.inside.ravel())
-        reached = [axis.everywhere(count) for axis, count in zip(space.noises, self.counts, strict=True)]
-        table = space.evaluate(pair.right, at_phi, *(values for _, values in reached))
-        phi, stretch = _own_phase(pair.generator, pair.p, self.psi.ravel())
-        columns = (-1, *[1] * len(reached))
-        rate = growth_rate(problem.drift, problem.at_values([xi for xi, _ in reached]))(phi.reshape(columns))
-        shape = (*self.psi.shape, *table.shape[1:])
-        return (table * stretch.reshape(columns)).reshape(shape), np.broadcast_to(rate, table.shape).reshape(shape)
-
-    def continuous(self, pair: PrincipalPair) -> tuple[int, ...]:
-        """The axes of these tables along which T is continuous: φ within a cell, and noise without states."""
-        return (1, *[2 + k for k, axis in enumerate(pair.space.noises) if axis.cells.max() >= 0])
+def _inverse(of: Estimate, factor: float = 1.0) -> Estimate | None:
+    """A factor over a positive number; None where this may be 0."""
+    value, error = of.value, of.error_estimate
+    if not value > error:
+        return None
+    return Estimate(factor / value, factor * error / (value * (value - error)), factor / value)
 
 
 def _own_phase(generator: Generator, p: float, psi: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -353,7 +311,7 @@ def _own_phase(generator: Generator, p: float, psi: FloatArray) -> tuple[FloatAr
     return phi, frame.length(phi) ** p
 
 
-def _at_start(pair: PrincipalPair, *, phi: Start, xi: StartOfNoise) -> float:
+def _at_start(pair: PrincipalPair, phi: Start, xi: StartOfNoise) -> float:
     """T₀, the mean of T over the start, in the coordinates of the system."""
     space, frame = pair.space, pair.generator.problem.frame
     if phi == UNIFORM:
@@ -384,69 +342,49 @@ def _mean_functions(axis: Any, xi: StartOfNoise) -> FloatArray:
     return np.asarray(at.values[0] * at.factor[0])
 
 
-def _prefactors(
-    ladder: Ladder, start: Callable[[PrincipalPair], float], crossing: Crossing
-) -> tuple[Estimate | None, Estimate | None, list[Message]]:
-    """T₀/(g^δ max T) and T₀/min T, or why one is not there. Raises `NotConverged`."""
-    coarse, best = None, None
-    for pair in ladder:
-        if coarse is not None:
-            best = _extremes(coarse, pair, start, crossing)
-            if best.relative_error <= CLOSE:
-                break
-        coarse = pair
-    if best is None:
-        raise NotConverged(Message(Code.EXCURSION_UNRESOLVED), remedy=Remedy.BUDGET)
-    size = crossing.overshoot ** (coarse.p if coarse else 0.0)
-    least, most = 1 / best.most.value, 1 / (best.most.value + best.most.error_estimate)
-    low = Estimate(least / size, (least - most) / size, least)
-    if not best.least.value > best.least.error_estimate:
-        return low, None, [Message(Code.EXCURSION_NO_UPPER, value=best.least.value, error=best.least.error_estimate)]
-    smallest, widest = 1 / best.least.value, 1 / (best.least.value - best.least.error_estimate)
-    return low, Estimate(smallest, widest - smallest, smallest), []
+def _extremes(pair: PrincipalPair, is_smooth: bool) -> FloatArray:
+    """The least and the largest T where ‖x‖ passes a level, each with what it may be beyond between the points.
 
-
-class Extremes(NamedTuple):
-    """The least and the largest T/T₀ where ‖x‖ passes a level."""
-
-    least: Estimate
-    most: Estimate
-
-    @property
-    def relative_error(self) -> float:
-        return max(each.error_estimate / abs(each.value) for each in self)
-
-
-def _extremes(
-    coarse: PrincipalPair, fine: PrincipalPair, start: Callable[[PrincipalPair], float], crossing: Crossing
-) -> Extremes:
-    """Those of a pair; their errors are its difference from a coarser one in the cell, and what lies between points."""
-    grid = Grid.of(fine)
-    values, rate = grid.values(fine)
-    values = values / start(fine)
-    other = grid.values(coarse)[0] / start(coarse)
-    axes = grid.continuous(fine)
-    error = np.max(np.abs(values - other), axis=1, keepdims=True) + _between(values, axes)
-    if not crossing.is_smooth or rate.max() < 0:
-        rate = np.ones(rate.shape)
-    wider = rate + _between(rate, axes)
+    These are in all cells of φ, seen from inside, and all over the noise, the ends included.
+    """
+    space, problem, lines = pair.space, pair.generator.problem, pair.space.phi.lines
+    counts = [FINE * (int(np.max(axis.modes)) + 1) for axis in space.axes]
+    share = min(1.0, (MOST_POINTS / (math.prod(counts) * (lines.size - 1))) ** (1 / len(counts)))
+    phases, *noises = (max(16, math.ceil(share * count)) for count in counts)
+    psi = np.linspace(lines[:-1], lines[1:], phases + 1, axis=1)
+    inside = np.repeat(0.5 * (lines[:-1] + lines[1:]), phases + 1)
+    reached = [axis.everywhere(count) for axis, count in zip(space.noises, noises, strict=True)]
+    table = space.evaluate(pair.right, space.phi.at(psi.ravel(), inside), *(values for _, values in reached))
+    phi, stretch = _own_phase(pair.generator, pair.p, psi.ravel())
+    columns, shape = (-1, *[1] * len(reached)), (*psi.shape, *table.shape[1:])
+    values = (table * stretch.reshape(columns)).reshape(shape)
+    growth: Harmonics = growth_rate(problem.drift, problem.at_values([xi for xi, _ in reached]))
+    rate = np.broadcast_to(growth(phi.reshape(columns)), table.shape).reshape(shape)
+    if not is_smooth or rate.max() < 0:
+        rate = np.ones(shape)
+    axes = [1, *(2 + k for k, axis in enumerate(space.noises) if axis.cells.max() >= 0)]  # along which T is continuous
+    bent, wider = _between(values, axes), rate + _between(rate, axes)
     own = _where_positive(values, rate, axes)
-    most, least = float(own.max()), float(own.min())
-    highest = float(_where_positive(values + error, wider, axes).max())
-    lowest = float(_where_positive(values - error, wider, axes).min())
-    return Extremes(
-        Estimate(least, max(least - lowest, 0.0), abs(least)), Estimate(most, max(highest - most, 0.0), most)
+    lowest, highest = (
+        _where_positive(values - bent, wider, axes).min(),
+        _where_positive(values + bent, wider, axes).max(),
     )
+    return np.array([[own.min(), max(own.min() - lowest, 0.0)], [own.max(), max(highest - own.max(), 0.0)]])
 
 
-def _where_positive(values: FloatArray, rate: FloatArray, axes: Iterable[int]) -> FloatArray:
+def _between(values: FloatArray, axes: Sequence[int]) -> FloatArray:
+    """How far a function may be beyond its values at three neighbours: an eighth of their second difference."""
+    ends = [[(int(k == axis),) * 2 for k in range(values.ndim)] for axis in axes]
+    bent = (np.abs(np.diff(values, n=2, axis=axis)) / 8 for axis in axes)
+    return sum(np.pad(each, end, mode="edge") for each, end in zip(bent, ends, strict=True))
+
+
+def _where_positive(values: FloatArray, rate: FloatArray, axes: Sequence[int]) -> FloatArray:
     """The values where a rate is not negative, also where it is 0 between two points, shape (n,)."""
     found = [values[rate >= 0]]
     for axis in axes:
-        count = rate.shape[axis]
         (here, there), (own, other) = (
-            [np.take(table, at, axis=axis) for at in (np.arange(count - 1), np.arange(1, count))]
-            for table in (rate, values)
+            (each[:-1], each[1:]) for each in (np.moveaxis(t, axis, 0) for t in (rate, values))
         )
         crosses = (here >= 0) != (there >= 0)
         share = here[crosses] / (here[crosses] - there[crosses])
@@ -454,37 +392,14 @@ def _where_positive(values: FloatArray, rate: FloatArray, axes: Iterable[int]) -
     return np.concatenate(found)
 
 
-def _between(values: FloatArray, axes: Iterable[int]) -> FloatArray:
-    """The most by which a function exceeds its values at two neighbours: an eighth of its second difference there."""
-    from scipy.ndimage import maximum_filter1d  # not before it is needed, as it takes a while
-
-    total = np.zeros(values.shape)
-    for axis in axes:
-        ends = [(int(each == axis),) * 2 for each in range(values.ndim)]
-        bent = np.pad(np.abs(np.diff(values, n=2, axis=axis)) / 8, ends, mode="edge")
-        total += maximum_filter1d(bent, 3, axis=axis, mode="nearest")
-    return total
+def _flux(pair: PrincipalPair) -> FloatArray:
+    """⟨T*, q⁺⟩, with ⟨T*, T⟩ = 1 on the full circle, and what the points miss of it, shape (1, 2)."""
+    fine, coarse = (_flux_by(pair, parts) for parts in (PARTS, PARTS // 2))
+    return np.array([[fine, abs(fine - coarse)]])
 
 
-def _upcrossings(ladder: Ladder, start: Callable[[PrincipalPair], float]) -> Estimate:
-    """C; its error is the difference from a coarser discretisation and a coarser rule. Raises `NotConverged`."""
-    last = None
-    for pair in ladder:
-        value = _flux(pair, PARTS) * start(pair) / pair.derivative
-        if last is not None:
-            coarser = _flux(pair, PARTS // 2) * start(pair) / pair.derivative
-            error = abs(value - last) + abs(value - coarser)
-            if error <= CLOSE * value:
-                break
-        last = value
-    else:
-        if last is None or not error <= value:
-            raise NotConverged(Message(Code.EXCURSION_UNRESOLVED), remedy=Remedy.BUDGET)
-    return Estimate(value, error, value, quantity=UPCROSSINGS)
-
-
-def _flux(pair: PrincipalPair, parts: int) -> float:
-    """⟨T*, q⁺⟩, with ⟨T*, T⟩ = 1 on the full circle."""
+def _flux_by(pair: PrincipalPair, parts: int) -> float:
+    """The same from so many parts of each cell of φ."""
     space, problem = pair.space, pair.generator.problem
     psi, weights = space.phi.finer_rule(parts)
     phi, stretch = _own_phase(pair.generator, pair.p, psi)

@@ -1,16 +1,15 @@
 """Design: the values of parameters at which λ, Λ(p) or δ_p has a wanted value, by its exact derivatives.
 
-One parameter: F of `Distance` is scanned over the range, from the value of the problem outwards, until it changes its
-sign; Brent's method finds F = 0 there. Where it turns between two points the least |F| is sought. If F has one sign
-everywhere, the target cannot be reached.
-
-Several parameters: of all θ with F(θ) = 0 the one that is nearest to the θ⁰ of the problem,
+Of all θ with F(θ) = 0, F of `Distance`, it is the one that is nearest to the θ⁰ of the problem,
 
     minimise ½ Σ xᵢ²,  xᵢ = (θᵢ − θᵢ⁰)/sᵢ,  with F(θ) = 0 and each θᵢ within its range,
 
 where sᵢ is what a change of θᵢ is measured by, |θᵢ⁰| where nothing else is stated. x + μ ∇F = 0 holds there but for the
 parameters at an end of their range, μ being the multiplier of Lagrange. It is found by sequential quadratic programming
-(SLSQP, D. Kraft, DFVLR-FB 88-28, 1988) with the exact gradients.
+(SLSQP, D. Kraft, DFVLR-FB 88-28, 1988) with the exact gradients, for one parameter Newton's method. Where that leads
+nowhere, F is solved at the corners and at points of a Latin hypercube; if it has one sign there, then on the way to
+where |F| is least. Between two points at which it has both signs Brent's method finds F = 0, from where the steps begin
+anew. If F has one sign everywhere, the target cannot be reached.
 """
 
 from __future__ import annotations
@@ -19,19 +18,20 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from itertools import pairwise, product
+from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.optimize import brentq, minimize, minimize_scalar
+from scipy.optimize import brentq, minimize
 
+from fpsolve.analysis.axis import Axis, check_ends
 from fpsolve.analysis.scan import TOLERANCE, Sample
-from fpsolve.analysis.target import Distance, Target, said, target_of
-from fpsolve.analysis.zero import Axis, is_none
+from fpsolve.analysis.target import Distance, Target, is_none, target_of
 from fpsolve.arrays import FloatArray, real_number, shown
 from fpsolve.data import Result, dataset, written
 from fpsolve.errors import FpsolveError, NoSuchExponent, NotConverged
 from fpsolve.exponent.error import Absent, Estimate
+from fpsolve.exponent.kinds import choose
 from fpsolve.exponent.method import Budget
 from fpsolve.messages import Code, Message
 from fpsolve.model.problem import Problem, checked_problem
@@ -42,22 +42,20 @@ if TYPE_CHECKING:
 
 EXACT = 1e-13
 """|F| over its scale at which a point is taken at once."""
-NODES = 17
-"""Number of points of a scan over one parameter."""
-POINTS = 24
+POINTS = 16
 """Number of points of a scan over several parameters, for each of them."""
-MOST_STEPS = 60
-"""Largest number of quadratic problems."""
-MOST_REFINEMENTS = 12
-"""Largest number of points between two of a scan where |F| is least."""
+MOST_SOLVES = 30
+"""Largest number of points on the steps from one start."""
+MOST_REFINEMENTS = 40
+"""Largest number of points on the way to where |F| is least."""
 MOST_PARAMETERS = 6
 """Largest number of parameters, as all corners of their ranges are points of a scan."""
 SAME = 1e-8
-"""Distance of x from the nearest point that no longer counts, relative to the larger of 1 and |x|."""
+"""How far x may be off the nearest point, relative to the larger of 1 and |x|."""
 BEYOND = 0.1
 """Rise of |F| with the distance from the last point, over |∇F|, that is assumed where F has no value."""
 NEAREST = 1e-6
-"""Largest component of x + μ ∇F, but for what leads out of a range, at the nearest point."""
+"""Largest component of x + μ ∇F at the nearest point, where the steps end before it is `SAME`."""
 FALL = 1e-15
 """Change of ½|x|² with which the quadratic problems end."""
 
@@ -140,13 +138,11 @@ def design(
     """
     wanted, axes = target_of(target), axes_of(problem, by)
     measures = units_of(problem, axes, units or {})
-    distance = Distance(problem, wanted, [axis.key for axis in axes], budget or Budget())
+    rtol, keys = choose(problem).line_rtol(wanted.order), [axis.key for axis in axes]
+    distance = Distance(problem, wanted, keys, rtol=rtol, budget=budget or Budget())
     tried, here = _Tried(distance, progress), np.array([float(problem.values[axis.key]) for axis in axes])
     unit = np.array([*measures.values()])
-    if len(axes) == 1:
-        found = _along_axis(tried, wanted, axes[0], here[0])
-    else:
-        found = _nearest(tried, wanted, axes, here, unit)
+    found = _nearest(tried, wanted, axes, here, unit)
     if isinstance(found, Absent):
         return found
     scaled = found.gradient * unit
@@ -184,11 +180,7 @@ def axes_of(problem: Problem, by: str | Axis | Sequence[str | Axis]) -> tuple[Ax
         axis = each if isinstance(each, Axis) else start_and_stop(problem, key)
         if axis is None:
             raise ValueError(f'{key} is 0, which leaves its range open; state it, as in Axis("{key}", -1.0, 1.0)')
-        for name, value in (("start", axis.start), ("stop", axis.stop)):
-            try:
-                problem.at({key: value})
-            except ValueError as failure:
-                raise ValueError(f"got {key} with {name} = {value:g}: {said(failure)}") from failure
+        check_ends(problem, axis)
         found.append(axis)
     return tuple(found)
 
@@ -208,14 +200,11 @@ def units_of(problem: Problem, axes: Sequence[Axis], stated: Mapping[str, float]
 
 def start_and_stop(problem: Problem, key: str) -> Axis | None:
     """The range from half to twice the value of a parameter, within its range; None where the value is 0."""
-    value, field = float(problem.values[key]), problem.parameters[key].field
+    value, (low, high) = float(problem.values[key]), problem.parameters[key].bounds
     if value == 0:
         return None
     start, stop = sorted((0.5 * value, 2.0 * value))
-    for limit in () if field is None else field.metadata:
-        start = max(start, getattr(limit, "ge", start))
-        stop = min(stop, getattr(limit, "le", stop), math.nextafter(getattr(limit, "lt", math.inf), -math.inf))
-    return Axis(key, start, stop)
+    return Axis(key, max(start, low), min(stop, high))
 
 
 def _is_met(sample: Sample) -> bool:
@@ -248,6 +237,10 @@ class _Tried:
     def solves(self) -> int:
         return len(self._known)
 
+    def beyond(self, sample: Sample) -> list[Sample]:
+        """Those of the other sign."""
+        return [each for each in self.samples if (each.value < 0) != (sample.value < 0)]
+
     def __call__(self, theta: FloatArray) -> Sample | None:
         """F at θ; None where there is none."""
         key = tuple(theta.tolist())
@@ -259,63 +252,6 @@ class _Tried:
                 self.reasons.append(failure.message)
             self._progress()
         return self._known[key]
-
-    def root(self, at: Callable[[float], FloatArray], low: float, high: float) -> Sample | None:
-        """F = 0 on a path between two points at which it has both signs; None where it jumps there, or has no value."""
-
-        def value(u: float) -> float:
-            if (sample := self(at(u))) is None:
-                raise StopIteration
-            return 0.0 if _is_met(sample) else sample.value
-
-        with suppress(StopIteration):
-            sample = self(at(brentq(value, low, high, xtol=EXACT)))
-            return sample if sample and _is_close(sample) else None
-        return None
-
-
-def _along_axis(tried: _Tried, target: Target, axis: Axis, start: float) -> Sample | Absent:
-    """F = 0 over one parameter, next to its value: from a scan, and between two points where |F| is least there."""
-
-    def at(u: float) -> FloatArray:
-        return np.array([axis.value(u)])
-
-    here, is_crossed = min(max(axis.share(start), 0.0), 1.0), False
-    nodes, known = np.unique([here, *np.linspace(0, 1, NODES)]).tolist(), dict[float, Sample]()
-    for u in sorted(nodes, key=lambda u: abs(u - here)):
-        if (sample := tried(at(u))) is None:
-            continue
-        known[u] = sample
-        if _is_met(sample):
-            return sample
-        for low, high in pairwise(nodes):
-            if u in (low, high) and low in known and high in known and known[low].value * known[high].value < 0:
-                is_crossed = True
-                if found := tried.root(at, low, high):
-                    return found
-    for low, high in pairwise(sorted(known)):
-        sign = math.copysign(1.0, known[low].value)
-        rises = [sign * float(known[u].gradient[0]) * axis.slope(u) for u in (low, high)]
-        if sign * known[high].value > 0 and rises[0] < 0 < rises[1] and (turn := _turn(tried, at, sign, low, high)):
-            is_crossed = True
-            if found := tried.root(at, low, turn):
-                return found
-    return _unreached(tried, target, (axis,), is_crossed)
-
-
-def _turn(tried: _Tried, at: Callable[[float], FloatArray], sign: float, low: float, high: float) -> float | None:
-    """A point between two others where F has the other sign, sought where |F| is least."""
-    passed = list[float]()
-
-    def size(u: float) -> float:
-        if (sample := tried(at(u))) is None or sign * sample.value <= 0:
-            passed.extend([u] if sample else [])
-            raise StopIteration
-        return sign * sample.value
-
-    with suppress(StopIteration):
-        minimize_scalar(size, bounds=(low, high), method="bounded", options={"maxiter": MOST_REFINEMENTS})
-    return passed[0] if passed else None
 
 
 def _unreached(tried: _Tried, target: Target, axes: Sequence[Axis], is_crossed: bool) -> Absent:
@@ -343,24 +279,54 @@ def _nearest(
     tried: _Tried, target: Target, axes: Sequence[Axis], here: FloatArray, units: FloatArray
 ) -> Sample | Absent:
     """The point F = 0 that is nearest to the problem."""
+    from scipy.stats import qmc  # not before it is needed, as it takes a while
+
     start = np.clip(here, *np.array([(axis.start, axis.stop) for axis in axes]).T)
     if (found := _nearest_from(tried, start, axes, here, units)) is not None:
         return found
-    from scipy.stats import qmc  # not before it is needed, as it takes a while
-
     corners, inner = product((0.0, 1.0), repeat=len(axes)), qmc.LatinHypercube(len(axes), seed=0)
     for each in (*corners, *inner.random(POINTS * len(axes)).tolist()):
         tried(np.array([axis.value(u) for axis, u in zip(axes, each, strict=True)]))
-    samples = tried.samples
-    best = min(samples, key=lambda each: abs(each.value), default=None)
-    others = [each for each in samples if best is not None and (each.value < 0) != (best.value < 0)]
-    if best is not None and others:
-        step = min((each.at - best.at for each in others), key=lambda step: float(np.linalg.norm(step / units)))
-        first = best.at
-        best = tried.root(lambda u: first + u * step, 0.0, 1.0) or best
-    if best is not None and (found := _nearest_from(tried, best.at, axes, here, units)) is not None:
-        return found
+    if (best := min(tried.samples, key=lambda each: abs(each.value), default=None)) is None:
+        return _unreached(tried, target, axes, False)
+    if not (others := tried.beyond(best)):
+        _approach(tried, best, axes, units)
+        others = tried.beyond(best)
+    if others:
+        other = min(others, key=lambda each: float(np.linalg.norm((each.at - best.at) / units)))
+        best = _root(tried, best.at, other.at) or best
+        if (found := _nearest_from(tried, best.at, axes, here, units)) is not None:
+            return found
     return _unreached(tried, target, axes, bool(others))
+
+
+def _approach(tried: _Tried, first: Sample, axes: Sequence[Axis], units: FloatArray) -> None:
+    """Solve on the way from a point to where |F| is least, until F changes its sign."""
+    sign = math.copysign(1.0, first.value)
+
+    def size(x: FloatArray) -> tuple[float, FloatArray]:
+        if (here := tried(x * units)) is None or sign * here.value <= 0:
+            raise StopIteration
+        return sign * here.value, sign * here.gradient * units
+
+    bounds = [(axis.start / unit, axis.stop / unit) for axis, unit in zip(axes, units, strict=True)]
+    with suppress(StopIteration):
+        minimize(
+            size, first.at / units, jac=True, method="L-BFGS-B", bounds=bounds, options={"maxfun": MOST_REFINEMENTS}
+        )
+
+
+def _root(tried: _Tried, one: FloatArray, other: FloatArray) -> Sample | None:
+    """F = 0 between two points at which it has both signs; None where it has no value on the way."""
+
+    def value(share: float) -> float:
+        if (sample := tried(one + share * (other - one))) is None:
+            raise StopIteration
+        return 0.0 if _is_met(sample) else sample.value
+
+    with suppress(StopIteration):
+        return tried(one + brentq(value, 0.0, 1.0, xtol=EXACT) * (other - one))
+    return None
 
 
 def _nearest_from(
@@ -372,7 +338,7 @@ def _nearest_from(
     low, high = (
         (np.array(ends) - origin) / units for ends in zip(*((axis.start, axis.stop) for axis in axes), strict=True)
     )
-    size, taken = float(np.linalg.norm(first.gradient * units)) or 1.0, [first]
+    size, taken, most = float(np.linalg.norm(first.gradient * units)) or 1.0, [first], tried.solves + MOST_SOLVES
 
     def x_of(sample: Sample) -> FloatArray:
         return (sample.at - origin) / units
@@ -380,17 +346,30 @@ def _nearest_from(
     def at(x: FloatArray) -> Sample | None:
         return tried(origin + np.clip(x, low, high) * units)
 
+    def off(sample: Sample) -> float:
+        """The largest component of x + μ ∇F, but for what leads out of a range."""
+        x, gradient = x_of(sample), sample.gradient * units
+        free = gradient * ((x > low) & (x < high))
+        if not free.any():
+            return 0.0
+        return float(np.max(np.abs(x - np.clip((x @ free) / (free @ free) * gradient, low, high))))
+
     def value(x: FloatArray) -> float:
-        """F; where there is none more than at the last point, so that a step to there is made shorter."""
+        """F; where there is none more than at the last point, so that a step to there is made shorter.
+
+        Raises:
+            StopIteration: it is the nearest point, or the steps take too many.
+        """
         if (here := at(x)) is None:
             return abs(taken[-1].value) / size + BEYOND * float(np.linalg.norm(x - x_of(taken[-1])))
+        if tried.solves >= most or (_is_met(here) and off(here) <= SAME):
+            taken.append(here)
+            raise StopIteration
         return 0.0 if _is_met(here) else here.value / size
 
     def slope(x: FloatArray) -> FloatArray:
-        """∇F at a point that is taken. Raises `StopIteration` where the steps end before F is 0."""
-        here = at(x)
-        is_rest = len(taken) > 1 and here and np.max(np.abs(x_of(here) - x_of(taken[-1]))) <= SAME
-        if here is None or (is_rest and not _is_close(here)):
+        """∇F at a point that is taken. Raises `StopIteration` where there is none."""
+        if (here := at(x)) is None:
             raise StopIteration
         taken.append(here)
         return here.gradient * units / size
@@ -403,10 +382,6 @@ def _nearest_from(
             method="SLSQP",
             bounds=list(zip(low, high, strict=True)),
             constraints={"type": "eq", "fun": value, "jac": slope},
-            options={"ftol": FALL, "maxiter": MOST_STEPS},
+            options={"ftol": FALL, "maxiter": MOST_SOLVES},
         )
-    x, gradient = x_of(taken[-1]), taken[-1].gradient * units
-    free = gradient * ((x > low) & (x < high))
-    multiplier = -(x @ free) / ((free @ free) or 1.0)
-    is_nearest = not free.any() or np.max(np.abs(x - np.clip(-multiplier * gradient, low, high))) <= NEAREST
-    return taken[-1] if is_nearest and _is_close(taken[-1]) else None
+    return taken[-1] if _is_close(taken[-1]) and off(taken[-1]) <= NEAREST else None

@@ -57,12 +57,9 @@ def regions(lines: Sequence[Boundary]) -> Regions:
     from scipy.ndimage import distance_transform_edt
 
     scans = [line.scan for line in lines]
-    points, values = FINE * min(scan.nodes.size - 1 for scan in scans), []
-    for scan in scans:
-        cells = scan.nodes.size - 1
-        inside = scan.fine((np.arange(points // cells) + 0.5) * cells / points)
-        values.append(inside.swapaxes(1, 2).reshape(points, points))
-    signs, exists = np.where(np.stack(values) > 0, 1, -1), np.all(np.isfinite(values), axis=0)
+    points = FINE * min(scan.nodes.size - 1 for scan in scans)
+    values = np.stack([scan.on((np.arange(points) + 0.5) / points) for scan in scans])
+    signs, exists = np.where(values > 0, 1, -1), np.all(np.isfinite(values), axis=0)
     kinds = np.unique(signs[:, exists].T, axis=0)
     insides = [exists & np.all(signs == kind[:, None, None], axis=0) for kind in kinds]
     shares = [np.mean(inside) for inside in insides]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from itertools import chain, islice, pairwise, product
 from time import thread_time
 from typing import Any, NamedTuple
 
@@ -16,8 +16,8 @@ from fpsolve.messages import Message
 
 TOLERANCE = 1e-10
 """|F| over its scale up to which it is 0, unless more is allowed."""
-FINE = 13
-"""Number of points along a cell of a scan at which its interpolation is looked at."""
+FINE = 12
+"""Number of pieces, each way, of a cell of a scan in which its interpolation is looked at."""
 
 
 class Sample(NamedTuple):
@@ -82,76 +82,56 @@ class Scan:
     reasons: tuple[Message, ...] = ()
     seconds: float = 0.0
 
-    def between(self, i: Any, j: Any, s: FloatArray, t: FloatArray) -> FloatArray:
-        """F in the cells of the nodes (i, j) to (i + 1, j + 1), s and t in [0, 1], by bicubic interpolation.
+    def on(self, points: FloatArray) -> FloatArray:
+        """F on the grid of these points of both sides, shape (n, n), u first, by bicubic interpolation.
 
-        The mixed derivatives are those by which it is exact for all cubic F (A. Adini, 1960). All four are broadcast.
+        The mixed derivatives are those by which it is exact for all cubic F (A. Adini, 1960).
         """
-        along, across = self.nodes[i + 1] - self.nodes[i], self.nodes[j + 1] - self.nodes[j]
-        ends = (0, 0), (0, 1), (1, 0), (1, 1)
-        values = {(a, b): self.values[i + a, j + b] for a, b in ends}
-        by_s = {(a, b): along * self.gradients[i + a, j + b, 0] for a, b in ends}
-        by_t = {(a, b): across * self.gradients[i + a, j + b, 1] for a, b in ends}
-        flat = values[1, 1] - values[1, 0] - values[0, 1] + values[0, 0]
-        in_s, in_t, total = _hermite(s), _hermite(t), np.zeros(1)
-        for a, b in ends:
-            (hold_s, rise_s), (hold_t, rise_t) = in_s[a], in_t[b]
-            twist = by_t[1, b] - by_t[0, b] + by_s[a, 1] - by_s[a, 0] - flat
-            total = total + (values[a, b] * hold_s + by_s[a, b] * rise_s) * hold_t
-            total = total + (twist * rise_s + by_t[a, b] * hold_s) * rise_t
+        size = 1 / (self.nodes.size - 1)
+        cells = np.minimum((points / size).astype(int), self.nodes.size - 2)
+        i, j = cells[:, None], cells
+        f, (by_u, by_v) = self.values, size * np.moveaxis(self.gradients, 2, 0)
+        flat = f[i + 1, j + 1] - f[i + 1, j] - f[i, j + 1] + f[i, j]
+        ends, total = _hermite(points / size - cells), np.zeros(1)
+        for (a, (hold_u, rise_u)), (b, (hold_v, rise_v)) in product(enumerate(ends), repeat=2):
+            hold_u, rise_u, at = hold_u[:, None], rise_u[:, None], (i + a, j + b)
+            twist = by_v[i + 1, j + b] - by_v[i, j + b] + by_u[i + a, j + 1] - by_u[i + a, j] - flat
+            total = total + (f[at] * hold_u + by_u[at] * rise_u) * hold_v
+            total = total + (twist * rise_u + by_v[at] * hold_u) * rise_v
         return total
 
-    def fine(self, shares: FloatArray) -> FloatArray:
-        """F at shares of the sides of every cell, shape (cells, cells, shares, shares), in both u first."""
-        cells = np.arange(self.nodes.size - 1)[:, None, None]
-        return self.between(cells[:, None], cells, shares[:, None], shares)
-
-    def at(self, points: FloatArray) -> Iterator[Sample]:
-        """Interpolated F at some points, shape (n, 2)."""
-        cells = np.clip(np.searchsorted(self.nodes, points, side="right") - 1, 0, self.nodes.size - 2)
-        size, step = self.nodes[cells + 1] - self.nodes[cells], 1e-5
-        aside = step * np.array([[0, 1, -1, 0, 0], [0, 0, 0, 1, -1]])
-        shares = ((points - self.nodes[cells]) / size)[:, :, None] + aside
-        i, j = cells.T[:, :, None]
-        value, right, left, up, down = self.between(i, j, shares[:, 0], shares[:, 1]).T
-        gradients = np.stack([right - left, up - down], axis=1) / (2 * step * size)
-        for point, of, gradient in zip(points, value.tolist(), gradients, strict=True):
-            yield Sample(point, of, gradient, 0.0, self._largest)
-
-    @cached_property
-    def _largest(self) -> float:
-        return float(np.nanmax(np.abs(self.values)))
-
-    def __call__(self, at: FloatArray) -> Sample:
-        """Interpolated F."""
-        return next(self.at(at[None]))
-
     def seeds(self) -> Iterator[Sample]:
-        """F near where it changes its sign: inside the cells, or beside missing nodes on their edges."""
-        shares, found = np.linspace(0, 1, FINE), list[FloatArray]()
-        inside, whole = self.fine(shares), np.diff(self.nodes)
-        for i, j in np.ndindex(inside.shape[:2]):
-            values, steps = inside[i, j], shares
-            if np.isnan(values).any():
-                values, steps = self.values[i : i + 2, j : j + 2], shares[[0, -1]]
-            signs, middles = np.sign(values), steps[:-1] + 0.5 * steps[1]  # where one is 0, too
-            for axis, (in_u, in_v) in enumerate(((middles, steps), (steps, middles))):
-                u, v = np.nonzero(np.abs(np.diff(signs, axis=axis)) > 0)
-                found.append(self.nodes[[i, j]] + whole[[i, j]] * np.stack([in_u[u], in_v[v]], axis=1))
-        yield from self.at(np.concatenate(found))
+        """Points on the lines F = 0 of the interpolated F, each with a gradient that tells their direction.
+
+        Beside missing nodes they are those of F on the nodes.
+        """
+        from contourpy import contour_generator  # not before it is needed, as it takes a while
+
+        finer = np.linspace(0, 1, FINE * (self.nodes.size - 1) + 1)
+        for points, values in ((finer, self.on(finer)), (self.nodes, self.values)):
+            holes = np.isnan(values)
+            lines: Any = contour_generator(
+                points, points, np.ma.array(values, mask=holes).T, line_type="Separate"
+            ).lines(0.0)
+            for line in lines:
+                for start, end in pairwise(line):
+                    if (along := end - start).any():
+                        yield Sample(0.5 * (start + end), 0.0, np.array([-along[1], along[0]]), 0.0, 0.0)
+            if not holes.any():
+                return
 
 
 @dataclass(frozen=True)
 class Row:
-    """A row of a grid as a task: it begins anew, so that what it finds does not depend on who scans the others.
+    """A row of a grid as a task, with an F of its own, so that what it finds does not depend on who scans the others.
 
     Attributes:
-        begin: gives F; a task for another process needs one that pickles.
+        field: F; a task for another process needs one that pickles.
         count: of the nodes of the grid, each way.
         number: of the row, from 0 on: it runs along v.
     """
 
-    begin: Callable[[], Field]
+    field: Field
     count: int
     number: int
 
@@ -175,12 +155,12 @@ class ScannedRow:
 
 def scan_row(row: Row) -> ScannedRow:
     """F on a row from one end to the other, so that each node is close to the one before."""
-    started, field, reasons = thread_time(), row.begin(), dict[Message, None]()
+    started, reasons = thread_time(), dict[Message, None]()
     values, gradients = np.full(row.count, np.nan), np.full((row.count, 2), np.nan)
     shares = np.linspace(0, 1, row.count)
     for k in range(row.count):
         try:
-            sample = field(shares[[row.number, k]])
+            sample = row.field(shares[[row.number, k]])
             values[k], gradients[k] = sample.value, sample.gradient
         except FpsolveError as failure:
             reasons.setdefault(failure.message)
@@ -192,16 +172,18 @@ def scanned(rows: Sequence[Row], found: Iterator[ScannedRow], progress: Callable
 
     `progress` is called for each node.
     """
-    count, seconds = len(rows), 0.0
-    values, gradients, reasons = np.empty((count, count)), np.empty((count, count, 2)), dict[Message, None]()
-    for row in rows:
-        result = next(found)
-        values[row.number], gradients[row.number] = result.values, result.gradients
-        reasons.update(dict.fromkeys(result.reasons))
-        seconds += result.seconds
-        for _ in range(count):
+    results = list[ScannedRow]()
+    for result in islice(found, len(rows)):
+        results.append(result)
+        for _ in rows:
             progress()
-    return Scan(np.linspace(0, 1, count), values, gradients, tuple(reasons), seconds)
+    return Scan(
+        np.linspace(0, 1, len(rows)),
+        np.stack([each.values for each in results]),
+        np.stack([each.gradients for each in results]),
+        tuple(dict.fromkeys(chain.from_iterable(each.reasons for each in results))),
+        sum(each.seconds for each in results),
+    )
 
 
 def _hermite(x: FloatArray) -> list[tuple[FloatArray, FloatArray]]:

@@ -16,9 +16,9 @@ in which B T = 0 at p = 0, where T = 1 whatever θ. And ∂δ_p/∂θ = −∂Λ
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -54,9 +54,7 @@ if TYPE_CHECKING:
 
 _EPS = sys.float_info.epsilon
 RECORDS = {each.name: each for each in (LYAPUNOV_EXPONENT, STABILITY_INDEX, VARIANCE_RATE)}
-"""The quantities besides Λ(p) that have sensitivities, by their names."""
-DIFFERENTIATED = tuple(RECORDS)
-"""The quantities that are no function of p."""
+"""The quantities besides Λ(p) that have sensitivities, by their names: those that are no function of p."""
 MOST_BARS = 4
 """Largest number of p whose sensitivities are drawn."""
 Slopes = Mapping[str, Estimate]
@@ -89,10 +87,10 @@ class Sensitivities(Result):
         single = [(RECORDS[name], (self.indices[name],)) for name in RECORDS if name in self.indices]
         for record, rows in [(MOMENT, self.moments), *single]:
             slope = record.by(THETA)
-            shape = (len(rows), len(self.theta))[2 - len(slope.dims) :]  # without p there is one row
             for quantity, of in ((slope, "value"), (slope.error(), "error_estimate")):
-                flat = [getattr(row[key], of) if key in row else np.nan for row in rows for key in self.theta]
-                numbers[quantity] = np.array(flat, dtype=float).reshape(shape)
+                table = [[getattr(row[key], of) if key in row else np.nan for key in self.theta] for row in rows]
+                shape = (len(rows), len(self.theta))
+                numbers[quantity] = np.reshape(table, shape if record is MOMENT else shape[1:])
         key = replace(THETA, name="parameter", words="key of a parameter", latex="", unit="1")
         unit = replace(THETA, name="theta_unit", words="unit of theta", latex="", unit="1")
         coordinates = {
@@ -154,7 +152,7 @@ def sensitivities(
     """
     solver = solver_of(problem, mesh, rtol, budget)
     points = checked_moments(p, solver.method, may_be_empty=True)
-    indices = DIFFERENTIATED if solver.method.has_pairs else ()
+    indices = tuple(RECORDS) if solver.method.has_pairs else ()
     return solve_sensitivities(solver, points, problem.derivatives(), indices=indices, progress=progress)
 
 
@@ -163,7 +161,7 @@ def solve_sensitivities(
     p: FloatArray,
     along: Mapping[str, ParameterDerivative],
     *,
-    indices: Sequence[str] = DIFFERENTIATED,
+    indices: Iterable[str] = RECORDS,
     root: float | None = None,
     progress: Callable[[], None] = lambda: None,
 ) -> Sensitivities:
@@ -232,96 +230,78 @@ class Gradient:
 
     def __init__(self, solver: ExponentSolver, along: Mapping[str, ParameterDerivative]) -> None:
         self._method, self._along = solver.method, along
-        self._slope_errors: dict[float, float] = {}  # of Λ′(p)
+        self._known = dict[float, list[tuple[PairDerivatives, dict[str, Changed]]]]()
 
     def moment(self, p: float) -> Slopes:
         """∂Λ(p)/∂θ. Raises `NotConverged`, `NoSuchExponent`."""
         if p == 0:
             return dict.fromkeys(self._along, Estimate(0.0, 0.0, 0.0))
-        if abs(p) < SMALL_P:
-            return {key: _times(p, each) for key, each in self._by_small_p(p).items()}
         if known := self._method.number(p):
             along = self._along
             slopes = {key: known.slope(key) for key in along}
             sizes = {key: known.scale / abs(by.theta) if by.theta else abs(slopes[key][0]) for key, by in along.items()}
             return {key: Estimate(slopes[key][0], slopes[key][1], sizes[key]) for key in along}
-        method, along = self._method.held(p, self._along)
-        pair = method.pair(p)
-        finer = method.finer_pair(pair)
-        self._slope_errors[p] = 2 * abs(finer.derivative - pair.derivative)
-        coarse, fine = (
-            {key: each.value for key, each in _changed(PairDerivatives(of), along).items()} for of in (pair, finer)
-        )
-        return _compared(coarse, fine, abs(finer.value - pair.value) / method.scale(p))
+        coarse, fine = (around.pair.value for around, _ in self._around(p))
+        method, _ = self._method.held(p, self._along)
+        return self._compared(p, abs(fine - coarse) / method.scale(p), lambda _, changed: changed.value)
 
-    def lyapunov_exponent(self) -> dict[str, Estimate]:
+    def lyapunov_exponent(self) -> Slopes:
         """∂λ/∂θ. Raises `NotConverged`, `NoSuchExponent`."""
         method, _ = self._method.held(0.0, self._along)
-        coarse, fine = ({key: each.slope for key, each in at.items()} for at in (self._at_zero, self._finer_at_zero))
-        return _compared(coarse, fine, method.ratio_alone(0.0)[1] / method.scales.linear)
+        share = method.ratio_alone(0.0)[1] / method.scales.linear
+        return self._compared(0.0, share, lambda _, changed: changed.slope)
 
     def variance_rate(self) -> Slopes:
         """∂Λ″(0)/∂θ. Raises `NotConverged`, `NoSuchExponent`."""
-        rate = self._method.variance_rate()
-        coarse, fine = (
-            {key: each.curvature for key, each in at.items()} for at in (self._at_zero, self._finer_at_zero)
-        )
-        return _compared(coarse, fine, rate.relative_error)
+        share = self._method.variance_rate().relative_error
+        return self._compared(0.0, share, lambda _, changed: changed.curvature)
 
     def root(self, p: float) -> Slopes:
         """∂δ_p/∂θ, p being δ_p: that of Λ(p)/p, for small p from its derivatives at p = 0, over that by p.
 
-        With its own error each has twice the relative one of δ_p, and that of the slope.
+        With its own error each has twice the relative one of δ_p.
         """
+        _, slope, error = self._method.ratio(p)
         if abs(p) >= SMALL_P:
-            slopes: Slopes = {key: _times(1 / p, each) for key, each in self.moment(p).items()}
-            doubt = self._slope_errors.get(p, 0.0) / abs(p)
+            found = self._compared(p, 0.0, lambda at, changed: _times(-1 / at.pair.derivative, changed.value))
         else:
-            slopes, doubt = self._by_small_p(p), 0.0
-        _, slope_by_p, error = self._method.ratio(p)  # now, as there is none where two parts of the motion are even
-        lost = (2 * error / max(abs(p), SMALL_P) + doubt) / abs(slope_by_p)
-        found = {key: _times(-1 / slope_by_p, each) for key, each in slopes.items()}
+            found = self._compared(0.0, 0.0, lambda at, changed: _times(-2 / at.second_derivative, _ratio(changed, p)))
+        share = 2 * error / (max(abs(p), SMALL_P) * abs(slope))
         return {
-            key: replace(each, error_estimate=each.error_estimate + lost * abs(each.value))
+            key: replace(each, error_estimate=each.error_estimate + share * abs(each.value))
             for key, each in found.items()
         }
 
-    def _by_small_p(self, p: float) -> Slopes:
-        """∂/∂θ of Λ(p)/p from its derivatives at p = 0."""
-        slopes = dict(self.lyapunov_exponent())
-        for key, each in (self.variance_rate() if p else {}).items():
-            slope, more = slopes[key], _times(0.5 * p, each)
-            errors = slope.error_estimate + more.error_estimate
-            slopes[key] = Estimate(slope.value + more.value, errors, max(slope.scale, more.scale))
-        return slopes
+    def _around(self, p: float) -> list[tuple[PairDerivatives, dict[str, Changed]]]:
+        """The pair at p, and one of a finer discretisation, with what changes along the directions."""
+        if p not in self._known:
+            method, along = self._method.held(p, self._along)
+            if p:
+                both = PairDerivatives(pair := method.pair(p)), PairDerivatives(method.finer_pair(pair))
+            else:
+                both = method.around_zero, method.finer_around_zero
+            self._known[p] = [(each, {key: Changed(each, by) for key, by in along.items()}) for each in both]
+        return self._known[p]
 
-    @cached_property
-    def _at_zero(self) -> Mapping[str, Changed]:
-        method, along = self._method.held(0.0, self._along)
-        return _changed(method.around_zero, along)
+    def _compared(self, p: float, share: float, of: Callable[[PairDerivatives, Changed], Estimate]) -> Slopes:
+        """Numbers of the finer one, their errors from how far both are apart.
 
-    @cached_property
-    def _finer_at_zero(self) -> Mapping[str, Changed]:
-        method, along = self._method.held(0.0, self._along)
-        return _changed(method.finer_around_zero, along)
+        That of one parameter may be small by chance, or fall slowly: twice as much counts, and of the scale of each the
+        share that the error of what is derived has of its own scale, as both are of one pair.
+        """
+        found = dict[str, Estimate]()
+        for key in self._along:
+            coarse, fine = (of(around, changed[key]) for around, changed in self._around(p))
+            apart = 2 * abs(fine.value - coarse.value) + share * fine.scale
+            found[key] = replace(fine, error_estimate=fine.error_estimate + apart)
+        return found
 
 
-def _changed(around: PairDerivatives, along: Mapping[str, ParameterDerivative]) -> dict[str, Changed]:
-    return {key: Changed(around, by) for key, by in along.items()}
-
-
-def _compared(coarse: Slopes, fine: Slopes, share: float) -> dict[str, Estimate]:
-    """The finer ones, their errors from how far both are apart.
-
-    That of one parameter may be small by chance, or fall slowly: twice as much counts, and of the scale of each the
-    share that the error of what is derived has of its own scale, as both are of one pair.
-    """
-    return {
-        key: replace(
-            each, error_estimate=each.error_estimate + 2 * abs(each.value - coarse[key].value) + share * each.scale
-        )
-        for key, each in fine.items()
-    }
+def _ratio(changed: Changed, p: float) -> Estimate:
+    """∂/∂θ of Λ(p)/p for small p."""
+    slope, more = changed.slope, _times(0.5 * p, changed.curvature)
+    errors = slope.error_estimate + more.error_estimate
+    return Estimate(slope.value + more.value, errors, max(slope.scale, more.scale))
 
 
 def _times(factor: float, estimate: Estimate) -> Estimate:

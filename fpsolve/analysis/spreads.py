@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import partial
 from itertools import repeat
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -100,7 +100,7 @@ class Law:
 
     def quantile(self, share: FloatArray) -> FloatArray:
         """The values below which these shares of the law are."""
-        return np.clip(self._cut.ppf(share), np.nextafter(self.low, math.inf), self.high)
+        return np.clip(self._cut.ppf(share), self.low, self.high)
 
 
 @dataclass(frozen=True)
@@ -148,14 +148,10 @@ def laws_of(problem: Problem, uncertain: Mapping[str, Any]) -> dict[str, Law]:
         if key not in known:
             raise ValueError(f"got {shown(key)} as a parameter; must be one of {', '.join(known) or 'none'}")
         deviation = stated if isinstance(stated, Deviation) else deviation_of(stated)
-        value, field = float(problem.values[key]), problem.parameters[key].field
+        value = float(problem.values[key])
         if not deviation.at(value) > 0:
             raise ValueError(f'{key} is 0, and so is a share of it; state {{"sd": number}} for it')
-        low, high = -math.inf, math.inf
-        for limit in () if field is None else field.metadata:
-            low = max(low, getattr(limit, "ge", low), getattr(limit, "gt", low))
-            high = min(high, getattr(limit, "le", high), getattr(limit, "lt", high))
-        found[key] = Law(value, deviation.at(value), low, high)
+        found[key] = Law(value, deviation.at(value), *problem.parameters[key].bounds)
     return found
 
 
@@ -207,11 +203,12 @@ class Uncertainty(Result):
     def to_xarray(self) -> xarray.Dataset:
         """The values, and the ends of their intervals."""
         numbers = dict[Quantity, Any]()
-        rows = [(RECORDS[name], [spread], ()) for name, spread in self.indices.items()]
-        for quantity, spreads, dims in [(MOMENT, self.moments, MOMENT.dims), *rows]:
-            for part in ("value", "low", "high"):
+        rows = [(RECORDS[name], [spread]) for name, spread in self.indices.items()]
+        for quantity, spreads in [(MOMENT, self.moments), *rows]:
+            ends = {which: quantity.end(which, LEVEL) for which in ("low", "high")}
+            for part, record in {"value": quantity, **ends}.items():
                 column = np.array([math.nan if each is None else getattr(each, part) for each in spreads])
-                numbers[interval_end(quantity, part)] = column if dims else column[0]
+                numbers[record] = column if quantity.dims else column[0]
         held = self.sensitivities.theta
         return dataset("uncertainty to first order", "finite elements", numbers, {P: self.p}, held, level=LEVEL)
 
@@ -220,15 +217,6 @@ class Uncertainty(Result):
             f"{RECORDS[name].symbol} from {each.low:.4g} to {each.high:.4g}" for name, each in self.indices.items()
         ]
         return f"with {LEVEL:.0%}: {', '.join(parts) or f'{self.p.size} p'}"
-
-
-def interval_end(quantity: Quantity, part: str) -> Quantity:
-    """The "low" or "high" end of an interval of a quantity; the quantity itself for "value"."""
-    if part == "value":
-        return quantity
-    words = f"{part} end of the {LEVEL:.0%} interval of the {quantity.words}"
-    plain = {each.name: getattr(quantity, each.name) for each in fields(Quantity)}
-    return Quantity(**{**plain, "name": f"{quantity.name}_{part}", "words": words})
 
 
 def uncertainty(

@@ -10,20 +10,21 @@ import math
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
 from itertools import combinations, product
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
+from fpsolve.analysis.axis import Axis, check_axes
 from fpsolve.analysis.continuation import LONGEST, SHORTEST, Trace, find_branches, with_branch
-from fpsolve.analysis.scan import Row, Scan, ScannedRow, scan_row, scanned
+from fpsolve.analysis.scan import Row, Sample, Scan, ScannedRow, scan_row, scanned
 from fpsolve.analysis.special_points import Placed, crossings, with_folds, with_points, with_values
-from fpsolve.analysis.target import Target, target_of
-from fpsolve.analysis.zero import Axis, Known, ZeroField, check_axes, is_none
+from fpsolve.analysis.target import Distance, Target, is_none, line_of_value, target_of
 from fpsolve.arrays import FloatArray, is_whole, real_number, shown
+from fpsolve.budget import Meter, OverBudget
 from fpsolve.data import Result, brief, dataset
 from fpsolve.drawing import add_legend, coloured, label_axes, scale_axis
+from fpsolve.errors import FpsolveError, NotConverged
 from fpsolve.exponent.kinds import choose
 from fpsolve.exponent.method import Budget
 from fpsolve.messages import Code, Message
@@ -46,6 +47,16 @@ SCAN_SHARE = 0.5
 """Share of this time for the scan."""
 LARGEST = 0.1
 """Step that may be asked for, in sides of the frame."""
+
+
+class Known(Protocol):
+    """The points of a line that were solved, also by an earlier run."""
+
+    def find(self, rtol: float, at: FloatArray) -> Sample | Message | None:
+        """F at (u, v), or why there is none."""
+
+    def keep(self, rtol: float, at: FloatArray, found: Sample | Message) -> None:
+        """Keep it."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -138,8 +149,7 @@ class Boundary(Result):
     def zero_field(self) -> ZeroField:
         """F over the unit square, with the time that is left for the line."""
         most = math.inf if self.budget.line_seconds is None else self.budget.line_seconds
-        frame, spent = (self.target, self.problem, (self.x, self.y)), Message(Code.LINE_SPENT, most=most)
-        return ZeroField(*frame, self.budget, None, most - self.seconds, spent, self.known)
+        return ZeroField(self, self.rtol, most - self.seconds, Message(Code.LINE_SPENT, most=most))
 
     def remark(self) -> str:
         """That there is no line, or not all of it, as a `Message`, or an empty text."""
@@ -168,9 +178,7 @@ class Boundary(Result):
         share = math.inf if most is None else SCAN_SHARE * most / count
         seconds, key = min((self.budget.seconds, "budget.seconds"), (share, LINE_KEY))
         spent = Message(Code.ROW_SPENT, most=seconds, key=key)
-        frame = self.target, self.problem, (self.x, self.y)
-        rough = partial(ZeroField, *frame, self.budget, self.scan_rtol, seconds, spent, self.known)
-        return [Row(rough, count, number) for number in range(count)]
+        return [Row(ZeroField(self, self.scan_rtol, seconds, spent), count, number) for number in range(count)]
 
     def solve(
         self,
@@ -196,7 +204,7 @@ class Boundary(Result):
         obstacles = [] if zero_field.stopped is None else [zero_field.stopped]
         is_empty = not np.isfinite(scan.values).any()
         obstacles += [each for each in scan.reasons if is_of_line(each) or (is_empty and not is_none(each))]
-        seconds = now.seconds + zero_field.spent_seconds
+        seconds = now.seconds + zero_field.seconds
         yield replace(now, seconds=seconds, obstacles=tuple(obstacles), complete=not obstacles)
 
     def _special(self, zero_field: ZeroField, trace: Trace) -> Trace:
@@ -244,6 +252,63 @@ class Boundary(Result):
     def _said(self) -> str:
         branches = f"{len(self.traces)} branch{'es' * (len(self.traces) != 1)}"
         return f"{self.target.equation}: {branches} over {self.x.key} and {self.y.key}"
+
+
+class ZeroField:
+    """F of a line over the unit square, with its gradient.
+
+    Args:
+        line: the target, the frame, and what a solve may cost.
+        rtol: of F, relative to its scale.
+        seconds: of the processor for all values together.
+        spent: what is said where they do not suffice.
+
+    Attributes:
+        stopped: what was said, or None.
+    """
+
+    def __init__(self, line: Boundary, rtol: float, seconds: float, spent: Message) -> None:
+        self._line, self._rtol, self._spent = line, rtol, spent
+        of_value = line_of_value(choose(line.problem), line.target)
+        settings = {"rtol": rtol, "of_value": of_value, "budget": line.budget}
+        self._distance = Distance(line.problem, line.target, [line.x.key, line.y.key], **settings)
+        self._meter = Meter(seconds, number=line.target.symbol)
+        self.stopped: Message | None = None
+
+    @property
+    def seconds(self) -> float:
+        """Of the processor, so far."""
+        return self._meter.spent
+
+    def __call__(self, at: FloatArray) -> Sample:
+        """F at (u, v).
+
+        Raises:
+            FpsolveError: there is none, or the time does not suffice.
+        """
+        known = self._line.known
+        found = known.find(self._rtol, at) if known else None
+        if found is None:
+            found = self._solved(at)
+            if known:
+                known.keep(self._rtol, at, found)
+        if isinstance(found, Message):
+            raise NotConverged(found)
+        return found
+
+    def _solved(self, at: FloatArray) -> Sample | Message:
+        """F, or why there is none."""
+        sides = list(zip((self._line.x, self._line.y), at.tolist(), strict=True))
+        theta, slopes = np.array([(axis.value(share), axis.slope(share)) for axis, share in sides]).T
+        try:
+            with self._meter.running():
+                found = self._distance(theta)
+        except OverBudget:
+            self.stopped = self._spent
+            return self.stopped
+        except FpsolveError as failure:
+            return failure.message
+        return found._replace(at=at, gradient=found.gradient * slopes, rtol=self._rtol)
 
 
 def boundary(

@@ -14,8 +14,7 @@ from fpsolve.analysis.scan import Sample
 from fpsolve.arrays import FloatArray, shown
 from fpsolve.errors import FpsolveError
 from fpsolve.exponent.error import Estimate
-from fpsolve.exponent.kinds import choose
-from fpsolve.exponent.method import Budget, Method, refuse
+from fpsolve.exponent.method import Method, refuse
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.messages import Code, Message
 from fpsolve.model.problem import Problem
@@ -81,8 +80,7 @@ class Target:
     @property
     def latex(self) -> str:
         """`equation` in LaTeX, with dollars."""
-        symbols = {"lyapunov_exponent": r"\lambda", "stability_index": r"\delta_p", "moment": rf"\Lambda({self.p:g})"}
-        return f"${symbols[self.kind]} = {self.value:g}$"
+        return f"${self.quantity.latex.strip('$')} = {self.value:g}$"
 
 
 def target_of(text: str) -> Target:
@@ -93,6 +91,11 @@ def target_of(text: str) -> Target:
         if math.isfinite(value) and (found[1] or (order and math.isfinite(order))):
             return Target(found[1] or "moment", value, 0.0 if found[1] else order)  # type: ignore[arg-type]
     raise ValueError(f"got {shown(text)}; must be {EXAMPLES}, all numbers finite and the order of a moment not 0")
+
+
+def is_none(reason: Message) -> bool:
+    """Whether there is no F for a reason, and it is not only not resolved."""
+    return reason.tells_of(Code.NO_PROBLEM) or reason.code in (Code.TAILS, Code.INFINITE_VARIANCE)
 
 
 def line_of_value(method: Method, target: Target) -> float:
@@ -118,23 +121,11 @@ class Distance:
         problem: with the values of all other parameters.
         target: what is wanted.
         keys: of the parameters.
-        budget: for a solve.
-        rtol: of F, relative to its scale; that of lines if None.
-        of_value: see `ExponentSolver`.
+        settings: of the solves, see `ExponentSolver`.
     """
 
-    def __init__(
-        self,
-        problem: Problem,
-        target: Target,
-        keys: Sequence[str],
-        budget: Budget,
-        rtol: float | None = None,
-        of_value: float = 0.0,
-    ) -> None:
-        self.problem, self.target, self.keys = problem, target, tuple(keys)
-        rtol = choose(problem).line_rtol(target.order) if rtol is None else rtol
-        self._own: Any = {"rtol": rtol, "of_value": of_value, "budget": budget}
+    def __init__(self, problem: Problem, target: Target, keys: Sequence[str], **settings: Any) -> None:
+        self.problem, self.target, self.keys, self._settings = problem, target, tuple(keys), settings
 
     def at(self, theta: FloatArray) -> Problem:
         """The problem at θ. Raises `FpsolveError` where there is none."""
@@ -145,7 +136,7 @@ class Distance:
 
     def method(self, theta: FloatArray) -> Method:
         """What solves F at θ."""
-        return ExponentSolver(self.at(theta), **self._own).method
+        return ExponentSolver(self.at(theta), **self._settings).method
 
     def __call__(self, theta: FloatArray) -> Sample:
         """F at θ, shape (n,). Raises `FpsolveError` where there is none."""

@@ -17,9 +17,9 @@ import numpy as np
 from pydantic import ValidationError
 from pydantic.fields import FieldInfo
 
+from fpsolve.analysis.axis import axis_faults
 from fpsolve.analysis.excursions import STATIONARY, check_start
 from fpsolve.analysis.target import said
-from fpsolve.analysis.zero import axis_faults
 from fpsolve.arrays import FloatArray, is_log_spaced
 from fpsolve.case.kinds import parameters_of, problem_of
 from fpsolve.case.read_vary import values_of

@@ -24,9 +24,9 @@ from pydantic import (
     model_validator,
 )
 
+from fpsolve.analysis.axis import Axis
 from fpsolve.analysis.excursions import STATIONARY
 from fpsolve.analysis.target import EXAMPLES, Target, target_of
-from fpsolve.analysis.zero import Axis
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import MeshError
 from fpsolve.explain import (

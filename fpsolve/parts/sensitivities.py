@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from fpsolve.analysis.sensitivity import DIFFERENTIATED, Sensitivities, Slopes, solve_sensitivities
+from fpsolve.analysis.sensitivity import RECORDS, Sensitivities, Slopes, solve_sensitivities
 from fpsolve.case.case import Case, Curve
 from fpsolve.case.sections import SENSITIVITIES
 from fpsolve.drawing import draw_bars, figure_for
@@ -27,7 +27,7 @@ def _settings(case: Case, number: int) -> Settings | None:
     if SENSITIVITIES not in case.asked and not case.uncertain:
         return None
     p = case.differentiated.tolist() if MOMENT.name in case.asked else []
-    return {"p": p, "indices": [name for name in DIFFERENTIATED if name in case.asked]}
+    return {"p": p, "indices": [name for name in RECORDS if name in case.asked]}
 
 
 def _solve(job: Job, settings: Settings) -> Sensitivities:
@@ -54,7 +54,7 @@ def _content(case: Case, result: CurveResult) -> Mapping[str, Any]:
             return {key: of(each) if each.relative_error <= MEANINGLESS else None for key, each in slopes.items()}
 
         moments = zip(known.p.tolist(), known.moments, strict=True)
-        indices = {name: row(known.indices[name]) if name in known.indices else None for name in DIFFERENTIATED}
+        indices = {name: row(known.indices[name]) if name in known.indices else None for name in RECORDS}
         return {"moments": [{"p": p, **row(slopes)} for p, slopes in moments], **indices}
 
     errors = numbers(lambda each: each.error_estimate)

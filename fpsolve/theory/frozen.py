@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -76,23 +77,6 @@ def swing(problem: Problem, p: float) -> tuple[float, float]:
     return float(a[best]) / noise.standard_deviation, float(rate[best])
 
 
-class _Held:
-    """Noise held at some z, increasing, shape (n,)."""
-
-    def __init__(self, problem: Problem, z: FloatArray) -> None:
-        noise, self.z = problem.coloured, z
-        xi = noise.standard_deviation * z
-        self._faster, self._slower, self.turns = eigenvalues_at(problem, xi)
-        self._holding = noise.holding_cost(xi)
-
-    def rate(self, p: float) -> FloatArray:
-        """F of `FrozenNoise`."""
-        growth = p * self._faster
-        if p < -1:
-            growth = np.where(self.turns, growth, np.maximum(growth, (p + 1) * self._slower - self._faster))
-        return growth - self._holding
-
-
 class FrozenNoise:
     """The growth rate F(z; p) of ‖x‖^p on paths that hold the noise at z, and where it is the largest.
 
@@ -105,28 +89,24 @@ class FrozenNoise:
 
     Args:
         problem: its noise must be a diffusion without algebraic tails.
-
-    Attributes:
-        z: points on both sides, increasing, denser near 0, shape (n,).
+        z: where ξ is held, increasing, shape (n,); without it points on both sides, denser near 0.
     """
 
-    def __init__(self, problem: Problem) -> None:
+    def __init__(self, problem: Problem, z: FloatArray | None = None) -> None:
         noise = problem.coloured
         if not noise.is_diffusion:
             raise TypeError("there is no z to look for where ξ is no diffusion by itself")
-        unit = noise.standard_deviation
-        furthest = 5 * LARGEST_P * unit * noise_strength(problem.motion) * noise.correlation_time
-        end = min(max(furthest, 1.0), 0.999 * noise.half_width / unit)
-        spread = max(np.log(end / 1e-2), 1.0)
-        side = end * np.sinh(spread * np.linspace(0, 1, SIDE_SAMPLES)) / np.sinh(spread)
-        self.z = np.concatenate([-side[:0:-1], side])
-        self._problem, self._held = problem, _Held(problem, self.z)
-        self._slope = np.gradient(noise.log_density(unit * self.z), self.z)
-        self._known = dict[tuple[float, int], tuple[float, float]]()
+        self.z, self._problem = _both_sides(problem) if z is None else z, problem
+        xi = noise.standard_deviation * self.z
+        self._faster, self._slower, self._turns = eigenvalues_at(problem, xi)
+        self._holding = noise.holding_cost(xi)
 
     def rate(self, p: float) -> FloatArray:
         """F at `z`."""
-        return self._held.rate(p)
+        growth = p * self._faster
+        if p < -1:
+            growth = np.where(self._turns, growth, np.maximum(growth, (p + 1) * self._slower - self._faster))
+        return growth - self._holding
 
     def peaks(self, p: float) -> tuple[FloatArray, FloatArray]:
         """z and F of the local maxima."""
@@ -139,30 +119,41 @@ class FrozenNoise:
         """About the mean z of the tilted density."""
         return self._peak(p, int(np.argmax(self.rate(p))))[0]
 
-    def _peak(self, p: float, number: int) -> tuple[float, float]:
-        """z and F of the maximum next to a number of `z`, looked for once."""
-        if (p, number) not in self._known:
-            self._known[p, number] = self._zoomed(p, number)
-        return self._known[p, number]
-
-    def _zoomed(self, p: float, best: int) -> tuple[float, float]:
-        held = self._held
+    def _peak(self, p: float, best: int) -> tuple[float, float]:
+        """z and F of the maximum next to a number of `z`."""
+        held = self
         while True:
             lower, upper = held.z[[max(best - 1, 0), min(best + 1, held.z.size - 1)]]
             if upper - lower <= CLOSE:
-                break
-            held = _Held(self._problem, np.linspace(float(lower), float(upper), ZOOM))
+                return float(held.z[best]), float(held.rate(p)[best])
+            held = FrozenNoise(self._problem, np.linspace(lower, upper, ZOOM))
             best = int(np.argmax(held.rate(p)))
-        return float(held.z[best]), float(held.rate(p)[best])
 
     def rests(self, p: float, lower: float = -math.inf, upper: float = math.inf) -> bool:
         """Whether the phase does not turn at the largest F between two z."""
         rate = np.where((self.z >= lower) & (self.z <= upper), self.rate(p), -math.inf)
-        return not self._held.turns[np.argmax(rate)]
+        return not self._turns[np.argmax(rate)]
 
     def tilt(self, z: float) -> float:
         """s for which P_s exp(2s z) is the largest at z: −½(ln P_s)′."""
         return -0.5 * float(np.interp(z, self.z, self._slope))
+
+    @cached_property
+    def _slope(self) -> FloatArray:
+        """(ln P_s)′ at `z`."""
+        noise = self._problem.coloured
+        return np.gradient(noise.log_density(noise.standard_deviation * self.z), self.z)
+
+
+def _both_sides(problem: Problem) -> FloatArray:
+    """Points z as far out as slow noise carries a moment, denser near 0."""
+    noise = problem.coloured
+    unit = noise.standard_deviation
+    furthest = 5 * LARGEST_P * unit * noise_strength(problem.motion) * noise.correlation_time
+    end = min(max(furthest, 1.0), 0.999 * noise.half_width / unit)
+    spread = max(np.log(end / 1e-2), 1.0)
+    side = end * np.sinh(spread * np.linspace(0, 1, SIDE_SAMPLES)) / np.sinh(spread)
+    return np.concatenate([-side[:0:-1], side])
 
 
 @cached_by_problem(8)

@@ -66,13 +66,13 @@ class SecondOrder:
     Attributes:
         linear_terms: what is linear in p: damping of each order, impacts, noise.
         quadratic: the coefficient of p².
-        half_turns: how often per unit time the phase passes a ray, ω/π.
+        impact_rate: N = ∂λ/∂ ln R of Eq. (39): how often per unit time the phase passes a ray, ω/π.
         log_factor: the sum of all ln R.
     """
 
     linear_terms: tuple[float, ...]
     quadratic: float
-    half_turns: float
+    impact_rate: float
     log_factor: float
 
     def moment_exponent(self, p: ArrayLike) -> Any:
@@ -96,14 +96,9 @@ class SecondOrder:
         return 2 * self.quadratic
 
     @property
-    def impact_rate(self) -> float:
-        """N = ∂λ/∂ ln R of Eq. (39), where there is one ray of impacts."""
-        return self.half_turns
-
-    @property
     def critical_log_factor(self) -> float:
         """ln R with which λ of Eq. (39) is 0."""
-        return self.log_factor - self.lyapunov_exponent / self.half_turns
+        return self.log_factor - self.lyapunov_exponent / self.impact_rate
 
     @property
     def critical_impact_factor(self) -> float:
@@ -181,8 +176,8 @@ def _of_random_noise(problem: Problem) -> SecondOrder:
         if each.order != 1:
             raise NoPerturbationTheory(f"perturbation theory is for white noise of order 1, not {each.order}")
         of_noise.append((_growth(each.matrix, frame), 1.0, 1.0))  # beside nothing: no path of white noise drives
-    half_turns, log_factors = omega / math.pi, [jump.second_order for jump in system.jumps]
-    parts += [half_turns * log_factor for log_factor in log_factors]
+    impact_rate, log_factors = omega / math.pi, [jump.second_order for jump in system.jumps]
+    parts += [impact_rate * log_factor for log_factor in log_factors]
     parts += [system.epsilon**2 * at_twice / 2 * q.amplitude**2 for q, _, at_twice in of_noise]
     quadratic = float(
         sum(
@@ -190,7 +185,7 @@ def _of_random_noise(problem: Problem) -> SecondOrder:
             for q, at_rest, at_twice in of_noise
         )
     )
-    return SecondOrder(tuple(map(float, parts)), quadratic, half_turns, float(sum(log_factors)))
+    return SecondOrder(tuple(map(float, parts)), quadratic, impact_rate, float(sum(log_factors)))
 
 
 def second_order_or_none(problem: Problem) -> SecondOrder | None:
@@ -270,7 +265,7 @@ def scale_of(problem: Problem) -> Scale:
     steady = np.zeros((problem.dimension, problem.dimension))
     for term in system.terms:
         size = system.epsilon**term.order * term.fastest[1]
-        noise, driven = problem.named_noise(term.noise), 0.0
+        noise = problem.named_noise(term.noise)
         if line := affine(term.g):
             at_mean = line[0] + (line[1] and line[1] * noise.mean)
             steady += system.epsilon**term.order * at_mean * np.array(term.matrix)

@@ -15,11 +15,11 @@ from typing import Any
 
 import numpy as np
 
+from fpsolve.analysis.axis import Axis
 from fpsolve.analysis.regions import P_BIFURCATIONS, Region, Regions, regions
 from fpsolve.analysis.scan import Row, Sample, ScannedRow, scan_row
 from fpsolve.analysis.stability import Boundary, begun, crossed, is_of_line
 from fpsolve.analysis.target import Target, line_of_value
-from fpsolve.analysis.zero import Axis
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case
 from fpsolve.case.sections import ChartSection

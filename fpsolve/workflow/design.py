@@ -8,10 +8,10 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from fpsolve.analysis.axis import Axis
 from fpsolve.analysis.inverse import Design, axes_of, start_and_stop, units_of
 from fpsolve.analysis.inverse import design as nearest_design
 from fpsolve.analysis.target import Target, target_of
-from fpsolve.analysis.zero import Axis
 from fpsolve.case.case import Case
 from fpsolve.case.remedies import CASE_WORDS
 from fpsolve.case.rewrite import rewritten

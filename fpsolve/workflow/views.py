@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
+from fpsolve.analysis.axis import check_axes
 from fpsolve.analysis.density import stationary_density, tilted_density
 from fpsolve.analysis.target import said
-from fpsolve.analysis.zero import check_axes
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case
 from fpsolve.case.sections import ChartSection

@@ -33,7 +33,7 @@ def straight(a, b, c, **more):
 
 
 def scan_of(of, nodes=13):
-    rows = [Row(lambda: of, nodes, number) for number in range(nodes)]
+    rows = [Row(of, nodes, number) for number in range(nodes)]
     return scanned(rows, map(scan_row, rows))
 
 
