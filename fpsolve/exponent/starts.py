@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fpsolve.exponent.density import noise_marginal
 from fpsolve.exponent.eigen import BACKWARD_ERROR_LIMIT, PrincipalPair, principal_pair
 from fpsolve.exponent.error import Solution, mode_effects
-from fpsolve.exponent.fields import noise_marginal
 from fpsolve.fem.effects import MOST_DEGREE, ModeEffects
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.mesh import CylinderMesh
