@@ -13,7 +13,7 @@ from fpsolve.arrays import FloatArray
 from fpsolve.data import Parameters, Quantity, Result, dataset
 from fpsolve.drawing import MOST_LINES, QUARTERS, add_legend, draw_line, draw_plane
 from fpsolve.errors import NotConverged
-from fpsolve.exponent.density import MOST_NEGATIVE, Grid, densities, evaluated
+from fpsolve.exponent.density import MOST_NEGATIVE, DirectionGrid, Grid, densities, evaluated
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.fem.mesh import vertices_at
 from fpsolve.messages import Code, Message, Remedy
@@ -54,7 +54,7 @@ class GridDensity(Result):
 
     def mean(self, f: Callable[[FloatArray, FloatArray], ArrayLike]) -> float:
         """∫ f ρ; f gets the first coordinate as a column and the second as a row, and may return either or a number."""
-        return self.grid.integral(f(self.grid.first[:, None], self.grid.second[None]) * self.values)
+        return self.grid.integral(np.asarray(f(self.grid.first[:, None], self.grid.second[None])) * self.values)
 
     def negative_share(self) -> float:
         """∫|ρ| where ρ < 0 over ∫|ρ|."""
@@ -123,6 +123,8 @@ class DirectionDensity(GridDensity):
     θ₁, on the half sphere that the stop leaves. Of three variables it is
     of longitude and latitude, per unit of the surface of the unit sphere, alike at opposite directions.
     """
+
+    grid: DirectionGrid
 
     def to_xarray(self) -> xarray.Dataset:
         return super().to_xarray().assign_attrs(total_variation_error=self.error)

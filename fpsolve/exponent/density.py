@@ -144,7 +144,7 @@ class Grid:
         right, adjoint, product = self.fields(pair)
         total = self.integral(product)
         fields = Fields(right, adjoint / self.integral(adjoint), product / total)
-        return Densities(pair, pair.value, self, fields, total)
+        return Densities(pair, pair.value, self, fields, abs(total - 1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,7 +156,7 @@ class Densities:
         value: Λ(p) as it was found before.
         grid: the nodes.
         fields: the functions there.
-        total: ∫ T T* over the nodes, by which it was divided; 1 where they resolve it.
+        missing: by how much ∫ T T* over the nodes misses 1, as long as it was not divided by it.
         error: the larger total variation of T* and of T T* from those of coarser functions; NaN if there are none.
     """
 
@@ -164,13 +164,8 @@ class Densities:
     value: float
     grid: Any
     fields: Fields
-    total: float
+    missing: float
     error: float = math.nan
-
-    @property
-    def is_resolved(self) -> bool:
-        """Whether the nodes are close enough."""
-        return abs(self.total - 1) <= RESOLVED
 
     def on(self, grid: Grid) -> Densities:
         """These at other nodes."""
@@ -205,7 +200,7 @@ def on_directions(pair: PrincipalPair) -> Densities:
     """Those of a pair of three or four variables, on the first grid that resolves T T*, or the finest."""
     for count in NODES:
         found = direction_grid(pair.generator.problem, count).densities(pair)
-        if found.is_resolved:
+        if found.missing <= RESOLVED:
             break
     return found
 
@@ -286,12 +281,12 @@ class DirectionGrid(Grid):
     def draw(self, axes: Any, values: FloatArray, about: Any, **kwargs: Any) -> None:
         """Draw values at the nodes in colours, with ticks at shares, or at parts of a turn."""
         draw_colours(axes, self.first, self.second, values.T, about, **{"shading": "gouraud", **kwargs})
-        first, second = (each.attributes for each in self.quantities)
-        axes.set_xticks(*QUARTERS)
-        axes.set_yticks(*(LATITUDES if self.second[0] else QUARTERS))
+        (first, second), ticks = (each.attributes for each in self.quantities), QUARTERS
         if self.share:
-            axes.set_xticks(np.arcsin(np.sqrt(SHARES)), [f"{100 * each:g}" for each in SHARES])
             first = {"long_name": f"{self.share.words}, {self.share.latex} (%)", "units": "1"}
+            ticks = np.arcsin(np.sqrt(SHARES)), [f"{100 * each:g}" for each in SHARES]
+        axes.set_xticks(*ticks)
+        axes.set_yticks(*(LATITUDES if self.second[0] else QUARTERS))
         label_axes(axes, first, second)
 
 
@@ -356,8 +351,8 @@ def oscillators(problem: Problem) -> dict[int, float]:
     system, stop = problem.system, problem.system.stop
     inside = stop.inside if stop else np.array
     sizes = [(term, system.epsilon**term.order * inside(term.matrix)) for term in system.terms]
-    free = sum(problem.named_noise(term.noise).mean_of(term.g) * size for term, size in sizes)
-    driven = sum(is_driven(term.g) * abs(size) for term, size in sizes)
+    free = np.sum([problem.named_noise(term.noise).mean_of(term.g) * size for term, size in sizes], axis=0)
+    driven = np.sum([is_driven(term.g) * abs(size) for term, size in sizes], axis=0)
     found = {}
     for q in range(0, problem.dimension - 1, 2):
         is_rate = not np.any(np.delete(free[q], q + 1)) and not np.any(driven[q])
@@ -381,12 +376,6 @@ def xi_marginal(pair: PrincipalPair, at: Samples) -> FloatArray:
     """∫ T T* dφ over the mesh at points of ξ, shape (n,)."""
     phi = pair.space.phi
     return np.asarray(phi.weights @ evaluated(pair, phi.values, at).product)
-
-
-def noise_marginal(pair: PrincipalPair) -> tuple[FloatArray, FloatArray]:
-    """z and the ξ-marginal of the tilted density at the points of a rule, times their measure."""
-    at = pair.space.xi.samples()
-    return at.xi / pair.generator.problem.coloured.standard_deviation, np.abs(xi_marginal(pair, at)) * at.measure
 
 
 def refuse_more(pair: PrincipalPair) -> None:

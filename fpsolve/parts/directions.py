@@ -16,8 +16,7 @@ from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case, Curve
 from fpsolve.data import Quantity, dataset
 from fpsolve.drawing import Format, figure_for
-from fpsolve.exponent.density import MOST_NEGATIVE, Densities, DirectionGrid, densities, direction_grid
-from fpsolve.exponent.eigen import PrincipalPair
+from fpsolve.exponent.density import MOST_NEGATIVE, RESOLVED, Densities, DirectionGrid, densities, direction_grid
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.files import atomic, write_text
 from fpsolve.messages import Code, Message
@@ -58,10 +57,7 @@ def _solve(job: Job, settings: Settings) -> tuple[Message, ...]:
     """The densities at the p that converge, at p = 0 with the stationary one; what is said of them."""
     found, said, shown = list[Densities](), list[Message](), without_failed(job, settings["p"])
     for p in sorted({*shown, 0.0} if settings["density"] else shown):
-        pair = attempt(partial(job.solver.pair, p), NAME)
-        if isinstance(pair, Reason):
-            continue
-        each = attempt(partial(_at, job.solver, pair), NAME)
+        each = attempt(partial(_at, job.solver, p), NAME)
         if isinstance(each, Reason):
             said.append(Message(Code.INDEX_MISSING, symbols=["density of directions"], reason=each.message))
         else:
@@ -70,7 +66,8 @@ def _solve(job: Job, settings: Settings) -> tuple[Message, ...]:
     return (*said, *(message for each in found for message in _unclear(each)))
 
 
-def _at(solver: ExponentSolver, pair: PrincipalPair) -> Densities:
+def _at(solver: ExponentSolver, p: float) -> Densities:
+    pair = solver.pair(p)
     with solver.meter.running():
         return densities(pair)
 
@@ -82,8 +79,8 @@ def _unclear(found: Densities) -> Iterator[Message]:
         defect = found.grid.negative_share(getattr(found.fields, FIELDS[name][0]))
         if defect > MOST_NEGATIVE:
             yield Message(Code.UNREADABLE, name=name, p=p, size=defect)
-    if not found.is_resolved:
-        yield Message(Code.FINE_DENSITY, p=p, size=abs(found.total - 1))
+    if not found.missing <= RESOLVED:
+        yield Message(Code.FINE_DENSITY, p=p, size=found.missing)
     if not found.error <= ROUGH:
         yield Message(Code.ROUGH_DENSITY, p=p, size=None if math.isnan(found.error) else found.error)
 
