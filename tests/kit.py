@@ -60,7 +60,7 @@ COSTLY = (
     "fpsolve.parts.sensitivities.solve_sensitivities",
     "fpsolve.parts.excursions.solve_excursion",
     "fpsolve.parts.response.solve_response",
-    "fpsolve.parts.directions.settled_directions",
+    "fpsolve.parts.directions.densities",
 )
 """What takes more than the tolerance of Λ(p) needs."""
 TABLES = {"summary.json", "moments.csv", "curves.csv", "results.nc"}

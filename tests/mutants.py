@@ -322,9 +322,9 @@ DEFECTS: tuple[Defect, ...] = (
     ),
     Defect(
         "R9 directions of four variables are those of three",
-        "exponent/directions.py",
-        "if problem.dimension == 4:",
-        "if problem.dimension != 4:",
+        "exponent/density.py",
+        "if problem.dimension == 3 else",
+        "if problem.dimension != 3 else",
         "direction",
     ),
     Defect(

@@ -21,6 +21,7 @@ from fpsolve.budget import unless_over_budget
 from fpsolve.errors import MeshError, NoHierarchy, NotConverged, SingularMatrix
 from fpsolve.exponent.changed import SMALL_P as SMALLEST
 from fpsolve.exponent.changed import Changed
+from fpsolve.exponent.density import no_picture_of
 from fpsolve.exponent.eigen import (
     PairDerivatives,
     PrincipalPair,
@@ -29,7 +30,6 @@ from fpsolve.exponent.eigen import (
     slope_rounding,
 )
 from fpsolve.exponent.error import Estimate, Moment, Solution, checked
-from fpsolve.exponent.fields import no_picture_of
 from fpsolve.exponent.method import (
     RTOL,
     RTOL_BEYOND_PLANE,

@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
+from fpsolve.exponent.density import xi_marginal
 from fpsolve.exponent.eigen import BACKWARD_ERROR_LIMIT, PrincipalPair, principal_pair
 from fpsolve.exponent.error import Solution, mode_effects
-from fpsolve.exponent.fields import noise_marginal
 from fpsolve.fem.effects import MOST_DEGREE, ModeEffects
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.noise_axes import CellAxis, PolynomialAxis
@@ -176,9 +176,10 @@ def other_centers(pair: PrincipalPair) -> list[float]:
     z, rate = frozen.peaks(pair.p)
     if z.size < 2:
         return []
-    at, density = noise_marginal(pair)
-    mean = float(at @ density / density.sum())
-    width = math.sqrt(float((at - mean) ** 2 @ density / density.sum()))
+    at = pair.space.xi.samples()
+    own, density = at.xi / noise.standard_deviation, np.abs(xi_marginal(pair, at)) * at.measure
+    mean = float(own @ density / density.sum())
+    width = math.sqrt(float((own - mean) ** 2 @ density / density.sum()))
     far = (np.abs(z - mean) > 3 * width + 2) & (rate > comparable(pair.value))
     return [float(z[far][np.argmax(rate[far])])] if np.any(far) else []
 

@@ -6,13 +6,12 @@ import math
 from io import BytesIO
 from typing import Literal
 
-from fpsolve.analysis.directions import draw_over
 from fpsolve.arrays import shown
 from fpsolve.drawing import SIZE, STYLE
-from fpsolve.exponent.directions import Directions
+from fpsolve.exponent.density import Grid, on_directions
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.model.problem import parameter_lines
-from fpsolve.model.quantity import PHASE, density_unit
+from fpsolve.model.quantity import PHASE
 from fpsolve.parts.nodes import FIELDS, Nodes
 from fpsolve.parts.surfaces import Picture, Surface, picture_of
 
@@ -58,12 +57,12 @@ def _picture_of_directions(pair: PrincipalPair, field: str, cmap: str) -> Pictur
     from matplotlib import rc_context
     from matplotlib.figure import Figure
 
-    found, (name, quantity), content = Directions(pair).fields, FIELDS[field], BytesIO()
+    found, (name, quantity), content = on_directions(pair), FIELDS[field], BytesIO()
     unit = quantity.unit if name == "right" else found.grid.unit
     with rc_context(STYLE):
         figure = Figure(figsize=SIZE, layout="constrained")
         axes = figure.add_subplot()
-        draw_over(found.grid, axes, getattr(found, name), {**quantity.attributes, "units": unit}, cmap=cmap)
+        found.grid.draw(axes, getattr(found.fields, name), {**quantity.attributes, "units": unit}, cmap=cmap)
         figure.suptitle(_title_of(pair), parse_math=False)
         axes.set_title("\n".join(parameter_lines(pair.generator.problem.parameters)), fontsize=9, parse_math=False)
     figure.savefig(content, format="png", dpi=150)
@@ -74,7 +73,7 @@ def surface_of(pair: PrincipalPair, field: str) -> Surface:
     """A function of a pair where it is not negligible, with its words. Raises `ValueError`."""
     (name, quantity), problem = FIELDS[_known(field)], pair.generator.problem
     nodes, noise, is_lines = Nodes.of(pair, FINER).seen(pair), problem.noise_quantity, problem.noise.has_states
-    unit = quantity.unit if name == "right" else "1/rad" if is_lines else density_unit(noise)
+    unit = quantity.unit if name == "right" else Grid.of(pair).unit
     xi = pair.space.xi.support if is_lines else nodes.unit * nodes.z
     values = getattr(nodes.fields(pair), name)
     about = {"phi": PHASE.attributes, "xi": noise.attributes, "values": {**quantity.attributes, "units": unit}}

@@ -12,21 +12,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fpsolve.analysis.directions import (
-    SettledDirections,
-    coordinates_of,
-    draw_over,
-    mean_share,
-    negative_part,
-    settled_directions,
-)
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case, Curve
 from fpsolve.data import Quantity, dataset
 from fpsolve.drawing import Format, figure_for
-from fpsolve.exponent.directions import DirectionGrid
-from fpsolve.exponent.eigen import PrincipalPair
-from fpsolve.exponent.fields import MOST_NEGATIVE
+from fpsolve.exponent.density import MOST_NEGATIVE, RESOLVED, Densities, DirectionGrid, densities, direction_grid
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.files import atomic, write_text
 from fpsolve.messages import Code, Message
@@ -65,12 +55,9 @@ def _settings(case: Case, number: int) -> Settings | None:
 
 def _solve(job: Job, settings: Settings) -> tuple[Message, ...]:
     """The densities at the p that converge, at p = 0 with the stationary one; what is said of them."""
-    found, said, shown = list[SettledDirections](), list[Message](), without_failed(job, settings["p"])
+    found, said, shown = list[Densities](), list[Message](), without_failed(job, settings["p"])
     for p in sorted({*shown, 0.0} if settings["density"] else shown):
-        pair = attempt(partial(job.solver.pair, p), NAME)
-        if isinstance(pair, Reason):
-            continue
-        each = attempt(partial(_at, job.solver, pair), NAME)
+        each = attempt(partial(_at, job.solver, p), NAME)
         if isinstance(each, Reason):
             said.append(Message(Code.INDEX_MISSING, symbols=["density of directions"], reason=each.message))
         else:
@@ -79,26 +66,28 @@ def _solve(job: Job, settings: Settings) -> tuple[Message, ...]:
     return (*said, *(message for each in found for message in _unclear(each)))
 
 
-def _at(solver: ExponentSolver, pair: PrincipalPair) -> SettledDirections:
+def _at(solver: ExponentSolver, p: float) -> Densities:
+    pair = solver.pair(p)
     with solver.meter.running():
-        return settled_directions(pair)
+        return densities(pair)
 
 
-def _unclear(found: SettledDirections) -> Iterator[Message]:
+def _unclear(found: Densities) -> Iterator[Message]:
     """Which densities mislead."""
-    p, fields = found.pair.p, found.fields
-    for name, values in {"T_adjoint": fields.adjoint, "tilted_density": fields.product}.items():
-        if (defect := negative_part(fields.grid, values)) > MOST_NEGATIVE:
+    p = found.pair.p
+    for name in ("T_adjoint", "tilted_density"):
+        defect = found.grid.negative_share(getattr(found.fields, FIELDS[name][0]))
+        if defect > MOST_NEGATIVE:
             yield Message(Code.UNREADABLE, name=name, p=p, size=defect)
-    if not fields.is_resolved:
-        yield Message(Code.FINE_DENSITY, p=p, size=abs(fields.total - 1))
+    if not found.missing <= RESOLVED:
+        yield Message(Code.FINE_DENSITY, p=p, size=found.missing)
     if not found.error <= ROUGH:
         yield Message(Code.ROUGH_DENSITY, p=p, size=None if math.isnan(found.error) else found.error)
 
 
-def on_one_grid(found: Sequence[SettledDirections]) -> list[SettledDirections]:
+def on_one_grid(found: Sequence[Densities]) -> list[Densities]:
     """All on the finest of their grids."""
-    grid = max((each.fields.grid for each in found), key=lambda grid: grid.first.size)
+    grid = max((each.grid for each in found), key=lambda grid: grid.first.size)
     return [each.on(grid) for each in found]
 
 
@@ -107,7 +96,7 @@ def directions_file(curve: Curve, folder: Path) -> Path:
     return folder / f"densities{curve.suffix}.nc"
 
 
-def write_densities(found: Sequence[SettledDirections], curve: Curve, folder: Path) -> None:
+def write_densities(found: Sequence[Densities], curve: Curve, folder: Path) -> None:
     """Write densities.nc: of every p that is there the fields over directions, and that at p = 0 as the stationary one.
 
     Args:
@@ -116,25 +105,23 @@ def write_densities(found: Sequence[SettledDirections], curve: Curve, folder: Pa
         folder: where.
     """
     shown = [each for each in found if each.pair.p or len(found) == 1]
-    stationary = next((each for each in found if not each.pair.p), None)
-    grid = found[0].fields.grid
-    plane, unit = tuple(each.name for each in grid.quantities), {"unit": grid.unit}
+    grid = found[0].grid
+    plane = tuple(each.name for each in grid.quantities)
     numbers = dict[Quantity, Any]()
-    if stationary is not None:
-        numbers[replace(STATIONARY, dims=plane, **unit)] = stationary.fields.adjoint
-        numbers[replace(ERROR, name="stationary_density_error", dims=())] = stationary.error
-    for name, (own, quantity) in FIELDS.items():
-        about = replace(quantity, dims=("p", *plane), **({} if own == "right" else unit))
-        numbers[replace(about, name=name)] = np.stack([getattr(each.fields, own) for each in shown])
+    for each in found:
+        if not each.pair.p:
+            numbers[replace(STATIONARY, dims=plane, unit=grid.unit)] = each.fields.adjoint
+            numbers[replace(ERROR, name="stationary_density_error", dims=())] = each.error
+    for own, quantity in FIELDS.values():
+        about = replace(quantity, dims=("p", *plane), unit="1" if own == "right" else grid.unit)
+        numbers[about] = np.stack([getattr(each.fields, own) for each in shown])
     numbers[ERROR] = np.array([each.error for each in shown])
     numbers[MOMENT] = np.array([each.value for each in shown])
-    if grid.dimension == 4:
-        share = replace(mean_share(grid), dims=("p",))
-        numbers[share] = np.array([grid.share(each.fields.product) for each in shown])
-    places: dict[Quantity, Any] = {P: np.array([each.pair.p for each in shown]), **coordinates_of(grid)}
-    if grid.dimension == 4:
-        words = f"share of {grid.names[1]} in the {grid.what}"
-        places[Quantity("share", "sin²η", words, r"$\sin^2\eta$", dims=("eta",))] = np.sin(grid.first) ** 2
+    for mean in grid.means(shown[0].fields.product):
+        numbers[replace(mean, dims=("p",))] = np.array([grid.means(each.fields.product)[mean] for each in shown])
+    places = {P: np.array([each.pair.p for each in shown]), **grid.coordinates}
+    if grid.share:
+        places[grid.share] = np.sin(grid.first) ** 2
     content = io.BytesIO()  # HDF5 does not survive a full disk
     whole = dataset("densities of directions", "finite elements", numbers, places, curve.parameters)
     whole.to_netcdf(content, engine="h5netcdf")
@@ -142,7 +129,7 @@ def write_densities(found: Sequence[SettledDirections], curve: Curve, folder: Pa
         draft.write_bytes(content.getvalue())
 
 
-def write_directions(found: Sequence[SettledDirections], curve: Curve, folder: Path) -> None:
+def write_directions(found: Sequence[Densities], curve: Curve, folder: Path) -> None:
     """Write densities.nc and, as `write_eigenfunctions`, a series over p; with the first curve the stationary density.
 
     The files for ParaView show x = η and y = θ₁ − θ₂ of four variables, with a stop y = θ₁ between two impacts, so that
@@ -151,18 +138,18 @@ def write_directions(found: Sequence[SettledDirections], curve: Curve, folder: P
     """
     found = on_one_grid(found)
     write_densities(found, curve, folder)
-    grid, problem = found[0].fields.grid, curve.problem
-    stationary = next((each for each in found if not each.pair.p), None)
+    grid, problem = found[0].grid, curve.problem
     facts = {"curve": float(curve.number), **field_data(curve.parameters, curve.varied, problem)}
     facts |= {f"along_{side}": _plain(axis) for side, axis in zip("xy", grid.quantities, strict=True)}
-    always: dict[str, FloatArray] = {}
-    if stationary is not None:
-        always["stationary_density"] = stationary.fields.adjoint
+    stationary, others = ([each for each in found if (not each.pair.p) == is_zero] for is_zero in (True, False))
     first, second = np.meshgrid(grid.first, grid.second, indexing="ij")
-    always |= {"share": np.sin(first) ** 2} if grid.dimension == 4 else {"longitude": first, "latitude": second}
-    if stationary is not None and curve.number == 1:
+    always = dict[str, FloatArray]()
+    for each in stationary:
+        always["stationary_density"] = each.fields.adjoint
+    always |= {"share": np.sin(first) ** 2} if grid.share else {"longitude": first, "latitude": second}
+    if stationary and curve.number == 1:
         _write_plane(folder / "density.vtu", grid, always, {"p": 0.0, "Lambda": 0.0, **facts})
-    stem, others = f"eigenfunctions{curve.suffix}", [each for each in found if each.pair.p]
+    stem = f"eigenfunctions{curve.suffix}"
     names = {each.pair.p: name_at(stem, each.pair.p) for each in others}
     for each in others:
         data = {name: getattr(each.fields, own) for name, (own, _) in reversed(FIELDS.items())}
@@ -180,10 +167,7 @@ def _plain(axis: Quantity) -> str:
 def _write_plane(path: Path, grid: DirectionGrid, data: Mapping[str, FloatArray], facts: Facts) -> None:
     """Write a .vtu file of quadrilaterals between the nodes; the first array of point data is shown first."""
     first, second = np.meshgrid(grid.first, grid.second, indexing="ij")
-    places = [first, second, 0 * first]
-    if grid.dimension == 3:
-        flat = np.cos(second)
-        places = [flat * np.cos(first), flat * np.sin(first), np.sin(second)]
+    places = [first, second, 0 * first] if grid.share else [*grid.directions.reshape(3, *first.shape)]
     write_between(path, places, data, facts)
 
 
@@ -206,9 +190,7 @@ def _draw(case: Case, curve: Curve, source: Path, paths: Sequence[Path], heading
 
 
 def _draw_panels(case: Case, curve: Curve, found: xarray.Dataset, paths: Sequence[Path], heading: str) -> None:
-    first, _ = (each for each in found["T"].dims if each != "p")
-    count = found.sizes[first] if case.problem.dimension == 4 else (found.sizes[first] - 1) // 2
-    grid = DirectionGrid.of(curve.problem, count)
+    grid = direction_grid(curve.problem, min(found["T"].shape[1:]))
     panels = []
     if "stationary_density" in found:
         panels.append(("stationary", found["stationary_density"]))
@@ -224,13 +206,13 @@ def _draw_panels(case: Case, curve: Curve, found: xarray.Dataset, paths: Sequenc
         for place, (axis, (words, values)) in enumerate(zip(axes, panels, strict=False)):
             is_right = place % columns == columns - 1 or place == len(panels) - 1
             about = {"long_name": "density", "units": grid.unit} if is_right else {"long_name": "", "units": "1"}
-            draw_over(grid, axis, values.values, about, vmin=0.0)
+            grid.draw(axis, values.values, about, vmin=0.0)
             if place % columns:
                 axis.set_ylabel("")
             if place + columns < len(panels):
                 axis.set_xlabel("")
-            share = f": mean share of {grid.names[1]} {grid.share(values.values):.1%}" if grid.dimension == 4 else ""
-            axis.set_title(words + share, parse_math=False)
+            means = (f": mean {each.symbol} {mean:.1%}" for each, mean in grid.means(values.values).items())
+            axis.set_title("".join([words, *means]), parse_math=False)
         for axis in axes[len(panels) :]:
             axis.set_axis_off()
 

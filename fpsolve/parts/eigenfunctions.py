@@ -20,14 +20,14 @@ from typing import Any
 
 import numpy as np
 
-from fpsolve.analysis.density import negative_share, stationary_density
+from fpsolve.analysis.density import stationary_density
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case, Curve
 from fpsolve.case.sections import EIGENFUNCTIONS
 from fpsolve.data import plain_unit
 from fpsolve.errors import NotConverged
+from fpsolve.exponent.density import MOST_NEGATIVE, UNRESOLVED, densities, xi_marginal
 from fpsolve.exponent.eigen import PrincipalPair
-from fpsolve.exponent.fields import MOST_NEGATIVE, UNRESOLVED, xi_marginal
 from fpsolve.files import write_text
 from fpsolve.messages import Code, Message
 from fpsolve.model.problem import Problem
@@ -94,10 +94,11 @@ def _solve(job: Job, settings: Settings) -> tuple[Message, ...]:
         stationary = None
         said.append(Message(Code.NOTHING_DRAWN, reason=failure.reason, remedy=job.solver.method.refinement))
     for pair in () if said else known:
+        tilted = densities(pair)
         limits = {
             "T": (pair.sign_defects[0], UNRESOLVED),
             "T_adjoint": (pair.sign_defects[1], UNRESOLVED),
-            "tilted_density": (negative_share(pair), MOST_NEGATIVE),
+            "tilted_density": (tilted.grid.negative_share(tilted.fields.product), MOST_NEGATIVE),
         }
         for name, (defect, most) in limits.items():
             said += [Message(Code.UNREADABLE, name=name, p=pair.p, size=defect)] * (defect > most)
@@ -180,10 +181,10 @@ def write_density(
     `lyapunov_exponent`, λ; `p` and `Lambda`, which are 0; and the parameters as in `write_eigenfunctions`.
     """
     grid, space = Nodes.of(stationary), stationary.space
-    over_xi = space.table(stationary.left) @ (space.xi.mass() @ space.xi.constant)
+    rule = space.xi.samples()
     data = {
         "stationary_density": grid.fields(stationary).adjoint,
-        "phi_marginal": grid.phase_table(stationary) @ over_xi[:, None],
+        "phi_marginal": grid.fields(stationary, rule).adjoint @ rule.measure[:, None],
         "xi_marginal": space.turns * xi_marginal(stationary, grid.samples(stationary)),
         "z": grid.z,
     }

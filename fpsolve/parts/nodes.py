@@ -16,8 +16,8 @@ from typing import Any, cast
 import numpy as np
 
 from fpsolve.arrays import FloatArray
+from fpsolve.exponent.density import ITSELF, Fields, plane_fields, refuse_more, xi_marginal
 from fpsolve.exponent.eigen import PrincipalPair
-from fpsolve.exponent.fields import Fields, fields, refuse_more, xi_marginal
 from fpsolve.fem.noise_axes import LineAxis, Samples
 from fpsolve.model.quantity import Quantity
 
@@ -62,9 +62,8 @@ class Nodes:
         space = pair.space
         degrees = int(np.max(space.phi.degrees)), int(np.max(space.xi.modes))
         order = min(MAX_ORDER, max(degrees))
-        frame = pair.generator.problem.frame
-        lines_of_phi = space.phi.lines if frame is None else frame.own_phase(space.phi.lines)
-        starts = np.sort(np.mod(lines_of_phi[:-1], space.phi.span))
+        frame = pair.generator.problem.frame or ITSELF
+        starts = np.sort(np.mod(frame.own_phase(space.phi.lines[:-1]), space.phi.span))
         starts = np.concatenate([starts + k * space.phi.span for k in range(space.phi.turns)])
         breaks = np.concatenate([[0.0], starts[(starts > 1e-9) & (starts < 2 * math.pi - 1e-9)], [2 * math.pi]])
         phi = _nodes(breaks, order, finer * _parts(degrees[0], order))
@@ -90,19 +89,11 @@ class Nodes:
         living = np.flatnonzero(np.any([each > NEGLIGIBLE * each.max() for each in densities], axis=0))
         return replace(self, z_cells=self.z[None, living[0] : living[-1] + 1])
 
-    def fields(self, pair: PrincipalPair) -> Fields:
-        """The functions of a pair at the nodes, shape (φ-nodes, ξ-nodes)."""
-        return fields(pair, self.phi.ravel(), self.phase_table(pair), self.samples(pair))
-
-    def phase_table(self, pair: PrincipalPair) -> FloatArray:
-        """Values of the φ-elements at the nodes, shape (φ-nodes, φ-unknowns)."""
-        axis, frame, phi = pair.space.phi, pair.generator.problem.frame, self.phi
+    def fields(self, pair: PrincipalPair, at: Samples | None = None) -> Fields:
+        """The functions of a pair at the nodes, shape (φ-nodes, ξ-nodes), or at other samples of ξ."""
         # contracted a little, as they then tell from which side a line of the mesh is seen
-        inside = phi + 1e-6 * (phi.mean(axis=1, keepdims=True) - phi)
-        if frame is not None:
-            phi, inside = frame.phase(phi), frame.phase(inside)
-        turned = axis.span * np.floor((inside - axis.lines[0]) / axis.span)
-        return axis.at((phi - turned).ravel(), (inside - turned).ravel())
+        inside = self.phi + 1e-6 * (self.phi.mean(axis=1, keepdims=True) - self.phi)
+        return plane_fields(pair, self.phi.ravel(), inside.ravel(), at or self.samples(pair))
 
     def samples(self, pair: PrincipalPair) -> Samples:
         """The functions of ξ at the nodes."""

@@ -102,7 +102,7 @@ def field_of(case: Case, p: Any) -> Answer:
         all_of: list[Any] = [stationary_density(stationary), *([tilted_density(solver.pair(float(p)))] if p else [])]
         names = [
             f"{each.words} ({plain_unit(each.unit)})" if each.unit != "1" else each.words
-            for each in all_of[0].grid.quantities[:2]
+            for each in all_of[0].grid.quantities
         ]
         panels = [panel(each.name, each.grid.first, each.grid.second, each.values, names) for each in all_of]
         said = [Sentence(each._said()) for each in all_of]

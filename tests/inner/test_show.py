@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fpsolve import NotConverged, tilted_density
-from fpsolve.exponent.fields import UNRESOLVED
+from fpsolve.exponent.density import UNRESOLVED
 from fpsolve.output.figures import Series, draw_series
 from fpsolve.theory.perturbation import second_order
 from tests.inner.test_output import drawn, many  # noqa: F401

@@ -6,7 +6,7 @@ import pytest
 from fpsolve import ExponentSolver, OrnsteinUhlenbeck, Problem, VibroImpactOscillator, moment_lyapunov
 from fpsolve.errors import NoHierarchy
 from fpsolve.exponent import even_moment
-from fpsolve.exponent.fields import fields
+from fpsolve.exponent.density import plane_fields
 from fpsolve.messages import Code
 from fpsolve.model import Bounded, White
 from fpsolve.theory.perturbation import perturbed_moments, weak_noise_note
@@ -112,6 +112,6 @@ def test_eigenfunction_tends_to_1_plus_epsilon_T1(p):
         oscillator = VibroImpactOscillator(omega=1.3, restitution=0.8, c1=0.1, epsilon=epsilon)
         space = (pair := ExponentSolver(Problem(oscillator, OU)).pair(p)).space
         t1 = perturbation.first_order_eigenfunction(oscillator, OU, p, phi[:, None], xi)
-        values = fields(pair, phi, space.phi.at(phi), space.xi.at(xi / OU.standard_deviation)).right
+        values = plane_fields(pair, phi, phi, space.xi.at(xi / OU.standard_deviation)).right
         errors.append(np.max(np.abs(values - 1 - epsilon * t1)))
     assert np.log2(np.array(errors[:-1]) / errors[1:]) == pytest.approx([2, 2], abs=0.15)

@@ -158,8 +158,9 @@ def test_share_of_a_mode_is_the_same_in_all_coordinates_of_a_user():
     found = [tilted_density(ExponentSolver(each, rtol=1e-3).pair(1.0)) for each in problems]
     shares = [float(each.to_xarray().mean_share) for each in found]
     np.testing.assert_allclose(shares, shares[0], rtol=1e-2)
-    data = found[0].to_xarray()
+    data, axes = found[0].to_xarray(), found[0].plot()
     assert data.density.dims == ("eta", "phase_difference")
+    assert axes.get_xlim() + axes.get_ylim() == pytest.approx((0, np.pi / 2, 0, 2 * np.pi))
     assert data.attrs["total_variation_error"] == found[0].error
 
 

@@ -1,0 +1,401 @@
+"""T, T* and their product over two coordinates, for pictures and as densities: phase and noise, or directions.
+
+The functions u and u* of a pair are of the directions of y = S⁻¹x, see `frame` and `modes`. A person reads those of z:
+in the plane z = x. Of more variables z = D⁻¹x: where q̇ = cv and v̇ = −kq + … is an oscillator, D divides v by √(k/c),
+with c = 1 the frequency with all others held, so that q² + v²c/k is 2/k times its energy; others stay as they are.
+With R = S⁻¹D, a direction e of z and ρ = ‖Re‖,
+
+    T(e) = ρ^p u(Re/ρ),    T*(e) = |det R| ρ^(−n − p) u*(Re/ρ),    T(e) T*(e) = |det R| ρ^(−n) u u*(Re/ρ),
+
+as ‖y‖ = ρ‖z‖, and the surface of the sphere obeys dσ_y = |det R| ρ^(−n) dσ_z. All three depend on the noise, too, over
+which those of directions are integrated.
+
+Of four variables in two pairs, e = (cos η (cos θ₁, sin θ₁), sin η (cos θ₂, sin θ₂)): sin²η is the share of the second
+pair in ‖z‖². Densities are of η and of θ₁ − θ₂, dσ = cos η sin η dη dθ₁ dθ₂, integrated over θ₂ at a fixed difference.
+With a stop for q₁ ≥ 0, z is of the coordinates of the stop, and densities are of η and of θ₁ from π/2, where an impact
+leaves it, to −π/2, where the next one finds it, integrated over θ₂.
+Of three variables they are of longitude and latitude, per unit of the surface of the sphere, alike at e and −e.
+
+Λ(p) settles long before T* does: it is the coarser one that the search for Λ(p) leaves. So functions of directions are
+enriched until two densities in turn differ by little in total variation, which then is the estimated error.
+"""
+
+from __future__ import annotations
+
+import math
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from functools import reduce
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from fpsolve.arrays import FloatArray, Matrix
+from fpsolve.budget import unless_over_budget
+from fpsolve.data import Quantity
+from fpsolve.drawing import QUARTERS, draw_colours, label_axes
+from fpsolve.errors import MeshError, OutputError, SingularMatrix
+from fpsolve.exponent.eigen import PrincipalPair, principal_pair
+from fpsolve.fem.generator import Generator
+from fpsolve.fem.noise_axes import Samples
+from fpsolve.model.frame import Frame
+from fpsolve.model.plane import is_driven
+from fpsolve.model.problem import Problem
+from fpsolve.model.quantity import PHASE, density_unit
+
+MOST_TILT = 1.5
+"""Slope of the tilt in z beyond which rounding leaves nothing of T around the mean of the noise."""
+UNRESOLVED = 0.1
+"""Share of an eigenfunction with the wrong sign from which on it misleads."""
+MOST_NEGATIVE = 0.02
+"""Share of a density with the wrong sign from which on it misleads."""
+NODES = 48, 96, 192
+"""Numbers of nodes between the ends of a coordinate of directions; there are twice as many steps around."""
+POINTS = 4096
+"""Number of directions at which functions are evaluated at once, about."""
+PHASES = 16
+"""Half turns of both phases together are looked at from so many; at a stop turns of the second one."""
+RESOLVED = 1e-3
+"""By how much the integral of the tilted density over the nodes may miss 1."""
+SETTLED = 0.02
+"""Total variation between two densities in turn from which on the finer one is taken."""
+MOST_DIRECTIONS = 3000
+"""Largest number of functions of directions that are made for a density alone: seconds of work."""
+MOST_UNKNOWNS = 15_000
+"""Largest number of unknowns that are made for a density alone."""
+SHARES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
+"""Shares of the second pair in ‖z‖² at which the axis of η has ticks."""
+LATITUDES = np.pi * np.arange(-2, 3) / 4, [r"$-\pi/2$", r"$-\pi/4$", "0", r"$\pi/4$", r"$\pi/2$"]
+ONE = np.ones(1)
+ITSELF = Frame(((1.0, 0.0), (0.0, 1.0)))
+"""The coordinates of a problem that is solved in its own."""
+
+
+class Fields(NamedTuple):
+    """Functions at nodes, each of shape (first, second).
+
+    Attributes:
+        right: T.
+        adjoint: T* as a density; at p = 0 the stationary one.
+        product: T T*, the tilted density.
+    """
+
+    right: FloatArray
+    adjoint: FloatArray
+    product: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """Nodes of two coordinates, and the weights of ∫ f dfirst dsecond; those of phase and noise.
+
+    Attributes:
+        quantities: what the coordinates are.
+        unit: of densities.
+        first, second: the nodes, shapes (a,) and (b,).
+        first_weights, second_weights: of the same shapes.
+    """
+
+    quantities: tuple[Quantity, Quantity]
+    unit: str
+    first: FloatArray
+    second: FloatArray
+    first_weights: FloatArray
+    second_weights: FloatArray
+
+    @classmethod
+    def of(cls, pair: PrincipalPair) -> Grid:
+        """The points of the rule of a pair, on the full circle. Raises `OutputError`."""
+        refuse_more(pair)
+        problem, axis, at = pair.generator.problem, pair.space.phi, pair.space.xi.samples()
+        frame, noise = problem.frame or ITSELF, problem.noise_quantity
+        phi = frame.own_phase(np.concatenate([axis.points + k * axis.span for k in range(axis.turns)]))
+        weights, phi = np.tile(axis.weights, axis.turns) / frame.density(phi), np.mod(phi, 2 * np.pi)
+        order = np.argsort(phi)
+        unit = "1/rad" if problem.noise.has_states else density_unit(noise)
+        return Grid((PHASE, noise), unit, phi[order], at.xi, weights[order], at.measure)
+
+    @property
+    def coordinates(self) -> dict[Quantity, FloatArray]:
+        """The nodes and the weights."""
+        words = "weight of the rule for integrals"
+        weights = (replace(each, name=f"{each.name}_weights", words=words, latex="") for each in self.quantities)
+        values = self.first, self.second, self.first_weights, self.second_weights
+        return dict(zip((*self.quantities, *weights), values, strict=True))
+
+    def integral(self, values: FloatArray) -> float:
+        """∫ of values at the nodes, shape (a, b)."""
+        return float(self.first_weights @ values @ self.second_weights)
+
+    def negative_share(self, values: FloatArray) -> float:
+        """∫|ρ| where ρ < 0 over ∫|ρ|."""
+        return self.integral(np.maximum(-values, 0.0)) / self.integral(np.abs(values))
+
+    def means(self, density: FloatArray) -> dict[Quantity, float]:
+        """What is told of a density."""
+        return {}
+
+    def fields(self, pair: PrincipalPair) -> Fields:
+        """T, and T* and T T* of any size."""
+        return plane_fields(pair, self.first, self.first, pair.space.xi.samples())
+
+    def densities(self, pair: PrincipalPair) -> Densities:
+        """T, and T* and T T* of the integral 1."""
+        right, adjoint, product = self.fields(pair)
+        total = self.integral(product)
+        fields = Fields(right, adjoint / self.integral(adjoint), product / total)
+        return Densities(pair, pair.value, self, fields, abs(total - 1))
+
+
+@dataclass(frozen=True, eq=False)
+class Densities:
+    """T, T* and T T* of a pair over two coordinates.
+
+    Attributes:
+        pair: the eigenpair.
+        value: Λ(p) as it was found before.
+        grid: the nodes.
+        fields: the functions there.
+        missing: by how much ∫ T T* over the nodes misses 1, as long as it was not divided by it.
+        error: the larger total variation of T* and of T T* from those of coarser functions; NaN if there are none.
+    """
+
+    pair: PrincipalPair
+    value: float
+    grid: Any
+    fields: Fields
+    missing: float
+    error: float = math.nan
+
+    def on(self, grid: Grid) -> Densities:
+        """These at other nodes."""
+        if grid.first.size == self.grid.first.size:
+            return self
+        return replace(grid.densities(self.pair), value=self.value, error=self.error)
+
+
+def densities(pair: PrincipalPair) -> Densities:
+    """Those of a pair; of three or four variables on as fine functions as T* and T T* need.
+
+    Raises:
+        OutputError: T of two variables depends on more than φ and ξ.
+    """
+    if pair.generator.problem.dimension == 2:
+        return Grid.of(pair).densities(pair)
+    found = on_directions(pair)
+    with suppress(SingularMatrix, MeshError), unless_over_budget():  # what there is stands, with its error
+        while not found.error <= SETTLED:
+            generator = found.pair.generator
+            finer = generator.chosen.with_axis(0, generator.chosen.phi.enriched())
+            if finer.phi.size > MOST_DIRECTIONS or finer.size > MOST_UNKNOWNS:
+                break
+            new = on_directions(principal_pair(Generator(generator.problem, finer), pair.p, start=found.pair))
+            old = found.on(new.grid)
+            _, *changes = (np.abs(after - before) for after, before in zip(new.fields, old.fields, strict=True))
+            found = replace(new, value=pair.value, error=0.5 * max(map(new.grid.integral, changes)))
+    return found
+
+
+def on_directions(pair: PrincipalPair) -> Densities:
+    """Those of a pair of three or four variables, on the first grid that resolves T T*, or the finest."""
+    for count in NODES:
+        found = direction_grid(pair.generator.problem, count).densities(pair)
+        if found.missing <= RESOLVED:
+            break
+    return found
+
+
+def evaluated(
+    pair: PrincipalPair, functions: Matrix, at: Samples, length: FloatArray = ONE, surface: FloatArray = ONE
+) -> Fields:
+    """T, T* and T T* at directions and values of the noise, shape (directions, values).
+
+    Args:
+        pair: the eigenpair.
+        functions: the values of the functions of directions, as rows.
+        at: samples of the functions of the noise.
+        length: ρ, shape (directions,); in the coordinates of the solve 1, as
+        surface: |det R| ρ^(−n).
+    """
+    table = pair.space.phi.size, -1
+    right, left = (functions @ each.reshape(table) @ at.values.T for each in (pair.right, pair.left))
+    factors, weights = np.outer(length**pair.p, at.factor), np.outer(surface, at.weight)
+    return Fields(right * factors, left * weights / factors, right * left * weights)
+
+
+def plane_fields(pair: PrincipalPair, phi: FloatArray, inside: FloatArray, at: Samples) -> Fields:
+    """T, T* and T T* at φ, seen from the cells that hold `inside`, and at samples of the noise.
+
+    T has mean 1 over P_s(ξ)/2π; with a tilt beyond `MOST_TILT`, which leaves T there to rounding, over P_s exp(2s z).
+    """
+    axis, xi, frame = pair.space.phi, pair.space.xi, pair.generator.problem.frame or ITSELF
+    psi, weights = axis.finer_rule(frame.parts)
+    own, rule = frame.own_phase(psi), xi.samples()
+    law = xi.law() * rule.factor if abs(xi.tilt) <= MOST_TILT else xi.measure
+    over_phi = weights / frame.density(own) * frame.length(own) ** pair.p @ axis.at(psi) / axis.span
+    mean = over_phi @ pair.space.table(pair.right) @ (law @ rule.values)
+    psi, cells = frame.phase(phi), frame.phase(inside)
+    turned = axis.span * np.floor((cells - axis.lines[0]) / axis.span)
+    functions = axis.at(psi - turned, cells - turned)
+    right, adjoint, product = evaluated(pair, functions, at, frame.length(phi), frame.density(phi))
+    return Fields(right / mean, adjoint * mean, product)
+
+
+@dataclass(frozen=True, eq=False)
+class DirectionGrid(Grid):
+    """Directions of three or four variables.
+
+    Attributes:
+        directions: e over the nodes, at m values of an angle that is left out, shape (n, a b m).
+        surface: of the sphere for dfirst dsecond, shape (a, b).
+        share: sin²η, if there are pairs of variables.
+    """
+
+    directions: FloatArray
+    surface: FloatArray
+    share: Quantity | None = None
+
+    def means(self, density: FloatArray) -> dict[Quantity, float]:
+        if self.share is None:
+            return {}
+        words, latex = f"mean {self.share.words}", r"$E\,\sin^2\eta$"
+        mean = replace(self.share, name="mean_share", words=words, latex=latex, dims=())
+        return {mean: self.integral(np.sin(self.first)[:, None] ** 2 * density)}
+
+    def fields(self, pair: PrincipalPair) -> Fields:
+        """T as its mean over the noise and the angle, itself of mean 1 over the sphere, or its half at a stop; T* and
+        T T* integrated over these."""
+        axis, noises, matrix = pair.space.phi, pair.space.noises, direction_map(pair)
+        at = Samples(*(reduce(np.kron, each) for each in zip(*(axis.samples() for axis in noises), strict=True)))
+        law = reduce(np.kron, [axis.law() for axis in noises])
+        found = []
+        for y in np.array_split(matrix @ self.directions, self.directions.shape[1] // POINTS + 1, axis=1):
+            length = np.linalg.norm(y, axis=0)
+            surface = abs(np.linalg.det(matrix)) / axis.area * length ** -len(y)
+            right, adjoint, product = evaluated(pair, axis.at(y / length), at, length, surface)
+            found.append([right @ law, adjoint @ at.measure, product @ at.measure])
+        right, adjoint, product = np.concatenate(found, axis=1).reshape(3, *self.surface.shape, -1).mean(axis=-1)
+        mean = self.integral(right * self.surface) / self.integral(self.surface)
+        return Fields(right / mean, adjoint * self.surface, product * self.surface)
+
+    def draw(self, axes: Any, values: FloatArray, about: Any, **kwargs: Any) -> None:
+        """Draw values at the nodes in colours, with ticks at shares, or at parts of a turn."""
+        draw_colours(axes, self.first, self.second, values.T, about, **{"shading": "gouraud", **kwargs})
+        (first, second), ticks = (each.attributes for each in self.quantities), QUARTERS
+        if self.share:
+            first = {"long_name": f"{self.share.words}, {self.share.latex} (%)", "units": "1"}
+            ticks = np.arcsin(np.sqrt(SHARES)), [f"{100 * each:g}" for each in SHARES]
+        axes.set_xticks(*ticks)
+        axes.set_yticks(*(LATITUDES if self.second[0] else QUARTERS))
+        label_axes(axes, first, second)
+
+
+def direction_grid(problem: Problem, count: int) -> DirectionGrid:
+    """One of `count` nodes between the ends of a coordinate, and twice as many steps around."""
+    return (_longitude_and_latitude if problem.dimension == 3 else _share_and_phase)(problem, count)
+
+
+def _line(count: int) -> tuple[FloatArray, FloatArray]:
+    """The rule of Gauss and Lobatto on [−1, 1]: with both ends, towards which the nodes crowd."""
+    last = np.polynomial.Legendre.basis(count - 1)
+    x = np.concatenate([[-1.0], last.deriv().roots(), [1.0]])
+    return x, 2 / (count * (count - 1) * last(x) ** 2)
+
+
+def _circle(count: int) -> tuple[FloatArray, FloatArray]:
+    """The trapezoidal rule on [0, 2π], with both ends."""
+    angles = np.linspace(0, 2 * math.pi, 2 * count + 1)
+    weights = np.full(angles.size, math.pi / count)
+    weights[[0, -1]] /= 2
+    return angles, weights
+
+
+def _longitude_and_latitude(problem: Problem, count: int) -> DirectionGrid:
+    """Of three variables; the weights of the latitude are those of its sine."""
+    (x, y, z), (first, turn), (sine, weights) = problem.system.states, _circle(count), _line(count)
+    longitude = Quantity("longitude", "longitude", f"longitude, from {x} towards {y}", "", "rad", ("longitude",))
+    latitude = Quantity("latitude", "latitude", f"latitude, towards {z}", "", "rad", ("latitude",))
+    nodes, (turned, height) = (first, np.arcsin(sine), turn, weights), np.meshgrid(first, sine, indexing="ij")
+    flat = np.sqrt(1 - height**2)
+    e = np.stack([flat * np.cos(turned), flat * np.sin(turned), height])
+    return DirectionGrid((longitude, latitude), "1/sr", *nodes, e.reshape(3, -1), np.ones(flat.shape))
+
+
+def _share_and_phase(problem: Problem, count: int) -> DirectionGrid:
+    """η and θ₁ − θ₂, at a stop θ₁, of four variables in two pairs."""
+    states, stop, own = problem.system.states, problem.system.stop, oscillators(problem)
+    states = stop.names(states) if stop else states
+    one, two = (states[k] if k in own else f"({states[k]}, {states[k + 1]})" for k in (0, 2))
+    words = f"angle whose squared sine is the share of {two}"
+    eta = Quantity("eta", "η", words, r"$\eta$", "rad", ("eta",))
+    words = f"share of {two} in the {'energy' if len(own) == 2 else 'sum of squares'}"
+    share = Quantity("share", f"share of {two}", words, r"$\sin^2\eta$", dims=("eta",))
+    x, weights = (0.25 * math.pi * each for each in _line(count))
+    first = x + 0.25 * math.pi
+    if stop:
+        phase = Quantity("phase", "θ₁", f"phase of {one} between impacts", r"$\theta_1$", "rad", ("phase",))
+        second, second_weights, turn = 2 * x, 2 * weights, 2 * math.pi
+    else:
+        words, latex = f"phase of {one} less that of {two}", r"$\theta_1 - \theta_2$"
+        phase = Quantity("phase_difference", "θ₁ − θ₂", words, latex, "rad", ("phase_difference",))
+        (second, second_weights), turn = _circle(count), math.pi
+    at, theta, other = np.meshgrid(first, second, turn * np.arange(PHASES) / PHASES, indexing="ij")
+    theta, c, s = theta if stop else theta + other, np.cos(at), np.sin(at)
+    e = np.stack([c * np.cos(theta), c * np.sin(theta), s * np.cos(other), s * np.sin(other)])
+    nodes, surface = (first, second, weights, second_weights), 2 * math.pi * (c * s)[..., 0]
+    return DirectionGrid((eta, phase), "1/rad^2", *nodes, e.reshape(4, -1), surface, share)
+
+
+def oscillators(problem: Problem) -> dict[int, float]:
+    """√(k/c) of each oscillator q̇ = cv, v̇ = −kq + …, by the place of q among the variables; pairs begin at 0 and 2."""
+    system, stop = problem.system, problem.system.stop
+    inside = stop.inside if stop else np.array
+    sizes = [(term, system.epsilon**term.order * inside(term.matrix)) for term in system.terms]
+    free = np.sum([problem.named_noise(term.noise).mean_of(term.g) * size for term, size in sizes], axis=0)
+    driven = np.sum([is_driven(term.g) * abs(size) for term, size in sizes], axis=0)
+    found = {}
+    for q in range(0, problem.dimension - 1, 2):
+        is_rate = not np.any(np.delete(free[q], q + 1)) and not np.any(driven[q])
+        if is_rate and -free[q + 1, q] * free[q, q + 1] > 0:
+            found[q] = math.sqrt(-free[q + 1, q] / free[q, q + 1])
+    return found
+
+
+def direction_map(pair: PrincipalPair) -> FloatArray:
+    """R = S⁻¹D, which takes z to y."""
+    problem = pair.generator.problem
+    stop, frame = problem.system.stop, problem.frame
+    maps = [stop and stop.coordinates, frame and frame.matrix, pair.space.phi.coordinates]
+    scales = np.ones(problem.dimension)
+    for q, size in oscillators(problem).items():
+        scales[q + 1] = size
+    return np.linalg.inv(reduce(np.matmul, [np.array(each) for each in maps if each])) * scales
+
+
+def xi_marginal(pair: PrincipalPair, at: Samples) -> FloatArray:
+    """∫ T T* dφ over the mesh at points of ξ, shape (n,)."""
+    phi = pair.space.phi
+    return np.asarray(phi.weights @ evaluated(pair, phi.values, at).product)
+
+
+def refuse_more(pair: PrincipalPair) -> None:
+    """Raises `OutputError` where T depends on more than φ and ξ."""
+    if why := no_picture_of(pair.generator.problem):
+        raise OutputError(why)
+
+
+def no_picture_of(problem: Problem) -> str:
+    """Why T cannot be drawn over phase and noise; empty where it can."""
+    noise = problem.coloured
+    if problem.dimension > 2:
+        why = f"T of {problem.dimension} variables is no function of phase and noise"
+        return f"{why}; use `draw_eigenfunction`, `tilted_density`, or a case, whose run writes files for ParaView"
+    if len(noise.parts) > 1:
+        several = "an eigenfunction of the phase and of several noises that are not white cannot be drawn"
+        return f"{several}; make all of these noises white but one"
+    if noise.is_drawn:
+        return ""
+    return (
+        f"{noise.kind} noise is no Markov process by itself, so that an eigenfunction is not a function of phase and "
+        "noise, which could be drawn; look at Λ(p), or at densities of a simulation"
+    )
