@@ -45,6 +45,7 @@ def test_the_walk_names_functions_that_run(tmp_path):
     assert names <= run
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("work", "functions"),
     [
