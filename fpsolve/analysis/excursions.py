@@ -320,12 +320,11 @@ def _at_start(pair: PrincipalPair, phi: Start, xi: StartOfNoise) -> float:
         weights = weights * stretch / (space.phi.span * (1.0 if frame is None else frame.density(own)))
         at_phi = weights @ space.phi.at(psi)
     else:
-        place = np.array([float(phi)])
-        psi = place if frame is None else frame.phase(place)
+        psi = np.array([float(phi)]) if frame is None else frame.phase(np.array([float(phi)]))
         first, span = space.phi.lines[0], space.phi.span
         psi, after = (first + np.mod(each - first, span) for each in (psi, psi + 1e-9))
-        length = 1.0 if frame is None else float(frame.length(place)[0])
-        at_phi = dense(space.phi.at(psi, after))[0] * length**pair.p
+        _, stretch = _own_phase(pair.generator, pair.p, psi)
+        at_phi = stretch[0] * dense(space.phi.at(psi, after))[0]
     means = space.product([at_phi, *(_mean_functions(axis, xi) for axis in space.noises)])
     return float(means @ pair.right)
 
@@ -376,7 +375,7 @@ def _between(values: FloatArray, axes: Sequence[int]) -> FloatArray:
     """How far a function may be beyond its values at three neighbours: an eighth of their second difference."""
     ends = [[(int(k == axis),) * 2 for k in range(values.ndim)] for axis in axes]
     bent = (np.abs(np.diff(values, n=2, axis=axis)) / 8 for axis in axes)
-    return sum(np.pad(each, end, mode="edge") for each, end in zip(bent, ends, strict=True))
+    return np.sum([np.pad(each, end, mode="edge") for each, end in zip(bent, ends, strict=True)], axis=0)
 
 
 def _where_positive(values: FloatArray, rate: FloatArray, axes: Sequence[int]) -> FloatArray:

@@ -294,8 +294,7 @@ def _nearest(
         others = tried.beyond(best)
     if others:
         other = min(others, key=lambda each: float(np.linalg.norm((each.at - best.at) / units)))
-        best = _root(tried, best.at, other.at) or best
-        if (found := _nearest_from(tried, best.at, axes, here, units)) is not None:
+        if (found := _nearest_from(tried, _root(tried, best.at, other.at), axes, here, units)) is not None:
             return found
     return _unreached(tried, target, axes, bool(others))
 
@@ -316,8 +315,8 @@ def _approach(tried: _Tried, first: Sample, axes: Sequence[Axis], units: FloatAr
         )
 
 
-def _root(tried: _Tried, one: FloatArray, other: FloatArray) -> Sample | None:
-    """F = 0 between two points at which it has both signs; None where it has no value on the way."""
+def _root(tried: _Tried, one: FloatArray, other: FloatArray) -> FloatArray:
+    """Where F = 0 between two points at which it has both signs; the first where it has no value on the way."""
 
     def value(share: float) -> float:
         if (sample := tried(one + share * (other - one))) is None:
@@ -325,8 +324,8 @@ def _root(tried: _Tried, one: FloatArray, other: FloatArray) -> Sample | None:
         return 0.0 if _is_met(sample) else sample.value
 
     with suppress(StopIteration):
-        return tried(one + brentq(value, 0.0, 1.0, xtol=EXACT) * (other - one))
-    return None
+        return one + brentq(value, 0.0, 1.0, xtol=EXACT) * (other - one)
+    return one
 
 
 def _nearest_from(

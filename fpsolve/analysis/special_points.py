@@ -33,7 +33,7 @@ def with_folds(field: Field, trace: Trace, names: tuple[str, str]) -> Trace:
     for axis in (0, 1):
         tangents = np.array([point.sample.tangent[axis] for point in trace.points])
         tangents[np.abs(tangents) < FLAT] = 0
-        for place in _roots(trace, tangents, lambda place, axis=axis: _on(field, trace, place).tangent[axis]):
+        for place in _roots(trace, tangents, lambda place: _on(field, trace, place).tangent, axis):
             new.append((place, Point(_on(field, trace, place), f"fold in {names[axis]}")))
     return with_points(trace, new)
 
@@ -45,7 +45,7 @@ def with_values(field: Field, trace: Trace, axis: int, values: Sequence[tuple[fl
         beyond = np.array([point.sample.at[axis] for point in trace.points]) - value
         beyond[np.abs(beyond) < EQUAL] = 0
         new += [(float(i), Point(trace.points[i].sample, label)) for i in np.flatnonzero(beyond == 0)]
-        for place in _roots(trace, beyond, lambda place, value=value: trace.between(place)[axis] - value):
+        for place in _roots(trace, beyond, trace.between, axis, value):
             guess = trace.between(place)
             sample = _or_none(correct_on_line, field, axis, value, guess)
             if sample is not None and np.linalg.norm(sample.at - guess) < 0.1 * trace.step(place):
@@ -108,8 +108,14 @@ def _or_none(search: Callable[..., Found | None], *arguments: Any) -> Found | No
         return None
 
 
-def _roots(trace: Trace, values: FloatArray, value: Callable[[float], float]) -> Iterator[float]:
-    """The places of a branch where something changes its sign, passing over zeros, from its values at the points."""
+def _roots(
+    trace: Trace, values: FloatArray, at: Callable[[float], FloatArray], axis: int, level: float = 0.0
+) -> Iterator[float]:
+    """The places of a branch where a component passes a level, from what it is above that at the points, or 0."""
+
+    def value(place: float) -> float:
+        return float(at(place)[axis]) - level
+
     signed = np.flatnonzero(values)
     ahead = [*signed[1:], *(signed[:1] + values.size)] if trace.closed else signed[1:]
     for i, j in zip(signed, ahead, strict=False):
