@@ -74,8 +74,6 @@ MIXED = 100.0
 """‖T′‖ over ‖T‖ from which on T is thought to be a mixture of those of two eigenvalues that meet."""
 MOST_HALVED = 20_000
 """Unknowns of a system on halved cells that is solved for that: beyond, cells are many, and it takes long."""
-A_THIRD_MORE = 4 / 3
-"""What a budget may be exceeded by."""
 MOST_EQUATIONS = 8000
 """Of even moments."""
 SURELY = 10.0
@@ -258,10 +256,10 @@ class Elements(Method):
         """That at the same p on other functions.
 
         Raises:
-            NotConverged: it cannot be made, has a third more unknowns than the budget allows, or does not resolve it.
+            NotConverged: it cannot be made, has more unknowns than the budget allows, or does not resolve it.
         """
         reason: Message | str
-        if chosen.size > A_THIRD_MORE * (most := self.most(chosen)):
+        if chosen.size > (most := self.most(chosen)):
             reason = Message(Code.UNKNOWNS_SPENT, unknowns=chosen.size, most=most)
         else:
             try:
