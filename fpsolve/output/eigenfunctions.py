@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import math
-from io import BytesIO
+from functools import partial
 from typing import Literal
 
 from fpsolve.arrays import shown
-from fpsolve.drawing import SIZE, STYLE
 from fpsolve.exponent.density import Grid, on_directions
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.model.problem import parameter_lines
 from fpsolve.model.quantity import PHASE
 from fpsolve.parts.nodes import FIELDS, Nodes
-from fpsolve.parts.surfaces import Picture, Surface, picture_of
+from fpsolve.parts.surfaces import Picture, Surface, painted, picture_of
 
 FINER = 2
 """So many times as many nodes either way as a file for ParaView has; there they carry polynomials."""
@@ -54,19 +53,10 @@ def _title_of(pair: PrincipalPair) -> str:
 
 def _picture_of_directions(pair: PrincipalPair, field: str, cmap: str) -> Picture:
     """A function of directions in colours."""
-    from matplotlib import rc_context
-    from matplotlib.figure import Figure
-
-    found, (name, quantity), content = on_directions(pair), FIELDS[field], BytesIO()
-    unit = quantity.unit if name == "right" else found.grid.unit
-    with rc_context(STYLE):
-        figure = Figure(figsize=SIZE, layout="constrained")
-        axes = figure.add_subplot()
-        found.grid.draw(axes, getattr(found.fields, name), {**quantity.attributes, "units": unit}, cmap=cmap)
-        figure.suptitle(_title_of(pair), parse_math=False)
-        axes.set_title("\n".join(parameter_lines(pair.generator.problem.parameters)), fontsize=9, parse_math=False)
-    figure.savefig(content, format="png", dpi=150)
-    return Picture(content.getvalue())
+    found, (name, quantity) = on_directions(pair), FIELDS[field]
+    about = {**quantity.attributes, "units": quantity.unit if name == "right" else found.grid.unit}
+    draw = partial(found.grid.draw, values=getattr(found.fields, name), about=about, cmap=cmap)
+    return painted(draw, _title_of(pair), parameter_lines(pair.generator.problem.parameters))
 
 
 def surface_of(pair: PrincipalPair, field: str) -> Surface:

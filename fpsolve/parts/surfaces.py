@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from fpsolve.arrays import FloatArray
 from fpsolve.drawing import COLOURS, MOST_LINES, QUARTERS, SIZE, STYLE, add_legend, draw_colours, label_axes
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 RED = "#C8102E"
 NEXT_TO_ZERO = 0.05
@@ -82,36 +80,41 @@ class Surface:
         return self.name == "T" and 0 < 10**DECADES * float(np.nanmin(self.values)) < float(np.nanmax(self.values))
 
 
-def picture_of(surface: Surface, cmap: str = "viridis") -> Picture:
-    """The function in colours over the plane, or as lines, by matplotlib."""
-    content = BytesIO()
-    figure_of(surface, cmap).savefig(content, format="png", dpi=150)
-    return Picture(content.getvalue())
-
-
-def figure_of(surface: Surface, cmap: str) -> Figure:
-    """The figure of `picture_of`, which belongs to no window."""
+def painted(draw: Callable[[Any], object], title: str, lines: Sequence[str]) -> Picture:
+    """What is drawn into axes, with a title and lines of parameters, in a figure that belongs to no window."""
     from matplotlib import rc_context
-    from matplotlib.colors import LogNorm, Normalize
     from matplotlib.figure import Figure
 
-    about, (low, high) = surface.about, surface.limits
-    style: dict[str, Any] = {"shading": "gouraud", "cmap": cmap}
+    content = BytesIO()
     with rc_context(STYLE):
         figure = Figure(figsize=SIZE, layout="constrained")
         axes = figure.add_subplot()
-        if surface.is_lines:
-            _draw_lines(axes, surface)
-        else:
-            style["norm"] = (LogNorm if surface.is_log else Normalize)(low, high)
-            draw_colours(axes, surface.phi.ravel(), surface.xi, surface.values.T, about["values"], **style)
-        for impact in surface.impacts:
-            axes.axvline(impact, color=RED, linewidth=1.2)
-        axes.set_xticks(*QUARTERS)
-        label_axes(axes, about["phi"], about["values" if surface.is_lines else "xi"])
-        figure.suptitle(surface.title, parse_math=False)
-        axes.set_title("\n".join(surface.lines), fontsize=9, parse_math=False)
-    return figure
+        draw(axes)
+        figure.suptitle(title, parse_math=False)
+        axes.set_title("\n".join(lines), fontsize=9, parse_math=False)
+    figure.savefig(content, format="png", dpi=150)
+    return Picture(content.getvalue())
+
+
+def picture_of(surface: Surface, cmap: str = "viridis") -> Picture:
+    """The function in colours over the plane, or as lines, by matplotlib."""
+    return painted(partial(_draw, surface, cmap), surface.title, surface.lines)
+
+
+def _draw(surface: Surface, cmap: str, axes: Any) -> None:
+    from matplotlib.colors import LogNorm, Normalize
+
+    about = surface.about
+    if surface.is_lines:
+        _draw_lines(axes, surface)
+    else:
+        norm = (LogNorm if surface.is_log else Normalize)(*surface.limits)
+        style = {"shading": "gouraud", "cmap": cmap, "norm": norm}
+        draw_colours(axes, surface.phi.ravel(), surface.xi, surface.values.T, about["values"], **style)
+    for impact in surface.impacts:
+        axes.axvline(impact, color=RED, linewidth=1.2)
+    axes.set_xticks(*QUARTERS)
+    label_axes(axes, about["phi"], about["values" if surface.is_lines else "xi"])
 
 
 def _draw_lines(axes: Any, surface: Surface) -> None:
