@@ -496,10 +496,10 @@ class Directions(Elements):
         return problem.dimension > 2
 
     def places(self, p: float, found: Sequence[Solution]) -> Iterator[Start]:
-        from fpsolve.exponent.modes import sphere_start  # with scikit-fem, which takes long to import
+        from fpsolve.exponent.modes import SphereStart  # with scikit-fem, which takes long to import
 
         if not found:
-            yield sphere_start(self.problem, p, self.settings.rtol, self.spaces)
+            yield SphereStart.at(self.problem, p, self.settings.rtol, self.spaces)
 
     def is_dear(self, p: float) -> bool:
         return p <= 0 or p % 2 != 0
@@ -537,10 +537,10 @@ class Stopped(Directions):
         return super().takes(problem) and problem.system.stop is not None
 
     def places(self, p: float, found: Sequence[Solution]) -> Iterator[Start]:
-        from fpsolve.exponent.stopped import stop_start
+        from fpsolve.exponent.stopped import StopStart
 
         if not found:
-            yield stop_start(self.problem, p, self.settings.rtol, self.spaces)
+            yield StopStart.at(self.problem, p, self.settings.rtol, self.spaces)
 
     def line_rtol(self, p: float) -> float:
         return 3e-3
