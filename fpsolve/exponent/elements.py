@@ -40,10 +40,10 @@ from fpsolve.exponent.method import (
     Tolerance,
     refuse_tails,
 )
-from fpsolve.exponent.modes import sphere_start
+from fpsolve.exponent.modes import SphereStart
 from fpsolve.exponent.moments import EvenMoment, even_moment, moment_row
 from fpsolve.exponent.starts import Start, first, other_centers, refined
-from fpsolve.exponent.stopped import stop_start
+from fpsolve.exponent.stopped import StopStart
 from fpsolve.fem.factors import FEW_UNKNOWNS, one_thread
 from fpsolve.fem.generator import SMALL_P, Generator
 from fpsolve.fem.noise_axes import PolynomialAxis
@@ -510,7 +510,7 @@ class Directions(Elements):
 
     def start(self, p: float) -> Stage:
         """The first functions of directions."""
-        return sphere_start(self.problem, p, self.settings.rtol, self.spaces)
+        return SphereStart.at(self.problem, p, self.settings.rtol, self.spaces)
 
     def is_dear(self, p: float) -> bool:
         return p <= 0 or p % 2 != 0
@@ -538,7 +538,7 @@ class Stopped(Directions):
         return super().takes(problem) and problem.system.stop is not None
 
     def start(self, p: float) -> Stage:
-        return stop_start(self.problem, p, self.settings.rtol, self.spaces)
+        return StopStart.at(self.problem, p, self.settings.rtol, self.spaces)
 
     def line_rtol(self, p: float) -> float:
         return 3e-3

@@ -5,9 +5,9 @@ T = xᵀQx is its eigenfunction for p = 2: in the coordinates of the eigenvector
 the weak ones the other. Where the noise is weak against the difference of their dampings, T has a layer of the width
 √(q_weak/q_strong) beside the weak ones, and T* one beside the strong ones, for which the elements are graded.
 
-Any search begins at p = 0, where T = 1, and goes from p to p on the coarsest space; on finer ones it begins with what
-the coarser one has found. What two degrees of waves change tells their error, that of all else comes from the highest
-modes, see `error`.
+Any search begins at p = 0, where T = 1, or at the nearest p that is known, and goes from p to p on the coarsest space;
+on finer ones it begins with what the coarser one has found. What two degrees of waves change tells their error, that of
+all else comes from the highest modes, see `error`.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import math
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import scipy.linalg
@@ -24,13 +24,12 @@ import scipy.linalg
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import NoHierarchy
 from fpsolve.exponent.eigen import PrincipalPair, principal_pair
-from fpsolve.exponent.error import Solution, ladders, mode_effects
+from fpsolve.exponent.error import Solution, mode_effects
 from fpsolve.exponent.moments import even_moment
 from fpsolve.exponent.powers import moment_form
 from fpsolve.exponent.starts import SHARE, Start
-from fpsolve.fem.directions import SphereAxis, group_dimensions
+from fpsolve.fem.directions import DirectionAxis, SphereAxis, group_dimensions
 from fpsolve.fem.generator import SMALL_P, Generator
-from fpsolve.fem.noise_axes import CountedAxis
 from fpsolve.fem.space import Space, first_axis
 from fpsolve.model.problem import Problem
 
@@ -53,61 +52,56 @@ OF_CHANGES = 3.0
 SETTLED_SLOPE = 3e-3
 """Share of Λ′ by which it may change from one level to the next."""
 MOST_FOR_SLOPES = 4
-"""Number of levels that may be added for Λ′."""
+"""Number of levels after which a slope is taken as it is."""
 MINOR = 0.25
 """Share of the tolerance that elements, or polynomials of a noise, may lack where others are made finer."""
 MEASURED = 3.0
 """What is left after elements or polynomials of the noise, over what two degrees more of them change."""
 
 
-def second_moments(problem: Problem) -> tuple[float, FloatArray, FloatArray]:
-    """Λ(2), Q of E‖x‖² and the second moments E xxᵀ, in the mean over the noise.
+def frame_of(problem: Problem) -> FloatArray:
+    """F of x = F z, z being what a problem is solved in."""
+    return np.eye(problem.dimension) if problem.frame is None else np.array(problem.frame.matrix)
 
-    Both matrices are without a scale, and 1 where noise is too strong or slow for the equations of the moments.
+
+def second_moments(problem: Problem, own: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Q of E‖x‖² = xᵀQx and the second moments of y = own⁻¹x, each of the trace 1, but for `THINNEST`² in each of y.
+
+    Both are 1 where noise is too strong or slow for the equations of the moments.
     """
-    unit = np.eye(problem.dimension)
+    q = moments = np.eye(len(own))
     try:
         found = even_moment(problem, 2)
+        q, moments = (moment_form(each, len(own), 2) for each in (found.polynomial, found.moments))
     except NoHierarchy:
-        return math.nan, unit, unit
-    q, moments = (moment_form(each, problem.dimension, 2) for each in (found.polynomial, found.moments))
-    return found.value, q * np.sign(np.trace(q)), moments * np.sign(np.trace(moments))
+        pass
+    back = np.linalg.inv(own)
+    q, moments = (
+        each / np.trace(each) + THINNEST**2 * np.eye(len(own)) for each in (own.T @ q @ own, back @ moments @ back.T)
+    )
+    return q, moments
 
 
-def balanced_coordinates(problem: Problem) -> tuple[FloatArray, float]:
-    """S of y = S⁻¹x whose directions are solved for, and ln tan η of a layer of T; that of T* has the other sign.
+def modal_coordinates(problem: Problem) -> tuple[FloatArray, float]:
+    """S of y = S⁻¹x whose directions are solved for, and ln tan η of a layer of T; T* has one at about minus that.
 
-    In them Q and E yyᵀ are the same diagonal matrix, as balanced realisations of control theory have it. T is about
-    (yᵀQy)^½p, and T* a power of yᵀ(E yyᵀ)⁻¹y, so that the layer lies at ½ ln(q₁/q₂), q being the mean of Q on each of
-    the two groups of y. Both matrices are told in the modes of the motion without noise, where what is hardly there is
-    given `THINNEST`² of all.
+    Each mode of the motion without noise has a unit in which Q and E yyᵀ are of one size, so that y is the same, but
+    for rotations, whatever the coordinates x are. T is about (yᵀQy)^½p, and T* a power of yᵀ(E yyᵀ)⁻¹y, so that the
+    layer lies at ½ ln(q₁/q₂), q being the mean of Q on each of the two groups of y.
     """
     free = problem.mean(problem.motion)
-    _, own = scipy.linalg.cdf2rdf(*np.linalg.eig(free))
+    rates, own = scipy.linalg.cdf2rdf(*np.linalg.eig(free))
     if np.linalg.cond(own) > WORST_CONDITION:
-        _, own = scipy.linalg.matrix_balance(free, permute=False)
-    _, q, p = second_moments(problem)
-    frame = np.eye(len(own)) if problem.frame is None else np.array(problem.frame.matrix)
-    own = frame @ own
-    back = np.linalg.inv(own)
-    q, p = (each / np.trace(each) + THINNEST**2 * np.eye(len(own)) for each in (own.T @ q @ own, back @ p @ back.T))
-    root = np.linalg.cholesky(p)
-    axes, squares, _ = np.linalg.svd(root.T @ q @ root)
-    if len(squares) == 3 and squares[0] * squares[2] < squares[1] ** 2:  # the weakest one is by itself
-        axes, squares = axes[:, [2, 0, 1]], squares[[2, 0, 1]]
-    first, second = (np.mean(each) for each in np.split(np.sqrt(squares), [group_dimensions(len(squares))[0]]))
-    return np.linalg.solve(frame, own @ root @ axes / squares**0.25), 0.5 * math.log(first / second)
-
-
-def first_directions(problem: Problem) -> SphereAxis:
-    """The coarsest functions of directions."""
-    coordinates, place = balanced_coordinates(problem)
-    lines = np.linspace(0, math.pi / 2, 3)
-    if abs(place) > math.log(1 / WEAK):
-        high = abs(place) + 1
-        inner = np.linspace(-high, high, max(2, round(2 * high / GRADED_STEP)) + 1)
-        lines = np.concatenate([[0.0], np.arctan(np.exp(inner)), [math.pi / 2]])
-    return SphereAxis(coordinates, lines, FIRST_DEGREE, FIRST_WAVES)
+        rates, (_, own) = np.eye(len(free)), scipy.linalg.matrix_balance(free, permute=False)
+    q, moments = second_moments(problem, frame_of(problem) @ own)
+    modes = (rates != 0) | np.eye(len(free), dtype=bool)
+    units = (modes @ np.diagonal(moments) / (modes @ np.diagonal(q))) ** 0.25
+    sizes, axes = np.linalg.eigh(units[:, None] * q * units)
+    order = [2, 1, 0] if len(sizes) == 3 else [3, 2, 1, 0]
+    if len(sizes) == 3 and sizes[0] * sizes[2] < sizes[1] ** 2:  # the weakest one is by itself
+        order = [0, 2, 1]
+    first, second = (np.mean(each) for each in np.split(sizes[order], [group_dimensions(len(sizes))[0]]))
+    return own * units @ axes[:, order], 0.5 * math.log(first / second)
 
 
 def first_order_changes(pair: PrincipalPair, finer: Generator, axis: int, new: Any) -> FloatArray:
@@ -124,20 +118,101 @@ def first_order_changes(pair: PrincipalPair, finer: Generator, axis: int, new: A
 
 
 @dataclass(frozen=True, eq=False)
-class SphereStart(Start):
-    """Directions of three or four variables, by elements and waves of a degree.
+class DirectionStart(Start):
+    """Directions of three or four variables.
 
     Attributes:
-        before: solutions with the same elements and functions of the noise, but waves of lower degrees.
-        enough: the first solution within the tolerance.
-        generators: L(p) with the same elements, by the degree of the waves.
-        pairs: those at other p with the waves of the lowest degree.
+        before: solutions on coarser spaces.
+        near: a pair of another p, to begin with.
     """
 
     before: tuple[Solution, ...] = ()
-    enough: Solution | None = None
+    near: PrincipalPair | None = None
+
+    @property
+    def generator(self) -> Generator:
+        """L(p) on the space."""
+        return Generator(self.problem, self.space)
+
+    @classmethod
+    def at(cls, problem: Problem, p: float, rtol: float, known: Mapping[float, Solution]) -> Self:
+        """The coarsest functions, or some of the nearest p if one is known."""
+        nearest = min(
+            (each for each in known.values() if each.start), key=lambda each: abs(each.pair.p - p), default=None
+        )
+        if nearest:
+            return replace(nearest.start.again(), before=(), near=nearest.pair)
+        noises = (first_axis(noise, -math.log10(rtol)) for noise in problem.coloured.parts.values())
+        return cls(problem, Space((cls.directions(problem), *noises)))
+
+    @staticmethod
+    def directions(problem: Problem) -> DirectionAxis:
+        """The coarsest functions of directions."""
+        raise NotImplementedError
+
+    def again(self) -> Self:
+        """The functions with which another p begins."""
+        raise NotImplementedError
+
+    def solved(self, p: float, near: PrincipalPair | None) -> PrincipalPair:
+        """The pair, from that of coarser functions, or from p to p."""
+        generator = self.generator
+        pair = near or self.near or principal_pair(generator, 0.0)
+        steps = max(math.ceil(abs(p - pair.p) / LARGEST_STEP), 1)
+        for point in np.linspace(pair.p, p, steps + 1)[1:].tolist():
+            pair.generator.forget()
+            pair = principal_pair(generator, point, start=pair)
+        rounding = 2 * self.problem.dimension * sys.float_info.epsilon * abs(p) * self.problem.unit_rate
+        return replace(pair, rounding=pair.rounding + rounding)  # an entry of S⁻¹AS is a sum of products twice
+
+    def errors_of_axes(self, pair: PrincipalPair, allowed: float) -> tuple[float, ...]:
+        """Of the elements and of each noise: the effects of the highest modes, or `MEASURED` of what two degrees more
+        change, or the geometric mean of that and of the sum over all functions of directions, whichever is larger.
+
+        Effects are too large where T* has layers that T, and so Λ(p), knows nothing of. An odd number of further
+        polynomials in ξ has one about ξ = 0, where T = 1 nearly is an eigenfunction of those alone.
+        """
+        errors = [each.error if each else 0.0 for each in mode_effects(pair)]
+        if sum(errors) <= 0.5 * allowed:
+            return tuple(errors)
+        for k, (axis, error) in enumerate(zip(self.space.axes, errors, strict=True)):
+            if error > SHARE * allowed:
+                finer = axis.raised()
+                generator = Generator(self.problem, self.space.with_axis(k, finer))
+                changes = first_order_changes(pair, generator, k, finer.modes > np.max(finer.modes) - 2)
+                of_each = changes.reshape(len(changes), -1).sum(axis=1)
+                change, size = abs(float(np.sum(of_each))), float(np.sum(np.abs(of_each)))
+                errors[k] = min(error, max(MEASURED * change, math.sqrt(size * change)))
+        return tuple(errors)
+
+    def finer_noises(self, solution: Solution, errors: Sequence[float], share: float) -> list[Any]:
+        """The axes of the noises, finer where these errors of them exceed a share."""
+        noises = list(self.space.noises)
+        for k, (axis, effects, error) in enumerate(zip(noises, solution.effects[1:], errors, strict=True)):
+            if effects is not None and error > share:
+                noises[k] = axis.enriched() if error < effects.error else axis.refined(effects, share, False)
+        return noises
+
+
+@dataclass(frozen=True, eq=False)
+class SphereStart(DirectionStart):
+    """Those without a stop; `before` are solutions that have the same but waves of lower degrees.
+
+    Attributes:
+        generators: L(p) with the same elements, by the degree of the waves.
+    """
+
     generators: dict[int, Generator] = field(default_factory=dict)
-    pairs: list[PrincipalPair] = field(default_factory=list)
+
+    @staticmethod
+    def directions(problem: Problem) -> SphereAxis:
+        coordinates, place = modal_coordinates(problem)
+        lines = np.linspace(0, math.pi / 2, 3)
+        if abs(place) > math.log(1 / WEAK):
+            high = abs(place) + 1
+            inner = np.linspace(-high, high, max(2, round(2 * high / GRADED_STEP)) + 1)
+            lines = np.concatenate([[0.0], np.arctan(np.exp(inner)), [math.pi / 2]])
+        return SphereAxis(coordinates, lines, FIRST_DEGREE, FIRST_WAVES)
 
     @property
     def generator(self) -> Generator:
@@ -151,20 +226,8 @@ class SphereStart(Start):
         waves = max(self.space.phi.waves + more, FIRST_WAVES)
         return replace(self, space=self.space.with_axis(0, replace(self.space.phi, waves=waves)), **changes)
 
-    def solved(self, p: float, near: PrincipalPair | None) -> PrincipalPair:
-        """The pair, from that of waves of a lower degree, or from p to p since p = 0."""
-        generator = self.generator
-        if near is not None:
-            near.generator.forget()
-            return principal_pair(generator, p, start=near)
-        known = [pair for pair in self.pairs if pair.generator is generator] or [principal_pair(generator, 0.0)]
-        closest = min(known, key=lambda pair: abs(pair.p - p)).p
-        steps = math.ceil(abs(p - closest) / LARGEST_STEP)
-        for k in range(1, steps + 1):
-            sides = sorted(known, key=lambda pair: abs(pair.p - p))[:2]
-            known.append(principal_pair(generator, closest + k / steps * (p - closest), start=sides))
-        self.pairs[:] = known
-        return min(known, key=lambda pair: abs(pair.p - p))
+    def again(self) -> SphereStart:
+        return self._with(-self.space.phi.waves)
 
     def judged(self, pair: PrincipalPair, allowed: float) -> Solution:
         """The pair, corrected by what the next waves change, with what is left then; first the other parts of it.
@@ -172,24 +235,18 @@ class SphereStart(Start):
         What is left is `OF_CHANGES` times the last change of the corrected value and the correction, from two spaces:
         each is too small by chance.
         """
-        of_axes, start = self._of_axes(pair, allowed), replace(self, before=(), enough=None)
+        of_axes, start = self.errors_of_axes(pair, allowed), replace(self, before=())
         if sum(of_axes) > 0.5 * allowed:
             return Solution(pair, math.inf, of_axes, start)
-        pair = replace(pair, correction=self.change(pair), rounding=pair.rounding + self._rounding(pair))
+        pair = replace(pair, correction=self.change(pair))
         change = pair.value - self.before[-1].pair.value if self.before else math.inf
-        left = OF_CHANGES * (abs(change) + abs(pair.correction))
-        if self.enough is not None:  # of Λ, not of Λ′
-            left = min(left, self.enough.search + abs(pair.value - self.enough.pair.value))
-        return Solution(pair, left, of_axes, start)
+        return Solution(pair, OF_CHANGES * (abs(change) + abs(pair.correction)), of_axes, start)
 
     def is_enough(self, solution: Solution) -> bool:
-        """Whether Λ′, which is not corrected, has settled, or as many waves as may be were added; λ is corrected."""
-        if abs(solution.pair.p) <= SMALL_P:
-            return True
-        slopes = [each.pair.derivative for each in (*self.before, solution)][-2:]
-        is_settled = len(slopes) > 1 and float(np.ptp(slopes)) <= SETTLED_SLOPE * abs(slopes[-1])
-        first = self.enough.pair.space.phi.waves if self.enough else self.space.phi.waves
-        return is_settled or self.space.phi.waves >= first + 2 * (MOST_FOR_SLOPES - 1)
+        """Whether Λ′, which is not corrected, has settled, or after so many levels is what it is; λ is corrected."""
+        change = abs(solution.derivative - self.before[-1].derivative)
+        is_settled = change <= SETTLED_SLOPE * abs(solution.derivative) or len(self.before) >= MOST_FOR_SLOPES
+        return is_settled or abs(solution.pair.p) <= SMALL_P
 
     def doubled(self, failure: Exception | None) -> SphereStart:
         return self._with(2, before=())
@@ -198,61 +255,13 @@ class SphereStart(Start):
         """Waves of the next degree; or other elements and functions of the noise, with waves of the degree before."""
         of_axes = solution.measured or ()
         if sum(of_axes) <= 0.5 * goal:
-            enough = self.enough or (solution if solution.error <= goal else None)
-            return self._with(2, before=(*self.before, solution), enough=enough)
-        phi, noises = self.space.phi, self._finer_noises(solution, of_axes[1:], MINOR * goal)
+            return self._with(2, before=(*self.before, solution))
+        phi, noises = self.space.phi, self.finer_noises(solution, of_axes[1:], MINOR * goal)
         found = Space((phi.finer(["degree"]) if of_axes[0] > MINOR * goal else phi, *noises))
         found = found if found.size > self.space.size else self.space.enriched()
-        self.generators.clear()
-        self.pairs.clear()
-        return SphereStart(self.problem, found, enough=self.enough)._with(phi.waves - 2 - found.phi.waves)
-
-    def _finer_noises(self, solution: Solution, errors: Sequence[float], share: float) -> list[Any]:
-        """The axes of the noises, finer where these errors of them exceed a share."""
-        noises = list(self.space.noises)
-        for k, (axis, effects, error) in enumerate(zip(noises, solution.effects[1:], errors, strict=True)):
-            if effects is not None and error > share:
-                noises[k] = axis.enriched() if error < effects.error else axis.refined(effects, share, False)
-        return noises
+        return SphereStart(self.problem, found)._with(phi.waves - 2 - found.phi.waves)
 
     def change(self, pair: PrincipalPair) -> float:
         """What waves of the next degree change in Λ(p), to first order."""
         finer = self._with(2).generator
         return float(np.sum(first_order_changes(pair, finer, 0, finer.phi.new_in(pair.space.phi))))
-
-    def _rounding(self, pair: PrincipalPair) -> float:
-        """Of the rates of growth: an entry of S⁻¹AS is a sum of products twice, which may cancel."""
-        return 2 * self.problem.dimension * sys.float_info.epsilon * abs(pair.p) * pair.generator.problem.unit_rate
-
-    def _of_axes(self, pair: PrincipalPair, allowed: float) -> tuple[float, ...]:
-        """Of the elements and of each noise: the effects of the highest modes, or `MEASURED` of what two degrees more
-        change, or the geometric mean of that and of the sum over all functions of directions, whichever is larger.
-
-        Effects are too large where T* has layers that T, and so Λ(p), knows nothing of. An odd number of further
-        polynomials in ξ has one about ξ = 0, where T = 1 nearly is an eigenfunction of those alone.
-        """
-        errors = [each.error if each else 0.0 for each in mode_effects(pair)]
-        if sum(errors) <= 0.5 * allowed:
-            return tuple(errors)
-        for k, (axis, error) in enumerate(zip(self.space.axes, errors, strict=True)):
-            if error <= SHARE * allowed:
-                continue
-            if k and not isinstance(axis, CountedAxis):
-                continue
-            finer = self.space.with_axis(k, axis.raised() if k else axis.deeper("degree"))
-            ladder = list(ladders(finer))[k]
-            assert ladder is not None
-            changes = first_order_changes(pair, Generator(self.problem, finer), k, ladder.highest(2))
-            of_each = changes.reshape(len(changes), -1).sum(axis=1)
-            change, size = abs(float(np.sum(of_each))), float(np.sum(np.abs(of_each)))
-            errors[k] = min(error, max(MEASURED * change, math.sqrt(size * change)))
-        return tuple(errors)
-
-
-def sphere_start(problem: Problem, p: float, rtol: float, known: Mapping[float, Solution]) -> SphereStart:
-    """The coarsest waves, with the elements and functions of the noise of the nearest p if one is known."""
-    for _, solution in sorted(known.items(), key=lambda each: abs(each[0] - p)):
-        if isinstance(start := solution.start, SphereStart):
-            return start._with(-start.space.phi.waves)
-    noises = (first_axis(noise, -math.log10(rtol)) for noise in problem.coloured.parts.values())
-    return SphereStart(problem, Space((first_directions(problem), *noises)))

@@ -18,7 +18,7 @@ what is stated in 58 comparisons.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import compress
 
@@ -28,12 +28,12 @@ import scipy.linalg
 from fpsolve.arrays import FloatArray
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.error import Solution
-from fpsolve.exponent.modes import THINNEST, SphereStart, first_order_changes, second_moments
+from fpsolve.exponent.modes import DirectionStart, first_order_changes, frame_of, second_moments
 from fpsolve.exponent.starts import SHARE
 from fpsolve.fem.directions import HalfSphereAxis
 from fpsolve.fem.generator import Generator
-from fpsolve.fem.space import Space, first_axis
-from fpsolve.model.plane import CoefficientMatrix, LinearMotion, rotating_coordinates
+from fpsolve.fem.space import Space
+from fpsolve.model.plane import LinearMotion, rotating_coordinates
 from fpsolve.model.problem import Problem
 
 FIRST_DEGREE = 4
@@ -61,36 +61,6 @@ WORTH = 0.2
 """Share of the largest change from which on functions in another direction are made finer, too."""
 
 
-def stopped_directions(problem: Problem) -> HalfSphereAxis:
-    """The coarsest functions on the half sphere."""
-    stop, system = problem.system.stop, problem.system
-    assert stop is not None
-    terms = [replace(term, matrix=tuple(map(tuple, stop.inside(term.matrix).tolist()))) for term in system.terms]
-    means = [problem.named_noise(term.noise).mean_of(term.g) for term in terms]
-    parts = [m * system.epsilon**term.order * np.array(term.matrix) for m, term in zip(means, terms, strict=True)]
-    free = np.sum(parts, axis=0)
-    own = scipy.linalg.block_diag(_rotating(free[:2, :2]), _rotating(free[2:, 2:]))
-    damping = np.zeros((4, 4))
-    damping[1, 1] = math.sqrt(abs(free[1, 0])) / math.pi * 2 * math.log(stop.restitution)
-    smooth = LinearMotion(system.epsilon, (*terms, CoefficientMatrix(0, damping.tolist())))
-    _, q, p = second_moments(replace(problem, system=smooth))
-    back = np.linalg.inv(own)
-    forms = [np.diagonal(each).reshape(2, 2).sum(axis=1) for each in (own.T @ q @ own, back @ p @ back.T)]
-    of_q, of_p = (np.maximum(each / np.sum(each), THINNEST**2) for each in forms)
-    units = (of_p / of_q) ** 0.25
-    rows = np.array(stop.coordinates) if problem.frame is None else np.array(stop.coordinates) @ problem.frame.matrix
-    coordinates = np.linalg.solve(rows, own @ np.diag(np.repeat(units, 2)))
-    in_theta = np.linspace(-0.5, 0.5, 3) * math.pi
-    return HalfSphereAxis(
-        coordinates,
-        0.5 * math.pi * np.array(AT_STOP),
-        FIRST_DEGREE,
-        FIRST_WAVES,
-        in_theta,
-        FIRST_DEGREE,
-    )
-
-
 def _rotating(block: FloatArray) -> FloatArray:
     """Coordinates in which a pair rotates uniformly, but for growth, the first one as it was but for its unit."""
     if (found := rotating_coordinates(block)) is None:
@@ -100,7 +70,7 @@ def _rotating(block: FloatArray) -> FloatArray:
 
 
 @dataclass(frozen=True, eq=False)
-class StopStart(SphereStart):
+class StopStart(DirectionStart):
     """Directions of four variables with a stop; `before` holds the solution with coarser functions, if there is one.
 
     Attributes:
@@ -112,14 +82,36 @@ class StopStart(SphereStart):
     is_first: bool = True
     tried: tuple[str, ...] = ()
 
+    @staticmethod
+    def directions(problem: Problem) -> HalfSphereAxis:
+        stop, system = problem.system.stop, problem.system
+        assert stop is not None
+        free, smooth = stop.inside(problem.mean(system)), LinearMotion(system.epsilon, tuple(system.terms))
+        own = scipy.linalg.block_diag(_rotating(free[:2, :2]), _rotating(free[2:, 2:]))
+        own = np.linalg.solve(np.array(stop.coordinates), own)
+        forms = second_moments(replace(problem, system=smooth), own)
+        q, moments = (np.diagonal(each).reshape(2, 2).sum(axis=1) for each in forms)
+        return HalfSphereAxis(
+            np.linalg.solve(frame_of(problem), own * np.repeat((moments / q) ** 0.25, 2)),
+            0.5 * math.pi * np.array(AT_STOP),
+            FIRST_DEGREE,
+            FIRST_WAVES,
+            np.linspace(-0.5, 0.5, 3) * math.pi,
+            FIRST_DEGREE,
+        )
+
+    def again(self) -> StopStart:
+        coarser = (*(each.start for each in self.before), self)[0]
+        return StopStart(self.problem, coarser.space, is_first=coarser.is_first)
+
     def judged(self, pair: PrincipalPair, allowed: float) -> Solution:
-        _, *of_noises = self._of_axes(pair, allowed)
+        _, *of_noises = self.errors_of_axes(pair, allowed)
         phi, found = self.space.phi, list[float]()
         for finer in map(phi.deeper, phi.ways):
             generator = Generator(self.problem, self.space.with_axis(0, finer))
             changes = first_order_changes(pair, generator, 0, finer.new_in(phi))
             found.append(float(abs(np.sum(changes))))
-        pair, left = replace(pair, rounding=pair.rounding + self._rounding(pair)), float(self._left(found) @ found)
+        left = float(self._left(found) @ found)
         for each in self.before:
             step, lacked = abs(pair.value - each.pair.value), sum(each.start.changes)
             left = max(left, OF_STEP * step, OF_LAST[not each.start.is_first] * lacked)
@@ -154,16 +146,6 @@ class StopStart(SphereStart):
             tried = tuple(compress(phi.ways, raised))
             phi = phi.finer(tried, ["degree"] if self._stalls(solution.start.changes) else [])
         share = max(SHARE * goal, MINOR_NOISE * solution.measured[0])
-        found = Space((phi, *self._finer_noises(solution, solution.measured[1:], share)))
+        found = Space((phi, *self.finer_noises(solution, solution.measured[1:], share)))
         found = found if found.size > self.space.size else self.space.enriched()
         return StopStart(self.problem, found, before=(solution,), is_first=False, tried=tried)
-
-
-def stop_start(problem: Problem, p: float, rtol: float, known: Mapping[float, Solution]) -> StopStart:
-    """The coarsest functions, or those before the ones that were enough for the nearest p."""
-    for _, solution in sorted(known.items(), key=lambda each: abs(each[0] - p)):
-        if isinstance(start := solution.start, StopStart):
-            start = (*(each.start for each in start.before), start)[0]
-            return StopStart(problem, start.space, is_first=start.is_first)
-    noises = (first_axis(noise, -math.log10(rtol) - 1) for noise in problem.coloured.parts.values())
-    return StopStart(problem, Space((stopped_directions(problem), *noises)))

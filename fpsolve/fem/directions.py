@@ -211,6 +211,9 @@ class DirectionAxis(Axis):
         """Two degrees more in some ways."""
         return replace(self, **{way: getattr(self, way) + 2 for way in ways})
 
+    def raised(self) -> DirectionAxis:
+        return self.deeper("degree")
+
     def finer(self, ways: Collection[str], halved_ways: Collection[str] = ()) -> DirectionAxis:
         """The same, but elements of the highest degree, and some others, are halved."""
         found = self.deeper(*ways)

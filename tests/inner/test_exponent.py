@@ -7,7 +7,7 @@ import pytest
 
 from fpsolve.exponent import principal_pair
 from fpsolve.exponent.curve import Node, polynomial, values
-from fpsolve.exponent.modes import SphereStart, balanced_coordinates, first_directions
+from fpsolve.exponent.modes import SphereStart, modal_coordinates
 from fpsolve.exponent.solver import broken_convexity
 from fpsolve.fem.space import Space, first_axis
 from fpsolve.model import OrnsteinUhlenbeck
@@ -18,7 +18,7 @@ from tests.numbers.test_identities import changed
 def on_sphere(problem, waves=4, **changes):
     """Directions with so many waves, and functions of the noise."""
     noises = [replace(first_axis(each, 5), **changes) for each in problem.coloured.parts.values()]
-    return SphereStart(problem, Space((replace(first_directions(problem), waves=waves), *noises)))
+    return SphereStart(problem, Space((replace(SphereStart.directions(problem), waves=waves), *noises)))
 
 
 def test_what_finer_waves_change_is_told_to_first_order():
@@ -31,7 +31,7 @@ def test_what_finer_waves_change_is_told_to_first_order():
 
 def test_what_polynomials_of_the_noise_lack_is_told():
     start = on_sphere(random_system(1, 3, OrnsteinUhlenbeck(alpha=1.2, sigma=1.6)), count=6)
-    finer = replace(start, space=start.space.with_axis(1, start.space.xi.enriched()), generators={}, pairs=[])
+    finer = replace(start, space=start.space.with_axis(1, start.space.xi.enriched()), generators={})
     pair = start.solved(0.5, None)
     lacking = abs(finer.solved(0.5, pair).eigenvalue - pair.eigenvalue)
     assert lacking < start.judged(pair, 1e-12).measured[1] < 50 * lacking
@@ -40,7 +40,7 @@ def test_what_polynomials_of_the_noise_lack_is_told():
 @pytest.mark.parametrize("seed", range(4))
 def test_layers_of_directions_are_those_of_the_system_in_other_coordinates(seed):
     problem, turn = random_system(seed, 4), np.random.default_rng(seed).standard_normal((4, 4))
-    assert balanced_coordinates(changed(problem, turn))[1] == pytest.approx(balanced_coordinates(problem)[1], rel=1e-3)
+    assert modal_coordinates(changed(problem, turn))[1] == pytest.approx(modal_coordinates(problem)[1], rel=1e-3)
 
 
 @pytest.mark.parametrize("size", [1e-9, 1e-6, 1e-3])
