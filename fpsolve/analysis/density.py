@@ -170,7 +170,7 @@ def tilted_density(pair: PrincipalPair) -> Density | DirectionDensity:
 def _density(pair: PrincipalPair, kind: Literal["stationary", "adjoint", "tilted"]) -> Density | DirectionDensity:
     """One of the `densities`, if it is one. Raises `NotConverged`."""
     found, problem, name = densities(pair), pair.generator.problem, f"{kind} density"
-    values = found.fields.product if kind == "tilted" else found.fields.adjoint
+    values = found.fields.tilted_density if kind == "tilted" else found.fields.T_adjoint
     of_kind = DirectionDensity if problem.dimension > 2 else Density
     density = of_kind(found.grid, values, f"{name} at p = {pair.p:g}", problem.values, found.error)
     if (share := density.negative_share()) > MOST_NEGATIVE:
@@ -198,10 +198,10 @@ def furstenberg_khasminskii(pair: PrincipalPair) -> float:
         rate = rate + 0.5 * system.epsilon ** (2 * each.order) * each.h(phi) * each.q.slope(phi)
     for struck in problem.impulses:
         rate = rate + struck.rate * np.log(struck.stretched(phi)[0])
-    growth = float(axis.weights @ (rate * evaluated(pair, axis.values, at).adjoint) @ at.measure)
+    growth = float(axis.weights @ (rate * evaluated(pair, axis.values, at).T_adjoint) @ at.measure)
     for jump, speed in zip(system.jumps, problem.wall_speeds(system), strict=True):
         met = (axis.left_trace if speed > 0 else axis.right_trace)[vertices_at(axis.lines, jump.phase)]
-        growth += abs(speed) * jump.log_factor * float(np.sum(evaluated(pair, met, at).adjoint @ at.measure))
+        growth += abs(speed) * jump.log_factor * float(np.sum(evaluated(pair, met, at).T_adjoint @ at.measure))
     return pair.space.turns * growth
 
 

@@ -51,8 +51,8 @@ MOST_NEGATIVE = 0.02
 """Share of a density with the wrong sign from which on it misleads."""
 NODES = 48, 96, 192
 """Numbers of nodes between the ends of a coordinate of directions; there are twice as many steps around."""
-POINTS = 4096
-"""Number of directions at which functions are evaluated at once, about."""
+CHUNK = 2**21
+"""Numbers of a table of functions and of values of the noise over directions, at most."""
 PHASES = 16
 """Half turns of both phases together are looked at from so many; at a stop turns of the second one."""
 RESOLVED = 1e-3
@@ -72,17 +72,17 @@ ITSELF = Frame(((1.0, 0.0), (0.0, 1.0)))
 
 
 class Fields(NamedTuple):
-    """Functions at nodes, each of shape (first, second).
+    """Functions at nodes, each of shape (first, second), by their names in files.
 
     Attributes:
-        right: T.
-        adjoint: T* as a density; at p = 0 the stationary one.
-        product: T T*, the tilted density.
+        T: T.
+        T_adjoint: T* as a density; at p = 0 the stationary one.
+        tilted_density: T T*.
     """
 
-    right: FloatArray
-    adjoint: FloatArray
-    product: FloatArray
+    T: FloatArray
+    T_adjoint: FloatArray
+    tilted_density: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -268,8 +268,8 @@ class DirectionGrid(Grid):
         axis, noises, matrix = pair.space.phi, pair.space.noises, direction_map(pair)
         at = Samples(*(reduce(np.kron, each) for each in zip(*(axis.samples() for axis in noises), strict=True)))
         law = reduce(np.kron, [axis.law() for axis in noises])
-        found = []
-        for y in np.array_split(matrix @ self.directions, self.directions.shape[1] // POINTS + 1, axis=1):
+        found, numbers = [], self.directions.shape[1] * (axis.size + law.size)
+        for y in np.array_split(matrix @ self.directions, numbers // CHUNK + 1, axis=1):
             length = np.linalg.norm(y, axis=0)
             surface = abs(np.linalg.det(matrix)) / axis.area * length ** -len(y)
             right, adjoint, product = evaluated(pair, axis.at(y / length), at, length, surface)
@@ -375,7 +375,7 @@ def direction_map(pair: PrincipalPair) -> FloatArray:
 def xi_marginal(pair: PrincipalPair, at: Samples) -> FloatArray:
     """∫ T T* dφ over the mesh at points of ξ, shape (n,)."""
     phi = pair.space.phi
-    return np.asarray(phi.weights @ evaluated(pair, phi.values, at).product)
+    return np.asarray(phi.weights @ evaluated(pair, phi.values, at).tilted_density)
 
 
 def refuse_more(pair: PrincipalPair) -> None:

@@ -34,16 +34,11 @@ def draw_eigenfunction(pair: PrincipalPair, field: Field = "T", *, cmap: str = "
         ValueError: there is no such field.
         OutputError: T depends on more than φ and ξ.
     """
-    if pair.generator.problem.dimension > 2:
-        return _picture_of_directions(pair, _known(field), cmap)
-    return picture_of(surface_of(pair, field), cmap)
-
-
-def _known(field: str) -> str:
-    """The name of a field. Raises `ValueError`."""
     if field not in FIELDS:
         raise ValueError(f"got field = {shown(field)}; must be one of {', '.join(map(repr, FIELDS))}")
-    return field
+    if pair.generator.problem.dimension > 2:
+        return _picture_of_directions(pair, field, cmap)
+    return picture_of(surface_of(pair, field), cmap)
 
 
 def _title_of(pair: PrincipalPair) -> str:
@@ -53,19 +48,19 @@ def _title_of(pair: PrincipalPair) -> str:
 
 def _picture_of_directions(pair: PrincipalPair, field: str, cmap: str) -> Picture:
     """A function of directions in colours."""
-    found, (name, quantity) = on_directions(pair), FIELDS[field]
-    about = {**quantity.attributes, "units": quantity.unit if name == "right" else found.grid.unit}
-    draw = partial(found.grid.draw, values=getattr(found.fields, name), about=about, cmap=cmap)
+    found, quantity = on_directions(pair), FIELDS[field]
+    about = {**quantity.attributes, "units": quantity.unit if field == "T" else found.grid.unit}
+    draw = partial(found.grid.draw, values=getattr(found.fields, field), about=about, cmap=cmap)
     return painted(draw, _title_of(pair), parameter_lines(pair.generator.problem.parameters))
 
 
 def surface_of(pair: PrincipalPair, field: str) -> Surface:
-    """A function of a pair where it is not negligible, with its words. Raises `ValueError`."""
-    (name, quantity), problem = FIELDS[_known(field)], pair.generator.problem
+    """A function of a pair where it is not negligible, with its words."""
+    quantity, problem = FIELDS[field], pair.generator.problem
     nodes, noise, is_lines = Nodes.of(pair, FINER).seen(pair), problem.noise_quantity, problem.noise.has_states
-    unit = quantity.unit if name == "right" else Grid.of(pair).unit
+    unit = quantity.unit if field == "T" else Grid.of(pair).unit
     xi = pair.space.xi.support if is_lines else nodes.unit * nodes.z
-    values = getattr(nodes.fields(pair), name)
+    values = getattr(nodes.fields(pair), field)
     about = {"phi": PHASE.attributes, "xi": noise.attributes, "values": {**quantity.attributes, "units": unit}}
     rays = {(jump.phase + turn) % (2 * math.pi) for jump in problem.system.jumps for turn in (0, math.pi)}
     return Surface(

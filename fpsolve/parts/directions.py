@@ -76,7 +76,7 @@ def _unclear(found: Densities) -> Iterator[Message]:
     """Which densities mislead."""
     p = found.pair.p
     for name in ("T_adjoint", "tilted_density"):
-        defect = found.grid.negative_share(getattr(found.fields, FIELDS[name][0]))
+        defect = found.grid.negative_share(getattr(found.fields, name))
         if defect > MOST_NEGATIVE:
             yield Message(Code.UNREADABLE, name=name, p=p, size=defect)
     if not found.missing <= RESOLVED:
@@ -110,15 +110,16 @@ def write_densities(found: Sequence[Densities], curve: Curve, folder: Path) -> N
     numbers = dict[Quantity, Any]()
     for each in found:
         if not each.pair.p:
-            numbers[replace(STATIONARY, dims=plane, unit=grid.unit)] = each.fields.adjoint
+            numbers[replace(STATIONARY, dims=plane, unit=grid.unit)] = each.fields.T_adjoint
             numbers[replace(ERROR, name="stationary_density_error", dims=())] = each.error
-    for own, quantity in FIELDS.values():
-        about = replace(quantity, dims=("p", *plane), unit="1" if own == "right" else grid.unit)
-        numbers[about] = np.stack([getattr(each.fields, own) for each in shown])
+    for name, quantity in FIELDS.items():
+        about = replace(quantity, dims=("p", *plane), unit="1" if name == "T" else grid.unit)
+        numbers[about] = np.stack([getattr(each.fields, name) for each in shown])
     numbers[ERROR] = np.array([each.error for each in shown])
     numbers[MOMENT] = np.array([each.value for each in shown])
-    for mean in grid.means(shown[0].fields.product):
-        numbers[replace(mean, dims=("p",))] = np.array([grid.means(each.fields.product)[mean] for each in shown])
+    for mean in grid.means(shown[0].fields.tilted_density):
+        values = [grid.means(each.fields.tilted_density)[mean] for each in shown]
+        numbers[replace(mean, dims=("p",))] = np.array(values)
     places = {P: np.array([each.pair.p for each in shown]), **grid.coordinates}
     if grid.share:
         places[grid.share] = np.sin(grid.first) ** 2
@@ -145,14 +146,14 @@ def write_directions(found: Sequence[Densities], curve: Curve, folder: Path) -> 
     first, second = np.meshgrid(grid.first, grid.second, indexing="ij")
     always = dict[str, FloatArray]()
     for each in stationary:
-        always["stationary_density"] = each.fields.adjoint
+        always["stationary_density"] = each.fields.T_adjoint
     always |= {"share": np.sin(first) ** 2} if grid.share else {"longitude": first, "latitude": second}
     if stationary and curve.number == 1:
         _write_plane(folder / "density.vtu", grid, always, {"p": 0.0, "Lambda": 0.0, **facts})
     stem = f"eigenfunctions{curve.suffix}"
     names = {each.pair.p: name_at(stem, each.pair.p) for each in others}
     for each in others:
-        data = {name: getattr(each.fields, own) for name, (own, _) in reversed(FIELDS.items())}
+        data = dict(reversed(each.fields._asdict().items()))
         known = {"p": each.pair.p, "Lambda": each.value}
         _write_plane(folder / names[each.pair.p], grid, {**data, **always}, {**known, **facts})
     if others:

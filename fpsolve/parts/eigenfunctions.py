@@ -98,7 +98,7 @@ def _solve(job: Job, settings: Settings) -> tuple[Message, ...]:
         limits = {
             "T": (pair.sign_defects[0], UNRESOLVED),
             "T_adjoint": (pair.sign_defects[1], UNRESOLVED),
-            "tilted_density": (tilted.grid.negative_share(tilted.fields.product), MOST_NEGATIVE),
+            "tilted_density": (tilted.grid.negative_share(tilted.fields.tilted_density), MOST_NEGATIVE),
         }
         for name, (defect, most) in limits.items():
             said += [Message(Code.UNREADABLE, name=name, p=pair.p, size=defect)] * (defect > most)
@@ -155,12 +155,9 @@ def write_eigenfunctions(
     facts = {**_frame(problem), **field_data(parameters, varied, problem)}
     for pair in pairs:
         grid = Nodes.of(pair)
-        found = grid.fields(pair)
         data = {
-            "T": found.right,
-            "T_adjoint": found.adjoint,
-            "tilted_density": found.product,
-            "stationary_density": grid.fields(stationary).adjoint,
+            **grid.fields(pair)._asdict(),
+            "stationary_density": grid.fields(stationary).T_adjoint,
             "z": grid.z,
         }
         _write_grid(directory / names[pair.p], grid, data, {"p": pair.p, "Lambda": pair.value, **facts})
@@ -183,8 +180,8 @@ def write_density(
     grid, space = Nodes.of(stationary), stationary.space
     rule = space.xi.samples()
     data = {
-        "stationary_density": grid.fields(stationary).adjoint,
-        "phi_marginal": grid.fields(stationary, rule).adjoint @ rule.measure[:, None],
+        "stationary_density": grid.fields(stationary).T_adjoint,
+        "phi_marginal": grid.fields(stationary, rule).T_adjoint @ rule.measure[:, None],
         "xi_marginal": space.turns * xi_marginal(stationary, grid.samples(stationary)),
         "z": grid.z,
     }

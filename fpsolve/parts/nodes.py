@@ -28,11 +28,11 @@ FAINT = 1e-6
 NEGLIGIBLE = 1e-3
 """A picture shows the ξ at which a density exceeds this share of its maximum."""
 FIELDS = {
-    "T": ("right", Quantity("T", "T", "eigenfunction", "$T$")),
-    "T_adjoint": ("adjoint", Quantity("T_adjoint", "T*", "adjoint eigenfunction", "$T^*$")),
-    "tilted_density": ("product", Quantity("tilted_density", "T T*", "tilted density", r"$T\,T^*$")),
+    "T": Quantity("T", "T", "eigenfunction", "$T$"),
+    "T_adjoint": Quantity("T_adjoint", "T*", "adjoint eigenfunction", "$T^*$"),
+    "tilted_density": Quantity("tilted_density", "T T*", "tilted density", r"$T\,T^*$"),
 }
-"""By the names that they have in files for ParaView: those among `Fields`, and what they are."""
+"""What the `Fields` of a pair are."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +85,7 @@ class Nodes:
     def seen(self, pair: PrincipalPair) -> Nodes:
         """The same where the tilted density, or that of the noise, is not negligible."""
         noise = pair.generator.problem.coloured
-        densities = self.fields(pair).product.max(axis=0), noise.density(self.unit * self.z)
+        densities = self.fields(pair).tilted_density.max(axis=0), noise.density(self.unit * self.z)
         living = np.flatnonzero(np.any([each > NEGLIGIBLE * each.max() for each in densities], axis=0))
         return replace(self, z_cells=self.z[None, living[0] : living[-1] + 1])
 

@@ -114,8 +114,8 @@ def field_of(case: Case, p: Any) -> Answer:
     xi, is_chain = grid.unit * grid.z[inside], problem.noise.has_states
     along = "number of the state" if problem.noise.has_states else f"noise ξ ({plain_unit(unit)})"
     names = ["phase φ (rad)", along.removesuffix(" (unknown)").removesuffix(" (1)")]
-    phi, shown = grid.phi.ravel(), {f"eigenfunction T of p = {p:g}": grid.fields(pair).right}
-    shown["stationary density"] = grid.fields(stationary).adjoint
+    phi, shown = grid.phi.ravel(), {f"eigenfunction T of p = {p:g}": grid.fields(pair).T}
+    shown["stationary density"] = grid.fields(stationary).T_adjoint
     panels = [panel(title, phi, xi, values[:, inside], names, is_chain) for title, values in shown.items()]
     return {"panels": panels, "told": part_of_page(told_of(panels))}
 

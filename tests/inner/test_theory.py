@@ -112,6 +112,6 @@ def test_eigenfunction_tends_to_1_plus_epsilon_T1(p):
         oscillator = VibroImpactOscillator(omega=1.3, restitution=0.8, c1=0.1, epsilon=epsilon)
         space = (pair := ExponentSolver(Problem(oscillator, OU)).pair(p)).space
         t1 = perturbation.first_order_eigenfunction(oscillator, OU, p, phi[:, None], xi)
-        values = plane_fields(pair, phi, phi, space.xi.at(xi / OU.standard_deviation)).right
+        values = plane_fields(pair, phi, phi, space.xi.at(xi / OU.standard_deviation)).T
         errors.append(np.max(np.abs(values - 1 - epsilon * t1)))
     assert np.log2(np.array(errors[:-1]) / errors[1:]) == pytest.approx([2, 2], abs=0.15)
