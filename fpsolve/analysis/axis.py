@@ -76,6 +76,16 @@ class Axis:
         return self.stop - self.start
 
 
+def bounds_of(problem: Problem, key: str) -> tuple[float, float]:
+    """The least and the largest value that a parameter may have."""
+    low, high = -math.inf, math.inf
+    field = problem.parameters[key].field
+    for limit in () if field is None else field.metadata:
+        low = max(low, getattr(limit, "ge", low), math.nextafter(getattr(limit, "gt", -math.inf), math.inf))
+        high = min(high, getattr(limit, "le", high), math.nextafter(getattr(limit, "lt", math.inf), -math.inf))
+    return low, high
+
+
 def check_axes(problem: Problem, x: Axis, y: Axis) -> None:
     """Refuse axes that span no frame. Raises `ValueError`."""
     known = checked_problem(problem).differentiable

@@ -45,7 +45,7 @@ SAME = 1e-3
 """Distance, in sides of the square, in which a curve that runs the same way is taken for one that is known."""
 DOUBT = 10.0
 """What the second derivatives of F are, over those along a curve, at most."""
-NEGLIGIBLE = 0.1
+NEGLIGIBLE = 0.01
 """Share of |F| up to which it is 0 that may be left without being solved."""
 PIECES = 8
 """Number of pieces into which the cubic between two points of a branch is divided."""
@@ -81,23 +81,11 @@ class Trace:
     closed: bool = False
     obstacles: tuple[Message, ...] = ()
 
-    @property
-    def at(self) -> FloatArray:
-        """(u, v), shape (n, 2); of a closed one the first again at the end."""
-        places = [point.sample.at for point in self.points]
-        return np.array(places + places[:1] * self.closed)
-
     @cached_property
     def fine(self) -> FloatArray:
         """(u, v) on the cubics through the points with their tangents, `PIECES` from one to the next."""
-        at = self.at
-        tangents = np.array([point.sample.tangent for point in self.points])
-        tangents = np.concatenate([tangents, tangents[:1]]) if self.closed else tangents
-        shares = np.arange(PIECES)[:, None] / PIECES
-        if len(at) == 1:
-            return np.concatenate([at, at])
-        pieces = [cubic(at[i], at[i + 1], tangents[i], tangents[i + 1], shares) for i in range(len(at) - 1)]
-        return np.concatenate([*pieces, at[-1:]])
+        count = max(len(self.points) - 1 + self.closed, 1)
+        return np.array([self.between(k / PIECES) for k in range(count * PIECES + 1)])
 
     def between(self, place: float) -> FloatArray:
         """About the point at a place: 2.5 is half way between the points 2 and 3."""
@@ -117,10 +105,8 @@ class Trace:
         return bool(np.any((gaps < within) & (way @ sample.tangent >= 0)))
 
 
-def cubic(
-    start: FloatArray, end: FloatArray, out: FloatArray, into: FloatArray, share: float | FloatArray
-) -> FloatArray:
-    """The cubic from a point to another with unit tangents there; shares beyond 1 continue it."""
+def cubic(start: FloatArray, end: FloatArray, out: FloatArray, into: FloatArray, share: float) -> FloatArray:
+    """On the cubic from a point to another with unit tangents there; shares beyond 1 continue it."""
     rise = end - start
     length = float(np.linalg.norm(rise))
     quadratic, third = 3 * rise - length * (2 * out + into), length * (out + into) - 2 * rise
@@ -157,7 +143,7 @@ def with_branch(known: tuple[Trace, ...], trace: Trace) -> tuple[Trace, ...]:
 
 def find_zero(field: Field, at: FloatArray) -> Sample | None:
     """A point F = 0 near a point: on the gradient, or where that leads out of the square, beside it or above it."""
-    for along in (None, np.array([1.0, 0.0]), np.array([0.0, 1.0])):
+    for along in (None, *np.eye(2)):
         with suppress(FpsolveError):
             if (sample := correct(field, at, along)) is not None:
                 return sample
@@ -194,9 +180,7 @@ def correct_on_line(field: Field, axis: int, value: float, guess: FloatArray) ->
     """The point F = 0 where u, or v, has a value; None where there is none near the guess."""
     at = guess.copy()
     at[axis] = value
-    along = np.zeros(2)
-    along[axis] = 1.0
-    return correct(field, at, along)
+    return correct(field, at, np.eye(2)[axis])
 
 
 def trace_branch(field: Field, start: Sample, longest: float, stepped: Callable[[], None] = lambda: None) -> Trace:

@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.optimize import brentq, minimize
 
-from fpsolve.analysis.axis import Axis, check_ends
+from fpsolve.analysis.axis import Axis, bounds_of, check_ends
 from fpsolve.analysis.scan import TOLERANCE, Sample
 from fpsolve.analysis.target import Distance, Target, is_none, target_of
 from fpsolve.arrays import FloatArray, real_number, shown
@@ -200,7 +200,7 @@ def units_of(problem: Problem, axes: Sequence[Axis], stated: Mapping[str, float]
 
 def start_and_stop(problem: Problem, key: str) -> Axis | None:
     """The range from half to twice the value of a parameter, within its range; None where the value is 0."""
-    value, (low, high) = float(problem.values[key]), problem.parameters[key].bounds
+    value, (low, high) = float(problem.values[key]), bounds_of(problem, key)
     if value == 0:
         return None
     start, stop = sorted((0.5 * value, 2.0 * value))

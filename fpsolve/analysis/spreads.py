@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import ndtr, ndtri
 
+from fpsolve.analysis.axis import bounds_of
 from fpsolve.analysis.sensitivity import RECORDS, Sensitivities, solve_sensitivities
 from fpsolve.arrays import FloatArray, is_whole, shown
 from fpsolve.data import Result, dataset
@@ -151,7 +152,7 @@ def laws_of(problem: Problem, uncertain: Mapping[str, Any]) -> dict[str, Law]:
         value = float(problem.values[key])
         if not deviation.at(value) > 0:
             raise ValueError(f'{key} is 0, and so is a share of it; state {{"sd": number}} for it')
-        found[key] = Law(value, deviation.at(value), *problem.parameters[key].bounds)
+        found[key] = Law(value, deviation.at(value), *bounds_of(problem, key))
     return found
 
 

@@ -129,15 +129,6 @@ class Parameter(NamedTuple):
         """The range that it may have; None where that is not stated."""
         return self.kind.fields().get(self.quantity.name.rpartition(".")[2])
 
-    @property
-    def bounds(self) -> tuple[float, float]:
-        """The least and the largest number that it may be."""
-        low, high = -math.inf, math.inf
-        for limit in () if self.field is None else self.field.metadata:
-            low = max(low, getattr(limit, "ge", low), math.nextafter(getattr(limit, "gt", -math.inf), math.inf))
-            high = min(high, getattr(limit, "le", high), math.nextafter(getattr(limit, "lt", math.inf), -math.inf))
-        return low, high
-
 
 class Parametrised:
     """A system or a noise, a kind with named parameters; here those of a pydantic dataclass.

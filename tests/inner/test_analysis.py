@@ -38,7 +38,7 @@ def scan_of(of, nodes=13):
 
 
 def length(branch):
-    return float(np.sum(np.linalg.norm(np.diff(branch.at, axis=0), axis=1)))
+    return float(np.sum(np.linalg.norm(np.diff(branch.fine, axis=0), axis=1)))
 
 
 def pair(u, v, gap=0.01):
@@ -71,7 +71,7 @@ def test_branches_of_a_curve_are_whole(name):
     assert closed is None or sum(each.closed for each in branches) == closed
     assert sum(len(each.obstacles) for each in branches) == obstacles
     for branch in branches:
-        steps = np.diff(branch.at, axis=0)
+        steps = np.diff([point.sample.at for point in branch.points], axis=0)
         assert np.all(np.linalg.norm(steps, axis=1) < 2 * LONGEST)
         assert all(abs(of(point.sample.at).value) <= 1e-10 for point in branch.points)
         ends = [] if branch.closed else [branch.points[0], branch.points[-1]]
