@@ -42,7 +42,7 @@ from fpsolve.exponent.method import (
 )
 from fpsolve.exponent.modes import SphereStart
 from fpsolve.exponent.moments import EvenMoment, even_moment, moment_row
-from fpsolve.exponent.starts import Start, first, other_centers, refined
+from fpsolve.exponent.starts import Start, first, has_cones, other_centers, refined
 from fpsolve.exponent.stopped import StopStart
 from fpsolve.fem.factors import FEW_UNKNOWNS, one_thread
 from fpsolve.fem.generator import SMALL_P, Generator
@@ -447,6 +447,15 @@ class Elements(Method):
         more = [0.5 * p * each.curvature.value if p else 0.0 for each in changed]
         return np.array([each.slope.value for each in changed]) + more
 
+    def bounds(self, p: FloatArray, value: FloatArray, error: FloatArray) -> tuple[Message, ...]:
+        """That Λ(p) for p < −1 depends on the start, or nothing.
+
+        On paths with singular values s₁ > s₂ of the matrix that moves x, starts in the cone of the faster mode grow as
+        s₁. Of those in that of the slower one a share s₂/s₁ stays there and grows as s₂. So there are E s₁^p and
+        E s₂^(p + 1)/s₁, which are equal at p = −1.
+        """
+        return (Message(Code.START_MATTERS),) if np.any(p < -1) and has_cones(self.problem) else ()
+
 
 class GivenMesh(Elements):
     """Λ(p) of two variables on a given mesh, with the error that a finer one tells."""
@@ -517,6 +526,9 @@ class Directions(Elements):
 
     def is_at_corner(self, p: float) -> bool:
         return False
+
+    def bounds(self, p: FloatArray, value: FloatArray, error: FloatArray) -> tuple[Message, ...]:
+        return ()
 
     def number(self, p: float) -> EvenMoment | None:
         return self.even(p)

@@ -314,7 +314,7 @@ class ExponentSolver:
             solver=self,
             warnings=(*missed(self, found, value, errors), *self.method.doubts(pairs)),
             failures=tuple(failures),
-            notes=(*of_the_start(self, found), *self.method.bounds(found, value, errors)),
+            notes=self.method.bounds(found, value, errors),
         )
 
     def slope(self, p: float) -> float:
@@ -372,16 +372,6 @@ def missed(solver: ExponentSolver, p: FloatArray, value: FloatArray, error: Floa
     worst, remedy = int(np.argmax(shares)), Remedy.ROUNDING if solver.method.adapts else Remedy.MESH
     found = {"p": p[worst], "size": shares[worst]}
     return (Message(Code.RTOL_MISSED, rtol=solver.rtol, count=count, of=p.size, **found, remedy=remedy),)
-
-
-def of_the_start(solver: ExponentSolver, p: FloatArray) -> tuple[Message, ...]:
-    """That Λ(p) for p < −1 depends on it, or nothing.
-
-    On paths with singular values s₁ > s₂ of the matrix that moves x, starts in the cone of the faster mode grow as s₁,
-    and of those in that of the slower one a share s₂/s₁ stays there and grows as s₂: E s₁^p and E s₂^(p + 1)/s₁, which
-    are equal at p = −1.
-    """
-    return (Message(Code.START_MATTERS),) if np.any(p < -1) and solver.problem.has_cones else ()
 
 
 def moment_lyapunov(
@@ -509,7 +499,7 @@ def interpolated(solver: ExponentSolver, curves: tuple[Curve, ...], p: FloatArra
         warnings=(*missed(solver, p, value, error), *solver.method.doubts(pairs)),
         curves=curves,
         root=sign_change(p, value, derivative),
-        notes=of_the_start(solver, p),
+        notes=solver.method.bounds(p, value, error),
     )
 
 

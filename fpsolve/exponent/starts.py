@@ -36,6 +36,8 @@ ALONE = 0.5
 """Share of the tolerance in each direction of a discretisation that serves one p only."""
 MOST_GAIN = 1e-3
 """Least factor by which one stage with cells of the noise aims to reduce the error: a larger fall is foreseen badly."""
+ROUND = 360
+"""Number of φ at which it is asked which way the phase turns."""
 COMPARABLE = 0.6
 """Paths that hold the noise elsewhere are looked at if they grow at this share of Λ (less by the rest, for Λ < 0)."""
 
@@ -182,6 +184,20 @@ def other_centers(pair: PrincipalPair) -> list[float]:
     width = math.sqrt(float((own - mean) ** 2 @ density / density.sum()))
     far = (np.abs(z - mean) > 3 * width + 2) & (rate > comparable(pair.value))
     return [float(z[far][np.argmax(rate[far])])] if np.any(far) else []
+
+
+def has_cones(problem: Problem) -> bool:
+    """Whether the phase never enters some set, nor leaves another one: it passes some φ forward only, others back.
+
+    Bounded noise that hardly moves the two modes of a saddle does this: the sets are around the slower one, and the
+    faster one. Told for one noise.
+    """
+    noise = problem.noise
+    if not noise.is_bounded or len(noise.parts) > 1 or problem.diffusions or problem.impulses:
+        return False
+    phi = np.linspace(0, math.pi, ROUND, endpoint=False)
+    turns = phase_speed(problem.motion, noise.reached)(phi[:, None])
+    return bool(np.any(np.all(turns > 0, axis=1)) and np.any(np.all(turns < 0, axis=1)))
 
 
 def comparable(value: float) -> float:

@@ -44,8 +44,6 @@ from fpsolve.model.subsystem import Subsystem, components, couplings, hidden_blo
 
 RATE = "1/time"
 """Unit of ξ for which the units of parameters of noises are stated."""
-PHASES = 360
-"""Number of φ at which the direction of the phase is looked at."""
 RTOLS = {"gt": 1e-13, "lt": 1}
 """The range of rtol."""
 SUPPORT = np.linspace(-12, 12, 2401)
@@ -344,27 +342,6 @@ class Problem:
         matrices = [*map(np.array, jolts), *self._by_noise(self.motion.terms)]
         pairs = [(turning(each), ROUNDED * float(np.linalg.norm(each))) for each in matrices]
         return [(speed, limit) for speed, limit in pairs if abs(speed.mean) + speed.amplitude > limit]
-
-    @cached_property
-    def has_cones(self) -> bool:
-        """Whether the phase never enters some set, nor leaves another one: it passes some φ forward only, others back.
-
-        Bounded noise that hardly moves the two modes of a saddle does this: the sets are around the slower one, and
-        the faster one. Told for one noise.
-        """
-        noise = self.noise
-        if (
-            self.dimension > 2
-            or not noise.is_bounded
-            or len(noise.parts) > 1
-            or self.diffusions
-            or self.impulses
-            or self.invariant_rays
-        ):
-            return False
-        phi = np.linspace(0, math.pi, PHASES, endpoint=False)
-        turns = phase_speed(self.motion, noise.reached)(phi[:, None])
-        return bool(np.any(np.all(turns > 0, axis=1)) and np.any(np.all(turns < 0, axis=1)))
 
     @cached_property
     def blocks(self) -> tuple[Subsystem, ...]:
