@@ -11,7 +11,7 @@ import sys
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -218,8 +218,9 @@ class Elements(Method):
         """
         chosen, p = found.pair.generator.chosen, search.p
         if self.is_at_corner(p) and is_mixed(found.pair):
-            change = self.finer_pair(found.pair).value - found.pair.value
-            return replace(found, search=2 * abs(change))
+            if finer_pair := search.attempt(partial(self.finer_pair, found.pair)):
+                return replace(found, search=2 * abs(finer_pair.value - found.pair.value))
+            return self._confirmed(search, search.settle(Start(self.problem, chosen.doubled())), tolerance)
         if self.settings.rtol <= SURELY_SEEN or not isinstance(chosen.phi, PhaseAxis):
             return found
         halved = chosen.with_axis(0, chosen.phi.doubled())
