@@ -67,6 +67,7 @@ SHARES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
 """Shares of the second pair in ‖z‖² at which the axis of η has ticks."""
 LATITUDES = np.pi * np.arange(-2, 3) / 4, [r"$-\pi/2$", r"$-\pi/4$", "0", r"$\pi/4$", r"$\pi/2$"]
 ONE = np.ones(1)
+"""ρ and |det R| ρ^(−n) in the coordinates of the solve, where R = 1."""
 ITSELF = Frame(((1.0, 0.0), (0.0, 1.0)))
 """The coordinates of a problem that is solved in its own."""
 
@@ -87,7 +88,7 @@ class Fields(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Grid:
-    """Nodes of two coordinates, and the weights of ∫ f dfirst dsecond; those of phase and noise.
+    """Nodes of two coordinates, and the weights of ∫ f dfirst dsecond: phase and noise, if it is no `DirectionGrid`.
 
     Attributes:
         quantities: what the coordinates are.
@@ -214,8 +215,8 @@ def evaluated(
         pair: the eigenpair.
         functions: the values of the functions of directions, as rows.
         at: samples of the functions of the noise.
-        length: ρ, shape (directions,); in the coordinates of the solve 1, as
-        surface: |det R| ρ^(−n).
+        length: ρ, shape (directions,).
+        surface: |det R| ρ^(−n), of the same shape.
     """
     table = pair.space.phi.size, -1
     right, left = (functions @ each.reshape(table) @ at.values.T for each in (pair.right, pair.left))

@@ -142,7 +142,7 @@ def write_directions(found: Sequence[Densities], curve: Curve, folder: Path) -> 
     grid, problem = found[0].grid, curve.problem
     facts = {"curve": float(curve.number), **field_data(curve.parameters, curve.varied, problem)}
     facts |= {f"along_{side}": _plain(axis) for side, axis in zip("xy", grid.quantities, strict=True)}
-    stationary, others = ([each for each in found if (not each.pair.p) == is_zero] for is_zero in (True, False))
+    stationary, others = [each for each in found if not each.pair.p], [each for each in found if each.pair.p]
     first, second = np.meshgrid(grid.first, grid.second, indexing="ij")
     always = dict[str, FloatArray]()
     for each in stationary:

@@ -100,10 +100,7 @@ def field_of(case: Case, p: Any) -> Answer:
     stationary = solver.pair(0.0)
     if problem.dimension > 2:
         all_of: list[Any] = [stationary_density(stationary), *([tilted_density(solver.pair(float(p)))] if p else [])]
-        names = [
-            f"{each.words} ({plain_unit(each.unit)})" if each.unit != "1" else each.words
-            for each in all_of[0].grid.quantities
-        ]
+        names = [f"{each.words} ({each.unit})" for each in all_of[0].grid.quantities]
         panels = [panel(each.name, each.grid.first, each.grid.second, each.values, names) for each in all_of]
         said = [Sentence(each._said()) for each in all_of]
         return {"panels": panels, "told": part_of_page([*told_of(panels), *said])}
