@@ -31,6 +31,7 @@ from fpsolve.exponent.starts import SHARE, Start
 from fpsolve.fem.directions import DirectionAxis, SphereAxis, group_dimensions
 from fpsolve.fem.generator import SMALL_P, Generator
 from fpsolve.fem.space import Space, first_axis
+from fpsolve.model.plane import System
 from fpsolve.model.problem import Problem
 
 FIRST_WAVES = 2
@@ -65,6 +66,12 @@ def frame_of(problem: Problem) -> FloatArray:
     return np.eye(problem.dimension) if problem.frame is None else np.array(problem.frame.matrix)
 
 
+def mean_matrix(problem: Problem, motion: System) -> FloatArray:
+    """Σ ε^n ⟨g⟩ A of the terms of a motion, in the mean over the noise."""
+    means = [motion.epsilon**term.order * problem.named_noise(term.noise).mean_of(term.g) for term in motion.terms]
+    return np.tensordot(means, [term.matrix for term in motion.terms], axes=1)
+
+
 def second_moments(problem: Problem, own: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Q of E‖x‖² = xᵀQx and the second moments of y = own⁻¹x, each of the trace 1, but for `THINNEST`² in each of y.
 
@@ -90,7 +97,7 @@ def modal_coordinates(problem: Problem) -> tuple[FloatArray, float]:
     for rotations, whatever the coordinates x are. T is about (yᵀQy)^½p, and T* a power of yᵀ(E yyᵀ)⁻¹y, so that the
     layer lies at ½ ln(q₁/q₂), q being the mean of Q on each of the two groups of y.
     """
-    free = problem.mean(problem.motion)
+    free = mean_matrix(problem, problem.motion)
     rates, own = scipy.linalg.cdf2rdf(*np.linalg.eig(free))
     if np.linalg.cond(own) > WORST_CONDITION:
         rates, (_, own) = np.eye(len(free)), scipy.linalg.matrix_balance(free, permute=False)

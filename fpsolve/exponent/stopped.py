@@ -23,7 +23,7 @@ import scipy.linalg
 from fpsolve.arrays import FloatArray
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.error import Solution
-from fpsolve.exponent.modes import MEASURED, MINOR, DirectionStart, frame_of, second_moments
+from fpsolve.exponent.modes import MEASURED, MINOR, DirectionStart, frame_of, mean_matrix, second_moments
 from fpsolve.fem.directions import HalfSphereAxis
 from fpsolve.model.plane import LinearMotion, rotating_coordinates
 from fpsolve.model.problem import Problem
@@ -62,7 +62,7 @@ class StopStart(DirectionStart):
     def directions(problem: Problem) -> HalfSphereAxis:
         stop, system = problem.system.stop, problem.system
         assert stop is not None
-        free, smooth = stop.inside(problem.mean(system)), LinearMotion(system.epsilon, tuple(system.terms))
+        free, smooth = stop.inside(mean_matrix(problem, system)), LinearMotion(system.epsilon, tuple(system.terms))
         own = scipy.linalg.block_diag(_rotating(free[:2, :2]), _rotating(free[2:, 2:]))
         own = np.linalg.solve(np.array(stop.coordinates), own)
         forms = second_moments(replace(problem, system=smooth), own)
