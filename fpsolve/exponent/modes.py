@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Self
 
@@ -31,6 +31,7 @@ from fpsolve.exponent.starts import SHARE, Start
 from fpsolve.fem.directions import DirectionAxis, SphereAxis, group_dimensions
 from fpsolve.fem.generator import SMALL_P, Generator
 from fpsolve.fem.space import Space, first_axis
+from fpsolve.model.plane import System
 from fpsolve.model.problem import Problem
 
 FIRST_WAVES = 2
@@ -55,13 +56,20 @@ MOST_FOR_SLOPES = 4
 """Number of levels after which a slope is taken as it is."""
 MINOR = 0.25
 """Share of the tolerance that elements, or polynomials of a noise, may lack where others are made finer."""
-MEASURED = 3.0
-"""What is left after elements or polynomials of the noise, over what two degrees more of them change."""
+MEASURED = 1.5
+"""What is left, over what two degrees more change: it was up to 1.2 at a stop with R = 1, where the motion without one
+tells Λ(p)."""
 
 
 def frame_of(problem: Problem) -> FloatArray:
     """F of x = F z, z being what a problem is solved in."""
     return np.eye(problem.dimension) if problem.frame is None else np.array(problem.frame.matrix)
+
+
+def mean_matrix(problem: Problem, motion: System) -> FloatArray:
+    """Σ ε^n ⟨g⟩ A of the terms of a motion, in the mean over the noise."""
+    means = [motion.epsilon**term.order * problem.named_noise(term.noise).mean_of(term.g) for term in motion.terms]
+    return np.tensordot(means, [term.matrix for term in motion.terms], axes=1)
 
 
 def second_moments(problem: Problem, own: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -89,7 +97,7 @@ def modal_coordinates(problem: Problem) -> tuple[FloatArray, float]:
     for rotations, whatever the coordinates x are. T is about (yᵀQy)^½p, and T* a power of yᵀ(E yyᵀ)⁻¹y, so that the
     layer lies at ½ ln(q₁/q₂), q being the mean of Q on each of the two groups of y.
     """
-    free = problem.mean(problem.motion)
+    free = mean_matrix(problem, problem.motion)
     rates, own = scipy.linalg.cdf2rdf(*np.linalg.eig(free))
     if np.linalg.cond(own) > WORST_CONDITION:
         rates, (_, own) = np.eye(len(free)), scipy.linalg.matrix_balance(free, permute=False)
@@ -104,17 +112,17 @@ def modal_coordinates(problem: Problem) -> tuple[FloatArray, float]:
     return own * units @ axes[:, order], 0.5 * math.log(first / second)
 
 
-def first_order_changes(pair: PrincipalPair, finer: Generator, axis: int, new: Any) -> FloatArray:
-    """What each new function of an axis of a finer space changes in Λ(p), to first order, in a table by all axes."""
+def first_order_changes(pair: PrincipalPair, finer: Generator, k: int) -> FloatArray:
+    """What each function of a finer axis that the pair's lacks changes in Λ(p), to first order."""
     pencil, space, old = finer.at(pair.p), finer.space(pair.p), pair.space
-    operator = pencil.matrix.shifted(pair.eigenvalue)
+    operator, new = pencil.matrix.shifted(pair.eigenvalue), space.axes[k].new_in(old.axes[k])
     right, left = (
-        np.compress(new, space.table(image @ space.carry(each, old)), axis=axis).ravel()
+        np.compress(new, space.table(image @ space.carry(each, old)), axis=k)
         for image, each in ((operator, pair.right), (operator.T, pair.left))
     )
-    factors = pencil.on(axis, new).factorised(pair.eigenvalue)
-    found = -left * factors.solve(right) / (pair.left @ old.weighed(pair.right))
-    return np.reshape(found, [-1 if k == axis else size for k, size in enumerate(space.shape)])
+    factors = pencil.on(k, new).factorised(pair.eigenvalue)
+    found = left * factors.solve(right.ravel()).reshape(right.shape) / -(pair.left @ old.weighed(pair.right))
+    return np.asarray(found.sum(axis=tuple(each for each in range(found.ndim) if each != k)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,9 +173,27 @@ class DirectionStart(Start):
         rounding = 2 * self.problem.dimension * sys.float_info.epsilon * abs(p) * self.problem.unit_rate
         return replace(pair, rounding=pair.rounding + rounding)  # an entry of S⁻¹AS is a sum of products twice
 
+    def _with(self, more: int, **changes: Any) -> Self:
+        """That with waves of higher degrees."""
+        waves = max(self.space.phi.waves + more, FIRST_WAVES)
+        return replace(self, space=self.space.with_axis(0, replace(self.space.phi, waves=waves)), **changes)
+
+    def change(self, pair: PrincipalPair) -> float:
+        """What waves of the next degree change in Λ(p), to first order."""
+        return float(np.sum(first_order_changes(pair, self._with(2).generator, 0)))
+
+    def lacking(self, pair: PrincipalPair, k: int, finer: Any) -> float:
+        """What is left without the new functions of a finer axis, by the sizes of what each of them changes.
+
+        What all of them change together may be small by chance.
+        """
+        if finer.size == self.space.axes[k].size:  # there are no more
+            return math.inf
+        generator = Generator(self.problem, self.space.with_axis(k, finer))
+        return MEASURED * float(np.sum(np.abs(first_order_changes(pair, generator, k))))
+
     def errors_of_axes(self, pair: PrincipalPair, allowed: float) -> tuple[float, ...]:
-        """Of the elements and of each noise: the effects of the highest modes, or `MEASURED` of what two degrees more
-        change, or the geometric mean of that and of the sum over all functions of directions, whichever is larger.
+        """Of the elements and of each noise: the effects of the highest modes, or what is lacking if that is less.
 
         Effects are too large where T* has layers that T, and so Λ(p), knows nothing of. An odd number of further
         polynomials in ξ has one about ξ = 0, where T = 1 nearly is an eigenfunction of those alone.
@@ -175,23 +201,20 @@ class DirectionStart(Start):
         errors = [each.error if each else 0.0 for each in mode_effects(pair)]
         if sum(errors) <= 0.5 * allowed:
             return tuple(errors)
-        for k, (axis, error) in enumerate(zip(self.space.axes, errors, strict=True)):
-            if error > SHARE * allowed:
-                finer = axis.raised()
-                generator = Generator(self.problem, self.space.with_axis(k, finer))
-                changes = first_order_changes(pair, generator, k, finer.modes > np.max(finer.modes) - 2)
-                of_each = changes.reshape(len(changes), -1).sum(axis=1)
-                change, size = abs(float(np.sum(of_each))), float(np.sum(np.abs(of_each)))
-                errors[k] = min(error, max(MEASURED * change, math.sqrt(size * change)))
-        return tuple(errors)
+        pairs = enumerate(zip(self.space.axes, errors, strict=True))
+        return tuple(
+            min(error, self.lacking(pair, k, axis.raised())) if error > SHARE * allowed else error
+            for k, (axis, error) in pairs
+        )
 
-    def finer_noises(self, solution: Solution, errors: Sequence[float], share: float) -> list[Any]:
-        """The axes of the noises, finer where these errors of them exceed a share."""
-        noises = list(self.space.noises)
+    def finer(self, phi: DirectionAxis, solution: Solution, share: float) -> Space:
+        """That with some functions of directions, and more of each noise that lacks more than a share."""
+        noises, errors = list(self.space.noises), (solution.measured or ())[1:]
         for k, (axis, effects, error) in enumerate(zip(noises, solution.effects[1:], errors, strict=True)):
             if effects is not None and error > share:
                 noises[k] = axis.enriched() if error < effects.error else axis.refined(effects, share, False)
-        return noises
+        found = Space((phi, *noises))
+        return found if found.size > self.space.size else self.space.enriched()
 
 
 @dataclass(frozen=True, eq=False)
@@ -220,11 +243,6 @@ class SphereStart(DirectionStart):
         if waves not in self.generators:
             self.generators[waves] = Generator(self.problem, self.space)
         return self.generators[waves]
-
-    def _with(self, more: int, **changes: Any) -> SphereStart:
-        """That with waves of higher degrees."""
-        waves = max(self.space.phi.waves + more, FIRST_WAVES)
-        return replace(self, space=self.space.with_axis(0, replace(self.space.phi, waves=waves)), **changes)
 
     def again(self) -> SphereStart:
         return self._with(-self.space.phi.waves)
@@ -256,12 +274,6 @@ class SphereStart(DirectionStart):
         of_axes = solution.measured or ()
         if sum(of_axes) <= 0.5 * goal:
             return self._with(2, before=(*self.before, solution))
-        phi, noises = self.space.phi, self.finer_noises(solution, of_axes[1:], MINOR * goal)
-        found = Space((phi.finer(["degree"]) if of_axes[0] > MINOR * goal else phi, *noises))
-        found = found if found.size > self.space.size else self.space.enriched()
+        phi, share = self.space.phi, MINOR * goal
+        found = self.finer(phi.finer(["degree"]) if of_axes[0] > share else phi, solution, share)
         return SphereStart(self.problem, found)._with(phi.waves - 2 - found.phi.waves)
-
-    def change(self, pair: PrincipalPair) -> float:
-        """What waves of the next degree change in Λ(p), to first order."""
-        finer = self._with(2).generator
-        return float(np.sum(first_order_changes(pair, finer, 0, finer.phi.new_in(pair.space.phi))))

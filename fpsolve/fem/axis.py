@@ -115,6 +115,10 @@ class Axis:
         """The matrix that takes a function on another axis to its projection on this one, shape (size, other.size)."""
         raise NotImplementedError
 
+    def new_in(self, coarse: Any) -> Mask:
+        """Which functions one of lower degrees does not have, shape (size,)."""
+        return np.asarray(self.modes > np.max(coarse.modes))
+
     def enriched(self) -> Self:
         """The next finer one."""
         return self

@@ -39,7 +39,7 @@ from scipy.linalg import block_diag
 from scipy.sparse import csc_matrix, csr_matrix, diags, identity, kron
 from scipy.sparse.linalg import LinearOperator
 
-from fpsolve.arrays import Coefficient, FloatArray, IntArray, Matrix, one
+from fpsolve.arrays import Coefficient, FloatArray, IntArray, Mask, Matrix, one
 from fpsolve.fem.axis import Axis, KroneckerSum, along
 from fpsolve.fem.element import gauss_legendre
 from fpsolve.fem.line import LineSpace
@@ -223,10 +223,9 @@ class DirectionAxis(Axis):
                 found = replace(found, **halves)
         return found
 
-    def new_in(self, coarse: DirectionAxis) -> Any:
-        """Which functions one of lower degrees does not have, shape (size,)."""
+    def new_in(self, coarse: DirectionAxis) -> Mask:
         pairs = zip(self.ways, self.levels, strict=True)
-        return np.any([level > getattr(coarse, way) for way, level in pairs], axis=0)
+        return np.asarray(np.any([level > getattr(coarse, way) for way, level in pairs], axis=0))
 
     @cached_property
     def line(self) -> LineSpace:

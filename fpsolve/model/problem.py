@@ -224,14 +224,6 @@ class Problem:
             return values[0]
         return dict(zip(self.coloured.parts, np.meshgrid(*values, indexing="ij", sparse=True), strict=True))
 
-    def mean(self, motion: System) -> FloatArray:
-        """Σ ε^n ⟨g⟩ A of a motion, in the mean over the noise."""
-        parts = [
-            motion.epsilon**term.order * self.named_noise(term.noise).mean_of(term.g) * np.array(term.matrix)
-            for term in motion.terms
-        ]
-        return np.sum(parts, axis=0)
-
     @property
     def typical(self) -> Xi:
         """All combinations of the states of chains, and of ends of the range where other noises are mostly."""
