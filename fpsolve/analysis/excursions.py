@@ -41,7 +41,6 @@ from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.method import Budget, refuse_tails
 from fpsolve.exponent.root import nonzero_root
 from fpsolve.exponent.solver import ExponentSolver, solver_of
-from fpsolve.fem.generator import Generator
 from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.plane import Harmonics, growth_rate
 from fpsolve.model.problem import Problem
@@ -302,13 +301,21 @@ def _inverse(of: Estimate, factor: float = 1.0) -> Estimate | None:
     return Estimate(factor / value, factor * error / (value * (value - error)), factor / value)
 
 
-def _own_phase(generator: Generator, p: float, psi: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _own_phase(pair: PrincipalPair, psi: FloatArray) -> tuple[FloatArray, FloatArray]:
     """φ in the coordinates of the system, and ρ^p there."""
-    frame = generator.problem.frame
+    frame = pair.generator.problem.frame
     if frame is None:
         return psi, np.ones(psi.shape)
     phi = frame.own_phase(psi)
-    return phi, frame.length(phi) ** p
+    return phi, frame.length(phi) ** pair.p
+
+
+def _growth(pair: PrincipalPair, psi: FloatArray, xi: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray]:
+    """q over φ and values of the noises, and ρ^p as a factor of such tables."""
+    problem, columns = pair.generator.problem, (-1, *[1] * len(xi))
+    phi, stretch = _own_phase(pair, psi)
+    rate: Harmonics = growth_rate(problem.drift, problem.at_values(xi))
+    return rate(phi.reshape(columns)), stretch.reshape(columns)
 
 
 def _at_start(pair: PrincipalPair, phi: Start, xi: StartOfNoise) -> float:
@@ -316,14 +323,14 @@ def _at_start(pair: PrincipalPair, phi: Start, xi: StartOfNoise) -> float:
     space, frame = pair.space, pair.generator.problem.frame
     if phi == UNIFORM:
         psi, weights = space.phi.finer_rule(1 if frame is None else frame.parts)
-        own, stretch = _own_phase(pair.generator, pair.p, psi)
+        own, stretch = _own_phase(pair, psi)
         weights = weights * stretch / (space.phi.span * (1.0 if frame is None else frame.density(own)))
         at_phi = weights @ space.phi.at(psi)
     else:
         psi = np.array([float(phi)]) if frame is None else frame.phase(np.array([float(phi)]))
         first, span = space.phi.lines[0], space.phi.span
         psi, after = (first + np.mod(each - first, span) for each in (psi, psi + 1e-9))
-        _, stretch = _own_phase(pair.generator, pair.p, psi)
+        _, stretch = _own_phase(pair, psi)
         at_phi = stretch[0] * dense(space.phi.at(psi, after))[0]
     means = space.product([at_phi, *(_mean_functions(axis, xi) for axis in space.noises)])
     return float(means @ pair.right)
@@ -346,19 +353,19 @@ def _extremes(pair: PrincipalPair, is_smooth: bool) -> FloatArray:
 
     These are in all cells of φ, seen from inside, and all over the noise, the ends included.
     """
-    space, problem, lines = pair.space, pair.generator.problem, pair.space.phi.lines
+    space, lines = pair.space, pair.space.phi.lines
     counts = [FINE * (int(np.max(axis.modes)) + 1) for axis in space.axes]
     share = min(1.0, (MOST_POINTS / (math.prod(counts) * (lines.size - 1))) ** (1 / len(counts)))
     phases, *noises = (max(16, math.ceil(share * count)) for count in counts)
     psi = np.linspace(lines[:-1], lines[1:], phases + 1, axis=1)
     inside = np.repeat(0.5 * (lines[:-1] + lines[1:]), phases + 1)
-    reached = [axis.everywhere(count) for axis, count in zip(space.noises, noises, strict=True)]
-    table = space.evaluate(pair.right, space.phi.at(psi.ravel(), inside), *(values for _, values in reached))
-    phi, stretch = _own_phase(pair.generator, pair.p, psi.ravel())
-    columns, shape = (-1, *[1] * len(reached)), (*psi.shape, *table.shape[1:])
-    values = (table * stretch.reshape(columns)).reshape(shape)
-    growth: Harmonics = growth_rate(problem.drift, problem.at_values([xi for xi, _ in reached]))
-    rate = np.broadcast_to(growth(phi.reshape(columns)), table.shape).reshape(shape)
+    xi, functions = zip(
+        *(axis.everywhere(count) for axis, count in zip(space.noises, noises, strict=True)), strict=True
+    )
+    table = space.evaluate(pair.right, space.phi.at(psi.ravel(), inside), *functions)
+    growth, stretch = _growth(pair, psi.ravel(), xi)
+    values = (table * stretch).reshape(shape := (*psi.shape, *table.shape[1:]))
+    rate = np.broadcast_to(growth, table.shape).reshape(shape)
     if not is_smooth or rate.max() < 0:
         rate = np.ones(shape)
     axes = [1, *(2 + k for k, axis in enumerate(space.noises) if axis.cells.max() >= 0)]  # along which T is continuous
@@ -399,17 +406,14 @@ def _flux(pair: PrincipalPair) -> FloatArray:
 
 def _flux_by(pair: PrincipalPair, parts: int) -> float:
     """The same from so many parts of each cell of φ."""
-    space, problem = pair.space, pair.generator.problem
+    space = pair.space
     psi, weights = space.phi.finer_rule(parts)
-    phi, stretch = _own_phase(pair.generator, pair.p, psi)
     most = (MOST_POINTS / psi.size) ** (1 / len(space.noises))
     each = [axis.finer_samples(round(min(most, POINTS * parts / PARTS))) for axis in space.noises]
     left = space.evaluate(pair.left, space.phi.at(psi), *(at.values for at in each))
-    measures = [at.weight * at.measure / at.factor for at in each]
-    shape = (-1, *[1] * len(each))
-    rate: Harmonics = growth_rate(problem.drift, problem.at_values([at.xi for at in each]))
-    density = np.maximum(rate(phi.reshape(shape)), 0) * left * (weights / stretch).reshape(shape)
-    return space.turns * float(np.sum(density * reduce(np.multiply.outer, measures)))
+    rate, stretch = _growth(pair, psi, [at.xi for at in each])
+    measures = [weights, *(at.weight * at.measure / at.factor for at in each)]
+    return space.turns * float(np.sum(np.maximum(rate, 0) * left / stretch * reduce(np.multiply.outer, measures)))
 
 
 def _checked_levels(level: ArrayLike) -> FloatArray:
