@@ -216,16 +216,16 @@ def solve_excursion(
     if (phase := solver.method.ray) is not None:
         return replace(found, notes=(Message(Code.EXCURSION_RAY, phase=phase),))
     overshoot, is_smooth = _crossing(problem)
-    p, notes = index.value, list[Message]()
+    p, pairs, notes = index.value, [solver.pair(index.value)], list[Message]()
     if problem.noise.is_bounded:
-        least, most = _settled(solver, p, lambda pair: _extremes(pair, is_smooth) / _at_start(pair, phi, xi))
+        least, most = _settled(solver, pairs, lambda pair: _extremes(pair, is_smooth) / _at_start(pair, phi, xi))
         found = replace(found, lower=_inverse(most, overshoot**-p), upper=_inverse(least))
         if found.upper is None:
             notes.append(Message(Code.EXCURSION_NO_UPPER, value=least.value, error=least.error_estimate))
     else:
         notes.append(Message(Code.EXCURSION_UNBOUNDED))
     if is_smooth:
-        [many] = _settled(solver, p, lambda pair: _flux(pair) * _at_start(pair, phi, xi) / pair.derivative)
+        [many] = _settled(solver, pairs, lambda pair: _flux(pair) * _at_start(pair, phi, xi) / pair.derivative)
         if not many.error_estimate <= many.value:
             raise NotConverged(Message(Code.EXCURSION_UNRESOLVED), remedy=Remedy.BUDGET)
         found = replace(found, upcrossings=replace(many, quantity=UPCROSSINGS))
@@ -272,18 +272,25 @@ def _crossing(problem: Problem) -> tuple[float, bool]:
     return overshoot, overshoot == 1.0 and not impulses and not diffuses
 
 
-def _settled(solver: ExponentSolver, p: float, numbers: Callable[[PrincipalPair], FloatArray]) -> list[Estimate]:
-    """Some numbers by the pair at p, each with what its points miss, and its difference from a coarser pair.
+def _settled(
+    solver: ExponentSolver, pairs: list[PrincipalPair], numbers: Callable[[PrincipalPair], FloatArray]
+) -> list[Estimate]:
+    """Some numbers by a pair, each with what its points miss, and its difference from a coarser pair.
+
+    Args:
+        solver: of the pairs.
+        pairs: on ever finer discretisations; those that are made join them.
+        numbers: by a pair, each with what its points miss.
 
     Raises:
         NotConverged: there is no finer discretisation within the budget.
     """
-    pair = solver.pair(p)
-    last, found = numbers(pair)[:, 0], None
+    last, found = numbers(pairs[0])[:, 0], None
     with unless_over_budget():
-        for _ in range(MOST_ROUNDS):
-            pair = solver.method.finer_pair(pair)
-            value, missed = numbers(pair).T
+        for k in range(1, 1 + MOST_ROUNDS):
+            if k == len(pairs):
+                pairs.append(solver.method.finer_pair(pairs[-1]))
+            value, missed = numbers(pairs[k]).T
             error, last = missed + abs(value - last), value
             found = list(map(Estimate, value.tolist(), error.tolist(), abs(value).tolist()))
             if np.all(error <= CLOSE * abs(value)):
@@ -412,8 +419,9 @@ def _flux_by(pair: PrincipalPair, parts: int) -> float:
     each = [axis.finer_samples(round(min(most, POINTS * parts / PARTS))) for axis in space.noises]
     left = space.evaluate(pair.left, space.phi.at(psi), *(at.values for at in each))
     rate, stretch = _growth(pair, psi, [at.xi for at in each])
-    measures = [weights, *(at.weight * at.measure / at.factor for at in each)]
-    return space.turns * float(np.sum(np.maximum(rate, 0) * left / stretch * reduce(np.multiply.outer, measures)))
+    measure = reduce(np.multiply.outer, [at.weight * at.measure / at.factor for at in each])
+    of_phi = np.sum((np.maximum(rate, 0) * left / stretch * measure).reshape(psi.size, -1), axis=1)
+    return space.turns * float(weights @ of_phi)
 
 
 def _checked_levels(level: ArrayLike) -> FloatArray:
