@@ -193,8 +193,7 @@ class Boundary(Result):
             progress: called once for each node of the scan.
             stepped: called once for each point of a branch.
         """
-        tasks = self.rows()
-        scan = scanned(tasks, map(scan_row, tasks) if rows is None else rows, progress)
+        scan = scanned(self.nodes, map(scan_row, self.rows()) if rows is None else rows, progress)
         now = replace(self, scan=scan, traces=(), seconds=scan.seconds, obstacles=(), complete=False)
         yield now
         zero_field = now.zero_field
