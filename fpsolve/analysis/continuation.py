@@ -212,7 +212,7 @@ def _half(
             sample = _exit(field, last, at) if is_leaving else _next(field, last, at)
         except FpsolveError as failure:
             sample, reason = None, failure.message
-        turn = 0.0 if sample is None else _angle(last.tangent, sample.tangent)
+        turn = 0.0 if sample is None else math.acos(min(float(last.tangent @ sample.tangent), 1.0))
         if sample is None or turn > 2 * MOST_TURN:
             step /= 3
             if step < SHORTEST:
@@ -267,7 +267,3 @@ def _exit(field: Field, last: Sample, beyond: FloatArray) -> Sample | None:
 def _inside(at: FloatArray) -> bool:
     """Whether a point is in the square, but for rounding."""
     return bool(np.all((at >= -BESIDE) & (at <= 1 + BESIDE)))
-
-
-def _angle(one: FloatArray, other: FloatArray) -> float:
-    return math.acos(float(np.clip(one @ other, -1, 1)))

@@ -41,7 +41,6 @@ from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.method import Budget, refuse_tails
 from fpsolve.exponent.root import nonzero_root
 from fpsolve.exponent.solver import ExponentSolver, solver_of
-from fpsolve.fem.generator import Generator
 from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.plane import Harmonics, growth_rate
 from fpsolve.model.problem import Problem
@@ -217,16 +216,16 @@ def solve_excursion(
     if (phase := solver.method.ray) is not None:
         return replace(found, notes=(Message(Code.EXCURSION_RAY, phase=phase),))
     overshoot, is_smooth = _crossing(problem)
-    p, notes = index.value, list[Message]()
+    p, pairs, notes = index.value, [solver.pair(index.value)], list[Message]()
     if problem.noise.is_bounded:
-        least, most = _settled(solver, p, lambda pair: _extremes(pair, is_smooth) / _at_start(pair, phi, xi))
+        least, most = _settled(solver, pairs, lambda pair: _extremes(pair, is_smooth) / _at_start(pair, phi, xi))
         found = replace(found, lower=_inverse(most, overshoot**-p), upper=_inverse(least))
         if found.upper is None:
             notes.append(Message(Code.EXCURSION_NO_UPPER, value=least.value, error=least.error_estimate))
     else:
         notes.append(Message(Code.EXCURSION_UNBOUNDED))
     if is_smooth:
-        [many] = _settled(solver, p, lambda pair: _flux(pair) * _at_start(pair, phi, xi) / pair.derivative)
+        [many] = _settled(solver, pairs, lambda pair: _flux(pair) * _at_start(pair, phi, xi) / pair.derivative)
         if not many.error_estimate <= many.value:
             raise NotConverged(Message(Code.EXCURSION_UNRESOLVED), remedy=Remedy.BUDGET)
         found = replace(found, upcrossings=replace(many, quantity=UPCROSSINGS))
@@ -273,18 +272,25 @@ def _crossing(problem: Problem) -> tuple[float, bool]:
     return overshoot, overshoot == 1.0 and not impulses and not diffuses
 
 
-def _settled(solver: ExponentSolver, p: float, numbers: Callable[[PrincipalPair], FloatArray]) -> list[Estimate]:
-    """Some numbers by the pair at p, each with what its points miss, and its difference from a coarser pair.
+def _settled(
+    solver: ExponentSolver, pairs: list[PrincipalPair], numbers: Callable[[PrincipalPair], FloatArray]
+) -> list[Estimate]:
+    """Some numbers by a pair, each with what its points miss, and its difference from a coarser pair.
+
+    Args:
+        solver: of the pairs.
+        pairs: on ever finer discretisations; those that are made join them.
+        numbers: by a pair, each with what its points miss.
 
     Raises:
         NotConverged: there is no finer discretisation within the budget.
     """
-    pair = solver.pair(p)
-    last, found = numbers(pair)[:, 0], None
+    last, found = numbers(pairs[0])[:, 0], None
     with unless_over_budget():
-        for _ in range(MOST_ROUNDS):
-            pair = solver.method.finer_pair(pair)
-            value, missed = numbers(pair).T
+        for k in range(1, 1 + MOST_ROUNDS):
+            if k == len(pairs):
+                pairs.append(solver.method.finer_pair(pairs[-1]))
+            value, missed = numbers(pairs[k]).T
             error, last = missed + abs(value - last), value
             found = list(map(Estimate, value.tolist(), error.tolist(), abs(value).tolist()))
             if np.all(error <= CLOSE * abs(value)):
@@ -302,13 +308,21 @@ def _inverse(of: Estimate, factor: float = 1.0) -> Estimate | None:
     return Estimate(factor / value, factor * error / (value * (value - error)), factor / value)
 
 
-def _own_phase(generator: Generator, p: float, psi: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _own_phase(pair: PrincipalPair, psi: FloatArray) -> tuple[FloatArray, FloatArray]:
     """φ in the coordinates of the system, and ρ^p there."""
-    frame = generator.problem.frame
+    frame = pair.generator.problem.frame
     if frame is None:
         return psi, np.ones(psi.shape)
     phi = frame.own_phase(psi)
-    return phi, frame.length(phi) ** p
+    return phi, frame.length(phi) ** pair.p
+
+
+def _growth(pair: PrincipalPair, psi: FloatArray, xi: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray]:
+    """q over φ and values of the noises, and ρ^p as a factor of such tables."""
+    problem, columns = pair.generator.problem, (-1, *[1] * len(xi))
+    phi, stretch = _own_phase(pair, psi)
+    rate: Harmonics = growth_rate(problem.drift, problem.at_values(xi))
+    return rate(phi.reshape(columns)), stretch.reshape(columns)
 
 
 def _at_start(pair: PrincipalPair, phi: Start, xi: StartOfNoise) -> float:
@@ -316,14 +330,14 @@ def _at_start(pair: PrincipalPair, phi: Start, xi: StartOfNoise) -> float:
     space, frame = pair.space, pair.generator.problem.frame
     if phi == UNIFORM:
         psi, weights = space.phi.finer_rule(1 if frame is None else frame.parts)
-        own, stretch = _own_phase(pair.generator, pair.p, psi)
+        own, stretch = _own_phase(pair, psi)
         weights = weights * stretch / (space.phi.span * (1.0 if frame is None else frame.density(own)))
         at_phi = weights @ space.phi.at(psi)
     else:
         psi = np.array([float(phi)]) if frame is None else frame.phase(np.array([float(phi)]))
         first, span = space.phi.lines[0], space.phi.span
         psi, after = (first + np.mod(each - first, span) for each in (psi, psi + 1e-9))
-        _, stretch = _own_phase(pair.generator, pair.p, psi)
+        _, stretch = _own_phase(pair, psi)
         at_phi = stretch[0] * dense(space.phi.at(psi, after))[0]
     means = space.product([at_phi, *(_mean_functions(axis, xi) for axis in space.noises)])
     return float(means @ pair.right)
@@ -346,19 +360,19 @@ def _extremes(pair: PrincipalPair, is_smooth: bool) -> FloatArray:
 
     These are in all cells of φ, seen from inside, and all over the noise, the ends included.
     """
-    space, problem, lines = pair.space, pair.generator.problem, pair.space.phi.lines
+    space, lines = pair.space, pair.space.phi.lines
     counts = [FINE * (int(np.max(axis.modes)) + 1) for axis in space.axes]
     share = min(1.0, (MOST_POINTS / (math.prod(counts) * (lines.size - 1))) ** (1 / len(counts)))
     phases, *noises = (max(16, math.ceil(share * count)) for count in counts)
     psi = np.linspace(lines[:-1], lines[1:], phases + 1, axis=1)
     inside = np.repeat(0.5 * (lines[:-1] + lines[1:]), phases + 1)
-    reached = [axis.everywhere(count) for axis, count in zip(space.noises, noises, strict=True)]
-    table = space.evaluate(pair.right, space.phi.at(psi.ravel(), inside), *(values for _, values in reached))
-    phi, stretch = _own_phase(pair.generator, pair.p, psi.ravel())
-    columns, shape = (-1, *[1] * len(reached)), (*psi.shape, *table.shape[1:])
-    values = (table * stretch.reshape(columns)).reshape(shape)
-    growth: Harmonics = growth_rate(problem.drift, problem.at_values([xi for xi, _ in reached]))
-    rate = np.broadcast_to(growth(phi.reshape(columns)), table.shape).reshape(shape)
+    xi, functions = zip(
+        *(axis.everywhere(count) for axis, count in zip(space.noises, noises, strict=True)), strict=True
+    )
+    table = space.evaluate(pair.right, space.phi.at(psi.ravel(), inside), *functions)
+    growth, stretch = _growth(pair, psi.ravel(), xi)
+    values = (table * stretch).reshape(shape := (*psi.shape, *table.shape[1:]))
+    rate = np.broadcast_to(growth, table.shape).reshape(shape)
     if not is_smooth or rate.max() < 0:
         rate = np.ones(shape)
     axes = [1, *(2 + k for k, axis in enumerate(space.noises) if axis.cells.max() >= 0)]  # along which T is continuous
@@ -399,17 +413,15 @@ def _flux(pair: PrincipalPair) -> FloatArray:
 
 def _flux_by(pair: PrincipalPair, parts: int) -> float:
     """The same from so many parts of each cell of φ."""
-    space, problem = pair.space, pair.generator.problem
+    space = pair.space
     psi, weights = space.phi.finer_rule(parts)
-    phi, stretch = _own_phase(pair.generator, pair.p, psi)
     most = (MOST_POINTS / psi.size) ** (1 / len(space.noises))
     each = [axis.finer_samples(round(min(most, POINTS * parts / PARTS))) for axis in space.noises]
     left = space.evaluate(pair.left, space.phi.at(psi), *(at.values for at in each))
-    measures = [at.weight * at.measure / at.factor for at in each]
-    shape = (-1, *[1] * len(each))
-    rate: Harmonics = growth_rate(problem.drift, problem.at_values([at.xi for at in each]))
-    density = np.maximum(rate(phi.reshape(shape)), 0) * left * (weights / stretch).reshape(shape)
-    return space.turns * float(np.sum(density * reduce(np.multiply.outer, measures)))
+    rate, stretch = _growth(pair, psi, [at.xi for at in each])
+    measure = reduce(np.multiply.outer, [at.weight * at.measure / at.factor for at in each])
+    of_phi = np.sum((np.maximum(rate, 0) * left / stretch * measure).reshape(psi.size, -1), axis=1)
+    return space.turns * float(weights @ of_phi)
 
 
 def _checked_levels(level: ArrayLike) -> FloatArray:

@@ -207,12 +207,8 @@ def start_and_stop(problem: Problem, key: str) -> Axis | None:
     return Axis(key, max(start, low), min(stop, high))
 
 
-def _is_met(sample: Sample) -> bool:
-    """Whether F is 0 to all digits that it has."""
-    return abs(sample.value) <= max(EXACT * sample.scale, 0.1 * sample.error)
-
-
 def _is_close(sample: Sample) -> bool:
+    """Whether F may be 0."""
     return abs(sample.value) <= max(TOLERANCE * sample.scale, sample.error)
 
 
@@ -247,7 +243,7 @@ class _Tried:
         if key not in self._known:
             self._known[key] = None
             try:
-                self._known[key] = self._distance(theta)
+                self._known[key] = self._distance(theta)._replace(rtol=EXACT)
             except FpsolveError as failure:
                 self.reasons.append(failure.message)
             self._progress()
@@ -321,7 +317,7 @@ def _root(tried: _Tried, one: FloatArray, other: FloatArray) -> FloatArray:
     def value(share: float) -> float:
         if (sample := tried(one + share * (other - one))) is None:
             raise StopIteration
-        return 0.0 if _is_met(sample) else sample.value
+        return 0.0 if sample.is_zero else sample.value
 
     with suppress(StopIteration):
         return one + brentq(value, 0.0, 1.0, xtol=EXACT) * (other - one)
@@ -361,10 +357,10 @@ def _nearest_from(
         """
         if (here := at(x)) is None:
             return abs(taken[-1].value) / size + BEYOND * float(np.linalg.norm(x - x_of(taken[-1])))
-        if tried.solves >= most or (_is_met(here) and off(here) <= SAME):
+        if tried.solves >= most or (here.is_zero and off(here) <= SAME):
             taken.append(here)
             raise StopIteration
-        return 0.0 if _is_met(here) else here.value / size
+        return 0.0 if here.is_zero else here.value / size
 
     def slope(x: FloatArray) -> FloatArray:
         """∇F at a point that is taken. Raises `StopIteration` where there is none."""

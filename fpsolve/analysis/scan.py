@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import chain, islice, pairwise, product
 from time import thread_time
@@ -168,18 +168,18 @@ def scan_row(row: Row) -> ScannedRow:
     return ScannedRow(values, gradients, tuple(reasons), thread_time() - started)
 
 
-def scanned(rows: Sequence[Row], found: Iterator[ScannedRow], progress: Callable[[], None] = lambda: None) -> Scan:
-    """The scan of all rows of a grid, from what is found on them, in their order; no more of that is taken.
+def scanned(count: int, found: Iterator[ScannedRow], progress: Callable[[], None] = lambda: None) -> Scan:
+    """The scan of a grid from so many rows in their order; no more of them is taken.
 
     `progress` is called for each node.
     """
     results = list[ScannedRow]()
-    for result in islice(found, len(rows)):
+    for result in islice(found, count):
         results.append(result)
-        for _ in rows:
+        for _ in range(count):
             progress()
     return Scan(
-        np.linspace(0, 1, len(rows)),
+        np.linspace(0, 1, count),
         np.stack([each.values for each in results]),
         np.stack([each.gradients for each in results]),
         tuple(dict.fromkeys(chain.from_iterable(each.reasons for each in results))),

@@ -193,8 +193,7 @@ class Boundary(Result):
             progress: called once for each node of the scan.
             stepped: called once for each point of a branch.
         """
-        tasks = self.rows()
-        scan = scanned(tasks, map(scan_row, tasks) if rows is None else rows, progress)
+        scan = scanned(self.nodes, map(scan_row, self.rows()) if rows is None else rows, progress)
         now = replace(self, scan=scan, traces=(), seconds=scan.seconds, obstacles=(), complete=False)
         yield now
         zero_field = now.zero_field
@@ -260,25 +259,20 @@ class ZeroField:
     Args:
         line: the target, the frame, and what a solve may cost.
         rtol: of F, relative to its scale.
-        seconds: of the processor for all values together.
+        seconds: of the processor for all values together; each may take half of what is left.
         spent: what is said where they do not suffice.
 
     Attributes:
+        seconds: of the processor, so far.
         stopped: what was said, or None.
     """
 
     def __init__(self, line: Boundary, rtol: float, seconds: float, spent: Message) -> None:
-        self._line, self._rtol, self._spent = line, rtol, spent
+        self._line, self._rtol, self._most, self._spent = line, rtol, seconds, spent
         of_value = line_of_value(choose(line.problem), line.target)
         settings = {"rtol": rtol, "of_value": of_value, "budget": line.budget}
         self._distance = Distance(line.problem, line.target, [line.x.key, line.y.key], **settings)
-        self._meter = Meter(seconds, number=line.target.symbol)
-        self.stopped: Message | None = None
-
-    @property
-    def seconds(self) -> float:
-        """Of the processor, so far."""
-        return self._meter.spent
+        self.seconds, self.stopped = 0.0, None if seconds > 0 else spent
 
     def __call__(self, at: FloatArray) -> Sample:
         """F at (u, v).
@@ -300,14 +294,17 @@ class ZeroField:
         """F, or why there is none."""
         sides = list(zip((self._line.x, self._line.y), at.tolist(), strict=True))
         theta, slopes = np.array([(axis.value(share), axis.slope(share)) for axis, share in sides]).T
+        meter = Meter(0.5 * (self._most - self.seconds), number=self._line.target.symbol)
         try:
-            with self._meter.running():
+            with meter.running():
                 found = self._distance(theta)
         except OverBudget:
             self.stopped = self._spent
             return self.stopped
         except FpsolveError as failure:
             return failure.message
+        finally:
+            self.seconds += meter.spent
         return found._replace(at=at, gradient=found.gradient * slopes, rtol=self._rtol)
 
 
