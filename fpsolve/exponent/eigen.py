@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.linalg
-from scipy.sparse.linalg import ArpackError, ArpackNoConvergence, LinearOperator, eigs
+from scipy.sparse.linalg import ArpackError, ArpackNoConvergence, LinearOperator, eigs, gmres
 
 from fpsolve.arrays import FloatArray, finite, one
 from fpsolve.data import brief
@@ -44,6 +44,8 @@ SURELY_POSITIVE = 1e-4
 """The same for a pair with which the search ends at once."""
 BESIDE_IT = 1e-6, 1e-2
 """Distances from an eigenvalue, over a rate of the system, at which it is looked whether others are to its right."""
+RESOLVED, STEPS = 1e-5, 20
+"""Residual of GMRES, as signs count from `SURELY_POSITIVE` on, and its number of steps at most."""
 LEAST_OF_MOST = 1e-2
 """Least value of T, over its largest, from which on it is positive beyond what it may be off."""
 MOSTLY = 0.5
@@ -147,7 +149,7 @@ def principal_pair(
     if not pencil.matrix.norm < LARGEST_NORM:
         raise NumericalFailure(f"L(p) has the size {pencil.matrix.norm:.0e}")
     pair = None
-    if pairs or _is_constant(generator, p) or not _has_other_positive(generator, p):
+    if pairs or p == 0 or not _has_other_positive(generator, p):
         x = y = pencil.space.constant  # of weak noise, Eqs. (26) and (28)
         if pairs:
             x, y = _carried(pairs, pencil, generator)
@@ -162,22 +164,18 @@ def _solved(pencil: Pencil, generator: Generator, x: FloatArray, y: FloatArray) 
     return _pair(generator, pencil, rayleigh_iteration(pencil, x, y, generator.problem.unit_rate))
 
 
-def _is_constant(generator: Generator, p: float) -> bool:
-    """Whether Λ(p) = 0 and T = 1 are known."""
-    return p == 0 and generator.keeps_constants
-
-
 def _is_principal(pair: PrincipalPair, pairs: Sequence[PrincipalPair], goes_on: bool) -> bool:
     """Whether a pair that was reached from others, or from T = 1, is the principal one.
 
-    Where other pairs may seem positive, too, it must go on from the others, or reach the tangent of Λ at their p.
+    Where other pairs may seem positive, too, it must go on from the others, or reach the tangent of Λ at their p. At
+    p = 0 it has Λ = 0 and T = 1.
     """
     generator, tangent = pair.generator, _tangents(pair.generator.problem, pair.p, pairs)
     most = POSITIVE if goes_on else SURELY_POSITIVE
     if pair.residual > BACKWARD_ERROR_LIMIT or pair.value < tangent or min(pair.sign_defects) > most:
         return False
-    if _is_constant(generator, pair.p):
-        return True
+    if pair.p == 0:
+        return abs(pair.value) <= BESIDE_IT[0] * generator.problem.unit_rate
     if not goes_on and math.isinf(tangent) and _has_other_positive(generator, pair.p):
         return False
     return not _has_states(generator.problem) or _is_rightmost(pair, pair.space)
@@ -227,14 +225,21 @@ def _is_rightmost(pair: PrincipalPair, space: Space) -> bool:
     judged = any if problem.system.stop else all
     seen = [side for side in (0, 1) if problem.dimension == 2 or pair.sign_defects[side] <= POSITIVE]
 
-    def is_positive(shift: float) -> bool:
-        factor, both = pencil.factorised(pair.eigenvalue + shift * problem.unit_rate), [pair.right, pair.left]
-        for side in seen:
-            both[side] = -factor.solve(source, transposed=bool(side))
-        defects = _sign_defects(space, *both)
-        return not seen or judged(defects[side] <= SURELY_POSITIVE for side in seen)
+    near, far = (pair.eigenvalue + shift * problem.unit_rate for shift in BESIDE_IT)
+    factor = pencil.factorised(near)
 
-    return all(map(is_positive, BESIDE_IT))
+    def is_positive(side: int) -> bool:
+        operator, both = pencil.matrix.shifted(far), [pair.right, pair.left]
+        operator = operator.T if side else operator
+        inverse = LinearOperator(2 * source.shape, lambda v: factor.solve(v, transposed=bool(side)), dtype=float)
+        moved = LinearOperator(2 * source.shape, lambda v: operator @ v, dtype=float)
+        for solution in (inverse @ source, gmres(moved, source, M=inverse, rtol=RESOLVED, restart=STEPS, maxiter=1)[0]):
+            both[side] = -solution
+            if _sign_defects(space, *both)[side] > SURELY_POSITIVE:
+                return False
+        return True
+
+    return not seen or judged(map(is_positive, seen))
 
 
 def _has_other_positive(generator: Generator, p: float) -> bool:
