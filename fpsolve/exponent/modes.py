@@ -57,8 +57,7 @@ MOST_FOR_SLOPES = 4
 MINOR = 0.25
 """Share of the tolerance that elements, or polynomials of a noise, may lack where others are made finer."""
 MEASURED = 1.5
-"""What is left, over what two degrees more change: it was up to 1.2 at a stop with R = 1, where the motion without one
-tells Λ(p)."""
+"""What is left after elements or polynomials of the noise, over the sizes of what each of two degrees more changes."""
 
 
 def frame_of(problem: Problem) -> FloatArray:
