@@ -28,7 +28,7 @@ from fpsolve.arrays import FloatArray
 from fpsolve.data import Result, dataset
 from fpsolve.drawing import add_legend, draw_bars
 from fpsolve.errors import NoSuchExponent, NotConverged
-from fpsolve.exponent.changed import SMALL_P, Changed
+from fpsolve.exponent.changed import NEAR_ZERO, Changed
 from fpsolve.exponent.eigen import PairDerivatives
 from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.method import Budget, checked_moments
@@ -238,7 +238,7 @@ class Gradient:
         """∂Λ(p)/∂θ. Raises `NotConverged`, `NoSuchExponent`."""
         if p == 0:
             return dict.fromkeys(self._along, Estimate(0.0, 0.0, 0.0))
-        if abs(p) < SMALL_P:
+        if abs(p) < NEAR_ZERO:
             return {key: _times(p, each) for key, each in self._by_small_p(p).items()}
         if known := self._method.number(p):
             along = self._along
@@ -273,13 +273,13 @@ class Gradient:
 
         With its own error each has twice the relative one of δ_p, and that of the slope.
         """
-        if abs(p) >= SMALL_P:
+        if abs(p) >= NEAR_ZERO:
             slopes: Slopes = {key: _times(1 / p, each) for key, each in self.moment(p).items()}
             doubt = self._slope_errors.get(p, 0.0) / abs(p)
         else:
             slopes, doubt = self._by_small_p(p), 0.0
         _, slope_by_p, error = self._method.ratio(p)  # now, as there is none where two parts of the motion are even
-        lost = (2 * error / max(abs(p), SMALL_P) + doubt) / abs(slope_by_p)
+        lost = (2 * error / max(abs(p), NEAR_ZERO) + doubt) / abs(slope_by_p)
         found = {key: _times(-1 / slope_by_p, each) for key, each in slopes.items()}
         return {
             key: replace(each, error_estimate=each.error_estimate + lost * abs(each.value))

@@ -25,7 +25,7 @@ from fpsolve.arrays import FloatArray
 from fpsolve.errors import NoHierarchy
 from fpsolve.exponent.eigen import PrincipalPair, principal_pair
 from fpsolve.exponent.error import Solution, ladders, mode_effects
-from fpsolve.exponent.moments import even_moment
+from fpsolve.exponent.moments import even_moment, mean_rates
 from fpsolve.exponent.powers import moment_form
 from fpsolve.exponent.starts import SHARE, Start
 from fpsolve.fem.generator import SMALL_P, Generator
@@ -81,10 +81,7 @@ def modal_coordinates(problem: Problem) -> tuple[Coordinates, tuple[float, float
     E yyᵀ on each: T is about (yᵀQy)^½p there, and T* a power of yᵀ(E yyᵀ)⁻¹y. Each mode of the motion without noise
     has a unit in which q = p before, so that y is the same, but for rotations, whatever the coordinates x are.
     """
-    free = sum(
-        problem.motion.epsilon**term.order * problem.named_noise(term.noise).mean_of(term.g) * np.array(term.matrix)
-        for term in problem.motion.terms
-    )
+    free = mean_rates(problem)
     values, vectors = np.linalg.eig(free)
     modes = [
         np.column_stack([vector.real, vector.imag] if value.imag else [vector.real])
