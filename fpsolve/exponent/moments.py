@@ -7,7 +7,7 @@ linear in A and skew-symmetric for a rotation. For functions f_k of noise, g f_k
 
 moves E[x^α f_k], for terms g(ξ)A, white noises Bx ∘ dW and impulses exp(C) at the rates ν. Λ(p) is its rightmost
 eigenvalue. The right vector is of moments, the left one of T, a polynomial of the degree p in x. As moments stay
-moments, no eigenvalue is nearer to a real σ > Λ than Λ: the search begins at a bound by the rows of H, from the right.
+moments, no eigenvalue is nearer to a real σ > Λ than Λ: the search begins at a bound by norms, from the right.
 The functions of the noise end somewhere; what the next ones change, with the last two of these to all orders and the
 others to the first, is added, and is the error, with what it is by the last one alone.
 """
