@@ -67,8 +67,8 @@ DEFECTS: tuple[Defect, ...] = (
     Defect(
         "T2 white noise adds 0.45 K²",
         "exponent/powers.py",
-        "rest = rest + 0.5 * k @ k",
-        "rest = rest + 0.45 * k @ k",
+        "steady = steady + 0.5 * k @ k",
+        "steady = steady + 0.45 * k @ k",
         "white",
     ),
     Defect(
@@ -88,15 +88,15 @@ DEFECTS: tuple[Defect, ...] = (
     Defect(
         "T5 two lags of white noise count once",
         "exponent/delays.py",
-        "noisy.append((1 if k == j else 2) * relaxed",
-        "noisy.append(1 * relaxed",
+        "terms.append((1 if k == j else 2) * relaxed",
+        "terms.append(1 * relaxed",
         "delay",
     ),
     Defect(
         "T6 noise does not relax between two delays",
         "exponent/delays.py",
-        "relaxed = _kron(self._power(own.unit * k), _kron",
-        "relaxed = _kron(functions, _kron",
+        "relaxed = _kron(expm(self.generator * self.unit * k), _kron",
+        "relaxed = _kron(np.eye(len(self.generator)), _kron",
         "delay",
     ),
     Defect(
@@ -144,8 +144,8 @@ DEFECTS: tuple[Defect, ...] = (
     Defect(
         "T14 a slope at the end of a range is of first order",
         "exponent/moments.py",
-        "((2 * values[k] - 1.5 * values[0] - 0.5 * values[2 * k]) / k for k in steps)",
-        "((values[k] - values[0]) / k for k in steps)",
+        "(polyfit(offsets[:k], values[:k], k - 1)[1] for k in (3, len(offsets)))",
+        "(polyfit(offsets[:k], values[:k], k - 1)[1] for k in (2, 2))",
         "slope",
     ),
     Defect(
@@ -198,10 +198,10 @@ DEFECTS: tuple[Defect, ...] = (
         "sensitivit",
     ),
     Defect(
-        "L1 what moves a state with delays is not balanced",
-        "exponent/delays.py",
-        "self.units, self.largest = moving.balance(sizes[:first], rest, units)",
-        "self.units, self.largest = np.ones(self.n), moving.balance(sizes[:first], rest, units)[1]",
+        "L1 what moves a state is not balanced",
+        "exponent/powers.py",
+        "return np.sqrt(np.append(units, units[list(same)]))",
+        "return np.ones(len(squares))",
         "delay",
     ),
     Defect(
@@ -221,7 +221,7 @@ DEFECTS: tuple[Defect, ...] = (
     Defect(
         "L4 rounding by the condition of Λ is left out",
         "exponent/moments.py",
-        "return ROUNDING * self.scale + sys.float_info.epsilon * self.equations.state.largest * condition",
+        "return ROUNDING * self.scale + sys.float_info.epsilon * self.equations.largest * condition",
         "return ROUNDING * self.scale",
         "moment",
     ),
@@ -406,9 +406,9 @@ DEFECTS: tuple[Defect, ...] = (
     ),
     Defect(
         "R21 nodes see a line of the mesh from the wrong side",
-        "parts/nodes.py",
-        "(inside - turned).ravel())",
-        "(inside + turned).ravel())",
+        "exponent/density.py",
+        "axis.at(psi - turned, cells - turned)",
+        "axis.at(psi - turned, cells + turned)",
         "vtk",
     ),
     Defect(

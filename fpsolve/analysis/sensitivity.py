@@ -28,7 +28,7 @@ from fpsolve.arrays import FloatArray
 from fpsolve.data import Result, dataset
 from fpsolve.drawing import add_legend, draw_bars
 from fpsolve.errors import NoSuchExponent, NotConverged
-from fpsolve.exponent.changed import SMALL_P, Changed
+from fpsolve.exponent.changed import NEAR_ZERO, Changed
 from fpsolve.exponent.eigen import PairDerivatives
 from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.method import Budget, checked_moments
@@ -262,11 +262,11 @@ class Gradient:
         With its own error each has twice the relative one of δ_p.
         """
         _, slope, error = self._method.ratio(p)
-        if abs(p) >= SMALL_P:
+        if abs(p) >= NEAR_ZERO:
             found = self._compared(p, 0.0, lambda at, changed: _times(-1 / at.pair.derivative, changed.value))
         else:
             found = self._compared(0.0, 0.0, lambda at, changed: _times(-2 / at.second_derivative, _ratio(changed, p)))
-        share = 2 * error / (max(abs(p), SMALL_P) * abs(slope))
+        share = 2 * error / (max(abs(p), NEAR_ZERO) * abs(slope))
         return {
             key: replace(each, error_estimate=each.error_estimate + share * abs(each.value))
             for key, each in found.items()

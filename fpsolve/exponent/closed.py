@@ -11,11 +11,10 @@ import numpy as np
 from fpsolve.arrays import FloatArray
 from fpsolve.budget import unless_over_budget
 from fpsolve.errors import NoHierarchy, NotConverged
-from fpsolve.exponent.delays import present
 from fpsolve.exponent.eigen import PrincipalPair
-from fpsolve.exponent.error import Estimate, Moment, checked
+from fpsolve.exponent.error import Estimate, checked
 from fpsolve.exponent.method import RTOL_BEYOND_PLANE, Method, Tolerance, refuse
-from fpsolve.exponent.moments import EvenMoment, constant_scale, even_moment, moment_row
+from fpsolve.exponent.moments import EvenMoment, constant_scale, even_moment
 from fpsolve.fem.factors import one_thread
 from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.problem import Problem, infinite
@@ -86,9 +85,6 @@ class EvenMoments(Method):
             self._solved[p] = found
         return self._solved[p]
 
-    def row(self, p: float) -> tuple[Moment, PrincipalPair | None]:
-        return moment_row(self.solution(p)), None
-
     def pair(self, p: float) -> PrincipalPair:
         refuse(self.reason(0.0, "an eigenfunction"))
         return super().pair(p)
@@ -120,7 +116,7 @@ class DelayMoments(EvenMoments):
 
     @classmethod
     def takes(cls, problem: Problem) -> bool:
-        return present(problem) < problem.dimension
+        return bool(problem.system.pasts)
 
     def has(self, p: float) -> bool:
         return p == 2

@@ -2,7 +2,7 @@
 
 ẋ = A x + Σ B_k x(t − kτ), with white noises Σ D_k x(t − kτ) dW (Itô) and loads on functions f of a noise. For moments
 that grow as e^σt those of y = e^(−σt/2) x stand still. It moves alike, with A − σ/2, e^(−σkτ/2)B_k and e^(−σkτ/2)D_k.
-So S(s) = E y(u + s) y(u)ᵀ f(u + s), s ≥ 0, is linear in S(0), see `_carried` and `_collocated`, and
+So S(s) = E y(u + s) y(u)ᵀ f(u + s), s ≥ 0, is linear in S(0), see `_later`, and
 
     Z(σ) S(0) = −(A S(0) + Σ B_k S(kτ)ᵀ) − (…)ᵀ − ΣΣ D_k E y(−kτ) y(−lτ)ᵀ D_lᵀ − Gᵀ S(0) = 0
 
@@ -15,31 +15,28 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import combinations_with_replacement
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
+from numpy.polynomial.chebyshev import chebder, chebpts2, chebval, chebvander
 from scipy import sparse
-from scipy.linalg import eig, eigvals, expm
-from scipy.optimize import brentq
+from scipy.linalg import eig, expm
 
-from fpsolve.arrays import FloatArray, dense, finite
+from fpsolve.arrays import FloatArray, IntArray, dense, finite
 from fpsolve.budget import charge
 from fpsolve.errors import NoHierarchy
-from fpsolve.exponent.powers import Moving, PowerRates, moment_form, upper
+from fpsolve.exponent.powers import Moving, PowerRates, moment_form
 from fpsolve.exponent.rightmost import REMEDY, ROUNDING, Eigenpair
 from fpsolve.model.plane import common_delay
-from fpsolve.model.problem import Problem
 
-MOST_SIZE = 1200
-"""Largest number of second moments at two times, times that multiple."""
-STEP = 2.0
-"""Norm of what moves S over the time from which times are doubled."""
+MOST_SIZE = 4000
+"""Largest number of values of moments at all times of a polynomial."""
+MOST_ROOTS = 1200
+"""Largest number of values of means at these."""
 STRIDE = 0.5
 """Logarithm of the factor between two σ − 2a, a the growth rate of E x."""
-LEAST = 1e-300
-"""Share of S that noise drives, from which on it counts."""
 NEAREST = 1e-6
 """Share of the bounds of Λ to which σ − 2a falls: y stands still without noise at 2a, next to which Z is not known."""
 NEAR = 0.03
@@ -48,108 +45,16 @@ MOST_POLISHES = 10
 """Largest number of steps of Newton's method."""
 SETTLED = 1e-10
 """Change of a over its size, or that of 1/τ, that is none."""
-CLOSE = 0.1
-"""Distance times τ at which a root is that of a number next to it."""
 NEGATIVE = 1e-6
 """Share of the largest second moment by which one may be negative that should not be."""
+ROUNDED = 10 * ROUNDING
+"""Error of Z by rounding, over its terms."""
 LARGEST = 300.0
 """Largest exponent, −Λτ/2, beyond which numbers overflow."""
-FEWEST, SHARE, GROWTH = 10, 0.6, 1.4
+FEWEST, SHARE, GROWTH = 10, 0.6, 1.2
 """Degree of polynomials of the time: at least, over what moves S meanwhile, and from one to the next."""
 TINY = 1e-20
 """Imaginary part of a σ that differentiates."""
-
-
-def present(problem: Problem) -> int:
-    """How many variables are no past values of others."""
-    return problem.dimension - len(problem.system.pasts)
-
-
-class Delayed:
-    """The second moments of what moves a state with delays.
-
-    Args:
-        moving: what does, for the state and its past values as one vector, with rates of the state alone.
-        problem: tells which variable each of the last ones is, and how long ago.
-        units: of the state; None for those in which what moves it is balanced.
-
-    Raises:
-        NoHierarchy: the delays are no multiples of one, or there are too many moments.
-    """
-
-    most = MOST_SIZE
-
-    def __init__(self, moving: Moving, problem: Problem, units: FloatArray | None = None) -> None:
-        self._pasts, self.n = problem.system.pasts, present(problem)
-        try:
-            self.unit, self.count = common_delay(self._pasts)
-        except ValueError as failure:
-            raise NoHierarchy(str(failure)) from failure
-        if (size := self.n**2 * self.count) > MOST_SIZE:
-            raise NoHierarchy(f"{size} second moments at two times are more than {MOST_SIZE}; {REMEDY}")
-        squares, drift = [*moving.squares], moving.steady + sum(0.5 * each @ each for each in moving.squares)
-        for rate, exponent in moving.impulses:  # whose second moments are those of white noise
-            jump = expm(exponent) - np.eye(len(exponent))
-            drift, squares = drift + rate * jump, [*squares, math.sqrt(rate) * jump]
-        parts = [self._split(each) for each in (drift, *moving.loads, *squares)]
-        sizes, first = [np.sum(np.abs(each), axis=0) for each in parts], 1 + len(moving.loads)
-        rest = sum((each @ each for each in sizes[first:]), np.zeros_like(sizes[0]))
-        self.units, self.largest = moving.balance(sizes[:first], rest, units)
-        self.drift, *others = (each * self.units / self.units[:, None] for each in parts)
-        self.loads, self.squares = others[: len(moving.loads)], others[len(moving.loads) :]
-        one = np.eye(self.n * (self.n + 1) // 2)
-        self.symmetric = np.array([moment_form(each, self.n, 2).ravel() for each in one]).T
-
-    @property
-    def last(self) -> float:
-        """The largest delay."""
-        return self.unit * self.count
-
-    def _split(self, matrix: FloatArray) -> FloatArray:
-        """What multiplies x(t − kτ), shape (count + 1, n, n)."""
-        found = np.zeros((self.count + 1, self.n, self.n))
-        found[0] = matrix[: self.n, : self.n]
-        for column, (variable, delay) in enumerate(self._pasts, self.n):
-            found[round(delay / self.unit), :, variable] += matrix[: self.n, column]
-        return found
-
-    @property
-    def size(self) -> int:
-        """The number of second moments."""
-        return self.symmetric.shape[1]
-
-    @property
-    def starts(self) -> tuple[FloatArray, FloatArray]:
-        """Moments of some law, and a positive polynomial."""
-        return upper(np.eye(self.n)), upper(np.eye(self.n))
-
-    def moments(self, x: FloatArray) -> FloatArray:
-        """E √(p!/α!) x^α of a right vector."""
-        return x * self.scales
-
-    def polynomial(self, y: FloatArray) -> FloatArray:
-        """T, as coefficients of these functions, of a left vector."""
-        return y / self.scales
-
-    @property
-    def scales(self) -> FloatArray:
-        """The units of the numbers for each function of the noise."""
-        i, j = np.triu_indices(self.n)
-        return self.units[i] * self.units[j]
-
-    @property
-    def is_still(self) -> bool:
-        """Whether no noise multiplies the state: then Λ(2) is twice the growth rate of E x."""
-        return not self.loads and not any(each.any() for each in self.squares)
-
-    def image(self, generator: Any, masses: Sequence[Any], x: FloatArray, value: float) -> FloatArray:
-        """−Z(Λ)x; 2a − Λ in place of −Z(Λ) where Λ is always 2a."""
-        rates = self.rates(generator, masses)
-        return (2 * rates.abscissa - value) * x if self.is_still else np.asarray(-rates.matrix(value) @ x)
-
-    def rates(self, generator: Any, masses: Sequence[Any]) -> DelayRates:
-        """−Z(σ), from Gᵀ and the Ξᵀ of each load."""
-        return DelayRates(self, dense(generator), [*map(dense, masses)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,16 +62,56 @@ class DelayRates:
     """−Z(σ) of moments S(0) with some functions of the noise.
 
     Attributes:
-        state: what moves it.
+        unit: τ.
+        drift, loads, squares: A and B_k, of each load and D_k of each white noise, shape (count + 1, n, n).
         generator: Gᵀ.
         masses: Ξᵀ of each load.
-        finer: how many times steps are halved, or degrees multiplied, beyond what is usual.
+        finer: how many times degrees of polynomials are multiplied beyond what is usual.
     """
 
-    state: Delayed
+    unit: float
+    drift: FloatArray
+    loads: Sequence[FloatArray]
+    squares: Sequence[FloatArray]
     generator: FloatArray
     masses: Sequence[FloatArray]
-    finer: int = 0
+    finer: int
+
+    @classmethod
+    def of(
+        cls, moving: Moving, pasts: Sequence[tuple[int, float]], generator: Any, masses: Sequence[Any], finer: int
+    ) -> DelayRates:
+        """That of a state and its past values, as one vector with rates of the state alone.
+
+        Args:
+            moving: what moves it.
+            pasts: of each of the last variables which one it is, and how long ago.
+            generator: Gᵀ.
+            masses: Ξᵀ of each load.
+            finer: how many times degrees of polynomials are multiplied.
+
+        Raises:
+            NoHierarchy: the delays are no multiples of one.
+        """
+        try:
+            unit, count = common_delay(pasts)
+        except ValueError as failure:
+            raise NoHierarchy(str(failure)) from failure
+        squares, drift = [*moving.squares], moving.steady + sum(0.5 * each @ each for each in moving.squares)
+        for rate, exponent in moving.impulses:  # whose second moments are those of white noise
+            jump = expm(exponent) - np.eye(len(exponent))
+            drift, squares = drift + rate * jump, [*squares, math.sqrt(rate) * jump]
+        n = len(drift) - len(pasts)
+
+        def split(matrix: FloatArray) -> FloatArray:
+            found = np.zeros((count + 1, n, n))
+            found[0] = matrix[:n, :n]
+            for column, (variable, delay) in enumerate(pasts, n):
+                found[round(delay / unit), :, variable] += matrix[:n, column]
+            return found
+
+        loads, squares = ([split(each) for each in of] for of in (moving.loads, squares))
+        return cls(unit, split(drift), loads, squares, dense(generator), [*map(dense, masses)], finer)
 
     def on(self, functions: Any) -> DelayRates:
         """That of some functions of the noise."""
@@ -175,297 +120,210 @@ class DelayRates:
 
     def at(self, sigma: float) -> PowerRates:
         """σ − Z(σ), whose eigenvalue Λ is for σ = Λ."""
-        z = np.eye(self._even.shape[1]) if self.state.is_still else self.matrix(sigma)
-        return PowerRates(sparse.csc_array(sigma * np.eye(len(z)) - z), self.state.size)
+        z = self.matrix(sigma)
+        return PowerRates(sparse.csc_array(sigma * np.eye(len(z)) - z), len(z) // len(self.generator))
+
+    @property
+    def is_still(self) -> bool:
+        """Whether no noise multiplies the state: then Λ(2) is twice the growth rate of E x."""
+        return not np.any([*self.loads, *self.squares])
 
     def matrix(self, sigma: Any) -> Any:
-        """Z(σ)."""
-        even = self._even
-        _, steady, noisy = self._parts(sigma)
-        return -even.T @ sum([*steady, *noisy]) @ even
+        """Z(σ); where Λ is always 2a that is known, σ − 2a without functions of the noise."""
+        if self.is_still:
+            size = self._even.shape[1]
+            own = np.eye(size // len(self.generator))
+            return (sigma - 2 * self._slowest.real) * np.eye(size) - _kron(self.generator, own)
+        return -self._even.T @ sum(self._terms(sigma)) @ self._even
+
+    def sizes(self, sigma: float) -> FloatArray:
+        """Σ |terms| that Z(σ) is the sum of."""
+        even = np.abs(self._even)
+        return np.asarray(even.T @ sum(map(np.abs, self._terms(sigma))) @ even)
+
+    @property
+    def _count(self) -> int:
+        """How many parts the largest delay has."""
+        return len(self.drift) - 1
+
+    @property
+    def _last(self) -> float:
+        """The largest delay."""
+        return self.unit * self._count
 
     @cached_property
     def _even(self) -> FloatArray:
-        return _kron(np.eye(len(self.generator)), self.state.symmetric)
+        """Symmetric matrices S(0), row by row, of their upper halves, for each function."""
+        n = len(self.drift[0])
+        one = np.eye(n * (n + 1) // 2)
+        return _kron(np.eye(len(self.generator)), moment_form(one, n, 2).reshape(len(one), -1).T)
 
     @cached_property
-    def _turn(self) -> FloatArray:
-        """The transposition of all n × n matrices in a vector."""
-        at = np.arange(self.state.n**2).reshape(self.state.n, -1)
-        return np.asarray(_kron(np.eye(len(self.generator)), np.eye(at.size)[at.T.ravel()]))
+    def _turned(self) -> IntArray:
+        """Where the numbers of all matrices are that of their transposes."""
+        n = len(self.drift[0])
+        return np.arange(len(self.generator) * n * n).reshape(-1, n, n).swapaxes(1, 2).ravel()
 
-    def _parts(self, sigma: Any) -> _Parts:
+    def _acting(self, one: FloatArray) -> Any:
+        """What multiplies x(t − kτ), with functions of the noise and for all columns of a matrix, by k."""
+        terms = [(np.eye(len(self.generator)), self.drift), *zip(self.masses, self.loads, strict=True)]
+        return np.array([sum(_kron(xi, _kron(by[k], one)) for xi, by in terms) for k in range(self._count + 1)])
+
+    def _terms(self, sigma: Any) -> list[Any]:
         """What −Z(σ) is the sum of, on all matrices S(0) for each function."""
-        own, count, n = self.state, self.state.count, self.state.n
-        fall = _exp(-0.5 * sigma * own.unit * np.arange(count + 1))[:, None, None]
-        one, functions = np.eye(n), np.eye(len(self.generator))
-        drift = own.drift * fall
-        drift[0] -= 0.5 * sigma * one
-        moving = _outer([(functions, drift), *zip(self.masses, (load * fall for load in own.loads), strict=True)], one)
-        generator = _kron(self.generator, np.eye(n * n))
-        charge(2 * count * len(generator))
-        ends = self._collocated(moving, generator) if generator.any() else self._carried(moving)
-        same, size = np.eye(len(ends)), len(generator)
-        starts = np.linalg.solve(same - np.eye(len(ends), k=-size) @ ends, same[:, :size])  # each is where one ends
-        later = [*np.split(starts, count), (ends @ starts)[-size:]]
-        shift, noisy = sigma * np.eye(size), list[Any]()
-        steady = [2 * moving[0] + shift, -shift, generator]
-        steady += [2 * each @ self._turn @ s for each, s in zip(moving[1:], later[1:], strict=True)]
-        for square in own.squares:
+        one = np.eye(len(self.drift[0]))
+        fall = _exp(-0.5 * sigma * self.unit * np.arange(self._count + 1))[:, None, None]
+        moving, own = self._acting(one) * fall, _kron(self.generator, _kron(one, one))
+        shift = sigma * np.eye(len(own))
+        moving[0] -= 0.5 * shift
+        later = self._later(moving, own)
+        terms = [2 * moving[0] + shift, -shift, own]
+        terms += [2 * each[:, self._turned] @ s for each, s in zip(moving[1:], later[1:], strict=True)]
+        for square in self.squares:
             parts = square * fall
-            reached = [k for k in range(count + 1) if square[k].any()]
+            reached = [k for k, each in enumerate(square) if each.any()]
             for k, j in combinations_with_replacement(reached, 2):
-                relaxed = _kron(self._power(own.unit * k), _kron(parts[k], parts[j]))
-                noisy.append((1 if k == j else 2) * relaxed @ later[j - k])
-        return _Parts(later, steady, noisy)
+                relaxed = _kron(expm(self.generator * self.unit * k), _kron(parts[k], parts[j]))
+                terms.append((1 if k == j else 2) * relaxed @ later[j - k])
+        return terms
 
-    def _carried(self, moving: Sequence[Any]) -> Any:
-        """S at the ends of the parts of time, of S at their beginnings, where functions of the noise stand still.
+    def _later(self, moving: Any, own: FloatArray) -> Any:
+        """S(kτ) of S(0) for each k, by polynomials of the time within each part of the largest delay.
 
-        S on the parts of time and R(s) = S(τ − s)ᵀ obey S′ = F S + K R, and the same backwards in time. Over a time h
-        S(h) = T S(0) + U R(h), and over 2h it is so again: nothing grows where S falls.
+        As functions of the noise relax meanwhile, S(s) is driven by S(kτ − s)ᵀ with coefficients that depend on s.
+
+        Args:
+            moving: what multiplies y(t − kτ).
+            own: Gᵀ for all matrices.
+
+        Raises:
+            NoHierarchy: there are too many values.
         """
-        count, turn = len(moving) - 1, _kron(np.eye(len(moving) - 1), self._turn)
-        ahead: Any = sum(_kron(np.eye(count, k=-lag), moving[lag]) for lag in range(count))
-        back: Any = sum(_kron(np.eye(count, k=count - lag)[:, ::-1], moving[lag]) for lag in range(1, count + 1))
-        whole = np.block([[ahead, back], [-turn @ back @ turn, -turn @ ahead @ turn]]) * self.state.unit
-        size, doublings = len(ahead), math.ceil(math.log2(max(1.0, float(np.linalg.norm(whole, 1)) / STEP)))
-        doublings += self.finer
-        parts = expm(whole / 2**doublings)
-        u = np.linalg.solve(parts[size:, size:].T, parts[:size, size:].T).T
-        t = parts[:size, :size] - u @ parts[size:, :size]
-        for _ in range(doublings):
-            middle = t @ np.linalg.solve(np.eye(size) - u @ turn @ u @ turn, np.hstack([t, u @ turn @ t @ turn]))
-            t, u = middle[:, :size], u + middle[:, size:]
-        return t + u @ turn
-
-    def _collocated(self, moving: Sequence[Any], generator: Any) -> Any:
-        """S at the ends of the parts of time, of S at their beginnings, by polynomials of the time within a part.
-
-        As functions of the noise relax meanwhile, S(s) is driven by R(s) with coefficients that depend on s.
-        """
-        count, width, unit = len(moving) - 1, len(generator), self.state.unit
-        slow = float(np.linalg.norm(sum(map(np.abs, moving)), 2)) * unit
-        slow = SHARE * slow + math.sqrt(float(np.max(np.abs(generator))) * unit)
-        degree = math.ceil((FEWEST + slow) * GROWTH**self.finer)
-        x = np.cos(np.pi * np.arange(degree, -1, -1) / degree)
-        slopes = _differentiating(x)
-        whole = np.zeros((count, degree + 1, width, count, degree + 1, width), dtype=np.result_type(*moving))
-        for j, i in np.ndindex(count, degree + 1):
-            rows, time = whole[j, i], 0.5 * (1 + x[i]) * unit
-            if i == 0:
-                rows[:, j, 0] = np.eye(width)
-                continue
-            rows[:, j] += (2 / unit) * np.multiply.outer(slopes[i], np.eye(width)).swapaxes(0, 1)
+        count, width = self._count, len(own)
+        slow = SHARE * float(np.linalg.norm(sum(map(np.abs, moving)), 2)) * self.unit
+        slow += math.sqrt(float(np.max(np.abs(own))) * self.unit)
+        x, slopes, _ = _polynomials(math.ceil((FEWEST + slow) * GROWTH**self.finer))
+        if (size := count * x.size * width) > MOST_SIZE:
+            raise NoHierarchy(f"{size} second moments over a delay are more than {MOST_SIZE}; {REMEDY}")
+        charge(size)
+        whole = np.zeros(2 * (count, x.size, width), dtype=moving.dtype)
+        starts, one, every = np.zeros((count, x.size, width, width)), np.eye(width), np.arange(x.size)
+        for j in range(count):
+            whole[j, :, :, j] = np.multiply.outer((2 / self.unit) * slopes, one).swapaxes(1, 2)
+            whole[j, every, :, j, every] -= own
             for k, each in enumerate(moving):
                 if k <= j:
-                    rows[:, j - k, i] -= each @ self._relaxed(unit * k)
+                    whole[j, every, :, j - k, every] -= each @ self._relaxed(self.unit * k)
                 else:
-                    rows[:, k - j - 1, degree - i] -= each @ self._relaxed(j * unit + time) @ self._turn
-            rows[:, j, i] -= generator
-        starts = np.zeros((count, degree + 1, width, count, width))
-        starts[np.arange(count), 0, :, np.arange(count)] = np.eye(width)
-        size = count * (degree + 1) * width
-        found = np.linalg.solve(whole.reshape(size, size), starts.reshape(size, -1))
-        return found.reshape(count, degree + 1, width, -1)[:, -1].reshape(count * width, -1)
+                    past = each @ self._relaxed(self.unit * (j + 0.5 * (1 + x)))
+                    whole[j, every, :, k - j - 1, -1 - every] -= past[..., self._turned]
+            whole[j, 0] = 0.0  # each part begins where one ends
+            whole[j, 0, :, j, 0] = one
+            whole[j, 0, :, j - 1, -1] -= one * (j > 0)
+        starts[0, 0] = one
+        found = np.linalg.solve(whole.reshape(size, size), starts.reshape(size, width)).reshape(starts.shape)
+        return [one, *found[:, -1]]
 
-    def _relaxed(self, time: float) -> Any:
-        """What functions of the noise become, for all matrices."""
-        return _kron(self._power(time), np.eye(self.state.n**2))
-
-    def _power(self, time: float) -> Any:
-        """e^(Gᵀt), once for each time."""
-        if time not in self._powers:
-            self._powers[time] = expm(self.generator * time)
-        return self._powers[time]
+    def _relaxed(self, time: Any) -> Any:
+        """What functions of the noise become, for all matrices, after a time, or several."""
+        return _kron(expm(np.multiply.outer(time, self.generator)), np.eye(self.drift[0].size))
 
     @cached_property
-    def _powers(self) -> dict[float, Any]:
-        return {}
+    def _slowest(self) -> complex:
+        """The rightmost root s of det(s − A − Σ B_k e^(−skτ)), by polynomials of the time: E x f grows so.
 
-    @cached_property
-    def _bound(self) -> float:
-        """A number above Λ, by norms."""
-        own = self.state
-        first = 2 * float(np.linalg.eigvalsh(0.5 * (own.drift[0] + own.drift[0].T))[-1])
-        linear = np.linalg.norm(own.drift, 2, axis=(1, 2))
-        linear[0] = 0.0
-        for load, xi in zip(own.loads, self.masses, strict=True):
-            linear += np.linalg.norm(xi, 2) * np.linalg.norm(load, 2, axis=(1, 2))
-        squares = np.array([np.linalg.norm(each, 2, axis=(1, 2)) for each in own.squares]).reshape(-1, own.count + 1)
+        They are times e^at of the last a. Of waves with a frequency ν, roots repeat at multiples of iν; these do not
+        count where there are too few nodes for them.
+        """
+        moving, found = self._acting(np.eye(1)), 0j
+        size, one, last = len(moving[0]), np.eye(len(self.drift[0])), self._last
+        degree = FEWEST + last * float(np.linalg.norm(sum(map(np.abs, moving)), 2))
+        moving = moving @ _kron(expm(np.multiply.outer(self.unit * np.arange(len(moving)), self.generator)), one)
+        moving[0] += _kron(self.generator, one)
+        while size * degree <= MOST_ROOTS:
+            _, slopes, through = _polynomials(math.ceil(degree))
+            whole = _kron((2 / last) * slopes, np.eye(size))
+            fall = _exp(-found.real * self.unit * np.arange(len(moving)))[:, None, None]
+            at = chebval(1 - 2 * np.arange(len(moving)) / self._count, through).T
+            now = [_kron(row[None], each) for row, each in zip(at, fall * moving, strict=True)]
+            whole[-size:] = sum(now) - found.real * np.eye(size, whole.shape[1], k=len(whole) - size)
+            roots = np.linalg.eigvals(whole) + found.real
+            before, found = found, max(roots[abs(roots.imag) * last <= degree], key=lambda root: root.real)
+            if abs(found.real - before.real) <= SETTLED * (abs(found) + 1 / last):
+                return complex(found)
+            degree *= GROWTH
+        raise NoHierarchy(f"the largest growth rate without noise is not found for a delay so long; {REMEDY}")
 
-        def left(sigma: float) -> float:
-            fall = _exp(-0.5 * sigma * own.unit * np.arange(own.count + 1))
-            return sigma - first - 2 * float(linear @ fall) - float(np.sum((squares @ fall) ** 2))
+    def rightmost(self, x: FloatArray, bound: float) -> Eigenpair:
+        """Λ, sought from the right, and its vectors, yᵀZ′x = 1: E‖x‖² ≥ ‖E x‖² bounds it from the left.
 
-        low, high = min(first, 0.0), max(-left(0.0), 0.0)
-        margin = NEAR * (high - low + 1 / own.last)
-        return margin + (float(brentq(left, low, high, xtol=margin)) if left(low) < 0 < left(high) else high)
+        Args:
+            x: positive moments of some law.
+            bound: what Λ would not exceed if past values were variables of their own.
+        """
+        low = 2 * self._slowest.real
+        size = abs(low) + 1 / self._last
+        if self.is_still:
+            return Eigenpair(low, x, x / (x @ x), 2 * SETTLED * size, size)
+        gap = (1 + self._count) * max(bound, 0.0) + NEAR * size - low
+        least, stride = NEAREST * (abs(low) + gap), STRIDE
+        while gap > least and stride > NEAR:
+            if self._is_right(low + math.exp(-stride) * gap, x):
+                gap *= math.exp(-stride)
+            else:
+                stride *= 0.5
+        if gap > least:
+            return self._settled(low + gap)
+        if abs(self._slowest.imag) * self._last <= SETTLED:  # else Z is 0/0 next to there
+            found = self._settled(low + gap)
+            if abs(found.value - low) <= gap and found.change < gap:
+                return found
+        _, x, y = self._near(low + gap)  # the noise does not reach what grows the fastest
+        return Eigenpair(low + gap, x, y, gap, size)
 
-    def _near(self, sigma: float) -> _Near:
-        """What the smallest eigenvalue of Z(σ) says of Λ."""
+    def _is_right(self, sigma: float, x: FloatArray) -> bool:
+        """Whether σ > Λ: whether y, driven for ever, stands still with positive second moments."""
+        driven = np.linalg.solve(self.matrix(sigma), x)
+        mean, *_ = x.reshape(len(self.generator), -1).T
+        form = moment_form(mean @ driven.reshape(mean.size, -1), len(self.drift[0]), 2)
+        values = np.linalg.eigvalsh(form)
+        return bool(values[0] >= -NEGATIVE * values[-1])
+
+    def _near(self, sigma: float) -> tuple[float, FloatArray, FloatArray]:
+        """σ − Λ by a step of Newton's method for the smallest eigenvalue of Z(σ), and the vectors, yᵀZ′x = 1."""
         both = self.matrix(sigma + 1j * TINY)
         values, left, right = eig(finite(both.real), left=True)
         at = int(np.argmin(np.abs(values)))
         x, y = right[:, at].real, left[:, at].real
         share = float(y @ (both.imag / TINY) @ x)
-        return _Near(float(values[at].real) * float(y @ x) / share, x, y / share)
-
-    def rightmost(self, x: FloatArray, y: FloatArray) -> Eigenpair:
-        """Λ from the right, and its vectors, yᵀZ′x = 1: E‖x‖² ≥ ‖E x‖² bounds it from the left."""
-        low, high = 2 * self.abscissa, self._bound
-        if self.state.is_still:
-            size = abs(low) + 1 / self.state.last
-            return Eigenpair(low, x, y / (y @ x), 2 * SETTLED * size, size)
-        gap, factor, least = high - low, math.exp(-STRIDE), NEAREST * (abs(low) + high - low)
-        if not self.state.loads and self._log_radius(low + least) > 0:
-            ends = math.log(least), math.log(gap)
-            share = float(brentq(lambda log: self._log_radius(low + math.exp(log)), *ends, xtol=NEAR))
-            return self._settled(low + math.exp(share))
-        while self.state.loads and gap > least and self._is_right(low + factor * gap, x, y):
-            gap *= factor
-        if gap <= least or not self.state.loads:  # the noise does not reach what grows the fastest
-            gap = min(gap, least)
-            if abs(self._slowest.imag) * self.state.last <= SETTLED:  # else Z is 0/0 next to there
-                found = self._settled(low + gap)
-                if 0 <= found.value - low <= gap and found.change < gap:
-                    return found
-            last = self._near(low + gap)
-            return Eigenpair(low + gap, last.x, last.y, gap, self._size(low + gap, last))
-        least = factor * gap
-        while gap > (1 + NEAR) * least:
-            middle = math.sqrt(gap * least)
-            gap, least = (middle, least) if self._is_right(low + middle, x, y) else (gap, middle)
-        return self._settled(low + least)
-
-    def _is_right(self, sigma: float, x: FloatArray, y: FloatArray) -> bool:
-        """Whether σ > Λ: whether y, driven for ever, stands still with positive moments at times kτ."""
-        later, steady, noisy = self._sums(sigma)
-        n, mean = self.state.n, y.reshape(len(self.generator), -1)[:, 0]
-        driven = self._even @ np.linalg.solve(-steady - noisy, x)
-        moments = [np.tensordot(mean, (each @ driven).reshape(-1, n, n), 1) for each in later]
-        rows = range(len(moments))
-        values = np.linalg.eigvalsh(np.block([[moments[max(i - j, 0)] for j in rows] for i in rows]))  # its lower half
-        return bool(values[0] >= -NEGATIVE * values[-1])
-
-    def _log_radius(self, sigma: float) -> float:
-        """ln of how much of S drives S that is without white noise; 0 at Λ, and below it for σ > Λ."""
-        _, steady, noisy = self._sums(sigma)
-        radius = float(np.max(np.abs(np.linalg.eigvals(np.linalg.solve(-steady, noisy)))))
-        return math.log(max(radius, LEAST))
-
-    def _sums(self, sigma: float) -> tuple[list[Any], Any, Any]:
-        """S(kτ) of S(0), and −Z(σ) without white noise and by it."""
-        later, *parts = self._parts(sigma)
-        return later, *(self._even.T @ sum(each, 0.0 * parts[0][0]) @ self._even for each in parts)
-
-    @property
-    def abscissa(self) -> float:
-        """a, the growth rate of E x f."""
-        return self._slowest.real
-
-    @cached_property
-    def _slowest(self) -> complex:
-        """The rightmost s of det(s − A − Σ B_k e^(−skτ)) = 0, by polynomials and by it."""
-        own, count = self.state, self.state.count
-        moving = _outer(
-            [(np.eye(len(self.generator)), own.drift), *zip(self.masses, own.loads, strict=True)], np.eye(1)
-        )
-        size, last = len(moving[0]), complex(math.nan)
-        degree = FEWEST + SHARE * own.last * float(np.linalg.norm(sum(map(np.abs, moving)), 2))
-        for k, each in enumerate(moving):
-            moving[k] = each @ _kron(self._power(own.unit * k), np.eye(own.n))
-        moving[0] = moving[0] + _kron(self.generator, np.eye(own.n))
-        while size * degree <= MOST_SIZE:
-            nodes = math.ceil(degree)
-            x = np.cos(np.pi * np.arange(nodes + 1) / nodes)
-            whole = _kron(_differentiating(x) * 2 / own.last, np.eye(size))
-            whole[:size] = 0.0
-            for k, each in enumerate(moving):
-                whole[:size] += _kron(_interpolating(x, 1 - 2 * k / count), each)
-            found = self._root(moving, np.linalg.eigvals(whole))
-            if abs(found - last) <= SETTLED * (abs(found) + 1 / own.last):
-                return found
-            degree, last = GROWTH * degree, found
-        raise NoHierarchy(f"the largest growth rate without noise is not found for a delay so long; {REMEDY}")
-
-    def _root(self, moving: Sequence[Any], roots: Any) -> complex:
-        """The root on the right of those that some numbers are next to, of several the one that turns the least."""
-        lags, one = self.state.unit * np.arange(len(moving))[:, None, None], np.eye(len(moving[0]))
-        found = complex(math.nan)
-        for root in sorted(roots[roots.imag >= 0], key=lambda each: -each.real):
-            if (found.real - root.real) * self.state.last > CLOSE:
-                break
-            s, step = complex(root), math.inf
-            for _ in range(MOST_POLISHES):
-                parts = _exp(-s * lags) * moving
-                values = eigvals(s * one - parts.sum(axis=0), one + (lags * parts).sum(axis=0))
-                step = values[np.argmin(np.abs(values))]
-                s -= step
-                if abs(step) <= SETTLED * (abs(s) + 1 / self.state.last):
-                    break
-            if abs(s - root) * self.state.last < CLOSE and abs(step) * self.state.last < CLOSE**2:
-                same = SETTLED * (abs(s) + 1 / self.state.last)  # waves repeat roots beside their multiples of iν
-                is_first = math.isnan(found.real) or s.real > found.real + same
-                if is_first or (s.real > found.real - same and abs(s.imag) < abs(found.imag)):
-                    found = complex(s)
-        return found
+        return float(values[at].real) * float(y @ x) / share, x, y / share
 
     def _settled(self, sigma: float) -> Eigenpair:
-        """Λ next to σ, and what finer steps or polynomials change: they are made finer until it is rounding."""
+        """Λ next to σ, and what polynomials of higher degrees change: these rise until it is rounding."""
         at, last = self, math.inf
         while True:
-            near = at._near(sigma)
-            size = at._size(sigma, near)
+            away, x, y = at._near(sigma)
+            size = float(np.abs(y) @ at.sizes(sigma) @ np.abs(x))  # of all terms
             for _ in range(MOST_POLISHES):
-                sigma -= near.away
-                if abs(near.away) <= ROUNDING * size:
+                sigma -= away
+                if abs(away) <= ROUNDED * size:
                     break
-                near = at._near(sigma)
-            finer = replace(at, finer=at.finer + 1)
-            change = abs(float(near.y @ finer.matrix(sigma) @ near.x))
-            if -0.5 * sigma * self.state.last > LARGEST:
+                away, x, y = at._near(sigma)
+            if -0.5 * sigma * self._last > LARGEST:
                 raise NoHierarchy(
                     f"second moments fall by more than e^(-{2 * LARGEST:g}) in a delay; use a shorter one"
                 )
-            if change <= ROUNDING * size or not change < 0.5 * last:
-                return Eigenpair(sigma, near.x, near.y, change, size)
+            finer = replace(at, finer=at.finer + 1)
+            change = abs(float(y @ finer.matrix(sigma) @ x))
+            if change <= ROUNDED * size or not change < 0.5 * last:
+                return Eigenpair(sigma, x, y, max(change, ROUNDED * size), size, at.finer)
             at, last = finer, change
-
-    def _size(self, sigma: float, near: _Near) -> float:
-        """Σ |terms| of yᵀZx."""
-        return float(np.abs(near.y) @ self.sizes(sigma) @ np.abs(near.x))
-
-    def sizes(self, sigma: float) -> FloatArray:
-        """Σ |terms| that Z(σ) is the sum of."""
-        even, (_, steady, noisy) = np.abs(self._even), self._parts(sigma)
-        return np.asarray(even.T @ sum(map(np.abs, [*steady, *noisy])) @ even)
 
 
 def _kron(a: Any, b: Any) -> Any:
-    """a ⊗ b; numpy's takes ten times as long for small matrices."""
-    return np.reshape(a[:, None, :, None] * b[None, :, None, :], (len(a) * len(b), -1))
-
-
-def _outer(terms: Sequence[tuple[Any, Any]], one: Any) -> list[Any]:
-    """Σ Ξ ⊗ C_k ⊗ 1 over pairs of a Ξ and all C_k."""
-    return [sum(_kron(xi, _kron(each[k], one)) for xi, each in terms) for k in range(len(terms[0][1]))]
-
-
-class _Parts(NamedTuple):
-    """S(kτ) of S(0), and what −Z(σ) is the sum of, without white noise and by it."""
-
-    later: list[Any]
-    steady: list[Any]
-    noisy: list[Any]
-
-
-class _Near(NamedTuple):
-    """σ − Λ by a step of Newton's method, and the vectors, yᵀZ′x = 1."""
-
-    away: float
-    x: FloatArray
-    y: FloatArray
+    """a ⊗ b, also of several a."""
+    found = a[..., :, None, :, None] * b[:, None, :]
+    return np.reshape(found, (*a.shape[:-2], a.shape[-2] * len(b), -1))
 
 
 def _exp(of: Any) -> Any:
@@ -473,16 +331,10 @@ def _exp(of: Any) -> Any:
     return np.exp(of - np.maximum(np.real(of) - LARGEST, 0.0))
 
 
-def _differentiating(x: FloatArray) -> FloatArray:
-    """The slopes at nodes of Chebyshev of polynomials by their values there."""
-    ends = np.where(np.arange(x.size) % (x.size - 1) == 0, 2.0, 1.0) * (-1.0) ** np.arange(x.size)
-    gaps = np.subtract.outer(x, x) + np.eye(x.size)
-    found = np.outer(ends, 1 / ends) / gaps
-    return found - np.diag(found.sum(axis=1))
-
-
-def _interpolating(x: FloatArray, at: float) -> FloatArray:
-    """What gives at a place of [−1, 1] the polynomial through values at nodes of Chebyshev."""
-    degrees = np.arange(x.size)
-    values = np.cos(np.outer(degrees, np.arccos(x)))
-    return np.linalg.solve(values, np.cos(degrees * math.acos(min(max(at, -1.0), 1.0))))[None]
+@lru_cache(maxsize=64)
+def _polynomials(degree: int) -> tuple[Any, Any, Any]:
+    """Nodes of Chebyshev, the slopes there of polynomials by their values, and the coefficients of these."""
+    x = chebpts2(degree + 1)
+    through = np.linalg.inv(chebvander(x, degree))
+    slopes = chebval(x, chebder(through)).T
+    return x, slopes - np.diag(slopes.sum(axis=1)), through

@@ -19,8 +19,7 @@ import numpy as np
 from fpsolve.arrays import FloatArray
 from fpsolve.budget import unless_over_budget
 from fpsolve.errors import MeshError, NoHierarchy, NotConverged, SingularMatrix
-from fpsolve.exponent.changed import SMALL_P as SMALLEST
-from fpsolve.exponent.changed import Changed
+from fpsolve.exponent.changed import NEAR_ZERO, Changed
 from fpsolve.exponent.density import no_picture_of
 from fpsolve.exponent.eigen import (
     PairDerivatives,
@@ -440,7 +439,7 @@ class Elements(Method):
         return PairDerivatives(self.finer_pair(self.around_zero.pair))
 
     def gradient_along(self, p: float, along: Sequence[ParameterDerivative]) -> FloatArray:
-        is_large = abs(p) >= SMALLEST
+        is_large = abs(p) >= NEAR_ZERO
         around = PairDerivatives(self._found(p).pair) if is_large else self.around_zero
         changed = [Changed(around, by) for by in along]
         if is_large:

@@ -9,16 +9,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import FpsolveError, NotConverged
+from fpsolve.exponent.delays import ROUNDED
 from fpsolve.exponent.moments import FIRST, GROWTH, Equations, even_moment
 from fpsolve.exponent.powers import moment_form
-from fpsolve.exponent.rightmost import ROUNDING
 from fpsolve.messages import Code, Message
 from fpsolve.model.problem import Problem
 
@@ -78,18 +77,16 @@ def stationary_moments(problem: Problem, rtol: float = 1e-6) -> StationaryMoment
 def _solved(equations: Equations, finer: int) -> Iterator[FloatArray]:
     """E yyᵀ of y = (x, 1) and what rounding changes, with steps and functions as fine as that."""
     counts = [math.ceil(FIRST * GROWTH**finer)] * len(equations.noises)
-    mean = equations.means(counts)
-    state: Any = equations.state
-    rates = replace(state.rates(*equations.over_noise(counts)), finer=finer)
+    mean, scales = equations.means(counts), equations.scales
+    rates = equations.rates(*equations.over_noise(counts), finer)
     z, sizes = rates.matrix(0.0), rates.sizes(0.0)
-    is_one = np.arange(len(z)) % state.size == state.size - 1  # E 1·1 f
+    is_one = np.arange(len(z)) % scales.size == scales.size - 1  # E 1·1 f
     moments, rounding = np.zeros((2, len(z)))
     moments[is_one] = mean
     inverse = np.linalg.inv(z[~is_one][:, ~is_one])
     moments[~is_one] = -inverse @ (z[~is_one][:, is_one] @ mean)
-    rounding[~is_one] = ROUNDING * np.abs(inverse) @ (sizes[~is_one] @ np.abs(moments))
-    unit = state.units[-1] ** 2
+    rounding[~is_one] = ROUNDED * np.abs(inverse) @ (sizes[~is_one] @ np.abs(moments))
     return (
-        moment_form(state.moments(weights @ each.reshape(-1, state.size)) / unit, equations.dimension, 2)
+        moment_form(weights @ each.reshape(-1, scales.size) * (scales / scales[-1]), equations.dimension, 2)
         for weights, each in ((mean, moments), (np.abs(mean), rounding))
     )

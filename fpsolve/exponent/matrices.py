@@ -21,76 +21,16 @@ from scipy.sparse.linalg import LinearOperator, gmres
 
 from fpsolve.arrays import FloatArray, dense
 from fpsolve.errors import NoHierarchy
-from fpsolve.exponent.powers import Moving, upper
-from fpsolve.exponent.rightmost import EXACTLY, REMEDY, ROUGHLY, ROUNDING, Eigenpair, Solve, rightmost
+from fpsolve.exponent.powers import Moving, moment_form, upper
+from fpsolve.exponent.rightmost import EXACTLY, REMEDY, ROUGHLY, ROUNDING, Rates, Solve
 
 MOST_VECTORS = 100
 """Largest number of vectors of GMRES, which is not restarted, as it may stall then."""
-MOST_NUMBERS = 500_000
-"""Largest number of second moments, of all functions of the noise."""
-
-
-class Matrices:
-    """Second moments of what moves a state, as matrices.
-
-    Args:
-        moving: what does.
-        p: 2.
-        units: of the state; None for those in which its matrices are balanced.
-
-    Raises:
-        NoHierarchy: numbers in H are beyond floating-point numbers.
-    """
-
-    most = MOST_NUMBERS
-
-    def __init__(self, moving: Moving, p: int, units: FloatArray | None = None) -> None:
-        steady = moving.steady + 0.5 * sum((each @ each for each in moving.squares), 0.0 * moving.steady)
-        gains = [(1.0, each) for each in moving.squares] + [(rate, expm(each)) for rate, each in moving.impulses]
-        rest = sum((rate * each * each for rate, each in gains), 0.0 * steady)
-        self.units, self.largest = moving.balance([steady, *moving.loads], rest, units)
-        shares = self.units / self.units[:, None]
-        self._steady = shares * steady - 0.5 * sum(rate for rate, _ in moving.impulses) * np.eye(len(steady))
-        self._loads = [shares * each for each in moving.loads]
-        self._gains = [np.sqrt(rate) * shares * each for rate, each in gains]
-
-    @property
-    def size(self) -> int:
-        """The number of second moments."""
-        n = len(self._steady)
-        return n * (n + 1) // 2
-
-    @property
-    def starts(self) -> tuple[FloatArray, FloatArray]:
-        """Moments of some law, and a positive form."""
-        unit = np.eye(len(self._steady)).ravel()
-        return unit, unit
-
-    @property
-    def scales(self) -> FloatArray:
-        """The units of the numbers for each function of the noise."""
-        return np.outer(self.units, self.units).ravel()
-
-    def moments(self, x: FloatArray) -> FloatArray:
-        """E x_i x_j, times √2 for i ≠ j, i ≤ j, of a right vector."""
-        return upper((x * self.scales).reshape(self._steady.shape))
-
-    def polynomial(self, y: FloatArray) -> FloatArray:
-        """T, as coefficients of these, of a left vector."""
-        return upper((y / self.scales).reshape(self._steady.shape))
-
-    def rates(self, generator: Any, masses: Sequence[Any]) -> MatrixRates:
-        """H from Gᵀ and the Ξᵀ of each load."""
-        return MatrixRates(self._steady, list(zip(self._loads, masses, strict=True)), self._gains, generator)
-
-    def image(self, generator: Any, masses: Sequence[Any], x: FloatArray, value: float) -> FloatArray:
-        """Hx."""
-        return self.rates(generator, masses) @ x
 
 
 @dataclass(frozen=True, eq=False)
-class MatrixRates:
-    """H of symmetric X_k, in one row.
+class MatrixRates(Rates):
+    """H of the upper halves of X_k, one after the other.
 
     Attributes:
         steady: A − ½Σν.
@@ -104,56 +44,43 @@ class MatrixRates:
     gains: Sequence[FloatArray]
     of_noise: Any
 
+    @classmethod
+    def of(cls, moving: Moving, generator: Any, masses: Sequence[Any]) -> MatrixRates:
+        """H from Gᵀ and the Ξᵀ of each load."""
+        unit = np.eye(len(moving.steady))
+        steady = moving.steady + 0.5 * sum((each @ each for each in moving.squares), 0.0 * unit)
+        steady = steady - 0.5 * sum(rate for rate, _ in moving.impulses) * unit
+        gains = [*moving.squares, *(np.sqrt(rate) * expm(exponent) for rate, exponent in moving.impulses)]
+        return cls(steady, list(zip(moving.loads, masses, strict=True)), gains, generator)
+
+    def _forms(self, x: FloatArray) -> FloatArray:
+        """X_k, shape (functions, n, n)."""
+        return moment_form(x.reshape(self.of_noise.shape[0], -1), len(self.steady), 2)
+
     def __matmul__(self, x: FloatArray) -> FloatArray:
-        given = x.reshape(-1, *self.steady.shape)
+        given = self._forms(x)
         total = _both(self.steady @ given) + _over(self.of_noise, given)
-        return np.asarray(total + self._driven(given)).ravel()
+        return upper(total + self._driven(given)).ravel()
 
     def _driven(self, given: Any) -> Any:
         """By noise."""
         total = sum((_over(xi, _both(load @ given)) for load, xi in self.loads), 0.0 * given)
         return total + sum((gain @ given @ gain.T for gain in self.gains), 0.0 * given)
 
-    def at(self, value: float) -> MatrixRates:
-        """H at an eigenvalue, on which it does not depend here."""
-        return self
-
     @cached_property
     def T(self) -> MatrixRates:
-        """The transpose."""
         loads = [(load.T, xi.T.tocsr()) for load, xi in self.loads]
         return MatrixRates(self.steady.T, loads, [each.T for each in self.gains], self.of_noise.T.tocsr())
 
     def on(self, functions: Any) -> MatrixRates:
-        """H of some functions of the noise."""
         at = np.flatnonzero(functions)
         loads = [(load, xi[at][:, at]) for load, xi in self.loads]
         return MatrixRates(self.steady, loads, self.gains, self.of_noise[at][:, at])
 
-    @cached_property
-    def _absolute(self) -> MatrixRates:
-        loads = [(abs(load), abs(xi)) for load, xi in self.loads]
-        return MatrixRates(abs(self.steady), loads, [abs(each) for each in self.gains], abs(self.of_noise))
-
     def sizes(self, x: FloatArray, y: FloatArray) -> float:
-        """|y|ᵀ|H||x|."""
-        return float(np.abs(y) @ (self._absolute @ np.abs(x)))
-
-    @property
-    def bound(self) -> float:
-        """By the symmetric part of A and norms, as that of G in orthonormal functions is not positive."""
-        own = float(np.linalg.eigvalsh(self.steady + self.steady.T)[-1])
-        of_loads = sum(2 * float(np.linalg.norm(load, 2)) * _norm(xi) for load, xi in self.loads)
-        return own + of_loads + sum(float(np.linalg.norm(each, 2)) ** 2 for each in self.gains)
-
-    @property
-    def largest(self) -> float:
-        """The size of its largest entry, about."""
-        return 2 * float(np.max(np.abs(self.steady))) + float(abs(self.of_noise).max())
-
-    def rightmost(self, x: FloatArray, y: FloatArray) -> Eigenpair:
-        """Λ, from a positive right and a positive left vector."""
-        return rightmost(self, x, y)
+        loads = [(abs(load), abs(xi)) for load, xi in self.loads]
+        absolute = MatrixRates(abs(self.steady), loads, [abs(each) for each in self.gains], abs(self.of_noise))
+        return float(np.abs(y) @ (absolute @ np.abs(x)))
 
     @cached_property
     def _schur(self) -> tuple[Any, Any, Any, Any]:
@@ -175,20 +102,19 @@ class MatrixRates:
             right = given[k] + np.tensordot(s[k, rest], found[rest], 1)
             x, scale, _ = trsyl(moved, moved.conj(), -right, tranb="C")
             found[k] = x / scale
-        return np.ascontiguousarray(_over(z, u @ found @ u.T).real)
+        return upper(_over(z, u @ found @ u.T).real).ravel()
 
     def solver(self, sigma: float, tolerance: float = EXACTLY) -> Solve:
-        """(σ − H)⁻¹ by GMRES. It raises `NoHierarchy` where that does not settle."""
+        """By GMRES. It raises `NoHierarchy` where that does not settle."""
 
         def solve(x: FloatArray, trans: int = 0) -> FloatArray:
             h = self.T if trans else self
-            shape = (-1, *self.steady.shape)
 
             def image(z: FloatArray) -> FloatArray:
-                return z - h._alone(sigma, h._driven(z.reshape(shape))).ravel()
+                return z - h._alone(sigma, h._driven(h._forms(z)))
 
             operator = LinearOperator(2 * x.shape, matvec=image, dtype=float)
-            start = h._alone(sigma, x.reshape(shape)).ravel()
+            start = h._alone(sigma, h._forms(x))
             moved = image(x)
             guess = (moved @ start) / (moved @ moved) * x  # next to an eigenvector little else is left
             least = ROUNDING * float(np.linalg.norm(guess))
@@ -196,8 +122,7 @@ class MatrixRates:
             if missed and np.linalg.norm(image(found) - start) > ROUGHLY * np.linalg.norm(start):
                 told = f"{x.size} second moments under noise so strong are not found by iteration"
                 raise NoHierarchy(f"{told}; {REMEDY}")
-            found = found.reshape(shape)
-            return np.asarray(0.5 * (found + found.swapaxes(1, 2))).ravel()  # H of a skew X would be another
+            return np.asarray(found)
 
         return solve
 
@@ -210,9 +135,3 @@ def _both(half: Any) -> Any:
 def _over(matrix: Any, given: Any) -> Any:
     """A matrix over the functions of the noise."""
     return (matrix @ given.reshape(len(given), -1)).reshape(given.shape)
-
-
-def _norm(matrix: Any) -> float:
-    """A bound of ‖Ξ‖₂."""
-    absolute = abs(matrix)
-    return float(np.sqrt(absolute.sum(axis=0).max() * absolute.sum(axis=1).max()))

@@ -25,13 +25,12 @@ from fpsolve.arrays import FloatArray
 from fpsolve.errors import NoHierarchy
 from fpsolve.exponent.eigen import PrincipalPair, principal_pair
 from fpsolve.exponent.error import Solution, mode_effects
-from fpsolve.exponent.moments import even_moment
+from fpsolve.exponent.moments import even_moment, mean_matrix
 from fpsolve.exponent.powers import moment_form
 from fpsolve.exponent.starts import SHARE, Start
 from fpsolve.fem.directions import DirectionAxis, SphereAxis, group_dimensions
 from fpsolve.fem.generator import SMALL_P, Generator
 from fpsolve.fem.space import Space, first_axis
-from fpsolve.model.plane import System
 from fpsolve.model.problem import Problem
 
 FIRST_WAVES = 2
@@ -63,12 +62,6 @@ MEASURED = 1.5
 def frame_of(problem: Problem) -> FloatArray:
     """F of x = F z, z being what a problem is solved in."""
     return np.eye(problem.dimension) if problem.frame is None else np.array(problem.frame.matrix)
-
-
-def mean_matrix(problem: Problem, motion: System) -> FloatArray:
-    """Σ ε^n ⟨g⟩ A of the terms of a motion, in the mean over the noise."""
-    means = [motion.epsilon**term.order * problem.named_noise(term.noise).mean_of(term.g) for term in motion.terms]
-    return np.tensordot(means, [term.matrix for term in motion.terms], axes=1)
 
 
 def second_moments(problem: Problem, own: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -7,7 +7,7 @@ linear in A and skew-symmetric for a rotation. For functions f_k of noise, g f_k
 
 moves E[x^α f_k], for terms g(ξ)A, white noises Bx ∘ dW and impulses exp(C) at the rates ν. Λ(p) is its rightmost
 eigenvalue. The right vector is of moments, the left one of T, a polynomial of the degree p in x. As moments stay
-moments, no eigenvalue is nearer to a real σ > Λ than Λ: the search begins at a bound by the rows of H, from the right.
+moments, no eigenvalue is nearer to a real σ > Λ than Λ: the search begins at a bound by norms, from the right.
 The functions of the noise end somewhere; what the next ones change, with the last two of these to all orders and the
 others to the first, is added, and is the error, with what it is by the last one alone.
 """
@@ -20,28 +20,31 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property, reduce
+from itertools import combinations_with_replacement
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.polynomial.polynomial import polyfit
 from scipy import sparse
 from scipy.linalg import solve_triangular
+from scipy.sparse.linalg import norm
 
 from fpsolve.arrays import Coefficient, FloatArray, one
 from fpsolve.budget import unless_over_budget
 from fpsolve.data import brief
 from fpsolve.errors import NoHierarchy
-from fpsolve.exponent.delays import Delayed, present
+from fpsolve.exponent.delays import DelayRates
 from fpsolve.exponent.error import Moment
-from fpsolve.exponent.matrices import MOST_NUMBERS, Matrices
+from fpsolve.exponent.matrices import MatrixRates
 from fpsolve.exponent.method import Budget, Search
-from fpsolve.exponent.powers import Moving, Powers, ladder, moment_form, multinomials
-from fpsolve.exponent.rightmost import REMEDY, ROUNDING, inverse
+from fpsolve.exponent.powers import Moving, PowerRates, exponents, moment_form, moves, multinomials, of_signs
+from fpsolve.exponent.rightmost import REMEDY, ROUNDING
 from fpsolve.fem.space import FIRST as AXES
 from fpsolve.fem.space import first_axis
 from fpsolve.messages import Remedy
 from fpsolve.model.noise import Noise
 from fpsolve.model.parameters import cached_by_problem
-from fpsolve.model.plane import affine
+from fpsolve.model.plane import System
 from fpsolve.model.problem import Problem
 from fpsolve.theory.perturbation import Scale
 
@@ -49,6 +52,8 @@ MOST_AS_POWERS = 1000
 """Largest number of second moments that are one vector, times the first functions of the noises."""
 MOST = 20_000
 """Largest number of equations."""
+MOST_NUMBERS = 500_000
+"""Largest number of second moments that are matrices."""
 MOST_MOMENTS = 1000
 """Largest number of moments for each function of the noise."""
 FIRST = 4
@@ -161,15 +166,16 @@ def even_moment(
     )
 
 
+def mean_matrix(problem: Problem, motion: System) -> FloatArray:
+    """Σ ε^n ⟨g⟩ A of the terms of a motion, in the mean over the noise."""
+    means = [motion.epsilon**term.order * problem.named_noise(term.noise).mean_of(term.g) for term in motion.terms]
+    return np.tensordot(means, [term.matrix for term in motion.terms], axes=1)
+
+
 def constant_scale(problem: Problem) -> Scale:
     """The scale of Λ(p) where even p alone are computed: constant terms, with the mean of the noise."""
-    steady = np.zeros((problem.dimension, problem.dimension))
-    for term in problem.motion.terms:
-        if line := affine(term.g):
-            at_mean = line[0] + (line[1] and line[1] * problem.named_noise(term.noise).mean)
-            steady += problem.motion.epsilon**term.order * at_mean * np.array(term.matrix)
-    now = present(problem)
-    abscissa = abs(float(np.max(np.linalg.eigvals(steady[:now, :now]).real)))
+    now = problem.dimension - len(problem.system.pasts)
+    abscissa = abs(float(np.max(np.linalg.eigvals(mean_matrix(problem, problem.motion)[:now, :now]).real)))
     return Scale(abscissa or problem.unit_rate, 0.0)
 
 
@@ -192,7 +198,7 @@ def refuse_open_hierarchy(problem: Problem, p: float) -> None:
             "the equations of the moments do not close where a wall changes the state, as that happens at one phase; "
             f"{REMEDY}, or remove the wall"
         )
-    if present(problem) < problem.dimension and p != 2:
+    if problem.system.pasts and p != 2:
         raise NoHierarchy(f"got p = {p:g}; with a delay the equations of the moments are for p = 2; {REMEDY}")
     moments = math.comb(int(p) + problem.dimension - 1, problem.dimension - 1)
     count = moments
@@ -219,6 +225,7 @@ class EvenMoment:
         polynomial: the coefficients of T at the same, in the mean over the noise.
         change: by the last step, from `effects` where only the last functions move with the next ones, and from fewer
             functions, where that is beyond the errors of both: then `effects` are no errors.
+        finer: how many times polynomials of the time were made finer, where there are delays.
     """
 
     equations: Equations
@@ -231,6 +238,7 @@ class EvenMoment:
     moments: FloatArray
     polynomial: FloatArray
     change: float = 0.0
+    finer: int = 0
 
     def __repr__(self) -> str:
         return brief(self, f"Λ({self.equations.p}) = {self.value:.10g} ± {self.error:.0e}, {self.x.size} equations")
@@ -249,7 +257,7 @@ class EvenMoment:
     def rounding(self) -> float:
         """A bound of what rounding changes, also in what moves the state: by its size, and the condition of Λ."""
         condition = float(np.linalg.norm(self.x) * np.linalg.norm(self.y))
-        return ROUNDING * self.scale + sys.float_info.epsilon * self.equations.state.largest * condition
+        return ROUNDING * self.scale + sys.float_info.epsilon * self.equations.largest * condition
 
     @property
     def told(self) -> float:
@@ -264,8 +272,8 @@ class EvenMoment:
     def slope(self, key: str) -> tuple[float, float]:
         """∂Λ(p)/∂θ of a parameter such as "noise.alpha", and its error: ⟨y, ∂H/∂θ x⟩ by differences of H.
 
-        The error is what two lengths of the step tell of one, rounding in the differences, and how fast what Λ(p)
-        lacks may change.
+        The slope is that of a polynomial through values next to each other. The error is what fewer of them tell,
+        rounding in the differences, and how fast what Λ(p) lacks may change.
 
         Raises:
             ValueError: there is no such parameter.
@@ -273,17 +281,12 @@ class EvenMoment:
         problem = self.equations.problem
         at = float(problem.values[key])
         step = STEP * (abs(at) or 1.0)
-        for offsets in (1, -1, 2, -2), (0, -1, -2, -4), (0, 1, 2, 4):
+        for offsets in (0, 1, -1, 2, -2), (0, -1, -2, -4), (0, 1, 2, 4):
             with suppress(ValueError, NoHierarchy):
-                values = {offset: self._with(problem.at({key: at + step * offset})) for offset in offsets}
-                if offsets[0]:
-                    value, longer = (0.5 * (values[k] - values[-k]) / k for k in (1, 2))
-                else:
-                    steps = offsets[1], offsets[2]
-                    value, longer = ((2 * values[k] - 1.5 * values[0] - 0.5 * values[2 * k]) / k for k in steps)
+                values = [self._with(problem.at({key: at + step * offset})) for offset in offsets]
+                coarse, slope = (polyfit(offsets[:k], values[:k], k - 1)[1] for k in (3, len(offsets)))
                 lacking = STEEPNESS * max(self.counts) * abs(step / at if at else 1.0) * self.error
-                error = abs(value - longer) / 3 + self.rounding + self.change + lacking
-                return (4 * value - longer) / 3 / step, error / step
+                return slope / step, (abs(slope - coarse) + self.rounding + self.change + lacking) / step
         raise ValueError(f"got {key}; Λ(p) has no slope by it")
 
     def gradient(self, keys: Sequence[str]) -> FloatArray:
@@ -293,8 +296,9 @@ class EvenMoment:
     def _with(self, problem: Problem) -> float:
         """⟨y, Hx⟩ of a problem next to it."""
         refuse_open_hierarchy(problem, self.equations.p)
-        near = Equations(problem, self.equations.p, self.equations)
-        return float(self.y @ near.state.image(*near.over_noise(self.counts), self.x, self.eigenvalue))
+        near = Equations(problem, self.equations.p, self.equations.units)
+        rates = near.rates(*near.over_noise(self.counts), self.finer)
+        return float(self.y @ (rates.at(self.eigenvalue) @ self.x))
 
     @cached_property
     def is_positive(self) -> bool:
@@ -312,7 +316,7 @@ class EvenMoment:
             return np.asarray(np.linalg.eigvalsh(moment_form(self.polynomial, n, 2)))
         x = np.random.default_rng(0).standard_normal((200, n))
         x /= np.linalg.norm(x, axis=1)[:, None]
-        alphas, _ = ladder(n, p)
+        alphas = exponents(n, p)
         return np.prod(x[:, None] ** alphas, axis=2) @ (self.polynomial * np.sqrt(multinomials(alphas)))
 
 
@@ -341,11 +345,11 @@ class Level:
     def size(self) -> int:
         if max(self.counts) > MOST_DEGREES:
             return sys.maxsize
-        return self.equations.state.size * math.prod(int(each.sum()) for each in self.equations.are_old(self.counts))
+        return self.equations.scales.size * math.prod(int(each.sum()) for each in self.equations.are_old(self.counts))
 
     @property
     def most_unknowns(self) -> int:
-        return max(self.most, self.equations.state.most)
+        return MOST_NUMBERS if self.equations.is_large else self.most
 
     def solved(self, p: float, near: EvenMoment | None) -> EvenMoment:
         return self.equations.moment(self.counts)
@@ -382,46 +386,46 @@ class Equations:
     Args:
         problem: the problem.
         p: even.
-        like: equations of a problem next to it, whose units of the state are taken.
+        units: of the variables; None for those in which what moves them is balanced.
+
+    Attributes:
+        dimension: the number of variables that are no past values of others.
+        is_large: whether their second moments are matrices.
+        scales: of the functions of the state, by these units.
+        largest: what no number in H exceeds.
 
     Raises:
         NoHierarchy: numbers in it are beyond floating-point numbers.
     """
 
-    def __init__(self, problem: Problem, p: int, like: Equations | None = None) -> None:
-        self.problem, self.p = problem, p
+    def __init__(self, problem: Problem, p: int, units: FloatArray | None = None) -> None:
+        self.problem, self.p, self.pasts = problem, p, problem.system.pasts
+        self.dimension = problem.dimension - len(self.pasts)
         named = problem.coloured.parts
         self.noises, names = list(named.values()), list(named)
         drift, diffusions, impulses = problem.noise.motion(problem.system)
         steady, self._loads = np.zeros(2 * (problem.dimension,)), list[tuple[Any, int]]()
-        matrices, strengths = list[FloatArray](), list[float]()
+        loads = list[FloatArray]()
         for term in drift.terms:
             matrix = drift.epsilon**term.order * np.array(term.matrix)
             if term.g == one:
                 steady += matrix
                 continue
-            at = names.index(term.noise) if term.noise in named else 0
-            noise = self.noises[at]
-            z = np.array([-1.0, 0.0, 1.0]) * (0.0 if noise.is_white else noise.standard_deviation)
-            self._loads.append((term.g, at))
-            matrices.append(matrix)
-            strengths.append(float(np.max(np.abs(term.g(noise.mean + z)))))
+            self._loads.append((term.g, names.index(term.noise) if term.noise in named else 0))
+            loads.append(matrix)
         squares = [drift.epsilon**each.order * np.array(each.matrix) for each in diffusions]
         jolts = [(each.rate, np.array(each.exponent)) for each in impulses]
-        moving = Moving(steady, matrices, strengths, squares, jolts)
-        self.state: Matrices | Powers | Delayed
-        self.dimension, units = present(problem), like.state.units if like else None
-        if self.dimension < problem.dimension:
-            self.state = Delayed(moving, problem, units)
-        else:
-            form: type[Matrices | Powers] = Matrices if p == 2 and self._first_size > MOST_AS_POWERS else Powers
-            self.state = form(moving, p, units)
-
-    @property
-    def _first_size(self) -> int:
-        """Of the second moments, with the first functions of each noise."""
-        axes = self._axes([FIRST] * len(self.noises))
-        return math.comb(self.problem.dimension + 1, 2) * math.prod(each.degrees.size for each in axes)
+        moving, sizes = Moving(steady, loads, squares, jolts), _sizes(self.over_noise([FIRST] * len(self.noises))[1])
+        self.units = moving.balance(sizes, [variable for variable, _ in self.pasts]) if units is None else units
+        self.moving = moving.over(self.units)
+        own = combinations_with_replacement(self.units[: self.dimension].tolist(), p)
+        self.scales = np.array([math.prod(each) for each in own])
+        first = self.scales.size * self.means([FIRST] * len(self.noises)).size
+        self.is_large = p == 2 and not self.pasts and first > MOST_AS_POWERS
+        with np.errstate(over="ignore"):
+            _, self.largest = self.moving.bounds(p, sizes)
+        if not math.isfinite(self.largest):
+            raise NoHierarchy("the equations of the moments are beyond floating-point numbers; use a smaller p")
 
     def are_old(self, counts: Sequence[int]) -> list[Any]:
         """Which functions of each noise, with the next ones, are of degrees below these."""
@@ -432,15 +436,14 @@ class Equations:
         """Λ(p) with functions of degrees below these. Raises `NoHierarchy`: it does not settle."""
         more = [count + NEXT for count in counts]
         axes, is_old = self._axes(more), self.are_old(counts)
-        size = math.prod(int(each.sum()) for each in is_old)
-        h, old = self.state.rates(*self.over_noise(more)), _outer(is_old)
-        mean = self.means(counts)
-        own = h.on(old)
-        starts: Any = (np.kron(mean, each) for each in self.state.starts)
-        value, x, y, change, scale = own.rightmost(*starts)
+        generator, masses = self.over_noise(more)
+        h, old, mean = self.rates(generator, masses), _outer(is_old), self.means(counts)
+        start = np.kron(mean, of_signs(self.dimension, self.p))
+        bound, _ = self.moving.bounds(self.p, _sizes(masses))
+        value, x, y, change, scale, finer = h.on(old).rightmost(start, bound)
         h = h.at(value)
-        whole = np.zeros((2, old.size, x.size // size))
-        whole[:, old] = x.reshape(size, -1), y.reshape(size, -1)
+        whole = np.zeros((2, old.size, self.scales.size))
+        whole[:, old] = x.reshape(mean.size, -1), y.reshape(mean.size, -1)
         images = [each.reshape(old.size, -1) for each in (h @ whole[0].ravel(), h.T @ whole[1].ravel())]
         effects = []
         for k, (axis, count) in enumerate(zip(axes, counts, strict=True)):
@@ -449,12 +452,24 @@ class Equations:
             for last in (1, 2) if new.any() else ():
                 moved = _outer([axis.degrees >= count - last if k == j else each for j, each in enumerate(is_old)])
                 right, left = ((each * new[:, None])[moved].ravel() for each in images)
-                told[last - 1] = float(left @ inverse(h.on(moved), value, right.size)(right))
+                told[last - 1] = float(left @ h.on(moved).inverse(value, right.size)(right))
             effects.append(told[1])
             change += abs(told[1] - told[0])
-        moments = self.state.moments(mean @ x.reshape(size, -1))
-        polynomial = self.state.polynomial(mean @ y.reshape(size, -1))
-        return EvenMoment(self, tuple(counts), value, effects, scale, x, y, moments, polynomial, change)
+        moments, polynomial = (mean @ each.reshape(mean.size, -1) for each in (x, y))
+        moments, polynomial = moments * self.scales, polynomial / self.scales
+        return EvenMoment(self, tuple(counts), value, effects, scale, x, y, moments, polynomial, change, finer)
+
+    def rates(self, generator: Any, masses: Sequence[Any], finer: int = 0) -> Any:
+        """H from Gᵀ and the Ξᵀ of each load, and polynomials of the time as fine as that."""
+        if self.pasts:
+            return DelayRates.of(self.moving, self.pasts, generator, masses, finer)
+        if self.is_large:
+            return MatrixRates.of(self.moving, generator, masses)
+        return PowerRates.of(self._moves, generator, masses)
+
+    @cached_property
+    def _moves(self) -> list[Any]:
+        return moves(self.moving, self.p)
 
     def _axes(self, counts: Sequence[int]) -> list[Functions]:
         return [functions_of(noise, count) for noise, count in zip(self.noises, counts, strict=True)]
@@ -475,6 +490,11 @@ class Equations:
 
         generator = sum((over(axis.generator, k) for k, axis in enumerate(axes[1:], 1)), over(axes[0].generator, 0))
         return generator, [over(axes[at].mass(g), at) for g, at in self._loads]
+
+
+def _sizes(masses: Sequence[Any]) -> list[float]:
+    """What no Ξ exceeds."""
+    return [math.sqrt(norm(xi, 1) * norm(xi, np.inf)) for xi in masses]
 
 
 def _outer(factors: Sequence[Any]) -> Any:

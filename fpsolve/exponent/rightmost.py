@@ -43,36 +43,13 @@ Solve = Callable[..., Any]
 """(σ − H)⁻¹ of a vector, or its transpose for trans = 1."""
 
 
-class Rates(Protocol):
-    """H, in whatever form it is held."""
-
-    @property
-    def T(self) -> Rates:
-        """The transpose."""
-
-    @property
-    def bound(self) -> float:
-        """A number that no real part of an eigenvalue exceeds."""
-
-    @property
-    def largest(self) -> float:
-        """The size of its largest entry."""
-
-    def __matmul__(self, x: FloatArray) -> FloatArray: ...
-
-    def sizes(self, x: FloatArray, y: FloatArray) -> float:
-        """|y|ᵀ|H||x|."""
-
-    def solver(self, sigma: float, tolerance: float = EXACTLY) -> Solve:
-        """(σ − H)⁻¹, to a tolerance where that is by iteration. Raises `SingularMatrix`."""
-
-
 class Eigenpair(NamedTuple):
     """An eigenvalue with its right and left vector, yᵀx = 1.
 
     Attributes:
         change: of the value by the last step, where that is not rounding.
         size: of the terms that the value is the sum of.
+        finer: how many times polynomials of the time were made finer, where there are delays.
     """
 
     value: float
@@ -80,52 +57,82 @@ class Eigenpair(NamedTuple):
     y: Any
     change: float
     size: float
+    finer: int = 0
 
 
-def rightmost(h: Rates, x: FloatArray, y: FloatArray) -> Eigenpair:
-    """The rightmost eigenvalue, from a positive right and a positive left vector. Raises `NoHierarchy`."""
-    sigma = h.bound + 0.1 * max(1e-3 * h.largest, abs(h.bound), sys.float_info.min)
-    value, away = -np.inf, np.inf
-    for _ in range(MOST_STEPS):
-        last, start = value, x
-        share, x = _largest(inverse(h, sigma, x.size, ROUGHLY), x)
-        value = sigma - 1 / share
-        if last - value > PASSED * away:
-            x, value, sigma = start, last, last + away
-            break
-        if abs(value - last) <= SETTLED * (sigma - value):
-            break
-        away = sigma - value
-        sigma = value + NEARER * away
-    change, size = 0.0, h.largest
-    for _ in range(MOST_POLISHES):
-        before = x, y
-        try:
-            solve = inverse(h, sigma, x.size)
-        except SingularMatrix:  # it is an eigenvalue to the last digit
-            break
-        for _ in range(2):
-            x, y = (each / float(np.max(np.abs(each))) for each in (solve(x), solve(y, 1)))
-        last, value = value, float(y @ (h @ x)) / float(y @ x)
-        size = h.sizes(x, y) / abs(float(y @ x))
-        change = abs(value - last)
-        turned = max(float(np.max(np.abs(new - old))) for new, old in zip((x, y), before, strict=True))
-        if change <= 0.1 * ROUNDING * size and turned <= STILL:
-            break
-        sigma = value + max(1e-3 * ROUNDING * size, NEARER * (sigma - value))
-    return Eigenpair(value, x, y / (y @ x), change if change > ROUNDING * size else 0.0, size)
+class Rates(Protocol):
+    """H, in whatever form it is held."""
 
+    @property
+    def T(self) -> Rates:
+        """The transpose."""
 
-def inverse(h: Rates, sigma: float, size: int, tolerance: float = EXACTLY) -> Solve:
-    """(σ − H)⁻¹ of so many numbers, within the budget. Raises as `Rates.solver`, and `OverBudget`."""
-    charge(size)
-    solve = h.solver(sigma, tolerance)
+    def __matmul__(self, x: FloatArray) -> FloatArray: ...
 
-    def asked(x: FloatArray, trans: int = 0) -> FloatArray:
+    def on(self, functions: Any) -> Rates:
+        """H of some functions of the noise."""
+
+    def sizes(self, x: FloatArray, y: FloatArray) -> float:
+        """|y|ᵀ|H||x|."""
+
+    def solver(self, sigma: float, tolerance: float = EXACTLY) -> Solve:
+        """(σ − H)⁻¹, to a tolerance where that is by iteration. Raises `SingularMatrix`."""
+
+    def at(self, value: float) -> Rates:
+        """H at an eigenvalue, on which it depends where there are delays."""
+        return self
+
+    def inverse(self, sigma: float, size: int, tolerance: float = EXACTLY) -> Solve:
+        """(σ − H)⁻¹ of so many numbers, within the budget. Raises as `solver`, and `OverBudget`."""
         charge(size)
-        return np.asarray(solve(x, trans))
+        solve = self.solver(sigma, tolerance)
 
-    return asked
+        def asked(x: FloatArray, trans: int = 0) -> FloatArray:
+            charge(size)
+            return np.asarray(solve(x, trans))
+
+        return asked
+
+    def rightmost(self, x: FloatArray, bound: float) -> Eigenpair:
+        """The rightmost eigenvalue.
+
+        Args:
+            x: a positive right vector, which is a positive left one, too.
+            bound: what no real part of an eigenvalue exceeds.
+
+        Raises:
+            NoHierarchy: it is not found.
+        """
+        y, size, change = x, self.sizes(x, x) / float(x @ x), 0.0
+        sigma = bound + 0.1 * max(1e-3 * size, abs(bound), sys.float_info.min)
+        value, away = -np.inf, np.inf
+        for _ in range(MOST_STEPS):
+            last, start = value, x
+            share, x = _largest(self.inverse(sigma, x.size, ROUGHLY), x)
+            value = sigma - 1 / share
+            if last - value > PASSED * away:
+                x, value, sigma = start, last, last + away
+                break
+            if abs(value - last) <= SETTLED * (sigma - value):
+                break
+            away = sigma - value
+            sigma = value + NEARER * away
+        for _ in range(MOST_POLISHES):
+            before = x, y
+            try:
+                solve = self.inverse(sigma, x.size)
+            except SingularMatrix:  # it is an eigenvalue to the last digit
+                break
+            for _ in range(2):
+                x, y = (each / float(np.max(np.abs(each))) for each in (solve(x), solve(y, 1)))
+            last, value = value, float(y @ (self @ x)) / float(y @ x)
+            size = self.sizes(x, y) / abs(float(y @ x))
+            change = abs(value - last)
+            turned = max(float(np.max(np.abs(new - old))) for new, old in zip((x, y), before, strict=True))
+            if change <= 0.1 * ROUNDING * size and turned <= STILL:
+                break
+            sigma = value + max(1e-3 * ROUNDING * size, NEARER * (sigma - value))
+        return Eigenpair(value, x, y / (y @ x), change if change > ROUNDING * size else 0.0, size)
 
 
 def _largest(solve: Solve, x: FloatArray) -> tuple[float, FloatArray]:

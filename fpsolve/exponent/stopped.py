@@ -27,7 +27,8 @@ import scipy.linalg
 from fpsolve.arrays import FloatArray
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.error import Solution
-from fpsolve.exponent.modes import DirectionStart, first_order_changes, frame_of, mean_matrix, second_moments
+from fpsolve.exponent.modes import DirectionStart, first_order_changes, frame_of, second_moments
+from fpsolve.exponent.moments import mean_matrix
 from fpsolve.exponent.starts import SHARE
 from fpsolve.fem.directions import HalfSphereAxis
 from fpsolve.fem.generator import Generator
