@@ -392,7 +392,7 @@ class Equations:
         dimension: the number of variables that are no past values of others.
         is_large: whether their second moments are matrices.
         scales: of the functions of the state, by these units.
-        largest: what no number in H exceeds.
+        largest: what about no number in H exceeds.
 
     Raises:
         NoHierarchy: numbers in it are beyond floating-point numbers.
@@ -415,7 +415,7 @@ class Equations:
             loads.append(matrix)
         squares = [drift.epsilon**each.order * np.array(each.matrix) for each in diffusions]
         jolts = [(each.rate, np.array(each.exponent)) for each in impulses]
-        moving, sizes = Moving(steady, loads, squares, jolts), _sizes(self.over_noise([FIRST] * len(self.noises))[1])
+        moving, sizes = Moving(steady, loads, squares, jolts), _sizes(self.over_noise([2] * len(self.noises))[1])
         self.units = moving.balance(sizes, [variable for variable, _ in self.pasts]) if units is None else units
         self.moving = moving.over(self.units)
         own = combinations_with_replacement(self.units[: self.dimension].tolist(), p)

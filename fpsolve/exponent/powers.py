@@ -133,16 +133,18 @@ class Moving(NamedTuple):
         return Moving(turned(self.steady), loads, squares, impulses)
 
     def bounds(self, p: int, sizes: Sequence[float]) -> tuple[float, float]:
-        """What no real part of an eigenvalue exceeds, and no number in H, with some sizes of the functions of noise."""
+        """What no real part of an eigenvalue exceeds, and about no number in H, with sizes of functions of noise."""
 
         def size(matrix: FloatArray) -> float:
             return p * float(np.linalg.norm(matrix, 2))
 
-        driven = sum(each * size(load) for each, load in zip(sizes, self.loads, strict=True))
-        driven += 0.5 * sum(size(each) ** 2 for each in self.squares)
+        driven = 0.5 * sum(size(each) ** 2 for each in self.squares)
         driven += sum(rate * size(each) * np.exp(size(each)) for rate, each in self.impulses)
+        loads = [*zip(sizes, self.loads, strict=True)]
         most = 0.5 * p * float(np.linalg.eigvalsh(self.steady + self.steady.T)[-1])
-        return most + driven, size(self.steady) + driven
+        most += sum(each * size(load) for each, load in loads)
+        largest = p * float(np.max(sum((each * abs(load) for each, load in loads), abs(self.steady))))
+        return most + driven, largest + driven
 
 
 def moves(moving: Moving, p: int) -> list[Any]:
