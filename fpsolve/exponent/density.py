@@ -370,7 +370,7 @@ def direction_map(pair: PrincipalPair) -> FloatArray:
     scales = np.ones(problem.dimension)
     for q, size in oscillators(problem).items():
         scales[q + 1] = size
-    return np.linalg.inv(reduce(np.matmul, [np.array(each) for each in maps if each])) * scales
+    return np.linalg.inv(reduce(np.matmul, [np.array(each) for each in maps if each is not None])) * scales
 
 
 def xi_marginal(pair: PrincipalPair, at: Samples) -> FloatArray:

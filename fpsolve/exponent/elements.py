@@ -217,9 +217,10 @@ class Elements(Method):
         """
         chosen, p = found.pair.generator.chosen, search.p
         if self.is_at_corner(p) and is_mixed(found.pair):
-            if finer_pair := search.attempt(partial(self.finer_pair, found.pair)):
-                return replace(found, search=2 * abs(finer_pair.value - found.pair.value))
-            return self._confirmed(search, search.settle(Start(self.problem, chosen.doubled())), tolerance)
+            halves = chosen.doubled()
+            if pair := search.attempt(partial(self.pair_among, halves, found.pair)):
+                return replace(found, search=2 * abs(pair.value - found.pair.value))
+            return self._confirmed(search, search.settle(Start(self.problem, halves)), tolerance)
         if self.settings.rtol <= SURELY_SEEN or not isinstance(chosen.phi, PhaseAxis):
             return found
         halved = chosen.with_axis(0, chosen.phi.doubled())
