@@ -25,7 +25,6 @@ from scipy import sparse
 from scipy.linalg import eig, expm
 
 from fpsolve.arrays import FloatArray, IntArray, dense, finite
-from fpsolve.budget import charge
 from fpsolve.errors import NoHierarchy
 from fpsolve.exponent.powers import Moving, PowerRates, moment_form
 from fpsolve.exponent.rightmost import REMEDY, ROUNDING, Eigenpair
@@ -205,7 +204,6 @@ class DelayRates:
         x, slopes, _ = _polynomials(math.ceil((FEWEST + slow) * GROWTH**self.finer))
         if (size := count * x.size * width) > MOST_SIZE:
             raise NoHierarchy(f"{size} second moments over a delay are more than {MOST_SIZE}; {REMEDY}")
-        charge(size)
         whole = np.zeros(2 * (count, x.size, width), dtype=moving.dtype)
         starts, one, every = np.zeros((count, x.size, width, width)), np.eye(width), np.arange(x.size)
         for j in range(count):
