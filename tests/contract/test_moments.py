@@ -28,7 +28,7 @@ from fpsolve.model import Telegraph, White
 from tests.kit import read_csv, read_json, run
 from tests.numbers.rows.heavy_tails import tailed
 from tests.numbers.rows.many_variables import masses
-from tests.numbers.rows.rays import NOISES, SYSTEMS, matrices, scalar
+from tests.numbers.rows.rays import matrices
 from tests.numbers.rows.saddles import SADDLE, TURN, UNDER_FILTER
 from tests.numbers.values import moment
 from tests.oracles import perturbation
@@ -142,20 +142,6 @@ def test_lyapunov_exponent_among_tails_is_that_of_almost_every_path():
     assert "almost every path" in lyapunov_exponent(falling).meaning
     found = moment_lyapunov(falling, [0.0])
     assert (found.value[0], np.isnan(found.derivative[0])) == (0.0, True)
-
-
-def test_classes_of_rays_have_names_and_moments_for_negative_p_too():
-    p, noise = np.array([-0.5, 2.0]), NOISES["OU"]
-    free, driven = SYSTEMS["triangular"]
-    found = ExponentSolver(matrices(free, driven, noise)).by_class(p)
-    for each, k, words in zip(found, (1, 0), ("along", "across"), strict=True):  # (0, 1) spans what is invariant
-        assert each.name == f"{words} the ray at phi = 1.5708"
-        assert each.lyapunov_exponent.value == pytest.approx(free[k][k], abs=1e-9)
-        expected = [scalar("OU", one, free[k][k], driven[k][k]) for one in p]
-        np.testing.assert_allclose(each.value, expected, atol=1e-9)
-    found = ExponentSolver(matrices(*SYSTEMS["diagonal"], noise)).by_class([])
-    assert [each.name.split()[0] for each in found] == ["along", "along"]
-    assert moment_lyapunov(FIG1, 1.0).classes == ()
 
 
 def test_moments_below_minus_one_of_a_saddle_say_that_the_start_matters():

@@ -23,9 +23,8 @@ OF_LIBRARIES = {"Dofs.__init__", "get_quadrature", "ElementLinePp.lbasis", "Mesh
 
 
 def test_walk_names_functions_that_run_and_libraries_do_the_work(tmp_path):
-    text = (ROOT / "docs/contributing.md").read_text(encoding="utf-8")
-    [walk] = re.findall(r"^## A walk.*?\n(.*?)^## ", text, re.DOTALL | re.MULTILINE)
-    names = set(re.findall(r"`(\w+(?:\.\w+)?)`", walk)) - {"ExponentSolver", "PhaseAxis", "Generator", "Solution"}
+    walk = (ROOT / "docs/contributing.md").read_text(encoding="utf-8").partition("## A walk")[2].partition("\n## ")[0]
+    names = set(re.findall(r"`(\w+(?:\.\w+)?)`", walk))
     program = [sys.executable, "-c", PROGRAM, str(CASES / "minimal.toml")]
     found = subprocess.run(program, cwd=tmp_path, check=True, capture_output=True, text=True, env={"PYTHONPATH": ROOT})
     of_number, of_all = (set(line.split()) for line in found.stdout.splitlines())

@@ -8,7 +8,7 @@ from fpsolve import OrnsteinUhlenbeck, PlaneSystem, Problem
 from fpsolve.model import CoefficientMatrix, Jump, MarkovChain, SineWiener, Telegraph, White
 from tests.kit import matrices, rates
 from tests.numbers.by_problem import even_rows
-from tests.numbers.values import Row, moment, moments, slope, variance_rate
+from tests.numbers.values import Row, moment, moments, variance_rate
 from tests.oracles import moment_hierarchy
 
 
@@ -104,7 +104,6 @@ ROWS = [
         )
         for rtol in (1e-5, 1e-8)
     ),
-    Row(CORNER, slope(-1.0, rtol=1e-5), 1.12, 0.0, 200.0, "any slope from −1.22 on at a corner"),
     *moments(
         rates("x' = 1304.5654004177877*v; v' = -xi*v", White(s=35.47186471641247, interpretation="ito")),
         {p: 0.5 * p * (p - 1) * 35.47186471641247**2 for p in (1.04268799533869, 2.4876484873472053)},
