@@ -63,6 +63,8 @@ NEGLIGIBLE_P = 1e-30
 """Pairs at smaller |p| are those at p = 0, from which they differ by less than by rounding."""
 NEIGHBOURS = 6
 """How many known eigenfunctions those of another p are interpolated from."""
+SLOWEST = 0.9
+"""The largest ratio of two changes in turn that is reckoned with."""
 WIDER = 4.0
 """Factor by which the interval of noise with algebraic tails is wider where it tells the error of a narrower one."""
 SURELY_SEEN = 1e-6
@@ -398,15 +400,21 @@ class Elements(Method):
         return 2 * abs(finer.derivative - pair.derivative) + slope_rounding(pair)
 
     def slope_error(self, p: float) -> float:
-        """Twice what a finer discretisation changes, or what has changed since a coarser one of the same place."""
+        """What finer discretisations change, times 1/(1 − r), r the ratio of two changes in turn; or twice what has
+        changed since a coarser one of the same place."""
         if abs(p) < TINIEST_P:
             return self.ratio_alone(0.0)[1]
         solution = self.solution(p)
         with one_thread():
-            jump = self._jump() if self.is_at_corner(p) else 0.0
-            coarser = [each.pair for each in getattr(solution.start, "before", ())]
-            other = coarser[-1] if coarser else self.finer_pair(solution.pair)
-            return 2 * abs(other.derivative - solution.derivative) + slope_rounding(solution.pair) + jump
+            rest = slope_rounding(solution.pair) + (self._jump() if self.is_at_corner(p) else 0.0)
+            if coarser := getattr(solution.start, "before", ()):
+                return 2 * abs(coarser[-1].derivative - solution.derivative) + rest
+            finer = self.finer_pair(solution.pair)
+            change, ratio = abs(finer.derivative - solution.derivative), 0.5
+            with suppress(NotConverged):
+                more = abs(self.finer_pair(finer).derivative - finer.derivative)
+                change, ratio = change + more, min(more / max(change, sys.float_info.min), SLOWEST)
+            return change / (1 - ratio) + rest
 
     def _jump(self) -> float:
         """What Λ′ rises at p = −1 if Λ″ on both sides does not explain it: there is any slope between at a corner."""

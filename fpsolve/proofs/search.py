@@ -134,10 +134,7 @@ class Galerkin:
         u = self.one.ravel().astype(complex)
         adjoint, value = u, guess
         for _ in range(2):
-            try:
-                factors = sparse_lu((self.matrix - value * self.mass).tocsc())
-            except ArithmeticError:  # the shift is the eigenvalue but for rounding
-                factors = sparse_lu((self.matrix - (value + NUDGE * (1 + abs(value))) * self.mass).tocsc())
+            factors = sparse_lu((self.matrix - (value + NUDGE * (1 + abs(value))) * self.mass).tocsc())
             for _ in range(4):
                 u, adjoint = factors.solve(self.mass @ u), factors.solve(self.mass @ adjoint, "H")
                 u, adjoint = (vector / vector[np.argmax(np.abs(vector))] for vector in (u, adjoint))
