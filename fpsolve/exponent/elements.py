@@ -400,8 +400,10 @@ class Elements(Method):
         return 2 * abs(finer.derivative - pair.derivative) + slope_rounding(pair)
 
     def slope_error(self, p: float) -> float:
-        """What finer discretisations change, times 1/(1 − r), r the ratio of two changes in turn; or twice what has
-        changed since a coarser one of the same place."""
+        """1.5 times the larger of two changes by finer discretisations over 1 − r, r their ratio if they have one sign.
+
+        With one finer one alone r is taken as ¼. Or twice what has changed since a coarser one of the same place.
+        """
         if abs(p) < TINIEST_P:
             return self.ratio_alone(0.0)[1]
         solution = self.solution(p)
@@ -410,11 +412,12 @@ class Elements(Method):
             if coarser := getattr(solution.start, "before", ()):
                 return 2 * abs(coarser[-1].derivative - solution.derivative) + rest
             finer = self.finer_pair(solution.pair)
-            change, ratio = abs(finer.derivative - solution.derivative), 0.5
+            change = finer.derivative - solution.derivative
+            more = 0.25 * change
             with suppress(NotConverged):
-                more = abs(self.finer_pair(finer).derivative - finer.derivative)
-                change, ratio = change + more, min(more / max(change, sys.float_info.min), SLOWEST)
-            return change / (1 - ratio) + rest
+                more = self.finer_pair(finer).derivative - finer.derivative
+            ratio = np.clip(more / (change or sys.float_info.min), 0.0, SLOWEST)
+            return float(1.5 * max(abs(change), abs(more)) / (1 - ratio) + rest)
 
     def _jump(self) -> float:
         """What Λ′ rises at p = −1 if Λ″ on both sides does not explain it: there is any slope between at a corner."""
