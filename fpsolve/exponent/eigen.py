@@ -233,8 +233,11 @@ def _is_rightmost(pair: PrincipalPair, space: Space) -> bool:
         operator = operator.T if side else operator
         inverse = LinearOperator(2 * source.shape, lambda v: factor.solve(v, transposed=bool(side)), dtype=float)
         moved = LinearOperator(2 * source.shape, lambda v: operator @ v, dtype=float)
-        for solution in (inverse @ source, gmres(moved, source, M=inverse, rtol=RESOLVED, restart=STEPS, maxiter=1)[0]):
-            both[side] = -solution
+        solution, failed = gmres(moved, source, M=inverse, rtol=RESOLVED, restart=STEPS, maxiter=1)
+        if failed:
+            solution = pencil.factorised(far).solve(source, transposed=bool(side))
+        for each in (inverse @ source, solution):
+            both[side] = -each
             if _sign_defects(space, *both)[side] > SURELY_POSITIVE:
                 return False
         return True
