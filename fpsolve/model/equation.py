@@ -39,12 +39,7 @@ def equations_of(system: System) -> list[str]:
     cubic = np.array(system.cubic.matrix) if system.cubic else np.zeros((n, 4))
     first = [still[0, 0], *cubic[0], *(each for matrix in driven.values() for each in matrix[0])]
     rows: list[tuple[str, FloatArray, FloatArray, dict[str, FloatArray], Sequence[str]]]
-    rates = len(system.states) if system.pasts else n
-    names = (
-        *system.states,
-        *([""] if system.forced else []),
-        *(f"{system.states[k]}(t − {delay:.10g})" for k, delay in system.pasts),
-    )
+    rates, names = len(system.states), system.columns
     x = names[0].removesuffix("₁")
     if n == 2 and speed != 0 and not any(first) and len(x) == 1:
         scale, names = np.array([speed, 1.0]), (x, _dotted(x, 1))

@@ -243,9 +243,6 @@ class LinearRecord(Record):
     def of(cls, problem: Problem) -> LinearRecord:
         """The matrices of a problem. Raises `TypeError` where its noise is not white."""
         drift, diffusions, impulses = problem.noise.motion(problem.system)
-        if impulses or not problem.noise.is_white or problem.system.pasts:
-            told = f"got a system of {problem.dimension} variables under other noise than white, or with a delay"
-            raise TypeError(f"{told}; proofs are for two variables under {KNOWN}, and for more under White")
         steady, *noisy = (
             sum(
                 (drift.epsilon**each.order * np.array(each.matrix) for each in terms),
@@ -253,6 +250,10 @@ class LinearRecord(Record):
             )
             for terms in (drift.terms, *([each] for each in diffusions))
         )
+        is_moved = np.any([steady, *noisy], axis=(0, 2))
+        if impulses or not problem.noise.is_white or not is_moved.all():
+            told = f"got a system of {problem.dimension} variables under other noise than white, or with a delay"
+            raise TypeError(f"{told}; proofs are for two variables under {KNOWN}, and for more under White")
         return cls(drift=steady.tolist(), diffusions=[each.tolist() for each in noisy])
 
     def problem(self, factor: FloatArray) -> Problem:

@@ -16,7 +16,7 @@ from scipy.linalg import expm
 
 from fpsolve.arrays import FloatArray
 from fpsolve.model.noise import Noise
-from fpsolve.model.plane import System, affine, is_driven, matrix_at, squared_frequency
+from fpsolve.model.plane import System, affine, common_delay, is_driven, matrix_at, squared_frequency
 from fpsolve.simulation.rays import Rays
 
 if TYPE_CHECKING:
@@ -197,6 +197,11 @@ class DelayedCoefficients(SplitCoefficients):
         n = self.dimension - len(self.pasts)
         rows = np.array([variable + n * round(delay / h) for variable, delay in self.pasts])
         return DelayedSpace(self.steady[:n].copy(), self.driven[:, :n].copy(), rows)
+
+
+def repeated_delay(system: System) -> float:
+    """The time of which all delays of a system are multiples, ∞ without any. Raises `ValueError`: there is none."""
+    return common_delay(system.pasts)[0] if system.pasts else math.inf
 
 
 def split_coefficients(system: System, noise: Noise) -> SplitCoefficients:

@@ -12,9 +12,9 @@ from fpsolve.arrays import FloatArray, is_whole, real_numbers, shown
 from fpsolve.errors import FpsolveError, NoSuchExponent
 from fpsolve.model.noise import Noise
 from fpsolve.model.noises.clock import waves_apart
-from fpsolve.model.plane import SAME_DELAY, System, affine, common_delay, written_coefficient
+from fpsolve.model.plane import SAME_DELAY, System, affine, written_coefficient
 from fpsolve.model.problem import Problem, checked_problem, infinite
-from fpsolve.simulation.coefficients import ROUGHER, SplitCoefficients, coefficients
+from fpsolve.simulation.coefficients import ROUGHER, SplitCoefficients, coefficients, repeated_delay
 
 Estimator = Literal["direct", "population"]
 SPLIT = 0.06
@@ -43,13 +43,12 @@ def simulated_parts(problem: Problem) -> tuple[System, Noise]:
     if system.clock:
         system, noise = waves_apart(system, noise)
     try:
-        _ = common_delay(system.pasts) if system.pasts else None
+        repeated_delay(system)
     except ValueError as failure:
         raise FpsolveError(f"simulation is in steps that divide each delay, but {failure}") from failure
     if problem.dimension > 2 and problem.impulses:
-        found = "the state has delays" if system.pasts else f"there are {problem.dimension}"
-        told = f"simulation under impulses is for two variables, but {found}"
-        raise FpsolveError(f"{told}; take {'p = 2' if system.pasts else 'even p'}, which needs none")
+        told = f"simulation under impulses is for two variables without a delay, but there are {problem.dimension}"
+        raise FpsolveError(f"{told}; take an even p, which needs none")
     if system.stop is not None and (len(noise.parts) > 1 or system.clock):
         raise FpsolveError("simulation of a wall of more than two variables is for one noise, without periodic terms")
     bent = [term.g for term in system.terms if affine(term.g) is None]
@@ -101,7 +100,7 @@ def largest_step(oscillator: System, noise: Noise) -> tuple[float, str]:
             "the damping": SPLIT / rest if rest else math.inf,
             "the strength of the noise": min(strengths, default=math.inf),
             "the correlation time of the noise": noise.largest_step,
-            "the delay": common_delay(oscillator.pasts)[0] / 4 if oscillator.pasts else math.inf,
+            "the delay": repeated_delay(oscillator) / 4,
         }
         reason = min(split, key=lambda name: split[name])
         return split[reason], reason
@@ -142,8 +141,8 @@ def default_step(oscillator: System, noise: Noise) -> float:
 
 def _repeated(oscillator: System, noise: Noise) -> float:
     """The delay, or the period of a harmonic load, without one a half-turn."""
-    if oscillator.pasts:
-        return common_delay(oscillator.pasts)[0]
+    if math.isfinite(delay := repeated_delay(oscillator)):
+        return delay
     return max(part.period for part in noise.parts.values()) or coefficients(oscillator, noise).half_turn
 
 
@@ -161,8 +160,8 @@ def obstacles(
         found["step"] = (
             f"got {step:g}, too large for {reason}; must be > 0 and <= {largest:.4g}; reduce it, or leave it out"
         )
-    elif step is not None and oscillator.pasts and not _divides(step, oscillator):
-        unit = common_delay(oscillator.pasts)[0] / ROUGHER
+    elif step is not None and not _divides(step, oscillator):
+        unit = repeated_delay(oscillator) / ROUGHER
         near = unit / math.ceil(unit / step)
         found["step"] = f"got {step:.10g}; must be a third, a sixth, … of the delay, such as {near:.10g}"
     elif step is not None and step < least <= largest:
@@ -186,8 +185,8 @@ def obstacles(
 
 def _divides(step: float, system: System) -> bool:
     """Whether the delays of a system are whole numbers of rough steps."""
-    parts = common_delay(system.pasts)[0] / (ROUGHER * step)
-    return abs(parts - round(parts)) <= SAME_DELAY * parts
+    parts = repeated_delay(system) / (ROUGHER * step)
+    return not math.isfinite(parts) or abs(parts - round(parts)) <= SAME_DELAY * parts
 
 
 def starting_state(

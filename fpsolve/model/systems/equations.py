@@ -336,6 +336,10 @@ class EquationSystem(System):
         return (*self.variables, f"{self.variables[0]}*") if is_plane else self.variables  # as `as_plane` has it
 
     @property
+    def columns(self) -> Sequence[str]:
+        return (*super().columns, *(f"{self.variables[k]}(t − {delay:.10g})" for k, delay in self.pasts))
+
+    @property
     def values(self) -> Mapping[str, float | str]:
         return dict(self.named)
 
