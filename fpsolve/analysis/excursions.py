@@ -311,8 +311,6 @@ def _inverse(of: Estimate, factor: float = 1.0) -> Estimate | None:
 def _own_phase(pair: PrincipalPair, psi: FloatArray) -> tuple[FloatArray, FloatArray]:
     """φ in the coordinates of the system, and ρ^p there."""
     frame = pair.generator.problem.frame
-    if frame is None:
-        return psi, np.ones(psi.shape)
     phi = frame.own_phase(psi)
     return phi, frame.length(phi) ** pair.p
 
@@ -329,12 +327,12 @@ def _at_start(pair: PrincipalPair, phi: Start, xi: StartOfNoise) -> float:
     """T₀, the mean of T over the start, in the coordinates of the system."""
     space, frame = pair.space, pair.generator.problem.frame
     if phi == UNIFORM:
-        psi, weights = space.phi.finer_rule(1 if frame is None else frame.parts)
+        psi, weights = space.phi.finer_rule(frame.parts)
         own, stretch = _own_phase(pair, psi)
-        weights = weights * stretch / (space.phi.span * (1.0 if frame is None else frame.density(own)))
+        weights = weights * stretch / (space.phi.span * frame.density(own))
         at_phi = weights @ space.phi.at(psi)
     else:
-        psi = np.array([float(phi)]) if frame is None else frame.phase(np.array([float(phi)]))
+        psi = frame.phase(np.array([float(phi)]))
         first, span = space.phi.lines[0], space.phi.span
         psi, after = (first + np.mod(each - first, span) for each in (psi, psi + 1e-9))
         _, stretch = _own_phase(pair, psi)

@@ -38,7 +38,6 @@ from fpsolve.errors import MeshError, OutputError, SingularMatrix
 from fpsolve.exponent.eigen import PrincipalPair, principal_pair
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.noise_axes import Samples
-from fpsolve.model.frame import Frame
 from fpsolve.model.plane import is_driven
 from fpsolve.model.problem import Problem
 from fpsolve.model.quantity import PHASE, density_unit
@@ -68,8 +67,6 @@ SHARES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
 LATITUDES = np.pi * np.arange(-2, 3) / 4, [r"$-\pi/2$", r"$-\pi/4$", "0", r"$\pi/4$", r"$\pi/2$"]
 ONE = np.ones(1)
 """ρ and |det R| ρ^(−n) in the coordinates of the solve, where R = 1."""
-ITSELF = Frame(((1.0, 0.0), (0.0, 1.0)))
-"""The coordinates of a problem that is solved in its own."""
 
 
 class Fields(NamedTuple):
@@ -109,7 +106,7 @@ class Grid:
         """The points of the rule of a pair, on the full circle. Raises `OutputError`."""
         refuse_more(pair)
         problem, axis, at = pair.generator.problem, pair.space.phi, pair.space.xi.samples()
-        frame, noise = problem.frame or ITSELF, problem.noise_quantity
+        frame, noise = problem.frame, problem.noise_quantity
         phi = frame.own_phase(np.concatenate([axis.points + k * axis.span for k in range(axis.turns)]))
         weights, phi = np.tile(axis.weights, axis.turns) / frame.density(phi), np.mod(phi, 2 * np.pi)
         order = np.argsort(phi)
@@ -229,7 +226,7 @@ def plane_fields(pair: PrincipalPair, phi: FloatArray, inside: FloatArray, at: S
 
     T has mean 1 over P_s(ξ)/2π; with a tilt beyond `MOST_TILT`, which leaves T there to rounding, over P_s exp(2s z).
     """
-    axis, xi, frame = pair.space.phi, pair.space.xi, pair.generator.problem.frame or ITSELF
+    axis, xi, frame = pair.space.phi, pair.space.xi, pair.generator.problem.frame
     psi, weights = axis.finer_rule(frame.parts)
     own, rule = frame.own_phase(psi), xi.samples()
     law = xi.law() * rule.factor if abs(xi.tilt) <= MOST_TILT else xi.measure
@@ -366,7 +363,7 @@ def direction_map(pair: PrincipalPair) -> FloatArray:
     """R = S⁻¹D, which takes z to y."""
     problem = pair.generator.problem
     stop, frame = problem.system.stop, problem.frame
-    maps = [stop and stop.coordinates, frame and frame.matrix, pair.space.phi.coordinates]
+    maps = [stop and stop.coordinates, frame.matrix, pair.space.phi.coordinates]
     scales = np.ones(problem.dimension)
     for q, size in oscillators(problem).items():
         scales[q + 1] = size

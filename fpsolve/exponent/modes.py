@@ -59,11 +59,6 @@ MEASURED = 1.5
 """What is left after elements or polynomials of the noise, over the sizes of what each of two degrees more changes."""
 
 
-def frame_of(problem: Problem) -> FloatArray:
-    """F of x = F z, z being what a problem is solved in."""
-    return np.eye(problem.dimension) if problem.frame is None else np.array(problem.frame.matrix)
-
-
 def second_moments(problem: Problem, own: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Q of E‖x‖² = xᵀQx and the second moments of y = own⁻¹x, each of the trace 1, but for `THINNEST`² in each of y.
 
@@ -93,7 +88,7 @@ def modal_coordinates(problem: Problem) -> tuple[FloatArray, float]:
     rates, own = scipy.linalg.cdf2rdf(*np.linalg.eig(free))
     if np.linalg.cond(own) > WORST_CONDITION:
         rates, (_, own) = np.eye(len(free)), scipy.linalg.matrix_balance(free, permute=False)
-    q, moments = second_moments(problem, frame_of(problem) @ own)
+    q, moments = second_moments(problem, np.array(problem.frame.matrix) @ own)
     modes = (rates != 0) | np.eye(len(free), dtype=bool)
     units = (modes @ np.diagonal(moments) / (modes @ np.diagonal(q))) ** 0.25
     sizes, axes = np.linalg.eigh(units[:, None] * q * units)

@@ -27,7 +27,7 @@ import scipy.linalg
 from fpsolve.arrays import FloatArray
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.error import Solution
-from fpsolve.exponent.modes import DirectionStart, first_order_changes, frame_of, second_moments
+from fpsolve.exponent.modes import DirectionStart, first_order_changes, second_moments
 from fpsolve.exponent.moments import mean_matrix
 from fpsolve.exponent.starts import SHARE
 from fpsolve.fem.directions import HalfSphereAxis
@@ -92,7 +92,7 @@ class StopStart(DirectionStart):
         forms = second_moments(replace(problem, system=smooth), own)
         q, moments = (np.diagonal(each).reshape(2, 2).sum(axis=1) for each in forms)
         return HalfSphereAxis(
-            np.linalg.solve(frame_of(problem), own * np.repeat((moments / q) ** 0.25, 2)),
+            np.linalg.solve(np.array(problem.frame.matrix), own * np.repeat((moments / q) ** 0.25, 2)),
             0.5 * math.pi * np.array(AT_STOP),
             FIRST_DEGREE,
             FIRST_WAVES,

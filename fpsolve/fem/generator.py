@@ -106,8 +106,7 @@ class Generator:
 
     def __str__(self) -> str:
         lines = [f"  {power_of_epsilon(term.order):<2}  {term.text}" for term in self.terms()]
-        words = "" if self.problem.frame is None else " in coordinates of its own,"
-        return "\n".join([f"L(p), Eq. (19){words} the sum of", *lines])
+        return "\n".join([f"L(p), Eq. (19){self.problem.frame.words} the sum of", *lines])
 
     def space(self, p: float) -> Space:
         """Trial and test functions; the tilt of those of ξ moves with p."""

@@ -19,7 +19,7 @@ from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.fem.noise_axes import CellAxis, NoiseAxis, PolynomialAxis, StateAxis
 from fpsolve.fem.pairs import PairAxis
 from fpsolve.fem.phase import PhaseAxis
-from fpsolve.model.frame import Frame
+from fpsolve.model.frame import ITSELF, Frame
 from fpsolve.model.noise import Noise
 
 MOST_BYTES = 1.2e9
@@ -51,7 +51,7 @@ class Space:
     axes: tuple[Any, ...]
 
     @classmethod
-    def on(cls, mesh: CylinderMesh, noise: Noise, frame: Frame | None = None) -> Space:
+    def on(cls, mesh: CylinderMesh, noise: Noise, frame: Frame = ITSELF) -> Space:
         """The elements of a mesh, which is cut off at the end of the noise's support, in the coordinates of a frame.
 
         Raises:
@@ -65,7 +65,7 @@ class Space:
                 "noise with states, with an angle or of a filter needs a mesh without z_lines, and other noise a mesh "
                 "with z_lines; leave the mesh out, and one is chosen for each p"
             )
-        lines = mesh.phi_lines if frame is None else frame.phase(mesh.phi_lines)
+        lines = frame.phase(mesh.phi_lines)
         phi = PhaseAxis.of(lines, np.full(lines.size - 1, mesh.phi_degree))
         if noise.is_diffusion:
             mesh = mesh.within(noise.half_width / noise.standard_deviation)

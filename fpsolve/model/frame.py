@@ -61,6 +61,16 @@ class Frame:
     def _array(self) -> FloatArray:
         return np.array(self.matrix)
 
+    @property
+    def is_itself(self) -> bool:
+        """Whether S = 1, so that y is x."""
+        return np.array_equal(self._array, np.eye(len(self._array)))
+
+    @property
+    def words(self) -> str:
+        """What is said of it."""
+        return "" if self.is_itself else " in coordinates of its own,"
+
     @cached_property
     def _inverse(self) -> FloatArray:
         return np.asarray(solve_triangular(self._array, np.eye(len(self._array)), lower=True))
@@ -81,6 +91,8 @@ class Frame:
 
     def motion(self, system: System) -> System:
         """A system for y, the terms of order 0 that no noise drives as one; a rotation is one exactly."""
+        if self.is_itself:
+            return system
         others = [self.term(term) for term in system.terms if not is_free(term)]
         free = _free(system.terms, len(self.matrix))
         a = self._inverse @ free @ self._array
@@ -112,6 +124,10 @@ class Frame:
         return np.asarray(np.linalg.det(self._inverse) / self.length(phi) ** 2)
 
 
+ITSELF = Frame(((1.0, 0.0), (0.0, 1.0)))
+"""That of the phase of x itself."""
+
+
 def amplitude_frame(system: System) -> Frame:
     """The frame in which ‖y‖ is the amplitude of a system with cubic terms, see `System.aspect`."""
     return Frame(((1.0, 0.0), (0.0, system.aspect / system.second_unit)))
@@ -122,8 +138,8 @@ def is_free(term: CoefficientMatrix) -> bool:
     return term.order == 0 and not is_driven(term.g)
 
 
-def own_frame(n: int, motion: Motion, spread: Callable[[str], tuple[float, float]]) -> tuple[Frame | None, float]:
-    """The frame in which a motion is small, None where x itself is hardly worse; and its size there, a rate.
+def own_frame(n: int, motion: Motion, spread: Callable[[str], tuple[float, float]]) -> tuple[Frame, float]:
+    """The frame in which a motion is small, x itself where that is hardly worse; and its size there, a rate.
 
     That is ‖A‖ + Σ‖B‖² + Σ r‖C‖ + Σ min(s‖D‖, τs²‖D‖²), A all that no noise drives, B of white noise, C of impulses
     at the rate r, D of noise with the standard deviation s and the correlation time τ: what the rates of growth and of
@@ -170,7 +186,7 @@ def own_frame(n: int, motion: Motion, spread: Callable[[str], tuple[float, float
         (first, _), (lower, last) = rotating
         choice.insert(0, np.array([[1.0, 0.0], [lower / first, last / abs(first)]]))
     chosen = next((each for each in choice if size(each) <= HARDLY * least), own)
-    return None if np.array_equal(chosen, own) else Frame(tuple(map(tuple, chosen.tolist()))), least
+    return Frame(tuple(map(tuple, chosen.tolist()))), least
 
 
 def _steps(n: int, is_scaling: bool) -> Iterator[FloatArray]:
@@ -194,7 +210,9 @@ def _unit(phi: FloatArray) -> FloatArray:
 
 
 def _turned(matrix: FloatArray, phi: ArrayLike) -> FloatArray:
-    """The phase of a matrix times e(φ), in the same half turn."""
+    """The phase of a matrix times e(φ), in the same half turn; φ itself for 1."""
+    if np.array_equal(matrix, np.eye(2)):
+        return np.asarray(phi, dtype=float)
     half_turns = math.pi * np.round(np.asarray(phi) / math.pi)
     x = matrix @ _unit(np.ravel(np.asarray(phi) - half_turns))
     return np.asarray(np.arctan2(-x[1], x[0]).reshape(np.shape(phi)) + half_turns)

@@ -258,8 +258,8 @@ class Problem:
         return self.system.dimension
 
     @cached_property
-    def frame(self) -> Frame | None:
-        """The coordinates that it is solved in where these are not x itself."""
+    def frame(self) -> Frame:
+        """The coordinates that it is solved in."""
         return self._own[0]
 
     @property
@@ -268,9 +268,9 @@ class Problem:
         return self._own[1]
 
     @cached_property
-    def _own(self) -> tuple[Frame | None, float]:
+    def _own(self) -> tuple[Frame, float]:
         if self.system.pasts:
-            return None, float(np.linalg.norm(matrix_at(self.drift, 0.0), 2))
+            return Frame(np.eye(self.dimension).tolist()), float(np.linalg.norm(matrix_at(self.drift, 0.0), 2))
         return own_frame(
             self.dimension,
             self._moved,
@@ -286,25 +286,22 @@ class Problem:
     @cached_property
     def motion(self) -> System:
         """The system along a path of ξ, in the coordinates of `frame`: what is left of it beside white noise."""
-        return self.drift if self.frame is None else self.frame.motion(self.drift)
+        return self.frame.motion(self.drift)
 
     @cached_property
     def diffusions(self) -> Sequence[CoefficientMatrix]:
         """ε^order B of every Bx ∘ dW by which white noise moves the state, in the same coordinates."""
-        own = self._moved.diffusions
-        return own if self.frame is None else [self.frame.term(each) for each in own]
+        return [self.frame.term(each) for each in self._moved.diffusions]
 
     @cached_property
     def impulses(self) -> Sequence[Impulse]:
         """The impulses that multiply the state at random times, in the same coordinates."""
-        own = self._moved.impulses
-        return own if self.frame is None else [self.frame.exponent(each) for each in own]
+        return [self.frame.exponent(each) for each in self._moved.impulses]
 
     @cached_property
     def invariant_rays(self) -> tuple[float, ...]:
         """φ of rays that the phase never leaves, nor reaches, whatever the noise does; one alone where all rays are."""
-        rays = self._resting
-        return rays if self.frame is None or not rays else tuple((self.frame.own_phase(rays) % math.pi).tolist())
+        return tuple(float(self.frame.own_phase(phi) % math.pi) for phi in self._resting)
 
     @property
     def unit_rate(self) -> float:
@@ -353,7 +350,7 @@ class Problem:
                 pattern[1, 0] += 1.0
             groups = components(pattern)
             if len(groups) == 1 and stop is None:
-                basis = basis if self.frame is None else np.array(self.frame.matrix)
+                basis = np.array(self.frame.matrix)
                 inverse = np.linalg.inv(basis)
                 own, groups, rounded = hidden_blocks([inverse @ each @ basis for each in matrices])
                 basis = basis @ own
@@ -362,8 +359,7 @@ class Problem:
         if not (rays := self._resting):
             return ()
         phases = np.array(rays if len(rays) == 2 else (rays[0], rays[0] + math.pi / 2))
-        basis = np.stack([np.cos(phases), -np.sin(phases)])
-        basis = basis if self.frame is None else np.array(self.frame.matrix) @ basis
+        basis = np.array(self.frame.matrix) @ np.stack([np.cos(phases), -np.sin(phases)])
         found = subsystems(self.system, basis, [(0,), (1,)], ("", ""), ROUNDED, self.size)
         return found if self._turns else found[:1]
 
@@ -528,9 +524,8 @@ class Problem:
             if not (own := self.named_noise(part)).is_white:
                 noise = own.derivative(name)
         terms, diffusions, impulses = self.noise.changed_motion(self.system, terms, changed)
-        if self.frame is not None:
-            terms, diffusions = ([self.frame.term(each) for each in parts] for parts in (terms, diffusions))
-            impulses = [self.frame.exponent(each) for each in impulses]
+        terms, diffusions = ([self.frame.term(each) for each in parts] for parts in (terms, diffusions))
+        impulses = [self.frame.exponent(each) for each in impulses]
         axis = [*self.coloured.parts].index(part) if noise and len(self.coloured.parts) > 1 else 0
         theta = float(self.values[key])
         return ParameterDerivative(theta, tuple(terms), tuple(jumps), noise, tuple(diffusions), tuple(impulses), axis)

@@ -16,7 +16,7 @@ from typing import Any, cast
 import numpy as np
 
 from fpsolve.arrays import FloatArray
-from fpsolve.exponent.density import ITSELF, Fields, plane_fields, refuse_more, xi_marginal
+from fpsolve.exponent.density import Fields, plane_fields, refuse_more, xi_marginal
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.fem.noise_axes import LineAxis, Samples
 from fpsolve.model.quantity import Quantity
@@ -62,7 +62,7 @@ class Nodes:
         space = pair.space
         degrees = int(np.max(space.phi.degrees)), int(np.max(space.xi.modes))
         order = min(MAX_ORDER, max(degrees))
-        frame = pair.generator.problem.frame or ITSELF
+        frame = pair.generator.problem.frame
         starts = np.sort(np.mod(frame.own_phase(space.phi.lines[:-1]), space.phi.span))
         starts = np.concatenate([starts + k * space.phi.span for k in range(space.phi.turns)])
         breaks = np.concatenate([[0.0], starts[(starts > 1e-9) & (starts < 2 * math.pi - 1e-9)], [2 * math.pi]])
