@@ -194,10 +194,8 @@ def solve_excursion(
     solver: ExponentSolver, *, phi: Start = 0.0, xi: StartOfNoise = STATIONARY, root: float | None = None
 ) -> Excursion:
     """The excursions of a solver's problem; `root` is near δ_p, if that is known."""
-    problem = solver.problem
+    problem, solver = solver.problem, solver.adapting()  # a mesh need not reach the ends of the noise
     check_start(problem, phi, xi)
-    if solver.mesh is not None:  # whose functions need not reach the ends of the noise
-        solver = replace(solver, mesh=None)
     exponent = solver.lyapunov_exponent()
     found = Excursion(exponent, phi=phi, xi=xi, parameters=problem.values)
     if abs(exponent.value) <= exponent.error_estimate:
@@ -211,11 +209,9 @@ def solve_excursion(
     if not index:
         return replace(found, notes=(_without_index(index.reason),))
     found = replace(found, stability_index=index)
-    if problem.dimension > 2:  # T is not looked at
-        return replace(found, notes=(Message(Code.EXCURSION_PLANE, count=problem.dimension),))
-    if (phase := solver.method.ray) is not None:
-        return replace(found, notes=(Message(Code.EXCURSION_RAY, phase=phase),))
-    overshoot, is_smooth = _crossing(problem)
+    if unseen := solver.method.unseen():
+        return replace(found, notes=(unseen,))
+    overshoot, is_smooth = problem.overshoot, problem.rises_smoothly
     p, pairs, notes = index.value, [solver.pair(index.value)], list[Message]()
     if problem.noise.is_bounded:
         least, most = _settled(solver, pairs, lambda pair: _extremes(pair, is_smooth) / _at_start(pair, phi, xi))
@@ -238,21 +234,9 @@ def check_start(problem: Problem, phi: Any, xi: Any) -> None:
         real_number(phi, "phi")
     if isinstance(xi, str) and xi == STATIONARY:
         return
-    value, noise = real_number(xi, "xi"), problem.coloured
-    stay = f'write xi = "{STATIONARY}"'
-    if noise.is_white:
-        raise ValueError(f"got xi = {value:g}, but white noise has no value at a time; {stay}")
-    if len(noise.parts) > 1 or not noise.is_drawn:
-        why = "several noises have values" if len(noise.parts) > 1 else "its value alone does not tell how it goes on"
-        raise ValueError(f"got xi = {value:g}, but {why}; {stay}")
-    if noise.has_states:
-        states = noise.reached
-        if not np.any(np.isclose(states, value, rtol=1e-9, atol=0)):
-            raise ValueError(
-                f"got xi = {value:g}; must be one of the states, {', '.join(f'{each:g}' for each in states)}"
-            )
-    elif not abs(value) < noise.half_width:
-        raise ValueError(f"got xi = {value:g}; must be between -{noise.half_width:g} and {noise.half_width:g}")
+    value = real_number(xi, "xi")
+    if why := problem.coloured.misfit(value):
+        raise ValueError(f"got xi = {value:g}{why}")
 
 
 def _without_index(reason: Message) -> Message:
@@ -260,16 +244,6 @@ def _without_index(reason: Message) -> Message:
     if reason.code in (Code.NO_ROOT, Code.NO_ROOT_REACHED):
         return Message(Code.EXCURSION_BEYOND, high=reason.data["high"])
     return Message(Code.EXCURSION_NO_INDEX, reason=reason)
-
-
-def _crossing(problem: Problem) -> tuple[float, bool]:
-    """How ‖x‖ passes a level: g, the largest factor of a jump, and whether it is differentiable, so that q ≥ 0."""
-    factors = [math.exp(jump.log_factor) for jump in problem.system.jumps]
-    _, diffusions, impulses = problem.noise.motion(problem.system)
-    factors += [float(np.linalg.norm(each.matrix, 2)) for each in impulses]
-    overshoot = max([1.0, *factors])
-    diffuses = any(not each.q.vanishes for each in diffusions)
-    return overshoot, overshoot == 1.0 and not impulses and not diffuses
 
 
 def _settled(
@@ -308,17 +282,11 @@ def _inverse(of: Estimate, factor: float = 1.0) -> Estimate | None:
     return Estimate(factor / value, factor * error / (value * (value - error)), factor / value)
 
 
-def _own_phase(pair: PrincipalPair, psi: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """φ in the coordinates of the system, and ρ^p there."""
-    frame = pair.generator.problem.frame
-    phi = frame.own_phase(psi)
-    return phi, frame.length(phi) ** pair.p
-
-
 def _growth(pair: PrincipalPair, psi: FloatArray, xi: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray]:
     """q over φ and values of the noises, and ρ^p as a factor of such tables."""
     problem, columns = pair.generator.problem, (-1, *[1] * len(xi))
-    phi, stretch = _own_phase(pair, psi)
+    phi = problem.frame.own_phase(psi)
+    stretch = problem.frame.length(phi) ** pair.p
     rate: Harmonics = growth_rate(problem.drift, problem.at_values(xi))
     return rate(phi.reshape(columns)), stretch.reshape(columns)
 
@@ -328,15 +296,14 @@ def _at_start(pair: PrincipalPair, phi: Start, xi: StartOfNoise) -> float:
     space, frame = pair.space, pair.generator.problem.frame
     if phi == UNIFORM:
         psi, weights = space.phi.finer_rule(frame.parts)
-        own, stretch = _own_phase(pair, psi)
-        weights = weights * stretch / (space.phi.span * frame.density(own))
+        own = frame.own_phase(psi)
+        weights = weights * frame.length(own) ** pair.p / (space.phi.span * frame.density(own))
         at_phi = weights @ space.phi.at(psi)
     else:
-        psi = frame.phase(np.array([float(phi)]))
-        first, span = space.phi.lines[0], space.phi.span
+        own = np.array([float(phi)])
+        psi, first, span = frame.phase(own), space.phi.lines[0], space.phi.span
         psi, after = (first + np.mod(each - first, span) for each in (psi, psi + 1e-9))
-        _, stretch = _own_phase(pair, psi)
-        at_phi = stretch[0] * dense(space.phi.at(psi, after))[0]
+        at_phi = frame.length(own)[0] ** pair.p * dense(space.phi.at(psi, after))[0]
     means = space.product([at_phi, *(_mean_functions(axis, xi) for axis in space.noises)])
     return float(means @ pair.right)
 

@@ -83,8 +83,6 @@ MOST_DRAWN = 10
 """Of so many curves at most the response is computed unasked, and densities of it are written."""
 MOST_FAULTS = 1000
 """Of so many faults of a case at most each is told."""
-MOST_DENSITIES = 3
-"""p of which densities of more than two variables are written unasked, which take seconds each."""
 USUAL_P = 2.0
 
 
@@ -300,7 +298,7 @@ class Case(Section):
             RESPONSE: RESPONSE not in named and self.responds,
             SENSITIVITIES: self.output.sensitivities,
             EIGENFUNCTIONS: self.output.asks_for_eigenfunctions
-            or (self.output.eigenfunctions is None and self.problem.dimension == 2),
+            or (self.output.eigenfunctions is None and self.method.pictures.is_usual),
         }
         return tuple(name for name in QUANTITY_NAMES if name in named or usual.get(name))
 
@@ -327,7 +325,7 @@ class Case(Section):
         elif not self.output.asks_for_eigenfunctions:
             wanted = (USUAL_P,)
         if wanted is None:
-            return _spread(self.p, 9 if self.problem.dimension == 2 else MOST_DENSITIES)
+            return _spread(self.p, self.method.pictures.most)
         return np.array([self.p[np.argmin(np.abs(self.p - p))] for p in wanted])
 
     @property

@@ -297,9 +297,8 @@ def _of_chart(chart: ChartSection | None, valid: Known, context: Known) -> Itera
     corners = [{chart.x.key: x, chart.y.key: y} for x, y in ends]
     for corner in corners:
         with suppress(ValueError):
-            noise = problem.at(corner).noise
-            if noise.has_algebraic_tails and noise.tails_beyond is not None:
-                limit, most, remedy = noise.tails_beyond
+            if heavy := problem.at(corner).noise.tails_beyond:
+                limit, most, remedy = heavy
                 key = f"{problem.system.noise_sections[0]}.{limit}"
                 stops = {name: axis.stop for name, axis in zip("xy", axes, strict=True) if axis.key == key}
                 highest = max(float(problem.values[key]), *stops.values())

@@ -19,7 +19,7 @@ from fpsolve.arrays import FloatArray
 from fpsolve.errors import NoSuchExponent, NotConverged
 from fpsolve.exponent.eigen import PairDerivatives, PrincipalPair
 from fpsolve.exponent.error import Absent, Estimate, InvariantClass, Moment
-from fpsolve.exponent.method import RTOL_BEYOND_PLANE, Along, Method, Tolerance
+from fpsolve.exponent.method import DIRECTIONS, PHASE_AND_NOISE, RTOL_BEYOND_PLANE, Along, Method, Pictures, Tolerance
 from fpsolve.messages import Code, Message
 from fpsolve.model.problem import ParameterDerivative, Problem
 
@@ -48,6 +48,18 @@ class Blocks(Method):
     @property
     def no_picture(self) -> str:  # type: ignore[override]
         return self.parts[0].no_picture
+
+    @property
+    def pictures(self) -> Pictures:  # type: ignore[override]
+        return PHASE_AND_NOISE if self._rays else DIRECTIONS
+
+    @property
+    def is_quick(self) -> bool:  # type: ignore[override]
+        return all(part.is_quick for part in self.parts)
+
+    @property
+    def by_moments(self) -> bool:  # type: ignore[override]
+        return not self._rays
 
     @property
     def is_function(self) -> bool:  # type: ignore[override]
@@ -181,6 +193,9 @@ class Blocks(Method):
             told = ", ".join(variables) or name
             found.append(InvariantClass(told, phase, variables, part.lyapunov_exponent(), p, rows[:, 0], rows[:, 3]))
         return tuple(found)
+
+    def unseen(self) -> Message | None:
+        return Message(Code.EXCURSION_RAY, phase=self._rays[0]) if self._rays else super().unseen()
 
     def index_of_parts(self, index: Callable[[Method], Estimate | Absent], nowhere: Absent) -> Estimate | Absent | None:
         """The least of theirs, as for p > 0 Λ(p) is the largest of them."""

@@ -32,6 +32,7 @@ class EvenMoments(Method):
 
     name = "closed equations of moments"
     usual_rtol = RTOL_BEYOND_PLANE
+    by_moments = True
     no_picture = "functions of the directions of so many variables are not computed; look at Λ(2)"
     code = Code.EVEN_ONLY
 

@@ -30,10 +30,13 @@ from fpsolve.exponent.eigen import (
 )
 from fpsolve.exponent.error import Estimate, Moment, Solution, checked
 from fpsolve.exponent.method import (
+    DIRECTIONS,
+    PHASE_AND_NOISE,
     RTOL,
     RTOL_BEYOND_PLANE,
     RTOL_OF_SEVERAL,
     Method,
+    Pictures,
     Search,
     Stage,
     Tolerance,
@@ -103,6 +106,7 @@ class Elements(Method):
     """
 
     is_function = True
+    pictures: Pictures = PHASE_AND_NOISE
     remedy: Remedy = Remedy.BUDGET
 
     def __init__(self, *args: Any) -> None:
@@ -121,6 +125,10 @@ class Elements(Method):
 
     def is_dear(self, p: float) -> bool:
         return len(self.problem.coloured.parts) > 1
+
+    @property
+    def is_quick(self) -> bool:  # type: ignore[override]
+        return self.problem.coloured.variables == 1
 
     @property
     def no_picture(self) -> str:  # type: ignore[override]
@@ -331,7 +339,7 @@ class Elements(Method):
     @property
     def _has_witness(self) -> bool:
         noise = self.problem.coloured
-        return len(noise.parts) > 1 or noise.basis == "pairs" or (noise.has_states and not noise.is_white)
+        return noise.variables > 1 or (noise.has_states and not noise.is_white)
 
     def pair(self, p: float) -> PrincipalPair:
         return self.solution(p).pair
@@ -468,6 +476,9 @@ class Elements(Method):
         """
         return (Message(Code.START_MATTERS),) if np.any(p < -1) and has_cones(self.problem) else ()
 
+    def unseen(self) -> Message | None:
+        return None
+
 
 class GivenMesh(Elements):
     """Λ(p) of two variables on a given mesh, with the error that a finer one tells."""
@@ -511,6 +522,9 @@ class Directions(Elements):
     """Λ(p) of three and four variables; of even p it is that of the equations of the moments, where these close."""
 
     is_function = False
+    is_quick = False
+    by_moments = True
+    pictures = DIRECTIONS
     _has_witness = True
     no_picture = ""
     usual_rtol = RTOL_BEYOND_PLANE
@@ -541,6 +555,9 @@ class Directions(Elements):
 
     def bounds(self, p: FloatArray, value: FloatArray, error: FloatArray) -> tuple[Message, ...]:
         return ()
+
+    def unseen(self) -> Message | None:
+        return Method.unseen(self)
 
     def number(self, p: float) -> EvenMoment | None:
         return self.even(p)

@@ -97,6 +97,24 @@ class Settings:
     meter: Meter = field(default_factory=lambda: Meter(math.inf))
 
 
+class Pictures(NamedTuple):
+    """What is drawn of T, T* and T T*.
+
+    Attributes:
+        part: the part of a case that draws it.
+        most: of so many p where a case names none.
+        is_usual: whether one of them is drawn where a case does not ask for any.
+    """
+
+    part: str
+    most: int
+    is_usual: bool
+
+
+PHASE_AND_NOISE: Pictures = Pictures("eigenfunctions", 9, is_usual=True)
+DIRECTIONS: Pictures = Pictures("directions", 3, is_usual=False)  # which take seconds each
+
+
 class Method:
     """How Λ(p) of one kind of problem is found.
 
@@ -111,9 +129,12 @@ class Method:
     Attributes:
         name: what the numbers come from, as tables say it.
         usual_rtol: the error that is wanted where none is named.
-        no_picture: why functions of it cannot be drawn; empty where they can.
+        pictures: what is drawn of its functions.
+        no_picture: why they cannot be drawn; empty where they can.
         goes_on: whether numbers of an earlier run do in place of solutions, which others need for their messages.
         is_function: whether Λ may be interpolated over p.
+        is_quick: whether Λ(p) at many p takes less than a second.
+        by_moments: whether Λ(p) of even p is that of the equations of the moments.
         ray: φ of a ray that the phase never leaves; None where there is none.
         is_computed: whether there is any Λ(p).
         spaces: solutions on elements, by p.
@@ -121,9 +142,12 @@ class Method:
 
     name: ClassVar[str] = "finite elements"
     usual_rtol: float = RTOL
+    pictures: Pictures = DIRECTIONS
     no_picture: str = ""
     goes_on: bool = True
     is_function: bool = False
+    is_quick: bool = False
+    by_moments: bool = False
     ray: float | None = None
     is_computed: bool = True
     spaces: Mapping[float, Any] = MappingProxyType({})
@@ -181,6 +205,11 @@ class Method:
     def adapts(self) -> bool:
         """Whether a discretisation is chosen for each p."""
         return self.settings.mesh is None
+
+    @property
+    def missed(self) -> Remedy | None:
+        """What to do where an index misses rtol; None where that is found for each p as well as it can be."""
+        return None if self.adapts else Remedy.MESH
 
     @property
     def refinement(self) -> Remedy:
@@ -284,6 +313,10 @@ class Method:
     def bounds(self, p: FloatArray, value: FloatArray, error: FloatArray) -> tuple[Message, ...]:
         """What is known of other numbers."""
         return ()
+
+    def unseen(self) -> Message | None:
+        """Why nobody looks at the extremes of T, which bound excursions; None where they are looked at."""
+        return Message(Code.EXCURSION_PLANE, count=self.problem.dimension)
 
     def doubts(self, pairs: Sequence[PrincipalPair]) -> tuple[Message, ...]:
         """Warnings about some pairs."""

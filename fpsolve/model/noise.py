@@ -19,6 +19,9 @@ from fpsolve.arrays import Coefficient, FloatArray, nothing
 from fpsolve.model.parameters import Parametrised
 from fpsolve.model.plane import CoefficientMatrix, Motion, MotionDerivative, System
 
+STAY = 'write xi = "stationary"'
+"""What to do where a value of ξ is no start."""
+
 
 @dataclass(frozen=True)
 class NoiseDerivative:
@@ -55,8 +58,7 @@ class Noise(Parametrised):
         has_states: whether ξ jumps between states. Such noise has no density, so that `log_density`, `diffusion` and
             what follows from them do not apply.
         approximates_spectrum: whether `spectral_density` is that of a simpler process which replaces this one.
-        tails_beyond: the name of a parameter, the value above which P_s has algebraic tails, and what to do then; None
-            for noise that never has such tails.
+        variables: how many numbers, without the white noises, tell how it goes on.
         may_tilt: whether a factor exp(s ξ) makes functions of ξ easier to resolve, as where P_s has a single peak.
         has_peak: whether the spectral density may have a high peak at a frequency of the noise itself.
         is_white: whether ξ has no value, as for white noise and impulses. Solvers see such noise as a chain with the
@@ -67,7 +69,7 @@ class Noise(Parametrised):
     section: ClassVar[str] = "noise"
     has_states: ClassVar[bool] = False
     approximates_spectrum: ClassVar[bool] = False
-    tails_beyond: ClassVar[tuple[str, float, str] | None] = None
+    variables: ClassVar[int] = 1
     may_tilt: ClassVar[bool] = True
     has_peak: bool = False
     is_white: ClassVar[bool] = False
@@ -110,6 +112,11 @@ class Noise(Parametrised):
     def has_algebraic_tails(self) -> bool:
         """Whether P_s falls off like a power of ξ: moments far out are infinite, and no Λ(p), p ≠ 0, is computed."""
         return False
+
+    @property
+    def tails_beyond(self) -> tuple[str, float, str] | None:
+        """The parameter that gives it these tails, the largest value without, and what to do; None without tails."""
+        return None
 
     @property
     def basis(self) -> Literal["polynomials", "cells", "states", "waves", "pairs"]:
@@ -169,6 +176,12 @@ class Noise(Parametrised):
         They increase; those of a chain are its states, in their order.
         """
         return np.asarray(min(self.half_width, 1e6 * self.standard_deviation) * np.linspace(-1, 1, 1001))
+
+    def misfit(self, xi: float) -> str:
+        """Why no path that is told by ξ alone starts there, after a sentence "got xi = 1"; empty where one does."""
+        if not self.is_drawn:
+            return f", but its value alone does not tell how it goes on; {STAY}"
+        return "" if abs(xi) < self.half_width else f"; must be between -{self.half_width:g} and {self.half_width:g}"
 
     @property
     def diffusion(self) -> float:
@@ -279,6 +292,9 @@ class Memoryless(Noise):
         return 0.0
 
     relaxation_time = correlation_time
+
+    def misfit(self, xi: float) -> str:
+        return f", but white noise has no value at a time; {STAY}"
 
     @property
     def probabilities(self) -> FloatArray:

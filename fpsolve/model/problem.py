@@ -298,6 +298,19 @@ class Problem:
         """The impulses that multiply the state at random times, in the same coordinates."""
         return [self.frame.exponent(each) for each in self._moved.impulses]
 
+    @property
+    def overshoot(self) -> float:
+        """The largest factor by which ‖x‖ jumps upwards, 1 where it does not."""
+        jumps = [math.exp(jump.log_factor) for jump in self.system.jumps]
+        struck = [float(np.linalg.norm(each.matrix, 2)) for each in self._moved.impulses]
+        return max([1.0, *jumps, *struck])
+
+    @property
+    def rises_smoothly(self) -> bool:
+        """Whether ‖x‖ is differentiable but where a wall makes it smaller."""
+        diffuses = any(not each.q.vanishes for each in self._moved.diffusions)
+        return self.overshoot == 1.0 and not self._moved.impulses and not diffuses
+
     @cached_property
     def invariant_rays(self) -> tuple[float, ...]:
         """φ of rays that the phase never leaves, nor reaches, whatever the noise does; one alone where all rays are."""

@@ -243,13 +243,13 @@ def stationary_response(problem: Problem, *, rtol: float = 1e-6, budget: Budget 
 
 def _linear(problem: Problem, budget: Budget) -> tuple[float, float]:
     """λ and δ_p of the linear system. Raises `FpsolveError` where there is no stationary response."""
-    reason = no_response(checked_problem(problem))
-    if reason is None and problem.coloured.has_algebraic_tails:
-        reason = Message(Code.RESPONSE_TAILS)
-    if reason is None and (ray := choose(problem).ray) is not None:
-        reason = Message(Code.RESPONSE_RAYS, phase=ray)
-    if reason is not None:
+    if reason := no_response(checked_problem(problem)):
         raise FpsolveError(reason)
+    method = choose(problem)
+    if method.ray is not None:
+        raise FpsolveError(Message(Code.RESPONSE_RAYS, phase=method.ray))
+    if method.reason(1.0):
+        raise FpsolveError(Message(Code.RESPONSE_TAILS))
     rate = lyapunov_exponent(problem, budget=budget)
     if not rate.value > rate.error_estimate:
         raise FpsolveError(Message(Code.RESPONSE_DIES, value=rate.value, error=rate.error_estimate))

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from functools import partial
 from typing import Literal
 
 from fpsolve.arrays import shown
 from fpsolve.exponent.density import Grid, on_directions
 from fpsolve.exponent.eigen import PrincipalPair
+from fpsolve.exponent.kinds import choose
+from fpsolve.exponent.method import DIRECTIONS, PHASE_AND_NOISE
 from fpsolve.model.problem import parameter_lines
 from fpsolve.model.quantity import PHASE
 from fpsolve.parts.nodes import FIELDS, Nodes
@@ -36,9 +37,7 @@ def draw_eigenfunction(pair: PrincipalPair, field: Field = "T", *, cmap: str = "
     """
     if field not in FIELDS:
         raise ValueError(f"got field = {shown(field)}; must be one of {', '.join(map(repr, FIELDS))}")
-    if pair.generator.problem.dimension > 2:
-        return _picture_of_directions(pair, field, cmap)
-    return picture_of(surface_of(pair, field), cmap)
+    return DRAWN[choose(pair.generator.problem).pictures.part](pair, field, cmap)
 
 
 def _title_of(pair: PrincipalPair) -> str:
@@ -54,23 +53,27 @@ def _picture_of_directions(pair: PrincipalPair, field: str, cmap: str) -> Pictur
     return painted(draw, _title_of(pair), parameter_lines(pair.generator.problem.parameters))
 
 
-def surface_of(pair: PrincipalPair, field: str) -> Surface:
-    """A function of a pair where it is not negligible, with its words."""
-    quantity, problem = FIELDS[field], pair.generator.problem
-    nodes, noise, is_lines = Nodes.of(pair, FINER).seen(pair), problem.noise_quantity, problem.noise.has_states
+def _picture_over_noise(pair: PrincipalPair, field: str, cmap: str) -> Picture:
+    """A function of phase and noise where it is not negligible."""
+    quantity, problem, nodes = FIELDS[field], pair.generator.problem, Nodes.of(pair, FINER).seen(pair)
     unit = quantity.unit if field == "T" else Grid.of(pair).unit
-    xi = pair.space.xi.support if is_lines else nodes.unit * nodes.z
-    values = getattr(nodes.fields(pair), field)
-    about = {"phi": PHASE.attributes, "xi": noise.attributes, "values": {**quantity.attributes, "units": unit}}
-    rays = {(jump.phase + turn) % (2 * math.pi) for jump in problem.system.jumps for turn in (0, math.pi)}
-    return Surface(
+    surface = Surface(
         phi=nodes.phi,
-        xi=xi,
-        values=values[:, :: nodes.order + 1] if is_lines else values,
-        about=about,
+        xi=nodes.xi,
+        values=nodes.at_xi(getattr(nodes.fields(pair), field)),
+        about={
+            "phi": PHASE.attributes,
+            "xi": problem.noise_quantity.attributes,
+            "values": {**quantity.attributes, "units": unit},
+        },
         name=quantity.symbol,
         title=_title_of(pair),
         lines=parameter_lines(problem.parameters),
-        impacts=sorted(rays),
-        is_lines=is_lines,
+        impacts=nodes.impacts,
+        is_lines=nodes.is_lines,
     )
+    return picture_of(surface, cmap)
+
+
+DRAWN = {PHASE_AND_NOISE.part: _picture_over_noise, DIRECTIONS.part: _picture_of_directions}
+"""What draws each of the `Pictures`."""

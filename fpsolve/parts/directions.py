@@ -17,22 +17,22 @@ from fpsolve.case.case import Case, Curve
 from fpsolve.data import Quantity, dataset
 from fpsolve.drawing import Format, figure_for
 from fpsolve.exponent.density import MOST_NEGATIVE, RESOLVED, Densities, DirectionGrid, densities, direction_grid
+from fpsolve.exponent.method import DIRECTIONS
 from fpsolve.exponent.solver import ExponentSolver
-from fpsolve.files import atomic, write_text
+from fpsolve.files import atomic
 from fpsolve.messages import Code, Message
 from fpsolve.model.quantity import MOMENT, P
 from fpsolve.page.page import Drawing
-from fpsolve.parts.eigenfunctions import said_of_pictures, shown_of, without_failed
+from fpsolve.parts.eigenfunctions import part_of_pictures, without_failed
 from fpsolve.parts.nodes import FIELDS
 from fpsolve.parts.part import Job, Part, Reason, Settings, attempt
-from fpsolve.results.curve import CurveResult, SimulatedCurve
-from fpsolve.vtk import Facts, collection_of, field_data, name_at, write_between
+from fpsolve.results.curve import CurveResult
+from fpsolve.vtk import Facts, field_data, write_between, write_series
 
 if TYPE_CHECKING:
     import xarray
 
 
-NAME = "directions"
 ROUGH = 0.05
 """Total variation by which finer functions may move a density that a picture shows."""
 MOST_PANELS = 4
@@ -49,20 +49,16 @@ _DIGITS = str.maketrans("₁₂₃₄²", "12342")
 STATIONARY = Quantity("stationary_density", "ρ", "stationary density", r"$\rho$")
 
 
-def _settings(case: Case, number: int) -> Settings | None:
-    return shown_of(case, number) if case.problem.dimension > 2 else None
-
-
 def _solve(job: Job, settings: Settings) -> tuple[Message, ...]:
     """The densities at the p that converge, at p = 0 with the stationary one; what is said of them."""
     found, said, shown = list[Densities](), list[Message](), without_failed(job, settings["p"])
     for p in sorted({*shown, 0.0} if settings["density"] else shown):
-        each = attempt(partial(_at, job.solver, p), NAME)
+        each = attempt(partial(_at, job.solver, p), DIRECTIONS.part)
         if isinstance(each, Reason):
             said.append(Message(Code.INDEX_MISSING, symbols=["density of directions"], reason=each.message))
         else:
             found.append(each)
-    job.pictures[NAME] = tuple(found)
+    job.pictures[DIRECTIONS.part] = tuple(found)
     return (*said, *(message for each in found for message in _unclear(each)))
 
 
@@ -150,14 +146,15 @@ def write_directions(found: Sequence[Densities], curve: Curve, folder: Path) -> 
     always |= {"share": np.sin(first) ** 2} if grid.share else {"longitude": first, "latitude": second}
     if stationary and curve.number == 1:
         _write_plane(folder / "density.vtu", grid, always, {"p": 0.0, "Lambda": 0.0, **facts})
-    stem = f"eigenfunctions{curve.suffix}"
-    names = {each.pair.p: name_at(stem, each.pair.p) for each in others}
-    for each in others:
+
+    def write(path: Path, each: Densities) -> None:
         data = dict(reversed(each.fields._asdict().items()))
-        known = {"p": each.pair.p, "Lambda": each.value}
-        _write_plane(folder / names[each.pair.p], grid, {**data, **always}, {**known, **facts})
+        _write_plane(path, grid, {**data, **always}, {"p": each.pair.p, "Lambda": each.value, **facts})
+
     if others:
-        write_text(folder / f"{stem}.pvd", collection_of((p, name, "") for p, name in names.items()))
+        write_series(
+            folder, f"eigenfunctions{curve.suffix}", {each.pair.p: partial(write, each=each) for each in others}
+        )
 
 
 def _plain(axis: Quantity) -> str:
@@ -172,12 +169,12 @@ def _write_plane(path: Path, grid: DirectionGrid, data: Mapping[str, FloatArray]
     write_between(path, places, data, facts)
 
 
-def _figures(case: Case, result: CurveResult, folder: Path, simulated: SimulatedCurve | None) -> Iterator[Drawing]:
+def _figures(case: Case, result: CurveResult, folder: Path) -> Iterator[Drawing]:
     """densities.png and .pdf, where densities were written."""
     curve, source = result.curve, directions_file(result.curve, folder)
-    if case.output.figure and case.problem.dimension > 2 and source.is_file():
-        what = "energy share and phase difference" if case.problem.dimension == 4 else "directions"
-        what = "energy share and phase" if case.problem.system.stop else what
+    if case.output.figure and source.is_file():
+        grid = direction_grid(curve.problem, 2)
+        what = f"energy share and {grid.quantities[1].name.replace('_', ' ')}" if grid.share else "directions"
         title, job = f"Densities of {what}{curve.of}", partial(_draw, case, curve, source)
         yield Drawing(title, job, f"densities{curve.suffix}", case.headline)
 
@@ -218,13 +215,4 @@ def _draw_panels(case: Case, curve: Curve, found: xarray.Dataset, paths: Sequenc
             axis.set_axis_off()
 
 
-PART: Part = Part(
-    NAME,
-    _settings,
-    _solve,
-    tuple[Message, ...],
-    "density of directions",
-    said=said_of_pictures,
-    draw=write_directions,
-    figures=_figures,
-)
+PART: Part = part_of_pictures(DIRECTIONS, "density of directions", _solve, write_directions, _figures)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from importlib.resources import files
@@ -24,27 +24,22 @@ from fpsolve.analysis.density import stationary_density
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case, Curve
 from fpsolve.case.sections import EIGENFUNCTIONS
-from fpsolve.data import plain_unit
 from fpsolve.errors import NotConverged
 from fpsolve.exponent.density import MOST_NEGATIVE, UNRESOLVED, densities, xi_marginal
 from fpsolve.exponent.eigen import PrincipalPair
+from fpsolve.exponent.method import PHASE_AND_NOISE, Pictures
 from fpsolve.files import write_text
 from fpsolve.messages import Code, Message
-from fpsolve.model.problem import Problem
 from fpsolve.model.quantity import MOMENT, NOISE, PHASE, UNNAMED
 from fpsolve.page.page import Drawing
-from fpsolve.parts.nodes import Nodes
+from fpsolve.parts.nodes import FURTHEST, Nodes
 from fpsolve.parts.part import Job, Numerics, Part, Reason, Settings, attempt
 from fpsolve.parts.surfaces import Surface, picture_of
 from fpsolve.results.curve import CurveResult, SimulatedCurve
-from fpsolve.vtk import Facts, collection_of, field_data, name_at, pyvista_module, write_vtk
+from fpsolve.vtk import Facts, collection_of, field_data, name_at, pyvista_module, write_cells, write_series
 
 CURVES = "curves.pvd"
 """The file of the series over curves."""
-MOST_STATES = 8
-"""States of the noise that a picture names."""
-FURTHEST = 4.0
-"""Standard deviations of the noise up to which T is shown; beyond, where next to no path is, it only grows."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,10 +72,6 @@ def without_failed(job: Job, p: Sequence[float]) -> list[float]:
     return [each for each in p if each not in failed]
 
 
-def _settings(case: Case, number: int) -> Settings | None:
-    return shown_of(case, number) if case.problem.dimension == 2 else None
-
-
 def _solve(job: Job, settings: Settings) -> tuple[Message, ...]:
     """The pairs that converge, that at p = 0 if it is to be trusted; what is said of them."""
     found = [attempt(partial(job.solver.pair, p), EIGENFUNCTIONS) for p in (*without_failed(job, settings["p"]), 0.0)]
@@ -106,9 +97,33 @@ def _solve(job: Job, settings: Settings) -> tuple[Message, ...]:
     return tuple(said)
 
 
-def said_of_pictures(found: Any, curve: Curve, numerics: Numerics) -> Sequence[Message]:
-    """What was said when they were solved."""
-    return tuple(found)
+def part_of_pictures(
+    pictures: Pictures,
+    symbol: str,
+    solve: Callable[[Job, Settings], tuple[Message, ...]],
+    draw: Callable[[Any, Curve, Path], None],
+    figures: Callable[[Case, CurveResult, Path], Iterator[Drawing]],
+) -> Part:
+    """The part of the cases of which there are such pictures; what it finds is what was said when they were solved.
+
+    Args:
+        pictures: what is drawn.
+        symbol, solve, draw: see `Part`.
+        figures: of what was written into a folder; empty where that was nothing.
+    """
+
+    def settings(case: Case, number: int) -> Settings | None:
+        return shown_of(case, number) if case.method.pictures == pictures else None
+
+    def drawings(case: Case, result: CurveResult, folder: Path, _: SimulatedCurve | None) -> Iterator[Drawing]:
+        if case.method.pictures == pictures:
+            yield from figures(case, result, folder)
+
+    def said(found: tuple[Message, ...], curve: Curve, numerics: Numerics) -> tuple[Message, ...]:
+        return found
+
+    kind = tuple[Message, ...]
+    return Part(pictures.part, settings, solve, kind, symbol, said=said, draw=draw, figures=drawings)
 
 
 def _draw(found: Eigenfunctions, curve: Curve, folder: Path) -> None:
@@ -150,20 +165,16 @@ def write_eigenfunctions(
     Returns:
         The files written, the collection first.
     """
-    names = {pair.p: name_at(stem, pair.p) for pair in sorted(pairs, key=lambda pair: pair.p)}
     problem = stationary.generator.problem
-    facts = {**_frame(problem), **field_data(parameters, varied, problem)}
-    for pair in pairs:
+    facts = field_data(parameters, varied, problem)
+
+    def write(path: Path, pair: PrincipalPair) -> None:
         grid = Nodes.of(pair)
-        data = {
-            **grid.fields(pair)._asdict(),
-            "stationary_density": grid.fields(stationary).T_adjoint,
-            "z": grid.z,
-        }
-        _write_grid(directory / names[pair.p], grid, data, {"p": pair.p, "Lambda": pair.value, **facts})
-    collection = directory / f"{stem}.pvd"
-    write_text(collection, collection_of((p, name, "") for p, name in names.items()))
-    return [collection, *(directory / name for name in names.values())]
+        density = grid.fields(stationary).T_adjoint
+        data = {**grid.fields(pair)._asdict(), "stationary_density": density, "z": grid.z}
+        _write_grid(path, grid, data, {"p": pair.p, "Lambda": pair.value, **facts})
+
+    return write_series(directory, stem, {pair.p: partial(write, pair=pair) for pair in pairs})
 
 
 def write_density(
@@ -186,7 +197,7 @@ def write_density(
         "z": grid.z,
     }
     problem = stationary.generator.problem
-    known = {"p": 0.0, "Lambda": 0.0, "lyapunov_exponent": stationary.derivative, **_frame(problem)}
+    known = {"p": 0.0, "Lambda": 0.0, "lyapunov_exponent": stationary.derivative}
     _write_grid(path, grid, data, {**known, **field_data(parameters, varied, problem)})
     return path
 
@@ -220,37 +231,15 @@ def copy_show_script(directory: Path) -> Path:
 
 def _write_grid(path: Path, grid: Nodes, data: Mapping[str, FloatArray], facts: Facts) -> None:
     """Write a .vtu file; arrays of point data broadcast to (φ-nodes, ξ-nodes), and the first is shown first."""
-    pyvista, connectivity = pyvista_module(), grid.cells()
-    count, size = connectivity.shape
-    cells = np.column_stack([np.full(count, size), connectivity]).ravel()
-    kinds = np.full(count, pyvista.CellType.LAGRANGE_QUADRILATERAL, dtype=np.uint8)
-    output = pyvista.UnstructuredGrid(cells, kinds, grid.points())
-    for name, values in data.items():
-        output.point_data[name] = np.broadcast_to(values, (grid.phi.size, grid.z.size)).ravel()
-    output.GetPointData().SetActiveScalars(next(iter(data)))
-    write_vtk(path, output, facts)
+    axes = {"impacts": grid.impacts or [math.nan], "along_y": grid.along_y}
+    shown = {name: np.broadcast_to(values, (grid.phi.size, grid.z.size)) for name, values in data.items()}
+    write_cells(path, "LAGRANGE_QUADRILATERAL", grid.cells(), grid.points(), shown, {**axes, **facts})
 
 
-def _frame(problem: Problem) -> Facts:
-    """What pictures say of the axes: where T jumps, in radians, and what stands along y."""
-    turns = {round((jump.phase + turn) % (2 * math.pi), 12) for jump in problem.system.jumps for turn in (0, math.pi)}
-    noise, unit = problem.noise, plain_unit(problem.noise_quantity.unit).replace("²", "^2")
-    along = "noise xi" if unit in ("1", "unknown") else f"noise xi ({unit})"
-    if noise.has_states:
-        states = [] if noise.is_white else [f"xi = {each:g}" for each in noise.reached]
-        along = "; ".join(
-            [
-                f"{noise.kind or 'white'} noise" if noise.is_white else "states",
-                *(states if len(states) <= MOST_STATES else ()),
-            ]
-        )
-    return {"impacts": sorted(turns) or [math.nan], "along_y": along}
-
-
-def _figures(case: Case, result: CurveResult, folder: Path, simulated: SimulatedCurve | None) -> Iterator[Drawing]:
+def _figures(case: Case, result: CurveResult, folder: Path) -> Iterator[Drawing]:
     """A picture at one p for a page, where the eigenfunction was written."""
     source = folder / name_at(f"eigenfunctions{result.curve.suffix}", case.usual_p)
-    if case.problem.dimension == 2 and case.shown.size and source.is_file():
+    if case.shown.size and source.is_file():
         title = f"Eigenfunction T(φ, ξ) of p = {case.usual_p:g}{result.curve.of}"
         yield Drawing(title, partial(_paint, source), kind="png")
 
@@ -294,13 +283,4 @@ def surface_from(path: Path) -> Surface:
     )
 
 
-PART: Part = Part(
-    EIGENFUNCTIONS,
-    _settings,
-    _solve,
-    tuple[Message, ...],
-    EIGENFUNCTIONS,
-    said=said_of_pictures,
-    draw=_draw,
-    figures=_figures,
-)
+PART: Part = part_of_pictures(PHASE_AND_NOISE, EIGENFUNCTIONS, _solve, _draw, _figures)

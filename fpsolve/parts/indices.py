@@ -19,7 +19,8 @@ from fpsolve.exponent.quantities import (
     VARIANCE_RATE,
     Index,
 )
-from fpsolve.messages import Code, Message, Remedy, message_of
+from fpsolve.messages import Code, Message, message_of
+from fpsolve.model.problem import infinite
 from fpsolve.model.quantity import MEAN_SQUARE
 from fpsolve.page.page import Block, Column, filled
 from fpsolve.parts.intervals import INTERVAL, spreads_of
@@ -61,7 +62,7 @@ def part_of(index: Index) -> Part:
                 error=found.error_estimate,
                 size=found.relative_error,
                 rtol=numerics.rtol,
-                remedy=None if numerics.mesh is None else Remedy.MESH,
+                remedy=numerics.solver(curve.problem).method.missed,
             )
 
     def columns(case: Case) -> Sequence[Quantity]:
@@ -125,7 +126,7 @@ def index_text(index: Index, result: CurveResult, most: int = 17) -> str:
     unsolved = {Code.INDEX_FAILED, Code.INDEX_MISSING} if result.failures else {Code.INDEX_FAILED}
     if any(each.code in unsolved and index.symbol in each.data["symbols"] for each in told):
         return "not solved"
-    if result.curve.problem.has_algebraic_tails and index in (STABILITY_INDEX, VARIANCE_RATE):
+    if index in (STABILITY_INDEX, VARIANCE_RATE) and infinite(result.curve.problem, 1.0, index.symbol):
         return "not computed"
     return "none" if index == CRITICAL_RESTITUTION else "none found"
 

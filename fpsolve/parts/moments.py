@@ -50,7 +50,7 @@ class Moments:
 
 def _settings(case: Case, number: int) -> Settings:
     p = case.p.tolist() if MOMENT.name in case.asked else []
-    every = case.problem.dimension > 2 and not {*OF_MOMENTS}.isdisjoint(case.asked)
+    every = not case.method.is_function and not {*OF_MOMENTS}.isdisjoint(case.asked)
     return {"p": p, "slopes": True, "every_slope": every}
 
 

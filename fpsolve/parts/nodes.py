@@ -11,14 +11,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any, cast
+from typing import Any, ClassVar, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fpsolve.arrays import FloatArray
+from fpsolve.data import plain_unit
 from fpsolve.exponent.density import Fields, plane_fields, refuse_more, xi_marginal
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.fem.noise_axes import LineAxis, Samples
+from fpsolve.model.problem import Problem
 from fpsolve.model.quantity import Quantity
 
 MAX_ORDER = 4
@@ -27,6 +30,10 @@ FAINT = 1e-6
 """Share of the largest values of P_s and of the tilted density below which the noise is not shown."""
 NEGLIGIBLE = 1e-3
 """A picture shows the ξ at which a density exceeds this share of its maximum."""
+FURTHEST = 4.0
+"""Standard deviations of the noise up to which T is shown; beyond, where next to no path is, it only grows."""
+MOST_STATES = 8
+"""States of the noise that a picture names."""
 FIELDS = {
     "T": Quantity("T", "T", "eigenfunction", "$T$"),
     "T_adjoint": Quantity("T_adjoint", "T*", "adjoint eigenfunction", "$T^*$"),
@@ -42,14 +49,16 @@ class Nodes:
     Attributes:
         phi: φ of the nodes, shape (blocks, nodes of a block); the ends are the φ-lines, 0 and 2π.
         z_cells: z of the nodes, shape (ξ-cells, nodes of a cell), with the ends of neighbours equal.
-        unit: ξ/z.
+        problem: whose functions they show.
         order: degree of the quadrilaterals.
+        is_lines: whether ξ has some values alone, so that a picture has a line for each.
     """
 
     phi: FloatArray
     z_cells: FloatArray
-    unit: float
+    problem: Problem
     order: int
+    is_lines: ClassVar[bool] = False
 
     @classmethod
     def of(cls, pair: PrincipalPair, finer: int = 1) -> Nodes:
@@ -62,30 +71,64 @@ class Nodes:
         space = pair.space
         degrees = int(np.max(space.phi.degrees)), int(np.max(space.xi.modes))
         order = min(MAX_ORDER, max(degrees))
-        frame = pair.generator.problem.frame
-        starts = np.sort(np.mod(frame.own_phase(space.phi.lines[:-1]), space.phi.span))
+        problem = pair.generator.problem
+        starts = np.sort(np.mod(problem.frame.own_phase(space.phi.lines[:-1]), space.phi.span))
         starts = np.concatenate([starts + k * space.phi.span for k in range(space.phi.turns)])
         breaks = np.concatenate([[0.0], starts[(starts > 1e-9) & (starts < 2 * math.pi - 1e-9)], [2 * math.pi]])
         phi = _nodes(breaks, order, finer * _parts(degrees[0], order))
-        if pair.generator.problem.noise.has_states:
-            return Strips(phi, _nodes(np.arange(0.5, space.xi.size + 1), order, 1), 1.0, order)
+        if problem.noise.has_states:
+            return Strips(phi, _nodes(np.arange(0.5, space.xi.size + 1), order, 1), problem, order)
         lines = _z_lines(pair)
-        # P_s is shown by quadrilaterals as high as a noise unit, or higher in algebraic tails
-        noise, inner = pair.generator.problem.coloured, np.minimum(abs(lines[:-1]), abs(lines[1:]))
-        widest = np.maximum(1.0, inner / 6 if noise.has_algebraic_tails else 1.0)
-        tall = math.ceil(np.max(np.diff(lines) / widest) - 1e-9)
+        # P_s is shown by quadrilaterals as high as a noise unit, or higher far out, as in algebraic tails
+        inner = np.minimum(abs(lines[:-1]), abs(lines[1:]))
+        tall = math.ceil(np.max(np.diff(lines) / np.maximum(1.0, inner / 6)) - 1e-9)
         z = _nodes(lines, order, finer * max(tall, _parts(degrees[1] if space.xi.lines.size else 0, order)))
-        return cls(phi, z, noise.standard_deviation, order)
+        return cls(phi, z, problem, order)
 
     @property
     def z(self) -> FloatArray:
         """z of the nodes, each once."""
         return np.append(self.z_cells[:, :-1], self.z_cells[-1, -1])
 
+    @property
+    def y(self) -> FloatArray:
+        """What stands along y at each z: ξ."""
+        return self.problem.coloured.standard_deviation * self.z
+
+    @property
+    def xi(self) -> FloatArray:
+        """ξ of a picture, each once."""
+        return self.y
+
+    def at_xi(self, values: FloatArray) -> FloatArray:
+        """Values at the nodes as those at `xi`."""
+        return values
+
+    @property
+    def axis(self) -> str:
+        """What stands along y, with its unit."""
+        unit = plain_unit(self.problem.noise_quantity.unit)
+        return "noise ξ" if unit in ("1", "unknown") else f"noise ξ ({unit})"
+
+    @property
+    def along_y(self) -> str:
+        """The same in ASCII, for files."""
+        return self.axis.replace("ξ", "xi").replace("²", "^2")
+
+    @property
+    def is_near(self) -> NDArray[np.bool_]:
+        """Which z are within `FURTHEST`."""
+        return abs(self.z) <= FURTHEST
+
+    @property
+    def impacts(self) -> list[float]:
+        """The phases at which T jumps, increasing."""
+        jumps, turns = self.problem.system.jumps, (0, math.pi)
+        return sorted({round((jump.phase + turn) % (2 * math.pi), 12) for jump in jumps for turn in turns})
+
     def seen(self, pair: PrincipalPair) -> Nodes:
         """The same where the tilted density, or that of the noise, is not negligible."""
-        noise = pair.generator.problem.coloured
-        densities = self.fields(pair).tilted_density.max(axis=0), noise.density(self.unit * self.z)
+        densities = self.fields(pair).tilted_density.max(axis=0), self.problem.coloured.density(self.y)
         living = np.flatnonzero(np.any([each > NEGLIGIBLE * each.max() for each in densities], axis=0))
         return replace(self, z_cells=self.z[None, living[0] : living[-1] + 1])
 
@@ -102,9 +145,9 @@ class Nodes:
         return found
 
     def points(self) -> FloatArray:
-        """(φ, ξ, 0), φ slowest, shape (points, 3)."""
-        phi, xi = np.meshgrid(self.phi.ravel(), self.unit * self.z, indexing="ij")
-        return np.stack([phi.ravel(), xi.ravel(), np.zeros(phi.size)], axis=1)
+        """(φ, y, 0), φ slowest, shape (points, 3)."""
+        phi, y = np.meshgrid(self.phi.ravel(), self.y, indexing="ij")
+        return np.stack([phi.ravel(), y.ravel(), np.zeros(phi.size)], axis=1)
 
     @property
     def _rows(self) -> Any:
@@ -124,6 +167,34 @@ class Nodes:
 
 class Strips(Nodes):
     """The same for the states of a noise: a strip for each, z their numbers from 1 on, half a unit to either side."""
+
+    is_lines = True
+
+    @property
+    def y(self) -> FloatArray:
+        return self.z
+
+    @property
+    def xi(self) -> FloatArray:
+        return np.asarray(self.problem.coloured.reached)
+
+    def at_xi(self, values: FloatArray) -> FloatArray:
+        return values[:, :: self.order + 1]
+
+    @property
+    def axis(self) -> str:
+        return "number of the state"
+
+    @property
+    def along_y(self) -> str:
+        noise = self.problem.noise
+        if noise.is_white:
+            return f"{noise.kind or 'white'} noise"
+        return "; ".join(["states", *(f"xi = {each:g}" for each in self.xi if self.xi.size <= MOST_STATES)])
+
+    @property
+    def is_near(self) -> NDArray[np.bool_]:
+        return np.full(self.z.shape, True)
 
     @property
     def z(self) -> FloatArray:

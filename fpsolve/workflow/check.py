@@ -100,7 +100,7 @@ def even_moments(case: Case) -> FloatArray:
 def refuse_no_hierarchy(case: Case) -> None:
     """Refuse a case without an even p, or some curve of which has no hierarchy. Raises `FpsolveError`."""
     orders = even_moments(case)
-    if case.problem.dimension > 2:
+    if case.method.by_moments:
         raise FpsolveError(
             f"{case.path}: has more than two variables, of which Λ(p) of even p is by the hierarchy anyway"
         )

@@ -92,13 +92,14 @@ class Explorer:
     def __init__(self, case: Case, code: str) -> None:
         first = next(case.curves(0, 1)).problem
         kinds = CHEAP + CHEAP_OF_WALLS * bool(first.system.jumps)
-        coloured, p, method = first.coloured, case.p, choose(first)
-        self.moves = first.dimension == 2 and len(coloured.parts) == 1 and coloured.basis != "pairs"
-        if not first.has_algebraic_tails:
+        p, method = case.p, choose(first)
+        self.moves, has_square = method.is_quick, method.reason(2.0) is None
+        if has_square:
             more = USUAL_P if p.size < FEW and self.moves else FEWEST_P
             p = np.union1d(p, more[more >= method.interval[0]] if method.has_pairs else more[1:])
         quantities = kinds if method.has_pairs else kinds[:1]
         self.source, self.code, self.first, self.quantities = case, code, first, quantities
+        self._written = quantities[: 2 + has_square]
         is_same = np.array_equal(np.sort(case.p), p)
         changed = {"vary": Vary(), "figure": FigureSection(), "uncertain": Uncertain(), "expect": (), "chart": None}
         changed["moments"] = case.moments.model_copy(update={} if is_same else {"p": tuple(p.tolist())})
@@ -308,7 +309,7 @@ class Explorer:
         """Python that computes these numbers."""
         values, held = self._at(question).problem.values, self.source.problem.values
         changed = {key: value for key, value in values.items() if value != held[key]}
-        names = ["moment_lyapunov", *self.quantities[1 : 2 if self.first.has_algebraic_tails else 3]]
+        names = ["moment_lyapunov", *self._written[1:]]
         p, rtol = self.case.p.tolist(), self.case.rtol
         calls = [f"print({name}(problem, {f'{p}, ' * (name == names[0])}rtol={rtol}))" for name in names]
         lines = [

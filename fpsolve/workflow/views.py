@@ -15,12 +15,12 @@ from fpsolve.analysis.target import said
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case
 from fpsolve.case.sections import ChartSection
-from fpsolve.data import plain_unit
 from fpsolve.errors import FpsolveError
 from fpsolve.explain import explain, is_number
+from fpsolve.exponent.eigen import PrincipalPair
+from fpsolve.exponent.method import DIRECTIONS, PHASE_AND_NOISE
 from fpsolve.page.html import part_of_page
 from fpsolve.page.page import Column, Drawing, Grid, Sentence
-from fpsolve.parts.eigenfunctions import FURTHEST
 from fpsolve.parts.nodes import Nodes
 from fpsolve.parts.part import Numerics
 from fpsolve.results.text import sampled
@@ -35,6 +35,7 @@ PATHS, POINTS, PERIODS = 10, 400, 12
 NAMED = 0.02
 """Share of the frame from which on a region is named."""
 Answer = Mapping[str, Any]
+Panels = tuple[list[Answer], list[Sentence]]
 
 
 def map_of(case: Case, axes: object, tell: Callable[[Answer], None]) -> Answer:
@@ -44,7 +45,7 @@ def map_of(case: Case, axes: object, tell: Callable[[Answer], None]) -> Answer:
         axes: two tables such as those of [chart].
         tell: takes what there is so far, of the grid that is searched for a line its rows.
     """
-    lines = ["moment(2) = 0"] if not case.problem.has_algebraic_tails else []
+    lines = ["moment(2) = 0"] if case.method.reason(2.0) is None else []
     lines = lines if not case.method.has_pairs else ["lyapunov_exponent = 0", *lines]
     x, y = axes if isinstance(axes, list) and len(axes) == 2 else (None, None)
     try:
@@ -93,28 +94,37 @@ def field_of(case: Case, p: Any) -> Answer:
     """T and the stationary density over phase and noise, of three and four variables densities of directions."""
     if not is_number(p):
         raise FpsolveError(f"got p = {p!r}; must be a finite number; write, for example, 2")
-    problem = case.problem
     if why := case.method.no_picture:
         raise FpsolveError(why)
-    solver = Numerics.of(case).solver(problem)
+    solver = Numerics.of(case).solver(case.problem)
     stationary = solver.pair(0.0)
-    if problem.dimension > 2:
-        all_of: list[Any] = [stationary_density(stationary), *([tilted_density(solver.pair(float(p)))] if p else [])]
-        names = [f"{each.words} ({each.unit})" for each in all_of[0].grid.quantities]
-        panels = [panel(each.name, each.grid.first, each.grid.second, each.values, names) for each in all_of]
-        said = [Sentence(each._said()) for each in all_of]
-        return {"panels": panels, "told": part_of_page([*told_of(panels), *said])}
-    stationary_density(stationary)  # which refuses one that misleads
-    pair = solver.pair(float(p))
-    grid, unit = Nodes.of(pair), problem.noise_quantity.unit
-    inside = (np.abs(grid.z) <= FURTHEST) | problem.noise.has_states
-    xi, is_chain = grid.unit * grid.z[inside], problem.noise.has_states
-    along = "number of the state" if problem.noise.has_states else f"noise ξ ({plain_unit(unit)})"
-    names = ["phase φ (rad)", along.removesuffix(" (unknown)").removesuffix(" (1)")]
-    phi, shown = grid.phi.ravel(), {f"eigenfunction T of p = {p:g}": grid.fields(pair).T}
+    density = stationary_density(stationary)  # which refuses one that misleads
+    panels, said = PANELS[case.method.pictures.part](density, stationary, solver.pair(float(p)))
+    return {"panels": panels, "told": part_of_page([*told_of(panels), *said])}
+
+
+def _panels_of_directions(density: Any, stationary: PrincipalPair, pair: PrincipalPair) -> Panels:
+    """The stationary density and, at another p, the tilted one."""
+    found = [density, *([tilted_density(pair)] if pair.p else [])]
+    names = [f"{each.words} ({each.unit})" for each in density.grid.quantities]
+    panels = [panel(each.name, each.grid.first, each.grid.second, each.values, names) for each in found]
+    return panels, [Sentence(each._said()) for each in found]
+
+
+def _panels_over_noise(density: Any, stationary: PrincipalPair, pair: PrincipalPair) -> Panels:
+    """T and the stationary density."""
+    grid = Nodes.of(pair)
+    near, names = grid.is_near, ["phase φ (rad)", grid.axis]
+    shown = {f"eigenfunction T of p = {pair.p:g}": grid.fields(pair).T}
     shown["stationary density"] = grid.fields(stationary).T_adjoint
-    panels = [panel(title, phi, xi, values[:, inside], names, is_chain) for title, values in shown.items()]
-    return {"panels": panels, "told": part_of_page(told_of(panels))}
+    return [
+        panel(title, grid.phi.ravel(), grid.y[near], values[:, near], names, grid.is_lines)
+        for title, values in shown.items()
+    ], []
+
+
+PANELS = {PHASE_AND_NOISE.part: _panels_over_noise, DIRECTIONS.part: _panels_of_directions}
+"""What is shown of each of the `Pictures`."""
 
 
 def listed(values: FloatArray) -> list[float | None]:

@@ -82,6 +82,7 @@ class Filter(Noise):
     kind: ClassVar[str] = "filter"
     of_xi: ClassVar[Sequence[str]] = ("s",)
     may_tilt: ClassVar[bool] = False
+    variables: ClassVar[int] = 2
     stated: ClassVar[Mapping[str, FieldInfo]] = {
         "output": stated_field(Pair, "c0 and c1 in ξ = c0 y + c1 y′", "output = [1.0, 0.0]", None)
     }

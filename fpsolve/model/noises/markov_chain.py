@@ -61,6 +61,10 @@ class Chain(Noise):
     def reached(self) -> FloatArray:
         return np.array(self.states)
 
+    def misfit(self, xi: float) -> str:
+        is_state = np.any(np.isclose(self.states, xi, rtol=1e-9, atol=0))
+        return "" if is_state else f"; must be one of the states, {', '.join(f'{each:g}' for each in self.states)}"
+
     @property
     def standard_deviation(self) -> float:
         return math.sqrt(self.probabilities @ (np.array(self.states) - self.mean) ** 2)

@@ -135,7 +135,6 @@ class NonGaussianNoise(TreatedNoise):
     of_xi: ClassVar[Sequence[str]] = ("D0",)
     words: ClassVar[Mapping[str, str]] = {"treatment": "exact"}
     approximates_spectrum: ClassVar[bool] = True
-    tails_beyond: ClassVar[tuple[str, float, str] | None] = "r0", 1.0, 'use treatment = "ou-reduction"'
 
     @property
     def curvature(self) -> float:
@@ -223,6 +222,10 @@ class NonGaussianNoise(TreatedNoise):
     @property
     def has_algebraic_tails(self) -> bool:
         return self.r0 > 1
+
+    @property
+    def tails_beyond(self) -> tuple[str, float, str] | None:
+        return ("r0", 1.0, 'use treatment = "ou-reduction"') if self.has_algebraic_tails else None
 
     def spectral_density(self, omega: float) -> float:
         """S(ω) of the reduced noise, Eq. (16); that of Eq. (7) itself has no closed form."""

@@ -11,7 +11,7 @@ from typing import ClassVar
 import numpy as np
 
 from fpsolve.arrays import FloatArray, shown
-from fpsolve.model.noise import Noise
+from fpsolve.model.noise import STAY, Noise
 from fpsolve.model.plane import CoefficientMatrix, LinearMotion, Motion, MotionDerivative, System, is_driven
 
 MOST_WITH_AXES = 2
@@ -107,6 +107,13 @@ class Noises(Noise):
     def approximates_spectrum(self) -> bool:  # type: ignore[override]
         """Whether the `spectral_density` of one of the noises is that of a simpler process which replaces it."""
         return any(noise.approximates_spectrum for _, noise in self.named)
+
+    @property
+    def variables(self) -> int:  # type: ignore[override]
+        return sum(noise.variables for noise in self._valued)
+
+    def misfit(self, xi: float) -> str:
+        return f", but several noises have values; {STAY}"
 
     @property
     def standard_deviation(self) -> float:
