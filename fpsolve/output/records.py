@@ -28,21 +28,19 @@ from pathlib import Path
 from secrets import token_hex
 from time import monotonic, sleep
 from types import NoneType, UnionType
-from typing import Any, Literal, NamedTuple, TypeVar, get_args, get_origin, get_type_hints
+from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
 
 import numpy as np
 
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case, Curve
-from fpsolve.data import Quantity
 from fpsolve.errors import OutputError, Remedy
 from fpsolve.exponent.error import Moment
-from fpsolve.fem.mesh import CylinderMesh
-from fpsolve.messages import Code, Message, Severity, message_of
+from fpsolve.messages import Code, Message, Severity
 from fpsolve.output.tables import says_more
 from fpsolve.parts.every import BY_NAME
 from fpsolve.parts.moments import PART as MOMENTS
-from fpsolve.parts.moments import Moments, begun_of, unfinished
+from fpsolve.parts.moments import begun_of, unfinished
 from fpsolve.parts.part import Entry, Job, Numerics, Part, Reason, Settings
 from fpsolve.results.curve import CurveResult, SimulatedCurve
 from fpsolve.results.table import Table
@@ -330,10 +328,10 @@ def part_key(part: Part, settings: Settings, numerics: Numerics, *, is_limited: 
         numerics: how it is solved.
         is_limited: whether it is an entry that a larger budget may change.
     """
-    content: dict[str, Any] = {"form": codec(part.kind).form, "settings": settings}
+    content: dict[str, Any] = {"form": form(part.kind), "settings": settings}
     if part.uses_solver:
         mesh = numerics.mesh
-        content["numerics"] = [numerics.rtol, mesh and codec(CylinderMesh).plain(mesh)]
+        content["numerics"] = [numerics.rtol, mesh and plain(mesh)]
     if is_limited:
         content["budget"] = [numerics.budget.unknowns, numerics.budget.seconds]
     return f"{part.name}-{_hash(content)[:16]}"
@@ -366,15 +364,14 @@ def record_of_set(curve: Curve, asked: Asked, numerics: Numerics, entries: Mappi
         if not any(each.tells_of(code) for each in said for code in (Code.NO_MEMORY, Code.FAULT)):
             is_limited = entry.reason is not None or any(each.severity is not Severity.NOTE for each in said)
             is_limited |= entry.found is not None and part.lacks(entry.found, asked[name])
-            found = None if entry.found is None else codec(part.kind).plain(entry.found)
-            record[keys[name][is_limited]] = [found, _REASON.plain(entry.reason), entry.seconds]
+            record[keys[name][is_limited]] = plain((entry.found, entry.reason, entry.seconds))
     return record
 
 
 def begun_record(job: Job) -> Record:
     """The record of Λ(p) while other p are being solved."""
     found = unfinished(job.curve.problem, job.begun)
-    return {begun_key(job.numerics): [codec(Moments).plain(found), None, 0.0]}
+    return {begun_key(job.numerics): [plain(found), None, 0.0]}
 
 
 def messages_of(part: Part, entry: Entry, curve: Curve, numerics: Numerics) -> Iterator[Message]:
@@ -405,22 +402,21 @@ def entries_of(record: Record, asked: Asked, numerics: Numerics) -> tuple[dict[s
 def _entry_of(data: Any, part: Part) -> Entry | None:
     """An entry from what a record has of it; None where that has another form."""
     try:
-        plain, reason, seconds = data
-        return Entry(None if plain is None else codec(part.kind).made(plain), _REASON.made(reason), float(seconds))
+        found, reason, seconds = data
+        return Entry(None if found is None else maker(part.kind)(found), maker(Reason | None)(reason), float(seconds))
     except _OF_ANOTHER_FORM:
         return None
 
 
 def record_of(found: Any) -> Record:
     """The record of a dataclass, without its curve."""
-    kind: Any = type(found)
-    return {name: each.plain(getattr(found, name)) for name, each in _recorded(kind).items()}
+    return {name: plain(getattr(found, name)) for name in _names(type(found))}
 
 
 def made_of(kind: type, record: Mapping[str, Any]) -> dict[str, Any]:
     """The attributes of a dataclass from its record. Raises `ValueError` where that has another form."""
     with _read_as(f"a {kind.__name__}"):
-        return {name: each.made(record[name]) for name, each in _recorded(kind).items()}
+        return {name: maker(each)(record[name]) for name, each in _hints(kind).items()}
 
 
 @contextmanager
@@ -434,93 +430,82 @@ def _read_as(what: str) -> Iterator[None]:
 
 def key_of(kind: type, curve: Curve, **content: Any) -> str:
     """What a record of a kind is found by: the version, a digest of form and content, and that of the curve."""
-    form = {name: each.form for name, each in _recorded(kind).items()}
-    return f"{RESULT_VERSION}-{_hash({'form': form, **content})}-{curve.digest}"
+    return f"{RESULT_VERSION}-{_hash({'form': form(kind), **content})}-{curve.digest}"
 
 
 def _hash(content: Any) -> str:
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 
-class Codec(NamedTuple):
-    """Makes plain data of the values of one kind, and values of plain data.
-
-    Attributes:
-        form: what the plain data look like; it changes with the attributes of a dataclass, and with those in it.
-        plain: gives what JSON can hold.
-        made: the inverse. Raises TypeError, ValueError or LookupError where the data have another form.
-    """
-
-    form: Any
-    plain: Callable[[Any], Any]
-    made: Callable[[Any], Any]
+def plain(value: Any) -> Any:
+    """What JSON can hold of a value, a dataclass without its curve."""
+    if isinstance(value, Message):
+        return value.to_data()
+    if names := _names(type(value)):
+        return [plain(getattr(value, name)) for name in names]
+    if isinstance(value, np.ndarray):
+        return _packed(value)
+    if isinstance(value, Mapping):
+        return {key: plain(each) for key, each in value.items()}
+    if isinstance(value, tuple | list):
+        return [plain(each) for each in value]
+    value = value.item() if isinstance(value, np.generic) else value
+    return str(value) if isinstance(value, float) and not math.isfinite(value) else value
 
 
 @cache
-def codec(kind: Any) -> Codec:
-    """For the values of an attribute with an annotation."""
-    origin, parts, is_row = get_origin(kind), get_args(kind), is_dataclass(kind) or hasattr(kind, "_fields")
-    if kind in _SIMPLE:
-        return _SIMPLE[kind]
-    if is_row:
-        attributes = _recorded(kind)
-        row = Codec(
-            [kind.__name__, *([name, one.form] for name, one in attributes.items())],
-            lambda value: [one.plain(getattr(value, name)) for name, one in attributes.items()],
-            lambda data: kind(*[one.made(part) for one, part in zip(attributes.values(), data, strict=True)]),
-        )
-        if kind is not Quantity:
-            return row
-        # a text for each, as there are few of them and many numbers
-        plain = lru_cache(lambda value: json.dumps(row.plain(value)))
-        made = lru_cache(lambda text: row.made(json.loads(text)))
-        return Codec(row.form, plain, made)
+def maker(kind: Any) -> Callable[[Any], Any]:
+    """Makes the values that have an annotation of what `plain` gave; raises one of `_OF_ANOTHER_FORM` elsewhere."""
+    origin, parts = get_origin(kind), get_args(kind)
+    if kind is Message:
+        return Message.from_data
+    if _names(kind):
+        each = [*map(maker, _hints(kind).values())]
+        return lambda data: kind(*(make(part) for make, part in zip(each, data, strict=True)))
     if origin is get_origin(FloatArray):  # np.ndarray, or NDArray itself since NumPy 2.5
-        return Codec("array or list", _packed, _unpacked)
+        return _unpacked
     if origin is Literal:
-        return Codec(parts, str, lambda data: parts[parts.index(data)])
+        return lambda data: parts[parts.index(data)]
     if origin is UnionType and NoneType in parts:
-        [inner] = [codec(part) for part in parts if part is not NoneType]
-        return Codec(
-            ["none", inner.form],
-            lambda value: None if value is None else inner.plain(value),
-            lambda data: None if data is None else inner.made(data),
-        )
+        [own] = [maker(part) for part in parts if part is not NoneType]
+        return lambda data: None if data is None else own(data)
     if origin is tuple and parts[1:] == (...,):
-        inner = codec(parts[0])
-        return Codec(
-            [inner.form],
-            lambda value: [inner.plain(each) for each in value],
-            lambda data: tuple(map(inner.made, data)),
-        )
+        one = maker(parts[0])
+        return lambda data: tuple(map(one, data))
     if origin is tuple:
-        each = [codec(part) for part in parts]
-        return Codec(
-            [one.form for one in each],
-            lambda value: [one.plain(part) for one, part in zip(each, value, strict=True)],
-            lambda data: tuple(one.made(part) for one, part in zip(each, data, strict=True)),
-        )
+        each = [*map(maker, parts)]
+        return lambda data: tuple(make(part) for make, part in zip(each, data, strict=True))
     if origin in (dict, Mapping):
-        inner = codec(parts[1])
-        return Codec(
-            {"": inner.form},
-            lambda value: {key: inner.plain(each) for key, each in value.items()},
-            lambda data: {key: inner.made(each) for key, each in data.items()},
-        )
-    raise TypeError(f"values of {kind} cannot be recorded")
+        entry = maker(parts[1])
+        return lambda data: {key: entry(value) for key, value in data.items()}
+    return kind if kind in (str, bool, int, float) else lambda data: data
 
 
 @cache
-def _recorded(kind: Any) -> Mapping[str, Codec]:
-    """For each attribute of a dataclass but a curve; what needs numba is imported for simulations only."""
+def form(kind: Any) -> Any:
+    """What the data of values with an annotation look like; it changes with the attributes of a dataclass in it."""
+    if _names(kind):
+        return [kind.__name__, *([name, form(each)] for name, each in _hints(kind).items())]
+    return [str(get_origin(kind) or kind), *map(form, get_args(kind))]
+
+
+@cache
+def _names(kind: Any) -> Sequence[str]:
+    """The attributes of a dataclass but a curve, or of a named tuple; none of what is neither."""
+    known = [each.name for each in fields(kind)] if is_dataclass(kind) else getattr(kind, "_fields", ())
+    return [name for name in known if name != "curve"]
+
+
+@cache
+def _hints(kind: Any) -> Mapping[str, Any]:
+    """Their annotations; what needs numba is imported for simulations only."""
     late: dict[str, Any] = {}
     if kind is SimulatedCurve:
         from fpsolve.simulation import MonteCarlo, Response
 
         late = {"MonteCarlo": MonteCarlo, "Response": Response}
     hints = get_type_hints(kind, localns=late)
-    names = getattr(kind, "_fields", None) or [each.name for each in fields(kind)]
-    return {name: codec(hints[name]) for name in names if name != "curve"}
+    return {name: hints[name] for name in _names(kind)}
 
 
 def _packed(value: FloatArray) -> Record | list[float | str]:
@@ -535,16 +520,3 @@ def _unpacked(packed: Any) -> FloatArray:
         return np.array(list(map(float, packed)), dtype=float)
     data = zlib.decompress(b64decode(packed["data"]))
     return np.frombuffer(data, dtype="<f8").reshape(packed["shape"]).astype(float)
-
-
-_SIMPLE: Mapping[Any, Codec] = {
-    Any: Codec("any", lambda value: value, lambda data: data),
-    str: Codec("text", str, str),
-    bool: Codec("bool", bool, bool),
-    int: Codec("int", int, int),
-    float: Codec("float", lambda value: float(value) if math.isfinite(value) else str(float(value)), float),
-    float | str: Codec("number or text", lambda value: value, lambda data: data),
-    Message: Codec("message", lambda value: message_of(value).to_data(), Message.from_data),
-}
-"""For what has no parts."""
-_REASON = codec(Reason | None)

@@ -63,7 +63,7 @@ RESULT = MonteCarlo(
     step=1e-300,
     seed=2**63,
     impacts=0,
-    warnings=("Λ(p) at p = 2", 'a "quoted" one\nof two lines'),
+    warnings=(Message(Code.TEXT, text="Λ(p) at p = 2"), Message(Code.TEXT, text='a "quoted" one\nof two lines')),
     interrupted=True,
     parameters={"noise.treatment": "exact"},
 )
