@@ -310,11 +310,11 @@ def _at_start(pair: PrincipalPair, phi: Start, xi: StartOfNoise) -> float:
 
 def _mean_functions(axis: Any, xi: StartOfNoise) -> FloatArray:
     """The means of the functions of a noise over its start, shape (size,)."""
+    at = axis.samples()
     if xi == STATIONARY:
-        at = axis.samples()
         return np.asarray((axis.law() * at.factor) @ at.values)
     if axis.cells.max() < 0:
-        chosen = np.isclose(axis.support, xi, rtol=1e-9, atol=0) * axis.measure
+        chosen = np.isclose(at.xi, xi, rtol=1e-9, atol=0) * at.weight
         return np.asarray(chosen / chosen.sum())
     at = axis.at(np.array([float(xi)]) / axis.unit)
     return np.asarray(at.values[0] * at.factor[0])

@@ -229,7 +229,7 @@ def plane_fields(pair: PrincipalPair, phi: FloatArray, inside: FloatArray, at: S
     axis, xi, frame = pair.space.phi, pair.space.xi, pair.generator.problem.frame
     psi, weights = axis.finer_rule(frame.parts)
     own, rule = frame.own_phase(psi), xi.samples()
-    law = xi.law() * rule.factor if abs(xi.tilt) <= MOST_TILT else xi.measure
+    law = xi.law() * rule.factor if abs(xi.tilt) <= MOST_TILT else xi.rule.measure
     over_phi = weights / frame.density(own) * frame.length(own) ** pair.p @ axis.at(psi) / axis.span
     mean = over_phi @ pair.space.table(pair.right) @ (law @ rule.values)
     psi, cells = frame.phase(phi), frame.phase(inside)

@@ -428,7 +428,7 @@ def _pair(generator: Generator, pencil: Pencil, found: Iterate) -> PrincipalPair
     y = found.y * (norm / (found.y @ space.weighed(x)))
     rounding = _EPS * float(abs(y) @ (abs(operator) @ abs(x))) / norm
     if generator.keeps_constants:
-        forcing, total = generator.matrix(p, orders=slice(1, None)), weight @ x
+        forcing, total = generator.matrix(p, is_forcing=True), weight @ x
         of_noise = _of_noises(space)
         doubtful = abs(x) + generator.loss * abs(x - constant)
         bound = _EPS * float((constant @ (abs(forcing) @ doubtful) + abs(of_noise) @ doubtful) / total)

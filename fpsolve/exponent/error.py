@@ -22,8 +22,7 @@ from fpsolve.arrays import FloatArray
 from fpsolve.data import Quantity, Result, brief, dataset
 from fpsolve.errors import NotConverged
 from fpsolve.exponent.eigen import PrincipalPair
-from fpsolve.fem.axis import along
-from fpsolve.fem.effects import ModeEffects
+from fpsolve.fem.axis import ModeEffects, along
 from fpsolve.fem.space import Space
 from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.quantity import UNNAMED

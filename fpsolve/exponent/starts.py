@@ -16,7 +16,7 @@ import numpy as np
 from fpsolve.exponent.density import xi_marginal
 from fpsolve.exponent.eigen import BACKWARD_ERROR_LIMIT, PrincipalPair, principal_pair
 from fpsolve.exponent.error import Solution, mode_effects
-from fpsolve.fem.effects import MOST_DEGREE, ModeEffects
+from fpsolve.fem.axis import MOST_DEGREE, ModeEffects
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.noise_axes import CellAxis, PolynomialAxis
 from fpsolve.fem.pairs import PairAxis

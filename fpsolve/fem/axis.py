@@ -1,29 +1,111 @@
-"""Axes, the functions along one direction each, and the operators on their products.
+"""Axes, the functions along one direction each, what tells that there should be more, and operators on their products.
 
 A function of (φ, ξ, …) has one coefficient for each choice of a function on every axis, the first axis slowest; an
 operator f(φ)·g(ξ)·… is a Kronecker product of one matrix for each axis, others are sums Σ Φ_k ⊗ Ξ_k ⊗ … of them.
+
+How fast the effect of a cell's highest modes on Λ falls with their degree is how fast the cell converges, and decides
+between a higher degree and smaller cells.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property, reduce
 from typing import Any, ClassVar, Self
 
 import numpy as np
 import scipy.sparse
-from scipy.sparse import csc_matrix, identity, issparse
+from scipy.sparse import csc_matrix
 
 from fpsolve.arrays import Coefficient, FloatArray, IntArray, Mask, Matrix, dense, one
-from fpsolve.fem.effects import ModeEffects, split
 from fpsolve.fem.mesh import MAX_DEGREE, halved
 from fpsolve.model.noise import NoiseDerivative
 
 NO_LINES = np.zeros(0)
 MAX_DENSE_UNKNOWNS = 600
 """Largest number of functions of an axis with cells whose matrices are arrays: of more they are sparse."""
+HALVING = 2 * math.log(2)
+"""Rate per degree by which the logarithm of an effect falls faster in half a cell."""
+LEAST_DEGREE = 4
+"""Lowest degree to which a cell is made coarser."""
+SPLIT_DEGREE = 6
+"""Lowest degree at which the highest modes tell whether halves of a cell take fewer functions."""
+MOST_DEGREE = 14
+"""Highest degree of a cell: beyond, it is halved."""
+LEAST_FALL = 0.3
+"""Least fall of the logarithm of an effect with each degree."""
+STILL = 3 / 7
+"""Ratio of the effects of two and of four modes where no fall is seen: then thrice the first may be left."""
+SPARE = 1.0
+"""Number of degrees beyond what seems to be enough that a cell keeps where none should be made coarser."""
+
+
+@dataclass(frozen=True, eq=False)
+class ModeEffects:
+    """How much of Λ each cell of one axis owes to its highest modes.
+
+    Attributes:
+        degrees: of the cells, shape (cells,).
+        highest: the effects of the highest mode, of the two highest and so on up to four, shape (4, cells).
+        slowest: the least share of the effect of two modes that is thought to be left.
+    """
+
+    degrees: IntArray
+    highest: FloatArray
+    slowest: float = 0.0
+
+    @property
+    def of_cells(self) -> FloatArray:
+        """Estimate of what each cell lacks, half way from the effect of two modes to what its slower fall predicts.
+
+        Where e falls slowly, by r with two degrees, effects are its differences, (1/r − 1)e and (1/r² − 1)e of two and
+        four modes: of their ratio q is r = q/(1 − q), and e is q/(1 − 2q) times the effect of two.
+        """
+        of_two = np.minimum(self.highest[1] / np.maximum(self.highest[3], 1e-300), STILL)
+        left = np.maximum(np.clip(np.sqrt(self._left_by_two), self.slowest, 1.0), of_two / (1 - 2 * of_two))
+        return self.highest[1] * left
+
+    @property
+    def error(self) -> float:
+        return float(np.sum(self.of_cells))
+
+    @property
+    def fall(self) -> FloatArray:
+        """By how much the logarithm of the effect falls with each degree, shape (cells,)."""
+        return np.maximum(-0.5 * np.log(np.maximum(self._left_by_two, 1e-300)), LEAST_FALL)
+
+    @property
+    def _left_by_two(self) -> FloatArray:
+        """What two degrees leave of the effect, as it has fallen to that of two modes and, if more slowly, of one.
+
+        In cells of few modes the effect of one tells nothing.
+        """
+        of_one, of_two = self.highest[:2] / np.maximum(self.highest[2:], 1e-300)
+        return np.where(self.degrees >= SPLIT_DEGREE, np.maximum(of_one, of_two), of_two)
+
+    def needed(self, tolerance: float) -> FloatArray:
+        """The degree at which each cell would lack `tolerance`, shape (cells,)."""
+        return self.degrees + np.log(np.maximum(self.of_cells, 1e-300) / tolerance) / self.fall
+
+
+def split(lines: FloatArray, effects: ModeEffects, share: float, may_coarsen: bool) -> tuple[FloatArray, IntArray]:
+    """Lines and a degree for each cell with which all together should lack no more than a share.
+
+    A cell is halved where halves take fewer unknowns: in them the effects fall faster.
+    """
+    rate, needed = effects.fall, effects.needed(max(share, 1e-290) / math.sqrt(effects.degrees.size))
+    if not may_coarsen:  # but for what is far more than enough
+        needed = np.maximum(needed, np.minimum(effects.degrees, needed + SPARE))
+    in_half = needed * rate / (rate + HALVING)
+    is_split = (2 * in_half + 2 < needed + 1) & (effects.degrees >= SPLIT_DEGREE) & (needed > effects.degrees)
+    is_split |= needed > MOST_DEGREE
+    degrees = np.ceil(np.where(is_split, in_half, needed) + 0.2)
+    degrees = np.clip(degrees, np.maximum(LEAST_DEGREE, effects.degrees - 4), effects.degrees + 4)
+    middles = 0.5 * (lines[:-1] + lines[1:])
+    degrees = np.repeat(np.minimum(degrees, MOST_DEGREE).astype(int), np.where(is_split, 2, 1))
+    return np.sort(np.concatenate([lines, middles[is_split]])), degrees
 
 
 class Axis:
@@ -37,13 +119,16 @@ class Axis:
         is_chain: whether each function is coupled to few next to it alone, as polynomials of noise are.
         slowest: the least share of the effect of the highest modes that two more may leave, see `ModeEffects`.
         slope: s/p of the factor exp(s z) that moves with p.
+        turns: how often the axis fits on the full circle; 1 for noise.
+        nested: to coefficients of modes whose sums by degree are functions of a lower one; None where they are that.
     """
 
     __dataclass_fields__: ClassVar[dict[str, Any]]
     lines = NO_LINES
     most_unknowns = 35_000
     is_chain = False
-    slowest, slope = 0.0, 0.0
+    slowest, slope, turns = 0.0, 0.0, 1
+    nested: Any = None
 
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), tuple(getattr(self, each.name) for each in fields(self))
@@ -63,25 +148,10 @@ class Axis:
         """For each unknown the degree of its polynomial in a cell, shape (size,)."""
         return np.zeros(self.size, dtype=int)
 
-    @property
-    def nested(self) -> Matrix | None:
-        """To coefficients of modes whose sums by degree are all functions of a lower one; None where they are that."""
-        return None
-
-    @property
-    def unit(self) -> Matrix | None:
-        """∫ u v; None where it is the identity, or for noise."""
-        return None
-
     @cached_property
     def constant(self) -> FloatArray:
         """Coefficients of the function 1, times the factor of the axis, shape (size,); by default it is the first."""
         return np.eye(1, self.size)[0]
-
-    @property
-    def turns(self) -> int:
-        """How often the axis fits on the full circle; 1 for noise."""
-        return 1
 
     @property
     def facts(self) -> dict[str, Any]:
@@ -170,118 +240,79 @@ class DividedAxis(Axis):
         return self.on(*split(self.lines, effects, share, may_coarsen))
 
 
-def along(factors: Sequence[Matrix | None], table: FloatArray) -> FloatArray:
-    """A table with a matrix applied along each of its axes, from the last; None leaves an axis as it is."""
-    if table.ndim == 2:
+def along(factors: Sequence[Matrix | None], tables: FloatArray) -> FloatArray:
+    """Tables, in the last axes of an array, with a matrix applied along each axis; None leaves one as it is."""
+    if tables.ndim == 2:  # by far the most products of a solve
         first, last = factors
-        table = table if last is None else np.asarray(table @ last.T)
-        return table if first is None else first @ table
-    for axis in range(len(factors) - 1, -1, -1):
-        if (factor := factors[axis]) is not None:
-            moved = np.moveaxis(table, axis, 0)
+        tables = tables if last is None else np.asarray(tables @ last.T)
+        return tables if first is None else first @ tables
+    for axis, factor in enumerate(factors, tables.ndim - len(factors)):
+        if factor is not None:
+            moved = tables.swapaxes(0, axis)
             image = factor @ moved.reshape(len(moved), -1)
-            table = np.moveaxis(image.reshape(-1, *moved.shape[1:]), 0, axis)
-    return table
+            tables = image.reshape(-1, *moved.shape[1:]).swapaxes(0, axis)
+    return tables
 
 
-@dataclass(frozen=True, eq=False)
 class KroneckerSum:
     """Σ Φ_k ⊗ Ξ_k ⊗ …, the factors kept apart; vectors are those of functions on φ × ξ × …, the first axis slowest.
 
     Attributes:
         terms: for each term a square matrix for each axis, arrays or sparse.
-        unit: ∫ u v of the first axis; None where it is the identity.
+        unit: ∫ u v of the first axis, which a shift needs.
+        shape: the number of functions along each axis.
+        size: the number of all functions.
     """
 
-    terms: Sequence[tuple[Matrix, ...]]
-    unit: Matrix | None = None
-
-    @cached_property
-    def shape(self) -> tuple[int, ...]:
-        """The number of functions along each axis."""
-        return tuple(factor.shape[0] for factor in self.terms[0])
-
-    @property
-    def size(self) -> int:
-        """The number of all functions."""
-        return math.prod(self.shape)
+    def __init__(self, terms: Sequence[Sequence[Matrix]], unit: Any = None) -> None:
+        self.terms, self.unit = terms, unit
+        self.shape = tuple(factor.shape[0] for factor in terms[0])
+        self.size = math.prod(self.shape)
 
     def __matmul__(self, vector: FloatArray) -> FloatArray:
-        table = vector.reshape(self.shape)
-        if len(self.shape) == 2:  # by far the most products of a solve
-            return np.ravel(sum(first @ (table @ last.T) for first, last in self.terms))
-        return np.ravel(sum(along(term, table) for term in self.terms))
+        return np.ravel(self.images(vector.reshape(self.shape)))
 
     def images(self, tables: FloatArray) -> FloatArray:
-        """The images of several vectors, each as a table, shape (count, *shape)."""
-        if len(self.shape) == 2 and not self.is_sparse:
-            return np.asarray(sum(first @ (tables @ last.T) for first, last in self.terms))
-        return np.stack([(self @ np.ravel(table)).reshape(self.shape) for table in tables])
+        """The images of vectors as tables, shape (…, *shape)."""
+        return np.asarray(sum(along(term, tables) for term in self.terms))
+
+    def each(self, function: Callable[[Matrix], Matrix]) -> KroneckerSum:
+        """The sum with a function of every factor in place of it."""
+        return KroneckerSum([tuple(map(function, term)) for term in self.terms], self.unit)
 
     @property
     def T(self) -> KroneckerSum:
         """The transpose."""
-        return KroneckerSum([tuple(factor.T for factor in term) for term in self.terms], self.unit)
+        return self.each(np.transpose)
 
     def __abs__(self) -> KroneckerSum:
         """A bound on the absolute values."""
-        return KroneckerSum([tuple(abs(factor) for factor in term) for term in self.terms], self.unit)
+        return self.each(abs)
 
     @cached_property
     def norm(self) -> float:
         """A bound on the largest sum of the absolute values of a column."""
-        return float(sum(np.prod([abs(factor).sum(axis=0).max() for factor in term]) for term in self.terms))
+        return float(sum(math.prod(abs(factor).sum(axis=0).max() for factor in term) for term in self.terms))
 
     def shifted(self, shift: float) -> KroneckerSum:
-        """The sum less `shift` · 1 ⊗ Ξ₀ ⊗ …, Ξ₀ ⊗ … being what the first term has beside its φ-matrix."""
+        """The sum less `shift` · unit ⊗ Ξ₀ ⊗ …, Ξ₀ ⊗ … being what the first term has beside its φ-matrix."""
         (phase, *noises), *others = self.terms
-        unit = self.unit
-        if unit is None:
-            unit = identity(phase.shape[0], format="csr") if issparse(phase) else np.eye(phase.shape[0])
-        return KroneckerSum([(phase - shift * unit, *noises), *others], self.unit)
+        return KroneckerSum([(phase - shift * self.unit, *noises), *others], self.unit)
 
     def on(self, axis: int, kept: Mask) -> KroneckerSum:
         """What it is on some functions of an axis, where a mask is true."""
         at = np.ix_(kept, kept)
         unit = self.unit if axis or self.unit is None else self.unit[at]
-        terms = [tuple(each[at] if k == axis else each for k, each in enumerate(term)) for term in self.terms]
+        terms = [[each[at] if k == axis else each for k, each in enumerate(term)] for term in self.terms]
         return KroneckerSum(terms, unit)
-
-    def with_last(self, axis: int) -> KroneckerSum:
-        """The sum with another axis as the last one."""
-        count = len(self.shape)
-        if axis % count == count - 1:
-            return self
-        order = [*(k for k in range(count) if k != axis), axis]
-        return KroneckerSum([tuple(term[k] for k in order) for term in self.terms])
-
-    @cached_property
-    def is_sparse(self) -> bool:
-        return any(issparse(factor) for term in self.terms for factor in term)
-
-    @cached_property
-    def pairs(self) -> Sequence[tuple[Matrix, Matrix]]:
-        """The terms with all factors but the last as one."""
-        product = scipy.sparse.kron if self.is_sparse else np.kron
-        return [(reduce(product, term[:-1]), term[-1]) for term in self.terms]
-
-    @property
-    def halves(self) -> tuple[int, int]:
-        """The number of functions along the last axis, after that of all others."""
-        last = self.shape[-1]
-        return self.size // last, last
-
-    def band(self, axis: int) -> int:
-        """How many diagonals the matrices of an axis have on each side."""
-        rows, columns = csc_matrix(sum(abs(csc_matrix(term[axis])) for term in self.terms)).nonzero()
-        return int(np.max(np.abs(rows - columns), initial=0))
 
     def toarray(self) -> FloatArray:
         """The dense matrix, shape (size, size)."""
-        m, n = self.halves
-        befores, lasts = (np.stack([dense(pair[side]) for pair in self.pairs]) for side in (0, 1))
-        products = befores.reshape(len(befores), -1).T @ lasts.reshape(len(lasts), -1)
-        return products.reshape(m, m, n, n).transpose(0, 2, 1, 3).reshape(m * n, m * n)
+        found = np.ones((len(self.terms), 1, 1))
+        for factors in zip(*self.terms, strict=True):
+            found = np.einsum("tij,tkl->tikjl", found, np.stack(list(map(dense, factors))))
+            found = found.reshape(len(found), found.shape[1] * found.shape[2], -1)
+        return np.asarray(found.sum(axis=0))
 
     def tocsc(self) -> csc_matrix:
         """The sparse matrix."""

@@ -61,7 +61,7 @@ class CircleAxis(CountedAxis):
         return values
 
     def mass(self, g: Coefficient = one) -> FloatArray:
-        return form(self.values, self.measure * g(self._xi)) if g != one else np.eye(self.size)
+        return form(self.rule.values, self.rule.measure * g(self._xi)) if g != one else np.eye(self.size)
 
     def generator(self) -> FloatArray:
         """∫ v (ν∂ + ½σ²∂²) u."""
@@ -71,12 +71,12 @@ class CircleAxis(CountedAxis):
         if g is None:
             return 2 * (change.log_diffusion - change.log_scale) * self._diffusing() + change.turning * self._turning()
         slope = (g(self._xi * (1 + STEP)) - g(self._xi * (1 - STEP))) / (2 * STEP)
-        return form(self.values, self.measure * change.log_scale * slope)
+        return form(self.rule.values, self.rule.measure * change.log_scale * slope)
 
     def samples(self) -> Samples:
         """At equidistant θ; weight and measure are those of θ."""
-        weight, turn = np.full(self.measure.size, 0.5 / np.pi), 2 * np.pi
-        return Samples(self._xi, weight, turn * self.measure, self.values, np.ones(self.measure.size))
+        weight, turn = np.full(self.rule.measure.size, 0.5 / np.pi), 2 * np.pi
+        return Samples(self._xi, weight, turn * self.rule.measure, self.rule.values, np.ones(self.rule.measure.size))
 
     def everywhere(self, count: int) -> tuple[FloatArray, Matrix]:
         """At equidistant θ of the whole circle, the first one twice."""

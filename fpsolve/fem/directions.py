@@ -268,10 +268,6 @@ class DirectionAxis(Axis):
         """∫ u v."""
         return self._form((self._itself, self._itself))
 
-    @property
-    def unit(self) -> Matrix:
-        return self.identity
-
     def mass(self, g: Coefficient = one) -> Matrix:
         return self.identity
 
@@ -549,4 +545,4 @@ class DirectionTerms(Terms):
         assert stop is not None
         omega = sum(self.system.epsilon**each.order * each.g(0.0) * self.phi.inside(each)[0, 1] for each in terms)
         words = f"{text}, ω = {omega:.6g}, R = {stop.restitution:.6g}"
-        return self._at(lambda p, k: size * omega * struck(math.log(stop.restitution), p, k), words)
+        return self._given(lambda p, k: size * omega * struck(math.log(stop.restitution), p, k), words)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from functools import lru_cache
+from functools import lru_cache, reduce
 from itertools import pairwise
 from threading import RLock
 from typing import Protocol
@@ -111,7 +111,9 @@ class SparseFactors:
 
 def neighbours(operator: KroneckerSum, axis: int) -> list[IntArray]:
     """The functions of an axis in levels, each coupled to the next ones only; both waves of a k are in one."""
-    size, band = operator.shape[axis], max(operator.band(axis), 1)
+    size = operator.shape[axis]
+    rows, columns = np.nonzero(np.sum([abs(dense(term[axis])) for term in operator.terms], axis=0))
+    band = max(1, int(np.max(np.abs(rows - columns), initial=0)))
     return np.split(np.arange(size), range(size % band or band, size, band))
 
 
@@ -134,10 +136,10 @@ class LevelFactors:
 
     def __init__(self, operator: KroneckerSum, groups: Sequence[IntArray], axis: int = -1) -> None:
         self._shape, self._axis, self._order = operator.shape, axis, np.concatenate(groups)
-        pairs = operator.with_last(axis).pairs
-        befores = np.stack([dense(before).T.ravel() for before, _ in pairs])
-        lasts = np.stack([dense(last) for _, last in pairs])
-        m, most = operator.size // operator.shape[axis], LARGEST_GROWTH * operator.norm
+        terms = [list(map(dense, term)) for term in operator.terms]
+        lasts = np.stack([term.pop(axis) for term in terms])
+        befores = np.stack([reduce(np.kron, others).T.ravel() for others in terms])  # type: ignore[arg-type]
+        m, most = operator.size // len(lasts[0]), LARGEST_GROWTH * operator.norm
         ends = m * np.cumsum([0, *(group.size for group in groups)])
         self._parts = [slice(*pair) for pair in pairwise(ends.tolist())]
 

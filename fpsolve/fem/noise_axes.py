@@ -19,8 +19,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 
 from fpsolve.arrays import Coefficient, FloatArray, IntArray, Matrix, dense, one
-from fpsolve.fem.axis import Axis, DividedAxis
-from fpsolve.fem.effects import ModeEffects
+from fpsolve.fem.axis import Axis, DividedAxis, ModeEffects
 from fpsolve.fem.line import LineSpace
 from fpsolve.model.noise import Noise, NoiseDerivative
 from fpsolve.polynomials import Polynomials, gegenbauer, hermite, logarithm, stieltjes
@@ -108,16 +107,6 @@ class NoiseAxis(Axis):
     def facts(self) -> dict[str, Any]:
         return {"xi": self.word, "xi_size": self.size, "tilt": self.tilt}
 
-    @property
-    def measure(self) -> FloatArray:
-        """∫ of the weight at the points of the rule, shape (n,)."""
-        return self.rule.measure
-
-    @property
-    def values(self) -> Matrix:
-        """The functions at the points of the rule, without factor, shape (n, size)."""
-        return self.rule.values
-
     def generator_of_one(self) -> FloatArray:
         """`generator` with v the function 1, times the factor; shape (size,)."""
         return np.zeros(self.size)
@@ -132,7 +121,7 @@ class NoiseAxis(Axis):
 
     def law(self) -> FloatArray:
         """The stationary law as weights of the `samples`, shape (n,)."""
-        weights = self.measure / self.samples().factor ** 2
+        weights = self.rule.measure / self.samples().factor ** 2
         return np.asarray(weights / weights.sum())
 
     def everywhere(self, count: int) -> tuple[FloatArray, Matrix]:
@@ -187,11 +176,6 @@ class LineAxis(NoiseAxis):
         return float(self.noise.standard_deviation)
 
     @property
-    def points(self) -> FloatArray:
-        """z of the rule, shape (n,)."""
-        return self.rule.points
-
-    @property
     def _log_mass(self) -> float:
         """ln ∫ P_s exp(2s z)."""
         return 0.0
@@ -238,26 +222,30 @@ class LineAxis(NoiseAxis):
         return self._sampled(z, np.zeros_like(z), self.values_at(z))
 
     def samples(self) -> Samples:
-        return self._sampled(self.points, self.unit * self.measure / self.weight(self.points), self.values)
+        z, measure, values = self.rule[:3]
+        return self._sampled(z, self.unit * measure / self.weight(z), values)
 
     def _sampled(self, z: FloatArray, measure: FloatArray, values: Matrix) -> Samples:
         return Samples(self.unit * z, self.weight(z) / self.unit, measure, values, self._factor(z))
 
     def projection(self, other: LineAxis) -> FloatArray:
-        exponent = other.tilt * (self.points - other.center) - self.tilt * (self.points - self.center)
-        scaled = (self.measure * np.exp(np.clip(exponent, -600, 600)))[:, None] * dense(other.values_at(self.points))
-        return np.asarray(np.linalg.solve(dense(self.matrix(one)), self.values.T @ scaled))
+        z, measure, values = self.rule[:3]
+        exponent = other.tilt * (z - other.center) - self.tilt * (z - self.center)
+        scaled = (measure * np.exp(np.clip(exponent, -600, 600)))[:, None] * dense(other.values_at(z))
+        return np.asarray(np.linalg.solve(dense(self.matrix(one)), values.T @ scaled))
 
 
-class _Table(NamedTuple):
-    """Polynomials of (z − shift)/scale, their rule, ∂/∂z with the tilt at its points, and ln ∫ P_s exp(2s z)."""
+class Table(NamedTuple):
+    """A `Rule` with ∂/∂z and the tilt at its points, ln ∫ P_s exp(2s z), and the polynomials of (z − shift)/scale."""
 
+    points: FloatArray
+    measure: FloatArray
+    values: FloatArray
+    slopes: FloatArray
+    log_mass: float
     polynomials: Polynomials
     shift: float
     scale: float
-    rule: Rule
-    slopes: FloatArray
-    log_mass: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -293,7 +281,7 @@ class PolynomialAxis(CountedAxis, LineAxis):
 
     @cached_property
     def center(self) -> float:  # type: ignore[override]
-        return float(self.measure @ self.points)
+        return float(self.rule.measure @ self.rule.points)
 
     @cached_property
     def modes(self) -> IntArray:
@@ -303,17 +291,13 @@ class PolynomialAxis(CountedAxis, LineAxis):
     def slowest(self) -> float:  # type: ignore[override]
         return 0.0 if math.isinf(self.noise.half_width) else 1.0
 
-    @property
-    def rule(self) -> Rule:
-        return self._table.rule
-
     @cached_property
-    def _table(self) -> _Table:
+    def rule(self) -> Table:  # type: ignore[override]
         tilt, end = self.tilt, self.noise.half_width / self.unit
         if math.isinf(end):
             polynomials, x, values, slopes, weights = _hermite_table(self.count)
-            rule = Rule(x + 2 * tilt, weights, values)
-            return _Table(polynomials, 2 * tilt, 1.0, rule, slopes + tilt * values, 2 * tilt**2)
+            slopes, log_mass = slopes + tilt * values, 2 * tilt**2
+            return Table(x + 2 * tilt, weights, values, slopes, log_mass, polynomials, 2 * tilt, 1.0)
         exponent, missing = self._ends
         more = min(abs(tilt) * end, 4 * tilt**2)
         points = 16 * math.ceil((2 * self.count + MORE_POINTS + more) / 16)  # few rules serve many spaces
@@ -322,9 +306,9 @@ class PolynomialAxis(CountedAxis, LineAxis):
         tilted = np.exp(logs - logs.max())
         polynomials = stieltjes(x, tilted, self.count) if tilt else gegenbauer(self.count, exponent)
         values, slopes = polynomials.at(x)
-        rule = Rule(end * x, tilted * damping / (tilted @ damping), values)
         log_mass = math.log((tilted @ damping) / (weights @ damping)) + float(logs.max())
-        return _Table(polynomials, 0.0, end, rule, slopes / end + tilt * values, log_mass)
+        measure, slopes = tilted * damping / (tilted @ damping), slopes / end + tilt * values
+        return Table(end * x, measure, values, slopes, log_mass, polynomials, 0.0, end)
 
     @cached_property
     def _ends(self) -> tuple[float, float]:
@@ -335,35 +319,37 @@ class PolynomialAxis(CountedAxis, LineAxis):
 
     @cached_property
     def _flux(self) -> FloatArray:
-        return self.measure * self.rate(self.points)
+        return self.rule.measure * self.rate(self.rule.points)
 
     @property
     def _log_mass(self) -> float:
-        return self._table.log_mass
+        return self.rule.log_mass
 
     def mass(self, g: Coefficient = one) -> FloatArray:
-        return form(self.values, self.measure if g == one else self.measure * g(self.unit * self.points))
+        z, measure, values = self.rule[:3]
+        return form(values, measure if g == one else measure * g(self.unit * z))
 
     def generator(self) -> FloatArray:
         """−½ ∫ P_s σ² (u′ + s u)(v′ + s v)."""
-        return -form(self._table.slopes, self._flux)
+        return -form(self.rule.slopes, self._flux)
 
     def changed(self, change: NoiseDerivative, g: Coefficient | None) -> FloatArray:
-        logs, a = change.log_density(self.unit * self.points), self.noise.end_exponent
+        z, measure, values, slopes = self.rule[:4]
+        logs, a = change.log_density(self.unit * z), self.noise.end_exponent
         if change.end_exponent and a < SHARP_ENDS:  # no rule of Gauss takes its ln(1 − x²) near ±1 as it stands
-            x = self.points / self._table.scale
+            x = z / self.rule.scale
             logs = logs + change.end_exponent * (_end_logarithm(x.size, self._ends[0], a) - np.log1p(-(x**2)))
-        logs = np.asarray(logs - self.measure @ logs)
+        logs = np.asarray(logs - measure @ logs)
         if g is not None:
-            return form(self.values, self.measure * self.changed_weight(change, g, logs, self.points))
+            return form(values, measure * self.changed_weight(change, g, logs, z))
         own = 2 * (change.log_diffusion - change.log_scale) * self.matrix(None)
-        return own - form(self._table.slopes, self._flux * logs)
+        return own - form(slopes, self._flux * logs)
 
     def generator_of_one(self) -> FloatArray:
-        return np.asarray(-self.tilt * (self._flux @ self._table.slopes))
+        return np.asarray(-self.tilt * (self._flux @ self.rule.slopes))
 
     def values_at(self, z: FloatArray) -> FloatArray:
-        return self._table.polynomials.at((z - self._table.shift) / self._table.scale)[0]
+        return self.rule.polynomials.at((z - self.rule.shift) / self.rule.scale)[0]
 
 
 @dataclass(frozen=True, eq=False)
@@ -424,7 +410,8 @@ class CellAxis(DividedAxis, LineAxis):
         return self.stored(-self.line.stiffness(self.rate))
 
     def changed(self, change: NoiseDerivative, g: Coefficient | None) -> Matrix:
-        mean = float(self.measure @ change.log_density(self.unit * self.points) / np.sum(self.measure))
+        z, measure, _ = self.rule
+        mean = float(measure @ change.log_density(self.unit * z) / np.sum(measure))
 
         def log_change(z: FloatArray) -> FloatArray:
             return change.log_density(self.unit * z) - mean
@@ -470,11 +457,11 @@ class StateAxis(NoiseAxis):
         return np.array(self.noise.rates)
 
     def mass(self, g: Coefficient = one) -> FloatArray:
-        return np.diag(self.measure * g(self.support))
+        return np.diag(self.rule.measure * g(self.support))
 
     def generator(self) -> FloatArray:
         """diag(π) Q."""
-        return self.measure[:, None] * self._rates
+        return self.rule.measure[:, None] * self._rates
 
     def changed(self, change: NoiseDerivative, g: Coefficient | None) -> FloatArray:
         """With ∂π from πQ = 0: (∂π)Q = −π ∂Q, of the sum 0."""
@@ -482,16 +469,19 @@ class StateAxis(NoiseAxis):
         rates = np.array(change.rates) if change.rates else np.diag(none)
         states = np.array(change.states) if change.states else none
         unit = np.abs(self._rates).max()
-        equations, right = np.vstack([self._rates.T / unit, none + 1]), np.append(-self.measure @ rates / unit, 0.0)
+        equations, right = (
+            np.vstack([self._rates.T / unit, none + 1]),
+            np.append(-self.rule.measure @ rates / unit, 0.0),
+        )
         weights = np.linalg.lstsq(equations, right, rcond=None)[0] if change.rates else none
         if g is None:
-            return np.asarray(weights[:, None] * self._rates + self.measure[:, None] * rates)
+            return np.asarray(weights[:, None] * self._rates + self.rule.measure[:, None] * rates)
         step = STEP * np.abs(self.support).max() / max(np.abs(states).max(), 1e-300)
         slope = (g(self.support + step * states) - g(self.support - step * states)) / (2 * step)
-        return np.diag(weights * g(self.support) + self.measure * slope)
+        return np.diag(weights * g(self.support) + self.rule.measure * slope)
 
     def samples(self) -> Samples:
-        return Samples(self.support, self.measure, np.ones(self.size), self.values, np.ones(self.size))
+        return Samples(self.support, self.rule.measure, np.ones(self.size), self.rule.values, np.ones(self.size))
 
     def projection(self, other: StateAxis) -> FloatArray:
         return np.eye(self.size)

@@ -102,10 +102,10 @@ class PairAxis(CountedAxis):
         """At the points of a rule for (u₁, u₂); the weight is in the measure."""
         factor = np.exp(np.clip(self._factors[0] @ self.rule.points, -600, 600))
         xi = self.noise.standard_deviation * (self.rule.points[0] + self.center)
-        return Samples(xi, np.ones(factor.size), self.measure, self.values, factor)
+        return Samples(xi, np.ones(factor.size), self.rule.measure, self.rule.values, factor)
 
     def law(self) -> FloatArray:
-        weights = self.measure * np.exp(-self._factors.sum(axis=0) @ self.rule.points)
+        weights = self.rule.measure * np.exp(-self._factors.sum(axis=0) @ self.rule.points)
         return np.asarray(weights / weights.sum())
 
     def projection(self, other: PairAxis) -> FloatArray:

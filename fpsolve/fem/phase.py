@@ -130,7 +130,7 @@ class PhaseAxis(DividedAxis):
         return float(self.lines[-1] - self.lines[0])
 
     @cached_property
-    def turns(self) -> int:
+    def turns(self) -> int:  # type: ignore[override]
         return round(2 * math.pi / self.span)
 
     @cached_property
@@ -312,11 +312,7 @@ class PhaseAxis(DividedAxis):
         return PlaneTerms(problem, self, noises)
 
     def _combined(self, f: Harmonics, parts: tuple[Matrix, Matrix, Matrix]) -> Matrix:
-        total = f.mean * parts[0]
-        for factor, part in ((f.cosine, parts[1]), (f.sine, parts[2])):
-            if factor:
-                total = total + factor * part
-        return total
+        return f.mean * parts[0] + f.cosine * parts[1] + f.sine * parts[2]
 
     def _assembled(self, blocks: FloatArray) -> Matrix:
         """The matrix with a block for each cell; its rows are those of the test functions."""
@@ -370,40 +366,52 @@ class PlaneTerms(Terms):
 
     def __init__(self, problem: Problem, phi: PhaseAxis, noises: Sequence[Any]) -> None:
         super().__init__(problem, phi, noises)
-        system = self.system
-        self._vertices, self._jump = self.phi.lines[:-1], self.phi.jump
+        system, self._jump, self._vertices = self.system, phi.jump, phi.lines[:-1]
+        steady, driven = np.zeros(self._vertices.size), np.zeros(self._vertices.size)
+        for term in system.terms:
+            speed, xi = system.epsilon**term.order * term.h(self._vertices), noises[self._at(term.noise)]
+            if not is_driven(term.g):
+                steady += float(term.g(0.0)) * speed
+            elif not xi.is_local:
+                square = xi.constant @ (xi.mass(lambda xi, g=term.g: g(xi) ** 2) @ xi.constant)
+                driven += abs(speed) * math.sqrt(square / (xi.constant @ (xi.matrix(one) @ xi.constant)))
+        self._theta = abs(steady) + driven  # for the typical ξ
         brought = 0.0 * self._jump  # to a wall
         # where θ = |v|, and the sign of v where that is the same for all ξ, otherwise 0
         is_exact, direction = np.full(self._vertices.size, False), np.zeros(self._vertices.size)
-        if all(axis.is_local for axis in self.noises):
-            rates = matrix_at(system, problem.at_values([axis.samples().xi for axis in self.noises]))
+        if all(axis.is_local for axis in noises):
+            rates = matrix_at(system, problem.at_values([axis.samples().xi for axis in noises]))
             speed = turning(rates.reshape(-1, 1, 2, 2))(self._vertices)
             is_exact, direction = ~is_exact, 1.0 * np.all(speed > 0, axis=0) - np.all(speed < 0, axis=0)
         self._walls = list[Wall]()
         for jump, v in zip(system.jumps, problem.wall_speeds(system), strict=True):
-            at = vertices_at(self.phi.lines, jump.phase)
+            at = vertices_at(phi.lines, jump.phase)
             is_exact[at], direction[at] = True, math.copysign(1.0, v)
-            left, right = self.phi.left_trace[at], self.phi.right_trace[at]
+            left, right = phi.left_trace[at], phi.right_trace[at]
             self._walls.append(Wall(jump, v, left.T @ right if v > 0 else right.T @ left))
             at_wall = np.isin(np.arange(self._vertices.size), at).astype(float)
-            brought = brought + by_rows(at_wall, self.phi.right_trace if v > 0 else -self.phi.left_trace)
-        self._step = self._jump - brought
-        self._is_exact, self._two_way = is_exact, np.flatnonzero(is_exact & (direction == 0))
+            brought = brought + by_rows(at_wall, phi.right_trace if v > 0 else -phi.left_trace)
+        self._step, self._two_way = self._jump - brought, np.flatnonzero(is_exact & (direction == 0))
+        self._theta[is_exact] = 0.0
         # nothing is left of the other side: where ξ is large that would count
-        self._trace = 0.5 * (self.phi.right_trace + self.phi.left_trace) - by_rows(0.5 * direction, self._jump)
+        self._trace = 0.5 * (phi.right_trace + phi.left_trace) - by_rows(0.5 * direction, self._jump)
+
+    @property
+    def keeps_constants(self) -> bool:  # type: ignore[override]
+        rotates = all(term.h.amplitude == 0 and term.q.vanishes for term in self.system.terms if term.order == 0)
+        return rotates and all(each.order for each in self._problem.diffusions)
 
     def _loads(self) -> Iterator[Term]:
         for struck in self._problem.impulses:
             yield self._struck(struck)
         # −½ ∫ P_s θ [w] [T] at the φ-vertices where the phase runs both ways, or θ is not |v|
         text, jump = "upwind loads between cells", self._jump
-        if not np.all(self._is_exact):
-            typical = np.where(self._is_exact, 0.0, self.typical_speed())
-            yield self._term(-0.5 * jump.T @ by_rows(typical, jump), one, text)
+        if np.any(self._theta):
+            yield self._term(-0.5 * jump.T @ by_rows(self._theta, jump), one, text)
         yield from self._upwind(lambda phi, xi: np.abs(phase_speed(self.system, xi)(phi)), text)
         for ray, v, delta in self._walls:
             text = f"(R^p − 1) |dφ/dt| δ(φ − {ray.phase:.6g} mod π), R = {math.exp(ray.log_factor):.6g}"
-            yield self._term(abs(v) * delta, one, text, OfMoment(0, ray.log_factor, is_change=True), order=2)
+            yield self._term(abs(v) * delta, one, text, OfMoment(0, ray.log_factor), order=2, is_wall=True)
 
     def _changed_loads(self, by: ParameterDerivative) -> Iterator[Term]:
         """The size of the speed for the typical ξ is held: [T] = 0 there but for the error of the elements."""
@@ -442,21 +450,7 @@ class PlaneTerms(Terms):
 
         stretch = ", ".join(f"{size:.3g}" for size in np.linalg.svd(of.matrix, compute_uv=False))
         text = f"{of.rate:.6g} (|Me|^p T(ψ) − T) of impulses M, which stretch by {stretch}"
-        return self._at(phase_at, text, order=1)
-
-    def typical_speed(self) -> FloatArray:
-        """θ at the φ-vertices for the typical ξ, shape (m,)."""
-        steady, driven = np.zeros(self._vertices.size), np.zeros(self._vertices.size)
-        for term in self.system.terms:
-            speed = self.system.epsilon**term.order * term.h(self._vertices)
-            if not is_driven(term.g):
-                steady += float(term.g(0.0)) * speed
-            else:
-                xi = self.noises[self._names.index(term.noise) if term.noise in self._names else 0]
-                constant, square = xi.constant, xi.mass(lambda xi, g=term.g: g(xi) ** 2)
-                total = constant @ (xi.matrix(one) @ constant)
-                driven = driven + abs(speed) * math.sqrt(constant @ (square @ constant) / total)
-        return np.asarray(abs(steady) + driven)
+        return self._given(phase_at, text, order=1)
 
     def _upwind(self, theta: Callable[[float, Xi], FloatArray], text: str) -> Iterator[Term]:
         """−½ ∫ P_s θ(φ, ξ) [w] [T] where the phase runs both ways: of several noises, chains, for each other state."""
@@ -472,14 +466,14 @@ class PlaneTerms(Terms):
                 yield Term(0, OfMoment(0), phase, (of_first, *map(At, values)), text)
 
 
-def _written(harmonics: Harmonics) -> str:
+def _written(of: Harmonics) -> str:
     """(0.5 − 0.5 cos 2φ), or one number."""
-    values = harmonics.mean, harmonics.cosine, harmonics.sine
-    names = ("", " cos 2φ", " sin 2φ")
-    parts = [(float(value), name) for value, name in zip(values, names, strict=True) if value]
-    text = "".join(f" {'−' if value < 0 else '+'} {abs(value):g}{name}" for value, name in parts)
+    text = ""
+    for value, name in ((of.mean, ""), (of.cosine, " cos 2φ"), (of.sine, " sin 2φ")):
+        if value:
+            text += f" {'−' if value < 0 else '+'} {abs(value):g}{name}"
     text = text.removeprefix(" + ").removeprefix(" ")
-    return text if parts == [(values[0], "")] else f"({text})"
+    return text if of.mean and not of.amplitude else f"({text})"
 
 
 def by_rows(factors: FloatArray, matrix: Matrix) -> Matrix:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
 from functools import cached_property, reduce
 from typing import Any
 
@@ -12,9 +11,8 @@ import numpy as np
 
 from fpsolve.arrays import FloatArray, Matrix, one
 from fpsolve.errors import MeshError
-from fpsolve.fem.axis import Axis, KroneckerSum, along
+from fpsolve.fem.axis import Axis, KroneckerSum, ModeEffects, along
 from fpsolve.fem.circle import CircleAxis
-from fpsolve.fem.effects import ModeEffects
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.fem.noise_axes import CellAxis, NoiseAxis, PolynomialAxis, StateAxis
 from fpsolve.fem.pairs import PairAxis
@@ -40,15 +38,32 @@ def first_axis(noise: Noise, digits: float) -> NoiseAxis:
     return FIRST[noise.basis](noise, round(digits / 2))
 
 
-@dataclass(frozen=True, eq=False)
 class Space:
     """The products of the functions of several axes.
 
     Attributes:
         axes: that of φ, or of directions, and that of each noise.
+        phi: the first one.
+        noises: those of all noises.
+        xi: that of the noise of a problem with one.
+        shape: the number of functions along each axis.
+        size: the number of unknowns.
+        turns: how often the domain fits on the full circle.
+        is_tilted: whether the functions move with p.
+        chain: the longest axis that is a chain, along which generators are eliminated; None where there is none.
+        most_unknowns: so many that a process takes 1.5 GB: three squares of a block for each level, otherwise as
+            measured.
     """
 
-    axes: tuple[Any, ...]
+    def __init__(self, axes: Sequence[Any]) -> None:
+        self.axes = tuple(axes)
+        self.phi, self.noises, self.xi = axes[0], self.axes[1:], axes[1]
+        self.shape, self.turns = tuple(axis.size for axis in axes), self.phi.turns
+        self.size, self.is_tilted = math.prod(self.shape), any(axis.slope for axis in axes)
+        chains = [k for k, axis in enumerate(axes) if axis.is_chain]
+        self.chain = max(chains, key=self.shape.__getitem__, default=None)
+        levels = 0 if self.chain is None else self.shape[self.chain]
+        self.most_unknowns = int(math.sqrt(MOST_BYTES / 24 * levels)) or self.phi.most_unknowns
 
     @classmethod
     def on(cls, mesh: CylinderMesh, noise: Noise, frame: Frame = ITSELF) -> Space:
@@ -72,57 +87,6 @@ class Space:
             return cls((phi, CellAxis(noise, mesh.z_lines, np.full(mesh.z_lines.size - 1, mesh.xi_degree))))
         of_degree = {"waves": CircleAxis, "pairs": PairAxis}.get(noise.basis)
         return cls((phi, of_degree(noise, mesh.xi_degree) if of_degree else StateAxis(noise)))
-
-    @property
-    def phi(self) -> Any:
-        """The phase, or directions."""
-        return self.axes[0]
-
-    @property
-    def noises(self) -> tuple[Any, ...]:
-        """The axes of all noises."""
-        return self.axes[1:]
-
-    @property
-    def xi(self) -> Any:
-        """The noise of a problem with one."""
-        return self.axes[1]
-
-    @cached_property
-    def shape(self) -> tuple[int, ...]:
-        """The sizes of the axes."""
-        return tuple(axis.size for axis in self.axes)
-
-    @cached_property
-    def size(self) -> int:
-        """Number of unknowns."""
-        return math.prod(self.shape)
-
-    @cached_property
-    def chain(self) -> int | None:
-        """The longest axis that is a chain, along which generators are eliminated; None where there is none."""
-        return max((k for k, axis in enumerate(self.axes) if axis.is_chain), key=lambda k: self.shape[k], default=None)
-
-    @property
-    def most_unknowns(self) -> int:
-        """So many that a process takes 1.5 GB: three squares of a block for each level, otherwise as measured."""
-        if self.chain is None:
-            return int(self.phi.most_unknowns)
-        return int(math.sqrt(MOST_BYTES / 24 * self.shape[self.chain]))
-
-    @property
-    def turns(self) -> int:
-        """How often the domain fits on the full circle."""
-        return math.prod(axis.turns for axis in self.axes)
-
-    @cached_property
-    def is_tilted(self) -> bool:
-        """Whether the functions move with p."""
-        return any(axis.slope for axis in self.axes)
-
-    def at(self, p: float, noises: Iterable[Noise]) -> Space:
-        """The space with the tilt for p; each axis has tables of its own."""
-        return Space((self.phi, *(axis.of(noise, p) for axis, noise in zip(self.noises, noises, strict=True))))
 
     def with_axis(self, k: int, axis: Axis) -> Space:
         """The space with another axis in one place."""
@@ -159,16 +123,11 @@ class Space:
     @cached_property
     def mass(self) -> KroneckerSum:
         """∫ P_s w T."""
-        return KroneckerSum([tuple(axis.matrix(one) for axis in self.axes)])
+        return KroneckerSum([[axis.matrix(one) for axis in self.axes]])
 
     def weighed(self, coefficients: FloatArray) -> FloatArray:
         """∫ P_s w T for every test function w, T a function of the space."""
-        return along(self._weights, self.table(coefficients)).ravel()
-
-    @cached_property
-    def _weights(self) -> tuple[Matrix | None, ...]:
-        """The factors of `mass`; None for that of φ where it is the identity."""
-        return self.phi.unit, *(axis.matrix(one) for axis in self.noises)
+        return self.mass @ coefficients
 
     def table(self, coefficients: FloatArray) -> FloatArray:
         """Coefficients of a function by axes, shape `shape`."""
@@ -183,12 +142,13 @@ class Space:
 
     def on_grid(self, coefficients: FloatArray) -> FloatArray:
         """A function without its factor at all points of a grid, φ first."""
-        return self.evaluate(coefficients, self.phi.inner_values, *(axis.values for axis in self.noises))
+        values = self.phi.inner_values, *(axis.rule.values for axis in self.noises)
+        return along(values, coefficients.reshape(self.shape))
 
     @property
     def grid_measure(self) -> FloatArray:
         """∫ of the weight of the noises at the points of that grid, the same for each φ."""
-        return np.asarray(reduce(np.multiply.outer, (axis.measure for axis in self.noises)))
+        return np.asarray(reduce(np.multiply.outer, (axis.rule.measure for axis in self.noises)))
 
     def evaluate(self, coefficients: FloatArray, *values: Matrix) -> FloatArray:
         """A function without its factor, from the values of the functions of each axis at points of it."""

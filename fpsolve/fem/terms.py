@@ -12,20 +12,18 @@ a space, the phase or directions, has the matrices of h·∇ and q, and makes th
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import reduce
+from functools import cached_property, reduce
 from operator import add
 from typing import Any
 
 import numpy as np
 
 from fpsolve.arrays import Coefficient, Matrix, one
-from fpsolve.fem.axis import Axis, KroneckerSum
 from fpsolve.model.plane import CoefficientMatrix, written_coefficient
 from fpsolve.model.problem import ParameterDerivative, Problem
 
-ALL_ORDERS = slice(None)
 Noises = tuple[Coefficient | None, ...]
 """For each noise the g of ∫P_s g u v, or None for its generator, ∫P_s v L_ξ u."""
 
@@ -37,18 +35,10 @@ class OfMoment:
     Attributes:
         n: the power of p.
         log_factor: ln R.
-        is_change: whether 1 of it is of order 0 in ε, so that the change at a jump is of the order of its term.
     """
 
     n: int
     log_factor: float = 0.0
-    is_change: bool = False
-
-    def of_orders(self, p: float, derivative: int, has_first: bool, has_own: bool) -> float:
-        """Its k-th derivative, of order 0, of that of its term, or of both."""
-        if self.is_change and has_first != has_own and not derivative:
-            return math.expm1(p * self.log_factor) if has_own else 1.0
-        return self(p, derivative) if has_own else 0.0
 
     def __call__(self, p: float, derivative: int = 0) -> float:
         """Its k-th derivative."""
@@ -84,6 +74,7 @@ class Term:
         text: the term as a reader would write it.
         phase_at: gives the k-th derivative of the matrix of φ by p, from p and k, where that is no coefficient times
             one matrix; `phase` is then 0.
+        is_wall: whether without noise it has the coefficient 1, so that forcing is what it has beyond that.
     """
 
     order: int
@@ -92,58 +83,16 @@ class Term:
     noises: Noises
     text: str
     phase_at: Callable[[float, int], Matrix] | None = None
+    is_wall: bool = False
 
-    def at(self, p: float, derivative: int = 0) -> Matrix | None:
-        """The k-th derivative by p of the matrix of φ with its coefficient; None where that is 0."""
+    def at(self, p: float, derivative: int = 0, is_forcing: bool = False) -> Matrix | None:
+        """The k-th derivative by p of the matrix of φ with its coefficient, or of its forcing; None where that is 0."""
+        if is_forcing and not self.order:
+            return None
         if self.phase_at:
             return self.phase_at(p, derivative)
-        size = self.of_p(p, derivative)
+        size = math.expm1(p * self.of_p.log_factor) if is_forcing and self.is_wall else self.of_p(p, derivative)
         return size * self.phase if size else None
-
-
-class TermSum:
-    """A sum of terms, in which those with the same functions of the noises, order and coefficient are added up once."""
-
-    def __init__(self, terms: Iterable[Term]) -> None:
-        sums: dict[Noises, dict[tuple[int, OfMoment], Matrix]] = {}
-        self._others = list[tuple[Noises, int, Callable[[float, int], Matrix]]]()
-        for term in terms:
-            if term.phase_at:
-                self._others.append((term.noises, term.order, term.phase_at))
-                continue
-            parts, key = sums.setdefault(term.noises, {}), (term.order, term.of_p)
-            parts[key] = parts[key] + term.phase if key in parts else term.phase
-        (noises, first), *_ = sums.items()
-        self._nothing: dict[Noises, Matrix] = {(one,) * len(noises): 0.0 * next(iter(first.values()))}
-        self._parts = [(noises, [(*key, phase) for key, phase in parts.items()]) for noises, parts in sums.items()]
-        orders = [order for parts in sums.values() for order, _ in parts] + [order for _, order, _ in self._others]
-        self._orders = range(1 + max(orders))
-
-    def phase_matrices(self, p: float, derivative: int = 0, orders: slice = ALL_ORDERS) -> dict[Noises, Matrix]:
-        """For each function of the noises the matrix of φ; the first is that of 1."""
-        phases, wanted = self._nothing.copy(), self._orders[orders]
-        for noises, parts in self._parts:
-            total = phases.get(noises)
-            for order, of_p, phase in parts:
-                if size := of_p.of_orders(p, derivative, 0 in wanted, order in wanted):
-                    total = size * phase if total is None else total + size * phase
-            if total is not None:
-                phases[noises] = total
-        for noises, order, phase_at in self._others:
-            if order in wanted:
-                phases[noises] = phases[noises] + phase_at(p, derivative)
-        return phases
-
-    def matrix(self, axes: Sequence[Axis], p: float, derivative: int = 0, orders: slice = ALL_ORDERS) -> KroneckerSum:
-        """The sum for p on the functions of some axes; its first term has ∫ P_s u v of every noise."""
-        phi, *others = axes
-        return KroneckerSum(
-            [
-                (phase, *(axis.matrix(g) for axis, g in zip(others, noises, strict=True)))
-                for noises, phase in self.phase_matrices(p, derivative, orders).items()
-            ],
-            phi.unit,
-        )
 
 
 class Terms:
@@ -153,14 +102,33 @@ class Terms:
         problem: whose motion it is, and what white noise adds to it.
         phi: the functions of the phase, or of directions.
         noises: those of each noise.
+
+    Attributes:
+        keeps_constants: whether ⟨P_s, L₀T⟩ = 0 for every T: the order 0 only rotates uniformly, as it does in the plane
+            alone.
     """
+
+    keeps_constants = False
 
     def __init__(self, problem: Problem, phi: Any, noises: Sequence[Any]) -> None:
         self.phi, self.noises, self._names = phi, noises, tuple(problem.coloured.parts)
         self._problem, self.system = problem, problem.motion
 
-    def whole(self) -> Iterator[Term]:
+    @cached_property
+    def all(self) -> Sequence[Term]:
         """L(p) of Eq. (19)."""
+        return list(self._whole())
+
+    def phases(self, p: float, derivative: int = 0, is_forcing: bool = False) -> dict[Noises, Matrix]:
+        """For each function of the noises the matrix of φ of dᵏL/dpᵏ, or of its forcing; the first is that of 1."""
+        found: dict[Noises, Matrix] = {(one,) * len(self._names): 0.0 * self.phi.identity}
+        for term in self.all:
+            phase = term.at(p, derivative, is_forcing)
+            if phase is not None:
+                found[term.noises] = found[term.noises] + phase if term.noises in found else phase
+        return found
+
+    def _whole(self) -> Iterator[Term]:
         for name in self._names:
             text = f"L_ξ, the generator of the noise{f' {name}' if name else ''}"
             yield self._term(self.phi.identity, None, text, of=name)
@@ -221,12 +189,18 @@ class Terms:
         of_p: OfMoment = OfMoment(0),
         order: int = 0,
         of: str = "",
+        is_wall: bool = False,
     ) -> Term:
         """One with a function of the noise `of`, or of the first."""
-        at = self._names.index(of) if of in self._names else 0
-        return Term(order, of_p, phase, tuple(g if k == at else one for k in range(len(self._names))), text)
+        noises: list[Coefficient | None] = [one] * len(self._names)
+        noises[self._at(of)] = g
+        return Term(order, of_p, phase, tuple(noises), text, is_wall=is_wall)
 
-    def _at(self, phase_at: Callable[[float, int], Matrix], text: str, order: int = 0) -> Term:
+    def _at(self, name: str) -> int:
+        """The place of a noise among those that have values; the first one for others."""
+        return self._names.index(name) if name in self._names else 0
+
+    def _given(self, phase_at: Callable[[float, int], Matrix], text: str, order: int = 0) -> Term:
         """One of no noise whose matrix is given by p and the number of derivatives by p."""
         return Term(order, OfMoment(0), 0.0, (one,) * len(self._names), text, phase_at)
 

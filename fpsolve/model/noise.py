@@ -57,6 +57,9 @@ class Noise(Parametrised):
     Attributes:
         has_states: whether ξ jumps between states. Such noise has no density, so that `log_density`, `diffusion` and
             what follows from them do not apply.
+        left_in_phase: share of the effect of two modes of φ that is left at least where T is not analytic, as where the
+            phase rests in a state, or at φ that white noise does not move: there it falls unevenly, and ever more
+            slowly.
         approximates_spectrum: whether `spectral_density` is that of a simpler process which replaces this one.
         variables: how many numbers, without the white noises, tell how it goes on.
         may_tilt: whether a factor exp(s ξ) makes functions of ξ easier to resolve, as where P_s has a single peak.
@@ -68,6 +71,7 @@ class Noise(Parametrised):
 
     section: ClassVar[str] = "noise"
     has_states: ClassVar[bool] = False
+    left_in_phase: ClassVar[float] = 0.0
     approximates_spectrum: ClassVar[bool] = False
     variables: ClassVar[int] = 1
     may_tilt: ClassVar[bool] = True
@@ -280,6 +284,7 @@ class Memoryless(Noise):
 
     is_white: ClassVar[bool] = True
     has_states: ClassVar[bool] = True
+    left_in_phase: ClassVar[float] = 1.0
     states: ClassVar[Sequence[float]] = (0.0,)
     rates: ClassVar[Sequence[Sequence[float]]] = ((0.0,),)
 

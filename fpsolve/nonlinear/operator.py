@@ -219,10 +219,10 @@ class Plane:
 
     def outflow(self, square: float, sign: int) -> FloatArray:
         """∫P_s max(±u̇, 0) w ρ at e^{2u} = `square`, by a rule with as many points as there are."""
-        at, phi = self.axis.samples(), self.circle.points
-        speed = self.speed(square, phi, at.xi)
-        weights = self.circle.weights[:, None] * self.axis.measure * np.maximum(sign * speed, 0)
-        values, noise = self.circle.values, dense(at.values)
+        at, circle = self.axis.samples(), self.circle
+        speed = self.speed(square, circle.points, at.xi)
+        weights = circle.weights[:, None] * self.axis.rule.measure * np.maximum(sign * speed, 0)
+        values, noise = circle.values, dense(at.values)
         of_noise = np.einsum("an,ni,nj->aij", weights, noise, noise, optimize=True)
         blocks = np.einsum("ak,al,aij->kilj", values, values, of_noise, optimize=True)
         return np.asarray(blocks.reshape(self.size, self.size))

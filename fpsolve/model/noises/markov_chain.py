@@ -44,6 +44,7 @@ class Chain(Noise):
     rates: Sequence[Sequence[float]]
 
     has_states: ClassVar[bool] = True
+    left_in_phase: ClassVar[float] = 1.0
 
     @property
     def probabilities(self) -> FloatArray:
