@@ -495,7 +495,11 @@ STOPPED = "q' = v; v' = -q - xi*q - 0.1*cos(t)*y; y' = w; w' = -y"
             {},
             r"is for terms that are a \+ b\*xi under a NonGaussianNoise, but one has g = sin\(ξ\); use the",
         ),
-        (matrices(FREE, COUPLED, Poisson(1.0, (0.1,))), {}, "under impulses is for two variables without a delay, but there are 4"),
+        (
+            matrices(FREE, COUPLED, Poisson(1.0, (0.1,))),
+            {},
+            "under impulses is for two variables without a delay, but there are 4",
+        ),
         (
             rates(STOPPED, Telegraph(0.5, 0.7), [{"at": "q = 0", "restitution": 0.5}]),
             *({}, "for one noise, without periodic terms"),
