@@ -64,7 +64,7 @@ def equations_of(system: System) -> list[str]:
         at = _sum(np.array(stop.coordinates[0]), none, {}, names)
         told += [
             f"{names[i]}⁺ = {_sum(np.round(stop.matrix[i], 12), none, {}, names)} at {at} = 0"
-            for i in np.flatnonzero(moved.any(axis=1))
+            for i in np.flatnonzero(moved.any(axis=1)).tolist()
         ]
     return told
 
