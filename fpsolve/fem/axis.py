@@ -308,11 +308,13 @@ class KroneckerSum:
 
     def toarray(self) -> FloatArray:
         """The dense matrix, shape (size, size)."""
-        found = np.ones((len(self.terms), 1, 1))
-        for factors in zip(*self.terms, strict=True):
-            found = np.einsum("tij,tkl->tikjl", found, np.stack(list(map(dense, factors))))
+        *firsts, lasts = [np.stack(list(map(dense, factors))) for factors in zip(*self.terms, strict=True)]
+        found = np.ones((len(lasts), 1, 1))
+        for factors in firsts:
+            found = np.einsum("tij,tkl->tikjl", found, factors)
             found = found.reshape(len(found), found.shape[1] * found.shape[2], -1)
-        return np.asarray(found.sum(axis=0))
+        products = np.tensordot(found, lasts, (0, 0))
+        return products.swapaxes(1, 2).reshape(self.size, self.size)
 
     def tocsc(self) -> csc_matrix:
         """The sparse matrix."""

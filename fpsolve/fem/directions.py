@@ -93,29 +93,40 @@ class Angle:
         return self.degrees.size
 
 
-def circle(dimension: int, most: int) -> Angle:
-    """Waves up to a degree, orthonormal in the mean; the constant and the sign of e = ±1."""
+def signs(_: int) -> Angle:
+    """The constant and the sign of e = ±1."""
+    table = np.array([[1.0, 1.0], [1.0, -1.0]])
+    return Angle(
+        np.arange(2),
+        lambda e: np.stack([np.ones(e.shape[1]), np.copysign(1.0, e[0])], axis=1),
+        table[1:],
+        table / 2,
+        np.eye(2),
+        np.zeros((2, 2)),
+        [np.eye(2)[::-1]],
+        [np.zeros((2, 2))],
+        2.0,
+        np.zeros((2, 2)),
+    )
+
+
+def circle(most: int) -> Angle:
+    """Waves up to a degree, orthonormal in the mean."""
     k = np.arange(1, most + 3)
-    if dimension == 1:
-        points, degrees, slope = np.array([[1.0, -1.0]]), np.arange(2), np.zeros((2, 2))
-    else:
-        theta = np.linspace(0, 2 * math.pi, max(POINTS, 2 * most + 8), endpoint=False)
-        points, degrees = np.stack([np.cos(theta), np.sin(theta)]), np.append(0, np.repeat(k, 2))
-        slope = block_diag(0.0, np.kron(np.diag(k), [[0.0, 1.0], [-1.0, 0.0]]))
+    theta = np.linspace(0, 2 * math.pi, max(POINTS, 2 * most + 8), endpoint=False)
+    points, degrees = np.stack([np.cos(theta), np.sin(theta)]), np.append(0, np.repeat(k, 2))
+    slope = block_diag(0.0, np.kron(np.diag(k), [[0.0, 1.0], [-1.0, 0.0]]))
 
     def every(e: FloatArray) -> FloatArray:
-        ones = np.ones(e.shape[1])
-        if dimension == 1:
-            return np.column_stack([ones, np.copysign(ones, e[0])])
         waves = np.exp(1j * np.outer(np.arctan2(e[1], e[0]), k))
-        return np.column_stack([ones, math.sqrt(2) * waves.view(float)])
+        return np.column_stack([np.ones(e.shape[1]), math.sqrt(2) * waves.view(float)])
 
     def multiplied(f: FloatArray) -> FloatArray:
         product = table.T @ (f[:, None] * table)
         return np.where(np.abs(product) > 1e-14, product, 0.0)
 
     table = every(points) / math.sqrt(points.shape[1])
-    size, unit = int(np.count_nonzero(degrees <= most)), [multiplied(each) for each in points]
+    size, (cosine, sine) = 2 * most + 1, map(multiplied, points)
     return Angle(
         degrees[:size],
         lambda e: every(e)[:, :size],
@@ -123,11 +134,15 @@ def circle(dimension: int, most: int) -> Angle:
         table.T[:size] / math.sqrt(points.shape[1]),
         np.eye(degrees.size, size),
         slope[:, :size],
-        unit,
-        [-unit[1], unit[0]] if dimension == 2 else [slope],
-        2 * math.pi ** (dimension / 2) / math.gamma(dimension / 2),
+        [cosine, sine],
+        [-sine, cosine],
+        2 * math.pi,
         np.zeros((size, size)),
     )
+
+
+ANGLES = {1: signs, 2: circle}
+"""Functions of a unit vector on the whole circle, or of ±1, by its number of coordinates."""
 
 
 def arc(lines: FloatArray, degree: int) -> Angle:
@@ -429,7 +444,7 @@ class SphereAxis(DirectionAxis):
 
     @cached_property
     def angles(self) -> tuple[Angle, Angle]:
-        first, second = (circle(each, self.waves) for each in self.dimensions)
+        first, second = (ANGLES[each](self.waves) for each in self.dimensions)
         return first, second
 
     @cached_property
@@ -474,7 +489,7 @@ class HalfSphereAxis(DirectionAxis):
 
     @cached_property
     def angles(self) -> tuple[Angle, Angle]:
-        return arc(self.first_lines, self.first_degree), circle(2, self.waves)
+        return arc(self.first_lines, self.first_degree), circle(self.waves)
 
     @cached_property
     def _own(self) -> IntArray:
@@ -487,6 +502,9 @@ class HalfSphereAxis(DirectionAxis):
 
     def _speeds(self, c: FloatArray, s: FloatArray) -> FloatArray:
         return c * s**3
+
+    def terms(self, problem: Problem, noises: Sequence[Any]) -> StopTerms:
+        return StopTerms(problem, self, noises)
 
     def struck(self, log_factor: float, p: float, derivative: int = 0) -> Matrix:
         """∂ᵏ/∂pᵏ of ∫ v (ρ^p u(η′, π/2, θ₂) − u) over θ₁ = −π/2."""
@@ -528,12 +546,21 @@ class DirectionTerms(Terms):
         return "h·∇", "q", "(h·∇ + p q)² of white noise"
 
     def _loads(self) -> Iterator[Term]:
-        """The penalty, as slopes jump by the error of the elements alone, and the stop."""
+        """The penalty, as slopes jump by the error of the elements alone."""
         free = sum((self.phi.inside(term) for term in self.system.terms if term.order == 0), 0.0 * self.phi.coordinates)
         size = float(np.linalg.norm(free + free.T, 2)) / 2
         yield self._term(size * self.phi.penalty(), one, "penalty on jumps of ∂u/∂η")
-        if self._problem.system.stop:
-            yield self._stop(self.phi.struck, "ω (ρ^p T(η′, π/2, θ₂) − T) δ(θ₁ + π/2)")
+
+    def _changed_loads(self, by: ParameterDerivative) -> Iterator[Term]:
+        return iter(())
+
+
+class StopTerms(DirectionTerms):
+    """L(p) of four variables with a stop. Args as those of `Terms`."""
+
+    def _loads(self) -> Iterator[Term]:
+        yield from super()._loads()
+        yield self._stop(self.phi.struck, "ω (ρ^p T(η′, π/2, θ₂) − T) δ(θ₁ + π/2)")
 
     def _changed_loads(self, by: ParameterDerivative) -> Iterator[Term]:
         """ω is held, as it is that of the coordinates."""
@@ -541,8 +568,9 @@ class DirectionTerms(Terms):
             yield self._stop(self.phi.changed_impacts, "∂/∂θ", log_factor)
 
     def _stop(self, struck: Callable[[float, float, int], Matrix], text: str, size: float = 1.0) -> Term:
-        stop, terms = self._problem.system.stop, self.system.terms
-        assert stop is not None
-        omega = sum(self.system.epsilon**each.order * each.g(0.0) * self.phi.inside(each)[0, 1] for each in terms)
+        stop: Any = self._problem.system.stop
+        omega = sum(
+            self.system.epsilon**each.order * each.g(0.0) * self.phi.inside(each)[0, 1] for each in self.system.terms
+        )
         words = f"{text}, ω = {omega:.6g}, R = {stop.restitution:.6g}"
         return self._given(lambda p, k: size * omega * struck(math.log(stop.restitution), p, k), words)

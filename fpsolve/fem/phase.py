@@ -85,25 +85,18 @@ class PhaseAxis(DividedAxis):
         """Which modes each cell has, and their numbers, shapes (m, largest degree + 1)."""
         return numbered(self.lines, self.degrees, skfem.ElementDG(element(int(self.degrees.max()))))
 
-    @property
-    def _kept(self) -> Mask:
-        return self._numbers[0]
-
-    @property
-    def _number(self) -> IntArray:
-        return self._numbers[1]
-
     @cached_property
     def cells(self) -> IntArray:
-        return np.nonzero(self._kept)[0]
+        return np.nonzero(self._numbers[0])[0]
 
     @cached_property
     def modes(self) -> IntArray:
-        return np.nonzero(self._kept)[1]
+        return np.nonzero(self._numbers[0])[1]
 
     @cached_property
     def _pairs(self) -> Mask:
-        return self._kept[:, :, None] & self._kept[:, None, :]
+        kept, _ = self._numbers
+        return kept[:, :, None] & kept[:, None, :]
 
     @cached_property
     def _grid(self) -> FloatArray:
@@ -154,11 +147,15 @@ class PhaseAxis(DividedAxis):
 
     def mass(self, f: Any = one) -> Matrix:
         """∫ f u v of `Harmonics` f, or of 1."""
-        return self.identity if f == one else self._combined(f, self._masses)
+        return self.identity if f == one else self._assembled(self._cellwise(f(self._grid), self._table.products, 0))
 
     def convection(self, f: Harmonics) -> Matrix:
         """∫ f u′ v, cell by cell."""
-        return self._combined(f, self._convections)
+        return self._assembled(self._cellwise(f(self._grid), self._table.convections, 1))
+
+    def _cellwise(self, f: FloatArray, table: FloatArray, order: int) -> FloatArray:
+        """∫ f of products with so many derivatives in each cell, from f at the points of its rule."""
+        return (f * self._table.rule.weights / self._sizes[:, None] ** order) @ table
 
     def diffusion(self, a: CoefficientMatrix, b: CoefficientMatrix) -> tuple[Matrix, Matrix, Matrix]:
         """∫ w D_a D_b T, D = h ∂φ + p q of two matrices: the coefficients of p⁰, p¹ and p².
@@ -170,12 +167,7 @@ class PhaseAxis(DividedAxis):
         the interior penalty method, in which η grows like degree²/size of the smaller cell. What h and q do not change
         at a vertex, as h = 0 at the ray of a jump, is not there.
         """
-        grid, at = self._grid, self.lines[:-1]
-        size, weights = self._sizes[:, None], self._sizes[:, None] * self._table.rule.weights
-
-        def cellwise(f: FloatArray, table: FloatArray, power: int) -> FloatArray:
-            return (f * weights / size ** (1 + power)) @ table
-
+        grid, at, cellwise = self._grid, self.lines[:-1], self._cellwise
         products, convections, stiffnesses = self._table.products, self._table.convections, self._table.stiffnesses
         transposed = convections.reshape(-1, *self._pairs.shape[1:]).swapaxes(1, 2).reshape(convections.shape)
         ha, qa, hb, qb, slope = a.h(grid), a.q(grid), b.h(grid), b.q(grid), a.h.slope(grid)
@@ -266,8 +258,8 @@ class PhaseAxis(DividedAxis):
         cell = np.clip(where, 0, self._sizes.size - 1)
         local = np.clip((phi - self.lines[cell]) / self._sizes[cell], 0, 1)
         values = legendre(int(self.degrees.max()), local) / np.sqrt(self._sizes[cell])[:, None]
-        kept = self._kept[cell]
-        return self._matrix(values[kept], np.nonzero(kept)[0], self._number[cell][kept], (phi.size, self.size))
+        kept, numbers = (each[cell] for each in self._numbers)
+        return self._matrix(values[kept], np.nonzero(kept)[0], numbers[kept], (phi.size, self.size))
 
     def finer_rule(self, parts: int) -> tuple[FloatArray, FloatArray]:
         """Points and weights of the rule where every cell is cut into so many parts, shapes (parts n,)."""
@@ -290,29 +282,9 @@ class PhaseAxis(DividedAxis):
         """The matrix that takes a function of another space to its projection on this one, shape (size, other.size)."""
         return self.values.T @ (diags(self.weights) @ other.at(self.points))
 
-    @cached_property
-    def _waves(self) -> FloatArray:
-        """cos 2φ and sin 2φ times the weights of the rule, shape (2, m, n)."""
-        return np.stack([np.cos(2 * self._grid), np.sin(2 * self._grid)]) * self._table.rule.weights
-
-    @cached_property
-    def _masses(self) -> tuple[Matrix, Matrix, Matrix]:
-        cosine, sine = self._waves @ self._table.products
-        return self.identity, self._assembled(cosine), self._assembled(sine)
-
-    @cached_property
-    def _convections(self) -> tuple[Matrix, Matrix, Matrix]:
-        weights = np.broadcast_to(self._table.rule.weights, self._grid.shape)[None]
-        blocks = np.concatenate([weights, self._waves]) @ self._table.convections
-        mean, cosine, sine = blocks / self._sizes[:, None]
-        return self._assembled(mean), self._assembled(cosine), self._assembled(sine)
-
     def terms(self, problem: Problem, noises: Sequence[Any]) -> PlaneTerms:
         """L(p) on these functions times those of each noise."""
         return PlaneTerms(problem, self, noises)
-
-    def _combined(self, f: Harmonics, parts: tuple[Matrix, Matrix, Matrix]) -> Matrix:
-        return f.mean * parts[0] + f.cosine * parts[1] + f.sine * parts[2]
 
     def _assembled(self, blocks: FloatArray) -> Matrix:
         """The matrix with a block for each cell; its rows are those of the test functions."""
@@ -321,14 +293,15 @@ class PhaseAxis(DividedAxis):
 
     @cached_property
     def _places(self) -> tuple[IntArray, IntArray]:
-        rows, columns = np.broadcast_arrays(self._number[:, :, None], self._number[:, None, :])
+        _, numbers = self._numbers
+        rows, columns = np.broadcast_arrays(numbers[:, :, None], numbers[:, None, :])
         return rows[self._pairs], columns[self._pairs]
 
     def _scattered(self, vertex: IntArray, values: FloatArray) -> Matrix:
         """A row for each vertex, with values for the functions of a cell."""
-        kept = self._kept
+        kept, numbers = self._numbers
         rows = np.broadcast_to((vertex % len(kept))[:, None], kept.shape)
-        return self._matrix(values[kept], rows[kept], self._number[kept], (len(kept), self.size))
+        return self._matrix(values[kept], rows[kept], numbers[kept], (len(kept), self.size))
 
     def _matrix(self, entries: FloatArray, rows: IntArray, columns: IntArray, shape: tuple[int, int]) -> Matrix:
         if self.size > MAX_DENSE_UNKNOWNS:
