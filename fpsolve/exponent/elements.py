@@ -46,7 +46,8 @@ from fpsolve.exponent.modes import SphereStart
 from fpsolve.exponent.moments import EvenMoment, even_moment, moment_row
 from fpsolve.exponent.starts import Start, first, has_cones, other_centers, refined
 from fpsolve.exponent.stopped import StopStart
-from fpsolve.fem.factors import FEW_UNKNOWNS, one_thread
+from fpsolve.fem.axis import FEW_UNKNOWNS
+from fpsolve.fem.factors import one_thread
 from fpsolve.fem.generator import SMALL_P, Generator
 from fpsolve.fem.noise_axes import PolynomialAxis
 from fpsolve.fem.phase import PhaseAxis

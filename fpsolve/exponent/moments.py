@@ -39,8 +39,7 @@ from fpsolve.exponent.matrices import MatrixRates
 from fpsolve.exponent.method import Budget, Search
 from fpsolve.exponent.powers import Moving, PowerRates, exponents, moment_form, moves, multinomials, of_signs
 from fpsolve.exponent.rightmost import REMEDY, ROUNDING
-from fpsolve.fem.space import FIRST as AXES
-from fpsolve.fem.space import first_axis
+from fpsolve.fem.space import AXES, first_axis
 from fpsolve.messages import Remedy
 from fpsolve.model.noise import Noise
 from fpsolve.model.parameters import cached_by_problem

@@ -24,8 +24,8 @@ from fpsolve.fem.mesh import MAX_DEGREE, halved
 from fpsolve.model.noise import NoiseDerivative
 
 NO_LINES = np.zeros(0)
-MAX_DENSE_UNKNOWNS = 600
-"""Largest number of functions of an axis with cells whose matrices are arrays: of more they are sparse."""
+FEW_UNKNOWNS = 600
+"""Largest number of functions of an axis with cells, or of a space, whose matrices are arrays: else they are sparse."""
 HALVING = 2 * math.log(2)
 """Rate per degree by which the logarithm of an effect falls faster in half a cell."""
 LEAST_DEGREE = 4
@@ -36,7 +36,7 @@ MOST_DEGREE = 14
 """Highest degree of a cell: beyond, it is halved."""
 LEAST_FALL = 0.3
 """Least fall of the logarithm of an effect with each degree."""
-STILL = 3 / 7
+NO_FALL = 3 / 7
 """Ratio of the effects of two and of four modes where no fall is seen: then thrice the first may be left."""
 SPARE = 1.0
 """Number of degrees beyond what seems to be enough that a cell keeps where none should be made coarser."""
@@ -63,7 +63,7 @@ class ModeEffects:
         Where e falls slowly, by r with two degrees, effects are its differences, (1/r − 1)e and (1/r² − 1)e of two and
         four modes: of their ratio q is r = q/(1 − q), and e is q/(1 − 2q) times the effect of two.
         """
-        of_two = np.minimum(self.highest[1] / np.maximum(self.highest[3], 1e-300), STILL)
+        of_two = np.minimum(self.highest[1] / np.maximum(self.highest[3], 1e-300), NO_FALL)
         left = np.maximum(np.clip(np.sqrt(self._left_by_two), self.slowest, 1.0), of_two / (1 - 2 * of_two))
         return self.highest[1] * left
 
@@ -220,7 +220,7 @@ class DividedAxis(Axis):
 
     def stored(self, matrix: Matrix) -> Matrix:
         """A matrix as those of the axis are: an array where it is small."""
-        return matrix if self.size > MAX_DENSE_UNKNOWNS else dense(matrix)
+        return matrix if self.size > FEW_UNKNOWNS else dense(matrix)
 
     def on(self, lines: FloatArray, degrees: IntArray) -> Self:
         """The axis with other cells."""

@@ -8,10 +8,10 @@ from functools import cached_property
 import numpy as np
 
 from fpsolve.arrays import Coefficient, FloatArray, IntArray, Matrix, one
-from fpsolve.fem.noise_axes import STEP, CountedAxis, Rule, Samples, form
+from fpsolve.fem.noise_axes import LOG_STEP, CountedAxis, Rule, Samples, form
 from fpsolve.model.noise import NoiseDerivative
 
-MORE_POINTS = 64
+MOST_HARMONICS = 64
 """Number of equidistant points beyond four for each wave: a rule of them is exact for g(ξ(θ)) of so many harmonics."""
 
 
@@ -45,7 +45,7 @@ class CircleAxis(CountedAxis):
 
     @cached_property
     def rule(self) -> Rule:
-        count = 2 * (self.size - 1) + MORE_POINTS
+        count = 2 * (self.size - 1) + MOST_HARMONICS
         theta = np.asarray(np.arange(count) * (2 * np.pi / count), dtype=float)
         return Rule(theta, np.full(count, 1 / count), self.values_at(theta))
 
@@ -70,7 +70,7 @@ class CircleAxis(CountedAxis):
     def changed(self, change: NoiseDerivative, g: Coefficient | None) -> FloatArray:
         if g is None:
             return 2 * (change.log_diffusion - change.log_scale) * self._diffusing() + change.turning * self._turning()
-        slope = (g(self._xi * (1 + STEP)) - g(self._xi * (1 - STEP))) / (2 * STEP)
+        slope = (g(self._xi * (1 + LOG_STEP)) - g(self._xi * (1 - LOG_STEP))) / (2 * LOG_STEP)
         return form(self.rule.values, self.rule.measure * change.log_scale * slope)
 
     def samples(self) -> Samples:

@@ -41,21 +41,19 @@ from scipy.sparse.linalg import LinearOperator
 
 from fpsolve.arrays import Coefficient, FloatArray, IntArray, Mask, Matrix, one
 from fpsolve.fem.axis import Axis, KroneckerSum, along
-from fpsolve.fem.element import gauss_legendre
+from fpsolve.fem.element import EXTRA_POINTS, gauss_legendre
 from fpsolve.fem.line import LineSpace
 from fpsolve.fem.mesh import halved
-from fpsolve.fem.terms import Term, Terms
+from fpsolve.fem.terms import OfMoment, Term, Terms
 from fpsolve.model.plane import CoefficientMatrix
 from fpsolve.model.problem import ParameterDerivative, Problem
 
-PENALTY = 0.02
+SLOPE_PENALTY = 0.02
 """Factor γ of the penalty on jumps of slopes."""
 MOST_DEGREE = 10
 """Highest degree of an element: beyond, elements are halved."""
-POINTS = 32
+LEAST_POINTS = 32
 """Least number of points of a rule on a circle; every second one is looked at for signs."""
-MORE_POINTS = 12
-"""Number of Gauss points between two lines, or what an impact takes to these, beyond the degree."""
 Parts = list[tuple[FloatArray, csr_matrix]]
 """Σ f(η) g(θ₁, θ₂): values at points of η, shape (points, nodes), and images of functions of both angles."""
 
@@ -113,7 +111,7 @@ def signs(_: int) -> Angle:
 def circle(most: int) -> Angle:
     """Waves up to a degree, orthonormal in the mean."""
     k = np.arange(1, most + 3)
-    theta = np.linspace(0, 2 * math.pi, max(POINTS, 2 * most + 8), endpoint=False)
+    theta = np.linspace(0, 2 * math.pi, max(LEAST_POINTS, 2 * most + 8), endpoint=False)
     points, degrees = np.stack([np.cos(theta), np.sin(theta)]), np.append(0, np.repeat(k, 2))
     slope = block_diag(0.0, np.kron(np.diag(k), [[0.0, 1.0], [-1.0, 0.0]]))
 
@@ -168,7 +166,7 @@ def arc(lines: FloatArray, degree: int) -> Angle:
 def _jumps(line: LineSpace, speeds: FloatArray) -> FloatArray:
     """Σ γ h² N⁻³ speed [u′] [v′] over the inner vertices."""
     sizes, jump = np.diff(line.lines), line.jumps_of_slope().toarray()
-    weights = PENALTY * (0.5 * (sizes[1:] + sizes[:-1])) ** 2 / line.degree**3 * speeds
+    weights = SLOPE_PENALTY * (0.5 * (sizes[1:] + sizes[:-1])) ** 2 / line.degree**3 * speeds
     return np.asarray(jump.T @ (weights[:, None] * jump))
 
 
@@ -509,23 +507,23 @@ class HalfSphereAxis(DirectionAxis):
     def struck(self, log_factor: float, p: float, derivative: int = 0) -> Matrix:
         """∂ᵏ/∂pᵏ of ∫ v (ρ^p u(η′, π/2, θ₂) − u) over θ₁ = −π/2."""
         eta, weights, after, logs = self._impacts(log_factor)
-        found = self._at_wall(eta, weights * np.exp(p * logs) * logs**derivative, self.line.at(after), 1)
+        found = self._at_wall(eta, weights * OfMoment(0, logs)(p, derivative), self.line.at(after), 1)
         return found if derivative else found - self._at_wall(eta, weights, self.line.at(eta), 0)
 
     def changed_impacts(self, log_factor: float, p: float, derivative: int = 0) -> Matrix:
         """The derivative by ln R of what `struck` gives."""
         eta, weights, after, logs = self._impacts(log_factor)
-        longer = np.cos(after) ** 2 * (p * logs**derivative + derivative * logs ** max(derivative - 1, 0))
-        turned = -np.sin(after) * np.cos(after) * logs**derivative
+        longer = np.cos(after) ** 2 * OfMoment(1, logs)(p, derivative)
+        turned = -np.sin(after) * np.cos(after) * OfMoment(0, logs)(p, derivative)
         moved = diags(longer) @ self.line.at(after) + diags(turned) @ self.line.at(after, 1)
-        return self._at_wall(eta, weights * np.exp(p * logs), moved, 1)
+        return self._at_wall(eta, weights, moved, 1)
 
     def _impacts(self, log_factor: float) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """η of a rule between the lines and what is taken to them, its weights, η′, and ln ρ."""
         r = math.exp(log_factor)
         cuts = np.unique(np.concatenate([self.lines, np.arctan2(r * np.sin(self.lines), np.cos(self.lines))]))
         cuts = cuts[np.append(True, np.diff(cuts) > 1e-12)]
-        local, weights = gauss_legendre(self.degree + MORE_POINTS)
+        local, weights = gauss_legendre(self.degree + EXTRA_POINTS)
         sizes = np.diff(cuts)[:, None]
         eta = (cuts[:-1, None] + sizes * local).ravel()
         c, s = np.cos(eta), np.sin(eta)

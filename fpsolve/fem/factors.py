@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import lru_cache, reduce
 from itertools import pairwise
@@ -18,11 +18,9 @@ from threadpoolctl import ThreadpoolController
 from fpsolve.arrays import FloatArray, IntArray, dense
 from fpsolve.budget import charge
 from fpsolve.errors import SingularMatrix
-from fpsolve.fem.axis import KroneckerSum
+from fpsolve.fem.axis import FEW_UNKNOWNS, KroneckerSum
 from fpsolve.superlu import sparse_lu
 
-FEW_UNKNOWNS = 600
-"""Largest number of unknowns of one dense matrix."""
 LARGEST_GROWTH = 1e3
 """Largest entry of a P_k over the norm of the matrix, as rows of different levels are not exchanged."""
 
@@ -73,7 +71,7 @@ def factorised(operator: KroneckerSum, noise: int | None) -> Factors:
         return ArrayFactors(operator.toarray())
     if noise is not None:
         try:
-            return LevelFactors(operator, neighbours(operator, noise), noise)
+            return LevelFactors(operator, noise)
         except SingularMatrix:
             pass
     return SparseFactors(operator)
@@ -109,14 +107,6 @@ class SparseFactors:
         return np.asarray(self._lu.solve(b, trans="T" if transposed else "N"))
 
 
-def neighbours(operator: KroneckerSum, axis: int) -> list[IntArray]:
-    """The functions of an axis in levels, each coupled to the next ones only; both waves of a k are in one."""
-    size = operator.shape[axis]
-    rows, columns = np.nonzero(np.sum([abs(dense(term[axis])) for term in operator.terms], axis=0))
-    band = max(1, int(np.max(np.abs(rows - columns), initial=0)))
-    return np.split(np.arange(size), range(size % band or band, size, band))
-
-
 class LevelFactors:
     """LU factors by levels along an axis, of functions that are coupled to those of the next levels only.
 
@@ -127,19 +117,21 @@ class LevelFactors:
 
     Args:
         operator: the sum.
-        groups: the functions of an axis in each level.
-        axis: this axis.
+        axis: its functions are in the levels: as few in each as are coupled to others, as both waves of a k.
 
     Raises:
         SingularMatrix: a P_k is singular, of functions that noise moves only by way of those of another level.
     """
 
-    def __init__(self, operator: KroneckerSum, groups: Sequence[IntArray], axis: int = -1) -> None:
-        self._shape, self._axis, self._order = operator.shape, axis, np.concatenate(groups)
+    def __init__(self, operator: KroneckerSum, axis: int) -> None:
+        self._shape, self._axis = operator.shape, axis
         terms = [list(map(dense, term)) for term in operator.terms]
         lasts = np.stack([term.pop(axis) for term in terms])
         befores = np.stack([reduce(np.kron, others).T.ravel() for others in terms])  # type: ignore[arg-type]
-        m, most = operator.size // len(lasts[0]), LARGEST_GROWTH * operator.norm
+        count, most = len(lasts[0]), LARGEST_GROWTH * operator.norm
+        m, (rows, columns) = operator.size // count, np.nonzero(np.any(lasts, axis=0))
+        band = max(1, int(np.max(np.abs(rows - columns), initial=0)))
+        groups = np.split(np.arange(count), range(count % band or band, count, band))
         ends = m * np.cumsum([0, *(group.size for group in groups)])
         self._parts = [slice(*pair) for pair in pairwise(ends.tolist())]
 
@@ -161,9 +153,8 @@ class LevelFactors:
 
     def solve(self, b: FloatArray, *, transposed: bool = False) -> FloatArray:
         """x of A x = b, or of Aᵀx = b; several b are columns."""
-        axis = self._axis % len(self._shape)
-        table = np.moveaxis(b.reshape(*self._shape, *b.shape[1:]), axis, 0)
-        rest = table[self._order].reshape(b.shape)
+        table = np.moveaxis(b.reshape(*self._shape, *b.shape[1:]), self._axis, 0)
+        rest = table.reshape(b.shape).copy()
         upward, downward = (self._quotients, self._up) if transposed else (self._up, self._quotients)
         for k in range(len(self._parts) - 1, -1, -1):
             own, last = self._parts[k], self._parts[k - 1]
@@ -177,6 +168,4 @@ class LevelFactors:
                 rest[own] -= downward[k - 1].T @ last if transposed else downward[k - 1] @ last
             if transposed:
                 rest[own] = self._pivots[k].solve(rest[own], transposed=True)
-        found = np.empty(table.shape)
-        found[self._order] = rest.reshape(table.shape)
-        return np.moveaxis(found, 0, axis).reshape(b.shape)
+        return np.moveaxis(rest.reshape(table.shape), 0, self._axis).reshape(b.shape)

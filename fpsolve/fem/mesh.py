@@ -22,7 +22,7 @@ MAX_DEGREE = 20
 """Highest degree of the polynomials in a cell."""
 MAX_CELLS = 1000
 """Largest number of cells along an axis of a mesh."""
-TOLERANCE = 1e-9
+SAME_LINE = 1e-9
 """Distance of two lines, over the length of the axis or in radians, up to which they are one."""
 NO_ZERO = "the noise interval [{:g}, {:g}] must contain 0 inside, where the noise lives; choose xi_min < 0 < xi_max"
 MARKERS = {"domain": 0, "impact": 1, "seam": 2, "truncation": 3}
@@ -63,14 +63,14 @@ class CylinderMesh:
                 continue
             if lines.ndim != 1 or lines.size < 2 or not np.all(np.isfinite(lines)):
                 raise MeshError(f"{name} must be at least two finite numbers")
-            if not np.all(np.diff(lines) > TOLERANCE * np.ptp(lines)):
+            if not np.all(np.diff(lines) > SAME_LINE * np.ptp(lines)):
                 raise MeshError(f"{name} must increase, and no cell may be thinner than 1e-9 of the whole")
         for name in ("phi_degree", "xi_degree"):
             degree = getattr(self, name)
             if not is_whole(degree, 1, MAX_DEGREE):
                 raise MeshError(f"{name} is {shown(degree)}; it must be a whole number from 1 to {MAX_DEGREE}")
         turns = self.span / math.pi
-        if not (abs(turns - 1) < TOLERANCE or abs(turns - 2) < TOLERANCE):
+        if not (abs(turns - 1) < SAME_LINE or abs(turns - 2) < SAME_LINE):
             raise MeshError(f"the phase spans {self.span:.9g}; it must span the half circle, pi, or the circle, 2 pi")
 
     @property
@@ -92,7 +92,7 @@ class CylinderMesh:
 
 def vertices_at(lines: FloatArray, phase: float) -> IntArray:
     """The indices of the φ-lines lines[:-1] at φ and φ + π. Raises `MeshError` where one is missing."""
-    found = np.flatnonzero(np.abs(np.sin(lines[:-1] - phase)) < TOLERANCE)
+    found = np.flatnonzero(np.abs(np.sin(lines[:-1] - phase)) < SAME_LINE)
     turns = round((lines[-1] - lines[0]) / math.pi)
     if found.size != turns:
         name = "pi/2" if phase == math.pi / 2 else f"{phase:.6g}"
@@ -231,7 +231,7 @@ def _as_meshio(mesh: CylinderMesh, impact: float, gmsh: bool) -> Any:
     m, n = mesh.phi_lines.size, mesh.z_lines.size
     node = np.arange(m * n).reshape(m, n)
     quads = np.stack([node[:-1, :-1], node[1:, :-1], node[1:, 1:], node[:-1, 1:]], axis=-1).reshape(-1, 4)
-    impacts = [("impact", node[i]) for i in np.flatnonzero(np.abs(np.sin(mesh.phi_lines - impact)) < TOLERANCE)]
+    impacts = [("impact", node[i]) for i in np.flatnonzero(np.abs(np.sin(mesh.phi_lines - impact)) < SAME_LINE)]
     edges = [*impacts, *(("seam", node[i]) for i in (0, -1)), *(("truncation", node[:, i]) for i in (0, -1))]
     lines = np.concatenate([np.stack([nodes[:-1], nodes[1:]], axis=1) for _, nodes in edges])
     tags = np.concatenate([np.full(nodes.size - 1, MARKERS[name]) for name, nodes in edges])
@@ -253,7 +253,7 @@ def _as_meshio(mesh: CylinderMesh, impact: float, gmsh: bool) -> Any:
 def _grid_lines(coordinates: FloatArray) -> tuple[FloatArray, IntArray]:
     """The distinct values among coordinates, and for each point the index of its own."""
     order = np.argsort(coordinates)
-    steps = np.diff(coordinates[order]) > TOLERANCE * max(np.ptp(coordinates), 1e-300)
+    steps = np.diff(coordinates[order]) > SAME_LINE * max(np.ptp(coordinates), 1e-300)
     index = np.empty(order.size, dtype=int)
     index[order] = np.concatenate([[0], np.cumsum(steps)])
     return coordinates[order][np.concatenate([[True], steps])], index

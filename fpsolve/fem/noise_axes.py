@@ -24,7 +24,7 @@ from fpsolve.fem.line import LineSpace
 from fpsolve.model.noise import Noise, NoiseDerivative
 from fpsolve.polynomials import Polynomials, gegenbauer, hermite, logarithm, stieltjes
 
-REACH = 9.0
+GAUSSIAN_REACH = 9.0
 """Distance from its centre, in standard deviations, beyond which nothing is left of a weight like a Gaussian."""
 SHARP_ENDS = 50.0
 """Least exponent a of P_s ~ (1 − |z|)^a that leaves next to nothing at the ends of its support."""
@@ -32,7 +32,7 @@ NEAR_END = 1e-9
 """Distance from an end of the support, over its half width, at which σ² is asked whether it vanishes there."""
 VANISHES = 1e-6
 """Largest share of σ² at ξ = 0 that is taken for none."""
-STEP = 1e-5
+LOG_STEP = 1e-5
 """Step of ln ξ by which a coefficient is differentiated."""
 MORE_POINTS = 16
 """Number of points of a quadrature beyond the number of polynomials."""
@@ -188,7 +188,7 @@ class LineAxis(NoiseAxis):
         """∂(P_s g)/∂θ over P_s from ∂ ln P_s/∂θ, where ξ may be measured by a length that changes: z is held."""
         xi, weight = self.unit * z, logs * g(self.unit * z)
         if change.log_scale:
-            weight = weight + change.log_scale * (g(xi * (1 + STEP)) - g(xi * (1 - STEP))) / (2 * STEP)
+            weight = weight + change.log_scale * (g(xi * (1 + LOG_STEP)) - g(xi * (1 - LOG_STEP))) / (2 * LOG_STEP)
         return np.asarray(weight)
 
     def values_at(self, z: FloatArray) -> Matrix:
@@ -206,7 +206,7 @@ class LineAxis(NoiseAxis):
         if math.isfinite(end):
             z, measure = end * np.sin(0.5 * np.pi * x), end * np.cos(0.5 * np.pi * x) * np.pi / count
         else:
-            z, measure = self.center + REACH * x, np.full(count, 2 * REACH / count)
+            z, measure = self.center + GAUSSIAN_REACH * x, np.full(count, 2 * GAUSSIAN_REACH / count)
         return self._sampled(z, self.unit * measure, self.values_at(z))
 
     def _factor(self, z: FloatArray) -> FloatArray:
@@ -476,7 +476,7 @@ class StateAxis(NoiseAxis):
         weights = np.linalg.lstsq(equations, right, rcond=None)[0] if change.rates else none
         if g is None:
             return np.asarray(weights[:, None] * self._rates + self.rule.measure[:, None] * rates)
-        step = STEP * np.abs(self.support).max() / max(np.abs(states).max(), 1e-300)
+        step = LOG_STEP * np.abs(self.support).max() / max(np.abs(states).max(), 1e-300)
         slope = (g(self.support + step * states) - g(self.support - step * states)) / (2 * step)
         return np.diag(weights * g(self.support) + self.rule.measure * slope)
 

@@ -14,8 +14,8 @@ import skfem
 from scipy.sparse import csr_matrix, diags, issparse
 
 from fpsolve.arrays import FloatArray, IntArray, Mask, Matrix, one
-from fpsolve.fem.axis import MAX_DENSE_UNKNOWNS, DividedAxis
-from fpsolve.fem.element import Orthonormal, element, gauss_legendre, legendre, numbered, orthonormal
+from fpsolve.fem.axis import FEW_UNKNOWNS, DividedAxis
+from fpsolve.fem.element import EXTRA_POINTS, Orthonormal, element, gauss_legendre, legendre, numbered, orthonormal
 from fpsolve.fem.mesh import vertices_at
 from fpsolve.fem.terms import At, OfMoment, Term, Terms
 from fpsolve.model.plane import (
@@ -37,12 +37,24 @@ PENALTY = 2.0
 """Factor η·size/(degree + 1)² of the interior penalty method."""
 STRIPS = 32
 """Number of parts of the domain in each of which an impulse is integrated before and after it."""
-MORE_POINTS = 8
-"""Number of Gauss points in such a part beyond the degree."""
-KEPT_IMPULSES = 8
-"""Number of impulses whose matrices are kept, as many problems may share the functions."""
 MOST_SHARED = 100
 """Largest number of functions of φ that are kept for the next problem."""
+
+
+class Struck(NamedTuple):
+    """What an impulse does at the points of a rule.
+
+    Attributes:
+        points, weights: of the rule, shape (n,).
+        logs: ln |exp(B)e|, shape (n,).
+        at, end: the functions at the points, and where it takes them, shape (n, size).
+    """
+
+    points: FloatArray
+    weights: FloatArray
+    logs: FloatArray
+    at: csr_matrix
+    end: csr_matrix
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,41 +201,30 @@ class PhaseAxis(DividedAxis):
         first, second, last = (self._assembled(blocks) for blocks in cells)
         return first + loads[0], second + loads[1], last
 
-    def impulses(self, of: Impulse, p: float, derivative: int = 0) -> Matrix:
+    def impulses(self, struck: Struck, p: float, derivative: int = 0) -> Matrix:
         """∂ᵏ/∂pᵏ of ∫ w |exp(B)e|^p T(ψ(φ)), ψ being where an impulse takes φ."""
-        at, end, weights, stretch, _ = self._struck(of)
-        logs = np.log(stretch)
-        return self.stored(at.T @ diags(weights * np.exp(p * logs) * logs**derivative) @ end)
+        size = struck.weights * OfMoment(0, struck.logs)(p, derivative)
+        return self.stored(struck.at.T @ diags(size) @ struck.end)
 
-    def changed_impulses(self, of: Impulse, by: Impulse, p: float, derivative: int = 0) -> Matrix:
+    def changed_impulses(self, struck: Struck, of: Impulse, by: Impulse, p: float, derivative: int = 0) -> Matrix:
         """∂/∂θ of what `impulses` gives, where B depends on θ."""
-        at, end, weights, stretch, points = self._struck(of)
-        logs = np.log(stretch)
-        e = np.stack([np.cos(points), -np.sin(points)])
+        logs, e = struck.logs, np.stack([np.cos(struck.points), -np.sin(struck.points)])
         (x, u), (dx, du) = (matrix @ e for matrix in (of.matrix, changed_exponential(of.exponent, by.exponent)))
-        size = weights * np.exp(p * logs)
-        longer = (x * dx + u * du) / stretch**2 * (p * logs**derivative + derivative * logs ** max(derivative - 1, 0))
-        turned = (u * dx - x * du) / stretch**2 * logs**derivative
-        slope = end @ csr_matrix(self.convection(Harmonics(1.0, 0.0, 0.0)))
-        return self.stored(at.T @ (diags(size * longer) @ end + diags(size * turned) @ slope))
+        size = struck.weights * np.exp(-2 * logs)
+        longer = size * (x * dx + u * du) * OfMoment(1, logs)(p, derivative)
+        turned = size * (u * dx - x * du) * OfMoment(0, logs)(p, derivative)
+        slope = struck.end @ csr_matrix(self.convection(Harmonics(1.0, 0.0, 0.0)))
+        return self.stored(struck.at.T @ (diags(longer) @ struck.end + diags(turned) @ slope))
 
-    @cached_property
-    def _strikes(self) -> dict[Impulse, tuple[Any, ...]]:
-        return {}
-
-    def _struck(self, of: Impulse) -> tuple[Any, ...]:
-        """The functions at the points of a rule and where an impulse takes them, weights, |exp(B)e|, and the points."""
-        if of not in self._strikes:
-            if len(self._strikes) >= KEPT_IMPULSES:
-                self._strikes.clear()
-            points, middles, weights = self._rule_of(of)
-            stretch, end = of.stretched(points)
-            _, inside = of.stretched(middles)
-            first = self.lines[0]
-            end, inside = (first + np.mod(phi - first, self.span) for phi in (end, inside))
-            functions = (csr_matrix(self.at(*where)) for where in ((points, middles), (end, inside)))
-            self._strikes[of] = *functions, weights, stretch, points
-        return self._strikes[of]
+    def struck(self, of: Impulse) -> Struck:
+        """What an impulse does at the points of a rule."""
+        points, middles, weights = self._rule_of(of)
+        stretch, end = of.stretched(points)
+        _, inside = of.stretched(middles)
+        first = self.lines[0]
+        end, inside = (first + np.mod(phi - first, self.span) for phi in (end, inside))
+        functions = (csr_matrix(self.at(*where)) for where in ((points, middles), (end, inside)))
+        return Struck(points, weights, np.log(stretch), *functions)
 
     def _rule_of(self, of: Impulse) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Points of a rule between the lines and those phases that an impulse takes to lines, middles, and weights."""
@@ -231,7 +232,7 @@ class PhaseAxis(DividedAxis):
         even = first + self.span * np.arange(STRIPS) / STRIPS
         _, before = back.stretched(np.concatenate([even, self.lines[:-1]]))
         cuts = np.unique(np.concatenate([even, self.lines, first + np.mod(before - first, self.span)]))
-        local, weights = gauss_legendre(int(self.degrees.max()) + MORE_POINTS)
+        local, weights = gauss_legendre(int(self.degrees.max()) + EXTRA_POINTS)
         sizes = np.diff(cuts)[:, None]
         middles = np.repeat(0.5 * (cuts[:-1] + cuts[1:]), local.size)
         return (cuts[:-1, None] + sizes * local).ravel(), middles, (sizes * weights).ravel()
@@ -304,7 +305,7 @@ class PhaseAxis(DividedAxis):
         return self._matrix(values[kept], rows[kept], numbers[kept], (len(kept), self.size))
 
     def _matrix(self, entries: FloatArray, rows: IntArray, columns: IntArray, shape: tuple[int, int]) -> Matrix:
-        if self.size > MAX_DENSE_UNKNOWNS:
+        if self.size > FEW_UNKNOWNS:
             return csr_matrix((entries, (rows, columns)), shape=shape)
         matrix = np.zeros(shape)
         matrix[rows, columns] = entries
@@ -412,12 +413,13 @@ class PlaneTerms(Terms):
 
     def _struck(self, of: Impulse, by: Impulse | None = None) -> Term:
         """An impulse, or ∂/∂θ of it."""
+        struck = self.phi.struck(of)
 
         def phase_at(p: float, derivative: int) -> Matrix:
             rate = of.rate if by is None else by.rate
-            total = 0.0 if by is None else of.rate * self.phi.changed_impulses(of, by, p, derivative)
+            total = 0.0 if by is None else of.rate * self.phi.changed_impulses(struck, of, by, p, derivative)
             if rate:
-                total = total + rate * self.phi.impulses(of, p, derivative)
+                total = total + rate * self.phi.impulses(struck, p, derivative)
                 total = total if derivative else total - rate * self.phi.identity
             return total
 

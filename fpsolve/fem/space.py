@@ -24,7 +24,7 @@ MOST_BYTES = 1.2e9
 """Of the factors of a generator: with what else is held, and libraries, a process takes about 1.5 GB."""
 LITTLE = 1e-2
 """Share of the largest effect of an axis below which others are left as they are, while nothing is resolved."""
-FIRST: dict[str, Callable[[Noise, int], NoiseAxis]] = {
+AXES: dict[str, Callable[[Noise, int], NoiseAxis]] = {
     "polynomials": lambda noise, count: PolynomialAxis(noise, count + 3),
     "waves": lambda noise, count: CircleAxis(noise, count + 4),
     "pairs": lambda noise, count: PairAxis(noise, count + 3),
@@ -35,7 +35,7 @@ FIRST: dict[str, Callable[[Noise, int], NoiseAxis]] = {
 
 def first_axis(noise: Noise, digits: float) -> NoiseAxis:
     """Few functions of a noise, for so many digits, where no value of the noise is held."""
-    return FIRST[noise.basis](noise, round(digits / 2))
+    return AXES[noise.basis](noise, round(digits / 2))
 
 
 class Space:

@@ -30,22 +30,23 @@ Noises = tuple[Coefficient | None, ...]
 
 @dataclass(frozen=True)
 class OfMoment:
-    """The coefficient pⁿ R^p, n ≤ 1 unless R = 1.
+    """The coefficient pⁿ R^p.
 
     Attributes:
         n: the power of p.
-        log_factor: ln R.
+        log_factor: ln R, or several.
     """
 
     n: int
-    log_factor: float = 0.0
+    log_factor: Any = 0.0
 
-    def __call__(self, p: float, derivative: int = 0) -> float:
-        """Its k-th derivative."""
-        if not self.log_factor:
-            return math.perm(self.n, derivative) * float(p) ** max(self.n - derivative, 0)
-        parts = p**self.n * self.log_factor**derivative, self.n * derivative * self.log_factor ** max(derivative - 1, 0)
-        return sum(parts) * math.exp(p * self.log_factor)
+    def __call__(self, p: float, derivative: int = 0) -> Any:
+        """Its k-th derivative, by the rule of Leibniz."""
+        total = 0.0
+        for j in range(min(self.n, derivative) + 1):
+            of_power = math.comb(derivative, j) * math.perm(self.n, j) * p ** (self.n - j)
+            total = total + of_power * self.log_factor ** (derivative - j)
+        return total * np.exp(p * self.log_factor)
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from scipy.linalg import lu_factor, lu_solve, solve
 from fpsolve.arrays import FloatArray, one
 from fpsolve.budget import charge
 from fpsolve.fem.axis import KroneckerSum
-from fpsolve.fem.factors import LevelFactors, neighbours
+from fpsolve.fem.factors import LevelFactors
 from fpsolve.nonlinear.operator import Elements, Plane
 
 TAIL_TERMS = 8
@@ -155,7 +155,7 @@ class Cell:
     def __init__(self, own: Tables, into: Tables, out: Tables, noise: Tables) -> None:
         self._into, self._out, self._noise = into, out, noise
         operator = KroneckerSum(list(zip(own, noise, strict=True)))
-        self._factors = LevelFactors(operator, neighbours(operator, 1))
+        self._factors = LevelFactors(operator, 1)
 
     def values(self, others: FloatArray) -> FloatArray:
         """The values of these functions, shape (n, n_ξ), from those of the others, shape (m, n_ξ)."""

@@ -22,11 +22,11 @@ FREQUENCIES = np.linspace(0, 2, 41)
 """Frequencies at which the noise of a filter may swing, over that of the filter."""
 AMPLITUDES = 401
 """Number of amplitudes of a swing."""
-PHASES = 32
+SWING_POINTS = 32
 """Number of points of half a turn of a swing."""
 LARGEST_P = 25.0
 """Largest p whose places are certainly among those that are looked at."""
-CLOSE = 0.1
+CENTER_ERROR = 0.1
 """Error of the centre of a tilted density, in standard deviations."""
 ZOOM = 41
 """Number of points between two that are farther apart."""
@@ -71,7 +71,7 @@ def swing(problem: Problem, p: float) -> tuple[float, float]:
     peak = noise.omega * math.sqrt(max(1 - 2 * noise.zeta**2, 0.0))
     spectrum = max(noise.spectral_density(each) for each in (peak, *(noise.omega * FREQUENCIES)))
     a = 4 * abs(p) * noise_strength(problem.motion) * spectrum * np.linspace(0, 1, AMPLITUDES)
-    xi = a[:, None] * np.cos(math.pi * (np.arange(PHASES) + 0.5) / PHASES)
+    xi = a[:, None] * np.cos(math.pi * (np.arange(SWING_POINTS) + 0.5) / SWING_POINTS)
     rate = p * np.mean(eigenvalues_at(problem, xi)[0], axis=1) - a**2 / (4 * spectrum)
     best = int(np.argmax(rate))
     return float(a[best]) / noise.standard_deviation, float(rate[best])
@@ -124,7 +124,7 @@ class FrozenNoise:
         held = self
         while True:
             lower, upper = held.z[[max(best - 1, 0), min(best + 1, held.z.size - 1)]]
-            if upper - lower <= CLOSE:
+            if upper - lower <= CENTER_ERROR:
                 return float(held.z[best]), float(held.rate(p)[best])
             held = FrozenNoise(self._problem, np.linspace(lower, upper, ZOOM))
             best = int(np.argmax(held.rate(p)))

@@ -38,7 +38,7 @@ from fpsolve.model.plane import (
 )
 from fpsolve.model.problem import Problem
 
-WEAK = 0.05
+STRONG = 0.05
 """Share of the terms of Eq. (37) that the orders beyond may have."""
 
 
@@ -220,12 +220,12 @@ def weak_noise_note(problem: Problem, p: FloatArray, value: FloatArray) -> Messa
     rest = value - theory.moment_exponent(p)
     scale = theory.scale.moment(p)
     shares = np.divide(np.abs(rest), scale, out=np.zeros_like(scale), where=scale > 0)
-    beyond = shares > WEAK
+    beyond = shares > STRONG
     if not np.any(beyond):
         return None
     worst, first = int(np.argmax(shares)), np.min(np.abs(p[beyond]))
     found = {"first": first, "p": p[worst], "rest": rest[worst], "size": shares[worst]}
-    return Message(Code.STRONG_NOISE, is_reduced=problem.noise.approximates_spectrum, most=WEAK, **found)
+    return Message(Code.STRONG_NOISE, is_reduced=problem.noise.approximates_spectrum, most=STRONG, **found)
 
 
 def first_order_eigenfunction(problem: Problem, p: float, phi: ArrayLike, xi: ArrayLike) -> FloatArray:

@@ -11,7 +11,7 @@ from scipy.sparse import csr_matrix
 
 from fpsolve.fem.axis import KroneckerSum
 from fpsolve.fem.directions import HalfSphereAxis, SphereAxis
-from fpsolve.fem.factors import ArrayFactors, LevelFactors, SparseFactors, neighbours
+from fpsolve.fem.factors import ArrayFactors, LevelFactors, SparseFactors
 from fpsolve.model import CoefficientMatrix
 
 TWO_THREADS = """
@@ -76,7 +76,7 @@ def test_all_kinds_of_factors_solve_the_same_equations(rng, sizes):
     operator = random_sum(rng, *sizes) if sizes else undamped(rng)
     b, several = rng.standard_normal(operator.size), rng.standard_normal((operator.size, 3))
     matrix = sum(np.kron(term[0], np.kron(*term[1:]) if len(term) > 2 else term[1]) for term in operator.terms)
-    by_levels = [LevelFactors(operator, neighbours(operator, axis), axis) for axis in range(1, len(operator.shape))]
+    by_levels = [LevelFactors(operator, axis) for axis in range(1, len(operator.shape))]
     mixed = KroneckerSum([(csr_matrix(first), *others) for first, *others in operator.terms])
     for each in (operator, mixed):
         assert_allclose(each.tocsc().toarray(), matrix, atol=1e-12)
