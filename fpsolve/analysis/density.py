@@ -15,7 +15,7 @@ from fpsolve.drawing import MOST_LINES, QUARTERS, add_legend, draw_line, draw_pl
 from fpsolve.errors import NotConverged
 from fpsolve.exponent.density import MOST_NEGATIVE, DirectionGrid, Grid, densities, evaluated
 from fpsolve.exponent.eigen import PrincipalPair
-from fpsolve.fem.mesh import vertices_at
+from fpsolve.fem.phase import vertices_at
 from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.plane import growth_rate
 

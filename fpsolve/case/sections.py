@@ -44,7 +44,7 @@ from fpsolve.explain import (
 )
 from fpsolve.exponent.method import RTOL, RTOL_BEYOND_PLANE, RTOL_OF_SEVERAL
 from fpsolve.exponent.quantities import INDICES, MOMENT, QUANTITIES, DrawnName, QuantityName
-from fpsolve.fem.mesh import MAX_CELLS, MAX_DEGREE, CylinderMesh, make_mesh, read_mesh, vertices_at
+from fpsolve.fem.mesh import MAX_CELLS, MAX_DEGREE, CylinderMesh, make_mesh, read_mesh
 from fpsolve.messages import is_control
 from fpsolve.model.faults import table_of
 from fpsolve.model.parameters import Section, parameter
@@ -267,6 +267,8 @@ class MeshSection(Section):
         if self.file is None:
             stated = self.model_dump(exclude_none=True)
             return make_mesh(**stated) if stated else None
+        from fpsolve.fem.phase import vertices_at  # takes a while to import
+
         path = folder / self.file
         mesh = read_mesh(path)
         try:

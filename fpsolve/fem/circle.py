@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from fpsolve.arrays import Coefficient, FloatArray, IntArray, Matrix, one
-from fpsolve.fem.noise_axes import LOG_STEP, CountedAxis, Rule, Samples, form
+from fpsolve.fem.noise_axes import CountedAxis, Rule, Samples, form, log_slope
 from fpsolve.model.noise import NoiseDerivative
 
 MOST_HARMONICS = 64
@@ -70,8 +70,7 @@ class CircleAxis(CountedAxis):
     def changed(self, change: NoiseDerivative, g: Coefficient | None) -> FloatArray:
         if g is None:
             return 2 * (change.log_diffusion - change.log_scale) * self._diffusing() + change.turning * self._turning()
-        slope = (g(self._xi * (1 + LOG_STEP)) - g(self._xi * (1 - LOG_STEP))) / (2 * LOG_STEP)
-        return form(self.rule.values, self.rule.measure * change.log_scale * slope)
+        return form(self.rule.values, self.rule.measure * change.log_scale * log_slope(g, self._xi))
 
     def samples(self) -> Samples:
         """At equidistant θ; weight and measure are those of θ."""

@@ -90,16 +90,6 @@ class CylinderMesh:
         return replace(self, z_lines=np.concatenate([[lower], inside, [upper]]))
 
 
-def vertices_at(lines: FloatArray, phase: float) -> IntArray:
-    """The indices of the φ-lines lines[:-1] at φ and φ + π. Raises `MeshError` where one is missing."""
-    found = np.flatnonzero(np.abs(np.sin(lines[:-1] - phase)) < SAME_LINE)
-    turns = round((lines[-1] - lines[0]) / math.pi)
-    if found.size != turns:
-        name = "pi/2" if phase == math.pi / 2 else f"{phase:.6g}"
-        raise MeshError(Message(Code.NO_IMPACT_LINE, wanted=turns, place=name, found=found.size))
-    return found
-
-
 def halved(lines: FloatArray) -> FloatArray:
     """The lines, and one in the middle between any two."""
     return np.sort(np.concatenate([lines, 0.5 * (lines[:-1] + lines[1:])]))

@@ -188,7 +188,7 @@ class LineAxis(NoiseAxis):
         """∂(P_s g)/∂θ over P_s from ∂ ln P_s/∂θ, where ξ may be measured by a length that changes: z is held."""
         xi, weight = self.unit * z, logs * g(self.unit * z)
         if change.log_scale:
-            weight = weight + change.log_scale * (g(xi * (1 + LOG_STEP)) - g(xi * (1 - LOG_STEP))) / (2 * LOG_STEP)
+            weight = weight + change.log_scale * log_slope(g, xi)
         return np.asarray(weight)
 
     def values_at(self, z: FloatArray) -> Matrix:
@@ -504,6 +504,11 @@ def _gegenbauer_rule(count: int, exponent: float) -> tuple[FloatArray, FloatArra
 def _end_logarithm(count: int, exponent: float, a: float) -> FloatArray:
     """ln(1 − x²) at the points of a rule, as the polynomials of the exponent a have it."""
     return logarithm(_gegenbauer_rule(count, exponent)[0], a, count)
+
+
+def log_slope(g: Coefficient, xi: FloatArray) -> FloatArray:
+    """ξ g′(ξ)."""
+    return np.asarray((g(xi * (1 + LOG_STEP)) - g(xi * (1 - LOG_STEP))) / (2 * LOG_STEP))
 
 
 def form(values: FloatArray, measure: FloatArray) -> FloatArray:

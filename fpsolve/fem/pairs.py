@@ -18,7 +18,7 @@ import numpy as np
 import scipy.sparse
 
 from fpsolve.arrays import Coefficient, FloatArray, IntArray, one
-from fpsolve.fem.noise_axes import LOG_STEP, MORE_POINTS, CountedAxis, Rule, Samples, form
+from fpsolve.fem.noise_axes import MORE_POINTS, CountedAxis, Rule, Samples, form, log_slope
 from fpsolve.model.noise import NoiseDerivative
 from fpsolve.polynomials import hermite
 
@@ -94,9 +94,7 @@ class PairAxis(CountedAxis):
     def changed(self, change: NoiseDerivative, g: Coefficient | None) -> FloatArray:
         if g is None:
             return self._moved(np.array(change.drift)) if change.drift else np.zeros((self.size, self.size))
-        xi = self._fine.points
-        slope = (g(xi * (1 + LOG_STEP)) - g(xi * (1 - LOG_STEP))) / (2 * LOG_STEP)
-        return self._weighed(change.log_scale * slope)
+        return self._weighed(change.log_scale * log_slope(g, self._fine.points))
 
     def samples(self) -> Samples:
         """At the points of a rule for (u₁, u₂); the weight is in the measure."""

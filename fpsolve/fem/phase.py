@@ -14,10 +14,12 @@ import skfem
 from scipy.sparse import csr_matrix, diags, issparse
 
 from fpsolve.arrays import FloatArray, IntArray, Mask, Matrix, one
+from fpsolve.errors import MeshError
 from fpsolve.fem.axis import FEW_UNKNOWNS, DividedAxis
 from fpsolve.fem.element import EXTRA_POINTS, Orthonormal, element, gauss_legendre, legendre, numbered, orthonormal
-from fpsolve.fem.mesh import vertices_at
+from fpsolve.fem.mesh import SAME_LINE
 from fpsolve.fem.terms import At, OfMoment, Term, Terms
+from fpsolve.messages import Code, Message
 from fpsolve.model.plane import (
     CoefficientMatrix,
     Harmonics,
@@ -39,6 +41,16 @@ STRIPS = 32
 """Number of parts of the domain in each of which an impulse is integrated before and after it."""
 MOST_SHARED = 100
 """Largest number of functions of φ that are kept for the next problem."""
+
+
+def vertices_at(lines: FloatArray, phase: float) -> IntArray:
+    """The indices of the φ-lines lines[:-1] at φ and φ + π. Raises `MeshError` where one is missing."""
+    found = np.flatnonzero(np.abs(np.sin(lines[:-1] - phase)) < SAME_LINE)
+    turns = round((lines[-1] - lines[0]) / math.pi)
+    if found.size != turns:
+        name = "pi/2" if phase == math.pi / 2 else f"{phase:.6g}"
+        raise MeshError(Message(Code.NO_IMPACT_LINE, wanted=turns, place=name, found=found.size))
+    return found
 
 
 class Struck(NamedTuple):

@@ -85,8 +85,7 @@ class Space:
         if noise.is_diffusion:
             mesh = mesh.within(noise.half_width / noise.standard_deviation)
             return cls((phi, CellAxis(noise, mesh.z_lines, np.full(mesh.z_lines.size - 1, mesh.xi_degree))))
-        of_degree = {"waves": CircleAxis, "pairs": PairAxis}.get(noise.basis)
-        return cls((phi, of_degree(noise, mesh.xi_degree) if of_degree else StateAxis(noise)))
+        return cls((phi, first_axis(noise, 0.0).of_degree(mesh.xi_degree)))
 
     def with_axis(self, k: int, axis: Axis) -> Space:
         """The space with another axis in one place."""

@@ -118,7 +118,15 @@ class Terms:
     @cached_property
     def all(self) -> Sequence[Term]:
         """L(p) of Eq. (19)."""
-        return list(self._whole())
+        found = list[Term]()
+        for name in self._names:
+            text = f"L_ξ, the generator of the noise{f' {name}' if name else ''}"
+            found.append(self._term(self.phi.identity, None, text, of=name))
+        for term in self.system.terms:
+            found += self._driven(term)
+        for each in self._problem.diffusions:
+            found += self._diffused([(0.5, each, each)])
+        return [*found, *self._loads()]
 
     def phases(self, p: float, derivative: int = 0, is_forcing: bool = False) -> dict[Noises, Matrix]:
         """For each function of the noises the matrix of φ of dᵏL/dpᵏ, or of its forcing; the first is that of 1."""
@@ -128,16 +136,6 @@ class Terms:
             if phase is not None:
                 found[term.noises] = found[term.noises] + phase if term.noises in found else phase
         return found
-
-    def _whole(self) -> Iterator[Term]:
-        for name in self._names:
-            text = f"L_ξ, the generator of the noise{f' {name}' if name else ''}"
-            yield self._term(self.phi.identity, None, text, of=name)
-        for term in self.system.terms:
-            yield from self._driven(term)
-        for each in self._problem.diffusions:
-            yield from self._diffused([(0.5, each, each)])
-        yield from self._loads()
 
     def changed(self, by: ParameterDerivative) -> Iterator[Term]:
         """∂L(p)/∂θ of the same terms; what makes functions smooth is held."""

@@ -14,14 +14,10 @@ from fpsolve.model.parameters import cached_by_problem
 from fpsolve.model.plane import matrix_at, noise_strength, squared_frequency
 from fpsolve.model.problem import Problem
 
-SAMPLES = 1001
-"""Number of steady values of a filter."""
-SIDE_SAMPLES = 601
-"""Number of values of a diffusion on each side."""
+SAMPLES = 601
+"""Number of values of a noise on each side, and of amplitudes of its swings."""
 FREQUENCIES = np.linspace(0, 2, 41)
 """Frequencies at which the noise of a filter may swing, over that of the filter."""
-AMPLITUDES = 401
-"""Number of amplitudes of a swing."""
 SWING_POINTS = 32
 """Number of points of half a turn of a swing."""
 LARGEST_P = 25.0
@@ -54,10 +50,10 @@ def steady_places(problem: Problem, p: float) -> tuple[FloatArray, FloatArray]:
     noise = problem.coloured
     unit, spectrum = noise.standard_deviation, noise.spectral_density(0.0)
     reach = 2 * abs(p) * noise_strength(problem.motion) * spectrum
-    xi = reach * np.linspace(-1, 1, SAMPLES)
+    xi = reach * np.linspace(-1, 1, 2 * SAMPLES - 1)
     rate = p * eigenvalues_at(problem, xi)[0] - (xi**2 / (2 * spectrum) if spectrum else 0.0)
     at = np.flatnonzero((rate[1:-1] > rate[:-2]) & (rate[1:-1] >= rate[2:])) + 1
-    at = at[np.argsort(-rate[at])] if at.size else np.array([SAMPLES // 2])
+    at = at[np.argsort(-rate[at])] if at.size else np.array([SAMPLES - 1])
     return xi[at] / unit, rate[at]
 
 
@@ -70,7 +66,7 @@ def swing(problem: Problem, p: float) -> tuple[float, float]:
     noise: Any = problem.coloured
     peak = noise.omega * math.sqrt(max(1 - 2 * noise.zeta**2, 0.0))
     spectrum = max(noise.spectral_density(each) for each in (peak, *(noise.omega * FREQUENCIES)))
-    a = 4 * abs(p) * noise_strength(problem.motion) * spectrum * np.linspace(0, 1, AMPLITUDES)
+    a = 4 * abs(p) * noise_strength(problem.motion) * spectrum * np.linspace(0, 1, SAMPLES)
     xi = a[:, None] * np.cos(math.pi * (np.arange(SWING_POINTS) + 0.5) / SWING_POINTS)
     rate = p * np.mean(eigenvalues_at(problem, xi)[0], axis=1) - a**2 / (4 * spectrum)
     best = int(np.argmax(rate))
@@ -152,7 +148,7 @@ def _both_sides(problem: Problem) -> FloatArray:
     furthest = 5 * LARGEST_P * unit * noise_strength(problem.motion) * noise.correlation_time
     end = min(max(furthest, 1.0), 0.999 * noise.half_width / unit)
     spread = max(np.log(end / 1e-2), 1.0)
-    side = end * np.sinh(spread * np.linspace(0, 1, SIDE_SAMPLES)) / np.sinh(spread)
+    side = end * np.sinh(spread * np.linspace(0, 1, SAMPLES)) / np.sinh(spread)
     return np.concatenate([-side[:0:-1], side])
 
 
