@@ -164,8 +164,8 @@ class LevelFactors:
                 rest[last] -= upward[k - 1].T @ rest[own] if transposed else upward[k - 1] @ rest[own]
         for k, own in enumerate(self._parts):
             if k:
-                last = rest[self._parts[k - 1]]
-                rest[own] -= downward[k - 1].T @ last if transposed else downward[k - 1] @ last
+                known = rest[self._parts[k - 1]]
+                rest[own] -= downward[k - 1].T @ known if transposed else downward[k - 1] @ known
             if transposed:
                 rest[own] = self._pivots[k].solve(rest[own], transposed=True)
         return np.moveaxis(rest.reshape(table.shape), 0, self._axis).reshape(b.shape)

@@ -171,7 +171,10 @@ class PhaseAxis(DividedAxis):
 
     def mass(self, f: Any = one) -> Matrix:
         """∫ f u v of `Harmonics` f, or of 1."""
-        return self.identity if f == one else self._assembled(self._cellwise(f(self._grid), self._table.products, 0))
+        if f == one:
+            return self.identity
+        wave = self._cellwise(f(self._grid) - f.mean, self._table.products, 0)
+        return f.mean * self.identity + self._assembled(wave)  # exact without a wave
 
     def convection(self, f: Harmonics) -> Matrix:
         """∫ f u′ v, cell by cell."""
@@ -271,7 +274,7 @@ class PhaseAxis(DividedAxis):
         cell = np.clip(where, 0, self._sizes.size - 1)
         local = np.clip((phi - self.lines[cell]) / self._sizes[cell], 0, 1)
         values = legendre(int(self.degrees.max()), local) / np.sqrt(self._sizes[cell])[:, None]
-        kept, numbers = (each[cell] for each in self._numbers)
+        kept, numbers = self._numbers[0][cell], self._numbers[1][cell]
         return self._matrix(values[kept], np.nonzero(kept)[0], numbers[kept], (phi.size, self.size))
 
     def finer_rule(self, parts: int) -> tuple[FloatArray, FloatArray]:
@@ -384,8 +387,10 @@ class PlaneTerms(Terms):
 
     @property
     def keeps_constants(self) -> bool:  # type: ignore[override]
-        rotates = all(term.h.amplitude == 0 and term.q.vanishes for term in self.system.terms if term.order == 0)
-        return rotates and all(each.order for each in self._problem.diffusions)
+        for term in self.system.terms:
+            if term.order == 0 and (term.h.amplitude or not term.q.vanishes):
+                return False
+        return all(each.order for each in self._problem.diffusions)
 
     def _loads(self) -> Iterator[Term]:
         for struck in self._problem.impulses:
