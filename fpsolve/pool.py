@@ -252,10 +252,10 @@ def _version() -> str:
 def _processes(count: int) -> Executor:
     """New processes, in which nothing of this one is copied, neither its locks nor its threads."""
     context = multiprocessing.get_context("spawn")
-    return futures.ProcessPoolExecutor(count, mp_context=context, initializer=_begin_worker, initargs=(count,))
+    return futures.ProcessPoolExecutor(count, mp_context=context, initializer=_begin_worker)
 
 
-def _begin_worker(count: int) -> None:
+def _begin_worker() -> None:
     """A worker has one processor, one share of the memory, and ends when what started it does, however that ends."""
     limit_processors(1)
     parent = multiprocessing.parent_process()

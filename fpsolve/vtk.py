@@ -9,7 +9,7 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from fpsolve.arrays import FloatArray, IntArray
+from fpsolve.arrays import FloatArray
 from fpsolve.files import write_text
 from fpsolve.model.problem import Problem, parameter_lines, parameter_words
 from fpsolve.signals import signals_held
@@ -36,35 +36,21 @@ def write_between(path: Path, places: Sequence[FloatArray], data: Mapping[str, A
         data: point data of this shape; the first is shown first.
         facts: field data.
     """
-    numbers = np.arange(places[0].size).reshape(places[0].shape)
+    pyvista, numbers = pyvista_module(), np.arange(places[0].size).reshape(places[0].shape)
     square = [(0, 0), (1, 0), (1, 1), (0, 1)]
     steps = square if numbers.ndim == 2 else [(*step, top) for top in (0, 1) for step in square]
     corners = [numbers[tuple(slice(k, k - 1 or None) for k in step)].ravel() for step in steps]
-    kind = "QUAD" if numbers.ndim == 2 else "HEXAHEDRON"
+    kind = pyvista.CellType.QUAD if numbers.ndim == 2 else pyvista.CellType.HEXAHEDRON
     points = np.stack([each.ravel() for each in places], axis=1)
-    write_cells(path, kind, np.stack(corners, axis=1), points, data, facts)
+    write_points(path, pyvista.UnstructuredGrid({kind: np.stack(corners, axis=1)}, points), data, facts)
 
 
-def write_cells(
-    path: Path, kind: str, cells: IntArray, points: FloatArray, data: Mapping[str, FloatArray], facts: Facts
-) -> None:
-    """Write a .vtu file of cells of one kind.
-
-    Args:
-        path: of the file.
-        kind: a name of `pyvista.CellType`.
-        cells: the points of each cell in VTK's order, shape (cells, n).
-        points: shape (points, 3).
-        data: point data, of any shape of as many numbers; the first is shown first.
-        facts: field data.
-    """
-    pyvista, (count, size) = pyvista_module(), cells.shape
-    kinds = np.full(count, pyvista.CellType[kind], dtype=np.uint8)
-    output = pyvista.UnstructuredGrid(np.insert(cells, 0, size, axis=1).ravel(), kinds, points)
+def write_points(path: Path, grid: Any, data: Mapping[str, FloatArray], facts: Facts) -> None:
+    """Write a .vtu file of a grid with point data, of which the first is shown first, and field data."""
     for name, values in data.items():
-        output.point_data[name] = values.ravel()
-    output.GetPointData().SetActiveScalars(next(iter(data)))
-    write_vtk(path, output, facts)
+        grid.point_data[name] = values.ravel()
+    grid.GetPointData().SetActiveScalars(next(iter(data)))
+    write_vtk(path, grid, facts)
 
 
 def write_series(folder: Path, stem: str, by_p: Mapping[float, Callable[[Path], None]]) -> list[Path]:

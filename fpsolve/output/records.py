@@ -410,7 +410,8 @@ def _entry_of(data: Any, part: Part) -> Entry | None:
 
 def record_of(found: Any) -> Record:
     """The record of a dataclass, without its curve."""
-    return {name: plain(getattr(found, name)) for name in _names(type(found))}
+    kind: Any = type(found)
+    return {name: plain(getattr(found, name)) for name in _names(kind)}
 
 
 def made_of(kind: type, record: Mapping[str, Any]) -> dict[str, Any]:
@@ -428,7 +429,7 @@ def _read_as(what: str) -> Iterator[None]:
         raise ValueError(f"this is no record of {what}: {failure!r}") from failure
 
 
-def key_of(kind: type, curve: Curve, **content: Any) -> str:
+def key_of(kind: Any, curve: Curve, **content: Any) -> str:
     """What a record of a kind is found by: the version, a digest of form and content, and that of the curve."""
     return f"{RESULT_VERSION}-{_hash({'form': form(kind), **content})}-{curve.digest}"
 
@@ -441,7 +442,7 @@ def plain(value: Any) -> Any:
     """What JSON can hold of a value, a dataclass without its curve."""
     if isinstance(value, Message):
         return value.to_data()
-    if names := _names(type(value)):
+    if names := _names(value.__class__):
         return [plain(getattr(value, name)) for name in names]
     if isinstance(value, np.ndarray):
         return _packed(value)

@@ -36,7 +36,7 @@ from fpsolve.parts.nodes import FURTHEST, Nodes
 from fpsolve.parts.part import Job, Numerics, Part, Reason, Settings, attempt
 from fpsolve.parts.surfaces import Surface, picture_of
 from fpsolve.results.curve import CurveResult, SimulatedCurve
-from fpsolve.vtk import Facts, collection_of, field_data, name_at, pyvista_module, write_cells, write_series
+from fpsolve.vtk import Facts, collection_of, field_data, name_at, pyvista_module, write_points, write_series
 
 CURVES = "curves.pvd"
 """The file of the series over curves."""
@@ -231,9 +231,10 @@ def copy_show_script(directory: Path) -> Path:
 
 def _write_grid(path: Path, grid: Nodes, data: Mapping[str, FloatArray], facts: Facts) -> None:
     """Write a .vtu file; arrays of point data broadcast to (φ-nodes, ξ-nodes), and the first is shown first."""
-    axes = {"impacts": grid.impacts or [math.nan], "along_y": grid.along_y}
+    pyvista, axes = pyvista_module(), {"impacts": grid.impacts or [math.nan], "along_y": grid.along_y}
+    cells = {pyvista.CellType.LAGRANGE_QUADRILATERAL: grid.cells()}
     shown = {name: np.broadcast_to(values, (grid.phi.size, grid.z.size)) for name, values in data.items()}
-    write_cells(path, "LAGRANGE_QUADRILATERAL", grid.cells(), grid.points(), shown, {**axes, **facts})
+    write_points(path, pyvista.UnstructuredGrid(cells, grid.points()), shown, {**axes, **facts})
 
 
 def _figures(case: Case, result: CurveResult, folder: Path) -> Iterator[Drawing]:
