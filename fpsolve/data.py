@@ -85,6 +85,11 @@ class Quantity:
         """Its symbol in a figure, or else its name, of a parameter without the section."""
         return self.latex or self.name.rpartition(".")[2]
 
+    @property
+    def unit_in_words(self) -> str:
+        """Its unit in a sentence; empty where it has none, or that is not known."""
+        return "" if self.unit in ("1", "unknown") else plain_unit(self.unit)
+
     def timed(self, unit: str) -> Self:
         """The quantity with a unit of time: "1/s" instead of "1/time"."""
         return replace(self, unit=re.sub(r"\btime(?=\b|²)", unit, self.unit))

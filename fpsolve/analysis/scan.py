@@ -66,12 +66,12 @@ Field = Callable[[FloatArray], Sample]
 
 @dataclass(frozen=True, eq=False)
 class Scan:
-    """F on a grid of the square.
+    """F on a grid of the square, or on a row of it.
 
     Attributes:
         nodes: of each direction, shape (n,).
-        values: F, shape (n, n), u first; NaN where it does not exist.
-        gradients: ∂F/∂(u, v), shape (n, n, 2).
+        values: F, shape (n, n), u first, of a row (n,); NaN where it does not exist.
+        gradients: ∂F/∂(u, v), shape (n, n, 2), of a row (n, 2).
         reasons: why F does not exist at some nodes, each once.
         seconds: of the processor, that it took.
     """
@@ -137,24 +137,7 @@ class Row:
     number: int
 
 
-@dataclass(frozen=True, eq=False)
-class ScannedRow:
-    """F on a row.
-
-    Attributes:
-        values: F, shape (n,); NaN where it does not exist.
-        gradients: ∂F/∂(u, v), shape (n, 2).
-        reasons: why F does not exist at some nodes, each once.
-        seconds: of the processor.
-    """
-
-    values: FloatArray
-    gradients: FloatArray
-    reasons: tuple[Message, ...] = ()
-    seconds: float = 0.0
-
-
-def scan_row(row: Row) -> ScannedRow:
+def scan_row(row: Row) -> Scan:
     """F on a row from one end to the other, so that each node is close to the one before."""
     started, reasons = thread_time(), dict[Message, None]()
     values, gradients = np.full(row.count, np.nan), np.full((row.count, 2), np.nan)
@@ -165,15 +148,15 @@ def scan_row(row: Row) -> ScannedRow:
             values[k], gradients[k] = sample.value, sample.gradient
         except FpsolveError as failure:
             reasons.setdefault(failure.message)
-    return ScannedRow(values, gradients, tuple(reasons), thread_time() - started)
+    return Scan(shares, values, gradients, tuple(reasons), thread_time() - started)
 
 
-def scanned(count: int, found: Iterator[ScannedRow], progress: Callable[[], None] = lambda: None) -> Scan:
+def scanned(count: int, found: Iterator[Scan], progress: Callable[[], None] = lambda: None) -> Scan:
     """The scan of a grid from so many rows in their order; no more of them is taken.
 
     `progress` is called for each node.
     """
-    results = list[ScannedRow]()
+    results = list[Scan]()
     for result in islice(found, count):
         results.append(result)
         for _ in range(count):

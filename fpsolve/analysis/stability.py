@@ -17,7 +17,7 @@ import numpy as np
 
 from fpsolve.analysis.axis import Axis, check_axes
 from fpsolve.analysis.continuation import LONGEST, SHORTEST, Trace, find_branches, with_branch
-from fpsolve.analysis.scan import Row, Sample, Scan, ScannedRow, scan_row, scanned
+from fpsolve.analysis.scan import Row, Sample, Scan, scan_row, scanned
 from fpsolve.analysis.special_points import Placed, crossings, with_folds, with_points, with_values
 from fpsolve.analysis.target import Distance, Target, is_none, line_of_value, target_of
 from fpsolve.arrays import FloatArray, is_whole, real_number, shown
@@ -123,17 +123,12 @@ class Boundary(Result):
     @property
     def branches(self) -> tuple[Branch, ...]:
         """The branches in the parameters themselves."""
-        return tuple(
-            Branch(
-                x=np.asarray(self.x.value(np.array([point.sample.at[0] for point in trace.points]))),
-                y=np.asarray(self.y.value(np.array([point.sample.at[1] for point in trace.points]))),
-                width=np.array([point.sample.width for point in trace.points]),
-                labels=tuple(point.label for point in trace.points),
-                closed=trace.closed,
-                obstacles=trace.obstacles,
-            )
-            for trace in self.traces
-        )
+        found = list[Branch]()
+        for trace in self.traces:
+            u, v, width = np.array([(*point.sample.at, point.sample.width) for point in trace.points]).T
+            labels = tuple(point.label for point in trace.points)
+            found.append(Branch(self.x.value(u), self.y.value(v), width, labels, trace.closed, trace.obstacles))
+        return tuple(found)
 
     @property
     def rtol(self) -> float:
@@ -182,7 +177,7 @@ class Boundary(Result):
 
     def solve(
         self,
-        rows: Iterator[ScannedRow] | None = None,
+        rows: Iterator[Scan] | None = None,
         progress: Callable[[], None] = lambda: None,
         stepped: Callable[[], None] = lambda: None,
     ) -> Iterator[Boundary]:

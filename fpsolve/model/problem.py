@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fpsolve.arrays import ROUNDED, FloatArray, shown
-from fpsolve.data import plain_unit, written
+from fpsolve.data import written
 from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.expressions import TIME
 from fpsolve.model.frame import Frame, own_frame
@@ -595,8 +595,8 @@ def parameter_lines(parameters: Mapping[str, Parameter], besides: Collection[str
 
 def _valued(parameter: Parameter) -> str:
     """The value of a parameter with its unit."""
-    text = written(parameter.value)
-    return text if parameter.quantity.unit in ("1", "unknown") else f"{text} ({plain_unit(parameter.quantity.unit)})"
+    text, unit = written(parameter.value), parameter.quantity.unit_in_words
+    return f"{text} ({unit})" if unit else text
 
 
 def checked_problem(problem: object) -> Problem:

@@ -92,7 +92,7 @@ def _content(case: Case, result: CurveResult) -> Mapping[str, Any]:
     content = {
         "level": LEVEL,
         "laws": {
-            key: {"value": each.value, "sd": each.sd, "mean": each.mean, "deviation": each.deviation}
+            key: {name: getattr(each, name) for name in ("value", "sd", "mean", "deviation")}
             for key, each in laws.items()
         },
         **{name: _plain(found.indices[name]) if name in found.indices else None for name in UNCERTAIN},

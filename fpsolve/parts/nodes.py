@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fpsolve.arrays import FloatArray
-from fpsolve.data import plain_unit
 from fpsolve.exponent.density import Fields, plane_fields, refuse_more, xi_marginal
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.fem.noise_axes import LineAxis, Samples
@@ -107,8 +106,8 @@ class Nodes:
     @property
     def axis(self) -> str:
         """What stands along y, with its unit."""
-        unit = plain_unit(self.problem.noise_quantity.unit)
-        return "noise ξ" if unit in ("1", "unknown") else f"noise ξ ({unit})"
+        unit = self.problem.noise_quantity.unit_in_words
+        return f"noise ξ ({unit})" if unit else "noise ξ"
 
     @property
     def along_y(self) -> str:

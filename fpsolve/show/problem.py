@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from fpsolve.case.case import Case
-from fpsolve.data import plain_unit, written
+from fpsolve.data import written
 from fpsolve.model.equation import noise_sentences
 from fpsolve.page.limits import EACH
 from fpsolve.page.page import Block, Column, Sentence, filled
@@ -27,8 +27,7 @@ def show(case: Case) -> Iterator[Block]:
         quantity = each.quantity.timed(case.units.time)
         values = dict.fromkeys(case.vary.values(key)) if key in case.vary.keys else [each.value]
         shown = ", ".join(map(written, values)) if len(values) <= EACH else f"{len(values)} values"
-        unit = "" if quantity.unit in ("1", "unknown") else plain_unit(quantity.unit)
         words = "" if quantity.words == key else quantity.words
-        rows.append([key, shown, unit, words])
+        rows.append([key, shown, quantity.unit_in_words, words])
     headings = "key", "value", "unit", "what it is"
     yield filled("", [Column(each, is_text=each != "value") for each in headings], rows)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
 from functools import partial
 from itertools import chain, product
@@ -17,7 +17,7 @@ import numpy as np
 
 from fpsolve.analysis.axis import Axis
 from fpsolve.analysis.regions import P_BIFURCATIONS, Region, Regions, regions
-from fpsolve.analysis.scan import Row, Sample, ScannedRow, scan_row
+from fpsolve.analysis.scan import Row, Sample, Scan, scan_row
 from fpsolve.analysis.stability import Boundary, begun, crossed, is_of_line
 from fpsolve.analysis.target import Target, line_of_value
 from fpsolve.arrays import FloatArray
@@ -46,7 +46,7 @@ LINE_RECORDS = "records/charted"
 """The folder of the records of points of lines."""
 FILES = "chart.csv", "chart.json"
 """The files with all numbers of a chart."""
-Map = Callable[[Callable[[Row], ScannedRow], Iterable[Row]], Iterable[ScannedRow]]
+Map = Callable[[Callable[[Row], Scan], Iterable[Row]], Iterable[Scan]]
 """The builtin `map`, or that of an executor: results in the order of the tasks."""
 CLOSED_FORM_NODES = 41
 """Of the grid, each way, on which the closed forms are evaluated."""
@@ -232,8 +232,7 @@ class Points:
             for place in records.addresses(self._key):
                 with suppress(OSError, ValueError):  # which counts as none
                     point = Point(**made_of(Point, records.read(place)))
-                    if point.sample is None or point.sample.at.shape == point.sample.gradient.shape == (2,):
-                        self._found[point.rtol, *point.at] = point.sample or point.reason
+                    self._found[point.rtol, *point.at] = point.sample or point.reason
         return self._found.get((rtol, *at))
 
     def keep(self, rtol: float, at: FloatArray, found: Sample | Message) -> None:
@@ -261,10 +260,7 @@ def write_chart(case: Case, chart: Chart, folder: Path) -> None:
         "planned": len(targets),
         "done": sum(line.complete for line in chart.lines),
         "parameters": {key: value for key, value in case.curve({}).parameters.items() if key not in keys},
-        **{
-            side: {"key": axis.key, "start": axis.start, "stop": axis.stop, "scale": axis.scale, "at": list(axis.at)}
-            for side, axis in frame.items()
-        },
+        **{side: asdict(axis) for side, axis in frame.items()},
         "lines": [
             {
                 "line": str(line.target),

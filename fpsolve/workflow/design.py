@@ -15,7 +15,7 @@ from fpsolve.analysis.target import Target, target_of
 from fpsolve.case.case import Case
 from fpsolve.case.remedies import CASE_WORDS
 from fpsolve.case.rewrite import rewritten
-from fpsolve.data import plain_unit, short_names
+from fpsolve.data import short_names
 from fpsolve.errors import FpsolveError
 from fpsolve.exponent.error import Absent, digits
 from fpsolve.files import writable, write_json, write_text
@@ -143,15 +143,12 @@ def summary(case: Case, outcome: DesignOutcome, facts: Mapping[str, Any]) -> dic
         "target": {"quantity": target.kind, "p": target.p if target.kind == "moment" else None, "value": target.value},
         "by": [
             {
-                "key": axis.key,
-                "start": axis.start,
-                "stop": axis.stop,
-                "scale": axis.scale,
+                **{name: getattr(axis, name) for name in ("key", "start", "stop", "scale")},
                 "unit": outcome.units[axis.key],
+                "before": before[axis.key],
+                "after": changed[axis.key].value if found else None,
+                "error_estimate": changed[axis.key].error_estimate if found else None,
             }
-            | {"before": before[axis.key]}
-            | {"after": changed[axis.key].value if found else None}
-            | {"error_estimate": changed[axis.key].error_estimate if found else None}
             for axis in outcome.by
         ],
         "found": found and {"value": found.found.value, "error_estimate": found.found.error_estimate},
@@ -194,10 +191,9 @@ def show(case: Case, outcome: DesignOutcome) -> Iterator[Block]:
     columns = [Column("parameter"), Column("before"), Column("after"), Column("± error", 1), Column("unit", 2)]
     grid = Grid(case.headline, columns)
     for key, name in zip(keys, short_names(keys), strict=True):
-        value, unit = found.values[key], case.about(key).unit
+        value = found.values[key]
         numbers = digits(value.value, value.error_estimate), f"{value.error_estimate:.0e}"
-        unit = "" if unit in ("1", "unknown") else plain_unit(unit)
-        grid.rows.append([name, f"{found.start.values[key]:.10g}", *numbers, unit])
+        grid.rows.append([name, f"{found.start.values[key]:.10g}", *numbers, case.about(key).unit_in_words])
     yield grid
     symbol, value = outcome.target.quantity.symbol, found.found
     met = digits(value.value, value.error_estimate)

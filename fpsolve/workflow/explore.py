@@ -31,7 +31,6 @@ from fpsolve.case.rewrite import of_one_curve
 from fpsolve.case.sections import FigureSection, Moments, OutputSection
 from fpsolve.case.uncertain import Uncertain
 from fpsolve.case.vary import Vary
-from fpsolve.data import plain_unit
 from fpsolve.errors import FpsolveError
 from fpsolve.explain import UNBOUNDED, explain
 from fpsolve.exponent.kinds import choose
@@ -176,12 +175,11 @@ class Explorer:
         for key in [key for key in known if key in linear]:
             about, value = known[key].quantity.timed(self.case.units.time), float(self.first.values[key])
             low, high, scale = self._range(key, value)
-            unit = "" if about.unit in ("1", "unknown") else plain_unit(about.unit)
             words = "" if about.words == key else about.words
             yield {
-                "key": key, "words": words, "symbol": _letters(about.latex), "unit": unit, "value": value,
-                "ends": [min(low, value), max(high, value)], "log": scale == "log" and min(low, value) > 0,
-                "axis": key in self.first.differentiable,
+                "key": key, "words": words, "symbol": _letters(about.latex), "unit": about.unit_in_words,
+                "value": value, "ends": [min(low, value), max(high, value)],
+                "log": scale == "log" and min(low, value) > 0, "axis": key in self.first.differentiable,
             }  # fmt: skip
 
     def _range(self, key: str, value: float) -> tuple[float, float, str]:

@@ -111,7 +111,7 @@ class Critical(NamedTuple):
     """A damping ratio above which a moment decays in weak noise without walls, and its standard error."""
 
     value: float
-    error: float
+    standard_error: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -438,11 +438,6 @@ def summary(outcome: NoiseOutcome, source: Path) -> dict[str, Any]:
         error, below = (None, None) if fit.spectrum.is_formula else (each.deviation, each.below)
         return {"value": each.value, "standard_error": error, "probability_below_0": below}
 
-    def critical(each: Critical | None) -> dict[str, float] | None:
-        if each is None:
-            return None
-        return {"value": each.value, "standard_error": each.error}
-
     omega = [each.omega for each in fit.misfit]
     densities, errors = density_of(fit, omega) if omega else (np.zeros(0), np.zeros(0))
     return {
@@ -466,7 +461,10 @@ def summary(outcome: NoiseOutcome, source: Path) -> dict[str, Any]:
             }
             for each, density, error in zip(fit.misfit, densities, errors, strict=True)
         ],
-        "critical_damping_ratio": {"lyapunov_exponent": critical(outcome.exponent), "moment": critical(outcome.moment)},
+        "critical_damping_ratio": {
+            "lyapunov_exponent": outcome.exponent and outcome.exponent._asdict(),
+            "moment": outcome.moment and outcome.moment._asdict(),
+        },
         "lyapunov_exponent": outcome.verdict and spread(outcome.verdict.exponent),
         "second_moment": outcome.verdict and spread(outcome.verdict.moment),
         "warnings": [each.words(CASE_WORDS) for each in (*fit.messages, *filter(None, [outcome.failure]))],
@@ -478,10 +476,8 @@ def band_of(fit: NoiseFit) -> tuple[FloatArray, FloatArray] | None:
     spectrum = fit.spectrum
     if spectrum.relative_error is None:
         return None
-    freedom = 2 / spectrum.relative_error**2
-    tail = 0.5 * (1 - LEVEL)
-    ends = (spectrum.density * freedom / chdtri(freedom, share) for share in (tail, 1 - tail))
-    low, high = ends
+    freedom, tail = 2 / spectrum.relative_error**2, 0.5 * (1 - LEVEL)
+    low, high = (spectrum.density * freedom / chdtri(freedom, share) for share in (tail, 1 - tail))
     return low, high
 
 
@@ -591,7 +587,7 @@ def _missing(outcome: NoiseOutcome) -> str:
 
 def _percent(each: Critical) -> str:
     """A damping ratio in percent with two digits of its error."""
-    value, error = 100 * each.value, 100 * each.error
+    value, error = 100 * each.value, 100 * each.standard_error
     return f"({sampled(value, error)} ± {error:.1g}) %" if error else f"{value:.4g} %"
 
 
