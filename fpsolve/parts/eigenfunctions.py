@@ -30,9 +30,9 @@ from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.method import PHASE_AND_NOISE, Pictures
 from fpsolve.files import write_text
 from fpsolve.messages import Code, Message
-from fpsolve.model.quantity import MOMENT, NOISE, PHASE, UNNAMED
+from fpsolve.model.quantity import MOMENT, NOISE, PHASE
 from fpsolve.page.page import Drawing
-from fpsolve.parts.nodes import FURTHEST, Nodes
+from fpsolve.parts.nodes import FIELDS, FURTHEST, Nodes
 from fpsolve.parts.part import Job, Numerics, Part, Reason, Settings, attempt
 from fpsolve.parts.surfaces import Surface, picture_of
 from fpsolve.results.curve import CurveResult, SimulatedCurve
@@ -269,8 +269,7 @@ def surface_from(path: Path) -> Surface:
         near = np.flatnonzero(np.abs(z) <= FURTHEST)
         near = near if near.size > 1 else np.arange(z.size)
     impacts = [each for each in np.asarray(facts["impacts"]).tolist() if not math.isnan(each)]
-    about = {"phi": PHASE.attributes, "xi": {**NOISE.attributes, "units": "1"}}
-    about["values"] = {**UNNAMED.attributes, "long_name": "eigenfunction", "symbol": "$T$", "units": "1"}
+    about = {"phi": PHASE.attributes, "xi": {**NOISE.attributes, "units": "1"}, "values": FIELDS["T"].attributes}
     return Surface(
         phi=phi.reshape(rows)[:, :1].T,
         xi=y[near],

@@ -102,8 +102,7 @@ def _solve_theory(job: Job, settings: Settings) -> dict[str, float]:
 
 def _row_of_theory(case: Case, result: CurveResult) -> Row:
     numbers: Mapping[str, float] = result.parts.get("theory", {})
-    is_there = {name for name in case.asked if result.estimates.get(name)}
-    return {_column_of_theory(name): each for name, each in numbers.items() if name in is_there}
+    return {_column_of_theory(name): each for name, each in numbers.items() if result.estimates[name]}
 
 
 def asked(case: Case) -> list[Index]:

@@ -13,7 +13,7 @@ from fpsolve.analysis.spreads import LEVEL, UNCERTAIN, Spread, spread_of
 from fpsolve.case.case import Case
 from fpsolve.exponent.quantities import INDICES, MOMENT
 from fpsolve.model.quantity import Quantity
-from fpsolve.parts.part import Part, Settings
+from fpsolve.parts.part import Part
 from fpsolve.results.curve import CurveResult
 from fpsolve.results.table import Row
 
@@ -59,28 +59,17 @@ def spreads_of(case: Case, result: CurveResult) -> Spreads:
     )
 
 
-def _settings(case: Case, number: int) -> Settings | None:
-    return {} if case.uncertain else None
-
-
-def _indices(case: Case) -> list[str]:
-    """The names of the indices whose intervals are asked for."""
-    return [name for name in INDICES if name in UNCERTAIN and name in case.asked] if case.uncertain else []
-
-
 def _columns(case: Case) -> Sequence[Quantity]:
-    about = [MOMENT] if case.uncertain and MOMENT.name in case.asked else []
-    return [each.end(end, LEVEL) for each in (*about, *(INDICES[name] for name in _indices(case))) for end in ENDS]
+    uncertain = (MOMENT, *(INDICES[name] for name in UNCERTAIN)) if case.uncertain else ()
+    return [each.end(end, LEVEL) for each in uncertain if each.name in case.asked for end in ENDS]
 
 
 def _row(case: Case, result: CurveResult) -> Row:
-    if not case.uncertain:
-        return {}
     spreads, row = spreads_of(case, result), dict[str, Any]()
     of_p = [spreads.moments.get(p) for p in result.moments.p.tolist()]
     for end in ENDS:
         row[f"{MOMENT.name}_{end}"] = np.array([getattr(each, end, math.nan) for each in of_p], dtype=float)
-        row |= {f"{name}_{end}": getattr(spreads.indices.get(name), end, None) for name in _indices(case)}
+        row |= {f"{name}_{end}": getattr(spreads.indices.get(name), end, None) for name in UNCERTAIN}
     return row
 
 
@@ -108,4 +97,4 @@ def _plain(spread: Spread) -> dict[str, float]:
     }
 
 
-PART: Part = Part("intervals", _settings, columns=_columns, row=_row, content=_content)
+PART: Part = Part("intervals", columns=_columns, row=_row, content=_content)

@@ -202,7 +202,7 @@ class Part:
     """
 
     name: str
-    settings: Callable[[Case, int], Settings | None]
+    settings: Callable[[Case, int], Settings | None] = lambda *_: None
     solve: Callable[[Job, Settings], Any] | None = None
     kind: Any = None
     symbol: str = ""

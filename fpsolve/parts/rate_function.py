@@ -7,21 +7,17 @@ from collections.abc import Sequence
 from fpsolve.case.case import Case
 from fpsolve.data import Quantity
 from fpsolve.model.quantity import MOMENT, RATE_FUNCTION
-from fpsolve.parts.part import Part, Settings
+from fpsolve.parts.part import Part
 from fpsolve.results.curve import CurveResult
 from fpsolve.results.table import Row
 
 
-def _settings(case: Case, number: int) -> Settings | None:
-    return {} if {MOMENT.name, RATE_FUNCTION.name} <= {*case.asked} else None
-
-
 def _columns(case: Case) -> Sequence[Quantity]:
-    return () if _settings(case, 1) is None else (RATE_FUNCTION,)
+    return (RATE_FUNCTION,) if {MOMENT.name, RATE_FUNCTION.name} <= {*case.asked} else ()
 
 
 def _row(case: Case, result: CurveResult) -> Row:
     return {RATE_FUNCTION.name: result.moments.rate_function}
 
 
-PART: Part = Part(RATE_FUNCTION.name, _settings, columns=_columns, row=_row)
+PART: Part = Part(RATE_FUNCTION.name, columns=_columns, row=_row)
