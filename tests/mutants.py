@@ -323,8 +323,8 @@ DEFECTS: tuple[Defect, ...] = (
     Defect(
         "R9 directions of four variables are those of three",
         "exponent/density.py",
-        "if problem.dimension == 3 else",
-        "if problem.dimension != 3 else",
+        "return GRIDS[problem.dimension](",
+        "return GRIDS[7 - problem.dimension](",
         "direction",
     ),
     Defect(

@@ -13,7 +13,7 @@ from fpsolve.arrays import FloatArray
 from fpsolve.data import Parameters, Quantity, Result, dataset
 from fpsolve.drawing import MOST_LINES, QUARTERS, add_legend, draw_line, draw_plane
 from fpsolve.errors import NotConverged
-from fpsolve.exponent.density import MOST_NEGATIVE, DirectionGrid, Grid, densities, evaluated
+from fpsolve.exponent.density import GRIDS, MOST_NEGATIVE, DirectionGrid, Grid, densities, evaluated
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.fem.phase import vertices_at
 from fpsolve.messages import Code, Message, Remedy
@@ -137,6 +137,9 @@ class DirectionDensity(GridDensity):
         return f"{self.name}, ± {self.error:.1%}{''.join(means)}"
 
 
+OF_GRIDS: dict[type[Grid], type[Density | DirectionDensity]] = {Grid: Density, DirectionGrid: DirectionDensity}
+
+
 def stationary_density(pair: PrincipalPair) -> Density | DirectionDensity:
     """ρ(φ, ξ), solution of the Fokker-Planck equation L*(0)ρ = 0; of more than two variables that of directions.
 
@@ -171,8 +174,7 @@ def _density(pair: PrincipalPair, kind: Literal["stationary", "adjoint", "tilted
     """One of the `densities`, if it is one. Raises `NotConverged`."""
     found, problem, name = densities(pair), pair.generator.problem, f"{kind} density"
     values = found.fields.tilted_density if kind == "tilted" else found.fields.T_adjoint
-    of_kind = DirectionDensity if problem.dimension > 2 else Density
-    density = of_kind(found.grid, values, f"{name} at p = {pair.p:g}", problem.values, found.error)
+    density = OF_GRIDS[type(found.grid)](found.grid, values, f"{name} at p = {pair.p:g}", problem.values, found.error)
     if (share := density.negative_share()) > MOST_NEGATIVE:
         raise NotConverged(Message(Code.NEGATIVE_DENSITY, name=name, p=pair.p, size=share), density, Remedy.CELLS)
     return density
@@ -188,7 +190,7 @@ def furstenberg_khasminskii(pair: PrincipalPair) -> float:
         ValueError: the pair is not the one at p = 0, several noises have values, or there are more than two variables.
     """
     problem, axis = pair.generator.problem, pair.space.phi
-    if problem.dimension > 2:
+    if problem.dimension in GRIDS:
         raise ValueError("the formula is for two variables, but there are more; use lyapunov_exponent")
     if len(problem.coloured.parts) > 1:
         raise ValueError("the formula is for one noise that is not white, but there are several; use lyapunov_exponent")

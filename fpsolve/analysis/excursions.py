@@ -38,7 +38,7 @@ from fpsolve.drawing import add_legend, coloured, label_axes
 from fpsolve.errors import NotConverged
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.error import Estimate
-from fpsolve.exponent.method import Budget, refuse_tails
+from fpsolve.exponent.method import Budget, refuse
 from fpsolve.exponent.root import nonzero_root
 from fpsolve.exponent.solver import ExponentSolver, solver_of
 from fpsolve.messages import Code, Message, Remedy
@@ -204,7 +204,7 @@ def solve_excursion(
         )
     if exponent.value > 0:
         return replace(found, is_certain=True)
-    refuse_tails(problem, SYMBOL)
+    refuse(solver.method.reason(1.0, SYMBOL))
     index = nonzero_root(solver, guess=root)
     if not index:
         return replace(found, notes=(_without_index(index.reason),))

@@ -21,7 +21,7 @@ from fpsolve.exponent.eigen import PairDerivatives, PrincipalPair
 from fpsolve.exponent.error import Absent, Estimate, InvariantClass, Moment
 from fpsolve.exponent.method import DIRECTIONS, PHASE_AND_NOISE, RTOL_BEYOND_PLANE, Along, Method, Pictures, Tolerance
 from fpsolve.messages import Code, Message
-from fpsolve.model.problem import ParameterDerivative, Problem
+from fpsolve.model.problem import ParameterDerivative
 
 TINIEST_P = 1e-9
 """For smaller |p| the part of the largest λ counts, and p < 0 is 0 but for rounding."""
@@ -31,10 +31,6 @@ class Blocks(Method):
     """Λ(p), p ≥ 0, is the largest of the parts."""
 
     goes_on = False
-
-    @classmethod
-    def takes(cls, problem: Problem) -> bool:
-        return bool(problem.blocks)
 
     @cached_property
     def parts(self) -> tuple[Method, ...]:
@@ -91,6 +87,10 @@ class Blocks(Method):
     def interval(self) -> tuple[float, float]:
         low, high = super().interval
         return (0.0 if len(self.parts) > 1 and self.problem.is_driven else low), high
+
+    @property
+    def adapts(self) -> bool:  # type: ignore[override]
+        return all(part.adapts for part in self.parts)
 
     @property
     def refused(self) -> Message:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import cached_property
-from types import MappingProxyType
 
 import numpy as np
 
@@ -17,28 +16,23 @@ from fpsolve.exponent.method import RTOL_BEYOND_PLANE, Method, Tolerance, refuse
 from fpsolve.exponent.moments import EvenMoment, constant_scale, even_moment
 from fpsolve.fem.factors import one_thread
 from fpsolve.messages import Code, Message, Remedy
-from fpsolve.model.problem import Problem, infinite
+from fpsolve.model.problem import infinite
 from fpsolve.model.quantity import moment_at
 from fpsolve.theory.perturbation import Scale
 
-MOST_BY_DIRECTIONS = 4
-"""Largest number of variables of which functions of a direction are discretised."""
 OF_CLOSED = 1e-4
 """Share of rtol that moments lack of the terms of their equations, as ω is one of these, and Λ a share of ζω."""
 
 
 class EvenMoments(Method):
-    """Λ(p) of even p > 0: directions are too many, or impulses move them."""
+    """Λ(p) of even p > 0 of variables whose directions are too many."""
 
     name = "closed equations of moments"
     usual_rtol = RTOL_BEYOND_PLANE
     by_moments = True
     no_picture = "functions of the directions of so many variables are not computed; look at Λ(2)"
     code = Code.EVEN_ONLY
-
-    @classmethod
-    def takes(cls, problem: Problem) -> bool:
-        return problem.dimension > MOST_BY_DIRECTIONS or (problem.dimension > 2 and bool(problem.impulses))
+    is_struck = False
 
     def has(self, p: float) -> bool:
         """Whether there is a Λ(p)."""
@@ -47,13 +41,9 @@ class EvenMoments(Method):
     def reason(self, p: float, symbol: str = "") -> Message | None:
         if not self.has(p):
             symbol = symbol or (moment_at(p).symbol if p else "λ")
-            return Message(self.code, what=symbol, **self._about, remedy=Remedy.SIMULATION)
+            about = {"count": self.problem.dimension, "is_struck": self.is_struck}
+            return Message(self.code, what=symbol, **about, remedy=Remedy.SIMULATION)
         return infinite(self.problem, p, symbol)
-
-    @property
-    def _about(self) -> Mapping[str, float]:
-        count = self.problem.dimension
-        return {"count": count, "is_struck": count <= MOST_BY_DIRECTIONS}
 
     def line_rtol(self, p: float) -> float:
         return 1e-7
@@ -109,15 +99,16 @@ class EvenMoments(Method):
         return (Message(Code.CONVEX_BOUNDS, p=p[at], bound=bound, root=root or None),)
 
 
+class StruckMoments(EvenMoments):
+    """Those of few variables, whose directions impulses move."""
+
+    is_struck = True
+
+
 class DelayMoments(EvenMoments):
     """Λ(2) of a state that its past moves."""
 
     code = Code.DELAY_ONLY
-    _about = MappingProxyType[str, float]({})
-
-    @classmethod
-    def takes(cls, problem: Problem) -> bool:
-        return bool(problem.system.pasts)
 
     def has(self, p: float) -> bool:
         return p == 2
@@ -128,11 +119,6 @@ class Simulated(EvenMoments):
 
     code = Code.WALL_SIMULATED
     is_computed = False
-    _about = MappingProxyType[str, float]({})
-
-    @classmethod
-    def takes(cls, problem: Problem) -> bool:
-        return problem.system.stop is not None and (problem.dimension != MOST_BY_DIRECTIONS or bool(problem.impulses))
 
     def has(self, p: float) -> bool:
         return False

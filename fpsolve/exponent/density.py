@@ -36,8 +36,11 @@ from fpsolve.data import Quantity
 from fpsolve.drawing import QUARTERS, draw_colours, label_axes
 from fpsolve.errors import MeshError, OutputError, SingularMatrix
 from fpsolve.exponent.eigen import PrincipalPair, principal_pair
+from fpsolve.exponent.kinds import choose
+from fpsolve.exponent.stopped import looked_at
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.noise_axes import Samples
+from fpsolve.fem.space import Space
 from fpsolve.model.plane import is_driven
 from fpsolve.model.problem import Problem
 from fpsolve.model.quantity import PHASE, density_unit
@@ -133,6 +136,10 @@ class Grid:
         """What is told of a density."""
         return {}
 
+    def finer(self, pair: PrincipalPair) -> Space | None:
+        """Finer functions for the sake of a density; None where there are none."""
+        return None
+
     def fields(self, pair: PrincipalPair) -> Fields:
         """T, and T* and T T* of any size."""
         return plane_fields(pair, self.first, self.first, pair.space.xi.samples())
@@ -178,26 +185,21 @@ def densities(pair: PrincipalPair) -> Densities:
     Raises:
         OutputError: T of two variables depends on more than φ and ξ.
     """
-    if pair.generator.problem.dimension == 2:
-        return Grid.of(pair).densities(pair)
-    found = on_directions(pair)
+    found, problem = on_nodes(pair), pair.generator.problem
     with suppress(SingularMatrix, MeshError), unless_over_budget():  # what there is stands, with its error
-        while not found.error <= SETTLED:
-            generator = found.pair.generator
-            finer = generator.chosen.with_axis(0, generator.chosen.phi.enriched())
-            if finer.phi.size > MOST_DIRECTIONS or finer.size > MOST_UNKNOWNS:
-                break
-            new = on_directions(principal_pair(Generator(generator.problem, finer), pair.p, start=found.pair))
+        while not found.error <= SETTLED and (finer := found.grid.finer(found.pair)):
+            new = on_nodes(principal_pair(Generator(problem, finer), pair.p, start=found.pair))
             old = found.on(new.grid)
             _, *changes = (np.abs(after - before) for after, before in zip(new.fields, old.fields, strict=True))
             found = replace(new, value=pair.value, error=0.5 * max(map(new.grid.integral, changes)))
     return found
 
 
-def on_directions(pair: PrincipalPair) -> Densities:
-    """Those of a pair of three or four variables, on the first grid that resolves T T*, or the finest."""
-    for count in NODES:
-        found = direction_grid(pair.generator.problem, count).densities(pair)
+def on_nodes(pair: PrincipalPair) -> Densities:
+    """Those of a pair, of directions on the first grid that resolves T T*, or the finest."""
+    problem = pair.generator.problem
+    for grid in (direction_grid(problem, count) for count in NODES) if problem.dimension in GRIDS else [Grid.of(pair)]:
+        found = grid.densities(pair)
         if found.missing <= RESOLVED:
             break
     return found
@@ -260,6 +262,11 @@ class DirectionGrid(Grid):
         mean = replace(self.share, name="mean_share", words=words, latex=latex, dims=())
         return {mean: self.integral(np.sin(self.first)[:, None] ** 2 * density)}
 
+    def finer(self, pair: PrincipalPair) -> Space | None:
+        chosen = pair.generator.chosen
+        found = chosen.with_axis(0, chosen.phi.enriched())
+        return found if found.phi.size <= MOST_DIRECTIONS and found.size <= MOST_UNKNOWNS else None
+
     def fields(self, pair: PrincipalPair) -> Fields:
         """T as its mean over the noise and the angle, itself of mean 1 over the sphere, or its half at a stop; T* and
         T T* integrated over these."""
@@ -286,11 +293,6 @@ class DirectionGrid(Grid):
         axes.set_xticks(*ticks)
         axes.set_yticks(*(LATITUDES if self.second[0] else QUARTERS))
         label_axes(axes, first, second)
-
-
-def direction_grid(problem: Problem, count: int) -> DirectionGrid:
-    """One of `count` nodes between the ends of a coordinate, and twice as many steps around."""
-    return (_longitude_and_latitude if problem.dimension == 3 else _share_and_phase)(problem, count)
 
 
 def _line(count: int) -> tuple[FloatArray, FloatArray]:
@@ -321,8 +323,8 @@ def _longitude_and_latitude(problem: Problem, count: int) -> DirectionGrid:
 
 def _share_and_phase(problem: Problem, count: int) -> DirectionGrid:
     """η and θ₁ − θ₂, at a stop θ₁, of four variables in two pairs."""
-    states, stop, own = problem.system.states, problem.system.stop, oscillators(problem)
-    states = stop.names(states) if stop else states
+    (read, is_half), own = looked_at(problem), oscillators(problem)
+    states = read.names(problem.system.states)
     one, two = (states[k] if k in own else f"({states[k]}, {states[k + 1]})" for k in (0, 2))
     words = f"angle whose squared sine is the share of {two}"
     eta = Quantity("eta", "η", words, r"$\eta$", "rad", ("eta",))
@@ -330,7 +332,7 @@ def _share_and_phase(problem: Problem, count: int) -> DirectionGrid:
     share = Quantity("share", f"share of {two}", words, r"$\sin^2\eta$", dims=("eta",))
     x, weights = (0.25 * math.pi * each for each in _line(count))
     first = x + 0.25 * math.pi
-    if stop:
+    if is_half:
         phase = Quantity("phase", "θ₁", f"phase of {one} between impacts", r"$\theta_1$", "rad", ("phase",))
         second, second_weights, turn = 2 * x, 2 * weights, 2 * math.pi
     else:
@@ -338,17 +340,25 @@ def _share_and_phase(problem: Problem, count: int) -> DirectionGrid:
         phase = Quantity("phase_difference", "θ₁ − θ₂", words, latex, "rad", ("phase_difference",))
         (second, second_weights), turn = _circle(count), math.pi
     at, theta, other = np.meshgrid(first, second, turn * np.arange(PHASES) / PHASES, indexing="ij")
-    theta, c, s = theta if stop else theta + other, np.cos(at), np.sin(at)
+    theta, c, s = theta if is_half else theta + other, np.cos(at), np.sin(at)
     e = np.stack([c * np.cos(theta), c * np.sin(theta), s * np.cos(other), s * np.sin(other)])
     nodes, surface = (first, second, weights, second_weights), 2 * math.pi * (c * s)[..., 0]
     return DirectionGrid((eta, phase), "1/rad^2", *nodes, e.reshape(4, -1), surface, share)
 
 
+GRIDS = {3: _longitude_and_latitude, 4: _share_and_phase}
+"""Grids of directions by the number of variables."""
+
+
+def direction_grid(problem: Problem, count: int) -> DirectionGrid:
+    """One of `count` nodes between the ends of a coordinate, and twice as many steps around."""
+    return GRIDS[problem.dimension](problem, count)
+
+
 def oscillators(problem: Problem) -> dict[int, float]:
     """√(k/c) of each oscillator q̇ = cv, v̇ = −kq + …, by the place of q among the variables; pairs begin at 0 and 2."""
-    system, stop = problem.system, problem.system.stop
-    inside = stop.inside if stop else np.array
-    sizes = [(term, system.epsilon**term.order * inside(term.matrix)) for term in system.terms]
+    system, (at, _) = problem.system, looked_at(problem)
+    sizes = [(term, system.epsilon**term.order * at.inside(term.matrix)) for term in system.terms]
     free = np.sum([problem.named_noise(term.noise).mean_of(term.g) * size for term, size in sizes], axis=0)
     driven = np.sum([is_driven(term.g) * abs(size) for term, size in sizes], axis=0)
     found = {}
@@ -362,12 +372,13 @@ def oscillators(problem: Problem) -> dict[int, float]:
 def direction_map(pair: PrincipalPair) -> FloatArray:
     """R = S⁻¹D, which takes z to y."""
     problem = pair.generator.problem
-    stop, frame = problem.system.stop, problem.frame
-    maps = [stop and stop.coordinates, frame.matrix, pair.space.phi.coordinates]
     scales = np.ones(problem.dimension)
     for q, size in oscillators(problem).items():
         scales[q + 1] = size
-    return np.linalg.inv(reduce(np.matmul, [np.array(each) for each in maps if each is not None])) * scales
+    at, _ = looked_at(problem)
+    return (
+        np.linalg.inv(np.array(at.coordinates) @ np.array(problem.frame.matrix) @ pair.space.phi.coordinates) * scales
+    )
 
 
 def xi_marginal(pair: PrincipalPair, at: Samples) -> FloatArray:
@@ -378,22 +389,5 @@ def xi_marginal(pair: PrincipalPair, at: Samples) -> FloatArray:
 
 def refuse_more(pair: PrincipalPair) -> None:
     """Raises `OutputError` where T depends on more than φ and ξ."""
-    if why := no_picture_of(pair.generator.problem):
+    if why := choose(pair.generator.problem).no_surface:
         raise OutputError(why)
-
-
-def no_picture_of(problem: Problem) -> str:
-    """Why T cannot be drawn over phase and noise; empty where it can."""
-    noise = problem.coloured
-    if problem.dimension > 2:
-        why = f"T of {problem.dimension} variables is no function of phase and noise"
-        return f"{why}; use `draw_eigenfunction`, `tilted_density`, or a case, whose run writes files for ParaView"
-    if len(noise.parts) > 1:
-        several = "an eigenfunction of the phase and of several noises that are not white cannot be drawn"
-        return f"{several}; make all of these noises white but one"
-    if noise.is_drawn:
-        return ""
-    return (
-        f"{noise.kind} noise is no Markov process by itself, so that an eigenfunction is not a function of phase and "
-        "noise, which could be drawn; look at Λ(p), or at densities of a simulation"
-    )

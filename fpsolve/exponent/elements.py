@@ -1,4 +1,4 @@
-"""Λ(p) by the principal eigenpair on elements: of the phase of two variables, or of directions of three and four.
+"""Λ(p) by the principal eigenpair on elements, of the phase of two variables.
 
 A discretisation is chosen for each p, each solve goes on from the nearest p. It is refined until Λ(p) meets a
 tolerance, or the budget is spent.
@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import cached_property, partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -20,7 +20,6 @@ from fpsolve.arrays import FloatArray
 from fpsolve.budget import unless_over_budget
 from fpsolve.errors import MeshError, NoHierarchy, NotConverged, SingularMatrix
 from fpsolve.exponent.changed import NEAR_ZERO, Changed
-from fpsolve.exponent.density import no_picture_of
 from fpsolve.exponent.eigen import (
     PairDerivatives,
     PrincipalPair,
@@ -30,22 +29,18 @@ from fpsolve.exponent.eigen import (
 )
 from fpsolve.exponent.error import Estimate, Moment, Solution, checked
 from fpsolve.exponent.method import (
-    DIRECTIONS,
     PHASE_AND_NOISE,
     RTOL,
-    RTOL_BEYOND_PLANE,
     RTOL_OF_SEVERAL,
     Method,
     Pictures,
     Search,
     Stage,
     Tolerance,
-    refuse_tails,
+    refuse,
 )
-from fpsolve.exponent.modes import SphereStart
 from fpsolve.exponent.moments import EvenMoment, even_moment, moment_row
 from fpsolve.exponent.starts import Start, first, has_cones, other_centers, refined
-from fpsolve.exponent.stopped import StopStart
 from fpsolve.fem.axis import FEW_UNKNOWNS
 from fpsolve.fem.factors import one_thread
 from fpsolve.fem.generator import SMALL_P, Generator
@@ -54,7 +49,7 @@ from fpsolve.fem.phase import PhaseAxis
 from fpsolve.fem.space import Space
 from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model import quantity
-from fpsolve.model.problem import ParameterDerivative, Problem
+from fpsolve.model.problem import ParameterDerivative, infinite
 from fpsolve.theory.frozen import frozen_noise
 
 WORTH_A_TRY = FEW_UNKNOWNS
@@ -91,13 +86,6 @@ TINIEST_P = 1e-9
 """For smaller |p| the error of Λ(p), which falls as p, has no scale, which may fall as p²."""
 
 
-class Place(NamedTuple):
-    """The first stage of a place, and what was found elsewhere, to begin with."""
-
-    start: Stage
-    near: Any = None
-
-
 class Elements(Method):
     """Λ(p) of two variables.
 
@@ -116,10 +104,6 @@ class Elements(Method):
         self.spaces: dict[float, Solution] = {}
         self._failed = dict[float, tuple[type[NotConverged], Message]]()
 
-    @classmethod
-    def takes(cls, problem: Problem) -> bool:
-        return True
-
     @property
     def usual_rtol(self) -> float:  # type: ignore[override]
         return RTOL_OF_SEVERAL if self.is_dear(1.0) else RTOL
@@ -133,122 +117,118 @@ class Elements(Method):
 
     @property
     def no_picture(self) -> str:  # type: ignore[override]
-        return no_picture_of(self.problem)
+        noise = self.problem.coloured
+        if len(noise.parts) > 1:
+            several = "an eigenfunction of the phase and of several noises that are not white cannot be drawn"
+            return f"{several}; make all of these noises white but one"
+        if noise.is_drawn:
+            return ""
+        return (
+            f"{noise.kind} noise is no Markov process by itself, so that an eigenfunction is not a function of phase "
+            "and noise, which could be drawn; look at Λ(p), or at densities of a simulation"
+        )
 
-    @property
-    def goes_on(self) -> bool:  # type: ignore[override]
-        return not self.problem.noise.has_algebraic_tails
-
-    def places(self, p: float, tolerance: Tolerance, found: Sequence[Solution]) -> Iterator[Place]:
-        """The places where Λ(p) may be carried, in order, from what was found in those before.
+    def places(self, p: float, tolerance: Tolerance, found: Sequence[Solution]) -> Iterator[tuple[Stage, Any]]:
+        """The first stages of the places where Λ(p) may be carried, and what each begins with, after those before.
 
         The first one is that of the nearest p, if what was chosen there is likely to do, else where slow noise carries
-        the moment, or the mean of other noise. Others are far from there.
+        the moment, or the mean of other noise. Others are far from there. A small p has the functions of `SMALL_P`.
         """
-        yield self._nearby(p, tolerance) or Place(Start(self.problem, first(self.problem, p, self.settings.rtol)))
-        for center in other_centers(found[0].pair):
-            yield Place(Start(self.problem, first(self.problem, p, self.settings.rtol, center)))
-
-    def _nearby(self, p: float, tolerance: Tolerance) -> Place | None:
-        """The discretisation of the nearest p, or one that should be within the tolerance there, and pairs around p."""
+        if abs(p) < SMALL_P:
+            yield Start(self.problem, self.near_zero(p, tolerance).pair.generator.chosen), self._near(p)
+            return
         near = self._near(p)
-        if not near:
-            return None
-        q, space = near[0].p, near[0].generator.chosen
+        if near and (space := self._reused(p, near[0], tolerance)):
+            yield Start(self.problem, space), near
+        else:
+            yield Start(self.problem, first(self.problem, p, self.settings.rtol)), None
+        for center in other_centers(found[0].pair):
+            yield Start(self.problem, first(self.problem, p, self.settings.rtol, center)), None
+
+    def _reused(self, p: float, near: PrincipalPair, tolerance: Tolerance) -> Space | None:
+        """The space of the nearest p, or one that should be within the tolerance there; None where it is of no use."""
+        q, space = near.p, near.generator.chosen
         if abs(q) >= SMALL_P:
-            new = refined(self.spaces[q], tolerance(q, near[0].value), 0)
+            new = refined(self.spaces[q], tolerance(q, near.value), 0)
             is_large = space.size > WORTH_A_TRY and new.size < TRIM * space.size
             space = new if is_large or new.size > space.size else space
-        if space.size > WORTH_A_TRY and abs(p - q) > max(0.5, 0.4 * min(abs(p), abs(q))):
-            return None
-        return Place(Start(self.problem, space), near) if self._tilt_fits(space, p) else None
+        is_far = space.size > WORTH_A_TRY and abs(p - q) > max(0.5, 0.4 * min(abs(p), abs(q)))
+        return space if not is_far and self._tilt_fits(space, p) else None
 
     def _near(self, p: float) -> list[PrincipalPair]:
         """Some pairs at the nearest p, the nearest first."""
         return sorted((each.pair for each in self.spaces.values()), key=lambda pair: abs(pair.p - p))[:NEIGHBOURS]
 
     def solution(self, p: float, tolerance: Tolerance | None = None) -> Solution:
-        """The principal eigenpair at p and its error, which no even moment contradicts. Raises `NotConverged`."""
-        point = solved_p(p)
-        try:
-            found = self._found(point, tolerance)
-        except NotConverged as failure:
-            if failure.reason.code is Code.BUDGET_SPENT:  # which tells a value
-                self._witness(point, failure.reason.data["value"], failure.reason.data["error"])
-            raise
-        self._witness(point, found.value, found.error)
-        return found
-
-    def _found(self, p: float, tolerance: Tolerance | None = None) -> Solution:
         """The principal eigenpair at p and its error, within a tolerance, the usual one if none is given.
 
         Raises:
-            NotConverged: the mesh does not resolve the problem, or the budget does not suffice to find one.
+            NotConverged: the mesh does not resolve the problem, or the budget does not suffice to find one, or the even
+                moment of this p contradicts it.
         """
-        p = solved_p(p)
+        p = p if abs(p) >= NEGLIGIBLE_P else 0.0
         if tolerance is None and p in self._failed:
             kind, message = self._failed[p]
             raise kind(message)
-        allowed = tolerance or self.tolerance
-        if p not in self.spaces or not self.is_accurate(self.spaces[p], allowed):
-            try:
-                with one_thread(), self.settings.meter.running():
-                    self.spaces[p] = self._searched(p, allowed)
-            except NotConverged as failure:
-                if tolerance is None:  # a tighter one may be out of reach where this is not
-                    self._failed[p] = type(failure), failure.message
-                raise failure from None
-            except MeshError as failure:
-                told = Message(Code.NOT_CONVERGED, p=p, reason=failure.message, remedy=self.remedy)
-                raise NotConverged(told) from failure
-            except (SingularMatrix, np.linalg.LinAlgError) as failure:
-                told = Message(Code.NOT_SOLVED, p=p, reason=str(failure), remedy=self.remedy)
-                raise NotConverged(told) from failure
-            except MemoryError as failure:
-                raise NotConverged(Message(Code.NO_MEMORY, remedy=Remedy.MEMORY)) from failure
-            except ArithmeticError as failure:
-                raise NotConverged(Message(Code.OUT_OF_RANGE, p=p, reason=str(failure))) from failure
-        return self.spaces[p]
+        allowed = partial(self.allowed, tolerance or self.tolerance)
+        if (known := self.spaces.get(p)) and known.error <= allowed(known.pair):
+            return known
+        try:
+            with one_thread(), self.settings.meter.running():
+                search, found = Search(p, allowed, self.settings.budget, self.remedy), list[Solution]()
+                for stage, near in self.places(p, tolerance or self.tolerance, found):
+                    found.append(search.settle(stage, near))
+                solution = self.spaces[p] = self.confirmed(search, found)
+            self._witness(p, solution.value, solution.error)
+        except NotConverged as failure:
+            if failure.reason.code is Code.BUDGET_SPENT:  # which tells a value
+                self._witness(p, failure.reason.data["value"], failure.reason.data["error"])
+            if tolerance is None:  # a tighter one may be out of reach where this is not
+                self._failed[p] = type(failure), failure.message
+            raise failure from None
+        except MeshError as failure:
+            told = Message(Code.NOT_CONVERGED, p=p, reason=failure.message, remedy=self.remedy)
+            raise NotConverged(told) from failure
+        except (SingularMatrix, np.linalg.LinAlgError) as failure:
+            told = Message(Code.NOT_SOLVED, p=p, reason=str(failure), remedy=self.remedy)
+            raise NotConverged(told) from failure
+        except MemoryError as failure:
+            raise NotConverged(Message(Code.NO_MEMORY, remedy=Remedy.MEMORY)) from failure
+        except ArithmeticError as failure:
+            raise NotConverged(Message(Code.OUT_OF_RANGE, p=p, reason=str(failure))) from failure
+        return solution
 
-    def _searched(self, p: float, tolerance: Tolerance) -> Solution:
-        """A solution within the tolerance, or the one on the given mesh."""
-        if abs(p) < SMALL_P:
-            return self._solved_with(self.near_zero(p, tolerance).pair.generator, p)
-        search = Search(p, lambda found: tolerance(p, found.value), self.settings.budget, self.remedy)
-        found = list[Solution]()
-        for place in self.places(p, tolerance, found):
-            found.append(search.settle(*place))
-        return self._confirmed(search, max(found, key=lambda each: each.pair.value), tolerance)
+    def allowed(self, tolerance: Tolerance, pair: PrincipalPair) -> float:
+        """The largest error of Λ(p); any for small p, where it has no scale."""
+        return tolerance(pair.p, pair.value) if abs(pair.p) >= SMALL_P else math.inf
 
-    def _confirmed(self, search: Search, found: Solution, tolerance: Tolerance) -> Solution:
-        """A solution that agrees with that of halved cells of φ within its error, or within what is allowed.
+    def confirmed(self, search: Search, found: Sequence[Solution]) -> Solution:
+        """The largest of those at all places, if it agrees with that of halved cells of φ within its error, or within
+        what is allowed.
 
         At a coarse tolerance a thin layer of T, as where the phase rests, may lie within a cell that is so large that
         none of its modes shows it. Where two eigenvalues meet, modes of a mixture of both T tell little.
         """
-        chosen, p = found.pair.generator.chosen, search.p
-        if self.is_at_corner(p) and is_mixed(found.pair):
+        best = max(found, key=lambda each: each.value)
+        chosen, p = best.pair.generator.chosen, search.p
+        if self.is_at_corner(p) and is_mixed(best.pair):
             halves = chosen.doubled()
-            if pair := search.attempt(partial(self.pair_among, halves, found.pair)):
-                return replace(found, search=2 * abs(pair.value - found.pair.value))
-            return self._confirmed(search, search.settle(Start(self.problem, halves)), tolerance)
-        if self.settings.rtol <= SURELY_SEEN or not isinstance(chosen.phi, PhaseAxis):
-            return found
+            with unless_over_budget():
+                pair = self.pair_among(halves, best.pair)
+                return replace(best, search=2 * abs(pair.value - best.value))
+            return self.confirmed(search, [search.settle(Start(self.problem, halves))])
+        if self.settings.rtol <= SURELY_SEEN or not isinstance(chosen.phi, PhaseAxis) or abs(p) < SMALL_P:
+            return best
         halved = chosen.with_axis(0, chosen.phi.doubled())
         if halved.size > min(MOST_HALVED, self.settings.budget.most(halved)):
-            return found
-        start = Start(self.problem, halved)
-        finer = search.attempt(lambda: Solution(start.solved(p, found.pair))) or search.settle(start)
-        change = abs(finer.pair.value - found.pair.value)
-        if change <= found.error:
-            return found
-        if change + finer.error <= tolerance(p, finer.pair.value):
+            return best
+        finer = search.settle(Start(self.problem, halved), best.pair)
+        change = abs(finer.value - best.value)
+        if change <= best.error:
+            return best
+        if change + finer.error <= search.allowed(finer.pair):
             return replace(finer, search=finer.search + change)
-        return self._confirmed(search, finer, tolerance)
-
-    def _solved_with(self, generator: Generator, p: float) -> Solution:
-        """The solution with a generator, from those around p, or from the nearest one."""
-        return Solution(self.pair_on(generator, p, self._near(p)))
+        return self.confirmed(search, [finer])
 
     def pair_on(self, generator: Generator, p: float, start: PrincipalPair | Sequence[PrincipalPair]) -> PrincipalPair:
         """The principal pair; where it is not found, the failure has the remedy of this place."""
@@ -285,10 +265,10 @@ class Elements(Method):
 
     def near_zero(self, p: float, tolerance: Tolerance | None = None) -> Solution:
         """The solution at ±`SMALL_P` that a smaller p goes with."""
-        side = p or (-1.0 if self.problem.coloured.has_algebraic_tails else 1.0)  # on which Λ is finite
+        side = p or (-1.0 if self.reason(1.0) else 1.0)  # on which Λ is finite
         q = math.copysign(SMALL_P, side)
         try:
-            return self._found(q, tolerance)
+            return self.solution(q, tolerance)
         except NotConverged as failure:
             told = Message(Code.NEAR_ZERO, p=q, reason=failure.message)
             raise type(failure)(told, failure.partial) from failure
@@ -296,11 +276,6 @@ class Elements(Method):
     def most(self, space: Space) -> float:
         """Number of unknowns that a finer space may have."""
         return self.settings.budget.most(space)
-
-    def is_accurate(self, solution: Solution, tolerance: Tolerance) -> bool:
-        """Whether an error is within a tolerance; for small p, where Λ has no scale, always."""
-        pair = solution.pair
-        return abs(pair.p) < SMALL_P or solution.error <= tolerance(pair.p, pair.value)
 
     def is_at_corner(self, p: float) -> bool:
         """Whether p is where Λ may have a corner."""
@@ -339,8 +314,7 @@ class Elements(Method):
 
     @property
     def _has_witness(self) -> bool:
-        noise = self.problem.coloured
-        return noise.variables > 1 or (noise.has_states and not noise.is_white)
+        return frozen_noise(self.problem) is None and not self.problem.coloured.is_white
 
     def pair(self, p: float) -> PrincipalPair:
         return self.solution(p).pair
@@ -358,14 +332,13 @@ class Elements(Method):
             elif abs(p) < TINY_P:
                 ratio, error = self.ratio_alone(p)
                 value, error = p * ratio, abs(p) * error
-            found = Estimate(value, error, self.scale(p), quantity=quantity.moment_at(p))
             if abs(p) >= TINIEST_P:  # else Λ has no scale
-                checked(found, self.refinement, p)
+                checked(Estimate(value, error, self.scale(p)), self.refinement, p)
         except NotConverged:
             if even := self.even(p):
                 return moment_row(even), None
             raise
-        return Moment(found.value, pair.derivative, math.nan, found.error_estimate, pair.residual), pair
+        return Moment(value, pair.derivative, math.nan, error, pair.residual), pair
 
     def ratio_alone(self, p: float, tolerance: Tolerance | None = None) -> tuple[float, float]:
         """Λ(p)/p and its error.
@@ -375,11 +348,11 @@ class Elements(Method):
         if known := self.number(p):
             return known.value / p, known.error / p
         if abs(p) >= TINY_P:
-            solution = self._found(p, tolerance)
+            solution = self.solution(p, tolerance)
             return solution.value / p, solution.error / abs(p)
         points = {p * (0.5 + shift) for shift in (-0.5 / math.sqrt(3), 0.5 / math.sqrt(3))}
-        pairs = [self._found(point, tolerance).pair for point in points]
-        if self.problem.has_algebraic_tails:  # of which Λ(p) for p < 0 hardly tells: their moments are finite
+        pairs = [self.solution(point, tolerance).pair for point in points]
+        if self.reason(1.0):  # algebraic tails, of which Λ(p) for p < 0 hardly tells: their moments are finite
             return self._among_tails(pairs[0])
         near = self.near_zero(p, tolerance)
         error = near.error / abs(near.pair.p) + slope_rounding(pairs[0])
@@ -388,8 +361,8 @@ class Elements(Method):
     def ratio(self, p: float, tolerance: Tolerance | None = None) -> tuple[float, float, float]:
         value, error = self.ratio_alone(p, tolerance)
         if abs(p) < TINY_P:  # ∫₀¹ s Λ″(sp) ds, by one point of Gauss
-            return value, 0.5 * second_derivative(self._found(p * 2 / 3, tolerance).pair), error
-        return value, (self._found(p, tolerance).derivative - value) / p, error
+            return value, 0.5 * second_derivative(self.solution(p * 2 / 3, tolerance).pair), error
+        return value, (self.solution(p, tolerance).derivative - value) / p, error
 
     def _among_tails(self, pair: PrincipalPair) -> tuple[float, float]:
         """λ from a pair at p = 0, on ever wider intervals of the noise, with what the ends and the first cells leave.
@@ -440,7 +413,7 @@ class Elements(Method):
         Its error is what two finer discretisations change in it, as one change is small by chance; twice the first one
         where the second has too many unknowns.
         """
-        refuse_tails(self.problem)
+        refuse(self.reason(1.0, quantity.VARIANCE_RATE.symbol))
         scale = 2 * self.scales.quadratic
         value, better = self.around_zero.second_derivative, self.finer_around_zero.second_derivative
         error = 2 * abs(better - value)
@@ -452,7 +425,7 @@ class Elements(Method):
 
     @cached_property
     def around_zero(self) -> PairDerivatives:
-        return PairDerivatives(self._found(0.0).pair)
+        return PairDerivatives(self.solution(0.0).pair)
 
     @cached_property
     def finer_around_zero(self) -> PairDerivatives:
@@ -461,7 +434,7 @@ class Elements(Method):
 
     def gradient_along(self, p: float, along: Sequence[ParameterDerivative]) -> FloatArray:
         is_large = abs(p) >= NEAR_ZERO
-        around = PairDerivatives(self._found(p).pair) if is_large else self.around_zero
+        around = PairDerivatives(self.solution(p).pair) if is_large else self.around_zero
         changed = [Changed(around, by) for by in along]
         if is_large:
             return np.array([each.value.value / p for each in changed])
@@ -484,6 +457,7 @@ class Elements(Method):
 class GivenMesh(Elements):
     """Λ(p) of two variables on a given mesh, with the error that a finer one tells."""
 
+    adapts = False
     goes_on = False
     remedy = Remedy.MESH
 
@@ -494,16 +468,21 @@ class GivenMesh(Elements):
         generator = Generator(self.problem, self.settings.mesh)
         return generator, generator.enriched().enriched()
 
-    def _found(self, p: float, tolerance: Tolerance | None = None) -> Solution:
+    def solution(self, p: float, tolerance: Tolerance | None = None) -> Solution:
         _ = self.generators  # refuses a mesh that cannot be used
-        return super()._found(p, tolerance)
+        return super().solution(p, tolerance)
 
-    def _searched(self, p: float, tolerance: Tolerance) -> Solution:
-        pair, finer = self._solved_with(self.generators[0], p).pair, self.generators[1]
-        return Solution(pair, measured=(abs(self.pair_on(finer, p, pair).value - pair.value),))
+    def places(self, p: float, tolerance: Tolerance, found: Sequence[Solution]) -> Iterator[tuple[Stage, Any]]:
+        return iter(())
 
-    def is_accurate(self, solution: Solution, tolerance: Tolerance) -> bool:
-        return True
+    def confirmed(self, search: Search, found: Sequence[Solution]) -> Solution:
+        """The solution on the mesh, whatever its error."""
+        coarse, fine = self.generators
+        pair = self.pair_on(coarse, search.p, self._near(search.p))
+        return Solution(pair, measured=(abs(self.pair_on(fine, search.p, pair).value - pair.value),))
+
+    def allowed(self, tolerance: Tolerance, pair: PrincipalPair) -> float:
+        return math.inf
 
     def most(self, space: Space) -> float:
         return math.inf
@@ -519,73 +498,6 @@ class GivenMesh(Elements):
         return tuple(Message(Code.CARRIED_ELSEWHERE, p=p, z=z, remedy=Remedy.REACH) for p, z in elsewhere)[:1]
 
 
-class Directions(Elements):
-    """Λ(p) of three and four variables; of even p it is that of the equations of the moments, where these close."""
-
-    is_function = False
-    is_quick = False
-    by_moments = True
-    pictures = DIRECTIONS
-    _has_witness = True
-    no_picture = ""
-    usual_rtol = RTOL_BEYOND_PLANE
-    remedy = Remedy.MANY
-
-    @classmethod
-    def takes(cls, problem: Problem) -> bool:
-        return problem.dimension > 2
-
-    def places(self, p: float, tolerance: Tolerance, found: Sequence[Solution]) -> Iterator[Place]:
-        """One: that of the nearest p; where it is p itself, a finer one than before."""
-        if p in self.spaces:
-            known = self.spaces[p]
-            most = self.settings.budget.most(known.start)
-            yield Place(known.start.refined(known, tolerance(p, known.value), 0, most), known.pair)
-        else:
-            yield Place(self.start(p))
-
-    def start(self, p: float) -> Stage:
-        """The first functions of directions."""
-        return SphereStart.at(self.problem, p, self.settings.rtol, self.spaces)
-
-    def is_dear(self, p: float) -> bool:
-        return p <= 0 or p % 2 != 0
-
-    def is_at_corner(self, p: float) -> bool:
-        return False
-
-    def bounds(self, p: FloatArray, value: FloatArray, error: FloatArray) -> tuple[Message, ...]:
-        return ()
-
-    def unseen(self) -> Message | None:
-        return Method.unseen(self)
-
-    def number(self, p: float) -> EvenMoment | None:
-        return self.even(p)
-
-    def row(self, p: float) -> tuple[Moment, PrincipalPair | None]:
-        return (moment_row(even), None) if (even := self.even(p)) else super().row(p)
-
-    def gradient(self, p: float, keys: Sequence[str]) -> FloatArray:
-        return known.gradient(keys) / p if (known := self.even(p)) else super().gradient(p, keys)
-
-
-class Stopped(Directions):
-    """Λ(p) of four variables with a stop, at which T is a root."""
-
-    usual_rtol = 1e-3
-
-    @classmethod
-    def takes(cls, problem: Problem) -> bool:
-        return super().takes(problem) and problem.system.stop is not None
-
-    def start(self, p: float) -> Stage:
-        return StopStart.at(self.problem, p, self.settings.rtol, self.spaces)
-
-    def line_rtol(self, p: float) -> float:
-        return 3e-3
-
-
 def doubt(error: float, known: Any) -> float:
     """The difference beyond which a value with this error contradicts an even moment."""
     return SURELY * (error + float(known.error)) + ROUNDED * abs(float(known.value))
@@ -599,13 +511,8 @@ def is_mixed(pair: PrincipalPair) -> bool:
 def widened(generator: Generator) -> Space:
     """That of a generator, on an interval `WIDER` times as wide for algebraic tails."""
     chosen, lines = generator.chosen, generator.chosen.xi.lines
-    if not (lines.size and generator.problem.coloured.has_algebraic_tails):
+    if not (lines.size and infinite(generator.problem, 1.0)):
         return chosen
     steps = WIDER ** np.linspace(0, 1, 4)[1:]
     wide = np.concatenate([(lines[0] * steps)[::-1], lines, lines[-1] * steps])
     return chosen.with_axis(1, chosen.xi.between(wide))
-
-
-def solved_p(p: float) -> float:
-    """The p at which the pair for a p is solved."""
-    return p if abs(p) >= NEGLIGIBLE_P else 0.0

@@ -3,17 +3,45 @@
 from __future__ import annotations
 
 from fpsolve.exponent.blocks import Blocks
-from fpsolve.exponent.closed import DelayMoments, EvenMoments, Simulated
-from fpsolve.exponent.elements import Directions, Elements, GivenMesh, Stopped
+from fpsolve.exponent.closed import DelayMoments, EvenMoments, Simulated, StruckMoments
+from fpsolve.exponent.elements import Elements, GivenMesh
 from fpsolve.exponent.method import Method, Settings
+from fpsolve.exponent.modes import Directions
+from fpsolve.exponent.stopped import Stopped
 from fpsolve.model.problem import Problem, checked_problem
 
-METHODS: list[type[Method]] = [Simulated, DelayMoments, EvenMoments, Blocks, Stopped, Directions, Elements]
-"""The first that takes a problem is its method."""
+MOST_BY_DIRECTIONS = 4
+"""Largest number of variables of which functions of a direction are discretised."""
+METHODS: list[type[Method]] = []
+"""Methods of one's own: the first that takes a problem is its method."""
 
 
 def choose(problem: Problem, settings: Settings | None = None) -> Method:
-    """The method of a problem, with settings."""
-    settings = settings or Settings()
-    kind = next(each for each in METHODS if each.takes(checked_problem(problem)))
-    return (GivenMesh if kind is Elements and settings.mesh else kind)(problem, settings, choose)
+    """The method of a problem, with settings. Raises `ValueError`: there is a mesh for more than two variables."""
+    settings, problem = settings or Settings(), checked_problem(problem)
+    kind = next((each for each in METHODS if each.takes(problem)), None) or kind_of(problem)
+    if settings.mesh:
+        if problem.dimension > 2:
+            raise ValueError(
+                "got a mesh, but meshes are for two variables only, as their lines are those of a phase; leave it out"
+            )
+        kind = GivenMesh if kind is Elements else kind
+    return kind(problem, settings, choose)
+
+
+def kind_of(problem: Problem) -> type[Method]:
+    """The method of a problem, if it is none of one's own."""
+    is_in_plane, has_directions = problem.dimension <= 2, problem.dimension <= MOST_BY_DIRECTIONS
+    if problem.system.stop and (problem.dimension != MOST_BY_DIRECTIONS or problem.impulses):
+        return Simulated
+    if problem.system.pasts:
+        return DelayMoments
+    if not has_directions:
+        return EvenMoments
+    if problem.impulses and not is_in_plane:
+        return StruckMoments
+    if problem.blocks:
+        return Blocks
+    if is_in_plane:
+        return Elements
+    return Stopped if problem.system.stop else Directions

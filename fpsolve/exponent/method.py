@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from types import MappingProxyType
-from typing import Annotated, Any, ClassVar, NamedTuple, NoReturn, Protocol, TypeVar
+from typing import Annotated, Any, ClassVar, NamedTuple, NoReturn, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,7 +23,7 @@ from fpsolve.messages import ALMOST_EVERY, Code, Message, Remedy
 from fpsolve.model.faults import strict_dataclass
 from fpsolve.model.parameters import parameter
 from fpsolve.model.problem import ParameterDerivative, Problem, infinite
-from fpsolve.model.quantity import LYAPUNOV_EXPONENT, VARIANCE_RATE
+from fpsolve.model.quantity import LYAPUNOV_EXPONENT
 from fpsolve.theory.perturbation import Scale, scale_of
 
 RTOL = 1e-8
@@ -36,7 +36,6 @@ MAX_STAGES = 60
 """Number of stages of a search, of all its places."""
 UNSOLVED = MeshError, NoHierarchy, NotConverged, SingularMatrix, np.linalg.LinAlgError
 """What is raised where functions do not have the principal pair, so that others are tried."""
-Found = TypeVar("Found")
 Tolerance = Callable[[float, float], float]
 """The largest error allowed, from p and a value of Λ(p)."""
 Along = Mapping[str, ParameterDerivative]
@@ -131,7 +130,7 @@ class Method:
         usual_rtol: the error that is wanted where none is named.
         pictures: what is drawn of its functions.
         no_picture: why they cannot be drawn; empty where they can.
-        goes_on: whether numbers of an earlier run do in place of solutions, which others need for their messages.
+        adapts: whether a discretisation is chosen for each p.
         is_function: whether Λ may be interpolated over p.
         is_quick: whether Λ(p) at many p takes less than a second.
         by_moments: whether Λ(p) of even p is that of the equations of the moments.
@@ -144,7 +143,7 @@ class Method:
     usual_rtol: float = RTOL
     pictures: Pictures = DIRECTIONS
     no_picture: str = ""
-    goes_on: bool = True
+    adapts: bool = True
     is_function: bool = False
     is_quick: bool = False
     by_moments: bool = False
@@ -170,6 +169,11 @@ class Method:
         return infinite(self.problem, p, symbol)
 
     @property
+    def no_surface(self) -> str:
+        """Why functions of it cannot be drawn over phase and noise; empty where they can."""
+        return self.no_picture
+
+    @property
     def has_pairs(self) -> bool:
         """Whether there are eigenfunctions, and what follows from them, as λ."""
         return self.reason(0.0) is None
@@ -177,7 +181,12 @@ class Method:
     @property
     def interval(self) -> tuple[float, float]:
         """The p for which Λ(p) is computed, as a closed interval."""
-        return (0.0, 0.0) if self.problem.has_algebraic_tails else (-math.inf, math.inf)
+        return (0.0, 0.0) if self.reason(1.0) else (-math.inf, math.inf)
+
+    @property
+    def goes_on(self) -> bool:
+        """Whether numbers of an earlier run do in place of solutions, which others need for their messages."""
+        return not self.reason(1.0)
 
     def is_dear(self, p: float) -> bool:
         """Whether Λ(p) takes elements of three axes or more, and so seconds."""
@@ -200,11 +209,6 @@ class Method:
     def tolerance(self) -> Tolerance:
         """The largest error allowed of a value of Λ(p); no method, as a cycle would keep matrices for long."""
         return partial(tolerated, self.settings.rtol, self.settings.of_value, self.scales)
-
-    @property
-    def adapts(self) -> bool:
-        """Whether a discretisation is chosen for each p."""
-        return self.settings.mesh is None
 
     @property
     def missed(self) -> Remedy | None:
@@ -260,7 +264,7 @@ class Method:
     def lyapunov_exponent(self) -> Estimate:
         """λ, Eq. (2), the growth rate of almost every path: Λ′(0) but for algebraic tails. Raises `NotConverged`."""
         value, error = self.ratio_alone(0.0)
-        meaning = ALMOST_EVERY if self.problem.has_algebraic_tails else ""
+        meaning = ALMOST_EVERY if self.reason(1.0) else ""
         return checked(Estimate(value, error, self.scales.linear, meaning, LYAPUNOV_EXPONENT), self.refinement)
 
     def variance_rate(self) -> Estimate:
@@ -327,12 +331,6 @@ def refuse(reason: Message | None) -> None:
     """Raise `NoSuchExponent` for a reason."""
     if reason:
         raise NoSuchExponent(reason)
-
-
-def refuse_tails(problem: Problem, symbol: str = VARIANCE_RATE.symbol) -> None:
-    """Refuse a number that noise with algebraic tails has not. Raises `NoSuchExponent`."""
-    if problem.has_algebraic_tails:
-        refuse(infinite(problem, 1.0, symbol))
 
 
 def tolerated(rtol: float, of_value: float, scales: Scale, p: float, value: float) -> float:
@@ -431,9 +429,13 @@ class Search:
         try:
             while True:
                 stage = self._begun(stage)
-                near = self.attempt(partial(stage.solved, self.p, near))
-                if near is None:
-                    stage = stage.doubled(self.failure)
+                try:
+                    near = stage.solved(self.p, near)
+                except OverBudget:
+                    raise
+                except UNSOLVED as failure:
+                    self.failure = failure.with_traceback(None)  # which would keep this search, and all it has found
+                    near, stage = None, stage.doubled(failure)
                     continue
                 allowed = self.allowed(near)
                 self.judged = found = stage.judged(near, allowed)
@@ -448,16 +450,6 @@ class Search:
             if self.best is not None and self.best.share <= 1:  # within the tolerance, but for its slope
                 return self.best.found
             return self._stop(failure)
-
-    def attempt(self, solve: Callable[[], Found]) -> Found | None:
-        """What is solved, or None where some functions do not have it, and the `failure` tells why."""
-        try:
-            return solve()
-        except OverBudget:
-            raise
-        except UNSOLVED as failure:
-            self.failure = failure.with_traceback(None)  # which would keep this search, and all that it has found
-            return None
 
     def _begun(self, stage: Stage | None) -> Stage:
         """A stage, which is counted. Raises `Ended`, `OverBudget`: it is beyond the budget, or there is none."""

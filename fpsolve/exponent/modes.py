@@ -14,9 +14,9 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 import scipy.linalg
@@ -24,13 +24,16 @@ import scipy.linalg
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import NoHierarchy
 from fpsolve.exponent.eigen import PrincipalPair, principal_pair
-from fpsolve.exponent.error import Solution, mode_effects
-from fpsolve.exponent.moments import even_moment, mean_matrix
+from fpsolve.exponent.elements import Elements
+from fpsolve.exponent.error import Moment, Solution, mode_effects
+from fpsolve.exponent.method import DIRECTIONS, RTOL_BEYOND_PLANE, Method, Stage, Tolerance
+from fpsolve.exponent.moments import EvenMoment, even_moment, mean_matrix, moment_row
 from fpsolve.exponent.powers import moment_form
 from fpsolve.exponent.starts import SHARE, Start
 from fpsolve.fem.directions import DirectionAxis, SphereAxis, group_dimensions
 from fpsolve.fem.generator import SMALL_P, Generator
 from fpsolve.fem.space import Space, first_axis
+from fpsolve.messages import Message, Remedy
 from fpsolve.model.problem import Problem
 
 FIRST_WAVES = 2
@@ -264,3 +267,53 @@ class SphereStart(DirectionStart):
         phi, share = self.space.phi, MINOR * goal
         found = self.finer(phi.finer(["degree"]) if of_axes[0] > share else phi, solution, share)
         return SphereStart(self.problem, found)._with(phi.waves - 2 - found.phi.waves)
+
+
+class Directions(Elements):
+    """Λ(p) of three and four variables; of even p it is that of the equations of the moments, where these close."""
+
+    stage: ClassVar[type[DirectionStart]] = SphereStart
+    is_function = False
+    is_quick = False
+    by_moments = True
+    pictures = DIRECTIONS
+    _has_witness = True
+    no_picture = ""
+    usual_rtol = RTOL_BEYOND_PLANE
+    remedy = Remedy.MANY
+
+    def places(self, p: float, tolerance: Tolerance, found: Sequence[Solution]) -> Iterator[tuple[Stage, Any]]:
+        """One: that of the nearest p; where it is p itself, a finer one than before."""
+        if abs(p) < SMALL_P:
+            yield from super().places(p, tolerance, found)
+        elif known := self.spaces.get(p):
+            most = self.settings.budget.most(known.start)
+            yield known.start.refined(known, tolerance(p, known.value), 0, most), known.pair
+        else:
+            yield self.stage.at(self.problem, p, self.settings.rtol, self.spaces), None
+
+    @property
+    def no_surface(self) -> str:
+        why = f"T of {self.problem.dimension} variables is no function of phase and noise"
+        return f"{why}; use `draw_eigenfunction`, `tilted_density`, or a case, whose run writes files for ParaView"
+
+    def is_dear(self, p: float) -> bool:
+        return p <= 0 or p % 2 != 0
+
+    def is_at_corner(self, p: float) -> bool:
+        return False
+
+    def bounds(self, p: FloatArray, value: FloatArray, error: FloatArray) -> tuple[Message, ...]:
+        return ()
+
+    def unseen(self) -> Message | None:
+        return Method.unseen(self)
+
+    def number(self, p: float) -> EvenMoment | None:
+        return self.even(p)
+
+    def row(self, p: float) -> tuple[Moment, PrincipalPair | None]:
+        return (moment_row(even), None) if (even := self.even(p)) else super().row(p)
+
+    def gradient(self, p: float, keys: Sequence[str]) -> FloatArray:
+        return known.gradient(keys) / p if (known := self.even(p)) else super().gradient(p, keys)

@@ -20,7 +20,7 @@ from fpsolve.data import Result, dataset
 from fpsolve.errors import NoSuchExponent, NotConverged
 from fpsolve.exponent.curve import Curve, Node, polynomial, values
 from fpsolve.exponent.eigen import PrincipalPair
-from fpsolve.exponent.elements import doubt, solved_p
+from fpsolve.exponent.elements import doubt
 from fpsolve.exponent.error import Estimate, Failure, InvariantClass, Moment, checked
 from fpsolve.exponent.kinds import choose
 from fpsolve.exponent.method import Budget, Method, Settings, Tolerance, checked_moments, refuse
@@ -176,16 +176,12 @@ class ExponentSolver:
         for name, kind, words in _KINDS:
             if not isinstance(getattr(self, name), kind) or getattr(self, name) is True:
                 raise TypeError(f"got {name} = {shown(getattr(self, name))}; must be {words}")
-        if self.mesh is not None and self.problem.dimension > 2:
-            raise ValueError(
-                "got a mesh, but meshes are for two variables only, as their lines are those of a phase; leave it out"
-            )
         if not (self.problem.noise.is_white or math.isfinite(self.problem.noise.standard_deviation)):
             raise NoSuchExponent(Message(Code.INFINITE_VARIANCE))
-        with suppress(ValueError):
-            if RTOLS["gt"] < real_number(self.rtol, "rtol") < RTOLS["lt"]:
-                return
-        raise ValueError(f"got rtol = {shown(self.rtol)}; must be > {RTOLS['gt']:g} and < 1; write, for example, 1e-8")
+        if not (math.isfinite(self.rtol) and RTOLS["gt"] < self.rtol < RTOLS["lt"]):
+            limits = f"must be > {RTOLS['gt']:g} and < 1; write, for example, 1e-8"
+            raise ValueError(f"got rtol = {shown(self.rtol)}; {limits}")
+        _ = self.method  # refuses a mesh of three variables
 
     @cached_property
     def meter(self) -> Meter:
@@ -220,7 +216,7 @@ class ExponentSolver:
     def _checked(self, p: float) -> float:
         point = real_number(p, "p")
         refuse(self.method.reason(point))
-        return solved_p(point)
+        return point
 
     def by_class(self, p: ArrayLike) -> tuple[InvariantClass, ...]:
         """λ and Λ(p) of each part, for p < 0 too; nothing where there are none. Raises `NotConverged`."""
@@ -289,7 +285,7 @@ class ExponentSolver:
         rows, solved, failures = dict[int, Moment](), dict[int, PrincipalPair](), list[Failure]()
         for i in best_order(points):
             point = float(points[i])
-            begin(quantity.moment_at(point).symbol)
+            begin(f"Λ({point:g})")
             if self.method.goes_on and point in known and not math.isnan(known[point].derivative):
                 rows[i] = known[point]
                 self.take(point, rows[i])
@@ -303,11 +299,14 @@ class ExponentSolver:
                     if is_kept:
                         known[point] = rows[i]._replace(derivative_error=self.slope_error(point))
             except NotConverged as failure:
-                failures.append(Failure(point, failure.message))
+                if point:
+                    failures.append(Failure(point, failure.message))
+                else:  # Λ(0) = 0 even so
+                    rows[i] = Moment(0.0, math.nan, math.nan, 0.0, math.nan)
             progress()
         pairs, found = tuple(solved[i] for i in sorted(solved)), points[sorted(rows)]
         value, slope, _, errors, residuals = np.array([rows[i] for i in sorted(rows)]).reshape(-1, 5).T
-        if self.problem.has_algebraic_tails:
+        if self.method.reason(1.0):
             slope = np.full_like(slope, math.nan)  # of p = 0, beside which there is no Λ(p)
         return MomentLyapunov(
             p=found,
@@ -444,7 +443,20 @@ def solve_moments(
             result = interpolated(solver, solver.curves(float(points.min()), float(points.max())), points)
             if result.warnings and solver.method.adapts:  # single solves round less
                 result = None
-    result = result or _one_by_one(solver, points, report, known)
+    if result is None:
+        result = solver.moments(points, progress=report, known=known)
+        if not result.failures and (
+            obstacle := _obstacle(
+                solver,
+                result.p,
+                result.value,
+                result.slope,
+                result.error_estimate,
+                partial(result.errors_of, result.slope),
+            )
+        ):
+            told = message_of(obstacle).advising(solver.method.refinement)
+            result = replace(result, failures=(Failure(None, told),))
     for each in reports:
         each()
     return result if points.size == asked.size else _at(result, asked)
@@ -458,39 +470,13 @@ def _at(result: MomentLyapunov, p: FloatArray) -> MomentLyapunov:
     return replace(result, **{name: getattr(result, name)[index] for name in names})
 
 
-def _one_by_one(
-    solver: ExponentSolver, p: FloatArray, progress: Callable[[], None], known: dict[float, Moment] | None
-) -> MomentLyapunov:
-    """Λ at each p by a solve of its own, if these are convex; Λ(0) = 0 even where its eigenpair failed."""
-    result = solver.moments(p, progress=progress, known=known)
-    columns = result.p, result.value, result.slope, result.error_estimate
-    obstacle = None
-    if not result.failures:
-        steep = partial(result.errors_of, result.slope)
-        obstacle = broken_convexity(*columns, steep) or contradiction(solver, *columns, steep)
-    if obstacle:
-        return replace(result, failures=(Failure(None, message_of(obstacle).advising(solver.method.refinement)),))
-    failures = tuple(failure for failure in result.failures if failure.p != 0)
-    if len(failures) == len(result.failures):
-        return result
-    failed = {failure.p for failure in failures}
-    place = [float(each) for each in p if each not in failed].index(0.0)
-    row = {"p": 0.0, "value": 0.0, "slope": np.nan, "error_estimate": 0.0, "residual": np.nan}
-    with_zero: dict[str, Any] = {name: np.insert(getattr(result, name), place, number) for name, number in row.items()}
-    return replace(result, failures=failures, **with_zero)
-
-
 def interpolated(solver: ExponentSolver, curves: tuple[Curve, ...], p: FloatArray) -> MomentLyapunov:
     """Λ at several p by curves; the residual is the largest of the nodes. Raises `NotConverged` if they contradict."""
     value, derivative, _, error, slope_error = values(curves, p)
-    columns = p, value, derivative, error
-    steep = partial(np.asarray, slope_error)
-    if obstacle := broken_convexity(*columns, steep) or contradiction(solver, *columns, steep):
+    if obstacle := _obstacle(solver, p, value, derivative, error, partial(np.asarray, slope_error)):
         raise NotConverged(obstacle, remedy=solver.method.refinement)
     for i in np.flatnonzero(p):
-        estimate = Estimate(
-            float(value[i]), float(error[i]), solver.method.scale(p[i]), quantity=quantity.moment_at(p[i])
-        )
+        estimate = Estimate(float(value[i]), float(error[i]), solver.method.scale(p[i]))
         checked(estimate, solver.method.refinement, float(p[i]))
     pairs = [solver.method.solution(each).pair for curve in curves for each in curve.nodes.tolist()]
     return MomentLyapunov(
@@ -517,6 +503,11 @@ def sign_change(p: FloatArray, value: FloatArray, slope: FloatArray) -> float | 
         return None
     i = sides[0] + int(abs(ratio[sides[0] + 1]) < abs(ratio[sides[0]]))
     return float(np.clip(p[i] - ratio[i] * p[i] / rise[i], p[sides[0]], p[sides[0] + 1]))
+
+
+def _obstacle(solver: ExponentSolver, *columns: Any) -> Message | None:
+    """Why not all values can be right, from the arguments of `broken_convexity`; None where they may be."""
+    return broken_convexity(*columns) or contradiction(solver, *columns)
 
 
 def broken_convexity(

@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from fpsolve.exponent.density import xi_marginal
+from fpsolve.arrays import Coefficient
 from fpsolve.exponent.eigen import BACKWARD_ERROR_LIMIT, PrincipalPair, principal_pair
 from fpsolve.exponent.error import Solution, mode_effects
-from fpsolve.fem.axis import MOST_DEGREE, ModeEffects
+from fpsolve.fem.axis import MOST_DEGREE, ModeEffects, along
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.noise_axes import CellAxis, PolynomialAxis
 from fpsolve.fem.pairs import PairAxis
@@ -178,12 +178,17 @@ def other_centers(pair: PrincipalPair) -> list[float]:
     z, rate = frozen.peaks(pair.p)
     if z.size < 2:
         return []
-    at = pair.space.xi.samples()
-    own, density = at.xi / noise.standard_deviation, np.abs(xi_marginal(pair, at)) * at.measure
-    mean = float(own @ density / density.sum())
-    width = math.sqrt(float((own - mean) ** 2 @ density / density.sum()))
+    mean = tilted_mean(pair, lambda xi: xi / noise.standard_deviation)
+    width = math.sqrt(tilted_mean(pair, lambda xi: (xi / noise.standard_deviation - mean) ** 2))
     far = (np.abs(z - mean) > 3 * width + 2) & (rate > comparable(pair.value))
     return [float(z[far][np.argmax(rate[far])])] if np.any(far) else []
+
+
+def tilted_mean(pair: PrincipalPair, g: Coefficient) -> float:
+    """The mean of a function of ξ in the tilted density."""
+    space = pair.space
+    weighed = along((space.phi.unit, space.xi.mass(g)), space.table(pair.right))
+    return float(pair.left @ weighed.ravel() / (pair.left @ space.weighed(pair.right)))
 
 
 def has_cones(problem: Problem) -> bool:

@@ -27,12 +27,12 @@ import scipy.linalg
 from fpsolve.arrays import FloatArray
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.error import Solution
-from fpsolve.exponent.modes import DirectionStart, first_order_changes, second_moments
+from fpsolve.exponent.modes import Directions, DirectionStart, first_order_changes, second_moments
 from fpsolve.exponent.moments import mean_matrix
 from fpsolve.exponent.starts import SHARE
 from fpsolve.fem.directions import HalfSphereAxis
 from fpsolve.fem.generator import Generator
-from fpsolve.model.plane import LinearMotion, rotating_coordinates
+from fpsolve.model.plane import LinearMotion, Stop, rotating_coordinates
 from fpsolve.model.problem import Problem
 
 FIRST_DEGREE = 4
@@ -60,6 +60,15 @@ WORTH = 0.2
 """Share of the largest change from which on functions in another direction are made finer, too."""
 
 
+def looked_at(problem: Problem) -> tuple[Stop, bool]:
+    """The coordinates in which variables are looked at, those of the stop, and whether the first one is never negative.
+
+    Without a stop they are x itself.
+    """
+    stop = problem.system.stop
+    return stop or Stop(np.eye(problem.dimension).tolist(), 1.0), stop is not None
+
+
 def _rotating(block: FloatArray) -> FloatArray:
     """Coordinates in which a pair rotates uniformly, but for growth, the first one as it was but for its unit."""
     if (found := rotating_coordinates(block)) is None:
@@ -84,11 +93,10 @@ class StopStart(DirectionStart):
 
     @staticmethod
     def directions(problem: Problem) -> HalfSphereAxis:
-        stop, system = problem.system.stop, problem.system
-        assert stop is not None
-        free, smooth = stop.inside(mean_matrix(problem, system)), LinearMotion(system.epsilon, tuple(system.terms))
+        (at, _), system = looked_at(problem), problem.system
+        free, smooth = at.inside(mean_matrix(problem, system)), LinearMotion(system.epsilon, tuple(system.terms))
         own = scipy.linalg.block_diag(_rotating(free[:2, :2]), _rotating(free[2:, 2:]))
-        own = np.linalg.solve(np.array(stop.coordinates), own)
+        own = np.linalg.solve(np.array(at.coordinates), own)
         forms = second_moments(replace(problem, system=smooth), own)
         q, moments = (np.diagonal(each).reshape(2, 2).sum(axis=1) for each in forms)
         return HalfSphereAxis(
@@ -148,3 +156,13 @@ class StopStart(DirectionStart):
         share = max(SHARE * goal, MINOR_NOISE * solution.measured[0])
         found = self.finer(phi, solution, share)
         return StopStart(self.problem, found, before=(solution,), is_first=False, tried=tried)
+
+
+class Stopped(Directions):
+    """Λ(p) of four variables with a stop, at which T is a root."""
+
+    stage = StopStart
+    usual_rtol = 1e-3
+
+    def line_rtol(self, p: float) -> float:
+        return 3e-3

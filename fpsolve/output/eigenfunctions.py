@@ -6,7 +6,7 @@ from functools import partial
 from typing import Literal
 
 from fpsolve.arrays import shown
-from fpsolve.exponent.density import Grid, on_directions
+from fpsolve.exponent.density import Grid, on_nodes
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.kinds import choose
 from fpsolve.exponent.method import DIRECTIONS, PHASE_AND_NOISE
@@ -47,7 +47,7 @@ def _title_of(pair: PrincipalPair) -> str:
 
 def _picture_of_directions(pair: PrincipalPair, field: str, cmap: str) -> Picture:
     """A function of directions in colours."""
-    found, quantity = on_directions(pair), FIELDS[field]
+    found, quantity = on_nodes(pair), FIELDS[field]
     about = {**quantity.attributes, "units": quantity.unit if field == "T" else found.grid.unit}
     draw = partial(found.grid.draw, values=getattr(found.fields, field), about=about, cmap=cmap)
     return painted(draw, _title_of(pair), parameter_lines(pair.generator.problem.parameters))
