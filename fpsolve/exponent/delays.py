@@ -96,10 +96,7 @@ class DelayRates:
             unit, count = common_delay(pasts)
         except ValueError as failure:
             raise NoHierarchy(str(failure)) from failure
-        squares, drift = [*moving.squares], moving.steady + sum(0.5 * each @ each for each in moving.squares)
-        for rate, exponent in moving.impulses:  # whose second moments are those of white noise
-            jump = expm(exponent) - np.eye(len(exponent))
-            drift, squares = drift + rate * jump, [*squares, math.sqrt(rate) * jump]
+        drift, squares = moving.of_squares()
         n = len(drift) - len(pasts)
 
         def split(matrix: FloatArray) -> FloatArray:

@@ -178,7 +178,7 @@ def _is_principal(pair: PrincipalPair, pairs: Sequence[PrincipalPair], goes_on: 
         return abs(pair.value) <= BESIDE_IT[0] * generator.problem.unit_rate
     if not goes_on and math.isinf(tangent) and _has_other_positive(generator, pair.p):
         return False
-    return not _has_states(generator.problem) or _is_rightmost(pair, pair.space)
+    return not generator.may_hold or _is_rightmost(pair)
 
 
 def _rightmost_pair(pencil: Pencil, generator: Generator, reached: PrincipalPair | None) -> PrincipalPair:
@@ -193,7 +193,7 @@ def _rightmost_pair(pencil: Pencil, generator: Generator, reached: PrincipalPair
         told = Message(Code.NO_EIGENVALUE, p=p, residual=pair.residual, size=defect, **limits)
         raise NotConverged(told, pair, Remedy.BOTH_AXES)
     others = [reached.value] if reached and reached.residual <= BACKWARD_ERROR_LIMIT else []
-    if _has_states(problem) and generator.size <= SURVEYED_UNKNOWNS:
+    if generator.may_hold and generator.size <= SURVEYED_UNKNOWNS:
         others.append(float(spectrum(generator, p, 1)[0].real))
     rightmost = max(others, default=-math.inf)
     if _has_other_positive(generator, p) and rightmost - pair.value > 1e-6 * max(abs(rightmost), problem.unit_rate):
@@ -202,29 +202,22 @@ def _rightmost_pair(pencil: Pencil, generator: Generator, reached: PrincipalPair
     return pair
 
 
-def _has_states(problem: Problem) -> bool:
-    """Whether a noise jumps: what hardly anything leaves, a state or by white noise a direction of x, has its pair."""
-    return any(noise.has_states for noise in problem.noise.parts.values())
-
-
-def _is_rightmost(pair: PrincipalPair, space: Space) -> bool:
+def _is_rightmost(pair: PrincipalPair) -> bool:
     """Whether (σ − L)⁻¹1 > 0, as it is for a σ beside Λ if Λ is the rightmost eigenvalue, and also for the adjoint.
 
-    Of another one, by which all else is larger than rounding, it is −1/(Λ′ − σ) of its share. Of three and four
-    variables, where pairs are followed from p = 0, only what is resolved is looked at: under waves T* is not. One of
-    both must do at a stop, where the adjoint is no function: a share of the time the mass is at rest there.
+    Of another one, by which all else is larger than rounding, it is −1/(Λ′ − σ) of its share. Where pairs are followed
+    from p = 0, only what is resolved is looked at: under waves T* is not. One of both must do where the adjoint is no
+    function.
 
     Where T lies between positive bounds, none is: E‖x(t)‖^p ≤ (max T/min T) exp(Λt) from every start.
     """
-    problem = pair.generator.problem
-    if problem.dimension == 2 and problem.coloured.is_bounded and not pair.generator.chosen.is_tilted:
+    problem, space = pair.generator.problem, pair.space
+    if problem.coloured.is_bounded and not space.is_tilted:
         values = space.on_grid(pair.right)
         if np.min(values) > LEAST_OF_MOST * np.max(values):
             return True
     pencil, source = pair.generator.at(pair.p), space.weighed(space.constant)
-    judged = any if problem.system.stop else all
-    seen = [side for side in (0, 1) if problem.dimension == 2 or pair.sign_defects[side] <= POSITIVE]
-
+    seen = [side for side in (0, 1) if not space.phi.is_followed or pair.sign_defects[side] <= POSITIVE]
     near, far = (pair.eigenvalue + shift * problem.unit_rate for shift in BESIDE_IT)
     factor = pencil.factorised(near)
 
@@ -242,7 +235,7 @@ def _is_rightmost(pair: PrincipalPair, space: Space) -> bool:
                 return False
         return True
 
-    return not seen or judged(map(is_positive, seen))
+    return not seen or (all if space.phi.has_adjoint else any)(map(is_positive, seen))
 
 
 def _has_other_positive(generator: Generator, p: float) -> bool:
@@ -252,9 +245,9 @@ def _has_other_positive(generator: Generator, p: float) -> bool:
     the k-th pair, x along the faster mode and v along the other: for even k its sign does not change.
     """
     problem = generator.problem
-    if problem.dimension > 2:  # each search begins at a neighbouring p
+    if generator.phi.is_followed:  # each search begins at a neighbouring p
         return False
-    if _has_states(problem):
+    if generator.may_hold:
         return True
     if (frozen := frozen_noise(problem)) is None:
         return problem.may_rest
@@ -291,15 +284,10 @@ def spectrum(generator: Generator, p: float, k: int = 10) -> Any:
         )
     if not 1 <= k <= size:
         raise ValueError(f"k is {k}; it must be from 1 to the number of unknowns, {size}")
-    values = scipy.linalg.eigvals(_standard(generator, p)[1], overwrite_a=True)
-    return values[np.lexsort((values.imag, -values.real))][:k]
-
-
-def _standard(generator: Generator, p: float) -> tuple[FloatArray, FloatArray]:
-    """The Cholesky factor C of the mass matrix, and C⁻¹ L(p) C⁻ᵀ, dense."""
     root = scipy.linalg.cholesky(finite(generator.space(p).mass.toarray()), lower=True)
     half = scipy.linalg.solve_triangular(root, finite(generator.matrix(p).toarray()), lower=True)
-    return root, scipy.linalg.solve_triangular(root, half.T, lower=True).T
+    values = scipy.linalg.eigvals(scipy.linalg.solve_triangular(root, half.T, lower=True).T, overwrite_a=True)
+    return values[np.lexsort((values.imag, -values.real))][:k]
 
 
 def _carried(pairs: Sequence[PrincipalPair], pencil: Pencil, generator: Generator) -> tuple[FloatArray, FloatArray]:

@@ -2,10 +2,10 @@
 
 In the terms of `moments`,
 
-    dX_k/dt = A X_k + X_k Aᵀ + Σ BX_kBᵀ + Σ ν(e^C X_k e^Cᵀ − X_k) + Σ_l Ξ_lk (D X_l + X_l Dᵀ) + Σ_l G_lk X_l,
+    dX_k/dt = A X_k + X_k Aᵀ + Σ BX_kBᵀ + Σ_l Ξ_lk (D X_l + X_l Dᵀ) + Σ_l G_lk X_l,
 
-A with ½ΣB². Without what noise drives, (σ + Σν)X_k − Σ_l G_lk X_l − A X_k − X_k Aᵀ = F_k are equations of Lyapunov, one
-after the other, in the Schur forms of A and of Gᵀ. By this inverse GMRES finds (σ − H)⁻¹.
+A with ½ΣB², impulses among the B. Without what noise drives, σX_k − Σ_l G_lk X_l − A X_k − X_k Aᵀ = F_k are equations
+of Lyapunov, one after the other, in the Schur forms of A and of Gᵀ. By this inverse GMRES finds (σ − H)⁻¹.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy.linalg import expm, get_lapack_funcs, rsf2csf, schur
+from scipy.linalg import get_lapack_funcs, rsf2csf, schur
 from scipy.sparse.linalg import LinearOperator, gmres
 
 from fpsolve.arrays import FloatArray, dense
@@ -33,7 +33,7 @@ class MatrixRates(Rates):
     """H of the upper halves of X_k, one after the other.
 
     Attributes:
-        steady: A − ½Σν.
+        steady: A.
         loads: D and Ξᵀ of what adds Ξᵀ(D X + X Dᵀ).
         gains: B of what adds B X Bᵀ.
         of_noise: Gᵀ, sparse.
@@ -47,10 +47,7 @@ class MatrixRates(Rates):
     @classmethod
     def of(cls, moving: Moving, generator: Any, masses: Sequence[Any]) -> MatrixRates:
         """H from Gᵀ and the Ξᵀ of each load."""
-        unit = np.eye(len(moving.steady))
-        steady = moving.steady + 0.5 * sum((each @ each for each in moving.squares), 0.0 * unit)
-        steady = steady - 0.5 * sum(rate for rate, _ in moving.impulses) * unit
-        gains = [*moving.squares, *(np.sqrt(rate) * expm(exponent) for rate, exponent in moving.impulses)]
+        steady, gains = moving.of_squares()
         return cls(steady, list(zip(moving.loads, masses, strict=True)), gains, generator)
 
     def _forms(self, x: FloatArray) -> FloatArray:
@@ -84,7 +81,7 @@ class MatrixRates(Rates):
 
     @cached_property
     def _schur(self) -> tuple[Any, Any, Any, Any]:
-        """T and U of A − ½Σν = UTUᴴ, S and Z of Gᵀ = ZSZᴴ: upper triangular ones, or T with blocks where S is real."""
+        """T and U of A = UTUᴴ, S and Z of Gᵀ = ZSZᴴ: upper triangular ones, or T with blocks where S is real."""
         of_noise, state = schur(dense(self.of_noise)), schur(self.steady)
         if np.any(np.diag(of_noise[0], -1)):
             of_noise, state = rsf2csf(*of_noise), rsf2csf(*state)

@@ -202,7 +202,7 @@ def refuse_open_hierarchy(problem: Problem, p: float) -> None:
     moments = math.comb(int(p) + problem.dimension - 1, problem.dimension - 1)
     count = moments
     for noise in problem.coloured.parts.values():
-        count *= len(noise.states) if noise.has_states else FIRST  # type: ignore[attr-defined]
+        count *= first_axis(noise, 0.0).of_degree(FIRST).size
     limits = (MOST_MOMENTS, MOST) if p > 2 else (math.inf, MOST_NUMBERS)
     for number, what, limit in zip((moments, count), ("moments", "equations"), limits, strict=True):
         if number > limit:

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from scipy import sparse
+from scipy.linalg import expm as dense_exponential
 from scipy.linalg import matrix_balance
 from scipy.sparse.linalg import expm
 
@@ -121,6 +122,15 @@ class Moving(NamedTuple):
             squares[:, variable] += squares[:, column]
         _, (units, _) = matrix_balance(squares[:now, :now], permute=False, separate=True)
         return np.sqrt(np.append(units, units[list(same)]))
+
+    def of_squares(self) -> tuple[FloatArray, list[FloatArray]]:
+        """A and G of what moves E xxᵀ besides loads, A E xxᵀ + E xxᵀ Aᵀ + Σ G E xxᵀ Gᵀ.
+
+        Those of an impulse are those of a white noise, as e^C X e^Cᵀ − X = JX + XJᵀ + JXJᵀ with J = e^C − 1.
+        """
+        jumps = [(rate, dense_exponential(exponent) - np.eye(len(exponent))) for rate, exponent in self.impulses]
+        drift = self.steady + sum(0.5 * each @ each for each in self.squares) + sum(rate * jump for rate, jump in jumps)
+        return drift, [*self.squares, *(math.sqrt(rate) * jump for rate, jump in jumps)]
 
     def over(self, units: FloatArray) -> Moving:
         """The same of a state in some units."""

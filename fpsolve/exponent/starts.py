@@ -18,8 +18,7 @@ from fpsolve.exponent.eigen import BACKWARD_ERROR_LIMIT, PrincipalPair, principa
 from fpsolve.exponent.error import Solution, mode_effects
 from fpsolve.fem.axis import MOST_DEGREE, ModeEffects, along
 from fpsolve.fem.generator import Generator
-from fpsolve.fem.noise_axes import CellAxis, PolynomialAxis
-from fpsolve.fem.pairs import PairAxis
+from fpsolve.fem.noise_axes import CellAxis, NoiseAxis, PolynomialAxis
 from fpsolve.fem.phase import PhaseAxis
 from fpsolve.fem.space import Space, first_axis
 from fpsolve.model.plane import System, Xi, phase_speed
@@ -114,29 +113,46 @@ def _effects_of(failure: Exception | None) -> Sequence[ModeEffects | None]:
 
 def first(problem: Problem, p: float, rtol: float, center: float | None = None) -> Space:
     """A first discretisation, small, for a tilted density around some z; None for where slow noise carries it."""
-    noise, system, digits = problem.coloured, problem.motion, -math.log10(rtol)
-    if noise.basis == "cells":  # around ξ = 0, their lines on both sides, further apart further out
-        steps = np.concatenate([[0.0], 3.0 * 1.5 ** np.arange(60)])
-        side = np.append(steps[steps < 0.8 * REACH], REACH)
-        phase = _phase(system, noise.standard_deviation * np.array([-2.0, 2.0]), digits)
-        lines = np.concatenate([-side[:0:-1], side])
-        return Space((phase, CellAxis(noise, lines, np.full(lines.size - 1, round(2 + digits / 2)))))
-    frozen = frozen_noise(problem)
-    if frozen is None:  # the noise has states, or a state of its own, or there are several
-        axes = [first_axis(each, digits) for each in noise.parts.values()]
-        is_smooth = sum(axis.dimension for axis in axes) > 1
-        phase = _phase(system, problem.typical, digits, is_smooth=is_smooth)
-        if len(axes) == 1 and isinstance(axis := axes[0], PairAxis):
-            if center is None:
-                center = float(steady_places(problem, p)[0][0])
-            pull = noise.standard_deviation**2 * center / noise.spectral_density(0.0) if center else 0.0
-            axes = [replace(axis, slope=pull / p)]
-        return Space((phase, *axes))
-    unit, center = noise.standard_deviation, frozen.center(p) if center is None else center
-    end = noise.half_width / unit
-    phase = _phase(system, unit * np.clip(center + np.array([-2.0, 2.0]), -end, end), digits)
+    noise, digits = problem.coloured, -math.log10(rtol)
+    if len(noise.parts) == 1 and (of_kind := AXES.get(noise.basis)):
+        axis, xi = of_kind(problem, p, digits, center)
+        axes = [axis]
+    else:
+        axes, xi = [first_axis(each, digits) for each in noise.parts.values()], problem.typical
+    is_smooth = sum(axis.dimension for axis in axes) > 1
+    return Space((_phase(problem.motion, xi, digits, is_smooth), *axes))
+
+
+def _of_tails(problem: Problem, p: float, digits: float, center: float | None) -> tuple[NoiseAxis, Xi]:
+    """Cells around ξ = 0, their lines on both sides, further apart further out."""
+    noise, steps = problem.coloured, np.concatenate([[0.0], 3.0 * 1.5 ** np.arange(60)])
+    side = np.append(steps[steps < 0.8 * REACH], REACH)
+    lines = np.concatenate([-side[:0:-1], side])
+    axis = CellAxis(noise, lines, np.full(lines.size - 1, round(2 + digits / 2)))
+    return axis, noise.standard_deviation * np.array([-2.0, 2.0])
+
+
+def _of_filter(problem: Problem, p: float, digits: float, center: float | None) -> tuple[NoiseAxis, Xi]:
+    """With the tilt of the force that holds the noise at z."""
+    noise = problem.coloured
+    center = float(steady_places(problem, p)[0][0]) if center is None else center
+    pull = noise.standard_deviation**2 * center / noise.spectral_density(0.0) if center else 0.0
+    return replace(first_axis(noise, digits), slope=pull / p), problem.typical  # type: ignore[call-arg]
+
+
+def _of_diffusion(problem: Problem, p: float, digits: float, center: float | None) -> tuple[NoiseAxis, Xi]:
+    """Polynomials with the tilt that has its peak at z."""
+    noise, frozen = problem.coloured, frozen_noise(problem)
+    assert frozen is not None
+    unit, end = noise.standard_deviation, noise.half_width / noise.standard_deviation
+    center = frozen.center(p) if center is None else center
     slope = frozen.tilt(center) / p if noise.may_tilt else 0.0
-    return Space((phase, PolynomialAxis(noise, round(digits / 2) + (3 if math.isinf(end) else 5), slope)))
+    axis = PolynomialAxis(noise, round(digits / 2) + (3 if math.isinf(end) else 5), slope)
+    return axis, unit * np.clip(center + np.array([-2.0, 2.0]), -end, end)
+
+
+AXES = {"cells": _of_tails, "pairs": _of_filter, "polynomials": _of_diffusion}
+"""The first functions of one noise by its `basis`, and ξ about which the phase is looked at; of others any will do."""
 
 
 def _phase(system: System, xi: Xi, digits: float, is_smooth: bool = False) -> PhaseAxis:
@@ -164,24 +180,36 @@ def other_centers(pair: PrincipalPair) -> list[float]:
     hardly ever passes: each has its own pair with T > 0 as far as that can be told, and only the larger eigenvalue is
     Λ.
     """
-    frozen, noise = frozen_noise(pair.generator.problem), pair.generator.problem.coloured
-    if noise.basis == "pairs":
-        center, (z, rate) = pair.space.xi.center, steady_places(pair.generator.problem, pair.p)
-        far = (np.abs(z - center) > 5) & (rate > comparable(pair.value))
-        found: list[float] = z[far][:1].tolist()
-        if center:
-            amplitude, swinging = swing(pair.generator.problem, pair.p)
-            found += [0.0] * (amplitude > 5 and swinging > comparable(pair.value))
-        return found
-    if frozen is None:
-        return []
+    noise = pair.generator.problem.coloured
+    others = OTHERS.get(noise.basis) if len(noise.parts) == 1 else None
+    return others(pair) if others else []
+
+
+def _of_filters(pair: PrincipalPair) -> list[float]:
+    problem, center = pair.generator.problem, pair.space.xi.center
+    z, rate = steady_places(problem, pair.p)
+    found: list[float] = z[(np.abs(z - center) > 5) & (rate > comparable(pair.value))][:1].tolist()
+    if center:
+        amplitude, swinging = swing(problem, pair.p)
+        found += [0.0] * (amplitude > 5 and swinging > comparable(pair.value))
+    return found
+
+
+def _of_diffusions(pair: PrincipalPair) -> list[float]:
+    unit = pair.generator.problem.coloured.standard_deviation
+    frozen = frozen_noise(pair.generator.problem)
+    assert frozen is not None
     z, rate = frozen.peaks(pair.p)
     if z.size < 2:
         return []
-    mean = tilted_mean(pair, lambda xi: xi / noise.standard_deviation)
-    width = math.sqrt(tilted_mean(pair, lambda xi: (xi / noise.standard_deviation - mean) ** 2))
+    mean = tilted_mean(pair, lambda xi: xi / unit)
+    width = math.sqrt(tilted_mean(pair, lambda xi: (xi / unit - mean) ** 2))
     far = (np.abs(z - mean) > 3 * width + 2) & (rate > comparable(pair.value))
     return [float(z[far][np.argmax(rate[far])])] if np.any(far) else []
+
+
+OTHERS = {"pairs": _of_filters, "polynomials": _of_diffusions}
+"""`other_centers` of one noise by its `basis`; of others there are none."""
 
 
 def tilted_mean(pair: PrincipalPair, g: Coefficient) -> float:
@@ -198,7 +226,7 @@ def has_cones(problem: Problem) -> bool:
     faster one. Told for one noise.
     """
     noise = problem.noise
-    if not noise.is_bounded or len(noise.parts) > 1 or problem.diffusions or problem.impulses:
+    if not noise.is_bounded or len(noise.parts) > 1 or noise.is_white:
         return False
     phi = np.linspace(0, math.pi, ROUND, endpoint=False)
     turns = phase_speed(problem.motion, noise.reached)(phi[:, None])

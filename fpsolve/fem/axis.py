@@ -121,6 +121,8 @@ class Axis:
         slope: s/p of the factor exp(s z) that moves with p.
         turns: how often the axis fits on the full circle; 1 for noise.
         nested: to coefficients of modes whose sums by degree are functions of a lower one; None where they are that.
+        is_followed: whether pairs are followed from p = 0 on, as T and T* may not be resolved enough to be judged.
+        has_adjoint: whether T* is a function.
     """
 
     __dataclass_fields__: ClassVar[dict[str, Any]]
@@ -129,6 +131,7 @@ class Axis:
     is_chain = False
     slowest, slope, turns = 0.0, 0.0, 1
     nested: Any = None
+    is_followed, has_adjoint = False, True
 
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), tuple(getattr(self, each.name) for each in fields(self))

@@ -188,6 +188,7 @@ class DirectionAxis(Axis):
     waves: int
     ways: ClassVar[tuple[str, ...]] = "degree", "waves"
     most_unknowns = 20_000
+    is_followed = True
 
     @cached_property
     def angles(self) -> tuple[Angle, Angle]:
@@ -480,6 +481,7 @@ class HalfSphereAxis(DirectionAxis):
     first_lines: FloatArray
     first_degree: int
     ways = "degree", "first_degree", "waves"
+    has_adjoint = False
 
     @property
     def facts(self) -> dict[str, Any]:

@@ -128,6 +128,11 @@ class Generator:
         of_phi = (noise.left_in_phase for noise in self.problem.noise.parts.values())
         return [max(of_phi), *(axis.slowest for axis in self.space(0.0).noises)]
 
+    @property
+    def may_hold(self) -> bool:
+        """Whether a noise jumps: what hardly anything leaves, a state or a direction of x, has a pair of its own."""
+        return self.slowest[0] > 0
+
     def enriched(self) -> Generator:
         """The generator on the next finer space."""
         return Generator(self.problem, self.chosen.enriched())
