@@ -245,7 +245,7 @@ def _has_other_positive(generator: Generator, p: float) -> bool:
     the k-th pair, x along the faster mode and v along the other: for even k its sign does not change.
     """
     problem = generator.problem
-    if generator.phi.is_followed:  # each search begins at a neighbouring p
+    if generator.chosen.phi.is_followed:  # each search begins at a neighbouring p
         return False
     if generator.may_hold:
         return True

@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from fpsolve.arrays import Coefficient
+from fpsolve.arrays import Coefficient, one
 from fpsolve.exponent.eigen import BACKWARD_ERROR_LIMIT, PrincipalPair, principal_pair
 from fpsolve.exponent.error import Solution, mode_effects
-from fpsolve.fem.axis import MOST_DEGREE, ModeEffects, along
+from fpsolve.fem.axis import MOST_DEGREE, KroneckerSum, ModeEffects
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.noise_axes import CellAxis, NoiseAxis, PolynomialAxis
 from fpsolve.fem.phase import PhaseAxis
@@ -215,8 +215,8 @@ OTHERS = {"pairs": _of_filters, "polynomials": _of_diffusions}
 def tilted_mean(pair: PrincipalPair, g: Coefficient) -> float:
     """The mean of a function of ξ in the tilted density."""
     space = pair.space
-    weighed = along((space.phi.unit, space.xi.mass(g)), space.table(pair.right))
-    return float(pair.left @ weighed.ravel() / (pair.left @ space.weighed(pair.right)))
+    weighed = KroneckerSum([[space.phi.matrix(one), space.xi.mass(g)]]) @ pair.right
+    return float(pair.left @ weighed / (pair.left @ space.weighed(pair.right)))
 
 
 def has_cones(problem: Problem) -> bool:
