@@ -33,7 +33,6 @@ from fpsolve.exponent.method import (
     RTOL,
     RTOL_OF_SEVERAL,
     Method,
-    Pictures,
     Search,
     Stage,
     Tolerance,
@@ -44,8 +43,6 @@ from fpsolve.exponent.starts import Start, first, has_cones, other_centers, refi
 from fpsolve.fem.axis import FEW_UNKNOWNS
 from fpsolve.fem.factors import one_thread
 from fpsolve.fem.generator import SMALL_P, Generator
-from fpsolve.fem.noise_axes import PolynomialAxis
-from fpsolve.fem.phase import PhaseAxis
 from fpsolve.fem.space import Space
 from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model import quantity
@@ -87,15 +84,15 @@ TINIEST_P = 1e-9
 
 
 class Elements(Method):
-    """Λ(p) of two variables.
+    """Λ(p) by pairs on elements.
 
     Attributes:
         spaces: what was solved, by p.
+        has_witness: whether the equations of even moments are independent of L(p), and quick.
         remedy: what to do where it is not resolved, or a budget does not suffice.
     """
 
-    is_function = True
-    pictures: Pictures = PHASE_AND_NOISE
+    has_witness: bool = True
     remedy: Remedy = Remedy.BUDGET
 
     def __init__(self, *args: Any) -> None:
@@ -103,57 +100,6 @@ class Elements(Method):
         self._even = dict[float, EvenMoment | None]()
         self.spaces: dict[float, Solution] = {}
         self._failed = dict[float, tuple[type[NotConverged], Message]]()
-
-    @property
-    def usual_rtol(self) -> float:  # type: ignore[override]
-        return RTOL_OF_SEVERAL if self.is_dear(1.0) else RTOL
-
-    def is_dear(self, p: float) -> bool:
-        return len(self.problem.coloured.parts) > 1
-
-    @property
-    def is_quick(self) -> bool:  # type: ignore[override]
-        return self.problem.coloured.variables == 1
-
-    @property
-    def no_picture(self) -> str:  # type: ignore[override]
-        noise = self.problem.coloured
-        if len(noise.parts) > 1:
-            several = "an eigenfunction of the phase and of several noises that are not white cannot be drawn"
-            return f"{several}; make all of these noises white but one"
-        if noise.is_drawn:
-            return ""
-        return (
-            f"{noise.kind} noise is no Markov process by itself, so that an eigenfunction is not a function of phase "
-            "and noise, which could be drawn; look at Λ(p), or at densities of a simulation"
-        )
-
-    def places(self, p: float, tolerance: Tolerance, found: Sequence[Solution]) -> Iterator[tuple[Stage, Any]]:
-        """The first stages of the places where Λ(p) may be carried, and what each begins with, after those before.
-
-        The first one is that of the nearest p, if what was chosen there is likely to do, else where slow noise carries
-        the moment, or the mean of other noise. Others are far from there. A small p has the functions of `SMALL_P`.
-        """
-        if abs(p) < SMALL_P:
-            yield Start(self.problem, self.near_zero(p, tolerance).pair.generator.chosen), self._near(p)
-            return
-        near = self._near(p)
-        if near and (space := self._reused(p, near[0], tolerance)):
-            yield Start(self.problem, space), near
-        else:
-            yield Start(self.problem, first(self.problem, p, self.settings.rtol)), None
-        for center in other_centers(found[0].pair):
-            yield Start(self.problem, first(self.problem, p, self.settings.rtol, center)), None
-
-    def _reused(self, p: float, near: PrincipalPair, tolerance: Tolerance) -> Space | None:
-        """The space of the nearest p, or one that should be within the tolerance there; None where it is of no use."""
-        q, space = near.p, near.generator.chosen
-        if abs(q) >= SMALL_P:
-            new = refined(self.spaces[q], tolerance(q, near.value), 0)
-            is_large = space.size > WORTH_A_TRY and new.size < TRIM * space.size
-            space = new if is_large or new.size > space.size else space
-        is_far = space.size > WORTH_A_TRY and abs(p - q) > max(0.5, 0.4 * min(abs(p), abs(q)))
-        return space if not is_far and self._tilt_fits(space, p) else None
 
     def _near(self, p: float) -> list[PrincipalPair]:
         """Some pairs at the nearest p, the nearest first."""
@@ -198,37 +144,24 @@ class Elements(Method):
             raise NotConverged(Message(Code.OUT_OF_RANGE, p=p, reason=str(failure))) from failure
         return solution
 
+    def places(self, p: float, tolerance: Tolerance, found: Sequence[Solution]) -> Iterator[tuple[Stage, Any]]:
+        """The first stages of the places where Λ(p) may be carried, and what each begins with, after those before.
+
+        A small p has the functions of `SMALL_P`.
+        """
+        yield Start(self.problem, self.near_zero(p, tolerance).pair.generator.chosen), self._near(p)
+
+    def confirmed(self, search: Search, found: Sequence[Solution]) -> Solution:
+        """The largest of those at all places."""
+        return max(found, key=lambda each: each.value)
+
+    def is_at_corner(self, p: float) -> bool:
+        """Whether p is where Λ may have a corner."""
+        return False
+
     def allowed(self, tolerance: Tolerance, pair: PrincipalPair) -> float:
         """The largest error of Λ(p); any for small p, where it has no scale."""
         return tolerance(pair.p, pair.value) if abs(pair.p) >= SMALL_P else math.inf
-
-    def confirmed(self, search: Search, found: Sequence[Solution]) -> Solution:
-        """The largest of those at all places, if it agrees with that of halved cells of φ within its error, or within
-        what is allowed.
-
-        At a coarse tolerance a thin layer of T, as where the phase rests, may lie within a cell that is so large that
-        none of its modes shows it. Where two eigenvalues meet, modes of a mixture of both T tell little.
-        """
-        best = max(found, key=lambda each: each.value)
-        chosen, p = best.pair.generator.chosen, search.p
-        if self.is_at_corner(p) and is_mixed(best.pair):
-            halves = chosen.doubled()
-            with unless_over_budget():
-                pair = self.pair_among(halves, best.pair)
-                return replace(best, search=2 * abs(pair.value - best.value))
-            return self.confirmed(search, [search.settle(Start(self.problem, halves))])
-        if self.settings.rtol <= SURELY_SEEN or not isinstance(chosen.phi, PhaseAxis) or abs(p) < SMALL_P:
-            return best
-        halved = chosen.with_axis(0, chosen.phi.doubled())
-        if halved.size > min(MOST_HALVED, self.settings.budget.most(halved)):
-            return best
-        finer = search.settle(Start(self.problem, halved), best.pair)
-        change = abs(finer.value - best.value)
-        if change <= best.error:
-            return best
-        if change + finer.error <= search.allowed(finer.pair):
-            return replace(finer, search=finer.search + change)
-        return self.confirmed(search, [finer])
 
     def pair_on(self, generator: Generator, p: float, start: PrincipalPair | Sequence[PrincipalPair]) -> PrincipalPair:
         """The principal pair; where it is not found, the failure has the remedy of this place."""
@@ -277,18 +210,6 @@ class Elements(Method):
         """Number of unknowns that a finer space may have."""
         return self.settings.budget.most(space)
 
-    def is_at_corner(self, p: float) -> bool:
-        """Whether p is where Λ may have a corner."""
-        return abs(p + 1) <= AT_CORNER
-
-    def _tilt_fits(self, chosen: Space, p: float) -> bool:
-        """Whether the tilt of a space is about that at p."""
-        axis, frozen = chosen.xi, frozen_noise(self.problem)
-        if frozen is None or not isinstance(axis, PolynomialAxis):
-            return True
-        away = abs(frozen.tilt(frozen.center(p)) - axis.slope * p) if self.problem.coloured.may_tilt else 0.0
-        return away <= MOST_TILT_AWAY
-
     def _witness(self, p: float, value: float, error: float) -> None:
         """Refuse a value with this error that contradicts the even moment of the same p."""
         if (known := self.even(p)) and abs(value - known.value) > doubt(error, known):
@@ -301,7 +222,7 @@ class Elements(Method):
         In the plane it is the witness under noise of several dimensions and under chains, where other pairs may be
         positive, too; under other noise it would take as long as elements do, and is None.
         """
-        if p <= 0 or p % 2 or not self._has_witness:
+        if p <= 0 or p % 2 or not self.has_witness:
             return None
         if p not in self._even:
             self._even[p] = None
@@ -311,10 +232,6 @@ class Elements(Method):
                 checked(Estimate(found.value, found.error, self.scale(p)), self.refinement, p)
                 self._even[p] = found
         return self._even[p]
-
-    @property
-    def _has_witness(self) -> bool:
-        return frozen_noise(self.problem) is None and not self.problem.coloured.is_white
 
     def pair(self, p: float) -> PrincipalPair:
         return self.solution(p).pair
@@ -441,6 +358,104 @@ class Elements(Method):
         more = [0.5 * p * each.curvature.value if p else 0.0 for each in changed]
         return np.array([each.slope.value for each in changed]) + more
 
+
+class PlaneElements(Elements):
+    """Λ(p) of two variables."""
+
+    is_function = True
+    pictures = PHASE_AND_NOISE
+
+    @property
+    def usual_rtol(self) -> float:  # type: ignore[override]
+        return RTOL_OF_SEVERAL if self.is_dear(1.0) else RTOL
+
+    def is_dear(self, p: float) -> bool:
+        return len(self.problem.coloured.parts) > 1
+
+    @property
+    def is_quick(self) -> bool:  # type: ignore[override]
+        return self.problem.coloured.variables == 1
+
+    @property
+    def no_picture(self) -> str:  # type: ignore[override]
+        noise = self.problem.coloured
+        if len(noise.parts) > 1:
+            several = "an eigenfunction of the phase and of several noises that are not white cannot be drawn"
+            return f"{several}; make all of these noises white but one"
+        if noise.is_drawn:
+            return ""
+        return (
+            f"{noise.kind} noise is no Markov process by itself, so that an eigenfunction is not a function of phase "
+            "and noise, which could be drawn; look at Λ(p), or at densities of a simulation"
+        )
+
+    def places(self, p: float, tolerance: Tolerance, found: Sequence[Solution]) -> Iterator[tuple[Stage, Any]]:
+        """The first one is that of the nearest p, if what was chosen there is likely to do, else where slow noise
+        carries the moment, or the mean of other noise. Others are far from there.
+        """
+        if abs(p) < SMALL_P:
+            yield from super().places(p, tolerance, found)
+            return
+        near = self._near(p)
+        if near and (space := self._reused(p, near[0], tolerance)):
+            yield Start(self.problem, space), near
+        else:
+            yield Start(self.problem, first(self.problem, p, self.settings.rtol)), None
+        for center in other_centers(found[0].pair):
+            yield Start(self.problem, first(self.problem, p, self.settings.rtol, center)), None
+
+    def _reused(self, p: float, near: PrincipalPair, tolerance: Tolerance) -> Space | None:
+        """The space of the nearest p, or one that should be within the tolerance there; None where it is of no use."""
+        q, space = near.p, near.generator.chosen
+        if abs(q) >= SMALL_P:
+            new = refined(self.spaces[q], tolerance(q, near.value), 0)
+            is_large = space.size > WORTH_A_TRY and new.size < TRIM * space.size
+            space = new if is_large or new.size > space.size else space
+        is_far = space.size > WORTH_A_TRY and abs(p - q) > max(0.5, 0.4 * min(abs(p), abs(q)))
+        return space if not is_far and self._tilt_fits(space, p) else None
+
+    def confirmed(self, search: Search, found: Sequence[Solution]) -> Solution:
+        """The largest one, if it agrees with that of halved cells of φ within its error, or within what is allowed.
+
+        At a coarse tolerance a thin layer of T, as where the phase rests, may lie within a cell that is so large that
+        none of its modes shows it. Where two eigenvalues meet, modes of a mixture of both T tell little.
+        """
+        best = super().confirmed(search, found)
+        chosen, p = best.pair.generator.chosen, search.p
+        if self.is_at_corner(p) and is_mixed(best.pair):
+            halves = chosen.doubled()
+            with unless_over_budget():
+                pair = self.pair_among(halves, best.pair)
+                return replace(best, search=2 * abs(pair.value - best.value))
+            return self.confirmed(search, [search.settle(Start(self.problem, halves))])
+        if self.settings.rtol <= SURELY_SEEN or abs(p) < SMALL_P:
+            return best
+        halved = chosen.with_axis(0, chosen.phi.doubled())
+        if halved.size > min(MOST_HALVED, self.settings.budget.most(halved)):
+            return best
+        finer = search.settle(Start(self.problem, halved), best.pair)
+        change = abs(finer.value - best.value)
+        if change <= best.error:
+            return best
+        if change + finer.error <= search.allowed(finer.pair):
+            return replace(finer, search=finer.search + change)
+        return self.confirmed(search, [finer])
+
+    def is_at_corner(self, p: float) -> bool:
+        return abs(p + 1) <= AT_CORNER
+
+    def _tilt_fits(self, chosen: Space, p: float) -> bool:
+        """Whether the tilt of a space is about that at p."""
+        axis, frozen = chosen.xi, frozen_noise(self.problem)
+        if frozen is None:
+            return True
+        away = abs(frozen.tilt(frozen.center(p)) - axis.slope * p) if self.problem.coloured.may_tilt else 0.0
+        return away <= MOST_TILT_AWAY
+
+    @property
+    def has_witness(self) -> bool:  # type: ignore[override]
+        return frozen_noise(self.problem) is None and not self.problem.coloured.is_white
+
     def bounds(self, p: FloatArray, value: FloatArray, error: FloatArray) -> tuple[Message, ...]:
         """That Λ(p) for p < −1 depends on the start, or nothing.
 
@@ -454,7 +469,7 @@ class Elements(Method):
         return None
 
 
-class GivenMesh(Elements):
+class GivenMesh(PlaneElements):
     """Λ(p) of two variables on a given mesh, with the error that a finer one tells."""
 
     adapts = False

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 from html import escape
@@ -23,7 +22,6 @@ from fpsolve.data import Quantity, Result, brief, dataset
 from fpsolve.errors import NotConverged
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.fem.axis import ModeEffects, along
-from fpsolve.fem.space import Space
 from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.quantity import UNNAMED
 
@@ -168,29 +166,13 @@ def checked(estimate: Estimate, remedy: Remedy, p: float | None = None) -> Estim
     return estimate
 
 
-class ErrorParts(NamedTuple):
-    """Estimates of |error of Λ(p)| by where it comes from.
-
-    Attributes:
-        modes: functions that the space lacks: the effects of the highest modes, or what finer functions change.
-        ends: the ends of an interval of the noise.
-        rounding: a bound.
-        search: what is left of a correction by finer functions of directions, or shown by halved cells of φ.
-    """
-
-    modes: float
-    ends: float
-    rounding: float
-    search: float
-
-
 @dataclass(frozen=True, eq=False)
 class Solution:
     """Λ(p) with the parts of its error.
 
     Attributes:
         pair: the principal pair.
-        search: see `ErrorParts`.
+        search: what is left of a correction by finer functions of directions, or shown by halved cells of φ.
         measured: what finer functions of each axis, or of all, change; None where the effects of the highest modes
             tell.
         start: the place where it was found, and its functions; None where these are just those of the pair.
@@ -222,53 +204,12 @@ class Solution:
         return truncation(self.pair)
 
     @cached_property
-    def parts(self) -> ErrorParts:
-        """Estimates of what the error of `pair.value` comes from."""
-        of_axes = [each.error for each in self.effects if each] if self.measured is None else self.measured
-        return ErrorParts(sum(of_axes), sum(self.truncation), self.pair.rounding, self.search)
-
-    @property
     def error(self) -> float:
-        """Estimate of the error of `pair.value`, the sum of its parts."""
-        return sum(self.parts)
-
-
-@dataclass(frozen=True, eq=False)
-class Ladder:
-    """The functions of a space by their modes along one axis.
-
-    Attributes:
-        at: the axis.
-        cells, modes: of its functions, shape (size,), see `Axis`.
-        degrees: of its cells, shape (cells,).
-        nested: for each axis the matrix to coefficients of modes; None where they are that already.
-    """
-
-    at: int
-    cells: Any
-    modes: Any
-    degrees: Any
-    nested: tuple[Any, ...]
-
-    def highest(self, depth: int) -> Any:
-        """Which functions of the axis are of so many highest modes of their cell, shape (size,)."""
-        return (self.cells >= 0) & (self.modes > self.degrees[self.cells] - depth)
-
-    def along(self, of_functions: Any) -> Any:
-        """Numbers for the functions of the axis as a factor of tables."""
-        return of_functions.reshape([-1 if k == self.at else 1 for k in range(len(self.nested))])
-
-
-def ladders(space: Space) -> Iterator[Ladder | None]:
-    """Those of all axes; None for one without cells, as of states."""
-    for at, axis in enumerate(space.axes):
-        if (count := int(axis.cells.max()) + 1) == 0:
-            yield None
-            continue
-        degrees, inside = np.zeros(count, dtype=int), axis.cells >= 0
-        np.maximum.at(degrees, axis.cells[inside], axis.modes[inside])
-        nested = tuple(axis.nested if k == at else None for k in range(len(space.axes)))
-        yield Ladder(at, axis.cells, axis.modes, degrees, nested)
+        """Estimate of the error of `value`: by functions that the space lacks, the ends of an interval, rounding."""
+        of_axes = self.measured
+        if of_axes is None:
+            of_axes = tuple(each.error for each in self.effects if each)
+        return sum(of_axes) + sum(self.truncation) + self.pair.rounding + self.search
 
 
 def mode_effects(pair: PrincipalPair) -> tuple[ModeEffects | None, ...]:
@@ -277,27 +218,28 @@ def mode_effects(pair: PrincipalPair) -> tuple[ModeEffects | None, ...]:
     L − Λ is applied to the smoother function of both. T for p and T* for −2 − p solve the same equation but for the
     direction of time: that of the paths for p < −1 has layers where the paths for p > −1 leave.
     """
-    operator = pair.generator.at(pair.p).matrix.shifted(pair.eigenvalue)
+    operator, space = pair.generator.at(pair.p).matrix.shifted(pair.eigenvalue), pair.space
     smooth, rough = pair.right, pair.left
     if pair.p < -1:
         smooth, rough, operator = rough, smooth, operator.T
-    space, found = pair.space, list[ModeEffects | None]()
     norm = abs(float(pair.left @ space.weighed(pair.right)))
-    for ladder in ladders(space):
-        if ladder is None:
+    count, found = len(space.axes), list[ModeEffects | None]()
+    for k, axis in enumerate(space.axes):
+        inside = axis.cells >= 0
+        if not np.any(inside):
             found.append(None)
             continue
-        height = ladder.degrees[ladder.cells] - ladder.modes  # 0 for the highest mode of a cell
-        masks = (ladder.cells >= 0) & (height == np.arange(DEPTH)[:, None])
-        kept = np.stack([ladder.along(mask) for mask in masks])
-        others = tuple(1 + k for k in range(len(space.axes)) if k != ladder.at)
-        first, last = (along(ladder.nested, space.table(each)) for each in (smooth, rough))
+        degrees = np.zeros(int(axis.cells.max()) + 1, dtype=int)
+        np.maximum.at(degrees, axis.cells[inside], axis.modes[inside])
+        masks = inside & (degrees[axis.cells] - axis.modes == np.arange(DEPTH)[:, None])  # from the highest mode on
+        kept = masks.reshape(DEPTH, *(axis.size if j == k else 1 for j in range(count)))
+        nested = [axis.nested if j == k else None for j in range(count)]
+        first, last = (along(nested, space.table(each)) for each in (smooth, rough))
         parts = last * np.cumsum(operator.images(first * kept), axis=0)
-        shares = np.abs(parts).sum(axis=others) * np.cumsum(masks, axis=0)
-        inside = np.flatnonzero(ladder.cells >= 0)
-        effects = [np.bincount(ladder.cells[inside], each[inside], ladder.degrees.size) / norm for each in shares]
+        shares = np.abs(parts).sum(axis=tuple(1 + j for j in range(count) if j != k)) * np.cumsum(masks, axis=0)
+        effects = [np.bincount(axis.cells[inside], each[inside], degrees.size) / norm for each in shares]
         highest = np.maximum.accumulate(effects)  # in those of more modes, parts of these may cancel
-        found.append(ModeEffects(ladder.degrees, highest, pair.generator.slowest[ladder.at]))
+        found.append(ModeEffects(degrees, highest, pair.generator.slowest[k]))
     return tuple(found)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from fpsolve.exponent.blocks import Blocks
 from fpsolve.exponent.closed import DelayMoments, EvenMoments, Simulated, StruckMoments
-from fpsolve.exponent.elements import Elements, GivenMesh
+from fpsolve.exponent.elements import GivenMesh, PlaneElements
 from fpsolve.exponent.method import Method, Settings
 from fpsolve.exponent.modes import Directions
 from fpsolve.exponent.stopped import Stopped
@@ -25,7 +25,7 @@ def choose(problem: Problem, settings: Settings | None = None) -> Method:
             raise ValueError(
                 "got a mesh, but meshes are for two variables only, as their lines are those of a phase; leave it out"
             )
-        kind = GivenMesh if kind is Elements else kind
+        kind = GivenMesh if kind is PlaneElements else kind
     return kind(problem, settings, choose)
 
 
@@ -43,5 +43,5 @@ def kind_of(problem: Problem) -> type[Method]:
     if problem.blocks:
         return Blocks
     if is_in_plane:
-        return Elements
+        return PlaneElements
     return Stopped if problem.system.stop else Directions

@@ -373,13 +373,6 @@ class Stage(Protocol):
         """Functions that should have an error of about a goal, after so many stages, with so many unknowns at most."""
 
 
-class Best(NamedTuple):
-    """What is found at a place that is nearest to the tolerance, and its error over what is allowed."""
-
-    found: Any
-    share: float
-
-
 class Ended(Exception):
     """No stage may follow, for a reason other than time."""
 
@@ -399,7 +392,8 @@ class Search:
         remedy: what to do where the budget does not suffice.
         stages: how many stages were solved.
         failure: why the last stage had no solution.
-        best: what the last place has.
+        best: what the last place has that is nearest to the tolerance.
+        share: its error over what is allowed.
         judged: what the last stage has.
         last: seconds spent before the last stage, and its unknowns.
     """
@@ -410,7 +404,8 @@ class Search:
     remedy: Remedy
     stages: int = 0
     failure: Exception | None = None
-    best: Best | None = None
+    best: Any = None
+    share: float = math.inf
     judged: Any = None
     last: tuple[float, int] = (0.0, 0)
 
@@ -425,7 +420,7 @@ class Search:
             NotConverged: the budget does not suffice, or rounding is larger than the tolerance; `partial` is the best
                 that is found, or None.
         """
-        self.best = self.judged = None
+        self.best, self.judged, self.share = None, None, math.inf
         try:
             while True:
                 stage = self._begun(stage)
@@ -441,14 +436,14 @@ class Search:
                 self.judged = found = stage.judged(near, allowed)
                 if found.error <= allowed and stage.is_enough(found):
                     return found
-                if found.error / allowed < (self.best.share if self.best else math.inf):
-                    self.best = Best(found, found.error / allowed)
+                if found.error / allowed < self.share:
+                    self.best, self.share = found, found.error / allowed
                 if near.rounding > allowed:
                     raise Ended(Message(Code.ROUNDED, size=near.rounding))
                 stage = stage.refined(found, allowed, self.stages, self.budget.most(stage))
         except (OverBudget, Ended) as failure:
-            if self.best is not None and self.best.share <= 1:  # within the tolerance, but for its slope
-                return self.best.found
+            if self.share <= 1:  # within the tolerance, but for its slope
+                return self.best
             return self._stop(failure)
 
     def _begun(self, stage: Stage | None) -> Stage:
@@ -466,11 +461,11 @@ class Search:
         """Raise `NotConverged`, or `OverBudget`, with the best that is found."""
         reason, kind = ended.reason, OverBudget if isinstance(ended, OverBudget) else NotConverged
         if self.best is not None:
-            number = {"value": self.best.found.value, "error": self.best.found.error, "size": self.best.share}
+            number = {"value": self.best.value, "error": self.best.error, "size": self.share}
             told = Message(Code.BUDGET_SPENT, p=self.p, reason=reason, **number)
         else:
             last, is_thin = self.failure, isinstance(self.failure, NotConverged)
             said = last.message.advising(None) if isinstance(last, FpsolveError) else last and str(last)
             told = Message(Code.NOTHING_RESOLVED, p=self.p, reason=reason, is_thin=is_thin, last=said)
         remedy = None if reason.code is Code.ROUNDED else self.remedy
-        raise kind(told, self.best and self.best.found, remedy)
+        raise kind(told, self.best, remedy)

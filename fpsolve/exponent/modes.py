@@ -26,14 +26,14 @@ from fpsolve.errors import NoHierarchy
 from fpsolve.exponent.eigen import PrincipalPair, principal_pair
 from fpsolve.exponent.elements import Elements
 from fpsolve.exponent.error import Moment, Solution, mode_effects
-from fpsolve.exponent.method import DIRECTIONS, RTOL_BEYOND_PLANE, Method, Stage, Tolerance
+from fpsolve.exponent.method import RTOL_BEYOND_PLANE, Stage, Tolerance
 from fpsolve.exponent.moments import EvenMoment, even_moment, mean_matrix, moment_row
 from fpsolve.exponent.powers import moment_form
 from fpsolve.exponent.starts import SHARE, Start
 from fpsolve.fem.directions import DirectionAxis, SphereAxis, group_dimensions
 from fpsolve.fem.generator import SMALL_P, Generator
 from fpsolve.fem.space import Space, first_axis
-from fpsolve.messages import Message, Remedy
+from fpsolve.messages import Remedy
 from fpsolve.model.problem import Problem
 
 FIRST_WAVES = 2
@@ -273,12 +273,7 @@ class Directions(Elements):
     """Λ(p) of three and four variables; of even p it is that of the equations of the moments, where these close."""
 
     stage: ClassVar[type[DirectionStart]] = SphereStart
-    is_function = False
-    is_quick = False
     by_moments = True
-    pictures = DIRECTIONS
-    _has_witness = True
-    no_picture = ""
     usual_rtol = RTOL_BEYOND_PLANE
     remedy = Remedy.MANY
 
@@ -299,15 +294,6 @@ class Directions(Elements):
 
     def is_dear(self, p: float) -> bool:
         return p <= 0 or p % 2 != 0
-
-    def is_at_corner(self, p: float) -> bool:
-        return False
-
-    def bounds(self, p: FloatArray, value: FloatArray, error: FloatArray) -> tuple[Message, ...]:
-        return ()
-
-    def unseen(self) -> Message | None:
-        return Method.unseen(self)
 
     def number(self, p: float) -> EvenMoment | None:
         return self.even(p)

@@ -258,11 +258,6 @@ class ExponentSolver:
         ratio, error = self.method.ratio_alone(p, tolerance)
         return Node(ratio, error, self.method.solution(p, tolerance).derivative if p else ratio)
 
-    def take(self, p: float, row: Moment) -> None:
-        """Have the error of Λ′(p), which takes an eigenpair, from an earlier run."""
-        if not math.isnan(row.derivative_error):
-            self.slope_errors.setdefault(p, row.derivative_error)
-
     def moments(
         self,
         p: ArrayLike,
@@ -288,7 +283,8 @@ class ExponentSolver:
             begin(f"Λ({point:g})")
             if self.method.goes_on and point in known and not math.isnan(known[point].derivative):
                 rows[i] = known[point]
-                self.take(point, rows[i])
+                if not math.isnan(rows[i].derivative_error):
+                    self.slope_errors.setdefault(point, rows[i].derivative_error)
                 progress()
                 continue
             try:
