@@ -11,7 +11,8 @@ import numpy as np
 
 from fpsolve.arrays import FloatArray
 from fpsolve.files import write_text
-from fpsolve.model.problem import Problem, parameter_lines, parameter_words
+from fpsolve.model.parameters import parameter_lines, parameter_words
+from fpsolve.model.problem import Problem
 from fpsolve.signals import signals_held
 
 Facts = Mapping[str, Any]
@@ -24,7 +25,7 @@ def field_data(parameters: Facts, varied: Collection[str], problem: Problem) -> 
     words = {"varied": parameter_words(known, varied), "held": "\n".join(parameter_lines(known, varied))}
     named = {f"{key} = {each.value}": 1.0 for key, each in known.items() if isinstance(each.value, str)}
     numbers = {key: each for key, each in parameters.items() if f"{key} = {each}" not in named}
-    return {**numbers, **named, **{name: text.replace("²", "^2") for name, text in words.items() if text}}
+    return numbers | named | {name: text.replace("²", "^2") for name, text in words.items() if text}
 
 
 def write_between(path: Path, places: Sequence[FloatArray], data: Mapping[str, Any], facts: Facts) -> None:
@@ -72,8 +73,9 @@ def write_vtk(path: Path, grid: Any, facts: Facts) -> None:
     from vtkmodules.vtkIOXML import vtkXMLImageDataWriter, vtkXMLUnstructuredGridWriter
 
     for name, value in facts.items():
-        is_text = isinstance(value, str)
-        grid.field_data[name] = np.frombuffer(value.encode(), np.uint8) if is_text else np.atleast_1d(value)
+        grid.field_data[name] = (
+            np.frombuffer(value.encode(), np.uint8) if isinstance(value, str) else np.atleast_1d(value)
+        )
     writer = vtkXMLImageDataWriter() if path.suffix == ".vti" else vtkXMLUnstructuredGridWriter()
     writer.SetInputData(grid)
     writer.WriteToOutputStringOn()

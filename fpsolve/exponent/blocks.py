@@ -21,7 +21,8 @@ from fpsolve.exponent.eigen import PairDerivatives, PrincipalPair
 from fpsolve.exponent.error import Absent, Estimate, InvariantClass, Moment
 from fpsolve.exponent.method import DIRECTIONS, PHASE_AND_NOISE, RTOL_BEYOND_PLANE, Along, Method, Pictures, Tolerance
 from fpsolve.messages import Code, Message
-from fpsolve.model.problem import ParameterDerivative
+from fpsolve.model.problem import ParameterDerivative, Problem
+from fpsolve.model.subsystem import couples
 
 TINIEST_P = 1e-9
 """For smaller |p| the part of the largest λ counts, and p < 0 is 0 but for rounding."""
@@ -35,7 +36,8 @@ class Blocks(Method):
     @cached_property
     def parts(self) -> tuple[Method, ...]:
         """The methods of the parts."""
-        return tuple(self.choose(each, self.settings) for each in self.problem.classes)
+        own = [Problem(block, self.problem.noise.driving(block)) for block in self.problem.blocks]
+        return tuple(self.choose(each, self.settings) for each in own)
 
     @property
     def usual_rtol(self) -> float:  # type: ignore[override]
@@ -158,7 +160,8 @@ class Blocks(Method):
         return part.held(p, known)
 
     def closes(self, key: str) -> bool:
-        return self.problem.couples_blocks(key)
+        section, _, name = key.rpartition(".")
+        return section == self.problem.system.section and couples(self.problem.blocks, name)
 
     def gradient(self, p: float, keys: Sequence[str]) -> FloatArray:
         part, along = self.held(p, {key: self.problem.derivative(key) for key in keys})

@@ -19,7 +19,7 @@ import sys
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import cached_property, reduce
+from functools import cached_property, lru_cache, reduce
 from itertools import combinations_with_replacement
 from typing import Any, NamedTuple
 
@@ -42,7 +42,6 @@ from fpsolve.exponent.rightmost import REMEDY, ROUNDING
 from fpsolve.fem.space import AXES, first_axis
 from fpsolve.messages import Remedy
 from fpsolve.model.noise import Noise
-from fpsolve.model.parameters import cached_by_problem
 from fpsolve.model.plane import System
 from fpsolve.model.problem import Problem
 from fpsolve.theory.perturbation import Scale
@@ -95,7 +94,7 @@ class Functions(NamedTuple):
     unit: FloatArray
 
 
-@cached_by_problem(64)  # derivatives by parameters of the system have the same
+@lru_cache(64)  # derivatives by parameters of the system have the same
 def functions_of(noise: Noise, count: int) -> Functions:
     """Those of degrees below a count: the functions of elements, by a Cholesky factor C of their products ∫ f_k f_l."""
     axis = first_axis(noise, 0.0).of_degree(count)

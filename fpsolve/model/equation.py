@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 import unicodedata
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -11,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from fpsolve.arrays import FloatArray
-from fpsolve.model.plane import System, affine
+from fpsolve.model.plane import System, affine, written_sum
 from fpsolve.model.problem import Problem
 
 
@@ -50,23 +49,7 @@ def equations_of(system: System) -> list[str]:
         each = [{key: matrix[i] for key, matrix in driven.items()} for i in range(rates)]
         rows = [(f"d{names[i]}/dt", still[i], cubic[i], each[i], names) for i in range(rates)]
     told = [f"{row[0]} = {_sum(*row[1:])}" for row in rows]
-    for jump in system.jumps:
-        factor = f"{math.exp(jump.log_factor):.10g}"
-        at_wall = math.isclose(math.cos(jump.phase), 0.0, abs_tol=1e-12)
-        words = (
-            f"|{names[1]}|⁺ = {factor} |{names[1]}|⁻ at {names[0]} = 0"
-            if at_wall
-            else f"‖x‖⁺ = {factor} ‖x‖⁻ at φ = {jump.phase:.6g} and φ + π"
-        )
-        told += [words] if jump.log_factor or not at_wall else []
-    if (stop := system.stop) is not None:
-        none, moved = np.zeros(4), stop.matrix - np.eye(n)
-        at = _sum(np.array(stop.coordinates[0]), none, {}, names)
-        told += [
-            f"{names[i]}⁺ = {_sum(np.round(stop.matrix[i], 12), none, {}, names)} at {at} = 0"
-            for i in np.flatnonzero(moved.any(axis=1)).tolist()
-        ]
-    return told
+    return told + [line for wall in system.barriers for line in wall.told(names)]
 
 
 def _dotted(letter: str, count: int) -> str:
@@ -85,12 +68,7 @@ def _sum(constant: FloatArray, cubic: FloatArray, by_noise: Mapping[str, FloatAr
         for name, row in by_noise.items()
         for size, s in zip(row, states, strict=True)
     ]
-    text = "".join(
-        f" {'−' if size < 0 else '+'} {'' if abs(size) == 1 else f'{abs(size):.10g} '}{name}"
-        for size, name in terms
-        if size
-    )
-    return re.sub(r"^ \+ |^ (?=−)", "", text).replace("− ", "−", text.startswith(" −")) or "0"
+    return written_sum(terms)
 
 
 def noise_sentences(problem: Problem) -> list[str]:

@@ -175,11 +175,16 @@ class Noise(Parametrised):
 
     @property
     def reached(self) -> FloatArray:
-        """Values of ξ that sample its whole range, at most 1e6 std wide to each side; shape (n,).
+        """Values of ξ that sample its whole range, at most 12 std wide to each side; shape (n,).
 
         They increase; those of a chain are its states, in their order.
         """
-        return np.asarray(min(self.half_width, 1e6 * self.standard_deviation) * np.linspace(-1, 1, 1001))
+        return np.asarray(min(self.half_width, 12 * self.standard_deviation) * np.linspace(-1, 1, 1001))
+
+    @property
+    def typical(self) -> FloatArray:
+        """The ends of the range where ξ is mostly; of a chain all states."""
+        return min(2 * self.standard_deviation, self.half_width) * np.array([-1.0, 1.0])
 
     def misfit(self, xi: float) -> str:
         """Why no path that is told by ξ alone starts there, after a sentence "got xi = 1"; empty where one does."""
@@ -259,6 +264,10 @@ class Noise(Parametrised):
         """How this noise moves a system; by default only along a path of ξ."""
         return Motion(system)
 
+    def driving(self, system: System) -> Noise:
+        """The noises of these that drive a part of the system; the first one where none does."""
+        return self
+
     def changed_motion(self, system: System, terms: Sequence[CoefficientMatrix], name: str = "") -> MotionDerivative:
         """The derivative ∂/∂θ of the `motion`.
 
@@ -285,6 +294,7 @@ class Memoryless(Noise):
     is_white: ClassVar[bool] = True
     has_states: ClassVar[bool] = True
     left_in_phase: ClassVar[float] = 1.0
+    may_tilt: ClassVar[bool] = False
     states: ClassVar[Sequence[float]] = (0.0,)
     rates: ClassVar[Sequence[Sequence[float]]] = ((0.0,),)
 
@@ -309,6 +319,8 @@ class Memoryless(Noise):
     @property
     def reached(self) -> FloatArray:
         return np.zeros(1)
+
+    typical = reached
 
     def start(self, size: int, rng: np.random.Generator) -> FloatArray:
         """0: it has no value."""

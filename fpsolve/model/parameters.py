@@ -4,22 +4,21 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from enum import Enum
-from functools import cache, lru_cache, wraps
-from typing import Annotated, Any, ClassVar, NamedTuple, ParamSpec, Self, TypeVar, cast
+from functools import cache
+from textwrap import wrap
+from typing import Annotated, Any, ClassVar, NamedTuple, Self, cast
 
 from pydantic import BaseModel, ConfigDict, Field
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
-from fpsolve.data import plain_unit
+from fpsolve.data import plain_unit, written
 from fpsolve.messages import Message
 from fpsolve.model.quantity import Quantity
 
-P = ParamSpec("P")
-R = TypeVar("R")
 SIZE = {"ge": 1e-15, "le": 1e15}
 """The range of a positive parameter: whatever the others are, no formula overflows or divides by nothing."""
 ANY_SIGN = {"ge": -SIZE["le"], "le": SIZE["le"]}
@@ -31,6 +30,8 @@ GREEK = (
     r"omega|Gamma|Delta|Theta|Lambda|Xi|Pi|Sigma|Phi|Psi|Omega)_?(\d*|(?<=_)[a-zA-Z])"
 )
 """A name that is a Greek letter, with a number or a letter below it."""
+LINE = 90
+"""Largest number of letters of a line of parameters."""
 UNITS = {
     "%": (0.01, ""),
     "Hz": (2 * math.pi, ", in rad/time"),
@@ -214,19 +215,23 @@ def unknown_parameter(key: str) -> Quantity:
     return Quantity(key, key, key, latex, "unknown")
 
 
-def cached_by_problem(most: int) -> Callable[[Callable[P, R]], Callable[P, R]]:
-    """Keep so many values of a function of problems or noises; none where the user's own ones cannot be hashed."""
+def parameter_words(parameters: Mapping[str, Parameter], keys: Collection[str]) -> str:
+    """Some of the parameters with their units, by dotted keys: "noise.D0 = 0.1 (1/time), noise.r0 = 0.9"."""
+    return ", ".join(f"{key} = {_valued(parameters[key])}" for key in keys)
 
-    def keeping(function: Callable[P, R]) -> Callable[P, R]:
-        known: Any = lru_cache(most)(function)
 
-        @wraps(function)
-        def value(*args: P.args, **kwargs: P.kwargs) -> R:
-            try:
-                return known(*args, **kwargs)
-            except TypeError:
-                return function(*args, **kwargs)
+def parameter_lines(parameters: Mapping[str, Parameter], besides: Collection[str] = ()) -> list[str]:
+    """All parameters besides some with their units, in lines for the system and for the noise, none of them long."""
+    sections = dict[str, list[str]]()
+    for key, parameter in parameters.items():
+        if key not in besides:
+            section, _, name = key.rpartition(".")
+            sections.setdefault(section, []).append(f"{name} = {_valued(parameter)}".replace(" ", "\xa0"))
+    lines = [wrap(f"{section}: {', '.join(words)}", LINE) for section, words in sections.items()]
+    return [line.replace("\xa0", " ") for each in lines for line in each]
 
-        return value
 
-    return keeping
+def _valued(parameter: Parameter) -> str:
+    """The value of a parameter with its unit."""
+    text, unit = written(parameter.value), parameter.quantity.unit_in_words
+    return f"{text} ({unit})" if unit else text

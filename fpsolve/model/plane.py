@@ -10,7 +10,8 @@ dφ = h dt and d ln a = q dt with h = e′ᵀA e, q = eᵀA e, e′ = de/dφ: a 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
@@ -44,6 +45,10 @@ MOST_MULTIPLE = 12
 """Largest delay, over that of which all are multiples."""
 SAME_DELAY = 1e-9
 """Share of a delay by which it may differ from such a multiple."""
+OF_ENTRIES = 1e-15
+"""Share of the largest speed of a term that is rounding of its entries, as of a matrix that keeps two rays."""
+COLLAPSE = math.exp(-math.pi / math.sqrt(3))
+"""Restitution below which a mass under white noise comes to rest at a wall (E. Jacob, arXiv:1004.1953)."""
 BELOW = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 """Digits below a line."""
 
@@ -161,6 +166,16 @@ def written_coefficient(g: Constant | Linear | Function) -> str:
         case Linear():
             return "ξ "
     return f"{getattr(g.f, '__name__', type(g.f).__name__)}(ξ) "
+
+
+def written_sum(terms: Iterable[tuple[float, str]]) -> str:
+    """A sum of multiples of what is named: "−x + 0.001 ẋ − 0.2 x² ẋ + 0.1 ξ ẋ"."""
+    text = "".join(
+        f" {'−' if size < 0 else '+'} {'' if abs(size) == 1 else f'{abs(size):.10g} '}{name}"
+        for size, name in terms
+        if size
+    )
+    return re.sub(r"^ \+ |^ (?=−)", "", text).replace("− ", "−", text.startswith(" −")) or "0"
 
 
 def is_driven(g: Constant | Linear | Function) -> bool:
@@ -331,6 +346,48 @@ class Jump:
     def second_order(self) -> float:
         return self.log_factor if self.leading is None else self.leading
 
+    def refuse(self, system: System, noise: Any) -> None:
+        """Refuse it where a noise moves the phase across the ray, or nothing does. Raises `ValueError`."""
+        ray, names = f"the ray of a jump, phi = {self.phase:.6g}", [*noise.parts]
+        x, u = (0.0 if abs(each) < 1e-15 else each for each in (math.cos(self.phase), -math.sin(self.phase)))
+        shares = u * x, u * u, -x * x, -x * u  # h = e′ᵀA e is the sum of these times the entries of A, in any units
+        driven = dict[str | None, list[tuple[CoefficientMatrix, FloatArray]]]()
+        for term in system.terms:
+            if np.any(parts := np.multiply(shares, np.ravel(term.matrix))):
+                by = (term.noise if len(names) > 1 else names[0]) if is_driven(term.g) else None
+                driven.setdefault(by, []).append((term, parts))
+        total = size = 0.0
+        for name, own in driven.items():
+            one, xi = noise.parts.get(name or "", noise), np.array([0.0, 1.0])
+            if any(affine(term.g) is None for term, _ in own):
+                xi = one.reached
+            speeds, rounded = np.zeros(xi.size), 0.0
+            for term, parts in own:
+                strengths = system.epsilon**term.order * term.g(xi)
+                most, whole = float(np.max(np.abs(strengths))), float(np.abs(parts).sum())
+                speeds, size = speeds + sum(parts.tolist()) * strengths, size + whole * most
+                rounded += (ROUNDED * whole + OF_ENTRIES * term.fastest[0]) * most
+            if name is not None and not np.ptp(speeds) <= rounded:
+                which = f'the noise "{name}"' if name else f"{one.kind} noise"
+                raise ValueError(
+                    f"{which} moves the phase across {ray}, which it does over no wall: x = 0, phi = pi/2 = "
+                    "1.5707963267948966, is passed with the speed v whatever the noise; let it drive terms that do "
+                    "not move the phase there, or remove the jump"
+                )
+            total += float(speeds[0])
+        if abs(total) <= ROUNDED * size:
+            raise ValueError(
+                f"the phase does not pass {ray}: nothing moves it there, so that no path comes to this wall; remove "
+                "the jump"
+            )
+
+    def told(self, names: Sequence[str]) -> list[str]:
+        """The impact as reports have it, for the names of the variables."""
+        factor = f"{math.exp(self.log_factor):.10g}"
+        if not math.isclose(math.cos(self.phase), 0.0, abs_tol=1e-12):
+            return [f"‖x‖⁺ = {factor} ‖x‖⁻ at φ = {self.phase:.6g} and φ + π"]
+        return [f"|{names[1]}|⁺ = {factor} |{names[1]}|⁻ at {names[0]} = 0"] if self.log_factor else []
+
 
 @dataclass(frozen=True)
 class Stop:
@@ -388,6 +445,40 @@ class Stop:
         found = rows @ whole @ back
         return np.where(np.abs(found) > ROUNDED * (np.abs(rows) @ np.abs(whole) @ np.abs(back)), found, 0.0)
 
+    def told(self, names: Sequence[str]) -> list[str]:
+        """The impact as reports have it, for the names of the variables."""
+
+        def written(row: FloatArray) -> str:
+            return written_sum(zip(np.round(row, 12).tolist(), names, strict=True))
+
+        moved, at = self.matrix, written(self._sides[0][0])
+        rows = [k for k, row in enumerate(moved - np.eye(len(moved))) if row.any()]
+        return [f"{names[k]}⁺ = {written(moved[k])} at {at} = 0" for k in rows]
+
+    def refuse(self, system: System, noise: Any) -> None:
+        """Refuse coordinates that are none of a wall, and one that no law says how to leave. Raises `ValueError`."""
+        n, total, size = system.dimension, 0.0, 0.0
+        if len(self.coordinates) != n:
+            raise ValueError(f"got a wall with {len(self.coordinates)} coordinates of {n} variables; must be of all")
+        for term in system.terms:
+            row = system.epsilon**term.order * self.inside(term.matrix)[0]
+            if is_driven(term.g) and row.any():
+                raise ValueError(
+                    "a noise moves the coordinate of the wall; let it drive velocities alone, or remove the wall"
+                )
+            total, size = total + float(term.g(0.0)) * row, size + float(np.max(np.abs(row)))
+        if not np.all(np.abs(total - np.eye(n)[1]) <= n * ROUNDED * size):
+            told = f"the rate of the coordinate of the wall is {np.round(total, 6).tolist()} in its coordinates"
+            raise ValueError(f"{told}; must be the second one alone, its velocity; choose other coordinates")
+        rows = [self.inside(each.matrix)[1, 2:] for each in noise.motion(system).diffusions]
+        if self.restitution < COLLAPSE and np.any(rows):
+            raise ValueError(
+                f"got restitution = {self.restitution:g} where white noise drives the coordinate of the wall while "
+                f"it rests there; must be >= exp(-pi/sqrt(3)) = {COLLAPSE:.6g}, as below that infinitely many impacts "
+                "bring it to rest, and how the noise frees it again is not computed (J. Bertoin, Ann. Probab. 35, "
+                "2007, for 0; E. Jacob, arXiv:1004.1953 and arXiv:1103.2845); increase it, or take noise with a memory"
+            )
+
 
 class System(Parametrised):
     """What solvers ask of a linear system in the plane.
@@ -419,6 +510,11 @@ class System(Parametrised):
     epsilon: float
     terms: Sequence[CoefficientMatrix]
     jumps: Sequence[Jump]
+
+    @property
+    def barriers(self) -> Sequence[Jump | Stop]:
+        """Its jumps, or its stop."""
+        return self.jumps if self.stop is None else (self.stop,)
 
     @cached_property
     def dimension(self) -> int:

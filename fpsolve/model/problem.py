@@ -4,56 +4,38 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from functools import cached_property
-from itertools import chain
-from textwrap import wrap
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fpsolve.arrays import ROUNDED, FloatArray, shown
-from fpsolve.data import written
+from fpsolve.arrays import FloatArray, shown
 from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.expressions import TIME
 from fpsolve.model.frame import Frame, own_frame
 from fpsolve.model.noise import Noise, NoiseDerivative
 from fpsolve.model.noises.several import noises_of
-from fpsolve.model.parameters import DERIVED, Parameter, Parametrised, cached_by_problem
+from fpsolve.model.parameters import DERIVED, Parameter, Parametrised
 from fpsolve.model.plane import (
-    BELOW,
     CoefficientMatrix,
-    Harmonics,
     Impulse,
-    Jump,
     Motion,
-    Stop,
     System,
     Xi,
-    affine,
     angular_frequency,
     is_driven,
     matrix_at,
     phase_speed,
-    turning,
 )
 from fpsolve.model.quantity import NOISE, Quantity, moment_at
-from fpsolve.model.subsystem import Subsystem, components, couplings, hidden_blocks, reached, subsystems
+from fpsolve.model.subsystem import Subsystem, blocks_of, by_noise, resting_phases
 
 RATE = "1/time"
 """Unit of ξ for which the units of parameters of noises are stated."""
 RTOLS = {"gt": 1e-13, "lt": 1}
 """The range of rtol."""
-SUPPORT = np.linspace(-12, 12, 2401)
-"""Values of ξ at which a coefficient is looked at that is no a + bξ, in standard deviations."""
-OF_ENTRIES = 1e-15
-"""Share of the largest speed of a term that is rounding of its entries, as of a matrix that keeps two rays."""
-COLLAPSE = math.exp(-math.pi / math.sqrt(3))
-"""Restitution below which a mass under white noise comes to rest at a wall (E. Jacob, arXiv:1004.1953)."""
-LINE = 90
-"""Largest number of letters of a line of parameters."""
 
 
 @dataclass(frozen=True)
@@ -127,10 +109,8 @@ class Problem:
                 raise ValueError(f"{told}, but the noises given are {stated}; {remedy}")
         if any(noise.is_white for noise in given.values()):
             _ = self._moved  # refuses what has no meaning
-        for jump in self.system.jumps:
-            self._refuse_ray(jump)
-        if self.system.stop is not None:
-            self._refuse_stop(self.system.stop)
+        for wall in self.system.barriers:
+            wall.refuse(self.system, self.noise)
         if self.dimension > 2 and self.noise.has_algebraic_tails:
             raise ValueError(
                 f"got {self.noise.kind} noise for {self.dimension} variables; noise with algebraic tails is for two "
@@ -141,67 +121,6 @@ class Problem:
                 "only the start of this noise is random, as of a harmonic load, so that Λ(p) is p times the largest "
                 "real part of the Floquet exponents: compute these from the equation over one period, or add a random "
                 "noise"
-            )
-
-    def _refuse_ray(self, jump: Jump) -> None:
-        """Refuse a jump at a ray over which a noise moves the phase, or nothing does. Raises `ValueError`."""
-        ray, names = f"the ray of a jump, phi = {jump.phase:.6g}", [*self.noise.parts]
-        x, u = (0.0 if abs(each) < 1e-15 else each for each in (math.cos(jump.phase), -math.sin(jump.phase)))
-        shares = u * x, u * u, -x * x, -x * u  # h = e′ᵀA e is the sum of these times the entries of A, in any units
-        driven = dict[str | None, list[tuple[CoefficientMatrix, list[float]]]]()
-        for term in self.system.terms:
-            parts = [share * entry for share, entry in zip(shares, chain(*term.matrix), strict=True)]
-            if any(parts):
-                by = (term.noise if len(names) > 1 else names[0]) if is_driven(term.g) else None
-                driven.setdefault(by, []).append((term, parts))
-        total = size = 0.0
-        for name, own in driven.items():
-            noise, xi = self.noise.parts.get(name or "", self.noise), np.array([0.0, 1.0])
-            if any(affine(term.g) is None for term, _ in own):
-                xi = np.array(noise.states) if noise.has_states else noise.standard_deviation * SUPPORT  # type: ignore[attr-defined]
-                xi = np.unique(np.clip(xi, -noise.half_width, noise.half_width))
-            speeds, rounded = np.zeros(xi.size), 0.0
-            for term, parts in own:
-                strengths = self.system.epsilon**term.order * term.g(xi)
-                speeds, most = speeds + sum(parts) * strengths, float(np.max(np.abs(strengths)))
-                size += sum(map(abs, parts)) * most
-                rounded += (ROUNDED * sum(map(abs, parts)) + OF_ENTRIES * term.fastest[0]) * most
-            if name is not None and not np.ptp(speeds) <= rounded:
-                which = f'the noise "{name}"' if name else f"{noise.kind} noise"
-                raise ValueError(
-                    f"{which} moves the phase across {ray}, which it does over no wall: x = 0, phi = pi/2 = "
-                    "1.5707963267948966, is passed with the speed v whatever the noise; let it drive terms that do "
-                    "not move the phase there, or remove the jump"
-                )
-            total += float(speeds[0])
-        if abs(total) <= ROUNDED * size:
-            raise ValueError(
-                f"the phase does not pass {ray}: nothing moves it there, so that no path comes to this wall; remove "
-                "the jump"
-            )
-
-    def _refuse_stop(self, stop: Stop) -> None:
-        """Refuse coordinates that are none of a wall, and one that no law says how to leave. Raises `ValueError`."""
-        n, total, size = self.dimension, 0.0, 0.0
-        if len(stop.coordinates) != n:
-            raise ValueError(f"got a wall with {len(stop.coordinates)} coordinates of {n} variables; must be of all")
-        for term in self.system.terms:
-            row = self.system.epsilon**term.order * stop.inside(term.matrix)[0]
-            if is_driven(term.g) and row.any():
-                raise ValueError(
-                    "a noise moves the coordinate of the wall; let it drive velocities alone, or remove the wall"
-                )
-            total, size = total + float(term.g(0.0)) * row, size + float(np.max(np.abs(row)))
-        if not np.all(np.abs(total - np.eye(n)[1]) <= n * ROUNDED * size):
-            told = f"the rate of the coordinate of the wall is {np.round(total, 6).tolist()} in its coordinates"
-            raise ValueError(f"{told}; must be the second one alone, its velocity; choose other coordinates")
-        rows = [stop.inside(each.matrix)[1, 2:] for each in self._moved.diffusions]
-        if stop.restitution < COLLAPSE and np.any(rows):
-            raise ValueError(
-                f"got restitution = {stop.restitution:g} where white noise drives the coordinate of the wall while "
-                f"it rests there; must be >= exp(-pi/sqrt(3)) = {COLLAPSE:.6g}, as below that infinitely many impacts "
-                "bring it to rest, and how the noise frees it again is not computed (J. Bertoin, Ann. Probab. 35, "
-                "2007, for 0; E. Jacob, arXiv:1004.1953 and arXiv:1103.2845); increase it, or take noise with a memory"
             )
 
     def wall_speeds(self, motion: System) -> list[float]:
@@ -226,20 +145,15 @@ class Problem:
 
     @property
     def typical(self) -> Xi:
-        """All combinations of the states of chains, and of ends of the range where other noises are mostly."""
-
-        def most(noise: Noise) -> FloatArray:
-            return np.array([-1.0, 1.0]) * min(2 * noise.standard_deviation, noise.half_width)
-
-        parts = self.coloured.parts.values()
-        return self.at_values([each.reached if each.has_states else most(each) for each in parts])
+        """All combinations of the `typical` values of the noises."""
+        return self.at_values([each.typical for each in self.coloured.parts.values()])
 
     @cached_property
     def may_rest(self) -> bool:
-        """Whether the phase rests at some φ for some of the `typical` ξ, or noises may hold it together."""
-        if len(self.coloured.parts) > 1 or self.coloured.basis == "pairs":
-            return True
-        speed = phase_speed(self.motion, self.typical)
+        """Whether the phase rests at some φ where noises have values at the ends of their ranges, or 12 std away."""
+        speed = phase_speed(
+            self.motion, self.at_values([each.reached[[0, -1]] for each in self.coloured.parts.values()])
+        )
         return bool(np.any(np.abs(speed.mean) <= speed.amplitude))
 
     @property
@@ -312,114 +226,25 @@ class Problem:
         return self.overshoot == 1.0 and not self._moved.impulses and not diffuses
 
     @cached_property
+    def _resting(self) -> tuple[float, ...]:
+        jolts = [each.matrix for each in self.diffusions] + [each.exponent for each in self.impulses]
+        return resting_phases([*map(np.array, jolts), *by_noise(self.motion, self.motion.terms)])
+
+    @cached_property
     def invariant_rays(self) -> tuple[float, ...]:
         """φ of rays that the phase never leaves, nor reaches, whatever the noise does; one alone where all rays are."""
         return tuple(float(self.frame.own_phase(phi) % math.pi) for phi in self._resting)
+
+    @cached_property
+    def blocks(self) -> tuple[Subsystem, ...]:
+        """Blocks that can be solved by themselves, as all matrices are block triangular; empty where they are not."""
+        return blocks_of(self.system, np.array(self.frame.matrix), self._resting, self.size)
 
     @property
     def unit_rate(self) -> float:
         """Its own unit of rates: ω or the size of the order 0, or of all where there is none."""
         has_own = np.any(matrix_at(self.motion, 0.0, slice(0, 1)))
         return angular_frequency(self.motion) if has_own else self.size or 1.0
-
-    @cached_property
-    def _resting(self) -> tuple[float, ...]:
-        """The phases of the `invariant_rays` in the coordinates of `frame`."""
-        if self.dimension > 2:
-            return ()
-        if not (turns := self._turns):
-            return (0.0,)
-        first, _ = turns[0]
-        if abs(first.mean) > first.amplitude * (1 + 1e-12):
-            return ()
-        middle = math.atan2(first.sine, first.cosine)
-        away = math.acos(min(max(-first.mean / first.amplitude, -1.0), 1.0))
-        found = {0.5 * (middle + away) % math.pi, 0.5 * (middle - away) % math.pi}
-        return tuple(phi for phi in sorted(found) if all(abs(float(speed(phi))) <= limit for speed, limit in turns))
-
-    @cached_property
-    def _turns(self) -> list[tuple[Harmonics, float]]:
-        """The speeds of the phase by all that moves it at all, and what is rounding in each, in these coordinates."""
-        jolts = [each.matrix for each in self.diffusions] + [each.exponent for each in self.impulses]
-        matrices = [*map(np.array, jolts), *self._by_noise(self.motion.terms)]
-        pairs = [(turning(each), ROUNDED * float(np.linalg.norm(each))) for each in matrices]
-        return [(speed, limit) for speed, limit in pairs if abs(speed.mean) + speed.amplitude > limit]
-
-    @cached_property
-    def blocks(self) -> tuple[Subsystem, ...]:
-        """The blocks that can be solved by themselves, as all matrices are block triangular; empty where they are not.
-
-        Of three and four variables groups of these, of which each drives later ones alone: the strongly connected
-        components of the union of the patterns of all matrices. Where there is one group, those of coordinates y that
-        show more, if there are any. Of two variables ‖x‖ on the first of the `invariant_rays`, and on the second one,
-        or else the distance from the first.
-        """
-        if self.dimension > 2:
-            matrices, n, stop = self._by_noise(self.system.terms), self.dimension, self.system.stop
-            basis, rounded, names, pattern = np.eye(n), 0.0, self.system.states, np.sum(np.abs(matrices), axis=0)
-            if stop is not None:  # in its coordinates, of which the first two are one block
-                basis, rounded, names = np.linalg.inv(np.array(stop.coordinates)), ROUNDED, stop.names(names)
-                pattern = np.sum([abs(stop.inside(each)) for each in matrices], axis=0)
-                pattern[1, 0] += 1.0
-            groups = components(pattern)
-            if len(groups) == 1 and stop is None:
-                basis = np.array(self.frame.matrix)
-                inverse = np.linalg.inv(basis)
-                own, groups, rounded = hidden_blocks([inverse @ each @ basis for each in matrices])
-                basis = basis @ own
-                names = [f"y{str(k + 1).translate(BELOW)}" for k in range(n)]
-            return subsystems(self.system, basis, groups, names, rounded, self.size) if len(groups) > 1 else ()
-        if not (rays := self._resting):
-            return ()
-        phases = np.array(rays if len(rays) == 2 else (rays[0], rays[0] + math.pi / 2))
-        basis = np.array(self.frame.matrix) @ np.stack([np.cos(phases), -np.sin(phases)])
-        found = subsystems(self.system, basis, [(0,), (1,)], ("", ""), ROUNDED, self.size)
-        return found if self._turns else found[:1]
-
-    @cached_property
-    def classes(self) -> tuple[Problem, ...]:
-        """The `blocks`, each with the noises that drive it."""
-        return tuple(Problem(block, self._noise_of(block)) for block in self.blocks)
-
-    def _noise_of(self, system: System) -> Noise:
-        """The noises that drive a part of the system; the first one where none does."""
-        if len(parts := self.noise.parts) == 1:
-            return self.noise
-        first = self.system.noise_sections[0].removeprefix("noise.")
-        known = {name: noise for name, noise in parts.items() if name in system.driven_by}
-        return noises_of(known or {first: parts[first]})
-
-    @cached_property
-    def is_driven_by(self) -> NDArray[np.bool_]:
-        """Which of the `blocks`, the row, is driven by which, the column, through any number of others; or is it."""
-        if len(self.invariant_rays) == 2:
-            return np.eye(2, dtype=bool)
-        return reached(couplings(self.blocks, self._by_noise(self.system.terms)))
-
-    def couples_blocks(self, key: str) -> bool:
-        """Whether another value of a parameter lets one of the `blocks` drive one that it is driven by.
-
-        Then the derivative of Λ(p) by it is not that of one block. By one that lets uncoupled blocks drive each other
-        it is, as −V_k in place of V_k gives the opposite derivative of the couplings: Λ(p) is even in them.
-        """
-        section, _, name = key.rpartition(".")
-        if not self.blocks or section != self.system.section:
-            return False
-        changes = self._by_noise(self.system.derivative(name)[0])
-        if len(self.blocks) == 1:  # all rays are invariant
-            return any(np.any(np.abs(a - a[0, 0] * np.eye(2)) > ROUNDED * np.linalg.norm(a)) for a in changes)
-        return bool(np.any(self.is_driven_by.T[couplings(self.blocks, changes)]))
-
-    def _by_noise(self, terms: Sequence[CoefficientMatrix]) -> list[FloatArray]:
-        """The sum of what no noise drives, and of what each noise drives; with a g that is no a + bξ all matrices."""
-        lines = [affine(term.g) for term in terms]
-        if None in lines:
-            return [np.array(term.matrix) for term in terms]
-        parts = dict[str | None, Any]()
-        for line, term in zip(lines, terms, strict=True):
-            for name, c in zip((None, term.noise), line or (), strict=True):
-                parts[name] = parts.get(name, 0.0) + c * self.system.epsilon**term.order * np.array(term.matrix)
-        return [*parts.values()]
 
     @property
     def is_driven(self) -> bool:
@@ -469,17 +294,16 @@ class Problem:
         found = dict[str, Parameter]()
         for section, half in self.sections.items():
             for name, value in half.values.items():
-                quantity = _keyed(half.quantity_of(name), key := f"{section}.{name}")
+                key = f"{section}.{name}"
+                quantity = replace(half.quantity_of(name), name=key, symbol=key)
                 if half is not self.system and name in half.of_xi and self.system.noise_unit != RATE:  # type: ignore[attr-defined]
                     quantity = replace(quantity, unit="unknown")
                 found[key] = Parameter(value, quantity, type(half))
-        signs = Counter(_sign(each.quantity) for each in found.values())
-        return {
-            key: each._replace(quantity=_of_noise(each.quantity))
-            if signs[_sign(each.quantity)] > 1 and not key.startswith(f"{self.system.section}.")
-            else each
-            for key, each in found.items()
-        }
+        signs = Counter(each.quantity.shown.strip("$") for each in found.values())
+        for key, each in found.items():
+            if signs[each.quantity.shown.strip("$")] > 1 and not key.startswith(f"{self.system.section}."):
+                found[key] = each._replace(quantity=_of_noise(each.quantity))
+        return found
 
     @property
     def differentiable(self) -> list[str]:
@@ -553,20 +377,10 @@ class Problem:
         return replace(NOISE, unit=self.system.noise_unit)
 
 
-@cached_by_problem(1024)  # sets of a sweep share the halves that are alike, and what these know
+@lru_cache(1024)  # sets of a sweep share the halves that are alike, and what these know
 def _at(half: Parametrised, values: tuple[tuple[str, float | str], ...]) -> Parametrised:
     """A system or a noise with other values of some parameters."""
     return half.at(dict(values))
-
-
-def _keyed(quantity: Quantity, key: str) -> Quantity:
-    """The quantity of a parameter, with its key in a problem."""
-    return quantity if quantity.name == key else replace(quantity, name=key, symbol=key)
-
-
-def _sign(quantity: Quantity) -> str:
-    """The symbol of a parameter in a figure, or its name, upright or not."""
-    return quantity.shown.strip("$")
 
 
 def _of_noise(quantity: Quantity) -> Quantity:
@@ -575,28 +389,6 @@ def _of_noise(quantity: Quantity) -> Quantity:
     below = rf"\mathrm{{{name[0]}}}".replace("_", r"\_") if name else r"\xi"
     sign = quantity.latex.strip("$") or rf"\mathrm{{{quantity.shown}}}".replace("_", r"\_")
     return replace(quantity, latex=f"${{{sign}}}_{{{below}}}$")
-
-
-def parameter_words(parameters: Mapping[str, Parameter], keys: Collection[str]) -> str:
-    """Some of the parameters with their units, by dotted keys: "noise.D0 = 0.1 (1/time), noise.r0 = 0.9"."""
-    return ", ".join(f"{key} = {_valued(parameters[key])}" for key in keys)
-
-
-def parameter_lines(parameters: Mapping[str, Parameter], besides: Collection[str] = ()) -> list[str]:
-    """All parameters besides some with their units, in lines for the system and for the noise, none of them long."""
-    sections = dict[str, list[str]]()
-    for key, parameter in parameters.items():
-        if key not in besides:
-            section, _, name = key.rpartition(".")
-            sections.setdefault(section, []).append(f"{name} = {_valued(parameter)}".replace(" ", "\xa0"))
-    lines = [wrap(f"{section}: {', '.join(words)}", LINE) for section, words in sections.items()]
-    return [line.replace("\xa0", " ") for each in lines for line in each]
-
-
-def _valued(parameter: Parameter) -> str:
-    """The value of a parameter with its unit."""
-    text, unit = written(parameter.value), parameter.quantity.unit_in_words
-    return f"{text} ({unit})" if unit else text
 
 
 def checked_problem(problem: object) -> Problem:

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fpsolve.arrays import ROUNDED, FloatArray
 from fpsolve.model.expressions import TIME
-from fpsolve.model.plane import CoefficientMatrix, Jump, System, as_plane
+from fpsolve.model.plane import BELOW, CoefficientMatrix, Jump, System, affine, as_plane, turning
 from fpsolve.model.quantity import Quantity
 
 WORST_CONDITION = 100.0
@@ -35,6 +35,7 @@ class Subsystem(System):
         names: what its coordinates are called.
         rounded: share of a matrix in these coordinates that is rounding: 0 where they are variables of the system.
         size: about how fast the system moves, the speed of that rotation is a power of four below it.
+        jumps: that of a stop of the whole, whose coordinate and its rate it has.
     """
 
     whole: System
@@ -43,11 +44,7 @@ class Subsystem(System):
     names: tuple[str, ...]
     rounded: float = 0.0
     size: float = 1.0
-
-    @property
-    def is_scalar(self) -> bool:
-        """Whether it is one coordinate."""
-        return len(self.own) == 1
+    jumps: tuple[Jump, ...] = ()
 
     @property
     def epsilon(self) -> float:  # type: ignore[override]
@@ -55,8 +52,7 @@ class Subsystem(System):
 
     @cached_property
     def terms(self) -> Sequence[CoefficientMatrix]:  # type: ignore[override]
-        terms = self.part(self.whole.terms)
-        return as_plane(terms, self.size or 1.0) if self.is_scalar else terms
+        return as_plane(self.part(self.whole.terms), self.size or 1.0)
 
     @property
     def clock(self) -> Any:
@@ -64,12 +60,6 @@ class Subsystem(System):
 
     def clock_slope(self, name: str) -> float:
         return self.whole.clock_slope(name)
-
-    @property
-    def jumps(self) -> Sequence[Jump]:  # type: ignore[override]
-        """That of a stop of the whole, whose coordinate and its rate are the first two."""
-        stop = self.whole.stop
-        return (Jump(math.pi / 2, math.log(stop.restitution)),) if stop and self.own == (0, 1) else ()
 
     @cached_property
     def _sides(self) -> tuple[FloatArray, FloatArray]:
@@ -125,17 +115,93 @@ class Subsystem(System):
         return as_plane(self.part(terms)), jumps if self.jumps else ()
 
 
-def subsystems(
-    whole: System,
-    basis: FloatArray,
-    groups: Sequence[tuple[int, ...]],
-    names: Sequence[str],
-    rounded: float,
-    size: float,
-) -> tuple[Subsystem, ...]:
-    """The blocks of a system in coordinates x = Σ V_k y_k, from groups of columns of a basis, and the names of all."""
+def by_noise(system: System, terms: Sequence[CoefficientMatrix]) -> list[FloatArray]:
+    """The sum of what no noise drives, and of what each noise drives; with a g that is no a + bξ all matrices."""
+    lines = [affine(term.g) for term in terms]
+    if None in lines:
+        return [np.array(term.matrix) for term in terms]
+    parts = dict[str | None, Any]()
+    for line, term in zip(lines, terms, strict=True):
+        for name, c in zip((None, term.noise), line or (), strict=True):
+            parts[name] = parts.get(name, 0.0) + c * system.epsilon**term.order * np.array(term.matrix)
+    return [*parts.values()]
+
+
+def resting_phases(matrices: Sequence[FloatArray]) -> tuple[float, ...]:
+    """φ of the rays of a plane that all matrices keep, none or two, or one; 0 where they keep all rays."""
+    if len(matrices[0]) > 2:
+        return ()
+    pairs = [(turning(each), ROUNDED * float(np.linalg.norm(each))) for each in matrices]
+    turns = [(speed, limit) for speed, limit in pairs if abs(speed.mean) + speed.amplitude > limit]
+    if not turns:
+        return (0.0,)
+    first, _ = turns[0]
+    if abs(first.mean) > first.amplitude * (1 + 1e-12):
+        return ()
+    middle = math.atan2(first.sine, first.cosine)
+    away = math.acos(min(max(-first.mean / first.amplitude, -1.0), 1.0))
+    found = {0.5 * (middle + away) % math.pi, 0.5 * (middle - away) % math.pi}
+    return tuple(phi for phi in sorted(found) if all(abs(float(speed(phi))) <= limit for speed, limit in turns))
+
+
+def blocks_of(system: System, frame: FloatArray, resting: Sequence[float], size: float) -> tuple[Subsystem, ...]:
+    """The blocks that can be solved by themselves, as all matrices are block triangular; empty where they are not.
+
+    Groups of the variables, of which each drives later ones alone: the strongly connected components of the union of
+    the patterns of all matrices. Where there is one group, those of coordinates y that show more, if there are any. Of
+    two variables ‖x‖ on the first of the rays that the phase never leaves, and on the second one, or else the distance
+    from the first.
+
+    Args:
+        system: the system.
+        frame: S of x = Sy.
+        resting: the phases of y on these rays.
+        size: about how fast y moves.
+    """
+    matrices, n, stop = by_noise(system, system.terms), system.dimension, system.stop
+    jumps, rounded, names, groups = tuple[Jump, ...](), 0.0, system.states, list[tuple[int, ...]]()
+    if n == 2:
+        if not resting:
+            return ()
+        phases = np.array(resting if len(resting) == 2 else (resting[0], resting[0] + math.pi / 2))
+        rays, names = np.stack([np.cos(phases), -np.sin(phases)]), ("", "")
+        basis, rounded = frame @ rays, ROUNDED * float(np.linalg.cond(rays))
+        groups = [(0,), (1,)] if any(map(_turns, matrices)) else [(0,)]
+    elif stop is not None:  # in its coordinates, of which the first two are one block
+        basis, rounded, names = np.linalg.inv(np.array(stop.coordinates)), ROUNDED, stop.names(names)
+        pattern = np.sum([abs(stop.inside(each)) for each in matrices], axis=0)
+        pattern[1, 0] += 1.0
+        groups = components(pattern)
+        jumps = (Jump(math.pi / 2, math.log(stop.restitution)),)
+    else:
+        basis, groups = np.eye(n), components(np.sum(np.abs(matrices), axis=0))
+        if len(groups) == 1:
+            own, groups, rounded = hidden_blocks([np.linalg.inv(frame) @ each @ frame for each in matrices])
+            basis, names = frame @ own, [f"y{str(k + 1).translate(BELOW)}" for k in range(n)]
     sides = tuple(map(tuple, basis.tolist()))
-    return tuple(Subsystem(whole, sides, own, tuple(names[k] for k in own), rounded, size) for own in groups)
+    return tuple(
+        Subsystem(system, sides, own, tuple(names[k] for k in own), rounded, size, jumps if own == (0, 1) else ())
+        for own in (groups if n == 2 or len(groups) > 1 else ())
+    )
+
+
+def _turns(a: FloatArray) -> bool:
+    """Whether a matrix is no multiple of 1, beyond rounding."""
+    return bool(np.any(np.abs(a - a[0, 0] * np.eye(len(a))) > ROUNDED * np.linalg.norm(a)))
+
+
+def couples(blocks: Sequence[Subsystem], name: str) -> bool:
+    """Whether another value of a parameter of the system lets one of the blocks drive one that it is driven by.
+
+    Then the derivative of Λ(p) by it is not that of one block. By one that lets uncoupled blocks drive each other it
+    is, as −V_k in place of V_k gives the opposite derivative of the couplings: Λ(p) is even in them.
+    """
+    whole = blocks[0].whole
+    changes = by_noise(whole, whole.derivative(name)[0])
+    if len(blocks) == 1:  # all rays are invariant
+        return any(map(_turns, changes))
+    drives = reached(couplings(blocks, by_noise(whole, whole.terms)))
+    return bool(np.any(drives.T & couplings(blocks, changes)))
 
 
 def couplings(blocks: Sequence[Subsystem], matrices: Sequence[FloatArray]) -> NDArray[np.bool_]:

@@ -19,7 +19,6 @@ import scipy.sparse as sp
 from scipy.special import roots_jacobi
 
 from fpsolve.arrays import FloatArray
-from fpsolve.exponent.method import Budget
 from fpsolve.proofs.balls import above, ball, balls, below, precision
 from fpsolve.proofs.basis import OTHERS, Basis, Core, Whole, hermite_table
 from fpsolve.proofs.bounds import LOWER, UPPER, Bounder, Bounds, HeldBounds, Trial
@@ -205,9 +204,9 @@ def enclose(
     stated: Statement,
     p: float | None,
     width: float,
-    guess: float = 0.0,
-    timer: Timer | None = None,
-    progress: Callable[[], None] = lambda: None,
+    guess: float,
+    timer: Timer,
+    progress: Callable[[], None],
 ) -> Enclosure:
     """Bounds on Λ(p), or on λ where p is None, that are at most `width` apart, if that can be done.
 
@@ -221,12 +220,12 @@ def enclose(
     Returns:
         The closest bounds that were found.
     """
-    noise, size, left = cylinder(stated), SMALLEST, timer or Timer(Budget().seconds)
+    noise, size = cylinder(stated), SMALLEST
     if noise.states is not None:
         size = size[0], len(noise.states)
     found, closest = list[Certificate](), math.inf
     for basis in bases(noise, p):
-        for certificate, waves, degrees in _enlarged(stated, noise, basis, p, guess, width, size, left, progress):
+        for certificate, waves, degrees in _enlarged(stated, noise, basis, p, guess, width, size, timer, progress):
             if _apart(certificate) <= width and not objection(certificate):
                 return enclosure_of(certificate)
             found.append(certificate)

@@ -32,6 +32,7 @@ from fpsolve.errors import NoSuchExponent
 from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.noise import Noise
 from fpsolve.model.noises.bounded import SineWiener
+from fpsolve.model.noises.markov_chain import Chain
 from fpsolve.model.noises.non_gaussian import NonGaussianNoise
 from fpsolve.model.noises.ornstein_uhlenbeck import GaussianNoise
 from fpsolve.model.noises.several import noises_of
@@ -125,7 +126,7 @@ class NoiseRecord(Record):
             TypeError: no proof is known for such a noise, or a chain has too many states.
         """
         if type(noise) is NonGaussianNoise:
-            if noise.has_algebraic_tails:
+            if noise.r0 > 1:
                 key = f"{noise.section}.r0"
                 raise NoSuchExponent(Message(Code.NO_BOUND, key=key, value=noise.r0, remedy=Remedy.REDUCTION))
             if noise.r0 < 1:
@@ -138,12 +139,11 @@ class NoiseRecord(Record):
             return cls(kind="circle", unit=noise.amplitude, nu=noise.sigma**2)
         if type(noise) is White:
             return cls(kind="white", unit=noise.s, states=[0.0], rates=[[0.0]])
-        if not noise.has_states or noise.is_white:
+        if not isinstance(noise, Chain):
             raise TypeError(f"got {type(noise).__name__}; proofs are for {KNOWN}")
-        states = np.asarray(noise.states)  # type: ignore[attr-defined]
-        if len(states) > MOST_STATES:
-            raise TypeError(f"got a chain of {len(states)} states; proofs are for {MOST_STATES} at most")
-        return cls(kind="chain", states=states.tolist(), rates=np.asarray(noise.rates).tolist())  # type: ignore[attr-defined]
+        if len(noise.states) > MOST_STATES:
+            raise TypeError(f"got a chain of {len(noise.states)} states; proofs are for {MOST_STATES} at most")
+        return cls(kind="chain", states=[*noise.states], rates=[*map(list, noise.rates)])
 
     @property
     def bases(self) -> tuple[BasisKind, ...]:
@@ -242,16 +242,15 @@ class LinearRecord(Record):
     @classmethod
     def of(cls, problem: Problem) -> LinearRecord:
         """The matrices of a problem. Raises `TypeError` where its noise is not white."""
-        drift, diffusions, impulses = problem.noise.motion(problem.system)
-        steady, *noisy = (
-            sum(
-                (drift.epsilon**each.order * np.array(each.matrix) for each in terms),
-                np.zeros(2 * (problem.dimension,)),
-            )
-            for terms in (drift.terms, *([each] for each in diffusions))
+        if problem.system.barriers:
+            raise TypeError("got a wall of more than two variables, where moments obey no closed equations; remove it")
+        drift, diffusions, _ = problem.noise.motion(problem.system)
+        parts, noisy = (
+            [drift.epsilon**each.order * np.array(each.matrix) for each in terms] for terms in (drift.terms, diffusions)
         )
+        steady = sum(parts, np.zeros(2 * (problem.dimension,)))
         is_moved = np.any([steady, *noisy], axis=(0, 2))
-        if impulses or not problem.noise.is_white or not is_moved.all():
+        if not is_moved.all() or {*map(type, problem.noise.parts.values())} != {White}:
             told = f"got a system of {problem.dimension} variables under other noise than white, or with a delay"
             raise TypeError(f"{told}; proofs are for two variables under {KNOWN}, and for more under White")
         return cls(drift=steady.tolist(), diffusions=[each.tolist() for each in noisy])
@@ -272,8 +271,6 @@ def statement_of(problem: Problem) -> Statement | LinearRecord:
         ValueError: the speed of the phase at the ray of a jump has no one sign.
     """
     checked_problem(problem)
-    if problem.system.stop is not None:
-        raise TypeError("got a wall of more than two variables, where moments obey no closed equations; remove it")
     if problem.dimension > 2:
         return LinearRecord.of(problem)
     if len(problem.noise.parts) > 1:

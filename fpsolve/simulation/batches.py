@@ -176,7 +176,7 @@ class Population(_Paths):
     def __init__(self, plan: Plan, seed: SeedSequence, p: float, *, is_far: bool) -> None:
         super().__init__(plan, seed)
         self.p, self.bias, self.expected = p, 0.0, 0.0
-        self._is_biased = p != 0 and self.xi.ndim == 1 and plan.noise.basis == "polynomials" and plan.noise.may_tilt
+        self._is_biased = p != 0 and self.xi.ndim == 1 and plan.noise.may_tilt
         if is_far and self._is_biased:
             self.bias = p * plan.known.strength * plan.noise.relaxation_time
         self.tallies = np.zeros(1, TALLIES)

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from fpsolve.arrays import FloatArray
-from fpsolve.model.parameters import cached_by_problem
 from fpsolve.model.plane import matrix_at, noise_strength, squared_frequency
 from fpsolve.model.problem import Problem
 
@@ -152,7 +151,7 @@ def _both_sides(problem: Problem) -> FloatArray:
     return np.concatenate([-side[:0:-1], side])
 
 
-@cached_by_problem(8)
+@lru_cache(8)
 def frozen_noise(problem: Problem) -> FrozenNoise | None:
     """The `FrozenNoise` of a problem; None beyond the plane, where ξ is no diffusion, or has algebraic tails."""
     noise = problem.coloured

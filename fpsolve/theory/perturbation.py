@@ -17,6 +17,7 @@ import math
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -25,7 +26,6 @@ from numpy.typing import ArrayLike
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import NoPerturbationTheory
 from fpsolve.messages import Code, Message
-from fpsolve.model.parameters import cached_by_problem
 from fpsolve.model.plane import (
     Harmonics,
     affine,
@@ -112,7 +112,7 @@ class SecondOrder:
         return Scale(sum(map(abs, self.linear_terms)), self.quadratic)
 
 
-@cached_by_problem(8)  # a set asks for it five times: scales, columns and notes
+@lru_cache(8)  # a set asks for it five times: scales, columns and notes
 def second_order(problem: Problem) -> SecondOrder:
     """ε²Λ₂(p) of a problem.
 
@@ -132,7 +132,7 @@ def harmonic_loads(problem: Problem) -> Sequence[str]:
     return [f"{section} with sigma = 0" if noise.values else "cos(nu*t)" for section, noise in loads]
 
 
-@cached_by_problem(8)
+@lru_cache(8)
 def _of_random_noise(problem: Problem) -> SecondOrder:
     """ε²Λ₂(p) without what harmonic loads change."""
     system, noises = problem.motion, problem.noise.parts

@@ -45,6 +45,7 @@ class Chain(Noise):
 
     has_states: ClassVar[bool] = True
     left_in_phase: ClassVar[float] = 1.0
+    may_tilt: ClassVar[bool] = False
 
     @property
     def probabilities(self) -> FloatArray:
@@ -65,6 +66,8 @@ class Chain(Noise):
     def misfit(self, xi: float) -> str:
         is_state = np.any(np.isclose(self.states, xi, rtol=1e-9, atol=0))
         return "" if is_state else f"; must be one of the states, {', '.join(f'{each:g}' for each in self.states)}"
+
+    typical = reached
 
     @property
     def standard_deviation(self) -> float:

@@ -220,6 +220,11 @@ class NonGaussianNoise(TreatedNoise):
         return 2 * (2 - self.r0) / self._bracket * self.tau0 if self._bracket > 0 else math.inf
 
     @property
+    def may_tilt(self) -> bool:  # type: ignore[override]
+        """Whether exp(s ξ) has a mean."""
+        return not self.has_algebraic_tails
+
+    @property
     def has_algebraic_tails(self) -> bool:
         return self.r0 > 1
 

@@ -153,11 +153,12 @@ class Noises(Noise):
         ]
         terms = [*self._others(system.terms), *chain.from_iterable(each.drift.terms for each in moved)]
         drift = LinearMotion(system.epsilon, tuple(terms), tuple(system.jumps))
-        return Motion(
-            drift,
-            list(chain.from_iterable(each.diffusions for each in moved)),
-            list(chain.from_iterable(each.impulses for each in moved)),
-        )
+        return Motion(drift, *(list(chain.from_iterable(parts)) for parts in list(zip(*moved, strict=True))[1:]))
+
+    def driving(self, system: System) -> Noise:
+        first = system.noise_sections[0].removeprefix("noise.")
+        known = {name: noise for name, noise in self.named if name in system.driven_by}
+        return noises_of(known or {first: self.parts[first]})
 
     def changed_motion(self, system: System, terms: Sequence[CoefficientMatrix], name: str = "") -> MotionDerivative:
         part, _, parameter = name.rpartition(".")
