@@ -128,11 +128,6 @@ ITSELF = Frame(((1.0, 0.0), (0.0, 1.0)))
 """That of the phase of x itself."""
 
 
-def amplitude_frame(system: System) -> Frame:
-    """The frame in which ‖y‖ is the amplitude of a system with cubic terms, see `System.aspect`."""
-    return Frame(((1.0, 0.0), (0.0, system.aspect / system.second_unit)))
-
-
 def is_free(term: CoefficientMatrix) -> bool:
     """Whether a term is of order 0, and no noise drives it."""
     return term.order == 0 and not is_driven(term.g)

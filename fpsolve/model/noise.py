@@ -251,11 +251,6 @@ class Noise(Parametrised):
         raise NotImplementedError
 
     @property
-    def marks(self) -> Sequence[float]:
-        """What the numbers that `step` draws stand for: the values of states, or the sizes of impulses; else empty."""
-        return ()
-
-    @property
     def is_simulated(self) -> bool:
         """Whether this kind states a `step`."""
         return type(self).step is not Noise.step

@@ -74,7 +74,7 @@ IMPACT_RATE = Quantity(
     "(39)",
     _FINER,
 )
-OF_STOPS = {
+OF_STOPS: Mapping[str, Quantity] = {
     name: Quantity(name, symbol, words, unit=unit)
     for name, symbol, words, unit in (
         ("fast_impact_rate", "N_f", "impacts faster than 0.001 Σ|others| in unit time", "1/time"),

@@ -16,8 +16,8 @@ import numpy as np
 
 from fpsolve.arrays import ROUNDED, FloatArray
 from fpsolve.messages import Code, Message
-from fpsolve.model.frame import amplitude_frame
-from fpsolve.model.plane import CoefficientMatrix, matrix_at
+from fpsolve.model.frame import Frame
+from fpsolve.model.plane import CoefficientMatrix, System, matrix_at
 from fpsolve.model.problem import Problem
 
 LEVEL = 1e6
@@ -37,12 +37,17 @@ MOST_STEPS = 2000
 Field = Callable[[float, FloatArray], tuple[float, float]]
 
 
+def amplitude_frame(system: System) -> Frame:
+    """The frame in which ‖y‖ is the amplitude of a system with cubic terms, see `System.aspect`."""
+    return Frame(((1.0, 0.0), (0.0, system.aspect / system.second_unit)))
+
+
 def no_response(problem: Problem) -> Message | None:
     """Why there is no stationary response, or none is computed, whatever λ is."""
     system = problem.system
     if system.cubic is None:
         return Message(Code.RESPONSE_LINEAR)
-    if len(problem.coloured.parts) > 1 or problem.diffusions or problem.impulses or problem.coloured.has_states:
+    if len(problem.noise.parts) > 1 or problem.noise.has_states:
         return Message(Code.RESPONSE_NOISE)
     size = ROUNDED * float(np.max(np.abs(system.cubic.matrix)))
     is_passed = [abs(float(system.cubic.h(each.phase))) <= size for each in system.jumps]

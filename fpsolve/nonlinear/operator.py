@@ -30,10 +30,9 @@ from scipy.sparse import csr_matrix
 from fpsolve.arrays import Coefficient, FloatArray, dense, identity, one
 from fpsolve.fem.line import LineSpace
 from fpsolve.fem.noise_axes import NoiseAxis
-from fpsolve.model.frame import Frame, amplitude_frame
 from fpsolve.model.plane import CoefficientMatrix
 from fpsolve.model.problem import Problem
-from fpsolve.model.settling import mean_terms
+from fpsolve.model.settling import amplitude_frame, mean_terms
 
 HALF_TURN = np.array([-0.5, 0.5]) * math.pi
 """The phases where x₁ is not negative."""
@@ -62,15 +61,12 @@ class Flow:
     problem: Problem
 
     @cached_property
-    def frame(self) -> Frame:
-        """The coordinates whose length is a."""
-        return amplitude_frame(self.problem.system)
-
-    @cached_property
     def half_turn(self) -> FloatArray:
         """The first and last φ of the half-turn that is solved for; it ends at the wall, if there is one."""
-        walls = self.problem.system.jumps
-        return HALF_TURN if not walls else self.frame.phase(np.array(walls[0].phase)) + np.array([-math.pi, 0.0])
+        system = self.problem.system
+        if not system.jumps:
+            return HALF_TURN
+        return amplitude_frame(system).phase(np.array(system.jumps[0].phase)) + np.array([-math.pi, 0.0])
 
     def phases(self, count: int) -> FloatArray:
         """So many from the first to the last."""
@@ -110,15 +106,15 @@ class Flow:
     @cached_property
     def linear(self) -> Sequence[Rate]:
         """The rates by the terms that do not depend on a."""
-        system = self.problem.system
-        return [_scaled(self.frame.term(term), system.epsilon**term.order) for term in system.terms]
+        system, frame = self.problem.system, amplitude_frame(self.problem.system)
+        return [_scaled(frame.term(term), system.epsilon**term.order) for term in system.terms]
 
     @cached_property
     def cubic(self) -> Rate:
         """h₃ and q₃ with e^{2γ}: what e^{2u} multiplies."""
         cubic = self.problem.system.cubic
         assert cubic is not None
-        terms = self.frame.cubic(cubic)
+        terms = amplitude_frame(self.problem.system).cubic(cubic)
 
         def size(phi: FloatArray) -> FloatArray:
             return np.asarray(np.exp(2 * self.gauge(phi)))

@@ -15,10 +15,10 @@ from numpy.random import SeedSequence, default_rng
 from fpsolve.arrays import FloatArray
 from fpsolve.model.noise import Noise
 from fpsolve.pool import processors
-from fpsolve.simulation.coefficients import Coefficients, SplitCoefficients
+from fpsolve.simulation.coefficients import Coefficients, SplitCoefficients, starting_state
 from fpsolve.simulation.kernels import RENORMALISED, TALLIES, add_windows, advance, advance_population, close_slice
-from fpsolve.simulation.motions import DrivenMotion, StruckMotion, SwitchedMotion
-from fpsolve.simulation.setup import PROGRESS_STEPS, Estimator, starting_state
+from fpsolve.simulation.motions import DrivenMotion, SwitchedMotion
+from fpsolve.simulation.setup import PROGRESS_STEPS, Estimator
 from fpsolve.simulation.spaces import DrivenSpace, SwitchedSpace
 
 _PORTION_SECONDS = 0.1
@@ -47,7 +47,7 @@ class Plan:
     """
 
     known: Coefficients
-    motion: DrivenMotion | SwitchedMotion | StruckMotion | DrivenSpace | SwitchedSpace
+    motion: DrivenMotion | SwitchedMotion | DrivenSpace | SwitchedSpace
     noise_step: Any
     step: float
     p: FloatArray

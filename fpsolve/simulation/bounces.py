@@ -11,8 +11,8 @@ A step of length h draws the noise at its end and its mean over the step. Then t
 integrates the motion in the frame that rotates with ω (Lawson's method), so that the free flight is exact. An impact
 is sought within the step, to the precision of floating point, and the rest of the step follows after the bounce.
 
-State: x, u and that of the noise of each path, see `motions`, changed in place. The coefficients are a `DampedMotion`
-or a `CubicMotion`, and the `step` of a noise.
+State: x, u and that of the noise of each path, see `motions`, changed in place. The coefficients are a `CubicMotion`,
+and the `step` of a noise.
 """
 
 from __future__ import annotations
@@ -21,10 +21,9 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba.extending import overload
 
-from fpsolve.model.frame import amplitude_frame
 from fpsolve.model.plane import System, affine
+from fpsolve.model.settling import amplitude_frame
 from fpsolve.simulation.compiled import compiled, inlined
 from fpsolve.simulation.kernels import CHUNK
 from fpsolve.simulation.motions import drawn
@@ -38,56 +37,10 @@ FREE = 1.0
 """The factor of u at x = 0 where there is nothing."""
 
 
-def _force(m, xi, x, u):  # type: ignore[no-untyped-def]
-    """`force` of the class of a motion; this is what numba replaces by it."""
-    raise NotImplementedError
-
-
-@overload(_force, inline="always")
-def _force_of_its_kind(m, xi, x, u):  # type: ignore[no-untyped-def]
-    return m.instance_class.force
-
-
-def _bound(m, xi, rise, x, u):  # type: ignore[no-untyped-def]
-    """`bound` of the class of a motion; this is what numba replaces by it."""
-    raise NotImplementedError
-
-
-@overload(_bound, inline="always")
-def _bound_of_its_kind(m, xi, rise, x, u):  # type: ignore[no-untyped-def]
-    return m.instance_class.bound
-
-
-class DampedMotion(NamedTuple):
-    """That of an oscillator, Eq. (3): the force g u on u, g = strength ξ + linear − cubic x² − rayleigh u².
-
-    `bounce` is the factor of u at x = 0: −R at a wall; R for the smooth coordinate y of Eq. (6), whose modulus is x;
-    `FREE` without a wall.
-    """
-
-    omega: float
-    strength: float
-    linear: float
-    cubic: float
-    rayleigh: float
-    bounce: float
-
-    @staticmethod
-    def force(m, xi, x, u):  # type: ignore[no-untyped-def]
-        """What the equation has besides the rotation with ω."""
-        return 0.0, (m.strength * xi + m.linear - m.cubic * x * x - m.rayleigh * u * u) * u
-
-    @staticmethod
-    def bound(m, xi, rise, x, u):  # type: ignore[no-untyped-def]
-        """A bound of its rate in the step; where damping and drive cancel, their sizes still limit the step."""
-        drive = abs(m.strength * xi + m.linear) + abs(m.strength * rise)
-        return drive + m.cubic * x * x + m.rayleigh * u * u
-
-
 class CubicMotion(NamedTuple):
-    """Any: besides the rotation the matrices A₀ and A₁ of A₀ + ξ A₁, row by row, and C with the products of degree 3.
+    """Besides the rotation the matrices A₀ and A₁ of A₀ + ξ A₁, row by row, and C with the products of degree 3.
 
-    `sizes` are their norms, and `bounce` is as in `DampedMotion`.
+    `sizes` are their norms, and `bounce` is the factor of u at x = 0: −R at a wall, `FREE` without a wall.
     """
 
     omega: float
@@ -97,21 +50,8 @@ class CubicMotion(NamedTuple):
     sizes: tuple[float, float, float]
     bounce: float
 
-    @staticmethod
-    def force(m, xi, x, u):  # type: ignore[no-untyped-def]
-        """As that of a `DampedMotion`."""
-        a, b, c = m.steady, m.driven, m.cubic
-        f = (a[0] + xi * b[0]) * x + (a[1] + xi * b[1]) * u + ((c[0] * x + c[1] * u) * x + c[2] * u * u) * x
-        g = (a[2] + xi * b[2]) * x + (a[3] + xi * b[3]) * u + ((c[4] * x + c[5] * u) * x + c[6] * u * u) * x
-        return f + c[3] * u * u * u, g + c[7] * u * u * u
 
-    @staticmethod
-    def bound(m, xi, rise, x, u):  # type: ignore[no-untyped-def]
-        """As that of a `DampedMotion`."""
-        return m.sizes[0] + m.sizes[1] * (abs(xi) + abs(rise)) + m.sizes[2] * (x * x + u * u)
-
-
-def motion_of(system: System) -> tuple[DampedMotion | CubicMotion, int]:
+def motion_of(system: System) -> tuple[CubicMotion, int]:
     """The motion of a system with its cubic terms, and which of its variables, 0 or 1, is x.
 
     x is the variable of the wall, or else the one whose rate grows with the other. u is the other one, and both are in
@@ -130,26 +70,38 @@ def motion_of(system: System) -> tuple[DampedMotion | CubicMotion, int]:
     steady = steady - [[0.0, omega], [-omega, 0.0]]
     steady[np.abs(steady) <= ROUNDED * omega] = 0
     bounce = -math.exp(system.jumps[0].log_factor) if system.jumps else FREE
-    rest = [steady.ravel()[:3], driven.ravel()[:3], cubic[0], cubic[1, ::2]]
-    if omega > 0 and not np.concatenate(rest).any():
-        return DampedMotion(omega, driven[1, 1], steady[1, 1], -cubic[1, 1], -cubic[1, 3], bounce), first
     sizes = [float(np.linalg.norm(each)) for each in (steady, driven, cubic)]
     rows: Any = [tuple(each.ravel().tolist()) for each in (steady, driven, cubic)]
     return CubicMotion(omega, rows[0], rows[1], rows[2], (sizes[0], sizes[1], sizes[2]), bounce), first
 
 
 @inlined
+def _force(m, xi, x, u):  # type: ignore[no-untyped-def]
+    """What the equation has besides the rotation with ω."""
+    a, b, c, square = m.steady, m.driven, m.cubic, u * u
+    f = (a[0] + xi * b[0] + (c[0] * x + c[1] * u) * x + c[2] * square) * x + (a[1] + xi * b[1] + c[3] * square) * u
+    g = (a[2] + xi * b[2] + (c[4] * x + c[5] * u) * x + c[6] * square) * x + (a[3] + xi * b[3] + c[7] * square) * u
+    return f, g
+
+
+@inlined
+def _bound(m, xi, rise, x, u):  # type: ignore[no-untyped-def]
+    """A bound of its rate in the step; where damping and drive cancel, their sizes still limit the step."""
+    return m.sizes[0] + m.sizes[1] * (abs(xi) + abs(rise)) + m.sizes[2] * (x * x + u * u)
+
+
+@inlined
 def _runge_kutta(m, h, half_cos, half_sin, cos, sin, x, u, xi, rise):  # type: ignore[no-untyped-def]
     """One step of Lawson's fourth-order rule under noise of mean `xi` that rises by 2 `rise`; cosines of ωh/2, ωh."""
-    f1, g1 = _force(m, xi - rise, x, u)  # type: ignore[no-untyped-call]
+    f1, g1 = _force(m, xi - rise, x, u)
     y, v = x + 0.5 * h * f1, u + 0.5 * h * g1
     y, v = half_cos * y + half_sin * v, half_cos * v - half_sin * y
-    f2, g2 = _force(m, xi, y, v)  # type: ignore[no-untyped-call]
+    f2, g2 = _force(m, xi, y, v)
     y, free = half_cos * x + half_sin * u, half_cos * u - half_sin * x
-    f3, g3 = _force(m, xi, y + 0.5 * h * f2, free + 0.5 * h * g2)  # type: ignore[no-untyped-call]
+    f3, g3 = _force(m, xi, y + 0.5 * h * f2, free + 0.5 * h * g2)
     f, g = half_cos * f3 + half_sin * g3, half_cos * g3 - half_sin * f3
     y, v = cos * x + sin * u + h * f, cos * u - sin * x + h * g
-    f4, g4 = _force(m, xi + rise, y, v)  # type: ignore[no-untyped-call]
+    f4, g4 = _force(m, xi + rise, y, v)
     y, v = x + h / 6 * f1, u + h / 6 * g1
     f2, g2 = h / 3 * (f2 + f3), h / 3 * (g2 + g3)
     f, g = half_cos * f2 + half_sin * g2 + h / 6 * f4, half_cos * g2 - half_sin * f2 + h / 6 * g4
@@ -174,7 +126,7 @@ def _flight(m, x, u, xi, rise, h):  # type: ignore[no-untyped-def]
     if m.bounce < 0 and x == 0 and u < 0:  # on the wall and about to cross it
         u, impacts = m.bounce * u, 1
     while t < h:
-        gain = _bound(m, xi, rise, x, u)  # type: ignore[no-untyped-call]
+        gain = _bound(m, xi, rise, x, u)
         s = max(min(longest, _ANGLE / m.omega, _GROWTH / (gain + 1e-300)), h / _MOST_PARTS)
         s = min(s, h - t)
         side = 0.0 if m.bounce == FREE else 1.0 if x > 0 or (x == 0 and u > 0) else -1.0
@@ -215,7 +167,7 @@ def move(m, h, x, u, mean, rise, x_end, u_end, is_plain):  # type: ignore[no-unt
     """Move paths by one step of length h, in place, and return the number of impacts.
 
     Args:
-        m: a `DampedMotion` or a `CubicMotion`.
+        m: a `CubicMotion`.
         x, u: the state; m.bounce < 0 needs x ≥ 0.
         mean, rise: ξ in the step is mean + rise (2t/h − 1).
         x_end, u_end, is_plain: room for as many numbers, and as many booleans.
@@ -226,7 +178,7 @@ def move(m, h, x, u, mean, rise, x_end, u_end, is_plain):  # type: ignore[no-unt
     is_free, impacts = m.bounce == FREE, 0
     for i in range(x.size):
         x_end[i], u_end[i] = _runge_kutta(m, h, half_cos, half_sin, cos, sin, x[i], u[i], mean[i], rise[i])
-        gain = _bound(m, mean[i], rise[i], x[i], u[i])  # type: ignore[no-untyped-call]
+        gain = _bound(m, mean[i], rise[i], x[i], u[i])
         is_between = (x_end[i] > 0) & (x[i] >= 0) & ((u[i] >= 0) | (u_end[i] <= 0))
         is_plain[i] = (is_between | is_free) & (gain < limit)
     for i in range(x.size):

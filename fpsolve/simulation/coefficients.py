@@ -9,19 +9,29 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from scipy.linalg import expm
 
 from fpsolve.arrays import FloatArray
+from fpsolve.errors import FpsolveError
 from fpsolve.model.noise import Noise
-from fpsolve.model.plane import System, affine, common_delay, is_driven, matrix_at, squared_frequency
+from fpsolve.model.plane import (
+    System,
+    affine,
+    common_delay,
+    is_driven,
+    matrix_at,
+    squared_frequency,
+    written_coefficient,
+)
+from fpsolve.model.quantity import OF_STOPS
 from fpsolve.simulation.rays import Rays
 
 if TYPE_CHECKING:
     from fpsolve.simulation.delays import DelayedSpace
-    from fpsolve.simulation.motions import DrivenMotion, StruckMotion, SwitchedMotion
+    from fpsolve.simulation.motions import DrivenMotion, SwitchedMotion
     from fpsolve.simulation.several import SplitMotion
     from fpsolve.simulation.spaces import DrivenSpace, SplitSpace, SwitchedSpace
     from fpsolve.simulation.stops import DrivenStop, SwitchedStop
@@ -64,7 +74,9 @@ class Coefficients:
         half_turn: π/ω, ω the largest; without rotation π times the time in which the direction of x is forgotten.
         settling: the time in which it is forgotten how modes shared the motion; 0 where all turn alike.
         rays: the lines of the jumps.
-        impulses: the matrices of impulses, shape (n, 2, 2); None without any.
+        impulses: what multiplies the state where a state of a chain is reached, or where an impulse comes, shape
+            (states, n, n); None under other noise.
+        counted: the names of what is counted at a wall of several variables.
     """
 
     noise: Noise
@@ -76,11 +88,12 @@ class Coefficients:
     rays: Rays
     settling: float = 0.0
     impulses: FloatArray | None = None
+    counted: ClassVar[Sequence[str]] = ()
 
     @property
     def is_exact(self) -> bool:
         """Whether steps of any length leave nothing out."""
-        return self.steady.ndim == 3 or self.impulses is not None
+        return self.impulses is not None
 
     @property
     def dimension(self) -> int:
@@ -101,18 +114,17 @@ class Coefficients:
         """The number of variables of a path that is moved in steps of length h."""
         return self.dimension
 
-    def motion(self, h: float) -> DrivenMotion | SwitchedMotion | StruckMotion | DrivenSpace | SwitchedSpace:
+    def motion(self, h: float) -> DrivenMotion | SwitchedMotion | DrivenSpace | SwitchedSpace:
         """The numbers that move paths by a step of length h."""
-        from fpsolve.simulation.motions import DrivenMotion, StruckMotion, SwitchedMotion
+        from fpsolve.simulation.motions import DrivenMotion, SwitchedMotion
         from fpsolve.simulation.spaces import DrivenSpace, SwitchedSpace
 
-        if self.impulses is not None:
-            return StruckMotion(_rows(self.steady[None]), self.impulses, self.rays)
-        if self.steady.ndim == 3 and self.dimension > 2:
-            return SwitchedSpace(self.steady, expm(h * self.steady), np.linalg.norm(self.steady, 2, axis=(1, 2)))
-        if self.steady.ndim == 3:
-            return SwitchedMotion(_rows(self.steady), self.rays)
-        steady, driven = self.steady, self.driven
+        steady, driven, impulses = self.steady, self.driven, self.impulses
+        if impulses is not None:
+            steady = np.broadcast_to(steady, impulses.shape).copy()
+            if self.dimension == 2:
+                return SwitchedMotion(_rows(steady), impulses, self.rays)
+            return SwitchedSpace(steady, expm(h * steady), impulses, np.linalg.norm(steady, 2, axis=(1, 2)))
         double = _commutator(driven, _commutator(driven, steady))
         if self.noise.is_white:
             steady = steady + _UNRESOLVED * h * double
@@ -143,6 +155,7 @@ class StoppedCoefficients(Coefficients):
     fast: FloatArray = field(default_factory=lambda: np.zeros(0))
 
     order = 1
+    counted = tuple(OF_STOPS)
 
     def motion(self, h: float) -> DrivenStop | SwitchedStop:  # type: ignore[override]
         from fpsolve.simulation.stops import DrivenStop, SwitchedStop
@@ -199,6 +212,35 @@ class DelayedCoefficients(SplitCoefficients):
         return DelayedSpace(self.steady[:n].copy(), self.driven[:, :n].copy(), rows)
 
 
+def refuse(system: System, noise: Noise) -> None:
+    """Refuse what no scheme moves. Raises `FpsolveError`."""
+    if noise.motion(system).impulses and (system.pasts or system.stop):
+        told = "simulation under impulses is for systems without a delay and a wall of more than two variables"
+        raise FpsolveError(f"{told}; take an even p, which needs none")
+    if system.stop and (len(noise.parts) > 1 or system.clock):
+        raise FpsolveError("simulation of a wall of more than two variables is for one noise, without periodic terms")
+    bent = [term.g for term in system.terms if affine(term.g) is None]
+    if bent and (not noise.has_states or len(noise.parts) > 1):
+        found = f"but one has g = {written_coefficient(bent[0]).strip()}"
+        need = f"terms that are a + b*xi under a {type(noise).__name__}, {found}"
+        raise FpsolveError(f"simulation is for {need}; use the finite elements")
+
+
+def starting_state(
+    noise: Noise, paths: int, rng: np.random.Generator, amplitude: float = 1.0, dimension: int = 2
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """x, u and the state of the noise, of paths of one amplitude, with uniform directions and stationary noise.
+
+    The phases are in front of the wall, where they stand for all. Beyond the plane u has a row for each variable but x.
+    """
+    if dimension > 2:
+        state = rng.standard_normal((dimension, paths))
+        state *= amplitude / np.linalg.norm(state, axis=0)
+        return state[0].copy(), state[1:].copy(), noise.start(paths, rng)
+    phase = rng.uniform(0, math.pi, paths)
+    return amplitude * np.sin(phase), amplitude * np.cos(phase), noise.start(paths, rng)
+
+
 def repeated_delay(system: System) -> float:
     """The time of which all delays of a system are multiples, ∞ without any. Raises `ValueError`: there is none."""
     return common_delay(system.pasts)[0] if system.pasts else math.inf
@@ -230,9 +272,9 @@ def split_coefficients(system: System, noise: Noise) -> SplitCoefficients:
         size = float(np.linalg.norm(even @ total @ back, 2))
         if part.is_white:
             sizes.append((size * math.sqrt(part.spectral_density(0.0)), True))
-            driven.append(total if len(part.marks) else total * math.sqrt(part.spectral_density(0.0)))
+            driven.append(total * math.sqrt(part.spectral_density(0.0)))
             intensity += sizes[-1][0] ** 2
-            intensities.append(part.spectral_density(0.0) if len(part.marks) else 1.0)
+            intensities.append(1.0)
         else:
             sizes.append((size * part.standard_deviation, False))
             driven.append(total)
@@ -291,8 +333,9 @@ def coefficients(system: System, noise: Any) -> Coefficients:
     back = np.linalg.inv(even)
     free, steady, driven = even @ free @ back, even @ steady @ back, even @ driven @ back
     around = steady - np.tensordot(noise.probabilities, steady, 1) if is_switched else steady
-    impulses = even @ np.array([each.matrix for each in struck]) @ back if struck else None
+    impulses = np.broadcast_to(np.eye(len(free)), steady.shape).copy() if is_switched else None
     if struck:
+        impulses = even @ np.array([each.matrix for each in struck]) @ back
         strength = fluctuation = math.sqrt(sum(each.rate * each.strength**2 for each in struck))
     elif is_switched:
         strength = fluctuation = math.sqrt(noise.probabilities @ np.sum(around**2, axis=(1, 2)) / 2)

@@ -321,7 +321,7 @@ def _simulated(
         warnings=(*_missing(estimates), *found[0][1], *stopped),
         interrupted=interrupted,
         parameters=problem.values,
-        wall=dict(zip(OF_STOPS, of_wall, strict=True)) if problem.system.stop else {},
+        wall=dict(zip(known.counted, of_wall, strict=False)),
     )
 
 

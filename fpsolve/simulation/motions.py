@@ -13,7 +13,7 @@ the mean 3b²/(5h) + h²/30 (J. Foster, T. Lyons and H. Oberhauser, SIAM J. Nume
 stands in A₀: a scheme of strong order 3/2 and weak order 2.
 
 Under a chain the motion between two jumps of ξ is exp(A t), and these come after exponential times: nothing is left
-out. So it is between impulses, each of which multiplies the state.
+out. So it is between impulses, each of which multiplies the state: they are a chain whose state is the last one's size.
 
 Rows of arrays are not taken out of them where a path is moved, which takes numba longer than all else.
 
@@ -36,6 +36,8 @@ from fpsolve.simulation.rays import Rays
 _LIMIT = 0.75**2
 """p² + ½(q² + r²) of Ω above which a step is taken in parts: below, series are exact, and no turn is overlooked."""
 _MOST_PARTS = 10_000
+_HUGE = 1e100
+"""Square of a norm from which on it is taken out of the state."""
 
 
 def _draw(step, xi, xi_mean, xi_end, push, rng):  # type: ignore[no-untyped-def]
@@ -106,19 +108,7 @@ class DrivenMotion(NamedTuple):
 
 
 class SwitchedMotion(NamedTuple):
-    """A of each state as rows (t, p, q, r), shape (states, 4)."""
-
-    matrices: FloatArray
-    rays: Rays
-
-    @staticmethod
-    def move(m, noise, h, x, u, xi, log_norm, push, room, rng):  # type: ignore[no-untyped-def]
-        """As that of a `DrivenMotion`, with the `step` of a chain and the numbers of its states in the place of ξ."""
-        return step_switched(m, noise, h, x, u, xi, log_norm, rng)
-
-
-class StruckMotion(NamedTuple):
-    """A as a row (t, p, q, r), shape (1, 4), and the matrices exp(B) of the impulses, shape (n, 2, 2)."""
+    """A of each state as rows (t, p, q, r), shape (states, 4), and what multiplies x on arrival, (states, 2, 2)."""
 
     matrices: FloatArray
     impulses: FloatArray
@@ -126,8 +116,8 @@ class StruckMotion(NamedTuple):
 
     @staticmethod
     def move(m, noise, h, x, u, xi, log_norm, push, room, rng):  # type: ignore[no-untyped-def]
-        """As that of a `DrivenMotion`, with the law of impulses as the `step` of the noise."""
-        return step_struck(m, noise, h, x, u, log_norm, rng)
+        """As that of a `DrivenMotion`, with the `step` of a chain and the numbers of its states in the place of ξ."""
+        return step_switched(m, noise, h, x, u, xi, log_norm, rng)
 
 
 _C = tuple(1 / math.factorial(2 * k) for k in range(9))
@@ -273,36 +263,14 @@ def step_switched(m, chain, h, x, u, states, log_norm, rng):  # type: ignore[no-
             left -= stay
             if left > 0:
                 k = picked(chain.reached[k], rng)
-        states[i] = k
-    return crossed
-
-
-@compiled
-def step_struck(m, law, h, x, u, log_norm, rng):  # type: ignore[no-untyped-def]
-    """Move paths by a time h, in place, with all impulses in it, and return how often they crossed lines.
-
-    Args:
-        m, law: a `StruckMotion` and the law of its impulses.
-        x, u: the state.
-        log_norm: takes in what the norm has grown by beyond that of the state.
-        rng: a `numpy.random.Generator`.
-    """
-    crossed = 0
-    for i in range(x.size):
-        left = h
-        while left > 0:
-            stay = rng.standard_exponential() / law.rate
-            x[i], u[i], log, count = exact_flow(m, 0, min(stay, left), x[i], u[i])
-            crossed += count
-            left -= stay
-            if left > 0:
-                k = picked(law.reached, rng)
                 a, b, c, d = m.impulses[k, 0, 0], m.impulses[k, 0, 1], m.impulses[k, 1, 0], m.impulses[k, 1, 1]
                 x[i], u[i] = a * x[i] + b * u[i], c * x[i] + d * u[i]
-            norm = math.sqrt(x[i] * x[i] + u[i] * u[i])
-            log_norm[i] += log + math.log(norm)
-            x[i] /= norm
-            u[i] /= norm
+                square = x[i] * x[i] + u[i] * u[i]
+                if not 1 / _HUGE < square < _HUGE:
+                    log_norm[i] += 0.5 * math.log(square)
+                    x[i] /= math.sqrt(square)
+                    u[i] /= math.sqrt(square)
+        states[i] = k
     return crossed
 
 

@@ -8,13 +8,13 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from fpsolve.arrays import FloatArray, is_whole, real_numbers, shown
+from fpsolve.arrays import is_whole, real_numbers, shown
 from fpsolve.errors import FpsolveError, NoSuchExponent
 from fpsolve.model.noise import Noise
 from fpsolve.model.noises.clock import waves_apart
-from fpsolve.model.plane import SAME_DELAY, System, affine, written_coefficient
+from fpsolve.model.plane import SAME_DELAY, System
 from fpsolve.model.problem import Problem, checked_problem, infinite
-from fpsolve.simulation.coefficients import ROUGHER, SplitCoefficients, coefficients, repeated_delay
+from fpsolve.simulation.coefficients import ROUGHER, SplitCoefficients, coefficients, refuse, repeated_delay
 
 Estimator = Literal["direct", "population"]
 SPLIT = 0.06
@@ -46,16 +46,7 @@ def simulated_parts(problem: Problem) -> tuple[System, Noise]:
         repeated_delay(system)
     except ValueError as failure:
         raise FpsolveError(f"simulation is in steps that divide each delay, but {failure}") from failure
-    if problem.dimension > 2 and problem.impulses:
-        told = f"simulation under impulses is for two variables without a delay, but there are {problem.dimension}"
-        raise FpsolveError(f"{told}; take an even p, which needs none")
-    if system.stop is not None and (len(noise.parts) > 1 or system.clock):
-        raise FpsolveError("simulation of a wall of more than two variables is for one noise, without periodic terms")
-    bent = [term.g for term in system.terms if affine(term.g) is None]
-    if bent and (not noise.has_states or len(noise.parts) > 1):
-        found = f"but one has g = {written_coefficient(bent[0]).strip()}"
-        need = f"terms that are a + b*xi under a {type(noise).__name__}, {found}"
-        raise FpsolveError(f"simulation is for {need}; use the finite elements")
+    refuse(system, noise)
     return system, noise
 
 
@@ -187,18 +178,3 @@ def _divides(step: float, system: System) -> bool:
     """Whether the delays of a system are whole numbers of rough steps."""
     parts = repeated_delay(system) / (ROUGHER * step)
     return not math.isfinite(parts) or abs(parts - round(parts)) <= SAME_DELAY * parts
-
-
-def starting_state(
-    noise: Noise, paths: int, rng: np.random.Generator, amplitude: float = 1.0, dimension: int = 2
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """x, u and the state of the noise, of paths of one amplitude, with uniform directions and stationary noise.
-
-    The phases are in front of the wall, where they stand for all. Beyond the plane u has a row for each variable but x.
-    """
-    if dimension > 2:
-        state = rng.standard_normal((dimension, paths))
-        state *= amplitude / np.linalg.norm(state, axis=0)
-        return state[0].copy(), state[1:].copy(), noise.start(paths, rng)
-    phase = rng.uniform(0, math.pi, paths)
-    return amplitude * np.sin(phase), amplitude * np.cos(phase), noise.start(paths, rng)

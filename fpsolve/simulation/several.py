@@ -11,15 +11,15 @@ Finance 15, 2008): of weak order 2, whatever the noises are.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba.core import types
 from numba.extending import overload
 
 from fpsolve.arrays import FloatArray
 from fpsolve.model.noise import Noise
+from fpsolve.model.noises.markov_chain import ChainStep
 from fpsolve.simulation.compiled import compiled
 from fpsolve.simulation.motions import drawn, exact_factors, factors, flow_on, picked
 from fpsolve.simulation.rays import Rays
@@ -30,12 +30,10 @@ class Driver(NamedTuple):
 
     Attributes:
         step: its own.
-        marks: see `Noise.marks`.
         row: the row.
     """
 
     step: Any
-    marks: FloatArray
     row: int
 
 
@@ -43,7 +41,6 @@ class WideDriver(NamedTuple):
     """The same of a noise whose state has several rows, the last of them before `end`."""
 
     step: Any
-    marks: FloatArray
     row: int
     end: int
 
@@ -67,10 +64,7 @@ def drivers(noises: Mapping[str, Noise], h: float) -> tuple[Driver | WideDriver,
     found, row, rng = list[Driver | WideDriver](), 0, np.random.default_rng(0)
     for noise in noises.values():
         count = len(np.atleast_2d(noise.start(1, rng)))
-        marks = np.asarray(noise.marks, dtype=float)
-        found.append(
-            Driver(noise.step(h), marks, row) if count == 1 else WideDriver(noise.step(h), marks, row, row + count)
-        )
+        found.append(Driver(noise.step(h), row) if count == 1 else WideDriver(noise.step(h), row, row + count))
         row += count
     return tuple(found)
 
@@ -105,14 +99,9 @@ def _integrate(driver, state, h, integral, room, push, rng):  # type: ignore[no-
 
 @overload(_integrate)
 def _integrated_by_its_kind(driver, state, h, integral, room, push, rng):  # type: ignore[no-untyped-def]
-    known = _fields(driver, "step")
-    if "leaving" in known:
-        return lambda driver, state, h, integral, room, push, rng: _time_in_states(
-            driver.step, driver.marks, h, state[driver.row], integral, rng
-        )
-    if "reached" in known:
-        return lambda driver, state, h, integral, room, push, rng: _sum_of_sizes(
-            driver.step, driver.marks, h, integral, rng
+    if driver.types[0].instance_class is ChainStep:
+        return lambda driver, state, h, integral, room, push, rng: _of_chain(
+            driver.step, h, state[driver.row], integral, rng
         )
     if driver.instance_class is WideDriver:
 
@@ -129,35 +118,19 @@ def _integrated_by_its_kind(driver, state, h, integral, room, push, rng):  # typ
     return plain
 
 
-def _fields(kind: types.NamedTuple, name: str) -> Sequence[str]:
-    """The names of the fields of a field of a named tuple."""
-    return tuple(kind.types[kind.fields.index(name)].fields)
-
-
 @compiled
-def _time_in_states(chain, values, h, states, integral, rng):  # type: ignore[no-untyped-def]
-    """∫ξ dt of a chain, whose states are moved."""
+def _of_chain(chain, h, states, integral, rng):  # type: ignore[no-untyped-def]
+    """∫ξ dt of a chain, or of impulses, whose states are moved."""
     for i in range(states.size):
         k, left, total = int(states[i]), h, 0.0
         while left > 0:
             stay = rng.standard_exponential() / chain.leaving[k]
-            total += values[k] * min(stay, left)
+            total += chain.values[k] * min(stay, left)
             left -= stay
             if left > 0:
                 k = picked(chain.reached[k], rng)
+                total += chain.sizes[k]
         states[i], integral[i] = k, total
-
-
-@compiled
-def _sum_of_sizes(law, sizes, h, integral, rng):  # type: ignore[no-untyped-def]
-    """The sum of the sizes of the impulses in a step."""
-    for i in range(integral.size):
-        left, total = h - rng.standard_exponential() / law.rate, 0.0
-        while left > 0:
-            k = picked(law.reached, rng)
-            total += sizes[k]
-            left -= rng.standard_exponential() / law.rate
-        integral[i] = total
 
 
 @compiled

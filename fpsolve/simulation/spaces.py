@@ -43,10 +43,11 @@ class DrivenSpace(NamedTuple):
 
 
 class SwitchedSpace(NamedTuple):
-    """A of each state and exp(A h), shapes (states, n, n), and ‖A‖, shape (states,)."""
+    """A of each state, exp(A h), and what multiplies x on arrival, shapes (states, n, n), and ‖A‖, shape (states,)."""
 
     matrices: FloatArray
     whole: FloatArray
+    impulses: FloatArray
     sizes: FloatArray
 
     @staticmethod
@@ -303,6 +304,7 @@ def step_switched_space(m, chain, h, x, u, states, log_norm, rng):  # type: igno
             left -= stay
             if left > 0:
                 k = picked(chain.reached[k], rng)
+                _multiplied(m.impulses[k], state, other)
         log_norm[i] += _tamed(state)
         _store(x, u, i, state)
         states[i] = k

@@ -158,9 +158,9 @@ def told_of(panels: Sequence[Answer]) -> Iterator[Grid]:
 
 def paths_of(case: Case, look: Callable[[], None]) -> Answer:
     """ln‖x(t)‖ of ten simulated paths, and the motion of one of them, whose wall throws it back."""
-    from fpsolve.simulation.coefficients import coefficients  # which compiles
+    from fpsolve.simulation.coefficients import coefficients, starting_state  # which compiles
     from fpsolve.simulation.kernels import RENORMALISED, advance
-    from fpsolve.simulation.setup import default_step, obstacles, simulated_parts, starting_state, transient
+    from fpsolve.simulation.setup import default_step, obstacles, simulated_parts, transient
 
     system, noise = simulated_parts(case.problem)
     for name, sentence in obstacles(system, noise).items():

@@ -8,8 +8,8 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
-from fpsolve.model import White
-from fpsolve.simulation.bounces import DampedMotion, move
+from fpsolve.model import VibroImpactOscillator, White
+from fpsolve.simulation.bounces import motion_of, move
 from fpsolve.simulation.coefficients import Coefficients
 from fpsolve.simulation.estimators import population_estimates
 from fpsolve.simulation.motions import step_driven
@@ -71,9 +71,9 @@ def test_a_coarse_step_under_white_noise_keeps_the_mean_to_second_order(n):
 
 def moved(R, h, u, gain, steps):
     """x, ẋ and the impacts at a wall of ẍ + x = g ẋ, from x = 0 on."""
-    m, x, u, gain = DampedMotion(1.0, 1.0, 0.0, 0.0, 0.0, -R), *np.array([[0.0], [u], [gain]])
-    room = np.empty(1), np.empty(1), np.empty(1, np.bool_)
-    count = sum(move(m, h, x, u, gain, np.zeros(1), *room) for _ in range(steps))
+    m, _ = motion_of(VibroImpactOscillator(1.0, R, gain, 1.0, impact="restitution"))
+    x, u, none, *room = np.array([[0.0], [u], [0.0], [0.0], [0.0]])
+    count = sum(move(m, h, x, u, none, none, *room, room[0] > 0) for _ in range(steps))
     return x[0], u[0], count
 
 

@@ -187,6 +187,9 @@ KNOWN = {
     "two modes, white": Simulated(
         matrices(FREE, COUPLED, White(s=1.0)), {-1: 0.0314237}, estimator="population", time=100.0
     ),
+    "two modes, impulses": Simulated(
+        matrices(FREE, COUPLED, Poisson(1.0, (0.4,))), {2: -0.0861990831}, estimator="population", paths=4096
+    ),
     "six variables, all alike": Simulated(
         matrices(MASSES, 0.5 * np.eye(6), White(s=0.2)),
         {
@@ -494,11 +497,6 @@ STOPPED = "q' = v; v' = -q - xi*q - 0.1*cos(t)*y; y' = w; w' = -y"
             BENT,
             {},
             r"is for terms that are a \+ b\*xi under a NonGaussianNoise, but one has g = sin\(ξ\); use the",
-        ),
-        (
-            matrices(FREE, COUPLED, Poisson(1.0, (0.1,))),
-            {},
-            "under impulses is for two variables without a delay, but there are 4",
         ),
         (
             rates(STOPPED, Telegraph(0.5, 0.7), [{"at": "q = 0", "restitution": 0.5}]),

@@ -26,10 +26,14 @@ class ChainStep(NamedTuple):
     Attributes:
         leaving: the rate at which each state is left, shape (n,).
         reached: the probability that a state is followed by one of the first j + 1, shape (n, n).
+        values: ξ in each state, shape (n,).
+        sizes: what comes on top of ∫ξ dt where a state is reached, shape (n,).
     """
 
     leaving: FloatArray
     reached: FloatArray
+    values: FloatArray
+    sizes: FloatArray
 
 
 class Chain(Noise):
@@ -99,11 +103,8 @@ class Chain(Noise):
         jumps = np.array(self.rates) * (1 - np.eye(len(self.states)))
         leaving = jumps.sum(axis=1)
         reached = np.cumsum(jumps / leaving[:, None], axis=1)
-        return ChainStep(leaving, np.where(reached >= reached[:, -1:], 1.0, reached))
-
-    @property
-    def marks(self) -> Sequence[float]:
-        return self.states
+        reached = np.where(reached >= reached[:, -1:], 1.0, reached)
+        return ChainStep(leaving, reached, np.array(self.states, dtype=float), np.zeros(leaving.size))
 
     @property
     def largest_step(self) -> float:

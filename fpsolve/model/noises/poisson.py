@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from typing import Annotated, ClassVar, NamedTuple
+from typing import Annotated, ClassVar
 
 import numpy as np
 from pydantic import AfterValidator
@@ -11,6 +12,7 @@ from pydantic import AfterValidator
 from fpsolve.arrays import FloatArray
 from fpsolve.model.faults import strict_dataclass
 from fpsolve.model.noise import Memoryless
+from fpsolve.model.noises.markov_chain import ChainStep
 from fpsolve.model.parameters import SIZE, parameter
 from fpsolve.model.plane import (
     CoefficientMatrix,
@@ -21,18 +23,6 @@ from fpsolve.model.plane import (
     System,
     split_by_noise,
 )
-
-
-class PoissonStep(NamedTuple):
-    """The law of the impulses, which come after exponential times: no step is made.
-
-    Attributes:
-        rate: of all.
-        reached: the probability that one is among the first j + 1, shape (n,).
-    """
-
-    rate: float
-    reached: FloatArray
 
 
 def _sizes(sizes: tuple[float, ...]) -> tuple[float, ...]:
@@ -110,13 +100,14 @@ class Poisson(Memoryless):
         """S(ω) = rate ⟨w²⟩, of what differs from the mean."""
         return self.rate * float(self.shares @ np.square(self.sizes))
 
-    def step(self, h: float, bias: float = 0.0) -> PoissonStep:
-        """The impulses in any time, without a bias."""
-        return PoissonStep(self.rate, np.append(np.cumsum(self.shares)[:-1], 1.0))
+    def step(self, h: float, bias: float = 0.0) -> ChainStep:
+        """The impulses in any time, without a bias, as jumps of a chain whose state is the size of the last one.
 
-    @property
-    def marks(self) -> Sequence[float]:
-        return self.sizes
+        √S is in the matrix that the noise drives.
+        """
+        sizes = np.array(self.sizes) / math.sqrt(self.spectral_density(0.0))
+        reached = np.tile(np.append(np.cumsum(self.shares)[:-1], 1.0), (sizes.size, 1))
+        return ChainStep(np.full(sizes.size, self.rate), reached, np.zeros(sizes.size), sizes)
 
     def motion(self, system: System) -> Motion:
         """The motion between impulses, and one impulse for each size, in their order, by which the simulation draws.
