@@ -40,12 +40,6 @@ def noise_kind(name: str) -> type[Noise]:
     return _kind(name, "noises")
 
 
-def kind_classes(room: Literal["systems", "noises"]) -> tuple[type[Any], ...]:
-    """The classes of all kinds, with their variants."""
-    kinds = map(system_kind, SYSTEMS) if room == "systems" else map(noise_kind, NOISES)
-    return tuple(each for kind in kinds for each in (kind, *kind.variants))
-
-
 @cache
 def _kind(name: str, room: Literal["systems", "noises"]) -> Any:
     known = SYSTEMS if room == "systems" else NOISES

@@ -74,7 +74,7 @@ class Coefficients:
         half_turn: π/ω, ω the largest; without rotation π times the time in which the direction of x is forgotten.
         settling: the time in which it is forgotten how modes shared the motion; 0 where all turn alike.
         rays: the lines of the jumps.
-        impulses: what multiplies the state where a state of a chain is reached, or where an impulse comes, shape
+        arrivals: what multiplies the state where a state of a chain is reached, or where an impulse comes, shape
             (states, n, n); None under other noise.
         counted: the names of what is counted at a wall of several variables.
     """
@@ -87,13 +87,13 @@ class Coefficients:
     half_turn: float
     rays: Rays
     settling: float = 0.0
-    impulses: FloatArray | None = None
+    arrivals: FloatArray | None = None
     counted: ClassVar[Sequence[str]] = ()
 
     @property
     def is_exact(self) -> bool:
         """Whether steps of any length leave nothing out."""
-        return self.impulses is not None
+        return self.arrivals is not None
 
     @property
     def dimension(self) -> int:
@@ -119,12 +119,12 @@ class Coefficients:
         from fpsolve.simulation.motions import DrivenMotion, SwitchedMotion
         from fpsolve.simulation.spaces import DrivenSpace, SwitchedSpace
 
-        steady, driven, impulses = self.steady, self.driven, self.impulses
-        if impulses is not None:
-            steady = np.broadcast_to(steady, impulses.shape).copy()
+        steady, driven, arrivals = self.steady, self.driven, self.arrivals
+        if arrivals is not None:
+            steady = np.broadcast_to(steady, arrivals.shape).copy()
             if self.dimension == 2:
-                return SwitchedMotion(_rows(steady), impulses, self.rays)
-            return SwitchedSpace(steady, expm(h * steady), impulses, np.linalg.norm(steady, 2, axis=(1, 2)))
+                return SwitchedMotion(_rows(steady), arrivals, self.rays)
+            return SwitchedSpace(steady, expm(h * steady), arrivals, np.linalg.norm(steady, 2, axis=(1, 2)))
         double = _commutator(driven, _commutator(driven, steady))
         if self.noise.is_white:
             steady = steady + _UNRESOLVED * h * double
@@ -333,9 +333,9 @@ def coefficients(system: System, noise: Any) -> Coefficients:
     back = np.linalg.inv(even)
     free, steady, driven = even @ free @ back, even @ steady @ back, even @ driven @ back
     around = steady - np.tensordot(noise.probabilities, steady, 1) if is_switched else steady
-    impulses = np.broadcast_to(np.eye(len(free)), steady.shape).copy() if is_switched else None
+    arrivals = np.broadcast_to(np.eye(len(free)), steady.shape).copy() if is_switched else None
     if struck:
-        impulses = even @ np.array([each.matrix for each in struck]) @ back
+        arrivals = even @ np.array([each.matrix for each in struck]) @ back
         strength = fluctuation = math.sqrt(sum(each.rate * each.strength**2 for each in struck))
     elif is_switched:
         strength = fluctuation = math.sqrt(noise.probabilities @ np.sum(around**2, axis=(1, 2)) / 2)
@@ -353,6 +353,8 @@ def coefficients(system: System, noise: Any) -> Coefficients:
     time *= _exchanged(free, noise)
     if is_switched:
         moves = [(time * share, each) for share, each in zip(noise.probabilities, around, strict=True)]
+    elif struck:
+        moves = [(each.rate, even @ np.array(each.exponent) @ back) for each in struck]
     else:
         moves = [(time if noise.is_white else time * noise.standard_deviation**2, driven)]
     found: Coefficients = kind(
@@ -364,7 +366,7 @@ def coefficients(system: System, noise: Any) -> Coefficients:
         half_turn,
         _rays(system, even, steady),
         _settling(free, moves, half_turn),
-        impulses,
+        arrivals,
     )
     return found
 

@@ -111,7 +111,7 @@ class SwitchedMotion(NamedTuple):
     """A of each state as rows (t, p, q, r), shape (states, 4), and what multiplies x on arrival, (states, 2, 2)."""
 
     matrices: FloatArray
-    impulses: FloatArray
+    arrivals: FloatArray
     rays: Rays
 
     @staticmethod
@@ -263,7 +263,7 @@ def step_switched(m, chain, h, x, u, states, log_norm, rng):  # type: ignore[no-
             left -= stay
             if left > 0:
                 k = picked(chain.reached[k], rng)
-                a, b, c, d = m.impulses[k, 0, 0], m.impulses[k, 0, 1], m.impulses[k, 1, 0], m.impulses[k, 1, 1]
+                a, b, c, d = m.arrivals[k, 0, 0], m.arrivals[k, 0, 1], m.arrivals[k, 1, 0], m.arrivals[k, 1, 1]
                 x[i], u[i] = a * x[i] + b * u[i], c * x[i] + d * u[i]
                 square = x[i] * x[i] + u[i] * u[i]
                 if not 1 / _HUGE < square < _HUGE:

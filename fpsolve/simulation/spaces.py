@@ -47,7 +47,7 @@ class SwitchedSpace(NamedTuple):
 
     matrices: FloatArray
     whole: FloatArray
-    impulses: FloatArray
+    arrivals: FloatArray
     sizes: FloatArray
 
     @staticmethod
@@ -304,7 +304,7 @@ def step_switched_space(m, chain, h, x, u, states, log_norm, rng):  # type: igno
             left -= stay
             if left > 0:
                 k = picked(chain.reached[k], rng)
-                _multiplied(m.impulses[k], state, other)
+                _multiplied(m.arrivals[k], state, other)
         log_norm[i] += _tamed(state)
         _store(x, u, i, state)
         states[i] = k

@@ -188,7 +188,7 @@ KNOWN = {
         matrices(FREE, COUPLED, White(s=1.0)), {-1: 0.0314237}, estimator="population", time=100.0
     ),
     "two modes, impulses": Simulated(
-        matrices(FREE, COUPLED, Poisson(1.0, (0.4,))), {2: -0.0861990831}, estimator="population", paths=4096
+        matrices(FREE, COUPLED, Poisson(1.0, (0.4,))), {2: -0.0861990831}, estimator="population"
     ),
     "six variables, all alike": Simulated(
         matrices(MASSES, 0.5 * np.eye(6), White(s=0.2)),
