@@ -211,7 +211,7 @@ def scale_of(values: FloatArray) -> Literal["linear", "log"]:
     return "log" if is_log_spaced(values) else "linear"
 
 
-def scale_axis(axis: Any, scale: str, limits: tuple[float, float] | None = None) -> None:
+def scale_axis(axis: Any, scale: str, limits: tuple[float, float] | None) -> None:
     """Set the scale of an axis, "linear" or "log", its ends, and numbers such as 0.5, 1, 2 where it is logarithmic."""
     axes, side = axis.axes, axis.axis_name
     axes.set(**{f"{side}scale": scale}, **({f"{side}lim": limits} if limits else {}))

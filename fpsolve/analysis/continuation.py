@@ -150,7 +150,7 @@ def find_zero(field: Field, at: FloatArray) -> Sample | None:
     return None
 
 
-def correct(field: Field, at: FloatArray, along: FloatArray | None = None, last: Sample | None = None) -> Sample | None:
+def correct(field: Field, at: FloatArray, along: FloatArray | None, last: Sample | None = None) -> Sample | None:
     """The point F = 0 near a point, on the normal to `along`, or without it on the gradient; None where there is none.
 
     A step of Newton's method is the last one where F is 0 to its error before it; or where hardly anything is left
@@ -183,7 +183,7 @@ def correct_on_line(field: Field, axis: int, value: float, guess: FloatArray) ->
     return correct(field, at, np.eye(2)[axis])
 
 
-def trace_branch(field: Field, start: Sample, longest: float, stepped: Callable[[], None] = lambda: None) -> Trace:
+def trace_branch(field: Field, start: Sample, longest: float, stepped: Callable[[], None]) -> Trace:
     """The whole branch through a point, within the square; `stepped` is called for each of its points."""
     stepped()
     forward, closed, obstacle = _half(field, start, 1.0, longest, stepped)

@@ -190,9 +190,7 @@ def excursion(
     return solve_excursion(solver, phi=phi, xi=xi)
 
 
-def solve_excursion(
-    solver: ExponentSolver, *, phi: Start = 0.0, xi: StartOfNoise = STATIONARY, root: float | None = None
-) -> Excursion:
+def solve_excursion(solver: ExponentSolver, *, phi: Start, xi: StartOfNoise, root: float | None = None) -> Excursion:
     """The excursions of a solver's problem; `root` is near δ_p, if that is known."""
     problem, solver = solver.problem, solver.adapting()  # a mesh need not reach the ends of the noise
     check_start(problem, phi, xi)

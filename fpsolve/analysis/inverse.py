@@ -207,11 +207,6 @@ def start_and_stop(problem: Problem, key: str) -> Axis | None:
     return Axis(key, max(start, low), min(stop, high))
 
 
-def _is_close(sample: Sample) -> bool:
-    """Whether F may be 0."""
-    return abs(sample.value) <= max(TOLERANCE * sample.scale, sample.error)
-
-
 class _Tried:
     """F, solved once at each θ.
 
@@ -379,4 +374,5 @@ def _nearest_from(
             constraints={"type": "eq", "fun": value, "jac": slope},
             options={"ftol": FALL, "maxiter": MOST_SOLVES},
         )
-    return taken[-1] if _is_close(taken[-1]) and off(taken[-1]) <= NEAREST else None
+    is_zero = abs(taken[-1].value) <= max(TOLERANCE * taken[-1].scale, taken[-1].error)
+    return taken[-1] if is_zero and off(taken[-1]) <= NEAREST else None

@@ -161,7 +161,7 @@ def solve_sensitivities(
     p: FloatArray,
     along: Mapping[str, ParameterDerivative],
     *,
-    indices: Iterable[str] = RECORDS,
+    indices: Iterable[str],
     root: float | None = None,
     progress: Callable[[], None] = lambda: None,
 ) -> Sensitivities:

@@ -37,7 +37,7 @@ def described_cases() -> dict[str, str]:
     return {name: str(tomllib.loads(text)["title"]) for name, text in texts}
 
 
-def copy_case(name: str, target: Path | None = None) -> Path:
+def copy_case(name: str, target: Path | None) -> Path:
     """Copy a case, with the files that it names, and beside it the schema by which editors complete and check it.
 
     Args:

@@ -121,7 +121,7 @@ class Statement:
 
 
 def measurement_of(
-    spectrum: Path | None, stated: Statement, case: Case | None = None
+    spectrum: Path | None, stated: Statement, case: Case | None
 ) -> tuple[Spectrum | Record, Wanted, Path]:
     """What was measured, in the unit of its signal, what is to be fitted, and the file.
 

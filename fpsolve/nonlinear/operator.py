@@ -27,7 +27,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.sparse import csr_matrix
 
-from fpsolve.arrays import Coefficient, FloatArray, dense, identity, one
+from fpsolve.arrays import Coefficient, FloatArray, dense, one
 from fpsolve.fem.line import LineSpace
 from fpsolve.fem.noise_axes import NoiseAxis
 from fpsolve.model.plane import CoefficientMatrix
@@ -237,7 +237,7 @@ class Plane:
         speed = sum(float(rate.g(mean)) * float(rate.h(end)[0]) for rate in self.flow.linear)
         return float(speed * (np.kron(self.circle.at(end)[0], self.xi_mean) @ values))
 
-    def integrals(self, f: FloatArray, g: Coefficient = identity) -> FloatArray:
+    def integrals(self, f: FloatArray, g: Coefficient) -> FloatArray:
         """∫ f(φ) P_s g(ξ) ρ as a vector over the functions, f at the points of φ."""
         noise = self.xi_mean if g == one else dense(self.axis.matrix(g)).T @ self.axis.constant
         return np.asarray(np.kron((self.circle.weights * f) @ self.circle.values, noise))

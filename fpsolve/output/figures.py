@@ -45,7 +45,6 @@ from fpsolve.model.quantity import (
 from fpsolve.page.page import Drawing
 from fpsolve.results.curve import CurveResult, SimulatedCurve, Status
 from fpsolve.results.table import Table
-from fpsolve.study.columns import table_of
 from fpsolve.theory import perturbation
 from fpsolve.theory.perturbation import perturbed_moments
 
@@ -141,7 +140,7 @@ def main_figure(
     case: Case,
     results: Sequence[CurveResult],
     simulated: Sequence[SimulatedCurve],
-    table: Table | None = None,
+    table: Table,
 ) -> Drawing:
     """figure.png and .pdf: finite elements, perturbation theory, dots of a simulation.
 
@@ -149,11 +148,10 @@ def main_figure(
     none of a case that does not ask for Λ(p).
 
     Args:
-        table: the numbers of all curves, if these are known already.
+        table: the numbers of all curves.
     """
     over = "p" if case.figure.x == "p" else case.about(case.figure.x).words
     title = f"The {case.figure.quantity.words}, {case.figure.quantity.symbol}, over {over}"
-    table = table_of(case, results) if table is None else table
     return Drawing(title, partial(_draw, case, results, simulated, table), "figure", case.caption)
 
 

@@ -28,7 +28,7 @@ from fpsolve.model.quantity import MOMENT, STATUS, Quantity
 from fpsolve.parts.every import PARTS
 from fpsolve.results.curve import CurveResult, Status
 from fpsolve.results.table import Column, Row, Table, plain, rows_over_p
-from fpsolve.study.columns import COUNTS, columns_of, row_of, table_of
+from fpsolve.study.columns import COUNTS, columns_of, row_of
 
 MOST_INDENTED = 100
 """Curves of a summary that is made for eyes, too."""
@@ -64,21 +64,20 @@ def write_results(
     results: Sequence[CurveResult],
     folder: Path,
     facts: Mapping[str, Any],
-    finished: int | None = None,
-    table: Table | None = None,
-    says: NDArray[np.bool_] | None = None,
-) -> Table:
-    """Write summary.json, which says whether all curves are there, moments.csv and curves.csv; return their numbers.
+    finished: int,
+    table: Table,
+    says: NDArray[np.bool_],
+) -> None:
+    """Write summary.json, which says whether all curves are there, moments.csv and curves.csv.
 
     Of many curves summary.json has the state, the messages and what no other table has; see `MOST_SUMMARISED`.
 
     Args:
         facts: on the run, see `facts_of`.
-        finished: how many of them are; all if None.
-        table: their numbers, if these are known already.
-        says: of which curves of the case there is more; of all if None.
+        finished: how many of them are.
+        table: their numbers.
+        says: of which curves of the case there is more.
     """
-    table = table_of(case, results) if table is None else table
     columns, is_short = columns_of(case), case.planned > MOST_SUMMARISED
     over_p, of_curve = _names(columns)
     of_curve = [name for name in of_curve if not name.endswith("_perturbation")]  # which others have
@@ -90,7 +89,9 @@ def write_results(
         by_moment, by_curve = csv.writer(moments), csv.writer(curves)
         by_moment.writerow([*case.vary.keys, *over_p])
         by_curve.writerow([*case.vary.keys, *of_curve])
-        summary.write(_beginning(case, len(results) if finished is None else finished, facts, held=is_short))
+        common = {"parameters": dict(case.constants)} if is_short else {}
+        start = json.dumps({**_state(case, finished), **facts, **common}, indent=1, ensure_ascii=False)
+        summary.write(start.removesuffix("\n}") + ',\n "curves": [')
         sets = [case.vary.sets[number] for number in known.tolist()]
         cells = zip(*(_cells(table[name], known) for name in of_curve), strict=True)
         by_curve.writerows([*varied.values(), *row] for varied, row in zip(sets, cells, strict=True))
@@ -100,14 +101,13 @@ def write_results(
             if not is_short:
                 result = results[place]
                 content = _summary(case, result, row_of(case, result), columns)
-            elif says is None or says[number]:
+            elif says[number]:
                 content = _short_summary(case, results[place])
             else:
                 word = Status(int(table[STATUS.name].values[number])).word
                 content = {"varied": varied, "status": word, "warnings": [], "notes": []}
             summary.write(_entry(case, place, content))
         summary.write(_END)
-    return table
 
 
 def _names(columns: Sequence[Quantity]) -> tuple[list[str], list[str]]:
@@ -155,13 +155,6 @@ def whole_summary(case: Case, results: Sequence[CurveResult], facts: Mapping[str
 
 def _state(case: Case, done: int) -> dict[str, Any]:
     return {**head(case), "complete": done == case.planned, "planned": case.planned, "done": done}
-
-
-def _beginning(case: Case, done: int, facts: Mapping[str, Any], *, held: bool = False) -> str:
-    """What summary.json has before its curves; with the parameters that these have in common, if they are held."""
-    common = {"parameters": dict(case.constants)} if held else {}
-    start = json.dumps({**_state(case, done), **facts, **common}, indent=1, ensure_ascii=False)
-    return start.removesuffix("\n}") + ',\n "curves": ['
 
 
 def _entry(case: Case, number: int, content: Mapping[str, Any]) -> str:

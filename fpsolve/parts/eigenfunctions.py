@@ -33,7 +33,7 @@ from fpsolve.messages import Code, Message
 from fpsolve.model.quantity import MOMENT, NOISE, PHASE
 from fpsolve.page.page import Drawing
 from fpsolve.parts.nodes import FIELDS, FURTHEST, Nodes
-from fpsolve.parts.part import Job, Numerics, Part, Reason, Settings, attempt
+from fpsolve.parts.part import Job, Part, Reason, Settings, attempt
 from fpsolve.parts.surfaces import Surface, picture_of
 from fpsolve.results.curve import CurveResult, SimulatedCurve
 from fpsolve.vtk import Facts, collection_of, field_data, name_at, pyvista_module, write_points, write_series
@@ -119,11 +119,8 @@ def part_of_pictures(
         if case.method.pictures == pictures:
             yield from figures(case, result, folder)
 
-    def said(found: tuple[Message, ...], curve: Curve, numerics: Numerics) -> tuple[Message, ...]:
-        return found
-
     kind = tuple[Message, ...]
-    return Part(pictures.part, settings, solve, kind, symbol, said=said, draw=draw, figures=drawings)
+    return Part(pictures.part, settings, solve, kind, symbol, said=lambda found, *_: found, draw=draw, figures=drawings)
 
 
 def _draw(found: Eigenfunctions, curve: Curve, folder: Path) -> None:

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
 
 from fpsolve.analysis.excursions import SYMBOL, Excursion, check_start, solve_excursion
-from fpsolve.case.case import Case, Curve
+from fpsolve.case.case import Case
 from fpsolve.case.sections import EXCURSIONS
 from fpsolve.errors import FpsolveError
-from fpsolve.messages import Message
 from fpsolve.page.page import Sentence
-from fpsolve.parts.part import Job, Numerics, Part, Settings
+from fpsolve.parts.part import Job, Part, Settings
 from fpsolve.results.curve import CurveResult
 from fpsolve.results.table import pair
 
@@ -30,10 +29,6 @@ def _solve(job: Job, settings: Settings) -> Excursion:
     except ValueError as error:  # of sets after the first one
         raise FpsolveError(str(error)) from None
     return solve_excursion(job.solver, phi=settings["phi"], xi=settings["xi"], root=job.root)
-
-
-def _said(found: Excursion, curve: Curve, numerics: Numerics) -> Iterable[Message]:
-    return found.notes
 
 
 def _content(case: Case, result: CurveResult) -> Mapping[str, Any]:
@@ -104,7 +99,7 @@ PART: Part = Part(
     _solve,
     Excursion,
     SYMBOL,
-    said=_said,
+    said=lambda found, *_: found.notes,
     content=_content,
     show=_show,
 )

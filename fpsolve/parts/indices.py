@@ -92,10 +92,6 @@ def _column_of_theory(name: str) -> str:
     return INDICES[name].perturbation.name
 
 
-def _theory_settings(case: Case, number: int) -> Settings | None:
-    return {} if any(name in case.asked for name in INDICES) else None
-
-
 def _solve_theory(job: Job, settings: Settings) -> dict[str, float]:
     return {name: index.theory(job.curve.problem) for name, index in INDICES.items()}
 
@@ -153,7 +149,7 @@ def _show(case: Case, result: CurveResult) -> Iterator[Block]:
 
 THEORY: Part = Part(
     "theory",
-    _theory_settings,
+    lambda case, _: {} if asked(case) else None,
     _solve_theory,
     dict[str, float],
     row=_row_of_theory,

@@ -98,21 +98,12 @@ def begun_of(found: Moments) -> dict[float, Moment]:
     return {p: Moment(*row) for p, row in zip(columns.p.tolist(), rows, strict=True)}
 
 
-def _said(found: Moments, curve: Curve, numerics: Numerics) -> Iterator[Message]:
-    yield from found.warnings
-    yield from found.notes
-
-
 def _columns(case: Case) -> Sequence[Quantity]:
     return tuple(OVER_P.values()) if MOMENT.name in case.asked else ()
 
 
 def _row(case: Case, result: CurveResult) -> Row:
     return {"p": result.moments.p} | {each.name: getattr(result.moments, name) for name, each in OVER_P.items()}
-
-
-def _reasons(found: Moments) -> Iterator[Message]:
-    return (each.reason for each in found.failures)
 
 
 def moment_grid(case: Case, result: CurveResult) -> Grid:
@@ -139,10 +130,10 @@ PART: Part = Part(
     _settings,
     _solve,
     Moments,
-    said=_said,
+    said=lambda found, *_: (*found.warnings, *found.notes),
     columns=_columns,
     row=_row,
-    reasons=_reasons,
+    reasons=lambda found: (each.reason for each in found.failures),
 )
 
 

@@ -72,7 +72,9 @@ def _density(found: StationaryResponse, grid: Grid) -> ResponseDensity:
     xi = _values_of(problem.coloured, values)
     whole = [found.density([each], phi, xi)[0] for each in a]  # one by one, which takes little memory
     of_plane = found.polar_density(a[:, None], phi)
-    return ResponseDensity(a, phi, xi, found.amplitude_density(a), of_plane, _short(np.array(whole)))
+    return ResponseDensity(
+        a, phi, xi, found.amplitude_density(a), of_plane, np.array(whole, dtype=np.float32).astype(float)
+    )
 
 
 def _values_of(noise: Noise, count: int) -> FloatArray:
@@ -80,10 +82,6 @@ def _values_of(noise: Noise, count: int) -> FloatArray:
     far = SPREAD * noise.standard_deviation
     low, high = max(noise.mean - far, -noise.half_width), min(noise.mean + far, noise.half_width)
     return np.asarray(low + (np.arange(count) + 0.5) * (high - low) / count)
-
-
-def _short(values: FloatArray) -> FloatArray:
-    return np.asarray(values.astype(np.float32), dtype=float)
 
 
 def _settings(case: Case, number: int) -> Settings | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -14,10 +14,9 @@ from fpsolve.case.case import Case, Curve
 from fpsolve.case.sections import SENSITIVITIES
 from fpsolve.drawing import draw_bars, figure_for
 from fpsolve.exponent.error import MEANINGLESS, Estimate
-from fpsolve.messages import Message
 from fpsolve.model.quantity import MOMENT
 from fpsolve.page.page import Drawing
-from fpsolve.parts.part import Job, Numerics, Part, Settings
+from fpsolve.parts.part import Job, Part, Settings
 from fpsolve.results.curve import CurveResult, SimulatedCurve
 from fpsolve.theory.perturbation import scale_of
 
@@ -35,10 +34,6 @@ def _solve(job: Job, settings: Settings) -> Sensitivities:
     p = np.array([p for p in settings["p"] if np.any(solved == p)])
     names = [name for name in settings["indices"] if job.found(name) is not None]
     return solve_sensitivities(job.solver, p, job.curve.problem.derivatives(), indices=names, root=job.root)
-
-
-def _said(found: Sensitivities, curve: Curve, numerics: Numerics) -> Iterable[Message]:
-    return found.notes
 
 
 def _content(case: Case, result: CurveResult) -> Mapping[str, Any]:
@@ -90,7 +85,7 @@ PART: Part = Part(
     _solve,
     Sensitivities,
     SENSITIVITIES,
-    said=_said,
+    said=lambda found, *_: found.notes,
     content=_content,
     figures=_figures,
     lacks=_lacks,

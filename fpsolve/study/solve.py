@@ -233,11 +233,6 @@ def solve_batch(
     return kept
 
 
-def batch_size(planned: int) -> int:
-    """Sets of a batch, from the case alone."""
-    return min(max(planned // BATCHES, 1), MOST_SETS)
-
-
 def batches(case: Case, order: Callable[[int, Varied], Order | None]) -> Iterator[tuple[Order, ...]]:
     """All batches of a case, without the sets of which nothing is wanted; the first sets come one by one.
 
@@ -247,7 +242,7 @@ def batches(case: Case, order: Callable[[int, Varied], Order | None]) -> Iterato
         case: whose sets these are.
         order: gives the order of a set from the number of its curve and what is varied.
     """
-    size = batch_size(case.planned)
+    size = min(max(case.planned // BATCHES, 1), MOST_SETS)  # from the case alone
     starts = [*range(min(size, case.planned)), *range(size, case.planned, size), case.planned]
     for start, stop in pairwise(starts):
         if found := tuple(filter(None, map(order, range(start + 1, stop + 1), case.vary.sets[start:stop]))):

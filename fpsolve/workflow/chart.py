@@ -145,7 +145,7 @@ def solve_chart(
     *,
     progress: Callable[[], None] = lambda: None,
     stepped: Callable[[], None] = lambda: None,
-    map: Map = map,
+    map: Map,
     known: Callable[[Boundary], Points | None] = lambda _: None,
     has_closed_forms: bool = True,
 ) -> Iterator[Chart]:

@@ -25,7 +25,7 @@ from fpsolve.page.page import Block, Column, Grid, Sentence
 from fpsolve.results.text import plural
 from fpsolve.show.notes import note_on
 from fpsolve.workflow.folders import ANEW, DESIGNED, own_folder, saying_if_interrupted
-from fpsolve.workflow.progress import SILENT, SOLVES, Phase, Watch
+from fpsolve.workflow.progress import SOLVES, Phase, Watch
 from fpsolve.workflow.reports import facts_since
 
 
@@ -108,9 +108,7 @@ def wanted_of(
         raise FpsolveError(f"{case.path}: {failure}") from None
 
 
-def solve_design(
-    case: Case, target: str, by: tuple[Axis, ...], progress: Callable[[], None] = lambda: None
-) -> DesignOutcome:
+def solve_design(case: Case, target: str, by: tuple[Axis, ...], progress: Callable[[], None]) -> DesignOutcome:
     """The design of a case, see `wanted_of`; or why there is none.
 
     Args:
@@ -160,9 +158,7 @@ def summary(case: Case, outcome: DesignOutcome, facts: Mapping[str, Any]) -> dic
     }
 
 
-def design_case(
-    case: Case, target: str, by: tuple[Axis, ...], out: str | Path = "results", *, watch: Watch = SILENT
-) -> DesignOutcome:
+def design_case(case: Case, target: str, by: tuple[Axis, ...], out: Path, *, watch: Watch) -> DesignOutcome:
     """Find the design of a case, see `wanted_of`; write design.json and, where there is one, design.toml.
 
     Raises:

@@ -166,7 +166,7 @@ def refuse_wrong_case(case: Case, wanted_of: str, terms: int) -> None:
         raise FpsolveError(f"{case.path}: has the unit of time {case.units.time}, and measurements are in s; use s")
 
 
-def measure(data: Spectrum | Record, wanted: Wanted, progress: Callable[[], None] = lambda: None) -> NoiseOutcome:
+def measure(data: Spectrum | Record, wanted: Wanted, progress: Callable[[], None]) -> NoiseOutcome:
     """Fit a noise to what was measured, and say what it means.
 
     Args:

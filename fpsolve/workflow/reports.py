@@ -38,7 +38,7 @@ def write_report(
     *,
     facts: Mapping[str, Any],
     files: Sequence[str],
-    complete: bool = True,
+    complete: bool,
 ) -> None:
     """Write the report of what a command found into a folder, if one is wanted; a fault in that is said and no more.
 

@@ -166,8 +166,8 @@ class Sweep:
     def write_tables(self) -> Table:
         """Write summary.json, moments.csv and curves.csv; return their numbers."""
         started, self.facts = monotonic(), facts_of(self.case, self.started, monotonic() - self._clock)
-        results = self.results
-        table = write_results(self.case, results, self.folder, self.facts, self.done, results.table, results.says)
+        results, table = self.results, self.results.table
+        write_results(self.case, results, self.folder, self.facts, self.done, table, results.says)
         self._due = monotonic() + REST * (monotonic() - started)
         return table
 

@@ -148,7 +148,7 @@ class Simulations:
         known: how many an earlier run had finished.
     """
 
-    def __init__(self, case: Case, folder: Path, *, is_fresh: bool = False) -> None:
+    def __init__(self, case: Case, folder: Path, *, is_fresh: bool) -> None:
         self.case, self.folder, self.records = case, folder, Records(folder / RECORDS)
         if is_fresh:
             self.records.remove()

@@ -10,6 +10,7 @@ from fpsolve.exponent.error import Estimate, Failure
 from fpsolve.exponent.quantities import INDICES
 from fpsolve.output.figures import Encoding, main_figure
 from fpsolve.results.curve import CurveResult, MomentColumns
+from fpsolve.study.columns import table_of
 from fpsolve.theory.perturbation import second_order
 from tests.conftest import sampled
 from tests.kit import TEXT, case_in
@@ -53,7 +54,7 @@ def drawn(pictures, monkeypatch, tmp_path):
             told = () if p.size else (Failure(None, "it was too hard"),)
             columns = MomentColumns(p, value, slope, nothing, nothing, nothing, value)
             results.append(CurveResult(curve, columns, dict.fromkeys(INDICES) | known, failures=told))
-        main_figure(case, results, []).write(tmp_path)
+        main_figure(case, results, [], table_of(case, results)).write(tmp_path)
         return figures[-1]
 
     monkeypatch.setattr(matplotlib.figure, "Figure", Recorded)
