@@ -50,9 +50,8 @@ def spreads_of(case: Case, result: CurveResult) -> Spreads:
         for name in UNCERTAIN
         if (each := result.estimates[name]) is not None
     }
-    values = dict(zip(result.moments.p.tolist(), result.moments.value.tolist(), strict=True))
     rows = zip(slopes.p.tolist(), slopes.moments, strict=True)
-    moments = {p: spread_of(values[p], row, laws) for p, row in rows if p and p in values}
+    moments = {p: spread_of(each.value, row, laws) for p, row in rows if p and (each := result.moment(p))}
     return Spreads(
         {name: each for name, each in indices.items() if each is not None},
         {p: each for p, each in moments.items() if each is not None},

@@ -148,16 +148,12 @@ class Nodes:
         phi, y = np.meshgrid(self.phi.ravel(), self.y, indexing="ij")
         return np.stack([phi.ravel(), y.ravel(), np.zeros(phi.size)], axis=1)
 
-    @property
-    def _rows(self) -> Any:
-        """Where cells begin among the nodes of ξ."""
-        return np.arange(0, self.z.size - 1, self.order)
-
     def cells(self) -> Any:
         """Points of each quadrilateral in VTK's order, shape (cells, (order + 1)²)."""
         k, (blocks, nodes) = self.order, self.phi.shape
         columns = (np.arange(blocks)[:, None] * nodes + np.arange(0, nodes - 1, k)).ravel()
-        corners = columns[:, None] * self.z.size + self._rows
+        rows = np.arange(0, self.z.size - 1, k + self.is_lines)  # lines share no nodes
+        corners = columns[:, None] * self.z.size + rows
         inner = range(1, k)
         edges = [*((i, 0) for i in inner), *((k, j) for j in inner), *((i, k) for i in inner), *((0, j) for j in inner)]
         i, j = np.transpose([(0, 0), (k, 0), (k, k), (0, k), *edges, *((i, j) for j in inner for i in inner)])
@@ -206,10 +202,6 @@ class Strips(Nodes):
     def samples(self, pair: PrincipalPair) -> Samples:
         at, states = pair.space.xi.samples(), np.arange(self.z_cells.shape[0]).repeat(self.z_cells.shape[1])
         return Samples(*(each[states] for each in at))
-
-    @property
-    def _rows(self) -> Any:
-        return np.arange(0, self.z.size, self.order + 1)
 
 
 def _z_lines(pair: PrincipalPair) -> FloatArray:

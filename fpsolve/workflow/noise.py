@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -358,20 +358,16 @@ def _lines(noise: Noise, fit: NoiseFit, part: str) -> Iterator[str]:
     yield from (f'{name} = "{word}"' for name, word in noise.words.items())
     errors = fit.errors
     values = {name: each for name, each in noise.values.items() if not isinstance(each, str)}
-    if noise.kind == "filter":
-        yield from (_line(name, values[name], errors, part, len(fit.parts)) for name in ("omega", "zeta", "s"))
+    is_filter = noise.kind == "filter"
+    for name in ("omega", "zeta", "s") if is_filter else values:
+        error = errors.get(name if len(fit.parts) == 1 else f"{part}.{name}")
+        text = f"{name} = {_number(values[name], error or 0.0)}"
+        yield f"{text:34}  # ± {error:.2g}" if error else text
+    if is_filter:
         error = errors.get("c1", errors.get(f"{part}.c1"))
         remark = "c0 and c1 of ξ = c0 y + c1 y′" + (f", c1 ± {error:.2g}" if error is not None else "")
         output = f"output = [{_number(values['c0'], 0.0)}, {_number(values['c1'], error or 0.0)}]"
         yield f"{output:34}  # {remark}"
-    else:
-        yield from (_line(name, values[name], errors, part, len(fit.parts)) for name in values)
-
-
-def _line(name: str, value: float, errors: Mapping[str, float], part: str, parts: int) -> str:
-    error = errors.get(name if parts == 1 else f"{part}.{name}")
-    text = f"{name} = {_number(value, error or 0.0)}"
-    return f"{text:34}  # ± {error:.2g}" if error else text
 
 
 def _number(value: float, error: float) -> str:
@@ -500,13 +496,14 @@ def draw_noise(outcome: NoiseOutcome, source: Path, shown: Convention, folder: P
         axes.loglog(x, factor * spectrum.density, ".", color="0.35", markersize=4, label=source_label)
         values, _ = density_of(fit, fine.tolist())
         axes.loglog(shown.frequency(fine), factor * values, "-", color=COLOURS[0], label="fitted")
+        dashed: dict[str, Any] = {"color": COLOURS[1], "linestyle": (0, (4, 2)), "linewidth": 1.2}
         for each in fit.misfit:
             place = shown.frequency(each.omega) if each.omega else x[0]
-            axes.axvline(place, color=COLOURS[1], linestyle=(0, (4, 2)), linewidth=1.2)
+            axes.axvline(place, **dashed)
             name = each.name.replace("ω", shown.symbol) if each.omega else "← 0"
             axes.annotate(name, (place, 1.0), (3, -3), xycoords=("data", "axes fraction"), textcoords="offset points",
                           va="top", color=COLOURS[1], fontsize="small")  # fmt: skip
-        axes.plot([], [], color=COLOURS[1], linestyle=(0, (4, 2)), linewidth=1.2, label="what stability depends on")
+        axes.plot([], [], label="what stability depends on", **dashed)
         axes.set_xlim(0.9 * x[0], x[-1] / 0.9)
         for axis in (axes.xaxis, axes.yaxis):
             plain_numbers(axis)
