@@ -298,7 +298,7 @@ class Case(Section):
             RESPONSE: RESPONSE not in named and self.responds,
             SENSITIVITIES: self.output.sensitivities,
             EIGENFUNCTIONS: self.output.asks_for_eigenfunctions
-            or (self.output.eigenfunctions is None and self.method.pictures.is_usual),
+            or (self.output.eigenfunctions is None and self.method.pictures.is_seen),
         }
         return tuple(name for name in QUANTITY_NAMES if name in named or usual.get(name))
 

@@ -548,11 +548,6 @@ class ExcursionSection(Section):
         parameter("the noise at the start", 'xi = "stationary"'),
     ] = STATIONARY
 
-    @property
-    def sentence_level(self) -> float:
-        """The level that is nearest to 10."""
-        return min(self.levels, key=lambda level: abs(math.log(level / 10)))
-
 
 class ResponseGrid(Section):
     """{ amplitude, phi, xi }: at how many places along each axis a density is written."""

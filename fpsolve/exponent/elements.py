@@ -465,9 +465,6 @@ class PlaneElements(Elements):
         """
         return (Message(Code.START_MATTERS),) if np.any(p < -1) and has_cones(self.problem) else ()
 
-    def unseen(self) -> Message | None:
-        return None
-
 
 class GivenMesh(PlaneElements):
     """Λ(p) of two variables on a given mesh, with the error that a finer one tells."""

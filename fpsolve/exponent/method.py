@@ -102,16 +102,16 @@ class Pictures(NamedTuple):
     Attributes:
         part: the part of a case that draws it.
         most: of so many p where a case names none.
-        is_usual: whether one of them is drawn where a case does not ask for any.
+        is_seen: whether they are over phase and noise, in cells whose extremes can be told; one is drawn unasked.
     """
 
     part: str
     most: int
-    is_usual: bool
+    is_seen: bool
 
 
-PHASE_AND_NOISE: Pictures = Pictures("eigenfunctions", 9, is_usual=True)
-DIRECTIONS: Pictures = Pictures("directions", 3, is_usual=False)  # which take seconds each
+PHASE_AND_NOISE: Pictures = Pictures("eigenfunctions", 9, is_seen=True)
+DIRECTIONS: Pictures = Pictures("directions", 3, is_seen=False)  # which take seconds each
 
 
 class Method:
@@ -320,7 +320,7 @@ class Method:
 
     def unseen(self) -> Message | None:
         """Why nobody looks at the extremes of T, which bound excursions; None where they are looked at."""
-        return Message(Code.EXCURSION_PLANE, count=self.problem.dimension)
+        return None if self.pictures.is_seen else Message(Code.EXCURSION_PLANE, count=self.problem.dimension)
 
     def doubts(self, pairs: Sequence[PrincipalPair]) -> tuple[Message, ...]:
         """Warnings about some pairs."""

@@ -138,7 +138,7 @@ def _quantities(case: Case, table: Table) -> Iterator[Shown]:
     for rank, index in enumerate([each for each in told if each not in MAIN and over_p], 4):
         yield Shown(Column(index.symbol, rank), partial(_index, index), table[index.name].values[known])
     if EXCURSIONS in case.asked:
-        level = case.excursions.sentence_level
+        level = min(case.excursions.levels, key=lambda each: abs(math.log(each / 10)))
         yield Shown(
             Column(f"P(sup ‖x‖ ≥ {level:g})", 1),
             lambda result: bounds_text(result.excursion, level) if result.excursion else "",
