@@ -55,8 +55,6 @@ SHARED_SECONDS = 60.0
 """After which a file that another machine has written is there, if it ever is."""
 KEPT = 2**21
 """Bytes of the records whose results stay in memory once they are read, as of few curves all are asked for again."""
-MOST_LISTED = 8
-"""Numbers of an array that is a list in a record; longer ones take less room and time compressed."""
 _OF_ANOTHER_FORM = LookupError, TypeError, AttributeError, ValueError, ArithmeticError, RecursionError, zlib.error
 """What is raised where data have another form than what is made of them."""
 _AS_IT_IS = getattr(os, "O_BINARY", 0)
@@ -509,15 +507,11 @@ def _hints(kind: Any) -> Mapping[str, Any]:
     return {name: hints[name] for name in _names(kind)}
 
 
-def _packed(value: FloatArray) -> Record | list[float | str]:
-    if value.ndim == 1 and value.size <= MOST_LISTED:
-        return [each if math.isfinite(each) else str(each) for each in map(float, value)]
+def _packed(value: FloatArray) -> Record:
     data = np.ascontiguousarray(value, dtype="<f8").tobytes()
     return {"shape": list(value.shape), "data": b64encode(zlib.compress(data)).decode("ascii")}
 
 
 def _unpacked(packed: Any) -> FloatArray:
-    if isinstance(packed, list):
-        return np.array(list(map(float, packed)), dtype=float)
     data = zlib.decompress(b64decode(packed["data"]))
     return np.frombuffer(data, dtype="<f8").reshape(packed["shape"]).astype(float)
