@@ -10,7 +10,7 @@ import pytest
 from fpsolve import ExponentSolver, load_case
 from fpsolve.errors import NotConverged
 from fpsolve.exponent import INDICES
-from fpsolve.messages import Code, Message
+from fpsolve.messages import Code, Message, message_of
 from fpsolve.output.records import record_of
 from fpsolve.parts import PARTS, indices
 from fpsolve.results.curve import SimulatedCurve, Status
@@ -63,7 +63,7 @@ RESULT = MonteCarlo(
     step=1e-300,
     seed=2**63,
     impacts=0,
-    warnings=(Message(Code.TEXT, text="Λ(p) at p = 2"), Message(Code.TEXT, text='a "quoted" one\nof two lines')),
+    warnings=(message_of('Λ(p), a "quoted" one\nof two lines'),),
     interrupted=True,
     parameters={"noise.treatment": "exact"},
 )
