@@ -301,15 +301,13 @@ class Elements(Method):
     def slope_error(self, p: float) -> float:
         """1.5 times the larger of two changes by finer discretisations over 1 − r, r their ratio if they have one sign.
 
-        With one finer one alone r is taken as ¼. Or twice what has changed since a coarser one of the same place.
+        With one finer one alone r is taken as ¼.
         """
         if abs(p) < TINIEST_P:
             return self.ratio_alone(0.0)[1]
         solution = self.solution(p)
         with one_thread():
             rest = slope_rounding(solution.pair) + (self._jump() if self.is_at_corner(p) else 0.0)
-            if coarser := getattr(solution.start, "before", ()):
-                return 2 * abs(coarser[-1].derivative - solution.derivative) + rest
             finer = self.finer_pair(solution.pair)
             change = finer.derivative - solution.derivative
             more = 0.25 * change

@@ -77,6 +77,10 @@ class Budget:
         return Meter(self.seconds)
 
 
+BUDGET = Budget()
+"""The usual one."""
+
+
 @dataclass(frozen=True, eq=False)
 class Settings:
     """How accurately Λ(p) is found, and at what cost.
@@ -92,7 +96,7 @@ class Settings:
     rtol: float = RTOL
     of_value: float = 0.0
     mesh: CylinderMesh | None = None
-    budget: Budget = field(default_factory=Budget)
+    budget: Budget = BUDGET
     meter: Meter = field(default_factory=lambda: Meter(math.inf))
 
 

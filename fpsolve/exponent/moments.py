@@ -36,7 +36,7 @@ from fpsolve.errors import NoHierarchy
 from fpsolve.exponent.delays import DelayRates
 from fpsolve.exponent.error import Moment
 from fpsolve.exponent.matrices import MatrixRates
-from fpsolve.exponent.method import Budget, Search
+from fpsolve.exponent.method import BUDGET, Search
 from fpsolve.exponent.powers import Moving, PowerRates, exponents, moment_form, moves, multinomials, of_signs
 from fpsolve.exponent.rightmost import REMEDY, ROUNDING
 from fpsolve.fem.space import AXES, first_axis
@@ -149,7 +149,7 @@ def even_moment(
         loosest = rtol if tolerance is None else LOOSEST
         return max(min(loosest * found.scale, math.inf if tolerance is None else tolerance), 2 * found.rounding)
 
-    search = Search(p, allowed, Budget(), Remedy.BUDGET)
+    search = Search(p, allowed, BUDGET, Remedy.BUDGET)
     last: EvenMoment | None
     with unless_over_budget():
         last = search.settle(Level(equations, (FIRST,) * len(equations.noises), most))

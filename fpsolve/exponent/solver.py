@@ -23,7 +23,7 @@ from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.elements import doubt
 from fpsolve.exponent.error import Estimate, Failure, InvariantClass, Moment, checked
 from fpsolve.exponent.kinds import choose
-from fpsolve.exponent.method import Budget, Method, Settings, Tolerance, checked_moments, refuse
+from fpsolve.exponent.method import BUDGET, Budget, Method, Settings, Tolerance, checked_moments, refuse
 from fpsolve.fem.factors import one_thread
 from fpsolve.fem.generator import SMALL_P
 from fpsolve.fem.mesh import CylinderMesh
@@ -348,7 +348,7 @@ def solver_of(
 ) -> ExponentSolver:
     """A solver of a problem, with what is usual for it in place of each None. Raises as `ExponentSolver`."""
     rtol = choose(problem).usual_rtol if rtol is None else rtol
-    return ExponentSolver(problem, mesh, rtol=rtol, budget=budget or Budget())
+    return ExponentSolver(problem, mesh, rtol=rtol, budget=budget or BUDGET)
 
 
 def share_of(most: float, p: float, value: float) -> float:
@@ -441,16 +441,7 @@ def solve_moments(
                 result = None
     if result is None:
         result = solver.moments(points, progress=report, known=known)
-        if not result.failures and (
-            obstacle := _obstacle(
-                solver,
-                result.p,
-                result.value,
-                result.slope,
-                result.error_estimate,
-                partial(result.errors_of, result.slope),
-            )
-        ):
+        if not result.failures and (obstacle := _obstacle(result)):
             told = message_of(obstacle).advising(solver.method.refinement)
             result = replace(result, failures=(Failure(None, told),))
     for each in reports:
@@ -468,14 +459,12 @@ def _at(result: MomentLyapunov, p: FloatArray) -> MomentLyapunov:
 
 def interpolated(solver: ExponentSolver, curves: tuple[Curve, ...], p: FloatArray) -> MomentLyapunov:
     """Λ at several p by curves; the residual is the largest of the nodes. Raises `NotConverged` if they contradict."""
-    value, derivative, _, error, slope_error = values(curves, p)
-    if obstacle := _obstacle(solver, p, value, derivative, error, partial(np.asarray, slope_error)):
-        raise NotConverged(obstacle, remedy=solver.method.refinement)
+    value, derivative, _, error, _ = values(curves, p)
     for i in np.flatnonzero(p):
         estimate = Estimate(float(value[i]), float(error[i]), solver.method.scale(p[i]))
         checked(estimate, solver.method.refinement, float(p[i]))
     pairs = [solver.method.solution(each).pair for curve in curves for each in curve.nodes.tolist()]
-    return MomentLyapunov(
+    found = MomentLyapunov(
         p=p,
         value=value,
         slope=derivative,
@@ -487,6 +476,9 @@ def interpolated(solver: ExponentSolver, curves: tuple[Curve, ...], p: FloatArra
         root=sign_change(p, value, derivative),
         notes=solver.method.bounds(p, value, error),
     )
+    if obstacle := _obstacle(found):
+        raise NotConverged(obstacle, remedy=solver.method.refinement)
+    return found
 
 
 def sign_change(p: FloatArray, value: FloatArray, slope: FloatArray) -> float | None:
@@ -501,9 +493,11 @@ def sign_change(p: FloatArray, value: FloatArray, slope: FloatArray) -> float | 
     return float(np.clip(p[i] - ratio[i] * p[i] / rise[i], p[sides[0]], p[sides[0] + 1]))
 
 
-def _obstacle(solver: ExponentSolver, *columns: Any) -> Message | None:
-    """Why not all values can be right, from the arguments of `broken_convexity`; None where they may be."""
-    return broken_convexity(*columns) or contradiction(solver, *columns)
+def _obstacle(result: MomentLyapunov) -> Message | None:
+    """Why not all values can be right; None where they may be."""
+    steep = partial(result.errors_of, result.slope)
+    columns = result.p, result.value, result.slope, result.error_estimate, steep
+    return broken_convexity(*columns) or contradiction(result.solver, *columns)
 
 
 def broken_convexity(
