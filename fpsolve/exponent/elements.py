@@ -39,7 +39,7 @@ from fpsolve.exponent.method import (
     refuse,
 )
 from fpsolve.exponent.moments import EvenMoment, even_moment, moment_row
-from fpsolve.exponent.starts import Start, first, has_cones, other_centers, refined
+from fpsolve.exponent.starts import Start, first, has_cones, other_centers
 from fpsolve.fem.axis import FEW_UNKNOWNS
 from fpsolve.fem.factors import one_thread
 from fpsolve.fem.generator import SMALL_P, Generator
@@ -53,8 +53,6 @@ WORTH_A_TRY = FEW_UNKNOWNS
 """Unknowns of a system that takes less time than finding another one."""
 MOST_TILT_AWAY = 0.7
 """How far the tilt of a space may be from the best one at another p."""
-TRIM = 0.8
-"""A smaller space must have at most this share of the unknowns."""
 NEGLIGIBLE_P = 1e-30
 """Pairs at smaller |p| are those at p = 0, from which they differ by less than by rounding."""
 NEIGHBOURS = 6
@@ -388,29 +386,28 @@ class PlaneElements(Elements):
         )
 
     def places(self, p: float, tolerance: Tolerance, found: Sequence[Solution]) -> Iterator[tuple[Stage, Any]]:
-        """The first one is that of the nearest p, if what was chosen there is likely to do, else where slow noise
-        carries the moment, or the mean of other noise. Others are far from there.
+        """The first one is that of the nearest p, if its functions serve this one, too, else where slow noise carries
+        the moment, or the mean of other noise. Others are far from there.
         """
         if abs(p) < SMALL_P:
             yield from super().places(p, tolerance, found)
             return
         near = self._near(p)
-        if near and (space := self._reused(p, near[0], tolerance)):
-            yield Start(self.problem, space), near
+        if near and self._serves(near[0], p):
+            yield Start(self.problem, near[0].generator.chosen), near
         else:
             yield Start(self.problem, first(self.problem, p, self.settings.rtol)), None
         for center in other_centers(found[0].pair):
             yield Start(self.problem, first(self.problem, p, self.settings.rtol, center)), None
 
-    def _reused(self, p: float, near: PrincipalPair, tolerance: Tolerance) -> Space | None:
-        """The space of the nearest p, or one that should be within the tolerance there; None where it is of no use."""
-        q, space = near.p, near.generator.chosen
-        if abs(q) >= SMALL_P:
-            new = refined(self.spaces[q], tolerance(q, near.value), 0)
-            is_large = space.size > WORTH_A_TRY and new.size < TRIM * space.size
-            space = new if is_large or new.size > space.size else space
-        is_far = space.size > WORTH_A_TRY and abs(p - q) > max(0.5, 0.4 * min(abs(p), abs(q)))
-        return space if not is_far and self._tilt_fits(space, p) else None
+    def _serves(self, near: PrincipalPair, p: float) -> bool:
+        """Whether the space of another p is of use: a large one far away is not, nor one with another tilt."""
+        q, space, frozen = near.p, near.generator.chosen, frozen_noise(self.problem)
+        if space.size > WORTH_A_TRY and abs(p - q) > max(0.5, 0.4 * min(abs(p), abs(q))):
+            return False
+        if frozen is None or not self.problem.coloured.may_tilt:
+            return True
+        return abs(frozen.tilt(frozen.center(p)) - space.xi.slope * p) <= MOST_TILT_AWAY
 
     def confirmed(self, search: Search, found: Sequence[Solution]) -> Solution:
         """The largest one, if it agrees with that of halved cells of φ within its error, or within what is allowed.
@@ -441,14 +438,6 @@ class PlaneElements(Elements):
 
     def is_at_corner(self, p: float) -> bool:
         return abs(p + 1) <= AT_CORNER
-
-    def _tilt_fits(self, chosen: Space, p: float) -> bool:
-        """Whether the tilt of a space is about that at p."""
-        axis, frozen = chosen.xi, frozen_noise(self.problem)
-        if frozen is None:
-            return True
-        away = abs(frozen.tilt(frozen.center(p)) - axis.slope * p) if self.problem.coloured.may_tilt else 0.0
-        return away <= MOST_TILT_AWAY
 
     @property
     def has_witness(self) -> bool:  # type: ignore[override]

@@ -86,23 +86,18 @@ class Start:
             stages: how many spaces were solved on.
             most: unknowns; where more are needed, a space is made that does for this p alone.
         """
-        if self.space.xi.lines.size:
+        chosen, may_coarsen = self.space, stages < FREE_STAGES
+        if chosen.xi.lines.size:
             goal = max(goal, MOST_GAIN * solution.error)
-        found = refined(solution, goal, stages)
-        if found.size > most:
-            found = refined(solution, ALONE / SHARE * goal, stages)
+        for share in (SHARE * goal, ALONE * goal):
+            found = chosen.refined(solution.effects, share, may_coarsen)
+            if chosen.xi.lines.size:
+                lower, upper = solution.truncation
+                found = found.with_axis(1, found.xi.reaching(lower > share, upper > share))
+            found = found if found.size > chosen.size or solution.error <= goal else found.raised()
+            if found.size <= most:
+                break
         return replace(self, space=found)
-
-
-def refined(solution: Solution, tolerance: float, stages: int) -> Space:
-    """A discretisation on which every cell should lack no more than its share of the tolerance."""
-    chosen = solution.pair.generator.chosen
-    share, may_coarsen = SHARE * tolerance, stages < FREE_STAGES
-    new = chosen.refined(solution.effects, share, may_coarsen)
-    if chosen.xi.lines.size:
-        lower, upper = solution.truncation
-        new = new.with_axis(1, new.xi.reaching(lower > share, upper > share))
-    return new if new.size > chosen.size or solution.error <= tolerance else new.raised()
 
 
 def _effects_of(failure: Exception | None) -> Sequence[ModeEffects | None]:
