@@ -31,17 +31,17 @@ def choose(problem: Problem, settings: Settings | None = None) -> Method:
 
 def kind_of(problem: Problem) -> type[Method]:
     """The method of a problem, if it is none of one's own."""
-    is_in_plane, has_directions = problem.dimension <= 2, problem.dimension <= MOST_BY_DIRECTIONS
-    if problem.system.stop and (problem.dimension != MOST_BY_DIRECTIONS or problem.impulses):
+    is_in_plane, stop = problem.dimension <= 2, problem.system.stop
+    if stop and (problem.dimension != MOST_BY_DIRECTIONS or problem.impulses):
         return Simulated
     if problem.system.pasts:
         return DelayMoments
-    if not has_directions:
+    if problem.dimension > MOST_BY_DIRECTIONS:
         return EvenMoments
-    if problem.impulses and not is_in_plane:
+    if not is_in_plane and problem.impulses:
         return StruckMoments
     if problem.blocks:
         return Blocks
     if is_in_plane:
         return PlaneElements
-    return Stopped if problem.system.stop else Directions
+    return Stopped if stop else Directions
