@@ -171,6 +171,7 @@ class Generator:
     @cached_property
     def loss(self) -> float:
         """About how many times its rounding elimination may harm T − 1: the size of L, free of forcing, over a rate."""
-        (phase, *_), axes = self._terms.phases(0.0).values(), self.space(0.0).noises
-        free = [phase, *(axis.matrix(None) for axis in axes)]
-        return 30 * sum(float(abs(each).sum(axis=0).max()) for each in free) / self.problem.unit_rate
+        size = abs(next(iter(self._terms.phases(0.0).values()))).sum(axis=0).max()
+        for axis in self.space(0.0).noises:
+            size += abs(axis.matrix(None)).sum(axis=0).max()
+        return float(30 * size / self.problem.unit_rate)

@@ -128,12 +128,12 @@ class LineSpace:
             (self._shares.ravel(), (bubbles.ravel(), vertices.ravel())), shape=shape
         )
 
-    def mass(self, f: Coefficient = one) -> csr_matrix:
-        """∫ w f u v."""
+    def mass(self, f: FloatArray | float = 1.0) -> csr_matrix:
+        """∫ w f u v, from f at the points."""
         return self._form(self._values, f)
 
-    def stiffness(self, f: Coefficient = one) -> csr_matrix:
-        """∫ w f u′v′."""
+    def stiffness(self, f: FloatArray | float = 1.0) -> csr_matrix:
+        """∫ w f u′v′, from f at the points."""
         return self._form(self._slopes, f)
 
     @property
@@ -152,9 +152,9 @@ class LineSpace:
         rows = np.repeat(np.arange(x.size), self.degree + 1)
         return csr_matrix((values.ravel(), (rows, self._dofs[cell].ravel())), shape=(x.size, self.size))
 
-    def _form(self, values: FloatArray, f: Coefficient) -> csr_matrix:
+    def _form(self, values: FloatArray, f: FloatArray | float) -> csr_matrix:
         """∫ w f of the products of functions, without what is zero but for rounding."""
-        measure = self._measure * f(self.points).reshape(self._measure.shape)
+        measure = (self.measure * f).reshape(self._measure.shape)
         blocks = (values * measure[..., None]).transpose(0, 2, 1) @ values
         blocks[np.abs(blocks) < 1e-16 * np.max(np.abs(blocks))] = 0
         rows, columns = np.broadcast_arrays(self._dofs[:, :, None], self._dofs[:, None, :])

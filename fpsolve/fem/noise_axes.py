@@ -184,12 +184,37 @@ class LineAxis(NoiseAxis):
         """½σ²/std², the diffusion of z."""
         return 0.5 * self.noise.squared_diffusion(self.unit * z) / self.unit**2
 
-    def changed_weight(self, change: NoiseDerivative, g: Coefficient, logs: FloatArray, z: FloatArray) -> FloatArray:
-        """∂(P_s g)/∂θ over P_s from ∂ ln P_s/∂θ, where ξ may be measured by a length that changes: z is held."""
-        xi, weight = self.unit * z, logs * g(self.unit * z)
-        if change.log_scale:
+    def product(self, f: FloatArray) -> Matrix:
+        """∫ f u v in the weight of the axis, from f at the points of the rule."""
+        raise NotImplementedError
+
+    def energy(self, f: FloatArray) -> Matrix:
+        """∫ f (u′ + s u)(v′ + s v) in the weight of the axis, from f at the points of the rule."""
+        raise NotImplementedError
+
+    def mass(self, g: Coefficient = one) -> Matrix:
+        return self.product(g(self.unit * self.rule.points))
+
+    def generator(self) -> Matrix:
+        """−½ ∫ P_s σ² (u′ + s u)(v′ + s v); at the ends no probability flux is the natural condition."""
+        return -self.energy(self.rate(self.rule.points))
+
+    def changed(self, change: NoiseDerivative, g: Coefficient | None) -> Matrix:
+        z, measure = self.rule[:2]
+        logs = self._changed_logs(change)
+        logs = np.asarray(logs - measure @ logs / measure.sum())
+        if g is None:
+            own = 2 * (change.log_diffusion - change.log_scale) * self.matrix(None)
+            return own - self.energy(self.rate(z) * logs)
+        xi = self.unit * z
+        weight = logs * g(xi)
+        if change.log_scale:  # ξ may be measured by a length that changes: z is held
             weight = weight + change.log_scale * log_slope(g, xi)
-        return np.asarray(weight)
+        return self.product(weight)
+
+    def _changed_logs(self, change: NoiseDerivative) -> FloatArray:
+        """∂ ln P_s/∂θ at the points of the rule, but for a constant."""
+        return np.asarray(change.log_density(self.unit * self.rule.points))
 
     def values_at(self, z: FloatArray) -> Matrix:
         """The functions at any z, shape (len(z), size)."""
@@ -317,36 +342,26 @@ class PolynomialAxis(CountedAxis, LineAxis):
         missing = 0.0 if near < VANISHES * middle else 1.0
         return self.noise.end_exponent - missing, missing
 
-    @cached_property
-    def _flux(self) -> FloatArray:
-        return self.rule.measure * self.rate(self.rule.points)
-
     @property
     def _log_mass(self) -> float:
         return self.rule.log_mass
 
-    def mass(self, g: Coefficient = one) -> FloatArray:
-        z, measure, values = self.rule[:3]
-        return form(values, measure if g == one else measure * g(self.unit * z))
+    def product(self, f: FloatArray) -> FloatArray:
+        return form(self.rule.values, self.rule.measure * f)
 
-    def generator(self) -> FloatArray:
-        """−½ ∫ P_s σ² (u′ + s u)(v′ + s v)."""
-        return -form(self.rule.slopes, self._flux)
+    def energy(self, f: FloatArray) -> FloatArray:
+        return form(self.rule.slopes, self.rule.measure * f)
 
-    def changed(self, change: NoiseDerivative, g: Coefficient | None) -> FloatArray:
-        z, measure, values, slopes = self.rule[:4]
-        logs, a = change.log_density(self.unit * z), self.noise.end_exponent
+    def _changed_logs(self, change: NoiseDerivative) -> FloatArray:
+        logs, a = super()._changed_logs(change), self.noise.end_exponent
         if change.end_exponent and a < SHARP_ENDS:  # no rule of Gauss takes its ln(1 − x²) near ±1 as it stands
-            x = z / self.rule.scale
+            x = self.rule.points / self.rule.scale
             logs = logs + change.end_exponent * (_end_logarithm(x.size, self._ends[0], a) - np.log1p(-(x**2)))
-        logs = np.asarray(logs - measure @ logs)
-        if g is not None:
-            return form(values, measure * self.changed_weight(change, g, logs, z))
-        own = 2 * (change.log_diffusion - change.log_scale) * self.matrix(None)
-        return own - form(slopes, self._flux * logs)
+        return logs
 
     def generator_of_one(self) -> FloatArray:
-        return np.asarray(-self.tilt * (self._flux @ self.rule.slopes))
+        flux = self.rule.measure * self.rate(self.rule.points)
+        return np.asarray(-self.tilt * (flux @ self.rule.slopes))
 
     def values_at(self, z: FloatArray) -> FloatArray:
         return self.rule.polynomials.at((z - self.rule.shift) / self.rule.scale)[0]
@@ -402,24 +417,11 @@ class CellAxis(DividedAxis, LineAxis):
         lower, upper = [1.6 * self.lines[0]] if below else [], [1.6 * self.lines[-1]] if above else []
         return self.between(np.concatenate([lower, self.lines, upper]))
 
-    def mass(self, g: Coefficient = one) -> Matrix:
-        return self.stored(self.line.mass() if g == one else self.line.mass(lambda z: g(self.unit * z)))
+    def product(self, f: FloatArray) -> Matrix:
+        return self.stored(self.line.mass(f))
 
-    def generator(self) -> Matrix:
-        """−½ ∫ P_s σ² u′v′; at the ends no probability flux is the natural condition."""
-        return self.stored(-self.line.stiffness(self.rate))
-
-    def changed(self, change: NoiseDerivative, g: Coefficient | None) -> Matrix:
-        z, measure, _ = self.rule
-        mean = float(measure @ change.log_density(self.unit * z) / np.sum(measure))
-
-        def log_change(z: FloatArray) -> FloatArray:
-            return change.log_density(self.unit * z) - mean
-
-        if g is not None:
-            return self.stored(self.line.mass(lambda z: self.changed_weight(change, g, log_change(z), z)))
-        stiffness = self.line.stiffness(lambda z: self.rate(z) * log_change(z))
-        return 2 * (change.log_diffusion - change.log_scale) * self.matrix(None) - self.stored(stiffness)
+    def energy(self, f: FloatArray) -> Matrix:
+        return self.stored(self.line.stiffness(f))
 
     @cached_property
     def nested(self) -> Matrix:
