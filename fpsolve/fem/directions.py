@@ -50,7 +50,7 @@ from fpsolve.model.problem import ParameterDerivative, Problem
 
 SLOPE_PENALTY = 0.02
 """Factor γ of the penalty on jumps of slopes."""
-MOST_DEGREE = 10
+HALVED_DEGREE = 10
 """Highest degree of an element: beyond, elements are halved."""
 LEAST_POINTS = 32
 """Least number of points of a rule on a circle; every second one is looked at for signs."""
@@ -232,7 +232,7 @@ class DirectionAxis(Axis):
         """The same, but elements of the highest degree, and some others, are halved."""
         found = self.deeper(*ways)
         for way, lines in (("degree", "lines"), ("first_degree", "first_lines")):
-            if way in ways and (way in halved_ways or getattr(found, way) > MOST_DEGREE):
+            if way in ways and (way in halved_ways or getattr(found, way) > HALVED_DEGREE):
                 halves = {way: getattr(found, way) // 2, lines: halved(getattr(self, lines))}
                 found = replace(found, **halves)
         return found

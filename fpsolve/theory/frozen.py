@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fpsolve.arrays import FloatArray
+from fpsolve.arrays import FloatArray, IntArray
 from fpsolve.model.plane import matrix_at, noise_strength, squared_frequency
 from fpsolve.model.problem import Problem
 
@@ -44,6 +44,11 @@ def eigenvalues_at(problem: Problem, xi: ArrayLike) -> tuple[FloatArray, FloatAr
     return np.where(turns, turning, faster), np.where(turns, turning, slower), turns
 
 
+def maxima(rate: FloatArray) -> IntArray:
+    """Where a value is larger than those beside it."""
+    return np.flatnonzero((rate[1:-1] > rate[:-2]) & (rate[1:-1] >= rate[2:])) + 1
+
+
 def steady_places(problem: Problem, p: float) -> tuple[FloatArray, FloatArray]:
     """z at which paths that hold slow Gaussian noise grow the fastest, the best first, and the rates pG − ξ²/2S(0)."""
     noise = problem.coloured
@@ -51,7 +56,7 @@ def steady_places(problem: Problem, p: float) -> tuple[FloatArray, FloatArray]:
     reach = 2 * abs(p) * noise_strength(problem.motion) * spectrum
     xi = reach * np.linspace(-1, 1, 2 * SAMPLES - 1)
     rate = p * eigenvalues_at(problem, xi)[0] - (xi**2 / (2 * spectrum) if spectrum else 0.0)
-    at = np.flatnonzero((rate[1:-1] > rate[:-2]) & (rate[1:-1] >= rate[2:])) + 1
+    at = maxima(rate)
     at = at[np.argsort(-rate[at])] if at.size else np.array([SAMPLES - 1])
     return xi[at] / unit, rate[at]
 
@@ -105,9 +110,7 @@ class FrozenNoise:
 
     def peaks(self, p: float) -> tuple[FloatArray, FloatArray]:
         """z and F of the local maxima."""
-        rate = self.rate(p)
-        at = np.flatnonzero((rate[1:-1] > rate[:-2]) & (rate[1:-1] >= rate[2:])) + 1
-        found = np.array([self._peak(p, int(k)) for k in at]).reshape(-1, 2)
+        found = np.array([self._peak(p, int(k)) for k in maxima(self.rate(p))]).reshape(-1, 2)
         return found[:, 0], found[:, 1]
 
     def center(self, p: float) -> float:
