@@ -188,7 +188,7 @@ KNOWN = {
         matrices(FREE, COUPLED, White(s=1.0)), {-1: 0.0314237}, estimator="population", time=100.0
     ),
     "two modes, impulses": Simulated(
-        matrices(FREE, COUPLED, Poisson(1.0, (0.4,))), {2: -0.0861990831}, estimator="population"
+        matrices(FREE, COUPLED, Poisson(1.0, [0.4])), {2: -0.0861990831}, estimator="population"
     ),
     "six variables, all alike": Simulated(
         matrices(MASSES, 0.5 * np.eye(6), White(s=0.2)),
@@ -500,7 +500,8 @@ STOPPED = "q' = v; v' = -q - xi*q - 0.1*cos(t)*y; y' = w; w' = -y"
         ),
         (
             rates(STOPPED, Telegraph(0.5, 0.7), [{"at": "q = 0", "restitution": 0.5}]),
-            *({}, "for one noise, without periodic terms"),
+            {},
+            "for one noise, without periodic terms",
         ),
     ],
 )
