@@ -185,11 +185,9 @@ KNOWN = {
         paths=2048,
     ),
     "two modes, white": Simulated(
-        matrices(FREE, COUPLED, White(s=1.0)), {-1: 0.0314237}, estimator="population", time=100.0
+        matrices(FREE, COUPLED, White(1.0)), {-1: 0.0314237}, estimator="population", time=100.0
     ),
-    "two modes, impulses": Simulated(
-        matrices(FREE, COUPLED, Poisson(1.0, [0.4])), {2: -0.0861990831}, estimator="population"
-    ),
+    "two modes, impulses": Simulated(matrices(FREE, COUPLED, Poisson(1.0, [0.4])), {2: -0.0861990831}),
     "six variables, all alike": Simulated(
         matrices(MASSES, 0.5 * np.eye(6), White(s=0.2)),
         {
