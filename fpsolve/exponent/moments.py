@@ -191,7 +191,7 @@ def refuse_open_hierarchy(problem: Problem, p: float) -> None:
             raise NoHierarchy(
                 f"moments of even order are infinite under {noise.kind} noise with algebraic tails; take r0 <= 1"
             )
-    if problem.system.stop or any(jump.log_factor for jump in problem.system.jumps):
+    if any(wall.changes_state for wall in problem.system.barriers):
         raise NoHierarchy(
             "the equations of the moments do not close where a wall changes the state, as that happens at one phase; "
             f"{REMEDY}, or remove the wall"

@@ -381,6 +381,11 @@ class Jump:
                 "the jump"
             )
 
+    @property
+    def changes_state(self) -> bool:
+        """Whether there is more to it than a phase."""
+        return self.log_factor != 0
+
     def told(self, names: Sequence[str]) -> list[str]:
         """The impact as reports have it, for the names of the variables."""
         factor = f"{math.exp(self.log_factor):.10g}"
@@ -413,6 +418,7 @@ class Stop:
 
     coordinates: Matrix
     restitution: float
+    changes_state: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         rows = real_array(self.coordinates, "coordinates")

@@ -76,7 +76,7 @@ class Coefficients:
         rays: the lines of the jumps.
         arrivals: what multiplies the state where a state of a chain is reached, or where an impulse comes, shape
             (states, n, n); None under other noise.
-        counted: the names of what is counted at a wall of several variables.
+        of_wall: the names of what is noted at a wall of several variables.
     """
 
     noise: Noise
@@ -88,7 +88,7 @@ class Coefficients:
     rays: Rays
     settling: float = 0.0
     arrivals: FloatArray | None = None
-    counted: ClassVar[Sequence[str]] = ()
+    of_wall: ClassVar[Sequence[str]] = ()
 
     @property
     def is_exact(self) -> bool:
@@ -155,7 +155,7 @@ class StoppedCoefficients(Coefficients):
     fast: FloatArray = field(default_factory=lambda: np.zeros(0))
 
     order = 1
-    counted = tuple(OF_STOPS)
+    of_wall = tuple(OF_STOPS)
 
     def motion(self, h: float) -> DrivenStop | SwitchedStop:  # type: ignore[override]
         from fpsolve.simulation.stops import DrivenStop, SwitchedStop

@@ -321,7 +321,7 @@ def _simulated(
         warnings=(*_missing(estimates), *found[0][1], *stopped),
         interrupted=interrupted,
         parameters=problem.values,
-        wall=dict(zip(known.counted, of_wall, strict=False)),
+        wall=dict(zip(known.of_wall, of_wall, strict=False)),
     )
 
 

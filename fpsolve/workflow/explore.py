@@ -69,8 +69,8 @@ FACTOR = 10.0
 """From a positive value to the ends of its slider, where nothing says how far it may go."""
 BEYOND = 3.0
 """The same of a value of any sign."""
-MOST_EQUATIONS = 4
-"""Variables whose rates the page shows; of more they would fill it."""
+MOST_EQUATIONS = 6
+"""Lines of the equations of motion that the page shows; more would fill it."""
 NO_BOUND = 1e3
 """A bound from which on it keeps formulas from overflow, and tells nothing of what is usual."""
 NUMBERS = {MOMENT.name, *INDICES, "theory", "classes", "discretisation"}
@@ -249,13 +249,14 @@ class Explorer:
     def _told(self, case: Case, result: CurveResult) -> Answer:
         """The curve, the equation, and what a report says of it."""
         moments, order = result.moments, np.argsort(result.moments.p)
+        equations = equations_of(case.system)
         names = ("p", "value", "derivative", "error_estimate")
         index, exponent = result.stability_index, result.lyapunov_exponent
         return {
             "curve": [listed(getattr(moments, name)[order]) for name in names],
             "root": index.value if index else None,
             "exponent": exponent.value if exponent else None,
-            "equations": equations_of(case.system) if case.problem.dimension <= MOST_EQUATIONS else [],
+            "equations": equations if len(equations) <= MOST_EQUATIONS else [],
             "verdict": part_of_page([Sentence(verdict(case, result)), *meaning(result)]),
             "numbers": part_of_page([*THEORY.show(case, result), *notes(case, [result], "")]),
             "table": "",  # which nobody reads while a slider moves

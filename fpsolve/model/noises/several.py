@@ -60,8 +60,8 @@ class Noises(Noise):
         valued = [name for name, noise in pairs if not noise.is_white]
         if len(valued) > MOST_WITH_AXES:
             raise ValueError(
-                f"got the noises {', '.join(valued)}; at most {MOST_WITH_AXES} noises may be other than white noise "
-                "and impulses; make the others white, or leave them out"
+                f"got the noises {', '.join(valued)}; at most {MOST_WITH_AXES} noises may be other than white "
+                "and Poisson noise; make the others white, or leave them out"
             )
 
     @cached_property
