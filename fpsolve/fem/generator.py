@@ -86,7 +86,7 @@ class Generator:
 
     def __init__(self, problem: Problem, chosen: Space | CylinderMesh) -> None:
         if isinstance(chosen, CylinderMesh):
-            chosen = Space.on(chosen, problem.coloured, problem.frame)
+            chosen = Space.on(chosen, problem.coloured, problem.frame.phase)
         self.problem, self.chosen, self.size = problem, chosen, chosen.size
         self._spaces: dict[float, Space] = {}
         self._changes: dict[ParameterDerivative, tuple[Term, ...]] = {}

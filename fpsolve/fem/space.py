@@ -17,7 +17,6 @@ from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.fem.noise_axes import CellAxis, NoiseAxis, PolynomialAxis, StateAxis
 from fpsolve.fem.pairs import PairAxis
 from fpsolve.fem.phase import PhaseAxis
-from fpsolve.model.frame import ITSELF, Frame
 from fpsolve.model.noise import Noise
 
 MOST_BYTES = 1.2e9
@@ -66,8 +65,8 @@ class Space:
         self.most_unknowns = int(math.sqrt(MOST_BYTES / 24 * levels)) or self.phi.most_unknowns
 
     @classmethod
-    def on(cls, mesh: CylinderMesh, noise: Noise, frame: Frame = ITSELF) -> Space:
-        """The elements of a mesh, which is cut off at the end of the noise's support, in the coordinates of a frame.
+    def on(cls, mesh: CylinderMesh, noise: Noise, phase: Callable[[FloatArray], FloatArray] = np.asarray) -> Space:
+        """The elements of a mesh, which is cut off at the end of the noise's support, where ψ is a function of φ.
 
         Raises:
             MeshError: the mesh has lines where ξ is no diffusion by itself, or none where it is; or several noises
@@ -80,7 +79,7 @@ class Space:
                 "noise with states, with an angle or of a filter needs a mesh without z_lines, and other noise a mesh "
                 "with z_lines; leave the mesh out, and one is chosen for each p"
             )
-        lines = frame.phase(mesh.phi_lines)
+        lines = phase(mesh.phi_lines)
         phi = PhaseAxis.of(lines, np.full(lines.size - 1, mesh.phi_degree))
         if noise.is_diffusion:
             mesh = mesh.within(noise.half_width / noise.standard_deviation)

@@ -124,10 +124,6 @@ class Frame:
         return np.asarray(np.linalg.det(self._inverse) / self.length(phi) ** 2)
 
 
-ITSELF = Frame(((1.0, 0.0), (0.0, 1.0)))
-"""That of the phase of x itself."""
-
-
 def is_free(term: CoefficientMatrix) -> bool:
     """Whether a term is of order 0, and no noise drives it."""
     return term.order == 0 and not is_driven(term.g)
