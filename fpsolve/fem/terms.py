@@ -41,12 +41,13 @@ class OfMoment:
     log_factor: Any = 0.0
 
     def __call__(self, p: float, derivative: int = 0) -> Any:
-        """Its k-th derivative, by the rule of Leibniz."""
+        """Its k-th derivative, by the rule of Leibniz. Raises `FloatingPointError`: it is beyond all numbers."""
         total = 0.0
         for j in range(min(self.n, derivative) + 1):
             of_power = math.comb(derivative, j) * math.perm(self.n, j) * p ** (self.n - j)
             total = total + of_power * self.log_factor ** (derivative - j)
-        return total * np.exp(p * self.log_factor)
+        with np.errstate(over="raise"):
+            return total * np.exp(p * self.log_factor)
 
 
 @dataclass(frozen=True)
