@@ -151,9 +151,8 @@ class Problem:
     @cached_property
     def may_rest(self) -> bool:
         """Whether the phase rests at some φ where noises have values at the ends of their ranges, or 12 std away."""
-        speed = phase_speed(
-            self.motion, self.at_values([each.reached[[0, -1]] for each in self.coloured.parts.values()])
-        )
+        ends = [np.sort(each.reached)[[0, -1]] for each in self.coloured.parts.values()]
+        speed = phase_speed(self.motion, self.at_values(ends))
         return bool(np.any(np.abs(speed.mean) <= speed.amplitude))
 
     @property
