@@ -1,6 +1,6 @@
 """What the numbers of a parameter set may cost together: seconds of a processor, asked before each factorisation.
 
-A number does not depend on its budget. Whether it is given may, on a slower machine.
+A number does not depend on these seconds. Whether it is given may, on a slower machine.
 """
 
 from __future__ import annotations

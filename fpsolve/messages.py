@@ -89,7 +89,7 @@ class Code(Enum):
     )
     WALL_SIMULATED = (
         "failure: {what} is not computed: at a wall of more than two variables moments obey no closed equations, and "
-        "there are elements for four variables alone; leave out the wall, {remedy}"
+        "there are elements for four variables alone, without impulses; leave out the wall, {remedy}"
     )
     CONVEX_BOUNDS = (
         "note: bounds, as Λ(p) is convex and Λ(0) = 0: λ <= Λ({p:g})/{p:g} <= {bound:.6g}, and "

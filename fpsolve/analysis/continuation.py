@@ -212,7 +212,7 @@ def _half(
             sample = _exit(field, last, at) if is_leaving else _next(field, last, at)
         except FpsolveError as failure:
             sample, reason = None, failure.message
-        turn = 0.0 if sample is None else math.acos(min(float(last.tangent @ sample.tangent), 1.0))
+        turn = 0.0 if sample is None else math.acos(np.clip(last.tangent @ sample.tangent, -1.0, 1.0))
         if sample is None or turn > 2 * MOST_TURN:
             step /= 3
             if step < SHORTEST:

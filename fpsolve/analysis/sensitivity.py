@@ -15,7 +15,6 @@ in which B T = 0 at p = 0, where T = 1 whatever θ. And ∂δ_p/∂θ = −∂Λ
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
@@ -52,7 +51,6 @@ if TYPE_CHECKING:
     import xarray
     from matplotlib.axes import Axes
 
-_EPS = sys.float_info.epsilon
 RECORDS = {each.name: each for each in (LYAPUNOV_EXPONENT, STABILITY_INDEX, VARIANCE_RATE)}
 """The quantities besides Λ(p) that have sensitivities, by their names: those that are no function of p."""
 MOST_BARS = 4

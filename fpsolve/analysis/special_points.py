@@ -34,7 +34,8 @@ def with_folds(field: Field, trace: Trace, names: tuple[str, str]) -> Trace:
         tangents = np.array([point.sample.tangent[axis] for point in trace.points])
         tangents[np.abs(tangents) < FLAT] = 0
         for place in _roots(trace, tangents, lambda place: _on(field, trace, place).tangent, axis):
-            new.append((place, Point(_on(field, trace, place), f"fold in {names[axis]}")))
+            if (sample := _or_none(_on, field, trace, place)) is not None:
+                new.append((place, Point(sample, f"fold in {names[axis]}")))
     return with_points(trace, new)
 
 

@@ -14,6 +14,7 @@ from fpsolve.analysis.scan import Sample
 from fpsolve.arrays import FloatArray, shown
 from fpsolve.errors import FpsolveError
 from fpsolve.exponent.error import Estimate
+from fpsolve.exponent.kinds import choose
 from fpsolve.exponent.method import Method, refuse
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.messages import Code, Message
@@ -122,10 +123,17 @@ class Distance:
         target: what is wanted.
         keys: of the parameters.
         settings: of the solves, see `ExponentSolver`.
+
+    Raises:
+        NoSuchExponent: such problems have no such quantity.
     """
 
     def __init__(self, problem: Problem, target: Target, keys: Sequence[str], **settings: Any) -> None:
         self.problem, self.target, self.keys, self._settings = problem, target, tuple(keys), settings
+        method = choose(problem)
+        for p in {target.order, 0.0} if target.kind == "stability_index" else {target.order}:  # for its error
+            if not method.has(p):
+                refuse(method.reason(p))
 
     def at(self, theta: FloatArray) -> Problem:
         """The problem at θ. Raises `FpsolveError` where there is none."""

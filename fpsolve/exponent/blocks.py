@@ -57,7 +57,7 @@ class Blocks(Method):
 
     @property
     def by_moments(self) -> bool:  # type: ignore[override]
-        return not self._rays
+        return all(part.by_moments for part in self.parts)
 
     @property
     def is_function(self) -> bool:  # type: ignore[override]

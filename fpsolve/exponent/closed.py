@@ -35,7 +35,6 @@ class EvenMoments(Method):
     is_struck = False
 
     def has(self, p: float) -> bool:
-        """Whether there is a Λ(p)."""
         return p > 0 and p % 2 == 0
 
     def reason(self, p: float, symbol: str = "") -> Message | None:

@@ -303,10 +303,10 @@ def _carried(pairs: Sequence[PrincipalPair], pencil: Pencil, generator: Generato
 
 
 def _from_the_right(pencil: Pencil, generator: Generator) -> tuple[FloatArray, FloatArray, float, float]:
-    """Vectors T and T*, and the value, of the rightmost real eigenvalue, seen from the right; and its error at most.
+    """Vectors T and T*, and the value, of the rightmost real eigenvalue, seen from the right; and half its distance.
 
     For a real shift σ > Λ no eigenvalue of L is nearer to σ than Λ. The first shift is the largest eigenvalue of the
-    symmetric part of L, which lies to the right of all eigenvalues of the discrete L; each further one keeps
+    symmetric part of L, about, and a margin, to the right of the eigenvalues of the discrete L; each further one keeps
     `SHIFT_RATIO` of the distance. Complex pairs that come of the truncation may be nearer; they are passed over.
     """
     space, value = pencil.space, math.inf

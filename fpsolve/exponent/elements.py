@@ -122,7 +122,7 @@ class Elements(Method):
                 search, found = Search(p, allowed, self.settings.budget, self.remedy), list[Solution]()
                 for stage, near in self.places(p, tolerance or self.tolerance, found):
                     found.append(search.settle(stage, near))
-                solution = self.spaces[p] = self.confirmed(search, found)
+                solution = self.confirmed(search, found)
             self._witness(p, solution.value, solution.error)
         except NotConverged as failure:
             if failure.reason.code is Code.BUDGET_SPENT:  # which tells a value
@@ -140,6 +140,7 @@ class Elements(Method):
             raise NotConverged(Message(Code.NO_MEMORY, remedy=Remedy.MEMORY)) from failure
         except ArithmeticError as failure:
             raise NotConverged(Message(Code.OUT_OF_RANGE, p=p, reason=str(failure))) from failure
+        self.spaces[p] = solution
         return solution
 
     def places(self, p: float, tolerance: Tolerance, found: Sequence[Solution]) -> Iterator[tuple[Stage, Any]]:
@@ -223,12 +224,13 @@ class Elements(Method):
         if p <= 0 or p % 2 or not self.has_witness:
             return None
         if p not in self._even:
-            self._even[p] = None
+            found = None
             with suppress(NoHierarchy, ArithmeticError), unless_over_budget():
                 with one_thread(), self.settings.meter.running():
-                    found = even_moment(self.problem, p, 0.1 * self.tolerance(p, 0.0), MOST_EQUATIONS)
-                checked(Estimate(found.value, found.error, self.scale(p)), self.refinement, p)
-                self._even[p] = found
+                    moment = even_moment(self.problem, p, 0.1 * self.tolerance(p, 0.0), MOST_EQUATIONS)
+                checked(Estimate(moment.value, moment.error, self.scale(p)), self.refinement, p)
+                found = moment
+            self._even[p] = found
         return self._even[p]
 
     def pair(self, p: float) -> PrincipalPair:

@@ -1,9 +1,9 @@
 """Where the error of Λ(p) comes from: the modes of each cell, the ends of a noise interval, rounding.
 
-Without its highest modes, a projection Q, the pair (Λ, T, T*) would have the Rayleigh quotient Λ plus exactly
-⟨Q T*, (L − Λ) Q T⟩/⟨T*, T⟩. Summed in absolute values over the unknowns of a cell, as their signs may cancel, that of
-the two highest modes bounds the error with a degree less by two, that of the four highest with a degree less by four,
-and how it falls tells what is left of it. It may fall unevenly; the slower one of two falls counts.
+Without its highest modes, a projection Q, the pair (Λ, T, T*) would have the Rayleigh quotient Λ plus
+⟨Q T*, (L − Λ) Q T⟩/⟨T*, T⟩, to leading order. Summed in absolute values over the unknowns of a cell, as signs may
+cancel, that of the two highest modes tells the error with a degree less by two, that of the four highest with a degree
+less by four, and how it falls tells what is left of it. It may fall unevenly; the slower one of two falls counts.
 """
 
 from __future__ import annotations
@@ -244,19 +244,19 @@ def mode_effects(pair: PrincipalPair) -> tuple[ModeEffects | None, ...]:
 
 
 def truncation(pair: PrincipalPair) -> tuple[float, float]:
-    """Bounds on what the two ends of an interval of cells change in Λ: ½σ² ∫ P_s |T_z| T* dφ / ∫ T T* there."""
+    """What the two ends of an interval of cells change in Λ, at most about: ½σ²P_s Σ |T_z T*| over functions of φ."""
     if not (lines := pair.space.xi.lines).size:
         return 0.0, 0.0
     return _end_effect(pair, lines[[0, 1]]), _end_effect(pair, lines[[-1, -2]])
 
 
 def _end_effect(pair: PrincipalPair, lines: FloatArray) -> float:
-    """½σ² P_s |∂T| T* at the first of two lines; the slope is the largest between them, as no flux makes it 0 there."""
+    """That of the first of two lines; the slope is the largest between them, as no flux makes it 0 there."""
     space, xi = pair.space, pair.space.xi
     if xi.unit * abs(lines[0]) >= xi.noise.half_width * (1 - 1e-12):  # nothing is cut off, and P_s may be infinite
         return 0.0
     z = lines[0] + (lines[1] - lines[0]) * np.linspace(0, 1, 9)
     right, left = (xi.values_at(z) @ space.table(v).T for v in (pair.right, pair.left))
-    slope = np.max(np.abs(np.diff(right @ left[0]) / np.diff(z)))
+    slope = np.max(np.sum(np.abs(np.diff(right, axis=0) * left[0]), axis=1) / np.abs(np.diff(z)))
     norm = pair.left @ space.weighed(pair.right)
     return float(xi.rate(z[:1])[0] * xi.weight(z[:1])[0] * slope / abs(norm))

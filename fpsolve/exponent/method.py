@@ -44,7 +44,9 @@ Along = Mapping[str, ParameterDerivative]
 
 @strict_dataclass
 class Budget:
-    """What the numbers of a parameter set may cost, and a line of a chart. A number that is given depends on neither.
+    """What the numbers of a parameter set may cost, and a line of a chart.
+
+    No number depends on the seconds. With few unknowns a number may be less accurate than with more, within its error.
 
     Args:
         unknowns: of the largest system; None for as many as 1.5 GB hold, see `Space.most_unknowns`.
@@ -162,6 +164,10 @@ class Method:
     def takes(cls, problem: Problem) -> bool:
         """Whether a problem is of this kind."""
         raise NotImplementedError
+
+    def has(self, p: float) -> bool:
+        """Whether Λ(p) of problems of this kind is computed, at p = 0 λ and other numbers of eigenfunctions."""
+        return True
 
     def reason(self, p: float, symbol: str = "") -> Message | None:
         """Why there is no Λ(p), at p = 0 no λ, nor another number of eigenfunctions; None where it is computed.

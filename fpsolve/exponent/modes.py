@@ -23,7 +23,7 @@ import scipy.linalg
 
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import NoHierarchy
-from fpsolve.exponent.eigen import PrincipalPair, principal_pair, slope_rounding
+from fpsolve.exponent.eigen import PrincipalPair, principal_pair
 from fpsolve.exponent.elements import Elements
 from fpsolve.exponent.error import Moment, Solution, mode_effects
 from fpsolve.exponent.method import RTOL_BEYOND_PLANE, Stage, Tolerance
@@ -294,13 +294,6 @@ class Directions(Elements):
 
     def is_dear(self, p: float) -> bool:
         return p <= 0 or p % 2 != 0
-
-    def slope_error(self, p: float) -> float:
-        """Twice what has changed since a coarser solution of the same place, where there is one."""
-        found = self.solution(p)
-        if not (found.start and found.start.before):
-            return super().slope_error(p)
-        return float(2 * abs(found.start.before[-1].derivative - found.derivative) + slope_rounding(found.pair))
 
     def number(self, p: float) -> EvenMoment | None:
         return self.even(p)

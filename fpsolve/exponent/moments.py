@@ -29,7 +29,7 @@ from scipy import sparse
 from scipy.linalg import solve_triangular
 from scipy.sparse.linalg import norm
 
-from fpsolve.arrays import Coefficient, FloatArray, one
+from fpsolve.arrays import ROUNDED, Coefficient, FloatArray, one
 from fpsolve.budget import unless_over_budget
 from fpsolve.data import brief
 from fpsolve.errors import NoHierarchy
@@ -173,8 +173,10 @@ def mean_matrix(problem: Problem, motion: System) -> FloatArray:
 def constant_scale(problem: Problem) -> Scale:
     """The scale of Λ(p) where even p alone are computed: constant terms, with the mean of the noise."""
     now = problem.dimension - len(problem.system.pasts)
-    abscissa = abs(float(np.max(np.linalg.eigvals(mean_matrix(problem, problem.motion)[:now, :now]).real)))
-    return Scale(abscissa or problem.unit_rate, 0.0)
+    mean = mean_matrix(problem, problem.motion)[:now, :now]
+    abscissa = abs(float(np.max(np.linalg.eigvals(mean).real)))
+    is_moved = abscissa > ROUNDED * float(np.linalg.norm(mean))
+    return Scale(abscissa if is_moved else problem.unit_rate, 0.0)
 
 
 def moment_row(found: EvenMoment) -> Moment:

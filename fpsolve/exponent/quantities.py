@@ -177,7 +177,7 @@ def lyapunov_exponent(
         rtol, mesh, budget: as for `moment_lyapunov`.
 
     Raises:
-        ValueError: rtol is not positive.
+        ValueError: rtol is not between 1e-13 and 1.
         NotConverged: it is not resolved on the mesh, or within the budget.
     """
     return solver_of(problem, mesh, rtol, budget).lyapunov_exponent()
@@ -196,7 +196,7 @@ def stability_index(
         rtol, mesh, budget: as for `moment_lyapunov`.
 
     Raises:
-        ValueError: rtol is not positive.
+        ValueError: rtol is not between 1e-13 and 1.
         NotConverged: some p on the way to it is not resolved on the mesh, or within the budget.
     """
     return nonzero_root(solver_of(problem, mesh, rtol, budget))

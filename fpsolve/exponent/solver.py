@@ -156,7 +156,7 @@ class ExponentSolver:
     Raises:
         NoSuchExponent: the variance of the noise is infinite.
         TypeError: an argument is of another kind.
-        ValueError: rtol is not positive.
+        ValueError: rtol is not between 1e-13 and 1.
     """
 
     problem: Problem
@@ -390,14 +390,14 @@ def moment_lyapunov(
         problem: a motion and its noise.
         p: one moment, or an array of shape (n,).
         rtol: |error| ≤ rtol·max(|Λ|, the terms of Eq. (37) before they cancel); None is 1e-8, under two noises
-            that are not white 1e-6, for more than two variables 1e-5.
+            that are not white 1e-6, for more than two variables 1e-5, and 1e-3 where one of these has a wall.
         mesh: a mesh for all p, where an `error_estimate` above rtol gives a warning; None chooses one that meets rtol.
         budget: what the choice of a mesh may cost; None for the default one.
 
     Many p are interpolated, see `exponent.curve`, where that saves solves; then `pairs` solves each p.
 
     Raises:
-        ValueError: p is not finite, or empty, or rtol is not positive.
+        ValueError: p is not finite, or empty, or rtol is not between 1e-13 and 1.
         NoSuchExponent: Λ(p) is infinite.
         NotConverged: some p are not resolved on the mesh, or within the budget; `partial` is the result for the others.
     """

@@ -94,7 +94,7 @@ class Start:
             if chosen.xi.lines.size:
                 lower, upper = solution.truncation
                 found = found.with_axis(1, found.xi.reaching(lower > share, upper > share))
-            found = found if found.size > chosen.size or solution.error <= goal else found.raised()
+            found = found if found.size > chosen.size else found.raised()
             if found.size <= most:
                 break
         return replace(self, space=found)

@@ -25,7 +25,7 @@ import numpy as np
 import scipy.linalg
 
 from fpsolve.arrays import FloatArray
-from fpsolve.exponent.eigen import PrincipalPair
+from fpsolve.exponent.eigen import PrincipalPair, slope_rounding
 from fpsolve.exponent.error import Solution
 from fpsolve.exponent.modes import Directions, DirectionStart, first_order_changes, second_moments
 from fpsolve.exponent.moments import mean_matrix
@@ -162,7 +162,18 @@ class Stopped(Directions):
     """Λ(p) of four variables with a stop, at which T is a root."""
 
     stage = StopStart
+    by_moments = False
     usual_rtol = 1e-3
+
+    def is_dear(self, p: float) -> bool:
+        return True
 
     def line_rtol(self, p: float) -> float:
         return 3e-3
+
+    def slope_error(self, p: float) -> float:
+        """Twice what has changed since a coarser solution, where there is one."""
+        found = self.solution(p)
+        if not (found.start and found.start.before):
+            return super().slope_error(p)
+        return float(2 * abs(found.start.before[-1].derivative - found.derivative) + slope_rounding(found.pair))

@@ -130,7 +130,7 @@ class Generator:
 
     @property
     def may_hold(self) -> bool:
-        """Whether a noise jumps: what hardly anything leaves, a state or a direction of x, has a pair of its own."""
+        """Whether chains or white noise move x: a state, or a direction, that is hardly ever left has its own pair."""
         return self.slowest[0] > 0
 
     def enriched(self) -> Generator:

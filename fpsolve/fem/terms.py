@@ -76,7 +76,7 @@ class Term:
         text: the term as a reader would write it.
         phase_at: gives the k-th derivative of the matrix of φ by p, from p and k, where that is no coefficient times
             one matrix; `phase` is then 0.
-        is_wall: whether without noise it has the coefficient 1, so that forcing is what it has beyond that.
+        is_wall: whether it is R^p of a wall, which is 1 where nothing is lost: forcing is R^p − 1.
     """
 
     order: int
