@@ -159,7 +159,7 @@ def test_share_of_a_mode_is_the_same_in_all_coordinates_of_a_user():
     np.testing.assert_allclose(shares, shares[0], rtol=1e-2)
     data = found[0].to_xarray()
     assert data.density.dims == ("eta", "phase_difference")
-    assert found[0].plot().get_xlim()[1] == pytest.approx(np.pi / 2)
+    assert found[0].plot().viewLim.extents == pytest.approx(np.array([0, 0, 0.5, 2]) * np.pi)
     assert data.attrs["total_variation_error"] == found[0].error
 
 
