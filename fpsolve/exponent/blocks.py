@@ -19,13 +19,19 @@ from fpsolve.arrays import FloatArray
 from fpsolve.errors import NoSuchExponent, NotConverged
 from fpsolve.exponent.eigen import PairDerivatives, PrincipalPair
 from fpsolve.exponent.error import Absent, Estimate, InvariantClass, Moment
-from fpsolve.exponent.method import DIRECTIONS, PHASE_AND_NOISE, RTOL_BEYOND_PLANE, Along, Method, Pictures, Tolerance
+from fpsolve.exponent.method import (
+    DIRECTIONS,
+    PHASE_AND_NOISE,
+    RTOL_BEYOND_PLANE,
+    TINIEST_P,
+    Along,
+    Method,
+    Pictures,
+    Tolerance,
+)
 from fpsolve.messages import Code, Message
 from fpsolve.model.problem import ParameterDerivative, Problem
 from fpsolve.model.subsystem import couples
-
-TINIEST_P = 1e-9
-"""For smaller |p| the part of the largest λ counts, and p < 0 is 0 but for rounding."""
 
 
 class Blocks(Method):

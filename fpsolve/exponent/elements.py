@@ -32,6 +32,7 @@ from fpsolve.exponent.method import (
     PHASE_AND_NOISE,
     RTOL,
     RTOL_OF_SEVERAL,
+    TINIEST_P,
     Method,
     Search,
     Stage,
@@ -77,8 +78,6 @@ ROUNDED = 1e-6
 """Share of the values themselves that is added to that."""
 TINY_P = 1e-3
 """Below it Λ(p)/p is a mean of Λ′, as rounding is not proportional to p."""
-TINIEST_P = 1e-9
-"""For smaller |p| the error of Λ(p), which falls as p, has no scale, which may fall as p²."""
 
 
 class Elements(Method):

@@ -23,7 +23,7 @@ from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.elements import doubt
 from fpsolve.exponent.error import Estimate, Failure, InvariantClass, Moment, checked
 from fpsolve.exponent.kinds import choose
-from fpsolve.exponent.method import BUDGET, Budget, Method, Settings, Tolerance, checked_moments, refuse
+from fpsolve.exponent.method import BUDGET, TINIEST_P, Budget, Method, Settings, Tolerance, checked_moments, refuse
 from fpsolve.fem.factors import one_thread
 from fpsolve.fem.generator import SMALL_P
 from fpsolve.fem.mesh import CylinderMesh
@@ -45,8 +45,6 @@ FEW_MOMENTS = 16
 """Up to so many p are solved one by one."""
 SLOPE_SHARE = 1e-3
 """Of what a tangent rises, by which it may lie too high, as slopes have errors."""
-TINIEST_P = 1e-9
-"""For smaller |p| the error of Λ(p), which falls as p, has no scale, which may fall as p²."""
 
 _KINDS: Sequence[tuple[str, Any, str]] = (
     ("mesh", CylinderMesh | None, "a CylinderMesh, or None"),
