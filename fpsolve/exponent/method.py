@@ -432,7 +432,7 @@ class Search:
             NotConverged: the budget does not suffice, or rounding is larger than the tolerance; `partial` is the best
                 that is found, or None.
         """
-        self.best, self.judged, self.share = None, None, math.inf
+        self.best, self.judged, self.failure, self.share = None, None, None, math.inf
         try:
             while True:
                 stage = self._begun(stage)

@@ -36,7 +36,7 @@ from fpsolve.errors import NoHierarchy
 from fpsolve.exponent.delays import DelayRates
 from fpsolve.exponent.error import Moment
 from fpsolve.exponent.matrices import MatrixRates
-from fpsolve.exponent.method import BUDGET, Search
+from fpsolve.exponent.method import BUDGET, Budget, Search
 from fpsolve.exponent.powers import Moving, PowerRates, exponents, moment_form, moves, multinomials, of_signs
 from fpsolve.exponent.rightmost import REMEDY, ROUNDING
 from fpsolve.fem.space import AXES, first_axis
@@ -129,6 +129,7 @@ def even_moment(
     most: int = MOST,
     *,
     rtol: float = TOLERANCE,
+    budget: Budget = BUDGET,
 ) -> EvenMoment:
     """Λ(p) of an even p.
 
@@ -138,6 +139,7 @@ def even_moment(
         tolerance: its largest error; None for the smallest that there is, down to rtol.
         most: number of equations, of moments that are no matrices.
         rtol: error over the terms that Λ is the sum of.
+        budget: of the number of equations, if it states one.
 
     Raises:
         NoHierarchy: the equations do not close for this problem and this p, or are too many.
@@ -149,7 +151,7 @@ def even_moment(
         loosest = rtol if tolerance is None else LOOSEST
         return max(min(loosest * found.scale, math.inf if tolerance is None else tolerance), 2 * found.rounding)
 
-    search = Search(p, allowed, BUDGET, Remedy.BUDGET)
+    search = Search(p, allowed, budget, Remedy.BUDGET)
     last: EvenMoment | None
     with unless_over_budget():
         last = search.settle(Level(equations, (FIRST,) * len(equations.noises), most))
