@@ -5,6 +5,7 @@ A number does not depend on these seconds. Whether it is given may, on a slower 
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -38,6 +39,7 @@ class Meter:
         unknowns: of the factorisation that is under way.
         at_begin: seconds that had passed when that number began.
         needed: about what all numbers take, once they are more than there is; the same for each that is left out.
+        pace: seconds for each unknown of the last work that was `timed`.
     """
 
     seconds: float
@@ -47,6 +49,7 @@ class Meter:
     unknowns: int = 0
     at_begin: float = 0.0
     needed: float = 0.0
+    pace: float = 0.0
     _before: float = 0.0
     _since: float | None = None
 
@@ -113,16 +116,25 @@ def watched(watch: Callable[[Meter], object]) -> Iterator[None]:
         _watch.reset(token)
 
 
-def seconds_spent() -> float:
-    """By the numbers of the meter that is running; 0 where none is."""
-    meter = _meter.get()
-    return meter.spent if meter else 0.0
-
-
-def charge(unknowns: int, seconds: float = 0.0) -> None:
-    """Ask whether work on so many unknowns, which takes so many seconds at least, may begin. Raises `OverBudget`."""
+def charge(unknowns: int) -> None:
+    """Ask whether work on so many unknowns may begin. Raises `OverBudget`."""
     if meter := _meter.get():
-        meter.refuse(meter.spent + seconds)
+        meter.refuse(meter.spent)
         meter.unknowns = unknowns
         if watch := _watch.get():
             watch(meter)
+
+
+@contextmanager
+def timed(unknowns: int) -> Iterator[None]:
+    """Work on so many unknowns, whose seconds for each of them grow from one such work to the next.
+
+    Raises:
+        OverBudget: it would take longer than there is, at the pace of the last one.
+    """
+    charge(unknowns)
+    meter = _meter.get() or Meter(math.inf)
+    begun = meter.spent
+    meter.refuse(begun + meter.pace * unknowns)
+    yield
+    meter.pace = (meter.spent - begun) / unknowns

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fpsolve.arrays import FloatArray, real_numbers
-from fpsolve.budget import Meter, OverBudget, charge, seconds_spent
+from fpsolve.budget import Meter, OverBudget, charge
 from fpsolve.errors import FpsolveError, MeshError, NoHierarchy, NoSuchExponent, NotConverged, SingularMatrix
 from fpsolve.exponent.eigen import PairDerivatives, PrincipalPair
 from fpsolve.exponent.error import Absent, Estimate, Moment, checked
@@ -407,7 +407,6 @@ class Search:
         best: what the last place has that is nearest to the tolerance.
         share: its error over what is allowed.
         judged: what the last stage has.
-        last: seconds spent before the last stage, and its unknowns.
     """
 
     p: float
@@ -419,7 +418,6 @@ class Search:
     best: Any = None
     share: float = math.inf
     judged: Any = None
-    last: tuple[float, int] = (0.0, 0)
 
     def settle(self, stage: Stage | None, near: Any = None) -> Any:
         """What is found within the tolerance at one place: solve, judge, and stop or refine.
@@ -462,11 +460,11 @@ class Search:
         """A stage, which is counted. Raises `Ended`, `OverBudget`: it is beyond the budget, or there is none."""
         if stage is None or self.stages >= MAX_STAGES:
             raise Ended(Message(Code.MESHES_SPENT, count=self.stages))
-        size, spent, most = stage.size, seconds_spent(), self.budget.most(stage)
+        size, most = stage.size, self.budget.most(stage)
         if size > most:
             raise Ended(Message(Code.UNKNOWNS_SPENT, unknowns=size, most=most))
-        charge(size, (spent - self.last[0]) * size / self.last[1] if self.last[1] else 0.0)
-        self.last, self.stages = (spent, size), self.stages + 1
+        charge(size)
+        self.stages += 1
         return stage
 
     def _stop(self, ended: OverBudget | Ended) -> NoReturn:

@@ -187,7 +187,7 @@ class DirectionAxis(Axis):
     degree: int
     waves: int
     ways: ClassVar[tuple[str, ...]] = "degree", "waves"
-    most_unknowns = 16_000
+    most_unknowns = 13_000
     is_followed = True
 
     @cached_property

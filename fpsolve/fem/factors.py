@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import lru_cache, reduce
 from itertools import pairwise
 from threading import RLock
@@ -16,7 +16,7 @@ from scipy.sparse import identity
 from threadpoolctl import ThreadpoolController
 
 from fpsolve.arrays import FloatArray, IntArray, dense
-from fpsolve.budget import charge
+from fpsolve.budget import timed
 from fpsolve.errors import SingularMatrix
 from fpsolve.fem.axis import FEW_UNKNOWNS, KroneckerSum
 from fpsolve.superlu import sparse_lu
@@ -66,15 +66,13 @@ def factorised(operator: KroneckerSum, noise: int | None) -> Factors:
     Raises:
         OverBudget: the seconds of a number have passed.
     """
-    charge(operator.size)
-    if operator.size <= FEW_UNKNOWNS:
-        return ArrayFactors(operator.toarray())
-    if noise is not None:
-        try:
-            return LevelFactors(operator, noise)
-        except SingularMatrix:
-            pass
-    return SparseFactors(operator)
+    with timed(operator.size):
+        if operator.size <= FEW_UNKNOWNS:
+            return ArrayFactors(operator.toarray())
+        if noise is not None:
+            with suppress(SingularMatrix):
+                return LevelFactors(operator, noise)
+        return SparseFactors(operator)
 
 
 class ArrayFactors:
