@@ -68,8 +68,8 @@ class EvenMoments(Method):
         if p not in self._solved:
             try:
                 with one_thread(), self.settings.meter.running():
-                    tolerance = OF_CLOSED * self.settings.rtol
-                    found = even_moment(self.problem, p, rtol=tolerance, budget=self.settings.budget)
+                    settings = self.settings
+                    found = even_moment(self.problem, p, rtol=OF_CLOSED * settings.rtol, budget=settings.budget)
             except (NoHierarchy, ArithmeticError) as failure:
                 raise NotConverged(Message(Code.NOT_CONVERGED, p=p, reason=str(failure))) from failure
             checked(Estimate(found.value, found.error, self.scale(p)), self.refinement, p)

@@ -81,7 +81,7 @@ class Budget:
         return Meter(self.seconds)
 
 
-BUDGET = Budget()
+BUDGET: Budget = Budget()
 """The usual one."""
 
 
