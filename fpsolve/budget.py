@@ -34,7 +34,7 @@ class Meter:
     Attributes:
         seconds: that they may take together.
         planned: how many numbers there are.
-        begun: how many of them were begun.
+        count: which of them is being solved, from 1 on.
         number: the symbol of the one that is being solved.
         unknowns: of the factorisation that is under way.
         at_begin: seconds that had passed when that number began.
@@ -44,7 +44,7 @@ class Meter:
 
     seconds: float
     planned: int = 0
-    begun: int = 0
+    count: int = 0
     number: str = ""
     unknowns: int = 0
     at_begin: float = 0.0
@@ -77,16 +77,16 @@ class Meter:
         It tells about how many all numbers take, if those that are left take as long as those that are done.
         """
         if seconds > self.seconds:
-            own, done = seconds - self.at_begin, self.begun - 1
+            own, done = seconds - self.at_begin, self.count - 1
             each = self.at_begin / done if done > 0 else own
-            self.needed = self.needed or self.at_begin + max(own, each) + max(self.planned - self.begun, 0) * each
+            self.needed = self.needed or self.at_begin + max(own, each) + max(self.planned - self.count, 0) * each
             raise OverBudget(Message(Code.SECONDS_SPENT, seconds=self.needed, most=self.seconds), remedy=Remedy.BUDGET)
 
 
 def begin(symbol: str) -> None:
     """Let the meter know which number comes next."""
     if meter := _meter.get():
-        meter.number, meter.begun, meter.at_begin = symbol, meter.begun + 1, meter.spent
+        meter.number, meter.count, meter.at_begin = symbol, meter.count + 1, meter.spent
 
 
 @contextmanager
@@ -134,7 +134,7 @@ def timed(unknowns: int) -> Iterator[None]:
     """
     charge(unknowns)
     meter = _meter.get() or Meter(math.inf)
-    begun = meter.spent
-    meter.refuse(begun + meter.pace * unknowns)
+    before = meter.spent
+    meter.refuse(before + meter.pace * unknowns)
     yield
-    meter.pace = (meter.spent - begun) / unknowns
+    meter.pace = (meter.spent - before) / unknowns

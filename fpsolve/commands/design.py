@@ -56,7 +56,7 @@ def design(
     code, loaded = 0, options.load(cases)
     wanted = [wanted_of(case, target, by or (), start or (), stop or ()) for case in loaded]
     for case, (what, ranges) in zip(loaded, wanted, strict=True):
-        begun = monotonic()
+        started = monotonic()
         outcome = design_case(case, what, ranges, options.out, watch=options.watch(is_json=json))
         if json:
             lines = (options.out / case.name / "design.json").read_text(encoding="utf-8").splitlines()
@@ -64,7 +64,7 @@ def design(
         is_short = options.quiet or json
         print_blocks(each for each in show(case, outcome) if isinstance(each, Note) or not is_short)
         if not json:
-            options.print_written(case, found_of(outcome), monotonic() - begun)
+            options.print_written(case, found_of(outcome), monotonic() - started)
         if outcome.is_out_of_reach:
             code = max(code, CHECK_FAILED)
         elif outcome.found is None:

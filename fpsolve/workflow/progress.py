@@ -6,12 +6,13 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
-from typing import Any, Protocol
+from datetime import timedelta
+from functools import partial
+from typing import Protocol
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, ProgressColumn, Task
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Column
-from rich.text import Text
 
 from fpsolve.budget import Meter, watched
 from fpsolve.page.page import Block
@@ -20,8 +21,8 @@ SETS, MOMENTS, NODES, POINTS, BOUNDS, PERCENT, SOLVES = "sets", "p", "nodes", "p
 """What a phase counts."""
 LINE_SECONDS, LINE_SHARE = 10.0, 0.1
 """A line in a file comes after as long at least, and as far."""
-KNOWN_SECONDS, KNOWN_SHARE, KNOWN_STEPS = 5.0, 0.05, 8
-"""A time to go is shown after as long, as far, and as many steps: the first ones are slow, and processes start then."""
+SPEED_SECONDS = 600.0
+"""Of the last steps, from whose speed the time to go is estimated."""
 ROOMY, LONGEST_WAIT = 80, 50
 """Columns of a terminal from which on there is room for the name of the case, and more for a long bar."""
 
@@ -89,17 +90,18 @@ class Bars:
     def __init__(self, console: Console | None = None, clock: Callable[[], float] = time.monotonic) -> None:
         self.console, self.clock = console or Console(stderr=True), clock
         self.is_live = self.console.is_terminal and not self.console.is_dumb_terminal
-        is_roomy = self.console.width >= ROOMY
+        text = partial(TextColumn, markup=False, table_column=Column(no_wrap=True))
         self._display = Progress(
-            _TextColumn(lambda task: f"{task.fields['phase'].case}, " * is_roomy + task.description),
-            _TextColumn(lambda task: task.fields["waits"], "dim"),
+            text("{task.fields[case]}{task.description}" if self.console.width >= ROOMY else "{task.description}"),
+            text("{task.fields[waits]}", style="dim"),
             BarColumn(bar_width=20 if self.console.width >= ROOMY + LONGEST_WAIT else 4),
-            _TextColumn(counted),
-            _TextColumn(timed, "cyan"),
+            text("{task.fields[counted]}"),
+            TimeRemainingColumn(elapsed_when_finished=True),
             console=self.console,
             transient=True,
             redirect_stdout=False,
             refresh_per_second=4,
+            speed_estimate_period=SPEED_SECONDS,
             get_time=clock,
             disable=not self.is_live,
         )
@@ -108,38 +110,31 @@ class Bars:
     @contextmanager
     def bar(self, phase: Phase) -> Iterator[Advance]:
         """Shows a phase as long as the body lasts, and those before it."""
-        display = self._display
-        fields: dict[str, Any] = {"phase": phase, "known": 0, "failed": 0, "marks": [(0.0, 0.0)], "waits": ""}
-        number = display.add_task(phase.name, total=phase.total, **fields)
-        task = display.tasks[-1]
+        display, done, fails, earlier = self._display, 0, 0, 0
+        number = display.add_task(phase.name, total=phase.total, case=f"{phase.case}, ", waits="", counted="")
         printed, printed_at = 0, self.clock()
 
-        def advance(count: int = 1, *, failed: int = 0, known: bool = False) -> None:
+        def tell(text: str) -> None:
             nonlocal printed, printed_at
-            earlier = count if known else 0
-            sums = {"known": task.fields["known"] + earlier, "failed": task.fields["failed"] + failed}
-            display.update(number, advance=count, **sums)
-            printed += earlier
-            marks, own = task.fields["marks"], task.completed - task.fields["known"]
-            if own > 1.01 * marks[-1][1]:
-                marks.append((task.elapsed or 0.0, own))
-            if self.is_live or not phase.total or not phase.unit or task.completed >= phase.total:
-                return
-            is_far = task.completed - printed >= LINE_SHARE * phase.total
-            if is_far and self.clock() - printed_at >= LINE_SECONDS:
-                left = "" if seconds_left(task) is None else f", {timed(task)}"
-                print(f"{phase.case}, {phase.name}: {counted(task)}{left}", file=self.console.file, flush=True)
-                printed, printed_at = int(task.completed), self.clock()
-
-        def wait(meter: Meter) -> None:
-            nonlocal printed_at
-            if not meter.number:
-                return
-            text = waiting(meter)
-            display.update(number, waits=text)
             if not self.is_live and phase.total and self.clock() - printed_at >= LINE_SECONDS:
                 print(f"{phase.case}, {phase.name}: {text}", file=self.console.file, flush=True)
-                printed_at = self.clock()
+                printed, printed_at = done, self.clock()
+
+        def advance(count: int = 1, *, failed: int = 0, known: bool = False) -> None:
+            nonlocal done, fails, earlier, printed
+            done, fails, earlier = done + count, fails + failed, earlier + count * known
+            text = counted(phase, done, fails)
+            left = None if phase.total is None else phase.total - earlier  # of which the time to go is estimated
+            display.update(number, total=left, completed=done - earlier, counted=text)
+            printed += count * known
+            if phase.total and phase.unit and LINE_SHARE * phase.total <= done - printed and done < phase.total:
+                [seconds] = (task.time_remaining for task in display.tasks if task.id == number)
+                tell(text if seconds is None else f"{text}, {timedelta(seconds=round(seconds))} left")
+
+        def wait(meter: Meter) -> None:
+            if meter.number:
+                display.update(number, waits=waiting(meter))
+                tell(waiting(meter))
 
         if self.is_live and not self._open:
             display.start()
@@ -148,9 +143,7 @@ class Bars:
             with watched(wait):
                 yield advance
         finally:
-            display.update(number, waits="")
-            display.stop_task(number)
-            display.update(number, total=task.completed or 1, completed=task.completed or not phase.unit)
+            display.update(number, waits="", total=1, completed=1)
             self._open -= 1
             if self.is_live and not self._open:
                 display.stop()
@@ -158,46 +151,15 @@ class Bars:
 
 def waiting(meter: Meter) -> str:
     """Which number is solved, and what is left for it and the others: "Λ″(0), 3 of 5, 12,400 unknowns, 80 s left"."""
-    of = f", {meter.begun} of {meter.planned}" * (meter.planned > 1)
+    of = f", {meter.count} of {meter.planned}" * (meter.planned > 1)
     return f"{meter.number}{of}, {meter.unknowns:,} unknowns, {max(meter.seconds - meter.spent, 0):.0f} s left"
 
 
-def counted(task: Task) -> str:
+def counted(phase: Phase, done: int, failed: int) -> str:
     """How far a phase is: "12 of 400 sets, 3 failed"."""
-    phase: Phase = task.fields["phase"]
     if not phase.unit:
         return ""
     if phase.unit == PERCENT:
-        return f"{task.completed / phase.total:.0%}" if phase.total else ""
-    failed, total = task.fields["failed"], "" if phase.total is None else f" of {phase.total}"
-    return f"{int(task.completed)}{total} {phase.unit}{f', {failed} failed' if failed else ''}"
-
-
-def seconds_left(task: Task) -> float | None:
-    """Seconds to go, by the rate of the later half of the steps that this run has done; None until that is known."""
-    total, known = task.fields["phase"].total, task.fields["known"]
-    own, elapsed = task.completed - known, task.elapsed or 0.0
-    if total is None or task.stop_time is not None or task.completed >= total:
-        return None
-    if elapsed < KNOWN_SECONDS or own < max(KNOWN_STEPS, KNOWN_SHARE * (total - known)):
-        return None
-    then, before = max(mark for mark in task.fields["marks"] if mark[1] <= own / 2)
-    return (elapsed - then) * (total - task.completed) / (own - before)
-
-
-def timed(task: Task) -> str:
-    """The time to go, "0:12:30 left"; where that is unknown, or after the end, the time that a phase has taken."""
-    left = seconds_left(task)
-    minutes, seconds = divmod(round(task.elapsed or 0.0 if left is None else left), 60)
-    return f"{minutes // 60}:{minutes % 60:02}:{seconds:02}{'' if left is None else ' left'}"
-
-
-class _TextColumn(ProgressColumn):
-    """A text about each phase, which is not broken."""
-
-    def __init__(self, text: Callable[[Task], str], style: str = "") -> None:
-        super().__init__(Column(no_wrap=True))
-        self.text, self.style = text, style
-
-    def render(self, task: Task) -> Text:
-        return Text(self.text(task), style=self.style)
+        return f"{done / phase.total:.0%}" if phase.total else ""
+    total = "" if phase.total is None else f" of {phase.total}"
+    return f"{done}{total} {phase.unit}{f', {failed} failed' if failed else ''}"

@@ -62,7 +62,7 @@ def test_budget_ends_a_number_and_never_changes_it(name, processor):
 
 def test_numbers_of_a_set_have_one_meter_and_its_watch_sees_which_is_solved(processor):
     seen, meter = [], Meter(5.0, planned=4)
-    with watched(lambda each: seen.append((each.number, each.begun, each.unknowns))), meter.running():
+    with watched(lambda each: seen.append((each.number, each.count, each.unknowns))), meter.running():
         begin("λ")
         with Meter(1.0).running() as inner:  # a part of it
             processor.now += 2.0
@@ -104,17 +104,18 @@ def test_terminal_shows_a_phase_and_what_a_number_waits_for_in_lines_that_fit(cl
     lines = []
     for phase in (SOLVING, Phase("mathieu", "solving", 11, MOMENTS)):
         bars = bars_of(clock, width=width, force_terminal=True, color_system=None, legacy_windows=False)
-        with bars.bar(phase) as advance, Meter(60.0, planned=5, begun=2).running():
+        with bars.bar(phase) as advance, Meter(60.0, planned=5, count=2).running():
             begin("Λ″(0)")
             if phase == SOLVING:
                 advance(100, known=True)
-                clock.now += 60.0
-                advance(30, failed=3)
+                for failed in (0, 3):
+                    clock.now += 30.0
+                    advance(15, failed=failed)
             else:
                 processor.now += 39.0
                 charge(12_400)
             bars._display.refresh()
         lines += re.split(r"[\r\n]+", re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", bars.console.file.getvalue()))
-    assert any("130 of 400 sets, 3 failed" in line and "0:09:00 left" in line for line in lines)
-    assert any("Λ″(0), 3 of 5, 12,400 unknowns, 21 s left" in line for line in lines) == (width > 60)
+    assert any("130 of 400 sets, 3 failed" in line and "0:09:00" in line for line in lines)
+    assert any("Λ″(0), 3 of 5, 12,400 unknowns, 21 s left" in line for line in lines)
     assert max(map(len, lines)) <= width
