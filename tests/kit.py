@@ -16,10 +16,10 @@ from fpsolve import PlaneSystem, Problem, load_case
 from fpsolve.case import Case
 from fpsolve.cli import main
 from fpsolve.model import CoefficientMatrix, LinearSystem, Noise, System
-from fpsolve.output.records import entries_of, record_of_set
-from fpsolve.parts.part import Numerics
+from fpsolve.output.known import names_of, read_into, record_of
+from fpsolve.parts.part import Entry, Job, Numerics
 from fpsolve.results import CurveResult, SimulatedCurve
-from fpsolve.study.solve import Solved, everything, result_of, solve_curve
+from fpsolve.study.solve import everything, result_of, solve_curve
 from fpsolve.workflow.simulate import simulate_curve
 
 ALL = 'output.quantities="all"'
@@ -143,10 +143,20 @@ def case_in(folder: Path, text: str, overrides: Sequence[str] = (), name: str = 
     return load_case(path, overrides)
 
 
+class Solved(NamedTuple):
+    """A curve once it is solved: its numbers and messages, what became of its parts, its Λ(p), and its pictures."""
+
+    result: CurveResult
+    entries: Mapping[str, Entry]
+    rows: Mapping[float, Sequence[float]]
+    pictures: Mapping[str, Any]
+
+
 def solve_sets(case: Case) -> list[Solved]:
     """All that a case wants of its curves, with the pictures."""
     wanted, numerics = everything(case), Numerics.of(case)
-    return [solve_curve(curve, wanted, numerics) for curve in case.curves()]
+    jobs = [solve_curve(Job(curve, wanted, numerics)) for curve in case.curves()]
+    return [Solved(result_of(job), job.entries, job.rows, job.pictures) for job in jobs]
 
 
 def solve_case(case: Case) -> list[CurveResult]:
@@ -163,8 +173,9 @@ def simulate_curves(case: Case) -> list[SimulatedCurve]:
 def from_record(case: Case, solved: Solved) -> CurveResult:
     """A solved set as it comes back from its record."""
     curve, asked, numerics = solved.result.curve, everything(case), Numerics.of(case)
-    record = json.loads(json.dumps(record_of_set(curve, asked, numerics, solved.entries)))
-    return result_of(curve, asked, numerics, *entries_of(record, asked, numerics))
+    record = record_of(Job(curve, asked, numerics, rows=dict(solved.rows), new=dict(solved.entries)))
+    job, names = Job(curve, asked, numerics), names_of(asked, numerics)
+    return result_of(read_into(job, json.loads(json.dumps(record)), names, is_all=True))
 
 
 def read_json(path: Path) -> Any:
@@ -180,8 +191,8 @@ def read_csv(path: Path) -> list[dict[str, str]]:
 
 def records_in(folder: Path) -> list[bytes]:
     """All records of sets in a folder of results, the torn ones too."""
-    paths = [path for path in (folder / "records/solved").glob("*") if path.is_file()]
-    return [line for path in paths for line in path.read_bytes().splitlines(keepends=True)]
+    path = folder / "records/solved.jsonl"
+    return path.read_bytes().splitlines(keepends=True) if path.exists() else []
 
 
 def sets(records: list[bytes]) -> set[bytes]:

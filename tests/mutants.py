@@ -456,8 +456,8 @@ DEFECTS: tuple[Defect, ...] = (
     Defect(
         "R28 an index that needs one ray is reported as missing",
         "study/solve.py",
-        "if numerics.is_stated or not message.tells_of",
-        "if numerics.is_stated or message.tells_of",
+        "if job.numerics.is_stated or not message.tells_of",
+        "if job.numerics.is_stated or message.tells_of",
         "study",
     ),
     Defect(

@@ -6,6 +6,7 @@ import os
 from collections.abc import Collection, Mapping, Sequence
 from itertools import takewhile
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import tomlkit
@@ -17,53 +18,33 @@ from fpsolve.explain import is_number
 from fpsolve.model.faults import table_of
 
 
-def rewritten(case: Case, values: Mapping[str, float], expect: Mapping[str, Any] | None, folder: Path) -> str:
-    """The text of a case with other values of some parameters, and with what the command line has changed.
+def rewritten(
+    case: Case,
+    folder: Path,
+    values: Mapping[str, float | str] = MappingProxyType({}),
+    *,
+    without: Collection[str] = (),
+    lists: Mapping[str, Sequence[Any]] = MappingProxyType({}),
+    more: str = "",
+) -> str:
+    """The text of a case with other values, and with what the command line has changed.
 
     Files that the case names are named from the new place.
 
     Args:
+        folder: where the file will be.
         values: of the parameters by their keys, such as "oscillator.c1".
-        expect: what is expected instead of what the case expects; nothing if None.
-        folder: where the file will be.
+        without: the sections that are left out; empty ones are, too.
+        lists: of other keys, such as "moments.p".
+        more: what stands at its end.
     """
-    data = _data(case, folder)
+    data = {name: each for name, each in _data(case, folder).items() if name not in without and each not in ({}, [])}
     for key, value in values.items():
         _set(data, key, value)
-    for name in [name for name, each in data.items() if name == "expect" or each in ({}, [])]:
-        del data[name]
-    text = _with_data(case.text, data)
-    return text if expect is None else f"{text}\n{tomlkit.dumps({'expect': [expect]})}"
-
-
-def of_one_curve(case: Case, values: Mapping[str, float | str], p: Sequence[float], quantities: Collection[str]) -> str:
-    """The text of a case in its folder with one curve, of these parameters: what it varies, draws or expects is gone.
-
-    Args:
-        values: of the parameters by their keys; those that it varies are among them.
-        p: the orders of the moments.
-        quantities: what it computes at least.
-    """
-    gone = "expect", "vary", "figure"
-    data = {name: each for name, each in _data(case, case.path.parent).items() if name not in gone}
-    for key, value in values.items():
-        _set(data, key, value)
-    if [*p] != case.p.tolist():
-        data["moments"]["p"] = [*p]
-    if (names := case.output.names) is not None and not {*quantities} <= {*names}:
-        data["output"]["quantities"] = [*dict.fromkeys((*names, *quantities))]
-    return _with_data(case.text, data)
-
-
-def with_noise(case: Case, noise: str, folder: Path) -> str:
-    """The text of a case with other sections of noise, at its end, and without what it expects.
-
-    Args:
-        noise: their text.
-        folder: where the file will be.
-    """
-    data = {name: each for name, each in _data(case, folder).items() if name not in ("noise", "expect")}
-    return _with_data(case.text, data) + noise
+    for key, each in lists.items():
+        section, _, name = key.partition(".")
+        data.setdefault(section, {})[name] = [*each]
+    return _with_data(case.text, data) + more
 
 
 def _data(case: Case, folder: Path) -> dict[str, Any]:
@@ -95,20 +76,20 @@ def _set(data: dict[str, Any], key: str, value: float | str) -> None:
 def _with_data(text: str, data: Mapping[str, Any]) -> str:
     """A text of TOML with other data, in the order and with the comments that it has."""
     document = tomlkit.parse(text)
-    _update(document, data)
+    _update(document, data, loads(text))
     found = tomlkit.dumps(document)
     return (found if loads(found) == data else tomlkit.dumps(data)).rstrip("\n") + "\n"
 
 
-def _update(table: Any, data: Mapping[str, Any]) -> None:
+def _update(table: Any, data: Mapping[str, Any], before: Mapping[str, Any]) -> None:
     """Give a table the entries of data, as deep as both are tables; others stay as they are written."""
-    for key in [key for key in table if key not in data]:
+    for key in [key for key in before if key not in data]:
         _remove(table, key)
     for key, value in data.items():
-        old = table.get(key)
+        old = before.get(key)
         if isinstance(value, dict) and isinstance(old, dict):
-            _update(old, value)
-        elif old is None or old.unwrap() != value or type(old.unwrap()) is not type(value):
+            _update(table[key], value, old)
+        elif old != value or type(old) is not type(value):
             table[key] = value
 
 

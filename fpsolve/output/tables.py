@@ -8,7 +8,7 @@ import platform
 import shlex
 import socket
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from datetime import datetime
 from functools import cache
@@ -27,8 +27,8 @@ from fpsolve.messages import message_of
 from fpsolve.model.quantity import MOMENT, STATUS, Quantity
 from fpsolve.parts.every import PARTS
 from fpsolve.results.curve import CurveResult, Status
-from fpsolve.results.table import Column, Row, Table, plain, rows_over_p
-from fpsolve.study.columns import COUNTS, columns_of, row_of
+from fpsolve.results.table import Table, plain
+from fpsolve.study.columns import COUNTS, table_of
 
 MOST_INDENTED = 100
 """Curves of a summary that is made for eyes, too."""
@@ -78,10 +78,10 @@ def write_results(
         table: their numbers.
         says: of which curves of the case there is more.
     """
-    columns, is_short = columns_of(case), case.planned > MOST_SUMMARISED
-    over_p, of_curve = _names(columns)
+    is_short, known = case.planned > MOST_SUMMARISED, np.flatnonzero(~np.isnan(table[STATUS.name].values)).tolist()
+    over_p = ["p", *(each.quantity.name for each in table.values() if each.quantity.dims)]
+    of_curve = [each.quantity.name for each in table.values() if not each.quantity.dims]
     of_curve = [name for name in of_curve if not name.endswith("_perturbation")]  # which others have
-    known = np.flatnonzero(~np.isnan(table[STATUS.name].values))
     with ExitStack() as stack:
         summary, moments, curves = (
             stack.enter_context(draft(folder / name)) for name in ("summary.json", "moments.csv", "curves.csv")
@@ -92,53 +92,38 @@ def write_results(
         common = {"parameters": dict(case.constants)} if is_short else {}
         start = json.dumps({**_state(case, finished), **facts, **common}, indent=1, ensure_ascii=False)
         summary.write(start.removesuffix("\n}") + ',\n "curves": [')
-        sets = [case.vary.sets[number] for number in known.tolist()]
-        cells = zip(*(_cells(table[name], known) for name in of_curve), strict=True)
-        by_curve.writerows([*varied.values(), *row] for varied, row in zip(sets, cells, strict=True))
-        for at, row in _over_p(case, table, over_p[1:], known):
-            by_moment.writerow([*sets[at].values(), *row])
-        for place, (number, varied) in enumerate(zip(known.tolist(), sets, strict=True)):
+        for place, number in enumerate(known):
+            varied, numbers, rows = case.vary.sets[number], _numbers(table, number), _over_p(case, table, number)
+            by_curve.writerow([*varied.values(), *(numbers[name] for name in of_curve)])
+            by_moment.writerows([*varied.values(), *row.values()] for row in rows)
             if not is_short:
-                result = results[place]
-                content = _summary(case, result, row_of(case, result), columns)
+                content = _summary(case, results[place], numbers, rows)
             elif says[number]:
                 content = _short_summary(case, results[place])
             else:
-                word = Status(int(table[STATUS.name].values[number])).word
-                content = {"varied": varied, "status": word, "warnings": [], "notes": []}
+                content = {"varied": varied, "status": numbers[STATUS.name], "warnings": [], "notes": []}
             summary.write(_entry(case, place, content))
         summary.write(_END)
 
 
-def _names(columns: Sequence[Quantity]) -> tuple[list[str], list[str]]:
-    """Of the columns over p, which comes first, and of the others."""
-    return ["p", *(each.name for each in columns if each.dims)], [each.name for each in columns if not each.dims]
+def _numbers(table: Table, number: int) -> dict[str, Any]:
+    """What tables have of a curve: the word of a status, nothing where there is no number."""
+    return {
+        name: _cell(each.quantity, each.values[number].item()) for name, each in table.items() if not each.quantity.dims
+    }
 
 
-def _cells(column: Column, places: NDArray[np.int64]) -> list[Any]:
-    """What stands in a table at some curves: the word of a status, nothing where there is no number."""
-    values = column.values[places]
-    if column.quantity in (STATUS, *COUNTS):
-        numbers = values.astype(int).tolist()
-        return [Status(each).word for each in numbers] if column.quantity is STATUS else numbers
-    return list(map(plain, values.tolist()))
+def _cell(quantity: Quantity, value: float) -> Any:
+    if quantity is STATUS:
+        return Status(int(value)).word
+    return int(value) if quantity in COUNTS else plain(value)
 
 
-def _over_p(
-    case: Case, table: Table, names: Sequence[str], places: NDArray[np.int64]
-) -> Iterator[tuple[int, tuple[Any, ...]]]:
-    """Of some curves a row for each p that was solved, after the number of the curve among these."""
-    if not names:
-        return
-    solved = ~np.isnan(table[MOMENT.name].values[places])
-    at, of_p = np.nonzero(solved)
-    columns = [map(plain, table[name].values[places][solved].tolist()) for name in names]
-    yield from zip(at.tolist(), zip(case.p[of_p].tolist(), *columns, strict=True), strict=True)
-
-
-def _cell(number: Any) -> Any:
-    """What stands in a table: the word of a status, nothing where there is no number."""
-    return number.word if isinstance(number, Status) else plain(number)
+def _over_p(case: Case, table: Table, number: int) -> list[dict[str, Any]]:
+    """The numbers of a curve at each p that was solved."""
+    columns = {"p": case.p} | {name: each.values[number] for name, each in table.items() if each.quantity.dims}
+    solved = np.flatnonzero(~np.isnan(columns[MOMENT.name])).tolist() if MOMENT.name in columns else ()
+    return [{name: plain(float(values[place])) for name, values in columns.items()} for place in solved]
 
 
 def whole_summary(case: Case, results: Sequence[CurveResult], facts: Mapping[str, Any]) -> str:
@@ -147,8 +132,9 @@ def whole_summary(case: Case, results: Sequence[CurveResult], facts: Mapping[str
     Args:
         facts: on the run, see `facts_of`.
     """
-    columns = columns_of(case)
-    curves = [_summary(case, result, row_of(case, result), columns) for result in results]
+    table = table_of(case, results)
+    of = ((result, result.curve.number - 1) for result in results)
+    curves = [_summary(case, result, _numbers(table, number), _over_p(case, table, number)) for result, number in of]
     content = {**_state(case, len(results)), **facts, "curves": curves}
     return json.dumps(content, allow_nan=False, ensure_ascii=False)
 
@@ -180,14 +166,14 @@ def parameters_of(curve: Curve) -> dict[str, dict[str, Any]]:
     return {"parameters": dict(curve.parameters), "varied": dict(curve.varied)}
 
 
-def _summary(case: Case, result: CurveResult, row: Row, columns: Sequence[Quantity]) -> dict[str, Any]:
+def _summary(
+    case: Case, result: CurveResult, numbers: Mapping[str, Any], moments: Sequence[Mapping[str, Any]]
+) -> dict[str, Any]:
     """What a case asks for of a curve, by the names of the columns; those over p are in a list of `moments`."""
-    over_p, of_curve = _names(columns)
-    moments = [dict(zip(over_p, each, strict=True)) for each in rows_over_p(row, over_p)]
     return {
         **parameters_of(result.curve),
         **({"moments": moments} if MOMENT.name in case.asked else {}),
-        **{name: _cell(row.get(name)) for name in of_curve},
+        **numbers,
         **_beyond_tables(case, result),
         "discretisation": result.discretisation,
         **_told(result),

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from fpsolve.case.case import Case
-from fpsolve.model.quantity import LYAPUNOV_EXPONENT, MOMENT
+from fpsolve.model.quantity import LYAPUNOV_EXPONENT
 from fpsolve.parts.part import Job, Part, Settings, attempt
 
 
@@ -21,7 +21,7 @@ def _solve(job: Job, settings: Settings) -> dict[str, Any]:
     """z in noise units; nothing where no p is by elements. One is solved where all numbers are from an earlier run."""
     known = job.solver.method.spaces
     if not known:
-        found = job.found(MOMENT.name).columns
+        found = job.columns
         has_pair = settings["p"] in found.p[np.isfinite(found.residual)]  # by elements
         if has_pair or job.found(LYAPUNOV_EXPONENT.name):
             attempt(partial(job.solver.solution, settings["p"] if has_pair else 0.0), "")

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from functools import cache
+from collections.abc import Iterator, Mapping
+from typing import Any
 
 from fpsolve.case.case import Case, Curve
 from fpsolve.data import Quantity
@@ -26,7 +26,7 @@ from fpsolve.page.page import Block, Column, filled
 from fpsolve.parts.intervals import INTERVAL, spreads_of
 from fpsolve.parts.part import Job, Numerics, Part, Reason, Settings
 from fpsolve.results.curve import CurveResult
-from fpsolve.results.table import Row, pair
+from fpsolve.results.table import estimated
 from fpsolve.results.text import NUMBER_COLUMNS, interval, row_of
 
 
@@ -41,6 +41,7 @@ def index_of(found: Estimate | Absent, name: str, symbol: str) -> Estimate | Rea
 
 def part_of(index: Index) -> Part:
     """The part of an index."""
+    by_theory = index.perturbation
 
     def settings(case: Case, number: int) -> Settings | None:
         return {} if index.name in case.asked else None
@@ -65,11 +66,12 @@ def part_of(index: Index) -> Part:
                 remedy=numerics.solver(curve.problem).method.missed,
             )
 
-    def columns(case: Case) -> Sequence[Quantity]:
-        return (index, index.error(), index.perturbation) if index.name in case.asked else ()
-
-    def row(case: Case, result: CurveResult) -> Row:
-        return pair(index.name, result.estimates[index.name])
+    def numbers(case: Case, result: CurveResult | None) -> Mapping[Quantity, Any]:
+        if index.name not in case.asked:
+            return {}
+        found = result and result.estimates[index.name]
+        theory: Mapping[str, float] = result.parts.get("theory", {}) if result and found else {}
+        return {**estimated(index, found), by_theory: theory.get(index.name)}
 
     return Part(
         index.name,
@@ -78,8 +80,7 @@ def part_of(index: Index) -> Part:
         Estimate,
         index.symbol,
         said=said,
-        columns=columns,
-        row=row,
+        numbers=numbers,
     )
 
 
@@ -87,18 +88,8 @@ PARTS: tuple[Part, ...] = tuple(map(part_of, INDICES.values()))
 """A part for each index."""
 
 
-@cache
-def _column_of_theory(name: str) -> str:
-    return INDICES[name].perturbation.name
-
-
 def _solve_theory(job: Job, settings: Settings) -> dict[str, float]:
     return {name: index.theory(job.curve.problem) for name, index in INDICES.items()}
-
-
-def _row_of_theory(case: Case, result: CurveResult) -> Row:
-    numbers: Mapping[str, float] = result.parts.get("theory", {})
-    return {_column_of_theory(name): each for name, each in numbers.items() if result.estimates[name]}
 
 
 def asked(case: Case) -> list[Index]:
@@ -152,7 +143,6 @@ THEORY: Part = Part(
     lambda case, _: {} if asked(case) else None,
     _solve_theory,
     dict[str, float],
-    row=_row_of_theory,
     show=_show,
     uses_solver=False,
 )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -15,7 +15,6 @@ from fpsolve.exponent.quantities import INDICES, MOMENT
 from fpsolve.model.quantity import Quantity
 from fpsolve.parts.part import Part
 from fpsolve.results.curve import CurveResult
-from fpsolve.results.table import Row
 
 INTERVAL = f"{LEVEL:.0%} interval"
 """The heading of intervals in tables."""
@@ -58,18 +57,18 @@ def spreads_of(case: Case, result: CurveResult) -> Spreads:
     )
 
 
-def _columns(case: Case) -> Sequence[Quantity]:
+def _numbers(case: Case, result: CurveResult | None) -> Mapping[Quantity, Any]:
+    spreads = spreads_of(case, result) if result else Spreads()
+    of_p = [spreads.moments.get(p) for p in result.moments.p.tolist()] if result else []
     uncertain = (MOMENT, *(INDICES[name] for name in UNCERTAIN)) if case.uncertain else ()
-    return [each.end(end, LEVEL) for each in uncertain if each.name in case.asked for end in ENDS]
-
-
-def _row(case: Case, result: CurveResult) -> Row:
-    spreads, row = spreads_of(case, result), dict[str, Any]()
-    of_p = [spreads.moments.get(p) for p in result.moments.p.tolist()]
-    for end in ENDS:
-        row[f"{MOMENT.name}_{end}"] = np.array([getattr(each, end, math.nan) for each in of_p], dtype=float)
-        row |= {f"{name}_{end}": getattr(spreads.indices.get(name), end, None) for name in UNCERTAIN}
-    return row
+    return {
+        each.end(end, LEVEL): np.array([getattr(at, end, math.nan) for at in of_p], dtype=float)
+        if each is MOMENT
+        else getattr(spreads.indices.get(each.name), end, None)
+        for each in uncertain
+        if each.name in case.asked
+        for end in ENDS
+    }
 
 
 def _content(case: Case, result: CurveResult) -> Mapping[str, Any]:
@@ -96,4 +95,4 @@ def _plain(spread: Spread) -> dict[str, float]:
     }
 
 
-PART: Part = Part("intervals", columns=_columns, row=_row, content=_content)
+PART: Part = Part("intervals", numbers=_numbers, content=_content)

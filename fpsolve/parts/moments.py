@@ -15,13 +15,12 @@ from fpsolve.data import Quantity
 from fpsolve.exponent.error import Failure, InvariantClass, Moment, digits
 from fpsolve.exponent.solver import solve_moments
 from fpsolve.messages import Code, Message
-from fpsolve.model.problem import Problem
 from fpsolve.model.quantity import LYAPUNOV_EXPONENT, MOMENT, OVER_P
 from fpsolve.page.page import Column, Grid
 from fpsolve.parts.intervals import INTERVAL, spreads_of
 from fpsolve.parts.part import Job, Numerics, Part, Settings
 from fpsolve.results.curve import CurveResult, MomentColumns
-from fpsolve.results.table import Row, pair
+from fpsolve.results.table import pair
 from fpsolve.results.text import interval, percent, units_in_words
 from fpsolve.theory.perturbation import perturbed_moments, weak_noise_note
 
@@ -31,17 +30,15 @@ STAR = "* for the noise reduced by Eqs. (12)-(14)"
 
 @dataclass(frozen=True, eq=False)
 class Moments:
-    """What is found of Λ(p).
+    """What is found of Λ(p), beside the rows of the p at which it did not fail.
 
     Attributes:
-        columns: where it did not fail.
         root: near δ_p, see `MomentLyapunov`.
         failures: why some p are missing.
         warnings: what limits the numbers.
         notes: on them, and where the theories compared with are not valid.
     """
 
-    columns: MomentColumns
     root: float | None = None
     failures: tuple[Failure, ...] = ()
     warnings: tuple[Message, ...] = ()
@@ -57,11 +54,23 @@ def _settings(case: Case, number: int) -> Settings:
 def _solve(job: Job, settings: Settings) -> Moments:
     """Λ(p), with errors of Λ′(p) if `slopes` says so, and with Λ′ that take a solve of their own if `every_slope`."""
     problem, has_slopes = job.curve.problem, settings["slopes"]
+    known = {
+        p: Moment(value, slope, slope_error, error, residual)
+        for p, (value, slope, error, slope_error, residual, _) in job.rows.items()
+    }
+
+    def advance() -> None:
+        for p in known.keys() - job.rows.keys():
+            found = known[p]
+            closed = float(perturbed_moments(problem, np.array(p)))
+            job.rows[p] = found.value, found.derivative, found.error, found.derivative_error, found.residual, closed
+        job.advance()
+
     refused = {p: told for p in settings["p"] if (told := job.solver.method.reason(p))}
     for _ in refused:
         job.advance()
     computed = [p for p in settings["p"] if p not in refused]
-    found = solve_moments(job.solver, computed, progress=job.advance, known=job.begun if has_slopes else None)
+    found = solve_moments(job.solver, computed, progress=advance, known=known if has_slopes else None)
     slopes = found.derivative if settings.get("every_slope") else found.slope
     columns = MomentColumns(
         p=found.p,
@@ -72,9 +81,9 @@ def _solve(job: Job, settings: Settings) -> Moments:
         residual=found.residual,
         perturbation=perturbed_moments(problem, found.p),  # Eq. (37)
     )
+    job.rows |= columns.rows
     notes = *found.notes, *problem.remarks, weak_noise_note(problem, found.p, found.value)
     return Moments(
-        columns,
         found.root,
         (*(Failure(p, reason) for p, reason in refused.items()), *found.failures),
         tuple(found.warnings),
@@ -82,28 +91,9 @@ def _solve(job: Job, settings: Settings) -> Moments:
     )
 
 
-def unfinished(problem: Problem, begun: Mapping[float, Moment]) -> Moments:
-    """What is known while other p are being solved."""
-    p = np.array(sorted(begun))
-    rows = np.array([begun[each] for each in p.tolist()]).reshape(-1, len(Moment._fields))
-    value, slope, slope_error, error, residual = np.where(np.isinf(rows), np.nan, rows).T
-    return Moments(MomentColumns(p, value, slope, error, slope_error, residual, perturbed_moments(problem, p)))
-
-
-def begun_of(found: Moments) -> dict[float, Moment]:
-    """The inverse of `unfinished`."""
-    columns = found.columns
-    names = "value", "derivative", "derivative_error", "error_estimate", "residual"
-    rows = zip(*(getattr(columns, name).tolist() for name in names), strict=True)
-    return {p: Moment(*row) for p, row in zip(columns.p.tolist(), rows, strict=True)}
-
-
-def _columns(case: Case) -> Sequence[Quantity]:
-    return tuple(OVER_P.values()) if MOMENT.name in case.asked else ()
-
-
-def _row(case: Case, result: CurveResult) -> Row:
-    return {"p": result.moments.p} | {each.name: getattr(result.moments, name) for name, each in OVER_P.items()}
+def _numbers(case: Case, result: CurveResult | None) -> Mapping[Quantity, Any]:
+    of_p = OVER_P if MOMENT.name in case.asked else {}
+    return {each: result and getattr(result.moments, name) for name, each in of_p.items()}
 
 
 def moment_grid(case: Case, result: CurveResult) -> Grid:
@@ -131,14 +121,13 @@ PART: Part = Part(
     _solve,
     Moments,
     said=lambda found, *_: (*found.warnings, *found.notes),
-    columns=_columns,
-    row=_row,
+    numbers=_numbers,
     reasons=lambda found: (each.reason for each in found.failures),
 )
 
 
 def _solve_classes(job: Job, settings: Settings) -> tuple[InvariantClass, ...]:
-    return job.solver.by_class(job.found(PART.name).columns.p) if PART.name in job.entries else ()
+    return job.solver.by_class(job.columns.p) if PART.name in job.entries else ()
 
 
 def _said_of_classes(classes: Sequence[InvariantClass], curve: Curve, numerics: Numerics) -> Iterator[Message]:

@@ -2,31 +2,36 @@
 
 from __future__ import annotations
 
+import math
 import traceback
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
+from operator import le
 from pathlib import Path
 from time import monotonic
 from typing import Any, Literal
 
+from fpsolve.budget import Meter
 from fpsolve.case.case import Case, Curve
 from fpsolve.data import Quantity
 from fpsolve.errors import FpsolveError
-from fpsolve.exponent.error import Moment
 from fpsolve.exponent.method import Budget
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.problem import Problem
-from fpsolve.model.quantity import STABILITY_INDEX
+from fpsolve.model.quantity import MOMENT, STABILITY_INDEX
 from fpsolve.page.page import Block, Drawing
-from fpsolve.results.curve import CurveResult, SimulatedCurve
-from fpsolve.results.table import Row
+from fpsolve.results.curve import CurveResult, MomentColumns, SimulatedCurve
 from fpsolve.signals import is_interrupt
 
 Settings = Mapping[str, Any]
 """What is asked of a part, as JSON can hold it: with the curve and the `Numerics` it decides its numbers."""
+Asked = Mapping[str, Settings]
+"""What is asked of the parts of a curve, by their names."""
+Limit = tuple[float, float]
+"""Unknowns and seconds of a budget."""
 SOON = 1.0
 """Seconds after which what is known of a curve is kept."""
 
@@ -48,6 +53,15 @@ class Numerics:
     @classmethod
     def of(cls, case: Case) -> Numerics:
         return cls(case.rtol, case.budget, case.cylinder_mesh(), case.output.lists_quantities)
+
+    @property
+    def limit(self) -> Limit:
+        """The limits of the budget."""
+        return self.budget.unknowns or math.inf, self.budget.seconds
+
+    def settles(self, limit: Limit | None) -> bool:
+        """Whether what was found within a limit need not be sought again."""
+        return limit is None or all(map(le, self.limit, limit))
 
     def solver(self, problem: Problem) -> ExponentSolver:
         """What solves Λ(p) of a problem."""
@@ -77,11 +91,13 @@ class Entry:
         found: what was found; None where nothing was.
         reason: why nothing was.
         seconds: how long the processor took.
+        limit: unknowns and seconds of a budget within which no more is to be found; None where no budget matters.
     """
 
     found: Any
     reason: Reason | None = None
     seconds: float = 0.0
+    limit: Limit | None = None
 
 
 def attempt(solve: Callable[[], Any], symbol: str) -> Any:
@@ -108,41 +124,59 @@ def fault(failure: Exception) -> Message:
     return Message(Code.FAULT, **said, file=Path(last.filename).name, line=last.lineno)
 
 
-class Job:
-    """The work on one curve: what it is solved with, and what its parts have found by now.
+def idle(*_: Any) -> None:
+    """What is called where nobody wants to know."""
 
-    Args:
-        curve: the parameter set.
-        numerics: how it is solved.
-        entries: of the parts that are known, by name.
-        begun: Λ(p) that an interrupted run knew, by p.
-        progress: called after each moment.
-        keep: takes the job now and then, see `SOON`.
+
+@dataclass(eq=False)
+class Job:
+    """The work on one curve: what is asked of it, and what is known of it by now.
 
     Attributes:
+        curve: the parameter set.
+        asked: what is asked of the parts, by their names.
+        numerics: how it is solved.
+        line: where it stands in a file of sets, for the message of one that cannot be solved.
+        entries: what became of parts, by their names; those that are there are not solved again.
+        rows: Λ(p) by p, see `MomentColumns`; those that are there are not solved again.
+        new: the entries that were solved now.
         pictures: what is drawn and not recorded, by the names of parts.
-        meter: of all numbers of the curve.
+        progress: called after each moment.
+        keep: takes the job now and then, see `SOON`.
     """
 
-    def __init__(
-        self,
-        curve: Curve,
-        numerics: Numerics,
-        entries: Mapping[str, Entry] | None = None,
-        begun: Mapping[float, Moment] | None = None,
-        progress: Callable[[], None] = lambda: None,
-        keep: Callable[[Job], None] = lambda _: None,
-    ) -> None:
-        self.curve, self.numerics = curve, numerics
-        self.entries, self.begun = dict(entries or {}), dict(begun or {})
-        self.pictures: dict[str, Any] = {}
-        self.meter = numerics.budget.meter()
-        self._progress, self._keep, self._kept_at = progress, keep, monotonic()
+    curve: Curve
+    asked: Asked
+    numerics: Numerics
+    line: str = ""
+    entries: dict[str, Entry] = field(default_factory=dict)
+    rows: dict[float, Sequence[float]] = field(default_factory=dict)
+    new: dict[str, Entry] = field(default_factory=dict)
+    pictures: dict[str, Any] = field(default_factory=dict)
+    progress: Callable[[], None] = idle
+    keep: Callable[[Job], None] = idle
+    _kept_at: float = field(default_factory=monotonic)
+
+    @cached_property
+    def meter(self) -> Meter:
+        """Of all numbers of the curve."""
+        return self.numerics.budget.meter()
 
     @cached_property
     def solver(self) -> ExponentSolver:
         """The solver of Λ(p), which all parts share."""
         return self.numerics.solver(self.curve.problem)
+
+    @property
+    def columns(self) -> MomentColumns:
+        """Λ(p) at the p that are asked for and known."""
+        return MomentColumns.of(self.rows, self.asked[MOMENT.name]["p"])
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether all is known; without Λ(p) there is nothing else."""
+        moments = self.entries.get(MOMENT.name)
+        return self.asked.keys() <= self.entries.keys() or (moments is not None and moments.reason is not None)
 
     def found(self, name: str) -> Any:
         """What a part found; None where that is nothing."""
@@ -153,27 +187,28 @@ class Job:
         """δ_p, if it is known."""
         return None if (index := self.found(STABILITY_INDEX.name)) is None else float(index.value)
 
+    def add(self, name: str, entry: Entry) -> None:
+        """Take what became of a part."""
+        self.entries[name] = self.new[name] = entry
+        self.grow()
+
     def advance(self) -> None:
         """Report a moment, and keep what is known."""
-        self._progress()
+        self.progress()
         self.grow()
 
     def grow(self) -> None:
         """Keep what is known, if that was not done just now."""
         if monotonic() - self._kept_at >= SOON:
-            self.keep()
-
-    def keep(self) -> None:
-        """Keep what is known."""
-        self._keep(self)
-        self._kept_at = monotonic()
+            self.keep(self)
+            self._kept_at = monotonic()
 
 
 def _nothing(*_: Any) -> tuple[()]:
     return ()
 
 
-def _no_row(*_: Any) -> Row:
+def _no_content(*_: Any) -> dict[Any, Any]:
     return {}
 
 
@@ -189,8 +224,7 @@ class Part:
         kind: the type of what is found, which a record holds.
         symbol: what messages call it; empty where nobody is told why there is none.
         said: the messages about what was found.
-        columns: the columns of tables that a case asks for.
-        row: the numbers of a curve in these columns.
+        numbers: those of a curve that a case asks for, by their quantities; of none, the quantities without numbers.
         content: what summary.json has of it beyond the tables; None where it is not asked for.
         files: writes into a folder the files that a curve has beyond the tables.
         draw: writes into a folder what a curve has beyond a record, so that a further run solves it again.
@@ -207,9 +241,8 @@ class Part:
     kind: Any = None
     symbol: str = ""
     said: Callable[[Any, Curve, Numerics], Iterable[Message]] = _nothing
-    columns: Callable[[Case], Sequence[Quantity]] = _nothing
-    row: Callable[[Case, CurveResult], Row] = _no_row
-    content: Callable[[Case, CurveResult], Mapping[str, Any]] = _no_row
+    numbers: Callable[[Case, CurveResult | None], Mapping[Quantity, Any]] = _no_content
+    content: Callable[[Case, CurveResult], Mapping[str, Any]] = _no_content
     files: Callable[[CurveResult, Path], None] | None = None
     draw: Callable[[Any, Curve, Path], None] | None = None
     show: Callable[[Case, CurveResult], Iterable[Block]] = _nothing
@@ -217,8 +250,3 @@ class Part:
     reasons: Callable[[Any], Iterable[Message]] = _nothing
     lacks: Callable[[Any, Settings], bool] = lambda *_: False
     uses_solver: bool = True
-
-    @property
-    def is_drawn(self) -> bool:
-        """Whether there is more than a record holds."""
-        return self.draw is not None

@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
+from typing import Any
 
 from fpsolve.case.case import Case
 from fpsolve.data import Quantity
 from fpsolve.model.quantity import MOMENT, RATE_FUNCTION
 from fpsolve.parts.part import Part
 from fpsolve.results.curve import CurveResult
-from fpsolve.results.table import Row
 
 
-def _columns(case: Case) -> Sequence[Quantity]:
-    return (RATE_FUNCTION,) if {MOMENT.name, RATE_FUNCTION.name} <= {*case.asked} else ()
+def _numbers(case: Case, result: CurveResult | None) -> Mapping[Quantity, Any]:
+    is_asked = {MOMENT.name, RATE_FUNCTION.name} <= {*case.asked}
+    return {RATE_FUNCTION: result and result.moments.rate_function} if is_asked else {}
 
 
-def _row(case: Case, result: CurveResult) -> Row:
-    return {RATE_FUNCTION.name: result.moments.rate_function}
-
-
-PART: Part = Part(RATE_FUNCTION.name, columns=_columns, row=_row)
+PART: Part = Part(RATE_FUNCTION.name, numbers=_numbers)

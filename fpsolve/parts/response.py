@@ -27,7 +27,7 @@ from fpsolve.model.quantity import ResponseQuantities
 from fpsolve.page.page import Block, Drawing, Sentence, filled
 from fpsolve.parts.part import Job, Part, Settings
 from fpsolve.results.curve import CurveResponse, CurveResult, ResponseDensity, SimulatedCurve
-from fpsolve.results.table import Row, pair
+from fpsolve.results.table import estimated, pair
 from fpsolve.results.text import NUMBER_COLUMNS, row_of
 from fpsolve.vtk import field_data, write_between
 
@@ -98,21 +98,10 @@ def _solve(job: Job, settings: Settings) -> CurveResponse:
     return solve_response(job.curve.problem, settings["rtol"], grid, job.numerics.budget)
 
 
-def numbers_of(case: Case) -> Mapping[str, Quantity]:
-    """The numbers of the stationary response by their names, if a case asks for them."""
-    return case.system.response.numbers if case.has_response else {}
-
-
-def _columns(case: Case) -> Sequence[Quantity]:
-    return tuple(each for number in numbers_of(case).values() for each in (number, number.error()))
-
-
-def _row(case: Case, result: CurveResult) -> Row:
-    found, numbers = result.response, numbers_of(case)
-    row: dict[str, Any] = {}
-    for name, number in found.numbers.items() if found and numbers else ():
-        row |= pair(numbers[name].name, number)
-    return row
+def _numbers(case: Case, result: CurveResult | None) -> Mapping[Quantity, Any]:
+    about = case.system.response.numbers if case.has_response else {}
+    found = result.response.numbers if result and result.response else {}
+    return {key: value for name, each in about.items() for key, value in estimated(each, found.get(name)).items()}
 
 
 def _content(case: Case, result: CurveResult) -> Mapping[str, Any]:
@@ -253,8 +242,7 @@ PART: Part = Part(
     _solve,
     CurveResponse,
     RESPONSE,
-    columns=_columns,
-    row=_row,
+    numbers=_numbers,
     content=_content,
     files=_files,
     show=_show,

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -65,15 +66,19 @@ class Table(Mapping[str, Column]):
                 column.values[(curve, places) if column.quantity.dims else curve] = found
 
 
-def rows_over_p(row: Row, names: Sequence[str]) -> list[list[float | None]]:
-    """What a curve has of some columns over p, a list for each p; None where there is no number."""
-    columns = [row[name].tolist() if name in row else [None] * row["p"].size for name in names]
-    return [[plain(each) for each in of_p] for of_p in zip(*columns, strict=True)]
-
-
 def plain(number: Any) -> Any:
     """A number as JSON and CSV have it: None where there is none."""
     return None if isinstance(number, float) and not math.isfinite(number) else number
+
+
+def estimated(quantity: Quantity, estimate: Any) -> dict[Quantity, float | None]:
+    """A number and its error by their quantities; None where there is none."""
+    return {quantity: estimate and estimate.value, _error(quantity): estimate and estimate.error_estimate}
+
+
+@cache
+def _error(quantity: Quantity) -> Quantity:
+    return quantity.error()
 
 
 def pair(name: str, estimate: Any) -> dict[str, float | None]:

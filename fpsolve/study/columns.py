@@ -19,7 +19,7 @@ COUNTS = (
 
 def columns_of(case: Case) -> tuple[Quantity, ...]:
     """The columns of all parts, those over p first; those of perturbation theory have no error."""
-    found = [each for part in PARTS for each in part.columns(case)]
+    found = [each for part in PARTS for each in part.numbers(case, None)]
     return *sorted(found, key=lambda each: not each.dims), *COUNTS, STATUS, SECONDS
 
 
@@ -30,10 +30,10 @@ def row_of(case: Case, result: CurveResult) -> Row:
         case: which tells what is asked for.
         result: of the curve.
     """
-    row = {name: each for part in PARTS for name, each in part.row(case, result).items()}
+    row = {about.name: each for part in PARTS for about, each in part.numbers(case, result).items()}
     count, solved = case.p.size if MOMENT.name in case.asked else 0, result.moments.p.size
     counts = {"p_solved": solved, "p_failed": count - solved}
-    return {**row, **counts, STATUS.name: result.status, SECONDS.name: round(result.seconds, 6)}
+    return {**row, "p": result.moments.p, **counts, STATUS.name: result.status, SECONDS.name: round(result.seconds, 6)}
 
 
 def table_of(case: Case, results: Iterable[CurveResult] = ()) -> Table:

@@ -186,8 +186,7 @@ def _solve(case: Case, folder: Path, pool: Pool, watch: Watch, *, is_fresh: bool
             with watch.bar(sweep.phase) as progress:
                 sweep.solve(pool, progress)
         except (KeyboardInterrupt, WorkersDied):
-            sweep.find()
-            sweep.find_unfinished()
+            sweep.results.add_rest()
             sweep.write_all()
             raise
         with watch.bar(Phase(case.name, "tables")), signals_held():

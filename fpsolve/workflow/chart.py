@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
@@ -30,7 +30,7 @@ from fpsolve.exponent.kinds import choose
 from fpsolve.files import writable, write_csv, write_json
 from fpsolve.messages import Code, Message, message_of
 from fpsolve.model.problem import Problem
-from fpsolve.output.records import Records, append, key_of, made_of, record_of
+from fpsolve.output.records import Records, key_of, made, plain
 from fpsolve.output.tables import head, in_case_words
 from fpsolve.page.page import Block, Column, Drawing, Grid, Sentence
 from fpsolve.pool import Pool, serial
@@ -42,11 +42,13 @@ from fpsolve.workflow.progress import NODES as SCANNED
 from fpsolve.workflow.progress import POINTS, SILENT, Phase, Watch
 from fpsolve.workflow.reports import facts_since, shown_at_the_end, write_report
 
-LINE_RECORDS = "records/charted"
-"""The folder of the records of points of lines."""
+LINE_RECORDS = "records/charted.jsonl"
+"""The file of the records of points of lines."""
+POINT = tuple[Sample | None, Message | None]
+"""What is recorded of a point: F, or why there is none."""
 FILES = "chart.csv", "chart.json"
 """The files with all numbers of a chart."""
-Map = Callable[[Callable[[Row], Scan], Iterable[Row]], Iterable[Scan]]
+Map = Callable[[Callable[[Any], Any], Iterable[Any]], Iterable[Any]]
 """The builtin `map`, or that of an executor: results in the order of the tasks."""
 CLOSED_FORM_NODES = 41
 """Of the grid, each way, on which the closed forms are evaluated."""
@@ -159,10 +161,20 @@ def solve_chart(
         known: gives what is recorded of the points of a line.
         has_closed_forms: whether they are found, too, which takes seconds.
     """
-    lines = [replace(line, known=known(line)) for line in begun_lines(case)]
+    lines = begun_lines(case)
+    found = [known(line) for line in lines]
+    lines = [replace(line, known=points) for line, points in zip(lines, found, strict=True)]
     x, y = lines[0].x, lines[0].y
     chart = Chart((), _closed_forms(lines[0].problem, charted(case).lines, (x, y)) if has_closed_forms else ())
-    rows = iter(map(scan_row, [row for line in lines for row in line.rows()]))
+    tasks = [(points, row) for line, points in zip(lines, found, strict=True) for row in line.rows()]
+
+    def scans() -> Iterator[Scan]:
+        for (points, _), (scan, new) in zip(tasks, map(scan_points, tasks), strict=True):
+            if points and new:
+                points.put(new)
+            yield scan
+
+    rows = scans()
     for each in lines:
         done = chart.lines
         for line in each.solve(rows, progress, stepped):
@@ -198,49 +210,58 @@ def _closed_forms(
     return tuple(found)
 
 
-@dataclass(frozen=True, eq=False)
-class Point:
-    """What is recorded of a point of a line: the wanted error of F over its scale, F, or why there is none."""
-
-    rtol: float
-    at: FloatArray
-    sample: Sample | None
-    reason: Message | None
-
-
 class Points:
     """The points of a line, recorded one by one as they are solved.
 
     Args:
-        folder: of the case.
+        records: of the case.
         case: the case.
         line: of which nothing is traced.
+
+    Attributes:
+        new: in another process, which does not record, the points that were solved.
     """
 
-    def __init__(self, folder: Path, case: Case, line: Boundary) -> None:
-        frame = [
-            repr(each) for each in (line.target, *(replace(axis, at=()) for axis in (line.x, line.y)), line.budget)
-        ]
-        self._folder = folder.resolve() / LINE_RECORDS
-        self._key = key_of(Point, case.curve({}), frame=frame)
-        self._found: dict[tuple[float, ...], Sample | Message | None] | None = None
+    def __init__(self, records: Records, case: Case, line: Boundary) -> None:
+        axes = (replace(axis, at=()) for axis in (line.x, line.y))
+        self._key = key_of(case.curve({}).digest, [repr(each) for each in (line.target, *axes, line.budget)])
+        self._records: Records | None = records
+        self._found, self.new = dict[str, Sample | Message | None](), dict[str, Any]()
+        for name, each in records.get(self._key).items():
+            with suppress(ValueError):  # which counts as none
+                sample, reason = made(POINT, each)
+                self._found[name] = sample or reason
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**vars(self), "_records": None}
 
     def find(self, rtol: float, at: FloatArray) -> Sample | Message | None:
         """F at a point, or why there is none; None where it is not known."""
-        if self._found is None:
-            self._found, records = {}, Records(self._folder).look()
-            for place in records.addresses(self._key):
-                with suppress(OSError, ValueError):  # which counts as none
-                    point = Point(**made_of(Point, records.read(place)))
-                    self._found[point.rtol, *point.at] = point.sample or point.reason
-        return self._found.get((rtol, *at))
+        return self._found.get(_point(rtol, at))
 
     def keep(self, rtol: float, at: FloatArray, found: Sample | Message) -> None:
         """Record it, but for what may not fail again."""
         if isinstance(found, Sample):
-            append(self._folder, self._key, record_of(Point(rtol, at, found, None)))
+            self.put({_point(rtol, at): plain((found, None))})
         elif not found.tells_of(Code.NO_MEMORY) and found.code is not Code.LINE_SPENT and not is_of_line(found):
-            append(self._folder, self._key, record_of(Point(rtol, at, None, found)))
+            self.put({_point(rtol, at): plain((None, found))})
+
+    def put(self, entries: Mapping[str, Any]) -> None:
+        """Record what was solved."""
+        if self._records is None:
+            self.new |= entries
+        else:
+            self._records.put(self._key, entries)
+
+
+def _point(rtol: float, at: FloatArray) -> str:
+    return f"{rtol!r} {at.tolist()}"
+
+
+def scan_points(task: tuple[Points | None, Row]) -> tuple[Scan, Mapping[str, Any]]:
+    """The task: a row, and what another process has solved on it."""
+    points, row = task
+    return scan_row(row), points.new if points else {}
 
 
 def write_chart(case: Case, chart: Chart, folder: Path) -> None:
@@ -496,7 +517,7 @@ def chart_case(
         writable(folder),
         pool or serial() as workers,
     ):
-        known = partial(Points, folder, case)
+        known = partial(Points, Records(folder / LINE_RECORDS), case)
         with shown_at_the_end(draw):
             for chart in solve_chart(case, progress=progress, stepped=stepped, map=workers.map, known=known):
                 write_chart(case, chart, folder)

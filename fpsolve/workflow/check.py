@@ -21,10 +21,10 @@ from fpsolve.messages import Message
 from fpsolve.page.limits import EACH, ROWS
 from fpsolve.page.page import Block, Column, Grid, Sentence
 from fpsolve.parts.moments import PART as MOMENTS
-from fpsolve.parts.part import Numerics, Settings
+from fpsolve.parts.part import Asked, Job, Numerics, Settings
 from fpsolve.pool import Pool, serial
 from fpsolve.results.curve import CurveResult
-from fpsolve.study.solve import Asked, Order, Solved, batches, solve_batch
+from fpsolve.study.solve import result_of, solve_set
 from fpsolve.workflow.folders import ANEW, kept, of_curves, saying_if_interrupted
 from fpsolve.workflow.progress import SETS, SILENT, Phase, Watch
 
@@ -127,10 +127,6 @@ def compare_with_hierarchy(case: Case, results: Sequence[CurveResult]) -> list[C
     return found
 
 
-def _result_alone(order: Order, curve: Curve, solved: Solved) -> CurveResult:
-    return solved.result
-
-
 def check_case(case: Case, *, by_hierarchy: bool = False, pool: Pool | None = None, watch: Watch = SILENT) -> Checked:
     """Solve what a case expects, and compare; nothing is written.
 
@@ -139,20 +135,19 @@ def check_case(case: Case, *, by_hierarchy: bool = False, pool: Pool | None = No
     found: list[CurveResult] = []
     numerics = replace(Numerics.of(case), is_stated=True)
 
-    def order(number: int, varied: Varied) -> Order:
+    def job(curve: Curve) -> Job:
         even = {MOMENTS.name: {"p": even_moments(case).tolist(), "slopes": True}}
-        return Order(number, varied, even if by_hierarchy else expected(case, varied), case.vary.line_of(number))
+        asked = even if by_hierarchy else expected(case, curve.varied)
+        return Job(curve, asked, numerics, case.vary.line_of(curve.number))
 
     with (
         saying_if_interrupted(lambda: kept(len(found), of_curves(case)), ANEW),
         watch.bar(Phase(case.name, "solving", case.planned, SETS)) as progress,
         pool or serial() as workers,
     ):
-        task = partial(solve_batch, problem=case.problem, numerics=numerics, keep=_result_alone)
-        for _, results in workers.run(task, batches(case, order)):
-            for result in results:
-                found.append(result)
-                progress(failed=result.status.fails)
+        for _, result in workers.run(partial(solve_set, tell=result_of), map(job, case.curves())):
+            found.append(result)
+            progress(failed=result.status.fails)
     found.sort(key=lambda result: result.curve.number)
     comparisons = compare_with_hierarchy(case, found) if by_hierarchy else compare(case, found)
     return Checked(found, comparisons)

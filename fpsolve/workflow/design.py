@@ -8,6 +8,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+import tomlkit
+
 from fpsolve.analysis.axis import Axis
 from fpsolve.analysis.inverse import Design, axes_of, start_and_stop, units_of
 from fpsolve.analysis.inverse import design as nearest_design
@@ -114,12 +116,12 @@ def solve_design(case: Case, target: str, by: tuple[Axis, ...], progress: Callab
     Args:
         progress: called after each solve.
     """
-    begun = DesignOutcome(target_of(target), by, units_of(case.problem, by, {}))
+    outcome = DesignOutcome(target_of(target), by, units_of(case.problem, by, {}))
     try:
         found = nearest_design(case.problem, target, by, budget=case.budget, progress=progress)
     except FpsolveError as failure:
-        return replace(begun, reason=failure.message)
-    return replace(begun, reason=found.reason) if isinstance(found, Absent) else replace(begun, found=found)
+        return replace(outcome, reason=failure.message)
+    return replace(outcome, reason=found.reason) if isinstance(found, Absent) else replace(outcome, found=found)
 
 
 def write_design(case: Case, outcome: DesignOutcome, folder: Path, facts: Mapping[str, Any]) -> None:
@@ -128,7 +130,9 @@ def write_design(case: Case, outcome: DesignOutcome, folder: Path, facts: Mappin
     found = outcome.found
     if found is not None:
         values = {key: each.value for key, each in found.values.items()}
-        write_text(folder / "design.toml", rewritten(case, values, outcome.expectation(case), folder))
+        expected = outcome.expectation(case)
+        more = f"\n{tomlkit.dumps({'expect': [expected]})}" if expected else ""
+        write_text(folder / "design.toml", rewritten(case, folder, values, without=["expect"], more=more))
 
 
 def summary(case: Case, outcome: DesignOutcome, facts: Mapping[str, Any]) -> dict[str, Any]:

@@ -27,7 +27,7 @@ from fpsolve.budget import Meter, watched
 from fpsolve.case.case import CHEAP, CHEAP_OF_WALLS, Case, load_case
 from fpsolve.case.refusals import obstacle
 from fpsolve.case.remedies import CASE_WORDS
-from fpsolve.case.rewrite import of_one_curve
+from fpsolve.case.rewrite import rewritten
 from fpsolve.case.sections import FigureSection, Moments, OutputSection
 from fpsolve.case.uncertain import Uncertain
 from fpsolve.case.vary import Vary
@@ -44,13 +44,13 @@ from fpsolve.page.local import LocalPage
 from fpsolve.page.page import Sentence
 from fpsolve.parts.indices import THEORY
 from fpsolve.parts.moments import moment_grid
-from fpsolve.parts.part import Numerics, fault
+from fpsolve.parts.part import Job, Numerics, fault
 from fpsolve.results.curve import CurveResult
 from fpsolve.show import results
 from fpsolve.show.notes import notes
 from fpsolve.show.problem import show as show_problem
 from fpsolve.show.verdict import meaning, verdict
-from fpsolve.study.solve import everything, solve_curve
+from fpsolve.study.solve import everything, result_of, solve_curve
 from fpsolve.workflow.progress import waiting
 from fpsolve.workflow.reports import COMPLETE, facts_since
 from fpsolve.workflow.views import field_of, listed, map_of, paths_of
@@ -230,7 +230,7 @@ class Explorer:
         if is_moving:
             asked[MOMENT.name] = {"p": self._few, "slopes": False}
             numerics = replace(numerics, rtol=max(numerics.rtol, MOVING_RTOL))
-        found = solve_curve(next(case.curves()), asked, numerics).result
+        found = result_of(solve_curve(Job(next(case.curves()), asked, numerics)))
         if not found.moments.p.size:
             raise FpsolveError(message_of(found.failures[0].reason))
         return found
@@ -285,7 +285,13 @@ class Explorer:
         held = self.source.problem.values
         values = case.problem.values
         changed = {key: value for key, value in values.items() if value != held[key] or key in self.source.vary.keys}
-        return of_one_curve(self.source, changed, self.case.p.tolist(), self.quantities)
+        lists, p, names = dict[str, Any](), self.case.p.tolist(), self.source.output.names
+        if p != self.source.p.tolist():
+            lists["moments.p"] = p
+        if names is not None and not {*self.quantities} <= {*names}:
+            lists["output.quantities"] = dict.fromkeys((*names, *self.quantities))
+        without = "expect", "vary", "figure"
+        return rewritten(self.source, self.source.path.parent, changed, without=without, lists=lists)
 
     def _report(self, question: Mapping[str, Any]) -> Answer:
         """The report of these numbers."""

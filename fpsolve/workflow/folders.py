@@ -25,7 +25,7 @@ REPORT = r"report\.html"
 CHART, PROVEN, DESIGNED = r"chart\.(csv|json|png|pdf)", r"proof\.json", r"design\.(json|toml)"
 """Patterns of the names of the files that a run writes, a simulation, a chart, proofs, and a design."""
 _UNFINISHED = rf"(eigenfunctions(-\d+)?/)?{TEMPORARY}"
-_FOLDERS = r"records|records/(solved|simulated|proven|charted)|eigenfunctions(-\d+)?"
+_FOLDERS = r"records|eigenfunctions(-\d+)?"
 _TABLES = {SOLVED: r"summary\.json", SIMULATED: r"monte_carlo(-\d+)?\.json", CHART: r"chart\.json"}
 _TABLES |= {PROVEN: PROVEN, DESIGNED: r"design\.json"}
 """Of each kind of files those that state the parameters."""

@@ -17,7 +17,7 @@ from fpsolve.analysis.spreads import LEVEL, Spread
 from fpsolve.arrays import FloatArray, one
 from fpsolve.case.case import Case
 from fpsolve.case.remedies import CASE_WORDS
-from fpsolve.case.rewrite import with_noise
+from fpsolve.case.rewrite import rewritten
 from fpsolve.drawing import COLOURS, figure_for, label_axes, plain_numbers
 from fpsolve.errors import FpsolveError, NotConverged
 from fpsolve.exponent.kinds import choose
@@ -394,7 +394,7 @@ def case_of(outcome: NoiseOutcome, folder: Path) -> str:
     wanted, sections = outcome.wanted, noise_sections(outcome)
     omega, zeta = wanted.modes.omega[0], wanted.modes.zeta
     if wanted.case:
-        return with_noise(wanted.case, sections, folder)
+        return rewritten(wanted.case, folder, without=["noise", "expect"], more=sections)
     count = len(outcome.fit.parts)
     if math.isnan(zeta) or len(wanted.modes.omega) > 1:
         return ""

@@ -7,8 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from decimal import ROUND_CEILING, ROUND_FLOOR, Decimal
-from functools import partial
-from hashlib import sha256
+from functools import cache, partial
 from pathlib import Path
 from time import monotonic
 from typing import Any, TypeAlias, cast
@@ -22,7 +21,7 @@ from fpsolve.errors import FpsolveError, NoSuchExponent
 from fpsolve.exponent.quantities import LYAPUNOV_EXPONENT, STABILITY_INDEX
 from fpsolve.files import writable, write_text
 from fpsolve.messages import Code, Message
-from fpsolve.output.records import Records, append
+from fpsolve.output.records import Records, key_of
 from fpsolve.page.limits import EACH, PROOFS, ROWS
 from fpsolve.page.page import Block, Column, Grid, Sentence
 from fpsolve.pool import Pool, serial
@@ -55,8 +54,8 @@ LONGEST = 12
 """Digits of a p at most in a table."""
 FATES = {1: "grows", -1: "decays", 0: "open"}
 """The fate of a path or a moment by the sign of its exponent."""
-PROVEN_RECORDS = "records/proven"
-"""The folder of the records of bounds."""
+PROVEN_RECORDS = "records/proven.jsonl"
+"""The file of the records of bounds."""
 ENCLOSURES = TypeAdapter(Enclosure)
 """The form of bounds in a record."""
 EVERY = 30.0
@@ -288,29 +287,26 @@ class Kept:
     """Bounds on Λ(p) and λ that an earlier run has proven, each verified anew from its certificate.
 
     Args:
-        folder: of their records.
+        records: of them.
     """
 
-    def __init__(self, folder: Path) -> None:
-        self.records, self._known = Records(folder).look(), dict[str, Enclosure | None]()
+    def __init__(self, records: Records) -> None:
+        self.records = records
+        self._verified = cache(self._read)
 
     def find(self, question: Question) -> Enclosure | None:
         """What was proven, if it was, and follows."""
-        if (key := self._key(question)) not in self._known:
-            self._known[key] = self._read(key)
-        return self._known[key]
+        return self._verified(_key(question))
 
     def add(self, question: Question, found: Answer) -> None:
         """Keep what was proven."""
         if isinstance(found, Enclosure):
-            append(self.records.folder, self._key(question), {"enclosure": ENCLOSURES.dump_python(found)})
+            self.records.put(_key(question), {"enclosure": ENCLOSURES.dump_python(found)})
 
     def _read(self, key: str) -> Enclosure | None:
-        if (address := self.records.address(key)) is None:
-            return None
         try:
-            found = ENCLOSURES.validate_python(self.records.read(address)["enclosure"])
-        except (OSError, ValueError, LookupError, TypeError):
+            found = ENCLOSURES.validate_python(self.records.get(key).get("enclosure"))
+        except ValueError:
             return None
         if found.certificate is None:
             return found if found == replace(NOTHING, wanted=found.wanted) else None
@@ -318,12 +314,11 @@ class Kept:
         is_same = (whole.lower, whole.upper) == (found.lower, found.upper)
         return found if is_same and not objection(found.certificate) else None
 
-    @staticmethod
-    def _key(question: Question) -> str:
-        """From the function and its arguments; the problem among these follows from what is stated."""
-        _, *asked = question.args
-        told = [__version__, question.func.__name__, *map(repr, asked), repr(question.keywords)]
-        return sha256("\n".join(told).encode()).hexdigest()
+
+def _key(question: Question) -> str:
+    """From the function and its arguments; the problem among these follows from what is stated."""
+    _, *asked = question.args
+    return key_of(question.func.__name__, *map(repr, asked), repr(question.keywords))
 
 
 @dataclass(frozen=True)
@@ -384,7 +379,7 @@ def prove_case(
         written = monotonic()
         with shown_at_the_end(report):
             try:
-                kept_bounds = Kept(folder / PROVEN_RECORDS)
+                kept_bounds = Kept(Records(folder / PROVEN_RECORDS))
                 fresh = workers.map(answer, (each for each in plan.questions() if kept_bounds.find(each) is None))
                 for question in plan.questions():
                     found: Answer | None = kept_bounds.find(question)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import nullcontext
+from contextlib import nullcontext, suppress
 from dataclasses import asdict, replace
 from datetime import UTC, datetime
 from functools import partial
@@ -22,7 +22,7 @@ from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, MOMENT
 from fpsolve.files import writable, write_csv, write_json
 from fpsolve.messages import Code, Message
 from fpsolve.model.quantity import OF_STOPS
-from fpsolve.output.records import Records, append, key_of, made_of, record_of
+from fpsolve.output.records import Records, key_of, made, plain
 from fpsolve.output.tables import head, in_case_words, parameters_of
 from fpsolve.page.limits import EACH, PICTURES
 from fpsolve.page.page import Block, Column, Drawing, Grid, Sentence, filled
@@ -37,8 +37,8 @@ from fpsolve.workflow.folders import AGAIN, SIMULATED, kept, of_curves, own_fold
 from fpsolve.workflow.progress import PERCENT, SILENT, Advance, Phase, Watch
 from fpsolve.workflow.reports import facts_since, write_report
 
-RECORDS = "records/simulated"
-"""The folder of the records of simulations."""
+RECORDS = "records/simulated.jsonl"
+"""The file of the records of simulations."""
 SIMULATION = ("monte_carlo.json",)
 """The file with all numbers of a simulation."""
 SIGNIFICANT = 3.0
@@ -126,12 +126,20 @@ def simulate_curve(
 
 def simulated_of(record: Mapping[str, Any], curve: Curve) -> SimulatedCurve:
     """The simulation of a curve from its record. Raises `ValueError` where that has another form."""
-    return SimulatedCurve(curve, **made_of(SimulatedCurve, record))
+    from fpsolve.simulation import MonteCarlo, Response
+
+    kind = tuple[MonteCarlo, Response | None, tuple[Message, ...]]
+    return SimulatedCurve(curve, *made(kind, record.get("simulation")))
+
+
+def record_of(found: SimulatedCurve) -> dict[str, Any]:
+    """The record of a simulation that is finished."""
+    return {"simulation": plain((found.result, found.response, found.warnings))}
 
 
 def simulation_key(curve: Curve, orders: Sequence[float], setting: MonteCarloSection) -> str:
     """What the record of a curve is found by."""
-    return key_of(SimulatedCurve, curve, orders=list(orders), setting=setting.model_dump(mode="json"))
+    return key_of(curve.digest, list(orders), setting.model_dump(mode="json"))
 
 
 class Simulations:
@@ -149,13 +157,11 @@ class Simulations:
     """
 
     def __init__(self, case: Case, folder: Path, *, is_fresh: bool) -> None:
-        self.case, self.folder, self.records = case, folder, Records(folder / RECORDS)
-        if is_fresh:
-            self.records.remove()
+        self.case, self.folder, self.records = case, folder, Records(folder / RECORDS, is_fresh=is_fresh)
         self.simulated, self.interruption = list[SimulatedCurve](), ""
         self._orders = case.simulated.tolist()
         self._key = partial(simulation_key, orders=self._orders, setting=case.monte_carlo)
-        curves = case.curves() if self.records.look().are_there else ()
+        curves = case.curves() if self.records else ()
         self._known = {curve.number for curve in curves if self._found(curve)}
 
     @property
@@ -204,14 +210,16 @@ class Simulations:
                         raise
                     return
                 if not found.interrupted and curve.number not in self._known:
-                    append(self.records.folder, self._key(curve), record_of(found))
+                    self.records.put(self._key(curve), record_of(found))
                 yield found
                 if found.interrupted:
                     return
 
     def _found(self, curve: Curve) -> SimulatedCurve | None:
         """Its simulation, if that is known; a record of another form does not count."""
-        return self.records.made(self._key(curve), lambda record: simulated_of(record, curve))
+        with suppress(ValueError):
+            return simulated_of(self.records.get(self._key(curve)), curve)
+        return None
 
 
 def write_simulation(case: Case, simulated: SimulatedCurve, folder: Path) -> None:

@@ -76,10 +76,11 @@ def map_of(case: Case, axes: object, tell: Callable[[Answer], None]) -> Answer:
         }
 
     def rows(scan: Callable[[Any], Any], tasks: Iterable[Any]) -> Iterator[Any]:
-        for row in tasks:
+        for task in tasks:
+            _, row = task
             grid[:] = grid if row.number else [[None] * row.count] * row.count
-            found = scan(row)
-            grid[row.number] = listed(np.sign(found.values))
+            found = scan(task)
+            grid[row.number] = listed(np.sign(found[0].values))
             tell(answer(chart))
             yield found
 

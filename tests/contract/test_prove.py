@@ -464,11 +464,11 @@ def broken(line):
 @pytest.mark.parametrize("change", [str, forged, broken])
 def test_a_run_goes_on_with_records_of_bounds_that_follow(proven, tmp_path, change):
     """What is forged or broken is proven anew."""
-    [records] = proof_in(proven.folder).parent.glob("records/proven/*.jsonl")
+    [records] = proof_in(proven.folder).parent.glob("records/*.jsonl")
     lines = records.read_text(encoding="utf-8").splitlines()
     changed = [change(line) for line in lines]
     assert (changed == lines) == (change is str)
-    folder = proof_in(tmp_path).parent / "records/proven"
+    folder = proof_in(tmp_path).parent / "records"
     folder.mkdir(parents=True)
     (folder / records.name).write_text("\n".join(changed) + "\n", encoding="utf-8")
     assert run(tmp_path, "prove", "case.toml", "--width", "1e-3", "--quiet", case=SYSTEM).code == 0
@@ -485,7 +485,7 @@ def test_an_interrupted_run_keeps_what_it_has_proven(tmp_path, kind, code):
     """Of p = 0, which needs no time, and another, whose width is beyond reach."""
     (tmp_path / "case.toml").write_text(GAUSSIAN, encoding="utf-8")
     process = started(CODE, "prove", "case.toml", "--jobs", "1", "--width", "1e-30", cwd=tmp_path)
-    kept = proof_in(tmp_path).parent / "records/proven"
+    kept = proof_in(tmp_path).parent / "records"
     while not [*kept.glob("*.jsonl")]:
         time.sleep(0.05)
         assert process.poll() is None

@@ -160,7 +160,7 @@ IN_THE_WAY = [
     ],
     *[
         (name, put, f"{name} cannot be written to: it is no folder, or a link to one; choose")
-        for name in ("records", "records/solved", "eigenfunctions", "eigenfunctions-2")
+        for name in ("records", "eigenfunctions", "eigenfunctions-2")
         for put in (as_link_to_elsewhere, as_file)
     ],
 ]

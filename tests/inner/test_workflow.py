@@ -9,8 +9,7 @@ from fpsolve import FpsolveError
 from fpsolve.case.sections import MonteCarloSection
 from fpsolve.exponent.method import Budget
 from fpsolve.files import alone, atomic
-from fpsolve.output.records import part_key, set_key
-from fpsolve.parts.every import BY_NAME
+from fpsolve.output.known import ROW, names_of, set_key
 from fpsolve.parts.part import Numerics
 from fpsolve.workflow.simulate import simulation_key
 from tests.kit import COSTLY, LEAN, TEXT, case_in, read_json, run
@@ -32,16 +31,16 @@ ASKED = {
     ],
 )
 def test_key_of_a_part_follows_from_what_its_numbers_follow_from(change, parts):
-    """A budget decides what it has limited alone."""
+    """A budget is none of this, nor is p for the key of Λ(p) at a p."""
     numerics = {"rtol": 1e-8, "budget": Budget(), "mesh": None}
 
     def keys(asked=ASKED, **more):
-        return {name: part_key(BY_NAME[name], each, Numerics(**numerics | more)) for name, each in asked.items()}
+        return names_of(asked, Numerics(**numerics | more))
 
-    assert {name for name in ASKED if keys()[name] != keys(**change)[name]} == parts
+    assert {name for name in keys() if keys()[name] != keys(**change)[name]} == parts | {ROW for _ in parts}
     for name in ASKED:
         other = keys({**ASKED, name: {**ASKED[name], "p": [7.0]}})
-        assert {each for each in ASKED if keys()[each] != other[each]} == {name}
+        assert {each for each in other if keys()[each] != other[each]} == {name}
 
 
 def test_keys_of_sets_and_simulations_differ(tmp_path):

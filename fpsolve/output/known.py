@@ -1,0 +1,155 @@
+"""What is known of the curves of a case: their records become results, and their work becomes records."""
+
+from __future__ import annotations
+
+from bisect import bisect_left, insort
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
+from typing import Any
+
+import numpy as np
+
+from fpsolve.case.case import Case, Curve
+from fpsolve.output.records import Entries, Records, key_of, made, plain
+from fpsolve.output.tables import says_more
+from fpsolve.parts.every import BY_NAME
+from fpsolve.parts.moments import PART as MOMENTS
+from fpsolve.parts.part import Asked, Entry, Job, Limit, Numerics, Reason
+from fpsolve.results.curve import CurveResult
+from fpsolve.study.columns import row_of, table_of
+from fpsolve.study.solve import everything, result_of
+
+KEPT = 100
+"""So many results stay in memory, as of few curves all are asked for again."""
+ROW = "row"
+"""What the entries of Λ(p) are called, before their p."""
+
+
+def names_of(asked: Asked, numerics: Numerics) -> dict[str, str]:
+    """What the entries of parts are called in the records of a set: by a digest of all that their numbers follow from.
+
+    A budget is none of this: a number is the same under any.
+    """
+    solver = numerics.rtol, plain(numerics.mesh)
+    of_row = {name: each for name, each in asked[MOMENTS.name].items() if name != "p"}
+    names = {name: key_of(each, *(solver if BY_NAME[name].uses_solver else ())) for name, each in asked.items()}
+    return {name: f"{name}-{key[:16]}" for name, key in (names | {ROW: key_of(of_row, *solver)}).items()}
+
+
+def record_of(job: Job) -> Entries:
+    """The entries of what was solved now of a set, and of each p."""
+    names = names_of(job.asked, job.numerics)
+    record = {names[name]: plain((each.found, each.reason, each.seconds, each.limit)) for name, each in job.new.items()}
+    if MOMENTS.name in job.new or MOMENTS.name not in job.entries:
+        limit = job.new[MOMENTS.name].limit if MOMENTS.name in job.new else job.numerics.limit
+        known = ((p, job.rows[p]) for p in job.asked[MOMENTS.name]["p"] if p in job.rows)
+        record |= {f"{names[ROW]} {p!r}": plain((row, limit)) for p, row in known}
+    return record
+
+
+def read_into(job: Job, record: Entries, names: Mapping[str, str], *, is_all: bool = False) -> Job:
+    """Give a job what its record has of what is asked: what is settled, or all; what cannot be read is not there."""
+    for name in job.asked:
+        with suppress(ValueError, KeyError, TypeError):
+            found, reason, seconds, limit = record[names[name]]
+            own = made(BY_NAME[name].kind | None, found), made(Reason | None, reason), float(seconds)
+            entry = Entry(*own, made(Limit | None, limit))
+            if is_all or job.numerics.settles(entry.limit):
+                job.entries[name] = entry
+    for p in job.asked[MOMENTS.name]["p"]:
+        with suppress(ValueError, KeyError):
+            row, limit = made(tuple[tuple[float, ...], Limit | None], record[f"{names[ROW]} {p!r}"])
+            if is_all or job.numerics.settles(limit):
+                job.rows[p] = row
+    return job
+
+
+def set_key(curve: Curve) -> str:
+    """What the records of a parameter set are found by."""
+    return key_of(curve.digest)
+
+
+class Results(Sequence[CurveResult]):
+    """What is known of the curves of a case, in their order; each is made of its records when it is looked at.
+
+    Args:
+        case: whose curves these are.
+        records: those of its folder.
+
+    Attributes:
+        table: the numbers of all that are known.
+        says: whether anything is said of a curve beyond its numbers, shape (curves,).
+        whole: the numbers of the curves of which all is known that is asked for.
+    """
+
+    def __init__(self, case: Case, records: Records) -> None:
+        self._case, self._records, self._numerics = case, records, Numerics.of(case)
+        self._asked = everything(case, 1), everything(case, 2)
+        self._names = [names_of(each, self._numerics) for each in self._asked]
+        self.table, self.says = table_of(case), np.ones(case.planned, dtype=bool)
+        self.whole, self._numbers = set[int](), list[int]()
+        self._kept: dict[int, CurveResult] = {}
+        for number in self._recorded():
+            if (job := self.job(number)).is_whole:
+                self.add(job)
+
+    def job(self, number: int, *, is_all: bool = False) -> Job:
+        """The work on the curve with a number, with what is known of it; or also with what is to be sought again."""
+        vary, place = self._case.vary, number > 1
+        curve = Curve(self._case.problem, vary.sets[number - 1], number)
+        job = Job(curve, self._asked[place], self._numerics, vary.line_of(number))
+        return read_into(job, self._records.get(set_key(curve)), self._names[place], is_all=is_all)
+
+    def add(self, job: Job) -> CurveResult:
+        """Take what is known of a curve into the table."""
+        number, result = job.curve.number, result_of(job)
+        if not self.has(number):
+            insort(self._numbers, number)
+        if job.is_whole:
+            self.whole.add(number)
+        if number <= KEPT:
+            self._kept[number] = result
+        self.table.put(number - 1, row_of(self._case, result))
+        self.says[number - 1] = says_more(self._case, result)
+        return result
+
+    def put(self, number: int, record: Entries) -> CurveResult:
+        """Keep what was solved of the curve with a number."""
+        [curve] = self._case.curves(number - 1, number)
+        self._records.put(set_key(curve), record)
+        return self.add(self.job(number, is_all=True))
+
+    def add_rest(self) -> None:
+        """Take in what is known of the sets that are not finished."""
+        for number in self._recorded():
+            if not self.has(number):
+                self.add(self.job(number, is_all=True))
+
+    def _recorded(self) -> Iterator[int]:
+        curves = self._case.curves() if self._records else ()
+        return (curve.number for curve in curves if set_key(curve) in self._records)
+
+    def asked(self, number: int) -> Asked:
+        """What is asked of the curve with a number."""
+        return self._asked[number > 1]
+
+    @property
+    def telling(self) -> Iterator[CurveResult]:
+        """Those of which more is said than their numbers."""
+        return (self.of(number) for number in self._numbers if self.says[number - 1])
+
+    def of(self, number: int) -> CurveResult:
+        """That of the curve with a number."""
+        return self._kept.get(number) or result_of(self.job(number, is_all=True))
+
+    def has(self, number: int) -> bool:
+        """Whether anything is known of the curve with a number."""
+        place = bisect_left(self._numbers, number)
+        return self._numbers[place : place + 1] == [number]
+
+    def __len__(self) -> int:
+        return len(self._numbers)
+
+    def __getitem__(self, index: Any) -> Any:
+        numbers = self._numbers[index]
+        return [*map(self.of, numbers)] if isinstance(numbers, list) else self.of(numbers)
