@@ -48,8 +48,8 @@ app = App(
 
     Example: fpsolve run cases/fig1.toml
 
-    Exit codes: 0 success, 1 a checked value differs or a design is out of reach, 2 bad input, 3 not converged,
-    130 interrupted""",
+    Exit codes: 0 success, 1 a checked value differs or a design is out of reach, 2 bad input, 3 not converged
+    or nothing found, 130 interrupted""",
     version=lambda: f"fpsolve {__version__}",
     help_format="plaintext",
     suppress_keyboard_interrupt=False,

@@ -8,6 +8,7 @@ import json
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import chdir, redirect_stderr, redirect_stdout
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,7 +18,7 @@ from fpsolve.case import Case
 from fpsolve.cli import main
 from fpsolve.model import CoefficientMatrix, LinearSystem, Noise, System
 from fpsolve.output.known import names_of, read_into, record_of
-from fpsolve.parts.part import Entry, Job, Numerics
+from fpsolve.parts.part import Job, Numerics
 from fpsolve.results import CurveResult, SimulatedCurve
 from fpsolve.study.solve import everything, result_of, solve_curve
 from fpsolve.workflow.simulate import simulate_curve
@@ -143,20 +144,10 @@ def case_in(folder: Path, text: str, overrides: Sequence[str] = (), name: str = 
     return load_case(path, overrides)
 
 
-class Solved(NamedTuple):
-    """A curve once it is solved: its numbers and messages, what became of its parts, its Λ(p), and its pictures."""
-
-    result: CurveResult
-    entries: Mapping[str, Entry]
-    rows: Mapping[float, Sequence[float]]
-    pictures: Mapping[str, Any]
-
-
-def solve_sets(case: Case) -> list[Solved]:
-    """All that a case wants of its curves, with the pictures."""
-    wanted, numerics = everything(case), Numerics.of(case)
-    jobs = [solve_curve(Job(curve, wanted, numerics)) for curve in case.curves()]
-    return [Solved(result_of(job), job.entries, job.rows, job.pictures) for job in jobs]
+def solve_sets(case: Case) -> list[Any]:
+    """All that a case wants of its curves, each with its record and its pictures."""
+    jobs = [solve_curve(Job(curve, everything(case), Numerics.of(case))) for curve in case.curves()]
+    return [SimpleNamespace(result=result_of(job), record=record_of(job), pictures=job.pictures) for job in jobs]
 
 
 def solve_case(case: Case) -> list[CurveResult]:
@@ -170,12 +161,11 @@ def simulate_curves(case: Case) -> list[SimulatedCurve]:
     return [simulate_curve(curve, orders, case.monte_carlo) for curve in case.curves()]
 
 
-def from_record(case: Case, solved: Solved) -> CurveResult:
+def from_record(case: Case, solved: Any) -> CurveResult:
     """A solved set as it comes back from its record."""
-    curve, asked, numerics = solved.result.curve, everything(case), Numerics.of(case)
-    record = record_of(Job(curve, asked, numerics, rows=dict(solved.rows), new=dict(solved.entries)))
-    job, names = Job(curve, asked, numerics), names_of(asked, numerics)
-    return result_of(read_into(job, json.loads(json.dumps(record)), names, is_all=True))
+    asked, numerics = everything(case), Numerics.of(case)
+    record, job = json.loads(json.dumps(solved.record)), Job(solved.result.curve, asked, numerics)
+    return result_of(read_into(job, record, names_of(asked, numerics), is_all=True))
 
 
 def read_json(path: Path) -> Any:

@@ -54,7 +54,7 @@ from fpsolve.case.uncertain import EXAMPLE as UNCERTAIN
 from fpsolve.case.uncertain import Uncertain, uncertain_of
 from fpsolve.case.vary import Vary, assignments
 from fpsolve.errors import CaseError, Fault
-from fpsolve.explain import explain, refuse, shortened
+from fpsolve.explain import explain, is_list, refuse, shortened
 from fpsolve.exponent.kinds import choose
 from fpsolve.exponent.method import Budget, Method
 from fpsolve.exponent.quantities import (
@@ -67,6 +67,7 @@ from fpsolve.exponent.quantities import (
 )
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import is_control
+from fpsolve.model.faults import table_of
 from fpsolve.model.noise import Noise
 from fpsolve.model.parameters import Parameter, Section, parameter
 from fpsolve.model.plane import System
@@ -331,7 +332,7 @@ class Case(Section):
     @property
     def usual_p(self) -> float:
         """The p at which curves are compared by their eigenfunctions: of those that are shown, or of all, next to 2."""
-        return float(min(self.shown if self.shown.size else self.p, key=lambda p: abs(p - USUAL_P)))
+        return float(min(self.shown if self.shown.size else self.p, key=lambda p: abs(p - USUAL_P), default=USUAL_P))
 
     @property
     def has_response(self) -> bool:
@@ -433,11 +434,14 @@ class Case(Section):
 
     @model_validator(mode="before")
     @classmethod
-    def _has_one_system(cls, data: Any) -> Any:
+    def _is_complete(cls, data: Any) -> Any:
+        """With one system; without orders of moments where other quantities are named."""
         if {"oscillator", "system"} <= set(data):
             text = "stands beside [system], but a case has one system; remove one of the two"
             refuse([(("oscillator",), data["oscillator"], text)])
-        return data
+        named = table_of(data.get("output")).get("quantities")
+        is_of_p = not is_list(named) or MOMENT.name in named
+        return data if is_of_p else {"moments": Moments.model_construct(p=()), **data}
 
     @model_validator(mode="after")
     def _draws_a_map_of_many(self) -> Self:

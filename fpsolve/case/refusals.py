@@ -345,8 +345,9 @@ def _of_orders(valid: Known, wanted: Iterable[tuple[tuple[str | int, ...], float
     moments: Moments | None = valid.get("moments")
     for path, p in wanted:
         if moments is not None and not moments.has(p):
-            first, last = moments.values[[0, -1]]
-            known = f"moments.p ({moments.values.size} values, {first:g} to {last:g})"
+            values = moments.values
+            ends = f"{values[0]:g} to {values[-1]:g}" if values.size else "none is stated"
+            known = f"moments.p ({values.size} values, {ends})"
             yield path, p, f"got {p}; must be among {known}; add it there, {remedy}"
 
 

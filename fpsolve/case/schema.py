@@ -105,7 +105,7 @@ def schema() -> dict[str, Any]:
             fields[name] = field.annotation, field
     model: Any = create_model("Case", __config__=STRICT, **fields)
     made: dict[str, Any] = model.model_json_schema(schema_generator=_Generator)
-    made["required"] = [key for key in made["required"] if key not in ("oscillator", "system")]
+    made["required"] = [key for key in made["required"] if key not in ("oscillator", "system", "moments")]
     made |= {"$schema": _DIALECT, "title": "fpsolve case", "description": "A case file of fpsolve."}
     made["oneOf"] = [{"required": ["oscillator"]}, {"required": ["system"]}]
     tidy: dict[str, Any] = _tidy(made)

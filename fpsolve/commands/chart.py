@@ -38,6 +38,6 @@ def chart(
         else:
             print_blocks(show(case, found))
         options.print_written(case, traced(found), monotonic() - start)
-        if found.failures:
+        if found.fails:
             code = NOT_CONVERGED
     return code

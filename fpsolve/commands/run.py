@@ -69,6 +69,6 @@ def run(
             options.print_written(case, what, outcome.facts["wall_seconds"], known_of(case, outcome.known))
         if outcome.interruption:
             return INTERRUPTED
-        if outcome.failed:
+        if outcome.fails:
             code = NOT_CONVERGED
     return code

@@ -24,9 +24,8 @@ from fpsolve.model.problem import infinite
 from fpsolve.model.quantity import MEAN_SQUARE
 from fpsolve.page.page import Block, Column, filled
 from fpsolve.parts.intervals import INTERVAL, spreads_of
-from fpsolve.parts.part import Job, Numerics, Part, Reason, Settings
+from fpsolve.parts.part import Job, Numerics, Part, Reason, Settings, estimated
 from fpsolve.results.curve import CurveResult
-from fpsolve.results.table import estimated
 from fpsolve.results.text import NUMBER_COLUMNS, interval, row_of
 
 

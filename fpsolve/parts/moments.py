@@ -81,7 +81,7 @@ def _solve(job: Job, settings: Settings) -> Moments:
         residual=found.residual,
         perturbation=perturbed_moments(problem, found.p),  # Eq. (37)
     )
-    job.rows |= columns.rows
+    job.rows |= {p: row for p, *row in np.column_stack([*vars(columns).values()]).tolist()}
     notes = *found.notes, *problem.remarks, weak_noise_note(problem, found.p, found.value)
     return Moments(
         found.root,

@@ -12,6 +12,8 @@ from pathlib import Path
 from time import monotonic
 from typing import Any, Literal
 
+import numpy as np
+
 from fpsolve.budget import Meter
 from fpsolve.case.case import Case, Curve
 from fpsolve.data import Quantity
@@ -170,7 +172,8 @@ class Job:
     @property
     def columns(self) -> MomentColumns:
         """Λ(p) at the p that are asked for and known."""
-        return MomentColumns.of(self.rows, self.asked[MOMENT.name]["p"])
+        rows = [(p, *self.rows[p]) for p in self.asked[MOMENT.name]["p"] if p in self.rows]
+        return MomentColumns(*np.array(rows).reshape(-1, 7).T)
 
     @property
     def is_whole(self) -> bool:
@@ -202,6 +205,11 @@ class Job:
         if monotonic() - self._kept_at >= SOON:
             self.keep(self)
             self._kept_at = monotonic()
+
+
+def estimated(quantity: Quantity, estimate: Any) -> dict[Quantity, float | None]:
+    """A number and its error by their quantities; None where there is none."""
+    return {quantity: estimate and estimate.value, quantity.error(): estimate and estimate.error_estimate}
 
 
 def _nothing(*_: Any) -> tuple[()]:

@@ -25,9 +25,9 @@ from fpsolve.model.plane import System
 from fpsolve.model.problem import Problem
 from fpsolve.model.quantity import ResponseQuantities
 from fpsolve.page.page import Block, Drawing, Sentence, filled
-from fpsolve.parts.part import Job, Part, Settings
+from fpsolve.parts.part import Job, Part, Settings, estimated
 from fpsolve.results.curve import CurveResponse, CurveResult, ResponseDensity, SimulatedCurve
-from fpsolve.results.table import estimated, pair
+from fpsolve.results.table import pair
 from fpsolve.results.text import NUMBER_COLUMNS, row_of
 from fpsolve.vtk import field_data, write_between
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import TYPE_CHECKING, Any
 
@@ -65,17 +65,6 @@ class MomentColumns:
     derivative_error: FloatArray
     residual: FloatArray
     perturbation: FloatArray
-
-    @classmethod
-    def of(cls, rows: Mapping[float, Sequence[float]], p: Iterable[float]) -> MomentColumns:
-        """The columns of those p of which there is a row."""
-        return cls(*np.array([(each, *rows[each]) for each in p if each in rows]).reshape(-1, len(fields(cls))).T)
-
-    @property
-    def rows(self) -> dict[float, Sequence[float]]:
-        """What stands beside each p."""
-        columns = np.column_stack([getattr(self, each.name) for each in fields(self)])
-        return {p: row for p, *row in columns.tolist()}
 
     @property
     def rate_function(self) -> FloatArray:

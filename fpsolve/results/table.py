@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -69,16 +68,6 @@ class Table(Mapping[str, Column]):
 def plain(number: Any) -> Any:
     """A number as JSON and CSV have it: None where there is none."""
     return None if isinstance(number, float) and not math.isfinite(number) else number
-
-
-def estimated(quantity: Quantity, estimate: Any) -> dict[Quantity, float | None]:
-    """A number and its error by their quantities; None where there is none."""
-    return {quantity: estimate and estimate.value, _error(quantity): estimate and estimate.error_estimate}
-
-
-@cache
-def _error(quantity: Quantity) -> Quantity:
-    return quantity.error()
 
 
 def pair(name: str, estimate: Any) -> dict[str, float | None]:

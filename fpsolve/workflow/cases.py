@@ -45,6 +45,7 @@ class Outcome:
         facts: versions, the command and the time of a run that solves, see `facts_of`.
         known: how many of its curves an earlier run had finished.
         failed: how many of its curves have failed in a run, also in part.
+        fails: whether some have, or no number was found.
     """
 
     results: Sequence[CurveResult] = ()
@@ -53,6 +54,7 @@ class Outcome:
     facts: Mapping[str, Any] = field(default_factory=dict)
     known: int = 0
     failed: int = 0
+    fails: bool = False
 
     @property
     def failures(self) -> tuple[Message, ...]:
@@ -169,6 +171,7 @@ def run_case(
         facts=sweep.facts,
         known=sweep.known,
         failed=sweep.failed,
+        fails=bool(sweep.failed) or sweep.is_empty,
     )
 
 

@@ -84,6 +84,11 @@ class Chart:
     complete: bool = False
 
     @property
+    def fails(self) -> bool:
+        """Whether a line ends too early, or nothing was found: F of no line exists anywhere in the frame."""
+        return bool(self.failures) or not any(np.isfinite(line.scan.values).any() for line in self.lines)
+
+    @property
     def failures(self) -> tuple[Message, ...]:
         """Why lines end inside of the frame, or may lack branches."""
         obstacles = [text for line in self.lines for trace in line.traces for text in trace.obstacles]

@@ -149,6 +149,10 @@ def refuse_unprovable_case(case: Case, width: float | None) -> None:
         check_width(width)
     except ValueError as failure:
         raise FpsolveError(f"--width: {failure}") from None
+    if not Plan(case, width).each:
+        raise FpsolveError(
+            f"{case.path}: moments: missing; proofs are of Λ(p), λ and δ_p; add [moments] with p = [2.0]"
+        )
     for curve in case.curves():
         place = f"{case.path}: with {curve.label}" if curve.varied else str(case.path)
         try:

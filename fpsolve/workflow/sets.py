@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from fpsolve.case.case import Case
-from fpsolve.model.quantity import MOMENT, STATUS
+from fpsolve.model.quantity import MOMENT, SECONDS, STATUS
 from fpsolve.output.datasets import write_dataset
 from fpsolve.output.known import Results, record_of
 from fpsolve.output.records import Entries, Records
@@ -19,10 +19,11 @@ from fpsolve.output.tables import facts_of, write_results
 from fpsolve.page.page import Note
 from fpsolve.parts.eigenfunctions import write_curves
 from fpsolve.parts.every import BY_NAME, PARTS
-from fpsolve.parts.part import Job, idle
+from fpsolve.parts.part import Job
 from fpsolve.pool import Pool, serial
 from fpsolve.results.curve import Status
 from fpsolve.show.notes import notes
+from fpsolve.study.columns import COUNTS
 from fpsolve.study.solve import solve_set
 from fpsolve.workflow.progress import MOMENTS, SETS, Advance, Phase
 
@@ -54,10 +55,12 @@ class Sweep:
         results: what is known of them.
         known: how many an earlier run had finished.
         failed: how many sets have failed, also in part, once the tables are written.
+        is_empty: whether no number was found, then.
         notes: what is said of all sets, then.
     """
 
     failed = 0
+    is_empty = False
     notes: tuple[Note, ...] = ()
 
     def __init__(self, case: Case, folder: Path, *, is_fresh: bool = False) -> None:
@@ -80,7 +83,7 @@ class Sweep:
         return len(self.results.whole)
 
     def _grow(self, job: Job) -> None:
-        """Keep what is known of a set by now, and show it in the tables; once it is solved, only pictures are drawn."""
+        """Keep what is known of the only set, and show it in the tables; once it is solved, only pictures are drawn."""
         if job.curve.number not in self.results.whole:
             self.results.put(job.curve.number, record_of(job))
             self._write_if_due()
@@ -96,8 +99,8 @@ class Sweep:
             progress((self.case.planned - len(left)) * self._steps_each, known=True)
         is_alone = self.case.planned == 1 and not pool.is_elsewhere
         task = partial(solve_set, tell=partial(drawn, self.folder))
-        if is_alone or pool.size == 1:
-            task = partial(task, keep=self._grow, progress=progress if is_alone else idle)
+        if is_alone:
+            task = partial(task, keep=self._grow, progress=progress)
         with serial() if is_alone else pool as workers:
             for job, record in workers.run(task, map(self.results.job, left)):
                 is_failed = bool(record) and self.results.put(job.curve.number, record).status.fails
@@ -126,5 +129,7 @@ class Sweep:
                 write(result, self.folder)
         table = self.results.table
         write_dataset(self.case, table, self.folder, self.facts)
+        numbers = [each.values for each in table.values() if each.quantity not in (*COUNTS, STATUS, SECONDS)]
+        self.is_empty = bool(numbers) and not any(np.isfinite(each).any() for each in numbers)
         self.failed = int(np.isin(table[STATUS.name].values, [each for each in Status if each.fails]).sum())
         self.notes = tuple(notes(self.case, self.results.telling, count=len(self.results)))

@@ -340,6 +340,17 @@ def test_a_stationary_density_that_is_not_resolved_is_not_written(tmp_path):
     assert "the stationary density at p = 0 is not resolved" in " ".join(done.err.split())
 
 
+NAMED = '[output]\nfigure = false\nquantities = ["lyapunov_exponent", "stability_index"]\n'
+NO_INDEX = {"omega": 10.0, "c1": -1.0, "restitution": 0.5}
+
+
+def test_orders_of_moments_may_be_left_out_and_a_run_that_finds_no_number_exits_with_3(tmp_path):
+    [curve] = curves(tmp_path, case_text(NAMED, noise={"D0": 0.1}, **NO_INDEX))
+    assert (curve["lyapunov_exponent"] < 0, "moments" in curve) == (True, False)
+    for name, code in (("moment", 2), ("stability_index", 3)):
+        assert run(tmp_path, "run", "case.toml", "--set", f"output.quantities=['{name}']").code == code
+
+
 RESPONSE = """[moments]
 p = [1.0]
 [output]
