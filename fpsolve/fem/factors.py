@@ -140,9 +140,9 @@ class LevelFactors:
 
     def __init__(self, operator: KroneckerSum, axis: int) -> None:
         self._shape, self._axis = operator.shape, axis
-        terms = [list(map(dense, term)) for term in operator.terms]
-        lasts = np.stack([term.pop(axis) for term in terms])
-        befores = np.stack([reduce(np.kron, others).T.ravel() for others in terms])  # type: ignore[arg-type]
+        terms = list(map(list, operator.terms))
+        lasts = np.stack([dense(term.pop(axis)) for term in terms])
+        befores = np.stack([reduce(np.kron, map(dense, others)).T.ravel() for others in terms])  # type: ignore[arg-type]
         count, most = len(lasts[0]), LARGEST_GROWTH * operator.norm
         m, (rows, columns) = operator.size // count, np.nonzero(np.any(lasts, axis=0))
         band = max(1, int(np.max(np.abs(rows - columns), initial=0)))

@@ -50,8 +50,8 @@ class Space:
         turns: how often the domain fits on the full circle.
         is_tilted: whether the functions move with p.
         chain: the longest axis that is a chain, along which generators are eliminated; None where there is none.
-        most_unknowns: so many that a process takes 1.5 GB: three squares of a block for each level, otherwise as
-            measured.
+        most_unknowns: so many that a process takes 1.5 GB: three squares of a block for each level and eight for the
+            terms, otherwise as measured.
     """
 
     def __init__(self, axes: Sequence[Any]) -> None:
@@ -62,7 +62,7 @@ class Space:
         chains = [k for k, axis in enumerate(axes) if axis.is_chain]
         self.chain = max(chains, key=self.shape.__getitem__, default=None)
         levels = 0 if self.chain is None else self.shape[self.chain]
-        self.most_unknowns = int(math.sqrt(MOST_BYTES / 24 * levels)) or self.phi.most_unknowns
+        self.most_unknowns = int(levels * math.sqrt(MOST_BYTES / 8 / (3 * levels + 8))) or self.phi.most_unknowns
 
     @classmethod
     def on(cls, mesh: CylinderMesh, noise: Noise, phase: Callable[[FloatArray], FloatArray] = np.asarray) -> Space:
