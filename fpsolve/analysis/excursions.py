@@ -41,6 +41,7 @@ from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.method import Budget, refuse
 from fpsolve.exponent.root import nonzero_root
 from fpsolve.exponent.solver import ExponentSolver, solver_of
+from fpsolve.fem.axis import along
 from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.plane import Harmonics, growth_rate
 from fpsolve.model.problem import Problem
@@ -332,7 +333,7 @@ def _extremes(pair: PrincipalPair, is_smooth: bool) -> FloatArray:
     xi, functions = zip(
         *(axis.everywhere(count) for axis, count in zip(space.noises, noises, strict=True)), strict=True
     )
-    table = space.evaluate(pair.right, space.phi.at(psi.ravel(), inside), *functions)
+    table = along([space.phi.at(psi.ravel(), inside), *functions], space.table(pair.right))
     growth, stretch = _growth(pair, psi.ravel(), xi)
     values = (table * stretch).reshape(shape := (*psi.shape, *table.shape[1:]))
     rate = np.broadcast_to(growth, table.shape).reshape(shape)
@@ -380,7 +381,7 @@ def _flux_by(pair: PrincipalPair, parts: int) -> float:
     psi, weights = space.phi.finer_rule(parts)
     most = (MOST_POINTS / psi.size) ** (1 / len(space.noises))
     each = [axis.finer_samples(round(min(most, POINTS * parts / PARTS))) for axis in space.noises]
-    left = space.evaluate(pair.left, space.phi.at(psi), *(at.values for at in each))
+    left = along([space.phi.at(psi), *(at.values for at in each)], space.table(pair.left))
     rate, stretch = _growth(pair, psi, [at.xi for at in each])
     measure = reduce(np.multiply.outer, [at.weight * at.measure / at.factor for at in each])
     of_phi = np.sum((np.maximum(rate, 0) * left / stretch * measure).reshape(psi.size, -1), axis=1)

@@ -222,7 +222,7 @@ def _is_rightmost(pair: PrincipalPair) -> bool:
     factor = pencil.factorised(near)
 
     def is_positive(side: int) -> bool:
-        operator, both = pencil.matrix.shifted(far), [pair.right, pair.left]
+        operator, both = pencil.shifted(far), [pair.right, pair.left]
         operator = operator.T if side else operator
         inverse = LinearOperator(2 * source.shape, lambda v: factor.solve(v, transposed=bool(side)), dtype=float)
         moved = LinearOperator(2 * source.shape, lambda v: operator @ v, dtype=float)
@@ -490,7 +490,7 @@ class PairDerivatives:
         self.pair, self._weighed = pair, (pair.space.weighed(pair.right), pair.space.weighed(pair.left))
         self.norm = float(pair.left @ self._weighed[0])
         self._pencil = pair.generator.at(pair.p)
-        self._operator = self._pencil.matrix.shifted(pair.eigenvalue)
+        self._operator = self._pencil.shifted(pair.eigenvalue)
         self.size = self._operator.norm
 
     @cached_property

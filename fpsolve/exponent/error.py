@@ -218,7 +218,7 @@ def mode_effects(pair: PrincipalPair) -> tuple[ModeEffects | None, ...]:
     L − Λ is applied to the smoother function of both. T for p and T* for −2 − p solve the same equation but for the
     direction of time: that of the paths for p < −1 has layers where the paths for p > −1 leave.
     """
-    operator, space = pair.generator.at(pair.p).matrix.shifted(pair.eigenvalue), pair.space
+    operator, space = pair.generator.at(pair.p).shifted(pair.eigenvalue), pair.space
     smooth, rough = pair.right, pair.left
     if pair.p < -1:
         smooth, rough, operator = rough, smooth, operator.T

@@ -31,6 +31,7 @@ from fpsolve.exponent.moments import EvenMoment, even_moment, mean_matrix, momen
 from fpsolve.exponent.powers import moment_form
 from fpsolve.exponent.starts import SHARE, Start
 from fpsolve.fem.directions import DirectionAxis, SphereAxis, group_dimensions
+from fpsolve.fem.factors import factorised
 from fpsolve.fem.generator import SMALL_P, Generator
 from fpsolve.fem.space import Space, first_axis
 from fpsolve.messages import Remedy
@@ -105,12 +106,12 @@ def modal_coordinates(problem: Problem) -> tuple[FloatArray, float]:
 def first_order_changes(pair: PrincipalPair, finer: Generator, k: int) -> FloatArray:
     """What each function of a finer axis that the pair's lacks changes in Λ(p), to first order."""
     pencil, space, old = finer.at(pair.p), finer.space(pair.p), pair.space
-    operator, new = pencil.matrix.shifted(pair.eigenvalue), space.axes[k].new_in(old.axes[k])
+    operator, new = pencil.shifted(pair.eigenvalue), space.axes[k].new_in(old.axes[k])
     right, left = (
         np.compress(new, space.table(image @ space.carry(each, old)), axis=k)
         for image, each in ((operator, pair.right), (operator.T, pair.left))
     )
-    factors = pencil.on(k, new).factorised(pair.eigenvalue)
+    factors = factorised(operator.on(k, new), space.chain)
     found = left * factors.solve(right.ravel()).reshape(right.shape) / -(pair.left @ old.weighed(pair.right))
     return np.asarray(found.sum(axis=tuple(each for each in range(found.ndim) if each != k)))
 
@@ -158,7 +159,6 @@ class DirectionStart(Start):
         pair = near or self.near or principal_pair(generator, 0.0)
         steps = max(math.ceil(abs(p - pair.p) / LARGEST_STEP), 1)
         for point in np.linspace(pair.p, p, steps + 1)[1:].tolist():
-            pair.generator.forget()
             pair = principal_pair(generator, point, start=pair)
         rounding = 2 * self.problem.dimension * sys.float_info.epsilon * abs(p) * self.problem.unit_rate
         return replace(pair, rounding=pair.rounding + rounding)  # an entry of S⁻¹AS is a sum of products twice

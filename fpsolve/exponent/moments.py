@@ -39,7 +39,7 @@ from fpsolve.exponent.matrices import MatrixRates
 from fpsolve.exponent.method import BUDGET, Budget, Search
 from fpsolve.exponent.powers import Moving, PowerRates, exponents, moment_form, moves, multinomials, of_signs
 from fpsolve.exponent.rightmost import REMEDY, ROUNDING
-from fpsolve.fem.space import AXES, first_axis
+from fpsolve.fem.space import BASES
 from fpsolve.messages import Remedy
 from fpsolve.model.noise import Noise
 from fpsolve.model.plane import System
@@ -97,7 +97,7 @@ class Functions(NamedTuple):
 @lru_cache(64)  # derivatives by parameters of the system have the same
 def functions_of(noise: Noise, count: int) -> Functions:
     """Those of degrees below a count: the functions of elements, by a Cholesky factor C of their products ∫ f_k f_l."""
-    axis = first_axis(noise, 0.0).of_degree(count)
+    axis = BASES[noise.basis](noise, count)
     at = np.flatnonzero(axis.modes < count)
     factor = np.linalg.cholesky(axis.matrix(one)[np.ix_(at, at)])
 
@@ -191,7 +191,7 @@ def refuse_open_hierarchy(problem: Problem, p: float) -> None:
     if not (p > 0 and p % 2 == 0):
         raise NoHierarchy(f"got p = {p:g}; the equations of the moments close for even p > 0 only; choose p = 2, 4, …")
     for noise in problem.coloured.parts.values():
-        if noise.basis not in AXES:
+        if noise.basis not in BASES:
             raise NoHierarchy(
                 f"moments of even order are infinite under {noise.kind} noise with algebraic tails; take r0 <= 1"
             )
@@ -205,7 +205,7 @@ def refuse_open_hierarchy(problem: Problem, p: float) -> None:
     moments = math.comb(int(p) + problem.dimension - 1, problem.dimension - 1)
     count = moments
     for noise in problem.coloured.parts.values():
-        count *= first_axis(noise, 0.0).of_degree(FIRST).size
+        count *= BASES[noise.basis](noise, FIRST).size
     limits = (MOST_MOMENTS, MOST) if p > 2 else (math.inf, MOST_NUMBERS)
     for number, what, limit in zip((moments, count), ("moments", "equations"), limits, strict=True):
         if number > limit:

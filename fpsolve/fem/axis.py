@@ -262,13 +262,12 @@ class KroneckerSum:
 
     Attributes:
         terms: for each term a square matrix for each axis, arrays or sparse.
-        unit: ∫ u v of the first axis, which a shift needs.
         shape: the number of functions along each axis.
         size: the number of all functions.
     """
 
-    def __init__(self, terms: Sequence[Sequence[Matrix]], unit: Any = None) -> None:
-        self.terms, self.unit = terms, unit
+    def __init__(self, terms: Sequence[Sequence[Matrix]]) -> None:
+        self.terms = terms
         self.shape = tuple(factor.shape[0] for factor in terms[0])
         self.size = math.prod(self.shape)
 
@@ -281,7 +280,7 @@ class KroneckerSum:
 
     def each(self, function: Callable[[Matrix], Matrix]) -> KroneckerSum:
         """The sum with a function of every factor in place of it."""
-        return KroneckerSum([tuple(map(function, term)) for term in self.terms], self.unit)
+        return KroneckerSum([tuple(map(function, term)) for term in self.terms])
 
     @property
     def T(self) -> KroneckerSum:
@@ -297,17 +296,10 @@ class KroneckerSum:
         """A bound on the largest sum of the absolute values of a column."""
         return float(sum(math.prod(abs(factor).sum(axis=0).max() for factor in term) for term in self.terms))
 
-    def shifted(self, shift: float) -> KroneckerSum:
-        """The sum less `shift` · unit ⊗ Ξ₀ ⊗ …, Ξ₀ ⊗ … being what the first term has beside its φ-matrix."""
-        (phase, *noises), *others = self.terms
-        return KroneckerSum([(phase - shift * self.unit, *noises), *others], self.unit)
-
     def on(self, axis: int, kept: Mask) -> KroneckerSum:
         """What it is on some functions of an axis, where a mask is true."""
         at = np.ix_(kept, kept)
-        unit = self.unit if axis or self.unit is None else self.unit[at]
-        terms = [[each[at] if k == axis else each for k, each in enumerate(term)] for term in self.terms]
-        return KroneckerSum(terms, unit)
+        return KroneckerSum([[each[at] if k == axis else each for k, each in enumerate(term)] for term in self.terms])
 
     def toarray(self) -> FloatArray:
         """The dense matrix, shape (size, size)."""

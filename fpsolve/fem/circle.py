@@ -7,8 +7,8 @@ from functools import cached_property
 
 import numpy as np
 
-from fpsolve.arrays import Coefficient, FloatArray, IntArray, Matrix, one
-from fpsolve.fem.noise_axes import CountedAxis, Rule, Samples, form, log_slope
+from fpsolve.arrays import FloatArray, IntArray, Matrix
+from fpsolve.fem.noise_axes import CountedAxis, Rule, Samples, form
 from fpsolve.model.noise import NoiseDerivative
 
 MOST_HARMONICS = 64
@@ -50,7 +50,7 @@ class CircleAxis(CountedAxis):
         return Rule(theta, np.full(count, 1 / count), self.values_at(theta))
 
     @cached_property
-    def _xi(self) -> FloatArray:
+    def xi(self) -> FloatArray:  # type: ignore[override]
         return np.asarray(self.noise.of_angle(self.rule.points))
 
     def values_at(self, theta: FloatArray) -> FloatArray:
@@ -60,30 +60,25 @@ class CircleAxis(CountedAxis):
         values[:, 0] = 1.0
         return values
 
-    def mass(self, g: Coefficient = one) -> FloatArray:
-        return form(self.rule.values, self.rule.measure * g(self._xi)) if g != one else np.eye(self.size)
+    def product(self, f: FloatArray) -> FloatArray:
+        return form(self.rule.values, self.rule.measure * f)
 
     def generator(self) -> FloatArray:
         """∫ v (ν∂ + ½σ²∂²) u."""
         return self.noise.nu * self._turning() + self._diffusing()
 
-    def changed(self, change: NoiseDerivative, g: Coefficient | None) -> FloatArray:
-        if g is None:
-            return 2 * (change.log_diffusion - change.log_scale) * self._diffusing() + change.turning * self._turning()
-        return form(self.rule.values, self.rule.measure * change.log_scale * log_slope(g, self._xi))
+    def _changed_generator(self, change: NoiseDerivative) -> FloatArray:
+        return 2 * (change.log_diffusion - change.log_scale) * self._diffusing() + change.turning * self._turning()
 
     def samples(self) -> Samples:
         """At equidistant θ; weight and measure are those of θ."""
         weight, turn = np.full(self.rule.measure.size, 0.5 / np.pi), 2 * np.pi
-        return Samples(self._xi, weight, turn * self.rule.measure, self.rule.values, np.ones(self.rule.measure.size))
+        return Samples(self.xi, weight, turn * self.rule.measure, self.rule.values, np.ones(self.rule.measure.size))
 
     def everywhere(self, count: int) -> tuple[FloatArray, Matrix]:
         """At equidistant θ of the whole circle, the first one twice."""
         theta = np.linspace(0, 2 * np.pi, 2 * count + 1)
         return self.noise.of_angle(theta), self.values_at(theta)
-
-    def projection(self, other: CircleAxis) -> FloatArray:
-        return np.eye(self.size, other.size)
 
     def _turning(self) -> FloatArray:
         """∫ v ∂u."""

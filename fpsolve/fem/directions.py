@@ -67,44 +67,47 @@ class Angle:
     Attributes:
         degrees: of each function; the first one is the constant 1, shape (size,).
         at: gives values at vectors along e, shape (m, size), from these, shape (dimension, m).
-        points: unit vectors of a rule, shape (dimension, m).
-        fitted: the matrix from values at these points to coefficients, shape (size, m).
+        points: unit vectors at which values tell the coefficients, shape (dimension, m).
         values, slopes: the images of the functions and of their ∂θ, shape (images, size).
-        unit, tangent: what multiplies images by each component of e, and of de/dθ, shape (images, images).
+        unit: what multiplies images by each component of e, shape (images, images).
         length: of all angles.
-        jumps: the penalty on jumps of slopes, shape (size, size).
+        jumps: the penalty on jumps of slopes, shape (size, size), of elements.
     """
 
     degrees: IntArray
     at: Callable[[FloatArray], FloatArray]
     points: FloatArray
-    fitted: FloatArray
     values: FloatArray
     slopes: FloatArray
     unit: Sequence[Matrix]
-    tangent: Sequence[Matrix]
     length: float
-    jumps: FloatArray
+    jumps: FloatArray | None = None
 
     @property
     def size(self) -> int:
         return self.degrees.size
 
+    @property
+    def tangent(self) -> Sequence[Matrix]:
+        """What multiplies images by each component of de/dθ; functions of e = ±1 have no slopes."""
+        return [-self.unit[-1], self.unit[0]][: len(self.unit)]
+
+    @property
+    def fitted(self) -> FloatArray:
+        """The matrix from values at `points` to coefficients, shape (size, m)."""
+        return np.linalg.pinv(self.at(self.points))
+
 
 def signs(_: int) -> Angle:
     """The constant and the sign of e = ±1."""
-    table = np.array([[1.0, 1.0], [1.0, -1.0]])
     return Angle(
-        np.arange(2),
-        lambda e: np.stack([np.ones(e.shape[1]), np.copysign(1.0, e[0])], axis=1),
-        table[1:],
-        table / 2,
-        np.eye(2),
-        np.zeros((2, 2)),
-        [np.eye(2)[::-1]],
-        [np.zeros((2, 2))],
-        2.0,
-        np.zeros((2, 2)),
+        degrees=np.arange(2),
+        at=lambda e: np.stack([np.ones(e.shape[1]), np.copysign(1.0, e[0])], axis=1),
+        points=np.array([[1.0, -1.0]]),
+        values=np.eye(2),
+        slopes=np.zeros((2, 2)),
+        unit=[np.eye(2)[::-1]],
+        length=2.0,
     )
 
 
@@ -123,19 +126,15 @@ def circle(most: int) -> Angle:
         product = table.T @ (f[:, None] * table)
         return np.where(np.abs(product) > 1e-14, product, 0.0)
 
-    table = every(points) / math.sqrt(points.shape[1])
-    size, (cosine, sine) = 2 * most + 1, map(multiplied, points)
+    table, size = every(points) / math.sqrt(points.shape[1]), 2 * most + 1
     return Angle(
-        degrees[:size],
-        lambda e: every(e)[:, :size],
-        points,
-        table.T[:size] / math.sqrt(points.shape[1]),
-        np.eye(degrees.size, size),
-        slope[:, :size],
-        [cosine, sine],
-        [-sine, cosine],
-        2 * math.pi,
-        np.zeros((size, size)),
+        degrees=degrees[:size],
+        at=lambda e: every(e)[:, :size],
+        points=points,
+        values=np.eye(degrees.size, size),
+        slopes=slope[:, :size],
+        unit=[multiplied(each) for each in points],
+        length=2 * math.pi,
     )
 
 
@@ -148,24 +147,24 @@ def arc(lines: FloatArray, degree: int) -> Angle:
     line, length = LineSpace(lines, degree), float(lines[-1] - lines[0])
     own = np.column_stack([line.constant(), np.delete(np.eye(line.size), line.ends[1], axis=1)])
     root = np.sqrt(line.measure / length)[:, None]
-    values, unit = root * (line.values @ own), np.stack([np.cos(line.points), np.sin(line.points)])
+    unit = np.stack([np.cos(line.points), np.sin(line.points)])
     return Angle(
-        np.append(0, np.delete(line.modes, line.ends[1])),
-        lambda e: line.at(np.arctan2(e[1], e[0])) @ own,
-        unit,
-        np.linalg.solve(values.T @ values, (root * values).T),
-        values,
-        root * (line.slopes @ own),
-        [diags(each) for each in unit],
-        [diags(-unit[1]), diags(unit[0])],
-        length,
-        own.T @ _jumps(line, np.ones(lines.size - 2)) @ own / length,
+        degrees=np.append(0, np.delete(line.modes, line.ends[1])),
+        at=lambda e: line.at(np.arctan2(e[1], e[0])) @ own,
+        points=unit,
+        values=root * (line.values @ own),
+        slopes=root * (line.slopes @ own),
+        unit=[diags(each) for each in unit],
+        length=length,
+        jumps=own.T @ _jumps(line, np.ones(lines.size - 2)) @ own / length,
     )
 
 
 def _jumps(line: LineSpace, speeds: FloatArray) -> FloatArray:
     """Σ γ h² N⁻³ speed [u′] [v′] over the inner vertices."""
-    sizes, jump = np.diff(line.lines), line.jumps_of_slope().toarray()
+    sizes, middles = np.diff(line.lines), 0.5 * (line.lines[1:] + line.lines[:-1])
+    above, below = (line.at(line.lines[1:-1], 1, inside).toarray() for inside in (middles[1:], middles[:-1]))
+    jump = above - below
     weights = SLOPE_PENALTY * (0.5 * (sizes[1:] + sizes[:-1])) ** 2 / line.degree**3 * speeds
     return np.asarray(jump.T @ (weights[:, None] * jump))
 
@@ -277,13 +276,8 @@ class DirectionAxis(Axis):
         constant[:, 0] = self.line.constant()
         return constant.ravel()[self._kept]
 
-    @cached_property
-    def identity(self) -> Matrix:
-        """∫ u v."""
-        return self._form((self._itself, self._itself))
-
     def mass(self, g: Coefficient = one) -> Matrix:
-        return self.identity
+        return self._form((self._itself, self._itself))
 
     @cached_property
     def _images(self) -> tuple[csr_matrix, list[list[csr_matrix]], list[list[csr_matrix]]]:
@@ -375,11 +369,8 @@ class DirectionAxis(Axis):
 
     def penalty(self) -> Matrix:
         """What is added against pairs that no path has."""
-        inner, (first, second), values = self.lines[1:-1], self.angles, self._tables[0]
-        in_eta, itself = _jumps(self.line, self._speeds(np.cos(inner), np.sin(inner))), self._images[0]
-        of_eta = values.T @ ((self.line.measure / np.cos(self.line.points))[:, None] * values)
-        in_theta = kron(first.jumps, identity(second.size), "csc")[:, self._own][self._own]
-        return -self._assembled([(in_eta, itself.T @ itself), (of_eta, in_theta)])
+        in_eta = _jumps(self.line, self._speeds(np.cos(self.lines[1:-1]), np.sin(self.lines[1:-1])))
+        return -self._assembled([(in_eta, self._images[0].T @ self._images[0])])
 
     def _speeds(self, c: FloatArray, s: FloatArray) -> FloatArray:
         """The measure times the bound on the speed across jumps of ∂u/∂η, over β."""
@@ -500,6 +491,11 @@ class HalfSphereAxis(DirectionAxis):
         node, product = self._places
         return self.line.modes[node], *self._degrees[:, product]
 
+    def penalty(self) -> Matrix:
+        (first, second), values = self.angles, self._tables[0]
+        of_eta = values.T @ ((self.line.measure / np.cos(self.line.points))[:, None] * values)
+        return super().penalty() - self._assembled([(of_eta, kron(first.jumps, identity(second.size)))])
+
     def _speeds(self, c: FloatArray, s: FloatArray) -> FloatArray:
         return c * s**3
 
@@ -573,4 +569,4 @@ class StopTerms(DirectionTerms):
             self.system.epsilon**each.order * each.g(0.0) * self.phi.inside(each)[0, 1] for each in self.system.terms
         )
         words = f"{text}, ω = {omega:.6g}, R = {stop.restitution:.6g}"
-        return self._given(lambda p, k: size * omega * struck(math.log(stop.restitution), p, k), words)
+        return self._term(lambda p, k: size * omega * struck(math.log(stop.restitution), p, k), one, words)

@@ -19,18 +19,11 @@ EXTRA_POINTS = 12
 """Quadrature points beyond what the product of two functions needs: for sin 2φ, cos 2φ and P_s."""
 
 
-class Rule(NamedTuple):
-    """A quadrature rule on [0, 1]."""
-
-    points: FloatArray
-    weights: FloatArray
-
-
 @lru_cache(maxsize=64)
-def gauss_legendre(count: int) -> Rule:
-    """The Gauss-Legendre rule of so many points."""
+def gauss_legendre(count: int) -> tuple[FloatArray, FloatArray]:
+    """Points and weights of the Gauss-Legendre rule on [0, 1] of so many points."""
     points, weights = get_quadrature(skfem.MeshLine.elem.refdom, 2 * count - 1)
-    return Rule(points[0], weights)
+    return points[0], weights
 
 
 def element(degree: int) -> Any:
@@ -68,6 +61,15 @@ def numbered(lines: FloatArray, degrees: IntArray, of: Any) -> tuple[Mask, IntAr
     return own, np.where(own, (np.cumsum(kept) - 1)[numbers], 0)
 
 
+def located(lines: FloatArray, x: FloatArray, inside: FloatArray | None = None) -> tuple[IntArray, FloatArray]:
+    """For each point the cell that holds it, and its place in that cell, from 0 to 1.
+
+    A point on a line between two cells is in the one that holds its entry of `inside`, without it in the one above.
+    """
+    cell = np.clip(np.searchsorted(lines, x if inside is None else inside, side="right") - 1, 0, lines.size - 2)
+    return cell, np.clip((x - lines[cell]) / np.diff(lines)[cell], 0, 1)
+
+
 def legendre(degree: int, points: FloatArray) -> FloatArray:
     """The orthonormal polynomials up to a degree at points of the cell, shape (n, degree + 1): slopes of `functions`.
 
@@ -78,30 +80,23 @@ def legendre(degree: int, points: FloatArray) -> FloatArray:
 
 
 class Orthonormal(NamedTuple):
-    """The orthonormal polynomials up to some degree at the points of a rule and at both ends.
+    """The orthonormal polynomials up to some degree at the points of a rule.
 
     Attributes:
-        rule: of n points.
-        products: values of all pairs of functions, shape (n, (degree + 1)²), the first function slowest.
-        convections: values of a function times the slope of another, in the same order.
-        stiffnesses: slopes of all pairs of functions, in the same order.
-        ends, end_slopes: values and slopes at 0 and at 1, shape (2, degree + 1).
+        points, weights: of the rule, shape (n,).
+        values, slopes: at its points, shape (n, degree + 1).
     """
 
-    rule: Rule
-    products: FloatArray
-    convections: FloatArray
-    stiffnesses: FloatArray
-    ends: FloatArray
-    end_slopes: FloatArray
+    points: FloatArray
+    weights: FloatArray
+    values: FloatArray
+    slopes: FloatArray
 
 
 @lru_cache(maxsize=64)
 def orthonormal(degree: int) -> Orthonormal:
     """The polynomials up to a degree; ∫ P_j P_k′ is P_j P_k at 1 less that at 0 for j < k, and 0 for others."""
-    rule = gauss_legendre(degree + EXTRA_POINTS)
-    values, ends = legendre(degree, rule.points), legendre(degree, np.array([0.0, 1.0]))
+    points, weights = gauss_legendre(degree + EXTRA_POINTS)
+    values, ends = legendre(degree, points), legendre(degree, np.array([0.0, 1.0]))
     derivative = np.triu(np.outer(ends[1], ends[1]) - np.outer(ends[0], ends[0]), 1)
-    factors = (values, values), (values, values @ derivative), (values @ derivative, values @ derivative)
-    pairs = [(first[:, :, None] * last[:, None, :]).reshape(len(values), -1) for first, last in factors]
-    return Orthonormal(rule, pairs[0], pairs[1], pairs[2], ends, ends @ derivative)
+    return Orthonormal(points, weights, values, values @ derivative)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -12,7 +12,7 @@ import scipy.linalg
 from scipy.sparse import csc_matrix
 from scipy.sparse.linalg import LinearOperator
 
-from fpsolve.arrays import Mask, Matrix, dense, one
+from fpsolve.arrays import Matrix, dense, one
 from fpsolve.fem.axis import KroneckerSum, along
 from fpsolve.fem.factors import Factors, factorised
 from fpsolve.fem.mesh import CylinderMesh
@@ -44,15 +44,11 @@ class Pencil:
     space: Space
     matrix: KroneckerSum
 
-    def on(self, axis: int, kept: Mask) -> Pencil:
-        """What it is on some functions of an axis, where a mask is true."""
-        return replace(self, matrix=self.matrix.on(axis, kept))
-
     @cached_property
     def numerical_abscissa(self) -> float:
         """About the largest ω of ½(L + Lᵀ)v = ωMv, rather above it, by some steps of Lanczos from a start of all v."""
         space, rows, betas = self.space, [0.0], [0.0]
-        unit = csc_matrix(space.phi.identity)
+        unit = csc_matrix(space.phi.matrix(one))
         solve = sparse_lu(unit).solve
         inverses: list[Any] = [LinearOperator(unit.shape, matvec=solve, matmat=solve, dtype=float)]
         inverses += [np.linalg.inv(dense(axis.matrix(one))) for axis in space.noises]
@@ -68,9 +64,14 @@ class Pencil:
         ritz, ends = scipy.linalg.eigh_tridiagonal(rows[1:], betas[2:])
         return float(ritz[-1] + abs(ends[-1, -1]) * math.sqrt(rest @ space.weighed(rest)))
 
+    def shifted(self, shift: float) -> KroneckerSum:
+        """L(p) − σM."""
+        (phase, *noises), *others = self.matrix.terms
+        return KroneckerSum([(phase - shift * self.space.phi.matrix(one), *noises), *others])
+
     def factorised(self, shift: float) -> Factors:
         """LU factors of L(p) − σM."""
-        return factorised(self.matrix.shifted(shift), self.space.chain)
+        return factorised(self.shifted(shift), self.space.chain)
 
 
 class Generator:
@@ -118,10 +119,6 @@ class Generator:
             self._last = Pencil(p, self.space(p), self.matrix(p))
         return self._last
 
-    def forget(self) -> None:
-        """Let go of what is kept of the last p."""
-        self._last = None
-
     @cached_property
     def slowest(self) -> list[float]:
         """For each axis the least share of the effect of its highest modes that two more may leave."""
@@ -145,11 +142,10 @@ class Generator:
             derivative: k.
             is_forcing: whether L₀, of the order 0 in ε, is left out.
         """
-        phi, *axes = self.space(p).axes
-        parts = []
+        axes, parts = self.space(p).noises, []
         for noises, phase in self._terms.phases(p, derivative, is_forcing).items():
             parts.append([phase, *map(NoiseAxis.matrix, axes, noises)])
-        return KroneckerSum(parts, phi.identity)
+        return KroneckerSum(parts)
 
     def changed(self, by: ParameterDerivative, p: float, rate: float, *, derivative: int = 0) -> KroneckerSum:
         """The matrix of ∂/∂θ (dᵏL/dpᵏ − rate M), the functions of φ and ξ held, M = `mass`; that of P_s is in it."""
@@ -163,10 +159,10 @@ class Generator:
         ]
         if by.noise is not None:
             (noises, phase), *others = self._terms.phases(p, derivative).items()  # the first is that of 1
-            moved = [(noises, phase - rate * self.chosen.phi.identity), *others]
+            moved = [(noises, phase - rate * self.chosen.phi.matrix(one)), *others]
             changes = [by.noise if k == by.part else None for k in range(len(axes))]
             parts += [(phase, *map(NoiseAxis.matrix, axes, noises, changes)) for noises, phase in moved]
-        return KroneckerSum(parts or [(0.0 * self.chosen.phi.identity, *(axis.matrix(one) for axis in axes))])
+        return KroneckerSum(parts or [(0.0 * self.chosen.phi.matrix(one), *(axis.matrix(one) for axis in axes))])
 
     @cached_property
     def loss(self) -> float:

@@ -15,18 +15,16 @@ from scipy.special import beta, roots_jacobi
 
 from fpsolve.arrays import Coefficient, FloatArray, IntArray, Mask, one
 from fpsolve.errors import MeshError
-from fpsolve.fem.element import EXTRA_POINTS, Rule, element, functions, gauss_legendre, numbered
+from fpsolve.fem.element import EXTRA_POINTS, element, functions, located, numbered
 from fpsolve.messages import Code, Message
 
 
 @lru_cache(maxsize=512)
-def _gauss_rule(count: int, left: float = 0.0, right: float = 0.0) -> Rule:
+def _gauss_rule(count: int, left: float = 0.0, right: float = 0.0) -> tuple[FloatArray, FloatArray]:
     """Gauss-Jacobi rule for integrands like x^left (1 − x)^right times a polynomial; Gauss-Legendre without powers."""
-    if not (left or right):
-        return gauss_legendre(count)
     y, w = roots_jacobi(count, right, left)
     x = 0.5 * (1 + y)
-    return Rule(x, w / w.sum() * beta(left + 1, right + 1) / (x**left * (1 - x) ** right))
+    return x, w / w.sum() * beta(left + 1, right + 1) / (x**left * (1 - x) ** right)
 
 
 class LineSpace:
@@ -72,11 +70,11 @@ class LineSpace:
         self.ends = self._dofs[[0, -1], [0, 1]]
         count, (left, right), last = degree + EXTRA_POINTS, end_exponents, lines.size - 2
         rules = [_gauss_rule(count, left * (j == 0), right * (j == last)) for j in range(last + 1)]
-        points = self.lines[:-1, None] + self._sizes[:, None] * np.stack([rule.points for rule in rules])
-        weights = np.stack([rule.weights for rule in rules]) * self._sizes[:, None]
+        local, weights = (np.stack(each) for each in zip(*rules, strict=True))
+        points, weights = self.lines[:-1, None] + self._sizes[:, None] * local, weights * self._sizes[:, None]
         self.points = points.ravel()
         self._measure = weights * weight(points)
-        tables = [functions(degree, rule.points.tobytes()) for rule in rules]
+        tables = [functions(degree, each.tobytes()) for each in local]
         values = np.stack([table[0] for table in tables])
         slopes = np.stack([table[1] for table in tables]) / self._sizes[:, None, None]
         self._transform, shares = _orthogonalised(slopes, self._measure, self._own[:, 2:])
@@ -100,17 +98,6 @@ class LineSpace:
     def slopes(self) -> csr_matrix:
         """Their derivatives at the points, shape (n, size)."""
         return csr_matrix((self._slopes.ravel(), self.values.indices, self.values.indptr), shape=self.values.shape)
-
-    def jumps_of_slope(self) -> csr_matrix:
-        """u′(x⁺) − u′(x⁻) at the inner vertices, shape (m − 1, size)."""
-        _, slopes = functions(self.degree, np.array([0.0, 1.0]).tobytes())
-        sides = (slopes / self._sizes[:, None, None]) @ self._transform
-        rows = np.repeat(np.arange(self.lines.size - 2), self.degree + 1)
-        right, left = (
-            csr_matrix((values.ravel(), (rows, dofs.ravel())), shape=(self.lines.size - 2, self.size))
-            for values, dofs in ((sides[1:, 0], self._dofs[1:]), (sides[:-1, 1], self._dofs[:-1]))
-        )
-        return right - left
 
     def constant(self) -> FloatArray:
         """Coefficients of the function 1, shape (size,): the vertex functions add up to it."""
@@ -140,13 +127,12 @@ class LineSpace:
     def measure(self) -> FloatArray:
         return self._measure.ravel()
 
-    def at(self, x: FloatArray, derivative: int = 0) -> csr_matrix:
+    def at(self, x: FloatArray, derivative: int = 0, inside: FloatArray | None = None) -> csr_matrix:
         """Values, or slopes, at any points, as rows of E with u(x) = E @ coefficients, shape (len(x), size).
 
-        Beyond the ends those there are taken.
+        Beyond the ends those there are taken. On a line between cells `inside` tells the cell, see `located`.
         """
-        cell = np.clip(np.searchsorted(self.lines, x, side="right") - 1, 0, self.lines.size - 2)
-        local = np.clip((x - self.lines[cell]) / self._sizes[cell], 0, 1)
+        cell, local = located(self.lines, x, inside)
         table = functions(self.degree, local.tobytes())[derivative] / self._sizes[cell, None] ** derivative
         values = table[:, None, :] @ self._transform[cell]
         rows = np.repeat(np.arange(x.size), self.degree + 1)

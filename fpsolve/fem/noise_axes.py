@@ -32,8 +32,8 @@ NEAR_END = 1e-9
 """Distance from an end of the support, over its half width, at which σ² is asked whether it vanishes there."""
 VANISHES = 1e-6
 """Largest share of σ² at ξ = 0 that is taken for none."""
-LOG_STEP = 1e-5
-"""Step of ln ξ by which a coefficient is differentiated."""
+STEP = 1e-5
+"""Largest step of ξ, over the largest |ξ|, by which a coefficient is differentiated."""
 MORE_POINTS = 16
 """Number of points of a quadrature beyond the number of polynomials."""
 MAX_COUNT = 200
@@ -80,24 +80,54 @@ class NoiseAxis(Axis):
         noise: ξ.
         word: what the functions are, as a table says it.
         dimension: of the state of the noise.
-        tilt: s of the factor exp(s (z − c)) that every function carries.
-        center: c, about the mean z of the weight.
+        p: the moment that the tilt is for.
+        center: c of the factor exp(s (z − c)) that every function carries, about the mean z of the weight.
         is_local: whether the functions can follow a kink in ξ.
     """
 
     noise: Any
 
     word, dimension = "", 1
-    tilt, center, is_local = 0.0, 0.0, True
+    p, center, is_local = 1.0, 0.0, True
+
+    @property
+    def tilt(self) -> float:
+        """s of this factor."""
+        return self.slope * self.p
 
     @property
     def rule(self) -> Rule:
         """The functions at points of their own."""
         raise NotImplementedError
 
-    def of_degree(self, count: int) -> Self:
-        """Functions up to a degree, where they have one."""
-        return self
+    @property
+    def xi(self) -> FloatArray:
+        """ξ at the points at which `product` takes a function."""
+        raise NotImplementedError
+
+    def product(self, f: FloatArray) -> Matrix:
+        """∫ f u v in the weight of the axis, from f at the points ξ."""
+        raise NotImplementedError
+
+    def mass(self, g: Coefficient = one) -> Matrix:
+        return self.product(g(self.xi))
+
+    def changed(self, change: NoiseDerivative, g: Coefficient | None) -> Matrix:
+        if g is None:
+            return self._changed_generator(change)
+        return self.product(self._changed_law(change) * g(self.xi) + slope_along(g, self.xi, self._moved(change)))
+
+    def _changed_generator(self, change: NoiseDerivative) -> Matrix:
+        """∂/∂θ of `generator()`."""
+        raise NotImplementedError
+
+    def _changed_law(self, change: NoiseDerivative) -> Any:
+        """∂ ln P_s/∂θ at the points ξ, their own motion left out."""
+        return 0.0
+
+    def _moved(self, change: NoiseDerivative) -> FloatArray:
+        """∂ξ/∂θ at the points ξ: a length by which ξ is measured may change."""
+        return change.log_scale * self.xi
 
     def of(self, noise: Noise, p: float) -> Self:
         """The functions for a noise, with the tilt for p; no tables are kept."""
@@ -118,6 +148,9 @@ class NoiseAxis(Axis):
     def finer_samples(self, count: int) -> Samples:
         """At the points of a rule for functions with kinks, some `count`."""
         return self.samples()
+
+    def projection(self, other: Any) -> Matrix:
+        return np.eye(self.size, other.size)
 
     def law(self) -> FloatArray:
         """The stationary law as weights of the `samples`, shape (n,)."""
@@ -148,9 +181,6 @@ class CountedAxis(NoiseAxis):
     @cached_property
     def cells(self) -> IntArray:
         return np.zeros(self.size, dtype=int)
-
-    def of_degree(self, count: int) -> Self:
-        return replace(self, count=count)
 
     def enriched(self) -> Self:
         return replace(self, count=self.count + max(3, self.count // 8))
@@ -184,37 +214,29 @@ class LineAxis(NoiseAxis):
         """½σ²/std², the diffusion of z."""
         return 0.5 * self.noise.squared_diffusion(self.unit * z) / self.unit**2
 
-    def product(self, f: FloatArray) -> Matrix:
-        """∫ f u v in the weight of the axis, from f at the points of the rule."""
-        raise NotImplementedError
+    @property
+    def xi(self) -> FloatArray:
+        return self.unit * self.rule.points
 
     def energy(self, f: FloatArray) -> Matrix:
         """∫ f (u′ + s u)(v′ + s v) in the weight of the axis, from f at the points of the rule."""
         raise NotImplementedError
 
-    def mass(self, g: Coefficient = one) -> Matrix:
-        return self.product(g(self.unit * self.rule.points))
-
     def generator(self) -> Matrix:
         """−½ ∫ P_s σ² (u′ + s u)(v′ + s v); at the ends no probability flux is the natural condition."""
         return -self.energy(self.rate(self.rule.points))
 
-    def changed(self, change: NoiseDerivative, g: Coefficient | None) -> Matrix:
-        z, measure = self.rule[:2]
-        logs = self._changed_logs(change)
-        logs = np.asarray(logs - measure @ logs / measure.sum())
-        if g is None:
-            own = 2 * (change.log_diffusion - change.log_scale) * self.matrix(None)
-            return own - self.energy(self.rate(z) * logs)
-        xi = self.unit * z
-        weight = logs * g(xi)
-        if change.log_scale:  # ξ may be measured by a length that changes: z is held
-            weight = weight + change.log_scale * log_slope(g, xi)
-        return self.product(weight)
+    def _changed_generator(self, change: NoiseDerivative) -> Matrix:
+        own = 2 * (change.log_diffusion - change.log_scale) * self.matrix(None)
+        return own - self.energy(self.rate(self.rule.points) * self._changed_law(change))
+
+    def _changed_law(self, change: NoiseDerivative) -> FloatArray:
+        logs, measure = self._changed_logs(change), self.rule.measure
+        return np.asarray(logs - measure @ logs / measure.sum())
 
     def _changed_logs(self, change: NoiseDerivative) -> FloatArray:
         """∂ ln P_s/∂θ at the points of the rule, but for a constant."""
-        return np.asarray(change.log_density(self.unit * self.rule.points))
+        return np.asarray(change.log_density(self.xi))
 
     def values_at(self, z: FloatArray) -> Matrix:
         """The functions at any z, shape (len(z), size)."""
@@ -287,7 +309,6 @@ class PolynomialAxis(CountedAxis, LineAxis):
         noise: P_s must end, or fall like a Gaussian.
         count: the number of polynomials.
         slope: s/p.
-        p: the moment that the tilt is for.
     """
 
     slope: float = 0.0
@@ -299,10 +320,6 @@ class PolynomialAxis(CountedAxis, LineAxis):
     @property
     def size(self) -> int:
         return self.count
-
-    @property
-    def tilt(self) -> float:  # type: ignore[override]
-        return self.slope * self.p
 
     @cached_property
     def center(self) -> float:  # type: ignore[override]
@@ -439,16 +456,15 @@ class StateAxis(NoiseAxis):
 
     @property
     def size(self) -> int:
-        return self.support.size
+        return self.xi.size
 
     @cached_property
-    def support(self) -> FloatArray:
-        """The states."""
+    def xi(self) -> FloatArray:  # type: ignore[override]
         return np.array(self.noise.states)
 
     @cached_property
     def rule(self) -> Rule:
-        return Rule(self.support, self.noise.probabilities, np.eye(self.size))
+        return Rule(self.xi, self.noise.probabilities, np.eye(self.size))
 
     @cached_property
     def constant(self) -> FloatArray:
@@ -458,35 +474,33 @@ class StateAxis(NoiseAxis):
     def _rates(self) -> FloatArray:
         return np.array(self.noise.rates)
 
-    def mass(self, g: Coefficient = one) -> FloatArray:
-        return np.diag(self.rule.measure * g(self.support))
+    def product(self, f: FloatArray) -> FloatArray:
+        return np.diag(self.rule.measure * f)
 
     def generator(self) -> FloatArray:
         """diag(π) Q."""
         return self.rule.measure[:, None] * self._rates
 
-    def changed(self, change: NoiseDerivative, g: Coefficient | None) -> FloatArray:
+    def _changed_rates(self, change: NoiseDerivative) -> FloatArray:
+        """∂Q."""
+        return np.array(change.rates) if change.rates else np.zeros((self.size, self.size))
+
+    def _changed_generator(self, change: NoiseDerivative) -> FloatArray:
+        logs = self._changed_law(change)[:, None]
+        return np.asarray(self.rule.measure[:, None] * (logs * self._rates + self._changed_rates(change)))
+
+    def _changed_law(self, change: NoiseDerivative) -> FloatArray:
         """With ∂π from πQ = 0: (∂π)Q = −π ∂Q, of the sum 0."""
-        none = np.zeros(self.size)
-        rates = np.array(change.rates) if change.rates else np.diag(none)
-        states = np.array(change.states) if change.states else none
         unit = np.abs(self._rates).max()
-        equations, right = (
-            np.vstack([self._rates.T / unit, none + 1]),
-            np.append(-self.rule.measure @ rates / unit, 0.0),
-        )
-        weights = np.linalg.lstsq(equations, right, rcond=None)[0] if change.rates else none
-        if g is None:
-            return np.asarray(weights[:, None] * self._rates + self.rule.measure[:, None] * rates)
-        step = LOG_STEP * np.abs(self.support).max() / max(np.abs(states).max(), 1e-300)
-        slope = (g(self.support + step * states) - g(self.support - step * states)) / (2 * step)
-        return np.diag(weights * g(self.support) + self.rule.measure * slope)
+        equations = np.vstack([self._rates.T / unit, np.ones(self.size)])
+        right = np.append(-self.rule.measure @ self._changed_rates(change) / unit, 0.0)
+        return np.asarray(np.linalg.lstsq(equations, right, rcond=None)[0] / self.rule.measure)
+
+    def _moved(self, change: NoiseDerivative) -> FloatArray:
+        return np.array(change.states) if change.states else np.zeros(self.size)
 
     def samples(self) -> Samples:
-        return Samples(self.support, self.rule.measure, np.ones(self.size), self.rule.values, np.ones(self.size))
-
-    def projection(self, other: StateAxis) -> FloatArray:
-        return np.eye(self.size)
+        return Samples(self.xi, self.rule.measure, np.ones(self.size), self.rule.values, np.ones(self.size))
 
 
 @lru_cache(maxsize=64)
@@ -508,9 +522,10 @@ def _end_logarithm(count: int, exponent: float, a: float) -> FloatArray:
     return logarithm(_gegenbauer_rule(count, exponent)[0], a, count)
 
 
-def log_slope(g: Coefficient, xi: FloatArray) -> FloatArray:
-    """ξ g′(ξ)."""
-    return np.asarray((g(xi * (1 + LOG_STEP)) - g(xi * (1 - LOG_STEP))) / (2 * LOG_STEP))
+def slope_along(g: Coefficient, xi: FloatArray, moved: FloatArray) -> FloatArray:
+    """g′(ξ) ∂ξ/∂θ, from the points ξ and ∂ξ/∂θ there."""
+    step = STEP * (np.abs(xi).max() or 1.0) / max(np.abs(moved).max(), 1e-300)
+    return np.asarray((g(xi + step * moved) - g(xi - step * moved)) / (2 * step))
 
 
 def form(values: FloatArray, measure: FloatArray) -> FloatArray:

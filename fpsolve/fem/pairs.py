@@ -12,13 +12,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 import scipy.sparse
 
-from fpsolve.arrays import Coefficient, FloatArray, IntArray, one
-from fpsolve.fem.noise_axes import MORE_POINTS, CountedAxis, Rule, Samples, form, log_slope
+from fpsolve.arrays import FloatArray, IntArray
+from fpsolve.fem.noise_axes import MORE_POINTS, CountedAxis, Rule, Samples, form
 from fpsolve.model.noise import NoiseDerivative
 from fpsolve.polynomials import hermite
 
@@ -31,7 +30,6 @@ class PairAxis(CountedAxis):
         noise: it states M as `drift_matrix`.
         count: n.
         slope: g/p.
-        p: the moment that g is for.
     """
 
     slope: float = 0.0
@@ -42,10 +40,6 @@ class PairAxis(CountedAxis):
     @property
     def size(self) -> int:
         return self.count * (self.count + 1) // 2
-
-    @property
-    def facts(self) -> dict[str, Any]:
-        return super().facts | {"tilt": self.slope * self.p}
 
     @cached_property
     def _degrees(self) -> IntArray:
@@ -60,7 +54,7 @@ class PairAxis(CountedAxis):
     @cached_property
     def _factors(self) -> FloatArray:
         """r and l."""
-        drift, first = self.noise.drift_matrix, np.array([self.slope * self.p, 0.0])
+        drift, first = self.noise.drift_matrix, np.array([self.tilt, 0.0])
         return np.stack([np.linalg.solve(drift.T, first), np.linalg.solve(drift, first)])
 
     @property
@@ -82,19 +76,22 @@ class PairAxis(CountedAxis):
         unit = self.noise.standard_deviation
         return Rule(unit * (x + self.center), weights, hermite(self.count).at(x)[0])
 
-    def mass(self, g: Coefficient = one) -> FloatArray:
-        return self._weighed(g(self._fine.points)) if g != one else np.eye(self.size)
+    @property
+    def xi(self) -> FloatArray:
+        return self._fine.points
+
+    def product(self, f: FloatArray) -> FloatArray:
+        matrix, (_, first, second) = form(self._fine.values, self._fine.measure * f), self._degrees
+        return np.where(np.equal.outer(second, second), matrix[np.ix_(first, first)], 0.0)
 
     def generator(self) -> FloatArray:
-        return self._moved(self.noise.drift_matrix)
+        return self._drifting(self.noise.drift_matrix)
 
     def generator_of_one(self) -> FloatArray:
         return np.asarray(self.matrix(None)[0])
 
-    def changed(self, change: NoiseDerivative, g: Coefficient | None) -> FloatArray:
-        if g is None:
-            return self._moved(np.array(change.drift)) if change.drift else np.zeros((self.size, self.size))
-        return self._weighed(change.log_scale * log_slope(g, self._fine.points))
+    def _changed_generator(self, change: NoiseDerivative) -> FloatArray:
+        return self._drifting(np.array(change.drift or np.zeros((2, 2))))
 
     def samples(self) -> Samples:
         """At the points of a rule for (u₁, u₂); the weight is in the measure."""
@@ -106,15 +103,7 @@ class PairAxis(CountedAxis):
         weights = self.rule.measure * np.exp(-self._factors.sum(axis=0) @ self.rule.points)
         return np.asarray(weights / weights.sum())
 
-    def projection(self, other: PairAxis) -> FloatArray:
-        return np.eye(self.size, other.size)
-
-    def _weighed(self, values: FloatArray) -> FloatArray:
-        """∫ g u v from g at the points of the rule for u₁."""
-        matrix, (_, first, second) = form(self._fine.values, self._fine.measure * values), self._degrees
-        return np.where(np.equal.outer(second, second), matrix[np.ix_(first, first)], 0.0)
-
-    def _moved(self, drift: FloatArray) -> FloatArray:
+    def _drifting(self, drift: FloatArray) -> FloatArray:
         """−Σ M_ij ∫ v (a_j† + l_j)(a_i + r_i) u."""
         identity, found = scipy.sparse.eye_array(self.size), np.zeros((self.size, self.size))
         lower = []  # a₁ and a₂

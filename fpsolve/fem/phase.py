@@ -16,7 +16,16 @@ from scipy.sparse import csr_matrix, diags, issparse
 from fpsolve.arrays import FloatArray, IntArray, Mask, Matrix, one
 from fpsolve.errors import MeshError
 from fpsolve.fem.axis import FEW_UNKNOWNS, DividedAxis
-from fpsolve.fem.element import EXTRA_POINTS, Orthonormal, element, gauss_legendre, legendre, numbered, orthonormal
+from fpsolve.fem.element import (
+    EXTRA_POINTS,
+    Orthonormal,
+    element,
+    gauss_legendre,
+    legendre,
+    located,
+    numbered,
+    orthonormal,
+)
 from fpsolve.fem.mesh import SAME_LINE
 from fpsolve.fem.terms import At, OfMoment, Term, Terms
 from fpsolve.messages import Code, Message
@@ -125,17 +134,17 @@ class PhaseAxis(DividedAxis):
     @cached_property
     def _grid(self) -> FloatArray:
         """The points of a rule in each cell, shape (m, n)."""
-        return self.lines[:-1, None] + self._sizes[:, None] * self._table.rule.points
+        return self.lines[:-1, None] + self._sizes[:, None] * self._table.points
 
-    @cached_property
+    @property
     def points(self) -> FloatArray:
         """The points of all cells, shape (m n,)."""
-        return self._grid.ravel()
+        return self.finer_rule(1)[0]
 
-    @cached_property
+    @property
     def weights(self) -> FloatArray:
         """Weights of the points, shape (m n,)."""
-        return (self._sizes[:, None] * self._table.rule.weights).ravel()
+        return self.finer_rule(1)[1]
 
     @cached_property
     def constant(self) -> FloatArray:
@@ -166,23 +175,25 @@ class PhaseAxis(DividedAxis):
         return self.right_trace - self.left_trace
 
     def _trace(self, side: int) -> Matrix:
-        values = self._table.ends[side] / np.sqrt(self._sizes)[:, None]
-        return self._scattered(np.arange(self._sizes.size) + side, values)
+        """T at lines[:-1] in the cells above these, or for side = 1 below."""
+        ends, cell = (self.lines[:-1], self.lines[1:]), np.arange(self._sizes.size) - side
+        return self.at(ends[side][cell], 0.5 * (ends[0] + ends[1])[cell])
 
     def mass(self, f: Any = one) -> Matrix:
         """∫ f u v of `Harmonics` f, or of 1."""
         if f == one:
-            return self.identity
-        wave = self._cellwise(f(self._grid) - f.mean, self._table.products, 0)
-        return f.mean * self.identity + self._assembled(wave)  # exact without a wave
+            return self._assembled(np.broadcast_to(np.eye(self._pairs.shape[1]), self._pairs.shape))
+        wave = self._cellwise(f(self._grid) - f.mean, self._table.values, self._table.values, 0)
+        return f.mean * self.matrix(one) + self._assembled(wave)  # exact without a wave
 
     def convection(self, f: Harmonics) -> Matrix:
         """∫ f u′ v, cell by cell."""
-        return self._assembled(self._cellwise(f(self._grid), self._table.convections, 1))
+        return self._assembled(self._cellwise(f(self._grid), self._table.values, self._table.slopes, 1))
 
-    def _cellwise(self, f: FloatArray, table: FloatArray, order: int) -> FloatArray:
-        """∫ f of products with so many derivatives in each cell, from f at the points of its rule."""
-        return (f * self._table.rule.weights / self._sizes[:, None] ** order) @ table
+    def _cellwise(self, f: FloatArray, of_test: FloatArray, of_trial: FloatArray, order: int) -> FloatArray:
+        """∫ f v u in each cell, from f at the points of its rule; v and u have so many derivatives together."""
+        weights = f * self._table.weights / self._sizes[:, None] ** order
+        return np.asarray((weights[:, None] * of_test.T) @ of_trial)
 
     def diffusion(self, a: CoefficientMatrix, b: CoefficientMatrix) -> tuple[Matrix, Matrix, Matrix]:
         """∫ w D_a D_b T, D = h ∂φ + p q of two matrices: the coefficients of p⁰, p¹ and p².
@@ -195,18 +206,20 @@ class PhaseAxis(DividedAxis):
         at a vertex, as h = 0 at the ray of a jump, is not there.
         """
         grid, at, cellwise = self._grid, self.lines[:-1], self._cellwise
-        products, convections, stiffnesses = self._table.products, self._table.convections, self._table.stiffnesses
-        transposed = convections.reshape(-1, *self._pairs.shape[1:]).swapaxes(1, 2).reshape(convections.shape)
+        values, slopes = self._table.values, self._table.slopes
         ha, qa, hb, qb, slope = a.h(grid), a.q(grid), b.h(grid), b.q(grid), a.h.slope(grid)
         cells = (
-            -cellwise(ha * hb, stiffnesses, 2) - cellwise(slope * hb, convections, 1),
-            cellwise((qa * hb), convections, 1) - cellwise(ha * qb, transposed, 1) - cellwise(slope * qb, products, 0),
-            cellwise(qa * qb, products, 0),
+            -cellwise(ha * hb, slopes, slopes, 2) - cellwise(slope * hb, values, slopes, 1),
+            cellwise(qa * hb, values, slopes, 1)
+            - cellwise(ha * qb, slopes, values, 1)
+            - cellwise(slope * qb, values, values, 0),
+            cellwise(qa * qb, values, values, 0),
         )
         ha, qa, hb, qb, slope = a.h(at), a.q(at), b.h(at), b.q(at), a.h.slope(at)
         sharpness = (self.degrees + 1) ** 2 / self._sizes
         penalty = PENALTY * np.maximum(sharpness, np.roll(sharpness, 1))
-        jump, mean, mean_slope = self.jump, 0.5 * (self.left_trace + self.right_trace), self._mean_slope
+        jump, mean = self.jump, 0.5 * (self.left_trace + self.right_trace)
+        mean_slope = mean @ self._derivative
         loads = (
             -(jump.T @ by_rows(ha * hb, mean_slope) + mean_slope.T @ by_rows(ha * hb, jump))
             - mean.T @ by_rows(hb * slope, jump)
@@ -228,41 +241,31 @@ class PhaseAxis(DividedAxis):
         size = struck.weights * np.exp(-2 * logs)
         longer = size * (x * dx + u * du) * OfMoment(1, logs)(p, derivative)
         turned = size * (u * dx - x * du) * OfMoment(0, logs)(p, derivative)
-        slope = struck.end @ csr_matrix(self.convection(Harmonics(1.0, 0.0, 0.0)))
+        slope = struck.end @ csr_matrix(self._derivative)
         return self.stored(struck.at.T @ (diags(longer) @ struck.end + diags(turned) @ slope))
 
     def struck(self, of: Impulse) -> Struck:
         """What an impulse does at the points of a rule."""
-        points, middles, weights = self._rule_of(of)
+        points, weights = self._rule_of(of)
         stretch, end = of.stretched(points)
-        _, inside = of.stretched(middles)
         first = self.lines[0]
-        end, inside = (first + np.mod(phi - first, self.span) for phi in (end, inside))
-        functions = (csr_matrix(self.at(*where)) for where in ((points, middles), (end, inside)))
+        functions = (csr_matrix(self.at(phi)) for phi in (points, first + np.mod(end - first, self.span)))
         return Struck(points, weights, np.log(stretch), *functions)
 
-    def _rule_of(self, of: Impulse) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Points of a rule between the lines and those phases that an impulse takes to lines, middles, and weights."""
+    def _rule_of(self, of: Impulse) -> tuple[FloatArray, FloatArray]:
+        """Points and weights of a rule between the lines and those phases that an impulse takes to lines."""
         first, back = self.lines[0], replace(of, exponent=(-np.array(of.exponent)).tolist())
         even = first + self.span * np.arange(STRIPS) / STRIPS
         _, before = back.stretched(np.concatenate([even, self.lines[:-1]]))
         cuts = np.unique(np.concatenate([even, self.lines, first + np.mod(before - first, self.span)]))
         local, weights = gauss_legendre(int(self.degrees.max()) + EXTRA_POINTS)
         sizes = np.diff(cuts)[:, None]
-        middles = np.repeat(0.5 * (cuts[:-1] + cuts[1:]), local.size)
-        return (cuts[:-1, None] + sizes * local).ravel(), middles, (sizes * weights).ravel()
+        return (cuts[:-1, None] + sizes * local).ravel(), (sizes * weights).ravel()
 
     @cached_property
-    def _mean_slope(self) -> Matrix:
-        """½(T′(φⱼ⁺) + T′(φⱼ⁻)) at the vertices."""
-        count = np.arange(self._sizes.size)
-        slopes = self._table.end_slopes[:, None] / self._sizes[:, None] ** 1.5
-        return 0.5 * (self._scattered(count, slopes[0]) + self._scattered(count + 1, slopes[1]))
-
-    @cached_property
-    def identity(self) -> Matrix:
-        """∫ u v."""
-        return self._assembled(np.broadcast_to(np.eye(self._pairs.shape[1]), self._pairs.shape))
+    def _derivative(self) -> Matrix:
+        """The matrix to the coefficients of T′ in each cell."""
+        return self.convection(Harmonics(1.0, 0.0, 0.0))
 
     def at(self, phi: FloatArray, inside: FloatArray | None = None) -> Matrix:
         """Values at points of the domain, as rows of E with u(φ) = E @ coefficients, shape (len(φ), size).
@@ -270,9 +273,7 @@ class PhaseAxis(DividedAxis):
         A point on a line between cells is seen from the cell that holds its entry of `inside`, without it from the
         cell above.
         """
-        where = np.searchsorted(self.lines, phi if inside is None else inside, side="right") - 1
-        cell = np.clip(where, 0, self._sizes.size - 1)
-        local = np.clip((phi - self.lines[cell]) / self._sizes[cell], 0, 1)
+        cell, local = located(self.lines, phi, inside)
         values = legendre(int(self.degrees.max()), local) / np.sqrt(self._sizes[cell])[:, None]
         kept, numbers = self._numbers[0][cell], self._numbers[1][cell]
         return self._matrix(values[kept], np.nonzero(kept)[0], numbers[kept], (phi.size, self.size))
@@ -281,8 +282,8 @@ class PhaseAxis(DividedAxis):
         """Points and weights of the rule where every cell is cut into so many parts, shapes (parts n,)."""
         sizes = np.repeat(self._sizes / parts, parts)
         starts = (self.lines[:-1, None] + self._sizes[:, None] * np.arange(parts) / parts).ravel()
-        points = starts[:, None] + sizes[:, None] * self._table.rule.points
-        return points.ravel(), (sizes[:, None] * self._table.rule.weights).ravel()
+        points = starts[:, None] + sizes[:, None] * self._table.points
+        return points.ravel(), (sizes[:, None] * self._table.weights).ravel()
 
     @cached_property
     def values(self) -> Matrix:
@@ -304,20 +305,13 @@ class PhaseAxis(DividedAxis):
 
     def _assembled(self, blocks: FloatArray) -> Matrix:
         """The matrix with a block for each cell; its rows are those of the test functions."""
-        entries = blocks.reshape(self._pairs.shape)[self._pairs]
-        return self._matrix(entries, *self._places, (self.size, self.size))
+        return self._matrix(blocks[self._pairs], *self._places, (self.size, self.size))
 
     @cached_property
     def _places(self) -> tuple[IntArray, IntArray]:
         _, numbers = self._numbers
         rows, columns = np.broadcast_arrays(numbers[:, :, None], numbers[:, None, :])
         return rows[self._pairs], columns[self._pairs]
-
-    def _scattered(self, vertex: IntArray, values: FloatArray) -> Matrix:
-        """A row for each vertex, with values for the functions of a cell."""
-        kept, numbers = self._numbers
-        rows = np.broadcast_to((vertex % len(kept))[:, None], kept.shape)
-        return self._matrix(values[kept], rows[kept], numbers[kept], (len(kept), self.size))
 
     def _matrix(self, entries: FloatArray, rows: IntArray, columns: IntArray, shape: tuple[int, int]) -> Matrix:
         if self.size > FEW_UNKNOWNS:
@@ -437,19 +431,19 @@ class PlaneTerms(Terms):
             total = 0.0 if by is None else of.rate * self.phi.changed_impulses(struck, of, by, p, derivative)
             if rate:
                 total = total + rate * self.phi.impulses(struck, p, derivative)
-                total = total if derivative else total - rate * self.phi.identity
+                total = total if derivative else total - rate * self.phi.matrix(one)
             return total
 
         stretch = ", ".join(f"{size:.3g}" for size in np.linalg.svd(of.matrix, compute_uv=False))
         text = f"{of.rate:.6g} (|Me|^p T(ψ) − T) of impulses M, which stretch by {stretch}"
-        return self._given(phase_at, text, order=1)
+        return self._term(phase_at, one, text, order=1)
 
     def _upwind(self, theta: Callable[[float, Xi], FloatArray], text: str) -> Iterator[Term]:
         """−½ ∫ P_s θ(φ, ξ) [w] [T] where the phase runs both ways: of several noises, chains, for each other state."""
         first, *others = self._names
         for j in self._two_way:
             phi, phase = float(self._vertices[j]), -0.5 * self._jump[[j]].T @ self._jump[[j]]
-            for values in product(*(np.unique(axis.support) for axis in self.noises[1:])):
+            for values in product(*(np.unique(axis.xi) for axis in self.noises[1:])):
                 held = dict(zip(others, values, strict=True))
 
                 def of_first(xi: Any, phi: float = phi, held: dict[str, float] = held) -> Any:

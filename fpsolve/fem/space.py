@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from fpsolve.arrays import FloatArray, Matrix, one
+from fpsolve.arrays import FloatArray, one
 from fpsolve.errors import MeshError
 from fpsolve.fem.axis import Axis, KroneckerSum, ModeEffects, along
 from fpsolve.fem.circle import CircleAxis
@@ -23,18 +23,18 @@ MOST_BYTES = 1.2e9
 """Of the factors of a generator: with what else is held, and libraries, a process takes about 1.5 GB."""
 LITTLE = 1e-2
 """Share of the largest effect of an axis below which others are left as they are, while nothing is resolved."""
-AXES: dict[str, Callable[[Noise, int], NoiseAxis]] = {
-    "polynomials": lambda noise, count: PolynomialAxis(noise, count + 3),
-    "waves": lambda noise, count: CircleAxis(noise, count + 4),
-    "pairs": lambda noise, count: PairAxis(noise, count + 3),
-    "states": lambda noise, count: StateAxis(noise),
+BASES: dict[str, Callable[[Noise, int], NoiseAxis]] = {
+    "polynomials": PolynomialAxis,
+    "waves": CircleAxis,
+    "pairs": PairAxis,
+    "states": lambda noise, _: StateAxis(noise),
 }
 """The functions of a noise by its `basis` and a number of them; those of "cells" follow from their interval."""
 
 
 def first_axis(noise: Noise, digits: float) -> NoiseAxis:
     """Few functions of a noise, for so many digits, where no value of the noise is held."""
-    return AXES[noise.basis](noise, round(digits / 2))
+    return BASES[noise.basis](noise, round(digits / 2) + 3)
 
 
 class Space:
@@ -84,7 +84,7 @@ class Space:
         if noise.is_diffusion:
             mesh = mesh.within(noise.half_width / noise.standard_deviation)
             return cls((phi, CellAxis(noise, mesh.z_lines, np.full(mesh.z_lines.size - 1, mesh.xi_degree))))
-        return cls((phi, first_axis(noise, 0.0).of_degree(mesh.xi_degree)))
+        return cls((phi, BASES[noise.basis](noise, mesh.xi_degree)))
 
     def with_axis(self, k: int, axis: Axis) -> Space:
         """The space with another axis in one place."""
@@ -140,14 +140,9 @@ class Space:
 
     def on_grid(self, coefficients: FloatArray) -> FloatArray:
         """A function without its factor at all points of a grid, φ first."""
-        values = self.phi.inner_values, *(axis.rule.values for axis in self.noises)
-        return along(values, coefficients.reshape(self.shape))
+        return along([self.phi.inner_values, *(axis.rule.values for axis in self.noises)], self.table(coefficients))
 
     @property
     def grid_measure(self) -> FloatArray:
         """∫ of the weight of the noises at the points of that grid, the same for each φ."""
         return np.asarray(reduce(np.multiply.outer, (axis.rule.measure for axis in self.noises)))
-
-    def evaluate(self, coefficients: FloatArray, *values: Matrix) -> FloatArray:
-        """A function without its factor, from the values of the functions of each axis at points of it."""
-        return along(values, self.table(coefficients))

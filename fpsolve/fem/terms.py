@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property, reduce
 from operator import add
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -26,6 +26,8 @@ from fpsolve.model.problem import ParameterDerivative, Problem
 
 Noises = tuple[Coefficient | None, ...]
 """For each noise the g of ∫P_s g u v, or None for its generator, ∫P_s v L_ξ u."""
+Phase: TypeAlias = "Matrix | Callable[[float, int], Matrix]"
+"""A matrix of φ, or what gives its k-th derivative by p from p and k."""
 
 
 @dataclass(frozen=True)
@@ -71,28 +73,25 @@ class Term:
     Attributes:
         order: the power of ε with which it begins; the power itself is in the operator.
         of_p: the coefficient.
-        phase: the matrix of φ.
+        phase: the matrix of φ; where p is in more than the coefficient, a function of p.
         noises: its functions of the noises.
         text: the term as a reader would write it.
-        phase_at: gives the k-th derivative of the matrix of φ by p, from p and k, where that is no coefficient times
-            one matrix; `phase` is then 0.
         is_wall: whether it is R^p of a wall, which is 1 where nothing is lost: forcing is R^p − 1.
     """
 
     order: int
     of_p: OfMoment
-    phase: Matrix
+    phase: Phase
     noises: Noises
     text: str
-    phase_at: Callable[[float, int], Matrix] | None = None
     is_wall: bool = False
 
     def at(self, p: float, derivative: int = 0, is_forcing: bool = False) -> Matrix | None:
         """The k-th derivative by p of the matrix of φ with its coefficient, or of its forcing; None where that is 0."""
         if is_forcing and not self.order:
             return None
-        if self.phase_at:
-            return self.phase_at(p, derivative)
+        if callable(self.phase):
+            return self.phase(p, derivative)
         size = math.expm1(p * self.of_p.log_factor) if is_forcing and self.is_wall else self.of_p(p, derivative)
         return size * self.phase if size else None
 
@@ -122,7 +121,7 @@ class Terms:
         found = list[Term]()
         for name in self._names:
             text = f"L_ξ, the generator of the noise{f' {name}' if name else ''}"
-            found.append(self._term(self.phi.identity, None, text, of=name))
+            found.append(self._term(self.phi.matrix(one), None, text, of=name))
         for term in self.system.terms:
             found += self._driven(term)
         for each in self._problem.diffusions:
@@ -131,7 +130,7 @@ class Terms:
 
     def phases(self, p: float, derivative: int = 0, is_forcing: bool = False) -> dict[Noises, Matrix]:
         """For each function of the noises the matrix of φ of dᵏL/dpᵏ, or of its forcing; the first is that of 1."""
-        found: dict[Noises, Matrix] = {(one,) * len(self._names): 0.0 * self.phi.identity}
+        found: dict[Noises, Matrix] = {(one,) * len(self._names): 0.0 * self.phi.matrix(one)}
         for term in self.all:
             phase = term.at(p, derivative, is_forcing)
             if phase is not None:
@@ -183,7 +182,7 @@ class Terms:
 
     def _term(
         self,
-        phase: Matrix,
+        phase: Phase,
         g: Coefficient | None,
         text: str,
         of_p: OfMoment = OfMoment(0),
@@ -199,10 +198,6 @@ class Terms:
     def _at(self, name: str) -> int:
         """The place of a noise among those that have values; the first one for others."""
         return self._names.index(name) if name in self._names else 0
-
-    def _given(self, phase_at: Callable[[float, int], Matrix], text: str, order: int = 0) -> Term:
-        """One of no noise whose matrix is given by p and the number of derivatives by p."""
-        return Term(order, OfMoment(0), 0.0, (one,) * len(self._names), text, phase_at)
 
 
 def power_of_epsilon(order: int) -> str:
