@@ -309,14 +309,10 @@ def _at_start(pair: PrincipalPair, phi: Start, xi: StartOfNoise) -> float:
 
 def _mean_functions(axis: Any, xi: StartOfNoise) -> FloatArray:
     """The means of the functions of a noise over its start, shape (size,)."""
-    at = axis.samples()
     if xi == STATIONARY:
+        at = axis.samples()
         return np.asarray((axis.law() * at.factor) @ at.values)
-    if axis.cells.max() < 0:
-        chosen = np.isclose(at.xi, xi, rtol=1e-9, atol=0) * at.weight
-        return np.asarray(chosen / chosen.sum())
-    at = axis.at(np.array([float(xi)]) / axis.unit)
-    return np.asarray(at.values[0] * at.factor[0])
+    return np.asarray(axis.started(xi))
 
 
 def _extremes(pair: PrincipalPair, is_smooth: bool) -> FloatArray:
@@ -339,7 +335,7 @@ def _extremes(pair: PrincipalPair, is_smooth: bool) -> FloatArray:
     rate = np.broadcast_to(growth, table.shape).reshape(shape)
     if not is_smooth or rate.max() < 0:
         rate = np.ones(shape)
-    axes = [1, *(2 + k for k, axis in enumerate(space.noises) if axis.cells.max() >= 0)]  # along which T is continuous
+    axes = [1, *(2 + k for k, axis in enumerate(space.noises) if axis.dimension)]  # along which T is continuous
     bent, wider = _between(values, axes), rate + _between(rate, axes)
     own = _where_positive(values, rate, axes)
     lowest, highest = (

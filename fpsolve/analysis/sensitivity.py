@@ -203,7 +203,7 @@ def solve_sensitivities(
     solves = dict(zip(RECORDS, (found.lyapunov_exponent, of_root, found.variance_rate), strict=True))
     slopes = {name: tried(RECORDS[name], solves[name]) for name in indices}
     values = problem.values
-    noises = zip([*problem.sections][1:], problem.noise.parts.values(), strict=True)
+    noises: list[Any] = [*problem.sections.items()][1:]
     keys = [f"{section}.{name}" for section, noise in noises for name in noise.one_sided]
     one_sided = [Message(Code.ONE_SIDED, key=key, value=values[key]) for key in keys if key in along]
     return Sensitivities(

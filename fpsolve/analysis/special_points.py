@@ -13,6 +13,7 @@ from fpsolve.analysis.continuation import PIECES, Point, Trace, correct, correct
 from fpsolve.analysis.scan import Field, Sample
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import FpsolveError, NotConverged
+from fpsolve.messages import Code, Message
 
 EQUAL = 1e-9
 """Distance of two points that are one, in sides of the square, and in ways between two points of a curve."""
@@ -86,7 +87,7 @@ def _on(field: Field, trace: Trace, place: float) -> Sample:
     """F at a place of a branch. Raises `FpsolveError`."""
     tangent = trace.points[int(place) % len(trace.points)].sample.tangent
     if (sample := correct(field, trace.between(place), tangent)) is None:
-        raise NotConverged("Newton's method does not settle")
+        raise NotConverged(Message(Code.NEWTON_UNSETTLED))
     return sample
 
 

@@ -268,6 +268,11 @@ class LineAxis(NoiseAxis):
         """At any z; the measure is 0."""
         return self._sampled(z, np.zeros_like(z), self.values_at(z))
 
+    def started(self, xi: float) -> FloatArray:
+        """The functions with their factor at one ξ, shape (size,)."""
+        at = self.at(np.array([xi]) / self.unit)
+        return np.asarray(dense(at.values)[0] * at.factor[0])
+
     def samples(self) -> Samples:
         z, measure, values = self.rule[:3]
         return self._sampled(z, self.unit * measure / self.weight(z), values)
@@ -498,6 +503,11 @@ class StateAxis(NoiseAxis):
 
     def _moved(self, change: NoiseDerivative) -> FloatArray:
         return np.array(change.states) if change.states else np.zeros(self.size)
+
+    def started(self, xi: float) -> FloatArray:
+        """The functions at one ξ, shape (size,): their mean over the states that have this value."""
+        chosen = np.isclose(self.xi, xi, rtol=1e-9, atol=0) * self.rule.measure
+        return np.asarray(chosen / chosen.sum())
 
     def samples(self) -> Samples:
         return Samples(self.xi, self.rule.measure, np.ones(self.size), self.rule.values, np.ones(self.size))

@@ -127,8 +127,8 @@ def second_order(problem: Problem) -> SecondOrder:
 
 def harmonic_loads(problem: Problem) -> Sequence[str]:
     """The noises of which only the start is random, as sentences have them."""
-    named = zip([*problem.sections][1:], problem.noise.parts.values(), strict=True)
-    loads = [(section, noise) for section, noise in named if not noise.is_random]
+    noises: list[Any] = [*problem.sections.items()][1:]
+    loads = [(section, noise) for section, noise in noises if not noise.is_random]
     return [f"{section} with sigma = 0" if noise.values else "cos(nu*t)" for section, noise in loads]
 
 
