@@ -86,6 +86,13 @@ def bounds_of(problem: Problem, key: str) -> tuple[float, float]:
     return low, high
 
 
+def check_key(problem: Problem, key: Any) -> None:
+    """Refuse what is no key of a parameter by which Λ can be differentiated. Raises `ValueError`."""
+    known = checked_problem(problem).differentiable
+    if key not in known:
+        raise ValueError(f"got {shown(key)} as a parameter; must be one of {', '.join(known) or 'none'}")
+
+
 def check_axes(problem: Problem, x: Axis, y: Axis) -> None:
     """Refuse axes that span no frame. Raises `ValueError`."""
     known = checked_problem(problem).differentiable

@@ -42,6 +42,7 @@ from fpsolve.exponent.method import Budget, refuse
 from fpsolve.exponent.root import nonzero_root
 from fpsolve.exponent.solver import ExponentSolver, solver_of
 from fpsolve.fem.axis import along
+from fpsolve.fem.mesh import middles
 from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.plane import Harmonics, growth_rate
 from fpsolve.model.problem import Problem
@@ -300,8 +301,7 @@ def _at_start(pair: PrincipalPair, phi: Start, xi: StartOfNoise) -> float:
         at_phi = weights @ space.phi.at(psi)
     else:
         own = np.array([float(phi)])
-        psi, first, span = frame.phase(own), space.phi.lines[0], space.phi.span
-        psi, after = (first + np.mod(each - first, span) for each in (psi, psi + 1e-9))
+        psi, after = (space.phi.folded(frame.phase(own) + more) for more in (0.0, 1e-9))
         at_phi = frame.length(own)[0] ** pair.p * dense(space.phi.at(psi, after))[0]
     means = space.product([at_phi, *(_mean_functions(axis, xi) for axis in space.noises)])
     return float(means @ pair.right)
@@ -325,7 +325,7 @@ def _extremes(pair: PrincipalPair, is_smooth: bool) -> FloatArray:
     share = min(1.0, (MOST_POINTS / (math.prod(counts) * (lines.size - 1))) ** (1 / len(counts)))
     phases, *noises = (max(16, math.ceil(share * count)) for count in counts)
     psi = np.linspace(lines[:-1], lines[1:], phases + 1, axis=1)
-    inside = np.repeat(0.5 * (lines[:-1] + lines[1:]), phases + 1)
+    inside = np.repeat(middles(lines), phases + 1)
     xi, functions = zip(
         *(axis.everywhere(count) for axis, count in zip(space.noises, noises, strict=True)), strict=True
     )

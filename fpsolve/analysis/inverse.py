@@ -24,17 +24,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.optimize import brentq, minimize
 
-from fpsolve.analysis.axis import Axis, bounds_of, check_ends
+from fpsolve.analysis.axis import Axis, bounds_of, check_ends, check_key
 from fpsolve.analysis.scan import TOLERANCE, Sample
 from fpsolve.analysis.target import Distance, Target, is_none, target_of
-from fpsolve.arrays import FloatArray, real_number, shown
+from fpsolve.arrays import FloatArray, real_number
 from fpsolve.data import Result, dataset, written
 from fpsolve.errors import FpsolveError, NoSuchExponent, NotConverged
 from fpsolve.exponent.error import Absent, Estimate
 from fpsolve.exponent.kinds import choose
 from fpsolve.exponent.method import Budget
 from fpsolve.messages import Code, Message
-from fpsolve.model.problem import Problem, checked_problem
+from fpsolve.model.problem import Problem
 from fpsolve.model.quantity import Quantity
 
 if TYPE_CHECKING:
@@ -168,13 +168,12 @@ def design(
 def axes_of(problem: Problem, by: str | Axis | Sequence[str | Axis]) -> tuple[Axis, ...]:
     """The parameters of a design with their ranges. Raises `ValueError`."""
     stated = [by] if isinstance(by, str | Axis) else list(by)
-    known, found = checked_problem(problem).differentiable, list[Axis]()
+    found = list[Axis]()
     if not 0 < len(stated) <= MOST_PARAMETERS:
         raise ValueError(f"got {len(stated)} parameters; must be 1 to {MOST_PARAMETERS}")
     for each in stated:
         key = each.key if isinstance(each, Axis) else each
-        if key not in known:
-            raise ValueError(f"got {shown(key)} as a parameter; must be one of {', '.join(known) or 'none'}")
+        check_key(problem, key)
         if key in [axis.key for axis in found]:
             raise ValueError(f"got {key} twice; remove one of them")
         axis = each if isinstance(each, Axis) else start_and_stop(problem, key)

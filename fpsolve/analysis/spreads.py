@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import ndtr, ndtri
 
-from fpsolve.analysis.axis import bounds_of
+from fpsolve.analysis.axis import bounds_of, check_key
 from fpsolve.analysis.sensitivity import RECORDS, Sensitivities, solve_sensitivities
 from fpsolve.arrays import FloatArray, is_whole, shown
 from fpsolve.data import Result, dataset
@@ -30,7 +30,7 @@ from fpsolve.exponent.error import Absent, Estimate
 from fpsolve.exponent.method import Budget, checked_moments
 from fpsolve.exponent.root import nonzero_root
 from fpsolve.exponent.solver import solver_of
-from fpsolve.model.problem import Problem, checked_problem
+from fpsolve.model.problem import Problem
 from fpsolve.model.quantity import LYAPUNOV_EXPONENT, MOMENT, STABILITY_INDEX, P, Quantity
 
 if TYPE_CHECKING:
@@ -144,10 +144,9 @@ def laws_of(problem: Problem, uncertain: Mapping[str, Any]) -> dict[str, Law]:
     Raises:
         ValueError: a key is none of a parameter by which Λ can be differentiated, or a deviation is 0 or none.
     """
-    known, found = checked_problem(problem).differentiable, dict[str, Law]()
+    found = dict[str, Law]()
     for key, stated in uncertain.items():
-        if key not in known:
-            raise ValueError(f"got {shown(key)} as a parameter; must be one of {', '.join(known) or 'none'}")
+        check_key(problem, key)
         deviation = stated if isinstance(stated, Deviation) else deviation_of(stated)
         value = float(problem.values[key])
         if not deviation.at(value) > 0:

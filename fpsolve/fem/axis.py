@@ -20,7 +20,7 @@ import scipy.sparse
 from scipy.sparse import csc_matrix
 
 from fpsolve.arrays import Coefficient, FloatArray, IntArray, Mask, Matrix, dense, one
-from fpsolve.fem.mesh import MAX_DEGREE, halved
+from fpsolve.fem.mesh import MAX_DEGREE, halved, middles
 from fpsolve.model.noise import NoiseDerivative
 
 NO_LINES = np.zeros(0)
@@ -103,9 +103,8 @@ def split(lines: FloatArray, effects: ModeEffects, share: float, may_coarsen: bo
     is_split |= needed > MOST_DEGREE
     degrees = np.ceil(np.where(is_split, in_half, needed) + 0.2)
     degrees = np.clip(degrees, np.maximum(LEAST_DEGREE, effects.degrees - 4), effects.degrees + 4)
-    middles = 0.5 * (lines[:-1] + lines[1:])
     degrees = np.repeat(np.minimum(degrees, MOST_DEGREE).astype(int), np.where(is_split, 2, 1))
-    return np.sort(np.concatenate([lines, middles[is_split]])), degrees
+    return np.sort(np.concatenate([lines, middles(lines)[is_split]])), degrees
 
 
 class Axis:

@@ -43,7 +43,7 @@ from fpsolve.arrays import Coefficient, FloatArray, IntArray, Mask, Matrix, one
 from fpsolve.fem.axis import Axis, KroneckerSum, along
 from fpsolve.fem.element import EXTRA_POINTS, gauss_legendre
 from fpsolve.fem.line import LineSpace
-from fpsolve.fem.mesh import halved
+from fpsolve.fem.mesh import halved, middles
 from fpsolve.fem.terms import OfMoment, Term, Terms
 from fpsolve.model.plane import CoefficientMatrix
 from fpsolve.model.problem import ParameterDerivative, Problem
@@ -162,10 +162,9 @@ def arc(lines: FloatArray, degree: int) -> Angle:
 
 def _jumps(line: LineSpace, speeds: FloatArray) -> FloatArray:
     """Σ γ h² N⁻³ speed [u′] [v′] over the inner vertices."""
-    sizes, middles = np.diff(line.lines), 0.5 * (line.lines[1:] + line.lines[:-1])
-    above, below = (line.at(line.lines[1:-1], 1, inside).toarray() for inside in (middles[1:], middles[:-1]))
-    jump = above - below
-    weights = SLOPE_PENALTY * (0.5 * (sizes[1:] + sizes[:-1])) ** 2 / line.degree**3 * speeds
+    inside = middles(line.lines)
+    above, below = (line.at(line.lines[1:-1], 1, each).toarray() for each in (inside[1:], inside[:-1]))
+    jump, weights = above - below, SLOPE_PENALTY * np.diff(inside) ** 2 / line.degree**3 * speeds
     return np.asarray(jump.T @ (weights[:, None] * jump))
 
 

@@ -90,9 +90,14 @@ class CylinderMesh:
         return replace(self, z_lines=np.concatenate([[lower], inside, [upper]]))
 
 
+def middles(lines: FloatArray) -> FloatArray:
+    """The middle of each cell."""
+    return 0.5 * (lines[:-1] + lines[1:])
+
+
 def halved(lines: FloatArray) -> FloatArray:
-    """The lines, and one in the middle between any two."""
-    return np.sort(np.concatenate([lines, 0.5 * (lines[:-1] + lines[1:])]))
+    """The lines, and the middles."""
+    return np.sort(np.concatenate([lines, middles(lines)]))
 
 
 def make_mesh(

@@ -21,6 +21,7 @@ import numpy as np
 from fpsolve.arrays import Coefficient, FloatArray, IntArray, Matrix, dense, one
 from fpsolve.fem.axis import Axis, DividedAxis, ModeEffects
 from fpsolve.fem.line import LineSpace
+from fpsolve.fem.mesh import middles
 from fpsolve.model.noise import Noise, NoiseDerivative
 from fpsolve.polynomials import Polynomials, gegenbauer, hermite, logarithm, stieltjes
 
@@ -430,8 +431,7 @@ class CellAxis(DividedAxis, LineAxis):
 
     def between(self, lines: FloatArray) -> CellAxis:
         """Those between other lines, each with the degree of the cell that its middle is in, or is next to."""
-        middles = 0.5 * (lines[:-1] + lines[1:])
-        own = np.clip(np.searchsorted(self.lines, middles) - 1, 0, self.degrees.size - 1)
+        own = np.clip(np.searchsorted(self.lines, middles(lines)) - 1, 0, self.degrees.size - 1)
         return self.on(lines, self.degrees[own])
 
     def reaching(self, below: bool, above: bool) -> CellAxis:

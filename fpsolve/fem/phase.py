@@ -26,7 +26,7 @@ from fpsolve.fem.element import (
     numbered,
     orthonormal,
 )
-from fpsolve.fem.mesh import SAME_LINE
+from fpsolve.fem.mesh import SAME_LINE, middles
 from fpsolve.fem.terms import At, OfMoment, Term, Terms
 from fpsolve.messages import Code, Message
 from fpsolve.model.plane import (
@@ -176,8 +176,8 @@ class PhaseAxis(DividedAxis):
 
     def _trace(self, side: int) -> Matrix:
         """T at lines[:-1] in the cells above these, or for side = 1 below."""
-        ends, cell = (self.lines[:-1], self.lines[1:]), np.arange(self._sizes.size) - side
-        return self.at(ends[side][cell], 0.5 * (ends[0] + ends[1])[cell])
+        cell = (np.arange(self._sizes.size) - side) % self._sizes.size
+        return self.at(self.lines[cell + side], middles(self.lines)[cell])
 
     def mass(self, f: Any = one) -> Matrix:
         """∫ f u v of `Harmonics` f, or of 1."""
@@ -245,22 +245,21 @@ class PhaseAxis(DividedAxis):
         return self.stored(struck.at.T @ (diags(longer) @ struck.end + diags(turned) @ slope))
 
     def struck(self, of: Impulse) -> Struck:
-        """What an impulse does at the points of a rule."""
-        points, weights = self._rule_of(of)
-        stretch, end = of.stretched(points)
-        first = self.lines[0]
-        functions = (csr_matrix(self.at(phi)) for phi in (points, first + np.mod(end - first, self.span)))
-        return Struck(points, weights, np.log(stretch), *functions)
-
-    def _rule_of(self, of: Impulse) -> tuple[FloatArray, FloatArray]:
-        """Points and weights of a rule between the lines and those phases that an impulse takes to lines."""
-        first, back = self.lines[0], replace(of, exponent=(-np.array(of.exponent)).tolist())
-        even = first + self.span * np.arange(STRIPS) / STRIPS
+        """What an impulse does at the points of a rule between the lines and the phases that it takes to lines."""
+        back = replace(of, exponent=(-np.array(of.exponent)).tolist())
+        even = self.lines[0] + self.span * np.arange(STRIPS) / STRIPS
         _, before = back.stretched(np.concatenate([even, self.lines[:-1]]))
-        cuts = np.unique(np.concatenate([even, self.lines, first + np.mod(before - first, self.span)]))
+        cuts = np.unique(np.concatenate([even, self.lines, self.folded(before)]))
         local, weights = gauss_legendre(int(self.degrees.max()) + EXTRA_POINTS)
         sizes = np.diff(cuts)[:, None]
-        return (cuts[:-1, None] + sizes * local).ravel(), (sizes * weights).ravel()
+        points = (cuts[:-1, None] + sizes * local).ravel()
+        stretch, end = of.stretched(points)
+        functions = (csr_matrix(self.at(phi)) for phi in (points, self.folded(end)))
+        return Struck(points, (sizes * weights).ravel(), np.log(stretch), *functions)
+
+    def folded(self, phi: FloatArray) -> FloatArray:
+        """The points of the domain that are φ but for whole turns of it."""
+        return np.asarray(self.lines[0] + np.mod(phi - self.lines[0], self.span))
 
     @cached_property
     def _derivative(self) -> Matrix:
