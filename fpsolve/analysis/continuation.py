@@ -55,19 +55,6 @@ FRAME = "leaves the frame"
 
 
 @dataclass(frozen=True, eq=False)
-class Point:
-    """A point of a curve.
-
-    Attributes:
-        sample: F there.
-        label: what is special about it; empty for an ordinary one.
-    """
-
-    sample: Sample
-    label: str = ""
-
-
-@dataclass(frozen=True, eq=False)
 class Trace:
     """One branch of a curve.
 
@@ -77,7 +64,7 @@ class Trace:
         obstacles: why it ends inside of the square, if it does.
     """
 
-    points: tuple[Point, ...]
+    points: tuple[Sample, ...]
     closed: bool = False
     obstacles: tuple[Message, ...] = ()
 
@@ -90,7 +77,7 @@ class Trace:
     def between(self, place: float) -> FloatArray:
         """About the point at a place: 2.5 is half way between the points 2 and 3."""
         i = int(place)
-        one, other = (self.points[k % len(self.points)].sample for k in (i, i + 1))
+        one, other = (self.points[k % len(self.points)] for k in (i, i + 1))
         return cubic(one.at, other.at, one.tangent, other.tangent, place - i)
 
     def step(self, place: float) -> float:
@@ -137,7 +124,7 @@ def find_branches(
 
 def with_branch(known: tuple[Trace, ...], trace: Trace) -> tuple[Trace, ...]:
     """A branch more, without those that broke off somewhere on it."""
-    left = (each for each in known if not each.obstacles or not all(trace.holds(point.sample) for point in each.points))
+    left = (each for each in known if not each.obstacles or not all(map(trace.holds, each.points)))
     return (*left, trace)
 
 
@@ -197,9 +184,9 @@ def trace_branch(field: Field, start: Sample, longest: float, stepped: Callable[
 
 def _half(
     field: Field, start: Sample, sign: float, longest: float, stepped: Callable[[], None]
-) -> tuple[list[Point], bool, Message | None]:
+) -> tuple[list[Sample], bool, Message | None]:
     """Points from a start on in one direction, whether they come back to it, and why they end inside of the square."""
-    points, step = [Point(start)], 0.25 * longest
+    points, step = [start], 0.25 * longest
     last, before = start, None
     while len(points) < MOST_POINTS:
         if before is None or EXTRAPOLATED * last.width > MOST_AWAY * step:
@@ -219,16 +206,16 @@ def _half(
                 return points, False, reason if sample is None else Message(Code.TOO_SHARP)
             continue
         way = float(np.linalg.norm(sample.at - last.at))
-        if len(points) > 2 and Trace((Point(last), Point(sample))).holds(start, CLOSED * way):
+        if len(points) > 2 and Trace((last, sample)).holds(start, CLOSED * way):
             return points, True, None
         if is_leaving:
             if way < BESIDE:
                 points.pop()
             else:
                 stepped()
-            points.append(Point(sample, FRAME))
+            points.append(sample._replace(label=FRAME))
             return points, False, None
-        points.append(Point(sample))
+        points.append(sample)
         stepped()
         before, last = last, sample
         step = min(longest, step * min(2.0, MOST_TURN / max(turn, 1e-3)))

@@ -30,6 +30,7 @@ class Sample(NamedTuple):
         error: estimate of |error of F|.
         scale: the size of the terms of F before they cancel.
         rtol: |F| over its scale up to which it is 0.
+        label: what is special about a point of a curve; empty for an ordinary one.
     """
 
     at: FloatArray
@@ -38,6 +39,7 @@ class Sample(NamedTuple):
     error: float
     scale: float
     rtol: float = TOLERANCE
+    label: str = ""
 
     @property
     def nothing(self) -> float:

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 import numpy as np
 from scipy.optimize import brentq
 
-from fpsolve.analysis.continuation import PIECES, Point, Trace, correct, correct_on_line
+from fpsolve.analysis.continuation import PIECES, Trace, correct, correct_on_line
 from fpsolve.analysis.scan import Field, Sample
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import FpsolveError, NotConverged
@@ -24,7 +24,7 @@ MOST_STEPS = 12
 BY_A_HAIR = 0.01
 """How far two pieces may miss each other, over their lengths."""
 Found = TypeVar("Found")
-Placed = tuple[float, Point]
+Placed = tuple[float, Sample]
 """A point, and its place: 2.5 is half way between the points 2 and 3 of a branch."""
 
 
@@ -32,11 +32,11 @@ def with_folds(field: Field, trace: Trace, names: tuple[str, str]) -> Trace:
     """A branch with the points at which it turns back in u, or in v, for which it has names."""
     new: list[Placed] = []
     for axis in (0, 1):
-        tangents = np.array([point.sample.tangent[axis] for point in trace.points])
+        tangents = np.array([point.tangent[axis] for point in trace.points])
         tangents[np.abs(tangents) < FLAT] = 0
         for place in _roots(trace, tangents, lambda place: _on(field, trace, place).tangent, axis):
             if (sample := _or_none(_on, field, trace, place)) is not None:
-                new.append((place, Point(sample, f"fold in {names[axis]}")))
+                new.append((place, sample._replace(label=f"fold in {names[axis]}")))
     return with_points(trace, new)
 
 
@@ -44,14 +44,14 @@ def with_values(field: Field, trace: Trace, axis: int, values: Sequence[tuple[fl
     """A branch with its points where u, or v, has certain values, each with its label."""
     new: list[Placed] = []
     for value, label in values:
-        beyond = np.array([point.sample.at[axis] for point in trace.points]) - value
+        beyond = np.array([point.at[axis] for point in trace.points]) - value
         beyond[np.abs(beyond) < EQUAL] = 0
-        new += [(float(i), Point(trace.points[i].sample, label)) for i in np.flatnonzero(beyond == 0)]
+        new += [(float(i), trace.points[i]._replace(label=label)) for i in np.flatnonzero(beyond == 0)]
         for place in _roots(trace, beyond, trace.between, axis, value):
             guess = trace.between(place)
             sample = _or_none(correct_on_line, field, axis, value, guess)
             if sample is not None and np.linalg.norm(sample.at - guess) < 0.1 * trace.step(place):
-                new.append((place, Point(sample, label)))
+                new.append((place, sample._replace(label=label)))
     return with_points(trace, new)
 
 
@@ -65,19 +65,19 @@ def crossings(one: Trace, other: Trace, fields: tuple[Field, Field]) -> Iterator
             continue
         if all(np.linalg.norm(samples[0].at - at) > 10 * EQUAL for at in known):
             known.append(samples[0].at)
-            yield (i, Point(samples[0])), (j, Point(samples[1]))
+            yield (i, samples[0]), (j, samples[1])
 
 
 def with_points(trace: Trace, new: Sequence[Placed]) -> Trace:
     """A branch with further points; one that is there already only gets its label."""
     placed: list[Placed] = [(float(i), point) for i, point in enumerate(trace.points)]
     for place, point in new:
-        k = int(np.argmin([np.linalg.norm(each.sample.at - point.sample.at) for _, each in placed]))
-        if np.linalg.norm(placed[k][1].sample.at - point.sample.at) < EQUAL:
+        k = int(np.argmin([np.linalg.norm(each.at - point.at) for _, each in placed]))
+        if np.linalg.norm(placed[k][1].at - point.at) < EQUAL:
             labels = [*placed[k][1].label.split("; "), *point.label.split("; ")]
             label = "; ".join(dict.fromkeys(each for each in labels if each))
             known = placed[k][1]
-            placed[k] = placed[k][0], Point(known.sample if known.label else point.sample, label)
+            placed[k] = placed[k][0], (known if known.label else point)._replace(label=label)
         else:
             placed.append((place, point))
     return replace(trace, points=tuple(point for _, point in sorted(placed, key=lambda each: each[0])))
@@ -85,7 +85,7 @@ def with_points(trace: Trace, new: Sequence[Placed]) -> Trace:
 
 def _on(field: Field, trace: Trace, place: float) -> Sample:
     """F at a place of a branch. Raises `FpsolveError`."""
-    tangent = trace.points[int(place) % len(trace.points)].sample.tangent
+    tangent = trace.points[int(place) % len(trace.points)].tangent
     if (sample := correct(field, trace.between(place), tangent)) is None:
         raise NotConverged(Message(Code.NEWTON_UNSETTLED))
     return sample

@@ -125,7 +125,7 @@ class Boundary(Result):
         """The branches in the parameters themselves."""
         found = list[Branch]()
         for trace in self.traces:
-            u, v, width = np.array([(*point.sample.at, point.sample.width) for point in trace.points]).T
+            u, v, width = np.array([(*point.at, point.width) for point in trace.points]).T
             labels = tuple(point.label for point in trace.points)
             found.append(Branch(self.x.value(u), self.y.value(v), width, labels, trace.closed, trace.obstacles))
         return tuple(found)
@@ -376,7 +376,7 @@ def crossed(lines: Sequence[Boundary]) -> list[Boundary]:
         for (a, trace), (b, crossing) in product(enumerate(first.traces), enumerate(second.traces)):
             for on_first, on_second in crossings(trace, crossing, fields):
                 for key, (place, point), other in (((i, a), on_first, second), ((j, b), on_second, first)):
-                    new[key].append((place, replace(point, label=f"crossing with {other.target}")))
+                    new[key].append((place, point._replace(label=f"crossing with {other.target}")))
     return [
         replace(line, traces=tuple(with_points(trace, new[i, a]) for a, trace in enumerate(line.traces)))
         for i, line in enumerate(lines)

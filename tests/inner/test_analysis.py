@@ -72,7 +72,7 @@ def test_branches_of_a_curve_are_whole(name):
     for branch in branches:
         steps = np.diff(branch.fine[::PIECES], axis=0)
         assert np.all(np.linalg.norm(steps, axis=1) < 2 * LONGEST)
-        assert all(abs(of(point.sample.at).value) <= 1e-10 for point in branch.points)
+        assert all(abs(of(point.at).value) <= 1e-10 for point in branch.points)
         ends = [] if branch.closed else [branch.points[0], branch.points[-1]]
         assert sum(bool(each.label) for each in ends) == len(ends) - len(branch.obstacles)
         folded = with_folds(of, branch, ("x", "y"))
@@ -84,11 +84,11 @@ def test_branches_of_a_curve_are_whole(name):
 def test_folds_values_and_crossings_of_a_curve_are_exact():
     [branch] = find_branches(S, scan_of(S))
     found = with_values(S, with_folds(S, branch, ("x", "y")), 0, [(0.45, "wanted")])
-    at = {label: sorted(p.sample.at[1] for p in found.points if p.label == label) for label in ("fold in x", "wanted")}
+    at = {label: sorted(p.at[1] for p in found.points if p.label == label) for label in ("fold in x", "wanted")}
     w = 1 / math.sqrt(18)
     assert at["fold in x"] == pytest.approx([0.5 - w, 0.5 + w], abs=1e-9)
     assert at["wanted"] == pytest.approx(np.sort(np.roots([6, 0, -1, 0.05]).real) + 0.5, abs=1e-9)
     one, other = circle(0.4, 0.5, 0.3), circle(0.6, 0.5, 0.3)
     [first], [second] = (list(find_branches(each, scan_of(each))) for each in (one, other))
-    met = sorted(tuple(point.sample.at) for (_, point), _ in crossings(first, second, (one, other)))
+    met = sorted(tuple(point.at) for (_, point), _ in crossings(first, second, (one, other)))
     assert np.allclose(met, [(0.5, 0.5 - math.sqrt(0.08)), (0.5, 0.5 + math.sqrt(0.08))], atol=1e-9)
