@@ -21,12 +21,12 @@ FINE = 12
 
 
 class Sample(NamedTuple):
-    """F at a point.
+    """F at a point of the unit square, or at parameters θ.
 
     Attributes:
-        at: (u, v).
+        at: (u, v), or θ.
         value: F.
-        gradient: ∂F/∂(u, v), shape (2,).
+        gradient: the derivatives of F by these, of the same shape.
         error: estimate of |error of F|.
         scale: the size of the terms of F before they cancel.
         rtol: |F| over its scale up to which it is 0.

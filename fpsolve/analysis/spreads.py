@@ -189,9 +189,9 @@ class Uncertainty(Result):
     Attributes:
         laws: of the uncertain parameters, by their keys.
         p: the moments, shape (n,).
-        moments: of Λ(p), one for each p; None where it was not solved.
-        indices: of "lyapunov_exponent" and "stability_index", without those that do not exist.
-        sensitivities: by which they are found.
+        moments: the spread of each Λ(p); None where its derivatives were not solved.
+        indices: the spreads of "lyapunov_exponent" and "stability_index", where these exist.
+        sensitivities: the derivatives by which the spreads are found.
     """
 
     laws: Mapping[str, Law]

@@ -49,7 +49,7 @@ class ModeEffects:
     Attributes:
         degrees: of the cells, shape (cells,).
         highest: the effects of the highest mode, of the two highest and so on up to four, shape (4, cells).
-        slowest: the least share of the effect of two modes that is thought to be left.
+        slowest: two more modes are taken to leave this share of the effect of the highest two at least.
     """
 
     degrees: IntArray
@@ -91,9 +91,10 @@ class ModeEffects:
 
 
 def split(lines: FloatArray, effects: ModeEffects, share: float, may_coarsen: bool) -> tuple[FloatArray, IntArray]:
-    """Lines and a degree for each cell with which all together should lack no more than a share.
+    """Lines, and a degree for each cell, with which all n cells together should lack no more than a share.
 
-    A cell is halved where halves take fewer unknowns: in them the effects fall faster.
+    What cells lack has both signs, so that it is taken to add up like √n: each cell may lack a share of 1/√n. A cell is
+    halved where its halves take fewer unknowns, as effects fall faster in them.
     """
     rate, needed = effects.fall, effects.needed(max(share, 1e-290) / math.sqrt(effects.degrees.size))
     if not may_coarsen:  # but for what is far more than enough
@@ -116,10 +117,11 @@ class Axis:
         lines: the vertices of cells; none where the functions are of the whole axis.
         most_unknowns: of a space with this first axis and no chain, with which a process takes 1.5 GB.
         is_chain: whether each function is coupled to few next to it alone, as polynomials of noise are.
-        slowest: the least share of the effect of the highest modes that two more may leave, see `ModeEffects`.
-        slope: s/p of the factor exp(s z) that moves with p.
+        slowest: two more modes are taken to leave this share of the effect of the highest two at least.
+        slope: s/p of the factor exp(s z) that every function carries, which moves with p.
         turns: how often the axis fits on the full circle; 1 for noise.
-        nested: to coefficients of modes whose sums by degree are functions of a lower one; None where they are that.
+        nested: the matrix to the coefficients of a hierarchical basis, in which the functions up to each degree span
+            the space of that degree; None where the basis is one.
         is_followed: whether pairs are followed from p = 0 on, as T and T* may not be resolved enough to be judged.
         has_adjoint: whether T* is a function.
     """

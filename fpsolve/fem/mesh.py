@@ -205,7 +205,7 @@ def read_mesh(path: str | Path) -> CylinderMesh:
             strange = quads[(quads < 0) | (quads >= len(points))][0]
             raise MeshError(f"a cell has the corner {strange}, but points are 0 to {len(points) - 1}", Remedy.MESH_FILE)
         phi, z = (_grid_lines(points[:, k]) for k in (0, 1))
-        _check_tensor_grid(np.stack([phi[1], z[1]]), quads, (phi[0].size - 1, z[0].size - 1))
+        _check_tensor_grid((phi[1] * z[0].size + z[1])[quads], phi[0].size, z[0].size)
         degrees = {name: _degree(content, name) for name in ("phi_degree", "xi_degree")}
         if not z[0][0] < 0 < z[0][-1]:
             raise MeshError(NO_ZERO.format(z[0][0], z[0][-1]))
@@ -224,8 +224,7 @@ def _as_meshio(mesh: CylinderMesh, impact: float, gmsh: bool) -> Any:
     import meshio
 
     m, n = mesh.phi_lines.size, mesh.z_lines.size
-    node = np.arange(m * n).reshape(m, n)
-    quads = np.stack([node[:-1, :-1], node[1:, :-1], node[1:, 1:], node[:-1, 1:]], axis=-1).reshape(-1, 4)
+    node, quads = np.arange(m * n).reshape(m, n), _cells(m, n)
     impacts = [("impact", node[i]) for i in np.flatnonzero(np.abs(np.sin(mesh.phi_lines - impact)) < SAME_LINE)]
     edges = [*impacts, *(("seam", node[i]) for i in (0, -1)), *(("truncation", node[:, i]) for i in (0, -1))]
     lines = np.concatenate([np.stack([nodes[:-1], nodes[1:]], axis=1) for _, nodes in edges])
@@ -254,17 +253,19 @@ def _grid_lines(coordinates: FloatArray) -> tuple[FloatArray, IntArray]:
     return coordinates[order][np.concatenate([[True], steps])], index
 
 
-def _check_tensor_grid(index: IntArray, quads: IntArray, shape: tuple[int, int]) -> None:
-    """Every cell of the grid must be one quadrilateral, with the cell's four corners."""
-    corners = index[:, quads]
-    lower = corners.min(axis=2)
-    offsets = corners - lower[:, :, None]
-    square = np.sort(offsets[0] + 2 * offsets[1], axis=1) == np.arange(4)
-    cells = np.unique(lower[0] * max(shape[1], 1) + lower[1])
-    if not np.all(square) or not len(quads) == cells.size == shape[0] * shape[1]:
+def _cells(m: int, n: int) -> IntArray:
+    """The four corners of each cell of a grid of m × n nodes, which are numbered row by row."""
+    node = np.arange(m * n).reshape(m, n)
+    return np.stack([node[:-1, :-1], node[1:, :-1], node[1:, 1:], node[:-1, 1:]], axis=-1).reshape(-1, 4)
+
+
+def _check_tensor_grid(quads: IntArray, m: int, n: int) -> None:
+    """Every cell of a grid of m × n nodes must be one quadrilateral, with the cell's four corners."""
+    found, wanted = ({*map(tuple, np.sort(each, axis=1).tolist())} for each in (quads, _cells(m, n)))
+    if found != wanted or len(quads) != len(wanted):
         raise MeshError(
-            f"{len(quads)} quadrilaterals on {shape[0] + 1} phi-lines and {shape[1] + 1} xi-lines are not the full "
-            f"tensor grid of {shape[0] * shape[1]} cells; every phi-line must cross every xi-line"
+            f"{len(quads)} quadrilaterals on {m} phi-lines and {n} xi-lines are not the full "
+            f"tensor grid of {len(wanted)} cells; every phi-line must cross every xi-line"
         )
 
 

@@ -255,11 +255,13 @@ def first_order_eigenfunction(problem: Problem, p: float, phi: ArrayLike, xi: Ar
 
 
 def scale_of(problem: Problem) -> Scale:
-    """The scale of Λ(p): of perturbation theory, or of the sizes of the terms where these are less, as in strong noise.
+    """The scale of Λ(p): that of perturbation theory, or the sum of the sizes of the terms if that is smaller at p = 2.
 
-    Then constant terms, with the mean of the noise, count by the largest |Re| of an eigenvalue of theirs, noise of
-    strength c by c min(1, c τ), white noise by the largest ½(h q′ + q²) and ½q², jumps once in a half-turn, impulses
-    that stretch by e^s by their rate times s min(1, s). Where even p alone are computed constant terms count alone.
+    Perturbation theory overstates strong noise.
+
+    In the sum the constant terms, with the mean of the noise, count by the largest |Re| of their eigenvalues. Noise of
+    strength c and correlation time τ counts by c min(1, c τ). White noise counts by the largest ½(h q′ + q²) and ½q².
+    A jump counts once in a half-turn. Impulses that stretch by e^s count by their rate times s min(1, s).
     """
     system, of_noises = problem.motion, dict[str, float]()
     steady = np.zeros((problem.dimension, problem.dimension))
