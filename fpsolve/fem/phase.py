@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from itertools import product
@@ -35,7 +35,6 @@ from fpsolve.model.plane import (
     Impulse,
     Jump,
     LinearMotion,
-    Xi,
     changed_exponential,
     is_driven,
     matrix_at,
@@ -392,19 +391,16 @@ class PlaneTerms(Terms):
         text, jump = "upwind loads between cells", self._jump
         if np.any(self._theta):
             yield self._term(-0.5 * jump.T @ by_rows(self._theta, jump), one, text)
-        yield from self._upwind(lambda phi, xi: np.abs(phase_speed(self.system, xi)(phi)), text)
+        yield from self._upwind(text)
         for ray, v, delta in self._walls:
             text = f"(R^p − 1) |dφ/dt| δ(φ − {ray.phase:.6g} mod π), R = {math.exp(ray.log_factor):.6g}"
             yield self._term(abs(v) * delta, one, text, OfMoment(0, ray.log_factor), order=2, is_wall=True)
 
     def _changed_loads(self, by: ParameterDerivative) -> Iterator[Term]:
-        """The size of the speed for the typical ξ is held: [T] = 0 there but for the error of the elements."""
+        """Upwinding is held: [T] = 0 at a vertex but for the error of the elements."""
         text, moved = "∂/∂θ", LinearMotion(self.system.epsilon, by.terms)
         for struck, moved_by in zip(self._problem.impulses, by.impulses, strict=bool(by.impulses)):
             yield self._struck(struck, moved_by)
-        yield from self._upwind(
-            lambda phi, xi: np.sign(phase_speed(self.system, xi)(phi)) * phase_speed(moved, xi)(phi), text
-        )
         faster = self._problem.wall_speeds(moved)
         for k, (ray, v, delta) in enumerate(self._walls):
             if by.jumps:
@@ -437,8 +433,8 @@ class PlaneTerms(Terms):
         text = f"{of.rate:.6g} (|Me|^p T(ψ) − T) of impulses M, which stretch by {stretch}"
         return self._term(phase_at, one, text, order=1)
 
-    def _upwind(self, theta: Callable[[float, Xi], FloatArray], text: str) -> Iterator[Term]:
-        """−½ ∫ P_s θ(φ, ξ) [w] [T] where the phase runs both ways: of several noises, chains, for each other state."""
+    def _upwind(self, text: str) -> Iterator[Term]:
+        """−½ ∫ P_s |v| [w] [T] where the phase runs both ways: of several noises, chains, for each other state."""
         first, *others = self._names
         for j in self._two_way:
             phi, phase = float(self._vertices[j]), -0.5 * self._jump[[j]].T @ self._jump[[j]]
@@ -446,7 +442,7 @@ class PlaneTerms(Terms):
                 held = dict(zip(others, values, strict=True))
 
                 def of_first(xi: Any, phi: float = phi, held: dict[str, float] = held) -> Any:
-                    return theta(phi, {**held, first: xi} if held else xi)
+                    return np.abs(phase_speed(self.system, {**held, first: xi} if held else xi)(phi))
 
                 yield Term(0, OfMoment(0), phase, (of_first, *map(At, values)), text)
 
