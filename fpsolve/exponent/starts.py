@@ -165,7 +165,7 @@ def _phase(system: System, xi: Xi, digits: float, is_smooth: bool = False) -> Ph
     near = np.min(np.abs(lines[1:-1, None] - others[None]), axis=1, initial=math.inf) < 0.3 * math.pi / cells
     lines = np.sort(np.concatenate([lines[:1], lines[1:-1][~near], lines[-1:], others]))
     degree = round(np.clip(digits + (4 if is_smooth else -2 if widest > 0.5 else 2), 4, MOST_DEGREE))
-    return PhaseAxis.of(lines, np.full(lines.size - 1, degree))
+    return PhaseAxis(lines, np.full(lines.size - 1, degree))
 
 
 def other_centers(pair: PrincipalPair) -> list[float]:

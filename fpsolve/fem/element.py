@@ -7,7 +7,7 @@ vanish at both. Continuous elements are made of these, discontinuous ones of the
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import skfem
@@ -26,12 +26,6 @@ def gauss_legendre(count: int) -> tuple[FloatArray, FloatArray]:
     return points[0], weights
 
 
-def element(degree: int) -> Any:
-    """A continuous element of a degree, for its numbers."""
-    fixed = {1: skfem.ElementLineP1, 2: skfem.ElementLineP2}
-    return fixed[degree]() if degree in fixed else skfem.ElementLinePp(degree)
-
-
 @lru_cache(maxsize=512)
 def functions(degree: int, points: bytes) -> tuple[FloatArray, FloatArray]:
     """Values and slopes of both functions of vertices and of bubbles up to a degree, shape (n, degree + 1)."""
@@ -42,18 +36,18 @@ def functions(degree: int, points: bytes) -> tuple[FloatArray, FloatArray]:
     return values, np.stack([np.ravel(function.grad[0]) for function in found], axis=-1)
 
 
-def numbered(lines: FloatArray, degrees: IntArray, of: Any) -> tuple[Mask, IntArray]:
-    """Which functions of an element each cell has, of a degree of its own, and their numbers; 0 for those it has not.
+def numbered(lines: FloatArray, degrees: IntArray) -> tuple[Mask, IntArray]:
+    """Which continuous functions each cell has, of a degree of its own, and their numbers; 0 for those it has not.
 
     Args:
         lines: the vertices, shape (m + 1,).
         degrees: in each cell, shape (m,).
-        of: the element of the highest degree, continuous or not.
 
     Returns:
         Arrays of shape (m, degree + 1).
     """
-    dofs = skfem.Dofs(skfem.MeshLine(lines), of)
+    fixed, degree = {1: skfem.ElementLineP1, 2: skfem.ElementLineP2}, int(np.max(degrees))
+    dofs = skfem.Dofs(skfem.MeshLine(lines), fixed[degree]() if degree in fixed else skfem.ElementLinePp(degree))
     numbers = dofs.element_dofs.T
     own = np.arange(numbers.shape[1]) <= degrees[:, None]
     kept = np.zeros(int(dofs.N), dtype=bool)

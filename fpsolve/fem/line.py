@@ -15,7 +15,7 @@ from scipy.special import beta, roots_jacobi
 
 from fpsolve.arrays import Coefficient, FloatArray, IntArray, Mask, one
 from fpsolve.errors import MeshError
-from fpsolve.fem.element import EXTRA_POINTS, element, functions, located, numbered
+from fpsolve.fem.element import EXTRA_POINTS, functions, located, numbered
 from fpsolve.messages import Code, Message
 
 
@@ -59,7 +59,7 @@ class LineSpace:
     ) -> None:
         self.lines, self._sizes, degrees = lines, np.diff(lines), np.broadcast_to(degree, lines.size - 1)
         self.degree = degree = int(np.max(degrees))
-        self._own, self._dofs = numbered(lines, degrees, element(degree))  # in each cell two of vertices, then bubbles
+        self._own, self._dofs = numbered(lines, degrees)  # in each cell two of vertices, then bubbles
         cell, function = np.nonzero(self._own)
         number = self._dofs[self._own]
         shared = np.bincount(number) > 1

@@ -5,12 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cached_property
 from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
-import skfem
 from scipy.sparse import csr_matrix, diags, issparse
 
 from fpsolve.arrays import FloatArray, IntArray, Mask, Matrix, one
@@ -19,11 +18,9 @@ from fpsolve.fem.axis import FEW_UNKNOWNS, DividedAxis
 from fpsolve.fem.element import (
     EXTRA_POINTS,
     Orthonormal,
-    element,
     gauss_legendre,
     legendre,
     located,
-    numbered,
     orthonormal,
 )
 from fpsolve.fem.mesh import SAME_LINE, middles
@@ -47,8 +44,6 @@ PENALTY = 2.0
 """Factor η·size/(degree + 1)² of the interior penalty method."""
 STRIPS = 32
 """Number of parts of the domain in each of which an impulse is integrated before and after it."""
-MOST_SHARED = 100
-"""Largest number of functions of φ that are kept for the next problem."""
 
 
 def vertices_at(lines: FloatArray, phase: float) -> IntArray:
@@ -84,15 +79,6 @@ class PhaseAxis(DividedAxis):
     The first and the last line are one, and degrees are from 1 on.
     """
 
-    @staticmethod
-    def of(lines: FloatArray, degrees: IntArray) -> PhaseAxis:
-        """The axis of lines and degrees; many problems share the tables of a small one."""
-        axis = PhaseAxis(lines, np.asarray(degrees, dtype=int))
-        return axis if axis.size > MOST_SHARED else _shared(lines.tobytes(), axis.degrees.tobytes())
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return self.of, (self.lines, self.degrees)
-
     @cached_property
     def size(self) -> int:
         return int(np.sum(self.degrees + 1))
@@ -100,9 +86,6 @@ class PhaseAxis(DividedAxis):
     @property
     def facts(self) -> dict[str, Any]:
         return {"phi_cells": self.lines.size - 1, "phi_degrees": [int(degree) for degree in self.degrees]}
-
-    def on(self, lines: FloatArray, degrees: IntArray) -> PhaseAxis:
-        return self.of(lines, degrees)
 
     @cached_property
     def _sizes(self) -> FloatArray:
@@ -115,7 +98,8 @@ class PhaseAxis(DividedAxis):
     @cached_property
     def _numbers(self) -> tuple[Mask, IntArray]:
         """Which modes each cell has, and their numbers, shapes (m, largest degree + 1)."""
-        return numbered(self.lines, self.degrees, skfem.ElementDG(element(int(self.degrees.max()))))
+        kept = np.arange(self.degrees.max() + 1) <= self.degrees[:, None]
+        return kept, np.cumsum(kept).reshape(kept.shape) - 1
 
     @cached_property
     def cells(self) -> IntArray:
@@ -460,9 +444,3 @@ def _written(of: Harmonics) -> str:
 def by_rows(factors: FloatArray, matrix: Matrix) -> Matrix:
     """A matrix with its rows multiplied."""
     return diags(factors) @ matrix if issparse(matrix) else factors[:, None] * matrix
-
-
-@lru_cache(maxsize=32)
-def _shared(lines: bytes, degrees: bytes) -> PhaseAxis:
-    """The functions of some cells; a problem changes nothing in them."""
-    return PhaseAxis(np.frombuffer(lines), np.frombuffer(degrees, dtype=int))

@@ -80,7 +80,7 @@ class Space:
                 "with z_lines; leave the mesh out, and one is chosen for each p"
             )
         lines = phase(mesh.phi_lines)
-        phi = PhaseAxis.of(lines, np.full(lines.size - 1, mesh.phi_degree))
+        phi = PhaseAxis(lines, np.full(lines.size - 1, mesh.phi_degree))
         if noise.is_diffusion:
             mesh = mesh.within(noise.half_width / noise.standard_deviation)
             return cls((phi, CellAxis(noise, mesh.z_lines, np.full(mesh.z_lines.size - 1, mesh.xi_degree))))
