@@ -15,7 +15,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from itertools import repeat
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -45,26 +45,21 @@ MOST_SAMPLES = 100_000
 """Largest number of samples."""
 
 
-class Deviation(NamedTuple):
-    """The standard deviation of a parameter before its law is cut: a number, or a share of its value."""
+def deviation_of(stated: Any, value: float) -> float:
+    """The standard deviation of a parameter with a value, before its law is cut. Raises `ValueError`.
 
-    size: float
-    is_relative: bool = True
-
-    def at(self, value: float) -> float:
-        """The standard deviation of a parameter with a value."""
-        return self.size * abs(value) if self.is_relative else self.size
-
-
-def deviation_of(value: Any) -> Deviation:
-    """What 0.05, a share, or {"sd": 0.02}, a number, says. Raises `ValueError`."""
-    size = value["sd"] if isinstance(value, Mapping) and value.keys() == {"sd"} else value
+    Args:
+        stated: 0.05, a share of the value, or {"sd": 0.02}, a number.
+        value: of the parameter.
+    """
+    is_number = isinstance(stated, Mapping) and stated.keys() == {"sd"}
+    size = stated["sd"] if is_number else stated
     if isinstance(size, bool) or not isinstance(size, int | float) or not 0 < size < math.inf:
         raise ValueError(
-            f"got {shown(value)}; must be a share of the value, such as 0.05, or a standard deviation such as "
+            f"got {shown(stated)}; must be a share of the value, such as 0.05, or a standard deviation such as "
             '{"sd": 0.02}, > 0 and finite'
         )
-    return Deviation(float(size), isinstance(value, int | float))
+    return float(size) if is_number else size * abs(value)
 
 
 @dataclass(frozen=True)
@@ -139,7 +134,7 @@ def laws_of(problem: Problem, uncertain: Mapping[str, Any]) -> dict[str, Law]:
 
     Args:
         problem: with their values and ranges.
-        uncertain: a share of the value, or {"sd": number}, by the key; or `Deviation`s.
+        uncertain: a share of the value, or {"sd": number}, by the key.
 
     Raises:
         ValueError: a key is none of a parameter by which Λ can be differentiated, or a deviation is 0 or none.
@@ -147,11 +142,10 @@ def laws_of(problem: Problem, uncertain: Mapping[str, Any]) -> dict[str, Law]:
     found = dict[str, Law]()
     for key, stated in uncertain.items():
         check_key(problem, key)
-        deviation = stated if isinstance(stated, Deviation) else deviation_of(stated)
         value = float(problem.values[key])
-        if not deviation.at(value) > 0:
+        if not (deviation := deviation_of(stated, value)) > 0:
             raise ValueError(f'{key} is 0, and so is a share of it; state {{"sd": number}} for it')
-        found[key] = Law(value, deviation.at(value), *bounds_of(problem, key))
+        found[key] = Law(value, deviation, *bounds_of(problem, key))
     return found
 
 

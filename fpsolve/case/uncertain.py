@@ -8,7 +8,7 @@ from typing import Any
 
 from pydantic import ValidationInfo
 
-from fpsolve.analysis.spreads import Deviation, Law, deviation_of, laws_of
+from fpsolve.analysis.spreads import Law, deviation_of, laws_of
 from fpsolve.case.kinds import parameters_of, problem_of
 from fpsolve.case.sections import flat
 from fpsolve.case.vary import Vary
@@ -27,7 +27,7 @@ class Uncertain:
         deviations: the standard deviations of the parameters, by their keys.
     """
 
-    deviations: Mapping[str, Deviation] = field(default_factory=dict)
+    deviations: Mapping[str, Any] = field(default_factory=dict)
 
     def __bool__(self) -> bool:
         """Whether anything is uncertain."""
@@ -36,7 +36,7 @@ class Uncertain:
     def laws(self, problem: Problem) -> dict[str, Law]:
         """The laws of the parameters around the values of a problem, without those of which a share is 0."""
         values = problem.values
-        stated = {key: each for key, each in self.deviations.items() if each.at(float(values[key])) > 0}
+        stated = {key: each for key, each in self.deviations.items() if deviation_of(each, float(values[key])) > 0}
         return laws_of(problem, stated)
 
 
@@ -54,7 +54,7 @@ def uncertain_of(value: Any, info: ValidationInfo) -> Uncertain:
         return Uncertain()
     table, refusals = flat(value, parameters), list[Refusal]()
     vary: Vary = info.data.get("vary", Vary())
-    deviations = dict[str, Deviation]()
+    deviations = dict[str, Any]()
     for key, stated in table.items():
         refusals += _deviation(key, stated, problem, vary, deviations)
     if not table:
@@ -63,7 +63,7 @@ def uncertain_of(value: Any, info: ValidationInfo) -> Uncertain:
     return Uncertain(deviations)
 
 
-def _deviation(key: str, stated: Any, problem: Problem, vary: Vary, found: dict[str, Deviation]) -> Iterator[Refusal]:
+def _deviation(key: str, stated: Any, problem: Problem, vary: Vary, found: dict[str, Any]) -> Iterator[Refusal]:
     """What is wrong with a parameter and its deviation; without faults it joins those that are found."""
     known = problem.differentiable
     if key not in known:
@@ -71,10 +71,11 @@ def _deviation(key: str, stated: Any, problem: Problem, vary: Vary, found: dict[
         yield (key,), stated, f"{text}; rename or remove it"
         return
     try:
-        found[key] = deviation_of(stated)
+        deviation = deviation_of(stated, float(problem.values[key]))
     except ValueError:
         must = "must be a share of the value > 0, or { sd = number } with a standard deviation > 0, and finite"
         yield (key,), stated, f"got {shown(stated)}; {must}; write, for example, {_EXAMPLE}"
         return
-    if key not in vary.keys and problem.values[key] == 0 and found[key].is_relative:
+    found[key] = stated
+    if key not in vary.keys and not deviation:
         yield (key,), stated, f"got {shown(stated)}, but a share of {key} = 0 is 0; write {{ sd = number }}"

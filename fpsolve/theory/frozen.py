@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -97,9 +97,9 @@ class FrozenNoise:
         if not noise.is_diffusion:
             raise TypeError("there is no z to look for where ξ is no diffusion by itself")
         self.z, self._problem = _both_sides(problem) if z is None else z, problem
-        xi = noise.standard_deviation * self.z
-        self._faster, self._slower, self._turns = eigenvalues_at(problem, xi)
-        self._holding = noise.holding_cost(xi)
+        self._xi = noise.standard_deviation * self.z
+        self._faster, self._slower, self._turns = eigenvalues_at(problem, self._xi)
+        self._holding = noise.holding_cost(self._xi)
 
     def rate(self, p: float) -> FloatArray:
         """F at `z`."""
@@ -134,13 +134,8 @@ class FrozenNoise:
 
     def tilt(self, z: float) -> float:
         """s for which P_s exp(2s z) is the largest at z: −½(ln P_s)′."""
-        return -0.5 * float(np.interp(z, self.z, self._slope))
-
-    @cached_property
-    def _slope(self) -> FloatArray:
-        """(ln P_s)′ at `z`."""
         noise = self._problem.coloured
-        return np.gradient(noise.log_density(noise.standard_deviation * self.z), self.z)
+        return -0.5 * float(np.interp(z, self.z, np.gradient(noise.log_density(self._xi), self.z)))
 
 
 def _both_sides(problem: Problem) -> FloatArray:
