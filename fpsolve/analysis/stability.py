@@ -19,7 +19,7 @@ from fpsolve.analysis.axis import Axis, check_axes
 from fpsolve.analysis.continuation import LONGEST, SHORTEST, Trace, find_branches, with_branch
 from fpsolve.analysis.scan import Row, Sample, Scan, scan_row, scanned
 from fpsolve.analysis.special_points import Placed, crossings, with_folds, with_points, with_values
-from fpsolve.analysis.target import Distance, Target, is_none, line_of_value, target_of
+from fpsolve.analysis.target import Distance, Target, is_none, target_of
 from fpsolve.arrays import FloatArray, is_whole, real_number, shown
 from fpsolve.budget import Meter, OverBudget
 from fpsolve.data import Result, brief, dataset
@@ -37,6 +37,8 @@ if TYPE_CHECKING:
 
 SCAN_RTOL = 1e-5
 """Smallest error of F on the grid of a scan that is asked for, relative to its scale."""
+ITS_SIGN = 0.3
+"""Largest error of a dear F, over F, where its sign is sure."""
 NODES, DEAR_NODES = 13, 7
 """Number of points of a scan, each way, and where F is dear."""
 DEAR_STEP = 0.05
@@ -134,6 +136,11 @@ class Boundary(Result):
     def rtol(self) -> float:
         """The error of F on the line that is wanted, relative to its scale."""
         return choose(self.problem).line_rtol(self.target.order)
+
+    @property
+    def of_value(self) -> float:
+        """The error of F that is enough away from the line, over F: of a dear F its sign does there."""
+        return ITS_SIGN if choose(self.problem).is_dear(self.target.order) and not self.target.level else 0.0
 
     @property
     def scan_rtol(self) -> float:
@@ -264,8 +271,7 @@ class ZeroField:
 
     def __init__(self, line: Boundary, rtol: float, seconds: float, spent: Message) -> None:
         self._line, self._rtol, self._most, self._spent = line, rtol, seconds, spent
-        of_value = line_of_value(choose(line.problem), line.target)
-        settings = {"rtol": rtol, "of_value": of_value, "budget": line.budget}
+        settings = {"rtol": rtol, "of_value": line.of_value, "budget": line.budget}
         self._distance = Distance(line.problem, line.target, [line.x.key, line.y.key], **settings)
         self.seconds, self.stopped = 0.0, None if seconds > 0 else spent
 

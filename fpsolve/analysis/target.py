@@ -24,8 +24,6 @@ from fpsolve.model.quantity import LYAPUNOV_EXPONENT, STABILITY_INDEX, Quantity,
 EXAMPLES = '"lyapunov_exponent = 0", "moment(2) = 0" or "stability_index = -1"'
 _NUMBER = r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)"
 _TARGET = re.compile(rf"\s*(?:(lyapunov_exponent|stability_index)|moment\s*\(\s*{_NUMBER}\s*\))\s*=\s*{_NUMBER}\s*")
-ITS_SIGN = 0.3
-"""Largest error of a dear F, over F, where its sign is sure."""
 
 
 @dataclass(frozen=True)
@@ -97,11 +95,6 @@ def target_of(text: str) -> Target:
 def is_none(reason: Message) -> bool:
     """Whether there is no F for a reason, and it is not only not resolved."""
     return reason.tells_of(Code.NO_PROBLEM) or reason.code in (Code.TAILS, Code.INFINITE_VARIANCE)
-
-
-def line_of_value(method: Method, target: Target) -> float:
-    """The error of F that is enough away from a line, over F."""
-    return ITS_SIGN if method.is_dear(target.order) and not target.level else 0.0
 
 
 def said(failure: Exception) -> str:

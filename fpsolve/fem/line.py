@@ -10,7 +10,7 @@ from __future__ import annotations
 from functools import cached_property, lru_cache
 
 import numpy as np
-from scipy.sparse import csr_matrix, identity
+from scipy.sparse import csr_matrix, diags, identity
 from scipy.special import beta, roots_jacobi
 
 from fpsolve.arrays import Coefficient, FloatArray, IntArray, Mask, one
@@ -117,11 +117,11 @@ class LineSpace:
 
     def mass(self, f: FloatArray | float = 1.0) -> csr_matrix:
         """∫ w f u v, from f at the points."""
-        return self._form(self._values, f)
+        return self._form(self.values, f)
 
     def stiffness(self, f: FloatArray | float = 1.0) -> csr_matrix:
         """∫ w f u′v′, from f at the points."""
-        return self._form(self._slopes, f)
+        return self._form(self.slopes, f)
 
     @property
     def measure(self) -> FloatArray:
@@ -138,14 +138,10 @@ class LineSpace:
         rows = np.repeat(np.arange(x.size), self.degree + 1)
         return csr_matrix((values.ravel(), (rows, self._dofs[cell].ravel())), shape=(x.size, self.size))
 
-    def _form(self, values: FloatArray, f: FloatArray | float) -> csr_matrix:
+    def _form(self, values: csr_matrix, f: FloatArray | float) -> csr_matrix:
         """∫ w f of the products of functions, without what is zero but for rounding."""
-        measure = (self.measure * f).reshape(self._measure.shape)
-        blocks = (values * measure[..., None]).transpose(0, 2, 1) @ values
-        blocks[np.abs(blocks) < 1e-16 * np.max(np.abs(blocks))] = 0
-        rows, columns = np.broadcast_arrays(self._dofs[:, :, None], self._dofs[:, None, :])
-        entries = (blocks.ravel(), (rows.ravel(), columns.ravel()))
-        matrix = csr_matrix(entries, shape=(self.size, self.size))
+        matrix = csr_matrix(values.T @ diags(self.measure * f) @ values)
+        matrix.data[np.abs(matrix.data) < 1e-16 * np.max(np.abs(matrix.data))] = 0
         matrix.eliminate_zeros()
         return matrix
 

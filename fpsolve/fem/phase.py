@@ -60,13 +60,13 @@ class Struck(NamedTuple):
     """What an impulse does at the points of a rule.
 
     Attributes:
-        points, weights: of the rule, shape (n,).
+        points: of the rule, shape (n,).
         logs: ln |exp(B)e|, shape (n,).
-        at, end: the functions at the points, and where it takes them, shape (n, size).
+        at: the functions at the points, times the weights of the rule, shape (n, size).
+        end: the functions where it takes the points, shape (n, size).
     """
 
     points: FloatArray
-    weights: FloatArray
     logs: FloatArray
     at: csr_matrix
     end: csr_matrix
@@ -214,14 +214,13 @@ class PhaseAxis(DividedAxis):
 
     def impulses(self, struck: Struck, p: float, derivative: int = 0) -> Matrix:
         """∂ᵏ/∂pᵏ of ∫ w |exp(B)e|^p T(ψ(φ)), ψ being where an impulse takes φ."""
-        size = struck.weights * OfMoment(0, struck.logs)(p, derivative)
-        return self.stored(struck.at.T @ diags(size) @ struck.end)
+        return self.stored(struck.at.T @ diags(OfMoment(0, struck.logs)(p, derivative)) @ struck.end)
 
     def changed_impulses(self, struck: Struck, of: Impulse, by: Impulse, p: float, derivative: int = 0) -> Matrix:
         """∂/∂θ of what `impulses` gives, where B depends on θ."""
         logs, e = struck.logs, np.stack([np.cos(struck.points), -np.sin(struck.points)])
         (x, u), (dx, du) = (matrix @ e for matrix in (of.matrix, changed_exponential(of.exponent, by.exponent)))
-        size = struck.weights * np.exp(-2 * logs)
+        size = np.exp(-2 * logs)
         longer = size * (x * dx + u * du) * OfMoment(1, logs)(p, derivative)
         turned = size * (u * dx - x * du) * OfMoment(0, logs)(p, derivative)
         slope = struck.end @ csr_matrix(self._derivative)
@@ -237,8 +236,8 @@ class PhaseAxis(DividedAxis):
         sizes = np.diff(cuts)[:, None]
         points = (cuts[:-1, None] + sizes * local).ravel()
         stretch, end = of.stretched(points)
-        functions = (csr_matrix(self.at(phi)) for phi in (points, self.folded(end)))
-        return Struck(points, (sizes * weights).ravel(), np.log(stretch), *functions)
+        at, end = (csr_matrix(self.at(phi)) for phi in (points, self.folded(end)))
+        return Struck(points, np.log(stretch), diags((sizes * weights).ravel()) @ at, end)
 
     def folded(self, phi: FloatArray) -> FloatArray:
         """The points of the domain that are φ but for whole turns of it."""

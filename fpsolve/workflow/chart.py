@@ -19,7 +19,7 @@ from fpsolve.analysis.axis import Axis
 from fpsolve.analysis.regions import P_BIFURCATIONS, Region, Regions, regions
 from fpsolve.analysis.scan import Row, Sample, Scan, scan_row
 from fpsolve.analysis.stability import Boundary, begun, crossed, is_of_line
-from fpsolve.analysis.target import Target, line_of_value
+from fpsolve.analysis.target import Target
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case
 from fpsolve.case.sections import ChartSection
@@ -296,7 +296,7 @@ def write_chart(case: Case, chart: Chart, folder: Path) -> None:
                 "scan": {
                     "nodes": [line.scan.nodes.size] * 2,
                     "rtol": line.scan_rtol,
-                    "of_value": line_of_value(choose(line.problem), line.target),
+                    "of_value": line.of_value,
                 },
                 "branches": [
                     {"points": branch.x.size, "closed": branch.closed, "obstacles": list(branch.obstacles)}
