@@ -163,8 +163,8 @@ def arc(lines: FloatArray, degree: int) -> Angle:
 def _jumps(line: LineSpace, speeds: FloatArray) -> FloatArray:
     """Σ γ h² N⁻³ speed [u′] [v′] over the inner vertices."""
     inside = middles(line.lines)
-    above, below = (line.at(line.lines[1:-1], 1, each).toarray() for each in (inside[1:], inside[:-1]))
-    jump, weights = above - below, SLOPE_PENALTY * np.diff(inside) ** 2 / line.degree**3 * speeds
+    above, below = (line.at(ends, 1, inside).toarray() for ends in (line.lines[:-1], line.lines[1:]))
+    jump, weights = above[1:] - below[:-1], SLOPE_PENALTY * np.diff(inside) ** 2 / line.degree**3 * speeds
     return np.asarray(jump.T @ (weights[:, None] * jump))
 
 

@@ -79,12 +79,14 @@ class Orthonormal(NamedTuple):
     Attributes:
         points, weights: of the rule, shape (n,).
         values, slopes: at its points, shape (n, degree + 1).
+        derivative: the matrix to the coefficients of the slopes, without rounding of the rule.
     """
 
     points: FloatArray
     weights: FloatArray
     values: FloatArray
     slopes: FloatArray
+    derivative: FloatArray
 
 
 @lru_cache(maxsize=64)
@@ -93,4 +95,4 @@ def orthonormal(degree: int) -> Orthonormal:
     points, weights = gauss_legendre(degree + EXTRA_POINTS)
     values, ends = legendre(degree, points), legendre(degree, np.array([0.0, 1.0]))
     derivative = np.triu(np.outer(ends[1], ends[1]) - np.outer(ends[0], ends[0]), 1)
-    return Orthonormal(points, weights, values, values @ derivative)
+    return Orthonormal(points, weights, values, values @ derivative, derivative)

@@ -246,7 +246,7 @@ class PhaseAxis(DividedAxis):
     @cached_property
     def _derivative(self) -> Matrix:
         """The matrix to the coefficients of T′ in each cell."""
-        return self.convection(Harmonics(1.0, 0.0, 0.0))
+        return self._assembled(self._table.derivative / self._sizes[:, None, None])
 
     def at(self, phi: FloatArray, inside: FloatArray | None = None) -> Matrix:
         """Values at points of the domain, as rows of E with u(φ) = E @ coefficients, shape (len(φ), size).

@@ -117,7 +117,7 @@ def numbers_of_charts(seed: int) -> Iterator[Number]:
         return
     for trace in found.traces:
         for k in sorted({round(each) for each in np.linspace(0, len(trace.points) - 1, POINTS)}):
-            sample = trace.points[k].sample
+            sample = trace.points[k]
             at = problem.at({axis.key: float(axis.value(u)) for axis, u in zip(axes, sample.at, strict=True)})
             system, p = of_paper(at.system, at.noise, found.target.order)
             value, doubt = system.by_fourier(p)

@@ -110,11 +110,11 @@ def test_solves_on_a_line_give_zero_and_its_gradient(frame, target, noise):
     [trace] = found.traces
     assert [trace.points[k].label for k in (0, -1)] == ["leaves the frame"] * 2
     for point in trace.points[1:-1:4]:
-        value, error, scale = at_place(found, point.sample.at)
+        value, error, scale = at_place(found, point.at)
         assert abs(value) < 1e-9 * scale
-        slope = float(np.linalg.norm(point.sample.gradient))
-        assert (abs(value) - error) / slope <= point.sample.width < 1e-8
-    point = trace.points[len(trace.points) // 2].sample
+        slope = float(np.linalg.norm(point.gradient))
+        assert (abs(value) - error) / slope <= point.width < 1e-8
+    point = trace.points[len(trace.points) // 2]
     for k, step in enumerate(1e-3 * np.eye(2)):
         values = [at_place(found, point.at + m * step)[0] for m in (-2, -1, 1, 2)]
         expected = np.dot([1, -8, 8, -1], values) / 12e-3
@@ -244,7 +244,7 @@ def test_trends_of_stability_are_those_of_the_paper(key, values, sign):
     found = line(x=Axis(key, *values), y=Axis("oscillator.c1", -5.0, 1.0))
     [branch] = found.branches
     assert np.all(sign * np.diff(branch.y[np.argsort(branch.x)]) < 0)
-    assert all(point.sample.gradient[1] > 0 for point in found.traces[0].points)
+    assert all(point.gradient[1] > 0 for point in found.traces[0].points)
 
 
 @pytest.mark.parametrize(
