@@ -439,7 +439,7 @@ class Case(Section):
         if {"oscillator", "system"} <= set(data):
             text = "stands beside [system], but a case has one system; remove one of the two"
             refuse([(("oscillator",), data["oscillator"], text)])
-        named = table_of(data.get("output")).get("quantities")
+        named: Any = table_of(data.get("output")).get("quantities")
         is_of_p = not is_list(named) or MOMENT.name in named
         return data if is_of_p else {"moments": Moments.model_construct(p=()), **data}
 

@@ -89,8 +89,8 @@ class Results(Sequence[CurveResult]):
         self.table, self.says = table_of(case), np.ones(case.planned, dtype=bool)
         self.whole, self._numbers = set[int](), list[int]()
         self._kept: dict[int, CurveResult] = {}
-        for number in self._recorded():
-            if (job := self.job(number)).is_whole:
+        for job in self._jobs():
+            if job.is_whole:
                 self.add(job)
 
     def job(self, number: int, *, is_all: bool = False) -> Job:
@@ -121,13 +121,13 @@ class Results(Sequence[CurveResult]):
 
     def add_rest(self) -> None:
         """Take in what is known of the sets that are not finished."""
-        for number in self._recorded():
-            if not self.has(number):
-                self.add(self.job(number, is_all=True))
+        for job in self._jobs(is_all=True):
+            if job.entries or job.rows:
+                self.add(job)
 
-    def _recorded(self) -> Iterator[int]:
-        curves = self._case.curves() if self._records else ()
-        return (curve.number for curve in curves if set_key(curve) in self._records)
+    def _jobs(self, *, is_all: bool = False) -> Iterator[Job]:
+        numbers = range(1, self._case.planned + 1) if self._records else ()
+        return (self.job(number, is_all=is_all) for number in numbers if not self.has(number))
 
     def asked(self, number: int) -> Asked:
         """What is asked of the curve with a number."""

@@ -61,13 +61,10 @@ class Records:
     def __bool__(self) -> bool:
         return bool(self._starts)
 
-    def __contains__(self, key: str) -> bool:
-        return key in self._starts
-
     def get(self, key: str) -> Entries:
         """All entries of a key; none where nothing is known, or can be read."""
         entries = Entries()
-        if key in self:
+        if key in self._starts:
             with suppress(OSError, ValueError), self.path.open("rb") as file:
                 for start in self._starts[key]:
                     file.seek(start)

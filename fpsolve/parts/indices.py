@@ -24,7 +24,7 @@ from fpsolve.model.problem import infinite
 from fpsolve.model.quantity import MEAN_SQUARE
 from fpsolve.page.page import Block, Column, filled
 from fpsolve.parts.intervals import INTERVAL, spreads_of
-from fpsolve.parts.part import Job, Numerics, Part, Reason, Settings, estimated
+from fpsolve.parts.part import Job, Numerics, Part, Reason, Settings
 from fpsolve.results.curve import CurveResult
 from fpsolve.results.text import NUMBER_COLUMNS, interval, row_of
 
@@ -40,7 +40,7 @@ def index_of(found: Estimate | Absent, name: str, symbol: str) -> Estimate | Rea
 
 def part_of(index: Index) -> Part:
     """The part of an index."""
-    by_theory = index.perturbation
+    error, by_theory = index.error(), index.perturbation
 
     def settings(case: Case, number: int) -> Settings | None:
         return {} if index.name in case.asked else None
@@ -70,7 +70,8 @@ def part_of(index: Index) -> Part:
             return {}
         found = result and result.estimates[index.name]
         theory: Mapping[str, float] = result.parts.get("theory", {}) if result and found else {}
-        return {**estimated(index, found), by_theory: theory.get(index.name)}
+        value = {index: found and found.value, error: found and found.error_estimate}
+        return {**value, by_theory: theory.get(index.name)}
 
     return Part(
         index.name,
