@@ -384,15 +384,11 @@ class Case(Section):
 
     def membership(self) -> Callable[[Varied], bool]:
         """Tells whether parameters by their keys are those of a curve."""
-        constants, is_set = self.constants, self.vary.membership()
-        names = {*constants, *self.vary.keys}
+        known, keys, constants = {tuple(each.values()) for each in self.vary.sets}, self.vary.keys, self.constants
 
         def is_curve(values: Varied) -> bool:
-            return (
-                values.keys() == names
-                and is_set(values)
-                and all(values[key] == each for key, each in constants.items())
-            )
+            varied = tuple(map(values.get, keys))
+            return varied in known and values == {**constants, **dict(zip(keys, varied, strict=True))}
 
         return is_curve
 

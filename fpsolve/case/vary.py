@@ -70,11 +70,6 @@ class Vary:
         rows = zip(*columns.values(), strict=True) if columns and self.mode == "zip" else product(*columns.values())
         return (dict(zip(columns, row, strict=True)) for row in rows)
 
-    def membership(self) -> Callable[[Mapping[str, Value]], bool]:
-        """Tells whether values of all keys are those of a set."""
-        known = {tuple(each.values()) for each in self.sets}
-        return lambda varied: tuple(varied[key] for key in self.columns) in known
-
     def line_of(self, number: int) -> str:
         """The line of its file on which the set of a curve stands, as "sets.csv:12: "; empty where there is no file."""
         return f"{self.file}:{self.lines[number - 1]}: " if self.file else ""
