@@ -18,12 +18,12 @@ SYSTEMS: Mapping[str, str] = {
 }
 NOISES: Mapping[str, str] = {
     "non-gaussian": "non_gaussian:NonGaussianNoise",
-    "ou-reduction": "non_gaussian:ReducedNoise",
+    "ou-reduction": "reduced:ReducedNoise",
     "ornstein-uhlenbeck": "ornstein_uhlenbeck:OrnsteinUhlenbeck",
     "sine-wiener": "bounded:SineWiener",
     "white": "white:White",
     "poisson": "poisson:Poisson",
-    "telegraph": "markov_chain:Telegraph",
+    "telegraph": "telegraph:Telegraph",
     "markov-chain": "markov_chain:MarkovChain",
     "bounded": "bounded:Bounded",
     "filter": "filter:Filter",

@@ -51,11 +51,11 @@ class Clock(NoiseOfAngle):
     """
 
     nu: float = field(repr=False)
-    harmonics: int = field(repr=False)  # type: ignore[misc]
+    harmonics: int = field(repr=False)
 
     kind: ClassVar[str] = "clock"
-    sigma: ClassVar[float] = 0.0  # type: ignore[misc]
-    amplitude: ClassVar[float] = 1.0  # type: ignore[misc]
+    sigma: ClassVar[float] = 0.0
+    amplitude: ClassVar[float] = 1.0
     half_width: ClassVar[float] = math.pi
 
     def of_angle(self, theta: FloatArray) -> FloatArray:
@@ -74,11 +74,11 @@ class ClockWave(NoiseOfAngle):
     wave: Wave
 
     kind: ClassVar[str] = "wave"
-    sigma: ClassVar[float] = 0.0  # type: ignore[misc]
-    amplitude: ClassVar[float] = 1.0  # type: ignore[misc]
+    sigma: ClassVar[float] = 0.0
+    amplitude: ClassVar[float] = 1.0
 
     @property
-    def nu(self) -> float:  # type: ignore[override]
+    def nu(self) -> float:
         return self.wave.multiple * self.clock.nu
 
     @property

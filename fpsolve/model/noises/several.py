@@ -80,17 +80,12 @@ class Noises(Noise):
         return self.coloured.parts.values()
 
     @property
-    def values(self) -> Mapping[str, float | str]:
-        """The values of the parameters of all noises, by keys such as "axial.alpha"."""
-        return {f"{name}.{key}": value for name, noise in self.named for key, value in noise.values.items()}
-
-    @property
-    def is_white(self) -> bool:  # type: ignore[override]
+    def is_white(self) -> bool:
         """Whether all of the noises are white noise or impulses."""
         return all(noise.is_white for _, noise in self.named)
 
     @property
-    def has_states(self) -> bool:  # type: ignore[override]
+    def has_states(self) -> bool:
         """Whether all `coloured` noises jump between states."""
         return all(noise.has_states for noise in self._valued)
 
@@ -104,12 +99,12 @@ class Noises(Noise):
         return any(noise.is_random for _, noise in self.named)
 
     @property
-    def approximates_spectrum(self) -> bool:  # type: ignore[override]
+    def approximates_spectrum(self) -> bool:
         """Whether the `spectral_density` of one of the noises is that of a simpler process which replaces it."""
         return any(noise.approximates_spectrum for _, noise in self.named)
 
     @property
-    def variables(self) -> int:  # type: ignore[override]
+    def variables(self) -> int:
         return sum(noise.variables for noise in self._valued)
 
     def misfit(self, xi: float) -> str:
@@ -186,4 +181,4 @@ def _driven(terms: Sequence[CoefficientMatrix], name: str) -> tuple[CoefficientM
 
 def noises_of(named: Mapping[str, Noise]) -> Noise:
     """A noise of a mapping from names: `Noises`, or the only one. Raises as `Noises`."""
-    return next(iter(named.values())) if len(named) == 1 else Noises(named)  # type: ignore[arg-type]
+    return next(iter(named.values())) if len(named) == 1 else Noises(named)
