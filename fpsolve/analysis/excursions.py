@@ -211,7 +211,10 @@ def solve_excursion(solver: ExponentSolver, *, phi: Start, xi: StartOfNoise, roo
     found = replace(found, stability_index=index)
     if unseen := solver.method.unseen():
         return replace(found, notes=(unseen,))
-    overshoot, is_smooth = problem.overshoot, problem.rises_smoothly
+    moved = problem.noise.motion(problem.system)
+    struck = [float(np.linalg.norm(each.matrix, 2)) for each in moved.impulses]
+    overshoot = max([1.0, *(math.exp(jump.log_factor) for jump in problem.system.jumps), *struck])
+    is_smooth = overshoot == 1.0 and not struck and all(each.q.vanishes for each in moved.diffusions)
     p, pairs, notes = index.value, [solver.pair(index.value)], list[Message]()
     if problem.noise.is_bounded:
         least, most = _settled(solver, pairs, lambda pair: _extremes(pair, is_smooth) / _at_start(pair, phi, xi))

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import math
 import unicodedata
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
 from fpsolve.arrays import FloatArray
-from fpsolve.model.plane import System, affine, written_sum
-from fpsolve.model.problem import Problem
+from fpsolve.model.noises.clock import Wave
+from fpsolve.model.plane import Function, System, affine, written_sum
 
 
 def equations_of(system: System) -> list[str]:
@@ -31,8 +29,8 @@ def equations_of(system: System) -> list[str]:
         offset, slope = line or (0.0, 1.0)
         still += offset * size
         if slope:
-            own: Any = getattr(term.g, "f", None)  # cos kθ or sin kθ of the clock has k
-            name = letter if line else own.at(system.clock.nu) if hasattr(own, "multiple") else f"g({letter})"
+            wave = term.g.f if isinstance(term.g, Function) else None
+            name = letter if line else wave.at(system.clock.nu) if isinstance(wave, Wave) else f"g({letter})"
             driven[name] = driven.get(name, np.zeros((n, n))) + slope * size
     speed = float(still[0, 1])
     cubic = np.array(system.cubic.matrix) if system.cubic else np.zeros((n, 4))
@@ -69,16 +67,3 @@ def _sum(constant: FloatArray, cubic: FloatArray, by_noise: Mapping[str, FloatAr
         for size, s in zip(row, states, strict=True)
     ]
     return written_sum(terms)
-
-
-def noise_sentences(problem: Problem) -> list[str]:
-    """Each noise in a sentence: its kind, and how strong and how slow it is."""
-    lines = list[str]()
-    for section, noise in zip(problem.system.noise_sections, problem.noise.parts.values(), strict=False):
-        size, time = noise.standard_deviation, noise.correlation_time
-        numbers = [f"standard deviation {size:.6g}"] if 0 < size < math.inf else []
-        numbers += [f"correlation time {time:.6g}"] if 0 < time < math.inf else []
-        name = f"ξ of [{section}]" if len(problem.noise.parts) > 1 else "ξ"
-        lines.append(f"{name} is noise of the kind {noise.kind}{', with ' if numbers else ''}{' and '.join(numbers)}.")
-        lines[-1] += f" The equation is meant in {noise.sense} sense." if noise.sense else ""
-    return lines

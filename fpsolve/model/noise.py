@@ -113,6 +113,11 @@ class Noise(Parametrised):
         return {"": self}
 
     @property
+    def coloured(self) -> Noise:
+        """Of several noises those that have values; where all are white, the first of them."""
+        return self
+
+    @property
     @abstractmethod
     def standard_deviation(self) -> float:
         """Stationary standard deviation of ξ: one noise unit, z = ξ/std."""

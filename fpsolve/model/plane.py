@@ -11,11 +11,12 @@ from __future__ import annotations
 
 import math
 import re
+from abc import abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
-from typing import Any, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -27,6 +28,7 @@ from fpsolve.arrays import (
     Constant,
     FloatArray,
     Linear,
+    identity,
     is_whole,
     one,
     real_array,
@@ -165,7 +167,9 @@ def written_coefficient(g: Constant | Linear | Function) -> str:
             return "" if value == 1 else f"{value:g} "
         case Linear():
             return "ξ "
-    return f"{getattr(g.f, '__name__', type(g.f).__name__)}(ξ) "
+    with suppress(AttributeError):
+        return f"{g.f.__name__}(ξ) "
+    return f"{type(g.f).__name__}(ξ) "
 
 
 def written_sum(terms: Iterable[tuple[float, str]]) -> str:
@@ -496,7 +500,6 @@ class System(Parametrised):
         noise_unit: the unit of ξ.
         noise_sections: the sections of a case file that state the noises, with which the keys of their parameters
             begin: "noise", or, for one that terms call axial, "noise.axial".
-        impact_parameter: the name of a parameter that is in ln R of the only jump and nowhere else; empty for none.
         cubic: what is of degree 3 in its rates, on which the stationary response depends alone; None for nothing.
         stop: the wall of one coordinate of more than two variables; None without one.
         forced: it with its terms of degree 0, which multiply a last variable, 1; None without such terms.
@@ -507,15 +510,42 @@ class System(Parametrised):
 
     section: ClassVar[str] = "system"
     noise_unit: ClassVar[str] = "unknown"
-    cubic: CubicTerms | None = None
-    stop: Stop | None = None
-    forced: System | None = None
-    clock: Any = None
-    pasts: Sequence[tuple[int, float]] = ()
-    second_unit: float = 1.0
-    epsilon: float
-    terms: Sequence[CoefficientMatrix]
-    jumps: Sequence[Jump]
+
+    if TYPE_CHECKING:  # a field, a constant or a property
+
+        @property
+        @abstractmethod
+        def epsilon(self) -> float: ...
+        @property
+        @abstractmethod
+        def terms(self) -> Sequence[CoefficientMatrix]: ...
+        @property
+        @abstractmethod
+        def jumps(self) -> Sequence[Jump]: ...
+
+    @property
+    def cubic(self) -> CubicTerms | None:
+        return None
+
+    @property
+    def stop(self) -> Stop | None:
+        return None
+
+    @property
+    def forced(self) -> System | None:
+        return None
+
+    @property
+    def clock(self) -> Any:
+        return None
+
+    @property
+    def pasts(self) -> Sequence[tuple[int, float]]:
+        return ()
+
+    @property
+    def second_unit(self) -> float:
+        return 1.0
 
     @property
     def barriers(self) -> Sequence[Jump | Stop]:
@@ -574,22 +604,17 @@ class System(Parametrised):
         return ("noise",)
 
     @property
-    def impact_parameter(self) -> str:
-        return ""
-
-    @property
     def impact_symbol(self) -> str:
         """The symbol of its coefficient of restitution in sentences."""
         return "R"
 
-    def impact_value(self, log_factor: float) -> float:
-        """The coefficient of restitution of a wall with a given ln R, by its law; it may be out of range. Here R."""
-        with np.errstate(over="ignore"):
-            return float(np.exp(log_factor))
+    def impact_value(self, log_factor: float) -> tuple[float, float]:
+        """The coefficient of restitution of a wall with a given ln R, by its law, and its derivative by ln R.
 
-    def impact_slope(self, log_factor: float) -> float:
-        """Its derivative by ln R at a given ln R."""
-        return self.impact_value(log_factor)
+        It may be out of range. Here it is R.
+        """
+        with np.errstate(over="ignore"):
+            return (factor := float(np.exp(log_factor))), factor
 
 
 @dataclass(frozen=True)
@@ -648,6 +673,35 @@ def split_by_noise(system: System, terms: Sequence[CoefficientMatrix]) -> tuple[
             steady.append(CoefficientMatrix(term.order, (offset * np.array(term.matrix)).tolist()))
         driven += slope * system.epsilon**term.order * np.array(term.matrix)
     return steady, driven
+
+
+def by_noise(system: System, terms: Sequence[CoefficientMatrix]) -> dict[tuple[str, Coefficient] | None, FloatArray]:
+    """Sums, with the powers of ε, of what no noise drives (None), and of what each drives by each g, a + bξ apart."""
+    found: dict[tuple[str, Coefficient] | None, FloatArray] = {None: np.zeros((system.dimension, system.dimension))}
+    for term in terms:
+        line = affine(term.g)
+        (offset, slope), g = line or (0.0, 1.0), identity if line else term.g
+        for key, c in (None, offset), ((term.noise, g), slope):
+            if c:
+                found[key] = found.get(key, 0.0) + c * system.epsilon**term.order * np.array(term.matrix)
+    return found
+
+
+def kept_phases(matrices: Sequence[FloatArray]) -> tuple[float, ...]:
+    """φ of the rays of a plane that all matrices keep, none or two, or one; 0 where they keep all rays."""
+    if len(matrices[0]) > 2:
+        return ()
+    pairs = [(turning(each), ROUNDED * float(np.linalg.norm(each))) for each in matrices]
+    turns = [(speed, limit) for speed, limit in pairs if abs(speed.mean) + speed.amplitude > limit]
+    if not turns:
+        return (0.0,)
+    first, _ = turns[0]
+    if abs(first.mean) > first.amplitude * (1 + 1e-12):
+        return ()
+    middle = math.atan2(first.sine, first.cosine)
+    away = math.acos(min(max(-first.mean / first.amplitude, -1.0), 1.0))
+    found = {0.5 * (middle + away) % math.pi, 0.5 * (middle - away) % math.pi}
+    return tuple(phi for phi in sorted(found) if all(abs(float(speed(phi))) <= limit for speed, limit in turns))
 
 
 def as_plane(terms: Sequence[CoefficientMatrix], size: float = 0.0) -> tuple[CoefficientMatrix, ...]:
@@ -745,12 +799,3 @@ def angular_frequency(system: System) -> float:
         return math.sqrt(square)
     sizes = [system.epsilon**term.order * float(np.linalg.norm(term.matrix)) for term in system.terms]
     return float(np.linalg.norm(a)) or max(sizes) or 1.0
-
-
-def noise_strength(system: System) -> float:
-    """Σ ε^n |b| max|q| over g = a + bξ, b = 1 for other g: d ln a/dt for ξ = 1; for the paper's oscillator ε."""
-    total = 0.0
-    for term in system.terms:
-        slope = abs((affine(term.g) or (0.0, 1.0))[1])
-        total += slope * system.epsilon**term.order * float(abs(term.q.mean) + term.q.amplitude)
-    return total

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
@@ -14,7 +14,7 @@ from fpsolve.arrays import FloatArray
 from fpsolve.model.faults import strict_dataclass
 from fpsolve.model.noise import Gaussian, NoiseDerivative
 from fpsolve.model.noises.steps import FilterStep, transition
-from fpsolve.model.parameters import ANY_SIGN, SIZE, parameter, stated_field
+from fpsolve.model.parameters import ANY_SIGN, SIZE, Table, parameter, stated_field
 
 Pair = Annotated[tuple[float, float], Field(strict=False)]
 
@@ -61,7 +61,7 @@ class Filter(Gaussian):
             raise ValueError("got c0 = 0 and c1 = 0; ξ would be 0; let one of them differ from 0")
 
     @classmethod
-    def from_table(cls, table: Mapping[str, Any]) -> Filter:
+    def from_table(cls, table: Table) -> Filter:
         """The noise that a table of a case file states, where `output = [c0, c1]` may replace c0 and c1.
 
         Raises:

@@ -16,7 +16,6 @@ from fpsolve.model.noise import Gaussian, Noise, NoiseDerivative
 from fpsolve.model.noises.steps import LinearStep, linear_step
 from fpsolve.model.parameters import DERIVED, SIZE, parameter
 
-
 Intensity = Annotated[float, parameter("noise intensity", "D0 = 0.1", "$D_0$", "1/time", **SIZE)]
 Memory = Annotated[float, parameter("correlation time", "tau0 = 0.5", r"$\tau_0$", "time", **SIZE)]
 
@@ -121,7 +120,14 @@ class OrnsteinUhlenbeckByDeviation(GaussianNoise):
     alpha: Annotated[float, parameter("relaxation rate", "alpha = 1.0", r"$\alpha$", "1/time", **SIZE)]
     standard_deviation: float = cast(
         "float",
-        parameter("standard deviation of the noise", "standard_deviation = 0.7", r"$\sigma_\xi$", "1/time", **SIZE),
+        parameter(
+            "standard deviation of the noise",
+            "standard_deviation = 0.7",
+            r"$\sigma_\xi$",
+            "1/time",
+            ge=SIZE["ge"],
+            le=SIZE["le"],
+        ),
     )
 
     kind: ClassVar[str] = "ornstein-uhlenbeck"

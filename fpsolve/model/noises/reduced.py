@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal, cast
 
 from pydantic import Field
 from pydantic.fields import FieldInfo
@@ -14,7 +14,7 @@ from fpsolve.model.faults import TableError, strict_dataclass
 from fpsolve.model.kinds import noise_kind
 from fpsolve.model.noise import Noise, NoiseDerivative
 from fpsolve.model.noises.ornstein_uhlenbeck import GaussianNoise, Intensity, Memory
-from fpsolve.model.parameters import parameter, stated_field
+from fpsolve.model.parameters import Table, parameter, stated_field
 
 Departure = Annotated[
     float,
@@ -31,8 +31,7 @@ NEAR_GAUSSIAN = 0.1
 
 def _treatment(usual: str) -> Mapping[str, FieldInfo]:
     meaning = "Eq. (7) itself, or the reduction of Eqs. (12)-(14)"
-    kinds: Any = Literal["ou-reduction", "exact"]
-    return {"treatment": stated_field(kinds, meaning, 'treatment = "ou-reduction"', usual)}
+    return {"treatment": stated_field(Literal["ou-reduction", "exact"], meaning, 'treatment = "ou-reduction"', usual)}
 
 
 @strict_dataclass
@@ -66,18 +65,17 @@ class TreatedNoise(Noise):
         return 2 * (2 - self.r0) / self._bracket * self.tau0 if self._bracket > 0 else math.inf
 
     @classmethod
-    def from_table(cls, table: Mapping[str, Any]) -> TreatedNoise:
+    def from_table(cls, table: Table) -> TreatedNoise:
         if table.get("treatment", cls.words["treatment"]) != cls.words["treatment"]:
             raise TableError(f'got "exact" beside kind = "{cls.kind}"; remove one of the two', "treatment")
         return cls(**{name: value for name, value in table.items() if name != "treatment"})
 
     def at(self, values: Mapping[str, float | str]) -> TreatedNoise:
         """The noise with other values of D₀, τ₀, r₀ or of its treatment, "exact" or "ou-reduction"."""
-        numbers: dict[str, Any] = {**self.values, **values}
+        numbers = {**self.values, **values}
         if (treatment := numbers.pop("treatment")) not in ("exact", "ou-reduction"):
             raise ValueError(f'got {treatment!r} as a treatment of the noise; must be one of "exact", "ou-reduction"')
-        made: TreatedNoise = noise_kind("non-gaussian" if treatment == "exact" else treatment)(**numbers)
-        return made
+        return cast("TreatedNoise", noise_kind("non-gaussian" if treatment == "exact" else treatment)(**numbers))
 
 
 @strict_dataclass

@@ -181,4 +181,4 @@ def _driven(terms: Sequence[CoefficientMatrix], name: str) -> tuple[CoefficientM
 
 def noises_of(named: Mapping[str, Noise]) -> Noise:
     """A noise of a mapping from names: `Noises`, or the only one. Raises as `Noises`."""
-    return next(iter(named.values())) if len(named) == 1 else Noises(named)
+    return next(iter(named.values())) if len(named) == 1 else Noises(tuple(named.items()))

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
-from typing import Annotated, Any, ClassVar, Self
+from typing import Annotated, ClassVar, Self
 
 import numpy as np
 from pydantic import AfterValidator, BaseModel, BeforeValidator, Field
@@ -36,7 +36,7 @@ from fpsolve.model.expressions import (
 )
 from fpsolve.model.faults import TableError, table_of
 from fpsolve.model.noises.clock import Clock, Wave
-from fpsolve.model.parameters import STRICT, parameter, stated_field, unknown_parameter, without_unit
+from fpsolve.model.parameters import STRICT, Table, parameter, stated_field, unknown_parameter, without_unit
 from fpsolve.model.plane import (
     MOST_VARIABLES,
     CoefficientMatrix,
@@ -97,10 +97,10 @@ class StatedWall(BaseModel):
     model_config = STRICT
 
     at: Annotated[str, parameter("where the wall is", 'at = "x = 0"')]
-    restitution: Annotated[Any, parameter("R of v+ = -R v-, a number or an expression", "restitution = 0.8")]
+    restitution: Annotated[object, parameter("R of v+ = -R v-, a number or an expression", "restitution = 0.8")]
 
 
-def _as_table(value: Any) -> Any:
+def _as_table(value: object) -> object:
     return value if isinstance(value, dict | StatedParameter) else {"value": value}
 
 
@@ -149,12 +149,14 @@ class Wall:
     restitution: float | str
 
 
-def walls_of(walls: Any) -> tuple[Wall, ...]:
+def walls_of(walls: object) -> tuple[Wall, ...]:
     """Walls from mappings with their keys. Raises `TableError`."""
+    found = list[Wall]()
     for number, wall in enumerate(walls if isinstance(walls, list | tuple) else (walls,)):
         if not isinstance(wall, Mapping) or set(wall) != {"at", "restitution"}:
             raise TableError(f"got {shown(wall)}; must have the keys at and restitution alone", "walls", number)
-    return tuple(Wall(**wall) for wall in walls)
+        found.append(Wall(**wall))
+    return tuple(found)
 
 
 @dataclass(frozen=True)
@@ -204,8 +206,8 @@ class EquationSystem(System):
     }
 
     def __post_init__(self) -> None:
-        for key in ("variables", "drift"):
-            texts = tuple(each) if isinstance(each := getattr(self, key), list | tuple) else (each,)
+        for key, each in (("variables", self.variables), ("drift", self.drift)):
+            texts = tuple(each) if isinstance(each, list | tuple) else (each,)
             if not 1 <= len(texts) <= MOST_VARIABLES or not all(isinstance(text, str) for text in texts):
                 raise TableError(f"got {shown(each)}; must be a list of 1 to {MOST_VARIABLES} texts", key)
             object.__setattr__(self, key, texts)
@@ -226,7 +228,7 @@ class EquationSystem(System):
                 fault = "is the name of the small parameter; rename it"
             if fault:
                 raise TableError(f"got the name {shown(name)}; it {fault}", *path)
-        known = set[str]()
+        known = set[object]()
         for name, path in self._given_names():
             if name in known:
                 raise TableError(f"got the name {name} twice; all names must differ; rename one of them", *path)
@@ -266,7 +268,7 @@ class EquationSystem(System):
             raise TableError(f"got {found}; {why}; leave out walls", "walls")
         _ = self.stop, self.jumps  # refuse what they cannot be
 
-    def _given_names(self) -> Iterator[tuple[Any, Place]]:
+    def _given_names(self) -> Iterator[tuple[object, Place]]:
         """All names with their places."""
         yield from ((name, ("variables", i)) for i, name in enumerate(self.variables))
         yield from ((name, ("parameters", str(name))) for name, _ in self.named)
@@ -294,13 +296,13 @@ class EquationSystem(System):
         return found
 
     @classmethod
-    def takes(cls, key: str, table: Mapping[str, Any]) -> bool:
+    def takes(cls, key: str, table: Table) -> bool:
         """Besides what is `stated`, keys of parameters, whose values these replace, as `--set` writes them."""
         return key in table_of(table.get("parameters"))
 
     @classmethod
     def named_of(
-        cls, table: Mapping[str, Any], stated: Mapping[str, FieldInfo]
+        cls, table: Table, stated: Mapping[str, FieldInfo]
     ) -> tuple[tuple[tuple[str, float], ...], tuple[tuple[str, Quantity], ...]]:
         """The parameters of a table, those beside its `stated` keys in their place, and what they are.
 
@@ -324,7 +326,7 @@ class EquationSystem(System):
         return tuple(named.items()), quantities
 
     @classmethod
-    def from_table(cls, table: Mapping[str, Any]) -> EquationSystem:
+    def from_table(cls, table: Table) -> EquationSystem:
         named, quantities = cls.named_of(table, cls.stated)
         return cls(
             variables=table["variables"],
@@ -425,9 +427,8 @@ class EquationSystem(System):
             read.speeds[written] = speed
             turned, sign = first if name == "cos" else first - 0.5 * math.pi, math.copysign(1.0, speed[0])
             c, s = (round(each(turned), 16) for each in (math.cos, math.sin))
-            series = {"cos": (c, -s * slope), "sin": (-sign * s, -sign * c * slope)}
-            waves = {((), f"{each} {abs(speed[0])!r}", 0): value for each, value in series.items() if any(value)}
-            return Form(waves)
+            waves = {"cos": (c, -s * slope), "sin": (-sign * s, -sign * c * slope)}
+            return Form({((), f"{each} {abs(speed[0])!r}", 0): value for each, value in waves.items() if any(value)})
         fault = "" if name in self.variables else f"{name} is none of the variables {', '.join(self.variables)}"
         if parts or speed != (1.0, 0.0):
             fault = (
@@ -597,8 +598,8 @@ class EquationSystem(System):
                 must = "must be a number > 0, or an expression in the parameters"
                 raise ExpressionError(f"got {shown(restitution)}; {must}; write, for example, restitution = 0.8")
             names = {name: constant(each, float(name == by), *zeros) for name, each in named.items()}
-            found = log_of(str(restitution), names, "the restitution")
-        return found
+            logs = log_of(str(restitution), names, "the restitution")
+        return logs  # noqa: RET504
 
     @cached_property
     def _derivatives(self) -> Mapping[str, tuple[tuple[CoefficientMatrix, ...], tuple[float, ...]]]:
@@ -641,34 +642,27 @@ class EquationSystem(System):
             raise ValueError(f"the derivative of the system by {name} is not finite; choose another value of {name}")
         return self._derivatives[name]
 
-    @property
-    def impact_parameter(self) -> str:
-        if not self.walls:
-            return ""
-        own = names_in(str(self.walls[0].restitution)) - {EPSILON}
-        return next(iter(own)) if len(own) == 1 and not own & self._used else ""
-
-    @property
+    @cached_property
     def _law(self) -> str:
-        """The parameter that is the coefficient of restitution: R = 1 for 1, and more for more; empty where R is."""
-        name = self.impact_parameter
-        if not name:
+        """The parameter that is the coefficient of restitution, in ln R alone: R = 1 for 1, and more for more."""
+        own = names_in(str(self.walls[0].restitution)) - {EPSILON} if self.walls else frozenset()
+        if len(own) != 1 or own & self._used:
             return ""
-        try:
+        (name,) = own
+        with suppress(TableError):
             at_one, slope = self._log_factor(name, 1.0)
-        except TableError:
-            return ""
-        return name if abs(at_one) <= ROUNDED and slope > 0 else ""
+            return name if abs(at_one) <= ROUNDED and slope > 0 else ""
+        return ""
 
     @property
     def impact_symbol(self) -> str:
         return self._law or super().impact_symbol
 
-    def impact_value(self, log_factor: float) -> float:
+    def impact_value(self, log_factor: float) -> tuple[float, float]:
         """The coefficient of restitution for which ln R has a given value, by Newton's method; NaN if not found."""
         if not (name := self._law):
             return super().impact_value(log_factor)
-        value, step = 1.0, math.inf
+        value, step, slope = 1.0, math.inf, 0.0
         for _ in range(_NEWTON):
             try:
                 known, slope = self._log_factor(name, value)
@@ -676,18 +670,12 @@ class EquationSystem(System):
                 step /= 2
                 value -= step
                 continue
-            if not slope:
+            if not slope or abs(step) <= 4e-16 * max(1.0, abs(value)):
                 break
             step = (log_factor - known) / slope
-            if abs(step) <= 4e-16 * max(1.0, abs(value)):
-                return value
             value += step
-        return value if abs(step) <= ROUNDED * max(1.0, abs(value)) else math.nan
-
-    def impact_slope(self, log_factor: float) -> float:
-        if not (name := self._law):
-            return super().impact_slope(log_factor)
-        return 1 / self._log_factor(name, self.impact_value(log_factor))[1]
+        is_found = slope and abs(step) <= ROUNDED * max(1.0, abs(value))
+        return (value, 1 / slope) if is_found else (math.nan, math.nan)
 
 
 def _quantity(name: str, stated: StatedParameter) -> Quantity:

@@ -6,7 +6,7 @@ from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 from pydantic import BeforeValidator, Field
@@ -15,7 +15,7 @@ from pydantic.fields import FieldInfo
 from fpsolve.arrays import ROUNDED, FloatArray, real_number, shown
 from fpsolve.model.expressions import Form, Monomial, OfTime, Series, constant, evaluate, names_in
 from fpsolve.model.faults import TableError
-from fpsolve.model.parameters import stated_field
+from fpsolve.model.parameters import Table, stated_field
 from fpsolve.model.plane import MOST_VARIABLES
 from fpsolve.model.systems.equations import EPSILON, EquationSystem, Place, Read, placed, walls_of
 
@@ -141,7 +141,7 @@ class ModalSystem(EquationSystem):
         )
 
     @classmethod
-    def from_table(cls, table: Mapping[str, Any]) -> ModalSystem:
+    def from_table(cls, table: Table) -> ModalSystem:
         named, quantities = cls.named_of(table, cls.stated)
         given = {key: each for key, each in table.items() if key in cls.stated}
         walls = [each.model_dump() for each in table.get("walls", ())]
@@ -150,7 +150,7 @@ class ModalSystem(EquationSystem):
     def __post_init__(self) -> None:
         self._refuse_faults()
 
-    def _given_names(self) -> Iterator[tuple[Any, Place]]:
+    def _given_names(self) -> Iterator[tuple[object, Place]]:
         yield from ((name, ("modes",) if path[0] == "variables" else path) for name, path in super()._given_names())
 
     def _texts(self) -> Iterator[tuple[str, Place]]:
@@ -262,7 +262,7 @@ def _series(
     return found
 
 
-def _by_noise(key: str, given: Any, noises: Mapping[str, str]) -> Iterator[tuple[Place, str, Any]]:
+def _by_noise(key: str, given: object, noises: Mapping[str, str]) -> Iterator[tuple[Place, str, object]]:
     """The matrices of a key, each with its place and its noise, "" for none. Raises `TableError`."""
     if not key.endswith("_noise"):
         if given or key in ("mass", "stiffness") or not isinstance(given, list | tuple):
@@ -279,7 +279,7 @@ def _by_noise(key: str, given: Any, noises: Mapping[str, str]) -> Iterator[tuple
         yield from (((key,), name, given) for name in noises)
 
 
-def _count(mass: Any) -> int:
+def _count(mass: object) -> int:
     """The number of modes. Raises `TableError`."""
     if not isinstance(mass, list | tuple) or not 1 <= len(mass) <= MOST_MODES:
         must = f"must be a matrix of 1 to {MOST_MODES} rows, one for each mode"
@@ -287,7 +287,7 @@ def _count(mass: Any) -> int:
     return len(mass)
 
 
-def _rows(matrix: Any, count: int, place: Place) -> Rows:
+def _rows(matrix: object, count: int, place: Place) -> Rows:
     """The rows of a matrix, numbers and texts. Raises `TableError`."""
     stated = matrix if isinstance(matrix, list | tuple) else ()
     if [len(row) if isinstance(row, list | tuple) else 0 for row in stated] != [count] * count:
@@ -296,7 +296,7 @@ def _rows(matrix: Any, count: int, place: Place) -> Rows:
     return tuple(tuple(_entry(each, (*place, i, j)) for j, each in enumerate(row)) for i, row in enumerate(stated))
 
 
-def _entry(given: Any, place: Place) -> Entry:
+def _entry(given: object, place: Place) -> Entry:
     """An entry of a matrix. Raises `TableError`."""
     if isinstance(given, str):
         return given
@@ -307,7 +307,7 @@ def _entry(given: Any, place: Place) -> Entry:
         raise TableError(f"got {shown(given)}; {must}; write, for example, 1.0", *place) from None
 
 
-def _listed(given: Any) -> Any:
+def _listed(given: object) -> object:
     """Arrays of NumPy as lists."""
     if isinstance(given, Mapping):
         return {key: _listed(each) for key, each in given.items()}

@@ -41,8 +41,7 @@ class PlaneSystem(System):
     dimensions: ClassVar[Sequence[int]] = (2,)
 
     def __post_init__(self) -> None:
-        for name, kind in (("terms", CoefficientMatrix), ("jumps", Jump)):
-            given = getattr(self, name)
+        for name, given, kind in (("terms", self.terms, CoefficientMatrix), ("jumps", self.jumps, Jump)):
             stated = tuple(given) if isinstance(given, Iterable) else (None,)
             if not all(isinstance(each, kind) for each in stated):
                 raise TypeError(f"got {name} = {shown(given)}; must be a list, each a {kind.__name__}")
