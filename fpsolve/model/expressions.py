@@ -20,7 +20,7 @@ from operator import add
 from fpsolve.model.parameters import without_unit
 
 Series = tuple[float, ...]
-"""Taylor coefficients in one parameter, the value first; all in one calculation have one length."""
+"""Taylor coefficients in one parameter, the value first, three at most; all in one calculation have one length."""
 Monomial = tuple[tuple[str, ...], str, int]
 """The variables of the state that are multiplied, in order, a noise or "", and the power of ε."""
 NUMBER: Monomial = (), "", 0
@@ -134,29 +134,28 @@ def _product(a: Series, b: Series) -> Series:
     return tuple(sum(a[i] * b[k - i] for i in range(k + 1)) for k in range(len(a)))
 
 
+def _function(a: Series, value: float, slope: float, curvature: float) -> Series:
+    """A function of a series, of three coefficients at most, from its value and its first derivatives there."""
+    first, second = (*a[1:], 0.0, 0.0)[:2]
+    return (value, slope * first, slope * second + 0.5 * curvature * first**2)[: len(a)]
+
+
 def _exponential(a: Series) -> Series:
-    c = [math.exp(a[0])]
-    for k in range(1, len(a)):
-        c.append(sum(i * a[i] * c[k - i] for i in range(1, k + 1)) / k)
-    return tuple(c)
+    return _function(a, *3 * (math.exp(a[0]),))
 
 
-def _logarithm(a: Series, first: float) -> Series:
+def _logarithm(a: Series, value: float) -> Series:
     """ln of a series, whose first coefficient is known."""
-    c = [first]
-    for k in range(1, len(a)):
-        c.append((a[k] - sum(i * c[i] * a[k - i] for i in range(1, k)) / k) / a[0])
-    return tuple(c)
+    return _function(a, value, 1 / a[0], -1 / a[0] ** 2)
 
 
 def _power(a: Series, power: float) -> Series:
     """a^r. Raises `_Unsuitable` where it is no real number."""
     if a[0] < 0 and not power.is_integer():
         raise _Unsuitable(*NOT_REAL)
-    c = [1 / a[0] if power == -1 else a[0] ** power]
-    for k in range(1, len(a)) if any(a[1:]) else ():
-        c.append(sum((power * i - (k - i)) * a[i] * c[k - i] for i in range(1, k + 1)) / (k * a[0]))
-    return (*c, *a[len(c) :])
+    value = 1 / a[0] if power == -1 else a[0] ** power
+    slope = power * value / a[0] if any(a[1:]) else 0.0
+    return _function(a, value, slope, (power - 1) * slope / a[0] if slope else 0.0)
 
 
 FUNCTIONS: Mapping[str, Callable[[Series], Series]] = {

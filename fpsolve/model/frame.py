@@ -21,6 +21,7 @@ from scipy.linalg import solve_triangular
 
 from fpsolve.arrays import FloatArray
 from fpsolve.model.plane import (
+    STEADY,
     CoefficientMatrix,
     CubicTerms,
     Impulse,
@@ -100,7 +101,7 @@ class Frame:
         is_turn = np.all(abs(a - turned) <= ROUNDED * (abs(self._inverse) @ abs(free) @ abs(self._array)))
         steady = CoefficientMatrix(0, (turned if is_turn and len(a) == 2 else a).tolist())
         jumps = [replace(jump, phase=float(self.phase(np.array(jump.phase)))) for jump in system.jumps]
-        return LinearMotion(system.epsilon, (steady, *others), tuple(jumps))
+        return LinearMotion((steady, *others), tuple(jumps), system.epsilon)
 
     @property
     def parts(self) -> int:
@@ -144,10 +145,10 @@ def own_frame(n: int, motion: Motion, spread: Callable[[str], tuple[float, float
     """
     (drift, diffusions, impulses), epsilon = motion, motion.drift.epsilon
     sums = by_noise(drift, drift.terms)
-    parts = [(sums.pop(None), 1.0, 0.0, 0.0, 0.0)]
+    parts = [(sums.pop(STEADY), 1.0, 0.0, 0.0, 0.0)]
     parts += [(epsilon**each.order * np.array(each.matrix), 0.0, 1.0, 0.0, 0.0) for each in diffusions]
     parts += [(np.array(each.exponent), each.rate, 0.0, 0.0, 0.0) for each in impulses]
-    parts += [(each, 0.0, 0.0, *spread(key[0])) for key, each in sums.items() if key and np.any(each)]
+    parts += [(each, 0.0, 0.0, *spread(key[0])) for key, each in sums.items() if np.any(each)]
     matrices = np.array([each for each, *_ in parts])
     linear, square, deviations, times = np.array([numbers for _, *numbers in parts]).T
 

@@ -194,7 +194,8 @@ class Parametrised:
 
     def at(self, values: Mapping[str, float | str]) -> Self:
         """A system or a noise with other values of some parameters. Raises `ValueError` where one is out of range."""
-        return replace(self, **values)  # type: ignore[type-var]
+        made: Self = replace(cast("Any", self), **values)
+        return made
 
 
 @cache

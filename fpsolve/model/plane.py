@@ -12,9 +12,10 @@ from __future__ import annotations
 import math
 import re
 from abc import abstractmethod
+from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
@@ -141,6 +142,12 @@ class Function:
         return (offset, slope) if np.all(near) else None
 
 
+Driver = tuple[str, Constant | Linear | Function]
+"""The name of a noise, and a function of it."""
+STEADY: Driver = "", one
+"""What is driven by nothing."""
+
+
 def coefficient(g: Coefficient) -> Constant | Linear | Function:
     """A coefficient as a value. Raises `TypeError` where it is no function."""
     if isinstance(g, Constant | Linear | Function):
@@ -221,6 +228,12 @@ class CoefficientMatrix:
         object.__setattr__(self, "order", int(self.order))
         object.__setattr__(self, "matrix", tuple(map(tuple, entries.tolist())))
         object.__setattr__(self, "g", coefficient(self.g))
+
+    @property
+    def drivers(self) -> Sequence[tuple[Driver, float]]:
+        """What drives it, the noise and a function of it, each with a factor: nothing and ξ for a + bξ."""
+        (offset, slope), g = (line, identity) if (line := affine(self.g)) else ((0.0, 1.0), self.g)
+        return [(driver, c) for driver, c in ((STEADY, offset), ((self.noise, g), slope)) if c]
 
     @cached_property
     def h(self) -> Harmonics:
@@ -352,34 +365,26 @@ class Jump:
 
     def refuse(self, system: System, noise: Any) -> None:
         """Refuse it where a noise moves the phase across the ray, or nothing does. Raises `ValueError`."""
-        ray, names = f"the ray of a jump, phi = {self.phase:.6g}", [*noise.parts]
+        ray = f"the ray of a jump, phi = {self.phase:.6g}"
         x, u = (0.0 if abs(each) < 1e-15 else each for each in (math.cos(self.phase), -math.sin(self.phase)))
-        shares = u * x, u * u, -x * x, -x * u  # h = e′ᵀA e is the sum of these times the entries of A, in any units
-        driven = dict[str | None, list[tuple[CoefficientMatrix, FloatArray]]]()
+        shares = (u * x, u * u), (-x * x, -x * u)  # h = e′ᵀA e is the sum of these times the entries of A, in any units
+        speeds, limits, size = defaultdict[Driver, float](float), defaultdict[Driver, float](float), 0.0
         for term in system.terms:
-            if np.any(parts := np.multiply(shares, np.ravel(term.matrix))):
-                by = (term.noise if len(names) > 1 else names[0]) if is_driven(term.g) else None
-                driven.setdefault(by, []).append((term, parts))
-        total = size = 0.0
-        for name, own in driven.items():
-            one, xi = noise.parts.get(name or "", noise), np.array([0.0, 1.0])
-            if any(affine(term.g) is None for term, _ in own):
-                xi = one.reached
-            speeds, rounded = np.zeros(xi.size), 0.0
-            for term, parts in own:
-                strengths = system.epsilon**term.order * term.g(xi)
-                most, whole = float(np.max(np.abs(strengths))), float(np.abs(parts).sum())
-                speeds, size = speeds + sum(parts.tolist()) * strengths, size + whole * most
-                rounded += (ROUNDED * whole + OF_ENTRIES * term.fastest[0]) * most
-            if name is not None and not np.ptp(speeds) <= rounded:
-                which = f'the noise "{name}"' if name else f"{one.kind} noise"
+            parts = np.multiply(shares, term.matrix)
+            for driver, c in term.drivers:
+                strength, whole = abs(c) * system.epsilon**term.order, float(np.abs(parts).sum())
+                speeds[driver] += math.copysign(strength, c) * float(parts.sum())
+                limits[driver] += strength * (ROUNDED * whole + OF_ENTRIES * term.fastest[0])
+                size += strength * whole
+        for driver, speed in speeds.items():
+            if driver != STEADY and abs(speed) > limits[driver]:
+                which = f'the noise "{driver[0]}"' if len(noise.parts) > 1 else f"{noise.kind} noise"
                 raise ValueError(
                     f"{which} moves the phase across {ray}, which it does over no wall: x = 0, phi = pi/2 = "
                     "1.5707963267948966, is passed with the speed v whatever the noise; let it drive terms that do "
                     "not move the phase there, or remove the jump"
                 )
-            total += float(speeds[0])
-        if abs(total) <= ROUNDED * size:
+        if abs(speeds[STEADY]) <= ROUNDED * size:
             raise ValueError(
                 f"the phase does not pass {ray}: nothing moves it there, so that no path comes to this wall; remove "
                 "the jump"
@@ -619,12 +624,12 @@ class System(Parametrised):
 
 @dataclass(frozen=True)
 class LinearMotion(System):
-    """Terms and jumps alone: what is left of a system beside white noise, or in other coordinates, or its ∂/∂θ."""
+    """Matrices alone: what is left of a system beside white noise, or in other coordinates, or its ∂/∂θ."""
 
-    epsilon: float
-    terms: tuple[CoefficientMatrix, ...]
-    jumps: tuple[Jump, ...] = ()
-    pasts: Sequence[tuple[int, float]] = ()
+    terms: Sequence[CoefficientMatrix]
+    jumps: Sequence[Jump] = ()
+    epsilon: float = 1.0
+    pasts: Sequence[tuple[int, float]] = field(default=(), kw_only=True)
 
 
 class Motion(NamedTuple):
@@ -675,15 +680,12 @@ def split_by_noise(system: System, terms: Sequence[CoefficientMatrix]) -> tuple[
     return steady, driven
 
 
-def by_noise(system: System, terms: Sequence[CoefficientMatrix]) -> dict[tuple[str, Coefficient] | None, FloatArray]:
-    """Sums, with the powers of ε, of what no noise drives (None), and of what each drives by each g, a + bξ apart."""
-    found: dict[tuple[str, Coefficient] | None, FloatArray] = {None: np.zeros((system.dimension, system.dimension))}
+def by_noise(system: System, terms: Sequence[CoefficientMatrix]) -> dict[Driver, FloatArray]:
+    """Sums, with the powers of ε, of what is steady, and of what each noise drives by each function."""
+    found: dict[Driver, FloatArray] = {STEADY: np.zeros((system.dimension, system.dimension))}
     for term in terms:
-        line = affine(term.g)
-        (offset, slope), g = line or (0.0, 1.0), identity if line else term.g
-        for key, c in (None, offset), ((term.noise, g), slope):
-            if c:
-                found[key] = found.get(key, 0.0) + c * system.epsilon**term.order * np.array(term.matrix)
+        for driver, c in term.drivers:
+            found[driver] = found.get(driver, 0.0) + c * system.epsilon**term.order * np.array(term.matrix)
     return found
 
 
@@ -751,13 +753,13 @@ def matrix_at(system: System, xi: Xi, orders: slice = slice(None)) -> FloatArray
 
     With several noises ξ is a mapping from their names to arrays, and its shape that of these broadcast together.
     """
-    named = {name: np.asarray(each, dtype=float) for name, each in xi.items()} if isinstance(xi, Mapping) else {}
-    rest = np.zeros(np.broadcast_shapes(*(each.shape for each in named.values()))) if named else np.asarray(xi, float)
-    total = np.zeros((*rest.shape, system.dimension, system.dimension))
+    named, others = (xi, 0.0) if isinstance(xi, Mapping) else ({}, xi)
+    shape = np.broadcast_shapes(np.shape(others), *map(np.shape, named.values()))
+    total = np.zeros((*shape, system.dimension, system.dimension))
     wanted = range(1 + max((term.order for term in system.terms), default=0))[orders]
     for term in system.terms:
         if term.order in wanted:
-            values = term.g(named.get(term.noise, rest))
+            values = np.asarray(term.g(np.asarray(named.get(term.noise, others), dtype=float)))
             total += system.epsilon**term.order * values[..., None, None] * np.array(term.matrix)
     return total
 

@@ -37,9 +37,10 @@ from fpsolve.model.noises.ornstein_uhlenbeck import GaussianNoise
 from fpsolve.model.noises.several import noises_of
 from fpsolve.model.noises.white import Interpretation, White
 from fpsolve.model.plane import (
+    STEADY,
     CoefficientMatrix,
     System,
-    affine,
+    by_noise,
     matrix_at,
     rotating_coordinates,
     written_coefficient,
@@ -183,14 +184,13 @@ class Statement(Record):
             ValueError: the speed of the phase at the ray of a jump has no one sign.
         """
         system, noise = problem.system, problem.noise
-        parts = np.zeros((2, 2, 2))
-        for term in system.terms:
-            line = affine(term.g)
-            if line is None:
-                told = written_coefficient(term.g).strip()
+        sums = by_noise(system, system.terms)
+        still = sums.pop(STEADY)
+        for _, g in sums:
+            if g != identity:
+                told = written_coefficient(g).strip()
                 raise TypeError(f"got the coefficient {told}; proofs are for coefficients a + b ξ")
-            parts += np.multiply.outer(line, system.epsilon**term.order * np.array(term.matrix))
-        still, driven = parts
+        driven = sum(sums.values(), np.zeros((2, 2)))
         if type(noise) is White and noise.interpretation == Interpretation.ITO:
             still = still - noise.s**2 / 2 * driven @ driven
         found = cls(

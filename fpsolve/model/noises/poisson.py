@@ -116,7 +116,7 @@ class Poisson(Memoryless):
             ValueError: a coefficient is no a + bξ, or impulses multiply the state by more than numbers hold.
         """
         terms, driven = split_by_noise(system, system.terms)
-        drift = LinearMotion(system.epsilon, tuple(terms), tuple(system.jumps))
+        drift = LinearMotion(tuple(terms), system.jumps, system.epsilon)
         if not driven.any():
             return Motion(drift)
         if float(np.max(np.abs(np.linalg.eigvals(driven)))) * max(map(abs, self.sizes)) > LARGEST:

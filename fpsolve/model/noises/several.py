@@ -143,11 +143,11 @@ class Noises(Noise):
     def motion(self, system: System) -> Motion:
         """The motion besides the white noises, and what all white noises add, each in its own `sense`."""
         moved = [
-            noise.motion(LinearMotion(system.epsilon, _driven(system.terms, name), tuple(system.jumps)))
+            noise.motion(LinearMotion(_driven(system.terms, name), system.jumps, system.epsilon))
             for name, noise in self._white
         ]
         terms = [*self._others(system.terms), *chain.from_iterable(each.drift.terms for each in moved)]
-        drift = LinearMotion(system.epsilon, tuple(terms), tuple(system.jumps))
+        drift = LinearMotion(tuple(terms), system.jumps, system.epsilon)
         return Motion(drift, *(list(chain.from_iterable(parts)) for parts in list(zip(*moved, strict=True))[1:]))
 
     def driving(self, system: System) -> Noise:
@@ -159,7 +159,7 @@ class Noises(Noise):
         part, _, parameter = name.rpartition(".")
         changed = [MotionDerivative(self._others(terms))]
         for own, noise in self._white:
-            driven = LinearMotion(system.epsilon, _driven(system.terms, own))
+            driven = LinearMotion(_driven(system.terms, own), epsilon=system.epsilon)
             changed.append(noise.changed_motion(driven, _driven(terms, own), parameter if part == own else ""))
         return MotionDerivative(*(list(chain.from_iterable(parts)) for parts in zip(*changed, strict=True)))
 

@@ -85,7 +85,7 @@ class White(Memoryless):
         diffusions = [_term(system, self.s * driven, _order(system))] if driven.any() else []
         if self.interpretation == Interpretation.ITO and diffusions:
             drift.append(_term(system, -0.5 * self.s**2 * driven @ driven, 2 * _order(system)))
-        return Motion(LinearMotion(system.epsilon, tuple(drift), tuple(system.jumps)), diffusions)
+        return Motion(LinearMotion(tuple(drift), system.jumps, system.epsilon), diffusions)
 
     def changed_motion(self, system: System, terms: Sequence[CoefficientMatrix], name: str = "") -> MotionDerivative:
         _, driven = split_by_noise(system, system.terms)

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 import re
+from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
-from typing import Annotated, ClassVar, Self
+from operator import itemgetter
+from typing import Annotated, ClassVar, Self, cast
 
 import numpy as np
 from pydantic import AfterValidator, BaseModel, BeforeValidator, Field
@@ -179,8 +181,8 @@ class EquationSystem(System):
         TableError: one of these is not what it must be, with its place.
     """
 
-    variables: tuple[str, ...]
-    drift: tuple[str, ...]
+    variables: Sequence[str]
+    drift: Sequence[str]
     named: tuple[tuple[str, float], ...] = ()
     noises: tuple[tuple[str, str], ...] = (("xi", "noise"),)
     walls: tuple[Wall, ...] = ()
@@ -374,7 +376,7 @@ class EquationSystem(System):
         for name in values:
             if name not in known:
                 raise ValueError(f"got {name}; the parameters are {', '.join(known) or 'none'}")
-        return replace(self, named=tuple({**known, **values}.items()))  # type: ignore[arg-type]
+        return replace(self, named=tuple({**dict(self.named), **cast("dict[str, float]", values)}.items()))
 
     @cached_property
     def _read(self) -> Read:
@@ -488,18 +490,16 @@ class EquationSystem(System):
         """
         has_orders = EPSILON in dict(self.named)
         names = {name: section[6:] for name, section in self.noises} if len(self.noises) > 1 else {}
-        columns, matrices = [*self.variables, *last, *self._read.delays], dict[tuple[int, str], FloatArray]()
-        size = len(self.variables) + len(last) + len(self.pasts)
+        columns, size = [*self.variables, *last, *self._read.delays], len(self.variables) + len(last) + len(self.pasts)
+        matrices = defaultdict[tuple[int, str], FloatArray](lambda: np.zeros(2 * (size,)))
         for i, form in enumerate(rates):
             for (states, noise, power), series in form.parts.items():
-                if len(states) > 1 or not (states or last):
-                    continue
-                order = power if has_orders else int(bool(noise))
-                matrix = matrices.setdefault((order, noise), np.zeros(2 * (size,)))
-                matrix[i, columns.index((*states, *last)[0])] += series[at]
+                if len(states) == 1 or (last and not states):
+                    order = power if has_orders else int(bool(noise))
+                    matrices[order, noise][i, columns.index((*states, *last)[0])] += series[at]
         terms = [
             CoefficientMatrix(order, matrix.tolist(), *self._coefficient(noise, names))
-            for (order, noise), matrix in sorted(matrices.items(), key=lambda item: item[0])
+            for (order, noise), matrix in sorted(matrices.items(), key=itemgetter(0))
             if at == 0 or matrix.any()
         ]
         return as_plane(terms, 0.0 if at else max((abs(matrix).max() for matrix in matrices.values()), default=0.0))
@@ -519,7 +519,7 @@ class EquationSystem(System):
     def forced(self) -> System | None:
         if not any(not states for form in self._rates for states, _, _ in form.parts):
             return None
-        return LinearMotion(self.epsilon, self._terms_of(self._rates, 0, [""]), (), self.pasts)
+        return LinearMotion(self._terms_of(self._rates, 0, [""]), (), self.epsilon, pasts=self.pasts)
 
     @property
     def driven_by(self) -> frozenset[str]:
@@ -630,10 +630,11 @@ class EquationSystem(System):
         recurring = [delay for _, delay in read.delays.values()], [*read.speeds.values()]
         rates = [[slope / value for value, slope in each] for each in recurring if each]
         alike = all(np.ptp(each) <= ROUNDED * max(map(abs, each)) for each in rates)
-        return alike and not (self.stop and self._moves_wall(name))
+        is_moved = self.stop and (self._moves_wall(name) or (self.stop.restitution == 1 and self._derivatives[name][1]))
+        return alike and not is_moved
 
     def _moves_wall(self, name: str) -> bool:
-        """Whether the coordinates of the wall depend on a parameter."""
+        """Whether the coordinates of a wall depend on a parameter."""
         return name in names_in(self.drift[self._place()[0]])
 
     def derivative(self, name: str) -> tuple[tuple[CoefficientMatrix, ...], tuple[float, ...]]:
