@@ -238,7 +238,7 @@ def check_start(problem: Problem, phi: Any, xi: Any) -> None:
     if isinstance(xi, str) and xi == STATIONARY:
         return
     value = real_number(xi, "xi")
-    if why := problem.coloured.misfit(value):
+    if why := problem.valued.misfit(value):
         raise ValueError(f"got xi = {value:g}{why}")
 
 

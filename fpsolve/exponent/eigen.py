@@ -213,7 +213,7 @@ def _is_rightmost(pair: PrincipalPair) -> bool:
     Where T lies between positive bounds, none is: E‖x(t)‖^p ≤ (max T/min T) exp(Λt) from every start.
     """
     problem, space = pair.generator.problem, pair.space
-    if problem.coloured.is_bounded and not space.is_tilted:
+    if problem.valued.is_bounded and not space.is_tilted:
         values = space.on_grid(pair.right)
         if np.min(values) > LEAST_OF_MOST * np.max(values):
             return True
@@ -251,7 +251,7 @@ def _has_other_positive(generator: Generator, p: float) -> bool:
     if generator.may_hold:
         return True
     if (frozen := frozen_noise(problem)) is None:
-        ends = [np.sort(each.reached)[[0, -1]] for each in problem.coloured.parts.values()]
+        ends = [np.sort(each.reached)[[0, -1]] for each in problem.valued.parts.values()]
         speed = phase_speed(problem.motion, problem.at_values(ends))
         return bool(np.any(np.abs(speed.mean) <= speed.amplitude))
     lines = generator.chosen.xi.lines

@@ -141,7 +141,7 @@ class DirectionStart(Start):
         )
         if nearest:
             return replace(nearest.start.again(), before=(), near=nearest.pair)
-        noises = (first_axis(noise, -math.log10(rtol)) for noise in problem.coloured.parts.values())
+        noises = (first_axis(noise, -math.log10(rtol)) for noise in problem.valued.parts.values())
         return cls(problem, Space((cls.directions(problem), *noises)))
 
     @staticmethod

@@ -113,7 +113,7 @@ class Noise(Parametrised):
         return {"": self}
 
     @property
-    def coloured(self) -> Noise:
+    def valued(self) -> Noise:
         """Of several noises those that have values; where all are white, the first of them."""
         return self
 
@@ -210,7 +210,7 @@ class Noise(Parametrised):
         return np.asarray(min(self.half_width, 12 * self.standard_deviation) * np.linspace(-1, 1, 1001))
 
     @property
-    def typical(self) -> FloatArray:
+    def extremes(self) -> FloatArray:
         """The ends of the range where ξ is mostly; of a chain all states."""
         return min(2 * self.standard_deviation, self.half_width) * np.array([-1.0, 1.0])
 
@@ -345,7 +345,7 @@ class Memoryless(Noise):
     def reached(self) -> FloatArray:
         return np.zeros(1)
 
-    typical = reached
+    extremes = reached
 
     def start(self, size: int, rng: np.random.Generator) -> FloatArray:
         """0: it has no value."""

@@ -48,7 +48,7 @@ class ParameterDerivative:
         noise: that of the noise; None where it does not change.
         diffusions: that of each of the `diffusions`; empty where none changes.
         impulses: that of each of the `impulses`, of its rate and of its exponent; empty where none changes.
-        part: which of the `coloured` noises changes.
+        part: which of the `valued` noises changes.
     """
 
     theta: float
@@ -127,28 +127,28 @@ class Problem:
 
     def wall_speeds(self, motion: System) -> list[float]:
         """dφ/dt of a motion in the coordinates of `frame` at the ray of each jump, which no noise changes."""
-        speed = phase_speed(motion, self.typical)
+        speed = phase_speed(motion, self.extremes)
         return [float(np.ravel(speed(jump.phase))[0]) for jump in self.motion.jumps]
 
     @cached_property
-    def coloured(self) -> Noise:
+    def valued(self) -> Noise:
         """The noise, or of several those that have values; where all are white, the first of them."""
-        return self.noise.coloured
+        return self.noise.valued
 
     def named_noise(self, name: str) -> Noise:
         """The noise that terms name so; with one noise that one, whatever its name."""
         return self.noise.parts.get(name, self.noise)
 
     def at_values(self, values: Sequence[FloatArray]) -> Xi:
-        """ξ of all combinations of some values of each of the `coloured` noises, as `matrix_at` takes it."""
+        """ξ of all combinations of some values of each of the `valued` noises, as `matrix_at` takes it."""
         if len(values) == 1:
             return values[0]
-        return dict(zip(self.coloured.parts, np.meshgrid(*values, indexing="ij", sparse=True), strict=True))
+        return dict(zip(self.valued.parts, np.meshgrid(*values, indexing="ij", sparse=True), strict=True))
 
     @property
-    def typical(self) -> Xi:
-        """All combinations of the `typical` values of the noises."""
-        return self.at_values([each.typical for each in self.coloured.parts.values()])
+    def extremes(self) -> Xi:
+        """All combinations of the `extremes` of the noises."""
+        return self.at_values([each.extremes for each in self.valued.parts.values()])
 
     @property
     def drift(self) -> System:
@@ -311,7 +311,7 @@ class Problem:
             if not (own := self.named_noise(part)).is_white:
                 noise = own.derivative(name)
         moved = self.noise.changed_motion(self.system, terms, changed)
-        axes = [*self.coloured.parts]
+        axes = [*self.valued.parts]
         return ParameterDerivative(
             float(self.values[key]),
             tuple(map(self.frame.term, moved.terms)),

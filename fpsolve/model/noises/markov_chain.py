@@ -63,7 +63,7 @@ class Chain(Noise):
         is_state = np.any(np.isclose(self.states, xi, rtol=1e-9, atol=0))
         return "" if is_state else f"; must be one of the states, {', '.join(f'{each:g}' for each in self.states)}"
 
-    typical = reached
+    extremes = reached
 
     @property
     def standard_deviation(self) -> float:

@@ -25,7 +25,7 @@ class Noises(Noise):
     >>> from fpsolve import OrnsteinUhlenbeck
     >>> from fpsolve.model.noises.white import White
     >>> noises = Noises({"axial": OrnsteinUhlenbeck(alpha=1.0, sigma=0.3), "lateral": White(s=0.2)})
-    >>> noises.coloured.kind
+    >>> noises.valued.kind
     'ornstein-uhlenbeck'
 
     A function of the noises has one variable for each noise that has a value; white noise and impulses have none.
@@ -70,14 +70,14 @@ class Noises(Noise):
         return dict(self.named)
 
     @cached_property
-    def coloured(self) -> Noise:
+    def valued(self) -> Noise:
         """The noise, or the noises, that have values; if all are white, the first of them, with the value 0."""
         valued = [(name, noise) for name, noise in self.named if not noise.is_white] or [self.named[0]]
         return valued[0][1] if len(valued) == 1 else self if len(valued) == len(self.named) else Noises(tuple(valued))
 
     @property
     def _valued(self) -> Iterable[Noise]:
-        return self.coloured.parts.values()
+        return self.valued.parts.values()
 
     @property
     def is_white(self) -> bool:
@@ -86,13 +86,13 @@ class Noises(Noise):
 
     @property
     def has_states(self) -> bool:
-        """Whether all `coloured` noises jump between states."""
+        """Whether all `valued` noises jump between states."""
         return all(noise.has_states for noise in self._valued)
 
     @property
     def is_diffusion(self) -> bool:
         """Whether only one noise has values, and is a diffusion by itself."""
-        return self.coloured is not self and self.coloured.is_diffusion
+        return self.valued is not self and self.valued.is_diffusion
 
     @property
     def is_random(self) -> bool:
@@ -112,7 +112,7 @@ class Noises(Noise):
 
     @property
     def standard_deviation(self) -> float:
-        """The largest standard deviation of the `coloured` noises."""
+        """The largest standard deviation of the `valued` noises."""
         return max(noise.standard_deviation for noise in self._valued)
 
     @property
