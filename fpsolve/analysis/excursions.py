@@ -17,7 +17,7 @@ as under the measure changed by the martingale (φ, ξ) has the density T T*/⟨
 of time: by the renewal theorem it is as often near ln A as near any other value. For A → ∞ it bounds P(sup ‖x‖ ≥ A).
 
 ‖x‖ is the length of the vector of the variables of the system. With x = Sy and ρ = |y|/|x| its T(φ, ξ) is ρ^p T_y(ψ, ξ)
-of what is solved for y, see `model.frame`.
+of what is solved for y, see `model.coordinates`.
 """
 
 from __future__ import annotations
@@ -212,9 +212,7 @@ def solve_excursion(solver: ExponentSolver, *, phi: Start, xi: StartOfNoise, roo
     if unseen := solver.method.unseen():
         return replace(found, notes=(unseen,))
     moved = problem.noise.motion(problem.system)
-    struck = [float(np.linalg.norm(each.matrix, 2)) for each in moved.impulses]
-    overshoot = max([1.0, *(math.exp(jump.log_factor) for jump in problem.system.jumps), *struck])
-    is_smooth = overshoot == 1.0 and not struck and all(each.q.vanishes for each in moved.diffusions)
+    overshoot, is_smooth = moved.overshoot, moved.rises_smoothly
     p, pairs, notes = index.value, [solver.pair(index.value)], list[Message]()
     if problem.noise.is_bounded:
         least, most = _settled(solver, pairs, lambda pair: _extremes(pair, is_smooth) / _at_start(pair, phi, xi))

@@ -11,7 +11,7 @@ from .noises.ornstein_uhlenbeck import OrnsteinUhlenbeck as OrnsteinUhlenbeck
 from .noises.ornstein_uhlenbeck import OrnsteinUhlenbeckByDeviation as OrnsteinUhlenbeckByDeviation
 from .noises.ornstein_uhlenbeck import OrnsteinUhlenbeckByIntensity as OrnsteinUhlenbeckByIntensity
 from .noises.poisson import Poisson as Poisson
-from .noises.reduced import ReducedNoise as ReducedNoise
+from .noises.reduction import ReducedNoise as ReducedNoise
 from .noises.several import Noises as Noises
 from .noises.telegraph import Telegraph as Telegraph
 from .noises.white import Interpretation as Interpretation

@@ -17,7 +17,7 @@ from scipy.optimize import brentq
 
 from fpsolve.arrays import ROUNDED, FloatArray
 from fpsolve.messages import Code, Message
-from fpsolve.model.frame import Frame
+from fpsolve.model.coordinates import Frame
 from fpsolve.model.plane import CoefficientMatrix, System, matrix_at
 from fpsolve.model.problem import Problem
 

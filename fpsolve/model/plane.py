@@ -645,6 +645,17 @@ class Motion(NamedTuple):
     diffusions: Sequence[CoefficientMatrix] = ()
     impulses: Sequence[Impulse] = ()
 
+    @property
+    def overshoot(self) -> float:
+        """The largest factor by which ‖x‖ jumps upwards, 1 where it does not."""
+        struck = [float(np.linalg.norm(each.matrix, 2)) for each in self.impulses]
+        return max([1.0, *(math.exp(jump.log_factor) for jump in self.drift.jumps), *struck])
+
+    @property
+    def rises_smoothly(self) -> bool:
+        """Whether ‖x‖ is differentiable but where a wall makes it smaller."""
+        return self.overshoot == 1.0 and not self.impulses and all(each.q.vanishes for each in self.diffusions)
+
 
 class MotionDerivative(NamedTuple):
     """∂/∂θ of a `Motion`: of the sum of the terms of its drift, of each diffusion, and of each rate and exponent."""

@@ -13,8 +13,8 @@ import numpy as np
 
 from fpsolve.arrays import FloatArray, shown
 from fpsolve.messages import Code, Message, Remedy
+from fpsolve.model.coordinates import Frame, own_frame
 from fpsolve.model.expressions import TIME
-from fpsolve.model.frame import Frame, own_frame
 from fpsolve.model.noise import Noise, NoiseDerivative
 from fpsolve.model.noises.several import noises_of
 from fpsolve.model.parameters import DERIVED, Parameter, Parametrised

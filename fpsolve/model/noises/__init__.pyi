@@ -6,7 +6,7 @@ from .non_gaussian import NonGaussianNoise as NonGaussianNoise
 from .ornstein_uhlenbeck import OrnsteinUhlenbeck as OrnsteinUhlenbeck
 from .ornstein_uhlenbeck import OrnsteinUhlenbeckByDeviation as OrnsteinUhlenbeckByDeviation
 from .ornstein_uhlenbeck import OrnsteinUhlenbeckByIntensity as OrnsteinUhlenbeckByIntensity
-from .reduced import ReducedNoise as ReducedNoise
+from .reduction import ReducedNoise as ReducedNoise
 from .several import Noises as Noises
 from .telegraph import Telegraph as Telegraph
 from .white import Interpretation as Interpretation

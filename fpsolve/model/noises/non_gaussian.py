@@ -14,7 +14,7 @@ from scipy.special import betaln, xlog1py
 from fpsolve.arrays import FloatArray
 from fpsolve.model.faults import strict_dataclass
 from fpsolve.model.noise import NoiseDerivative
-from fpsolve.model.noises.reduced import Departure, ReducedNoise, TreatedNoise
+from fpsolve.model.noises.reduction import Departure, ReducedNoise, TreatedNoise
 from fpsolve.model.noises.steps import ImplicitStep, LinearStep, linear_step
 
 _LARGE = 100.0
