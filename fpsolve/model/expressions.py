@@ -146,7 +146,8 @@ def _exponential(a: Series) -> Series:
 
 def _logarithm(a: Series, value: float) -> Series:
     """ln of a series, whose first coefficient is known."""
-    return _function(a, value, 1 / a[0], -1 / a[0] ** 2)
+    first, second = (each / a[0] for each in (*a[1:], 0.0, 0.0)[:2])
+    return (value, first, second - 0.5 * first * first)[: len(a)]
 
 
 def _power(a: Series, power: float) -> Series:

@@ -117,13 +117,16 @@ def test_noise_and_system_of_the_page_on_contributing_are_what_those_that_ship_a
     names, _ = typed(ROOT / "docs/contributing.md")
     own = Problem(names["Pendulum"](length=1.0, damping=0.1), names["Wind"](size=0.5**0.5, duration=1.0))
     known = Problem(ParametricOscillator(1.0, 0.1), OrnsteinUhlenbeckByDeviation(1.0, 0.5**0.5))
+    damping = Axis("system.damping", 0.1, 0.6)
     for found in (
         lambda each, _: moment_lyapunov(each, [1.0, 2.0]).value,
         lambda each, _: lyapunov_exponent(each).value,
         lambda each, _: simulate(each, [1.0], paths=64, time=100.0).lyapunov_exponent,
         lambda each, size: [sensitivities(each, 2.0).moments[0][key].value for key in ("system.damping", size)],
         lambda each, size: (
-            boundary(each, "moment(2) = 0", Axis("system.damping", 0.1, 0.6), Axis(size, 0.5, 2.0), nodes=3).traces[0].y
+            boundary(each, "moment(2) = 0", Axis("system.damping", 0.1, 0.6), Axis(size, 0.5, 2.0), nodes=3)
+            .branches[0]
+            .y
         ),
     ):
         assert_allclose(found(own, "noise.size"), found(known, "noise.standard_deviation"), rtol=1e-9)

@@ -142,7 +142,7 @@ class Planar:
 
         def size(mu):
             own = np.linalg.norm(change(self.drift, mu))
-            for matrix, law in self.valued:
+            for matrix, law in self.coloured:
                 own += np.linalg.norm(change(matrix, mu)) * float(np.abs(law.made(4)[1]).max())
             own += sum(np.linalg.norm(change(matrix, mu)) ** 2 for matrix in self.white)
             return own + sum(np.linalg.norm(change(c, mu)) * rate * max(map(abs, w)) for c, rate, w, _ in self.impulses)
@@ -150,7 +150,7 @@ class Planar:
         mu = min(2.0 ** np.arange(-20, 21), key=size)
         return Planar(
             change(self.drift, mu),
-            tuple((change(matrix, mu), law) for matrix, law in self.valued),
+            tuple((change(matrix, mu), law) for matrix, law in self.coloured),
             tuple(change(matrix, mu) for matrix in self.white),
             tuple((change(c, mu), *rest) for c, *rest in self.impulses),
             self.log_factor,
@@ -169,7 +169,7 @@ class Planar:
 
     def generator(self, p, modes, size):
         """L(p), ∂L/∂p and the constant function; phases are slow, functions of the noises fast."""
-        laws = [law.made(size) for _, law in self.valued]
+        laws = [law.made(size) for _, law in self.coloured]
         counts = [own[0].shape[0] for own in laws]
 
         def of_noises(place, matrix):
@@ -179,7 +179,7 @@ class Planar:
         one, ones = sparse.eye_array(2 * modes + 1), sparse.eye_array(math.prod(counts))
         total, slope = (sparse.kron(each, ones) for each in self.moved(p, modes))
         constant = np.ones(1)
-        for place, ((matrix, law), (own, xi)) in enumerate(zip(self.valued, laws, strict=True)):
+        for place, ((matrix, law), (own, xi)) in enumerate(zip(self.coloured, laws, strict=True)):
             x, dx = phases(matrix, p, modes, self.log_factor)
             lifted = of_noises(place, xi)
             total = total + sparse.kron(x, lifted) + sparse.kron(one, of_noises(place, own))
