@@ -123,11 +123,7 @@ def test_noise_and_system_of_the_page_on_contributing_are_what_those_that_ship_a
         lambda each, _: lyapunov_exponent(each).value,
         lambda each, _: simulate(each, [1.0], paths=64, time=100.0).lyapunov_exponent,
         lambda each, size: [sensitivities(each, 2.0).moments[0][key].value for key in ("system.damping", size)],
-        lambda each, size: (
-            boundary(each, "moment(2) = 0", Axis("system.damping", 0.1, 0.6), Axis(size, 0.5, 2.0), nodes=3)
-            .branches[0]
-            .y
-        ),
+        lambda each, size: boundary(each, "moment(2) = 0", damping, Axis(size, 0.5, 2.0), nodes=3).branches[0].y,
     ):
         assert_allclose(found(own, "noise.size"), found(known, "noise.standard_deviation"), rtol=1e-9)
     explore(own).close()

@@ -122,7 +122,7 @@ class Filter(Gaussian):
         ω((0, −1), (1, 2ζ)). Rotated so that u₁ ~ ξ it is M = ω(2ζ n nᵀ + ((0, −1), (1, 0))), n = (c₁ω, c₀)/‖(c₁ω, c₀)‖.
         """
         c = self._mixed
-        return np.asarray(self.omega * (2 * self.zeta * np.outer(c, c) / (c @ c) + _TURN))
+        return np.asarray(self.omega * (2 * self.zeta * np.outer(c, c) / (c @ c) + [[0.0, -1.0], [1.0, 0.0]]))
 
     def derivative(self, name: str) -> NoiseDerivative:
         """The derivative of M and of ln std(ξ) at fixed u; ω, c₀ and c₁ also change n."""
@@ -130,18 +130,16 @@ class Filter(Gaussian):
         by_c = np.array({"omega": (self.c1, 0.0), "c0": (0.0, 1.0), "c1": (omega, 0.0)}.get(name, (0.0, 0.0)))
         unit = {"s": 1 / self.s, "zeta": -0.5 / zeta, "omega": -1.5 / omega}.get(name, 0.0)
         square, stretch = c @ c, c @ by_c / (c @ c)
-        turned = (np.outer(c, by_c) + np.outer(by_c, c) - 2 * stretch * np.outer(c, c)) / square
-        drift = 2 * zeta * omega * turned
-        if name == "omega":
-            drift += self.drift_matrix / omega
-        if name == "zeta":
-            drift += 2 * omega * np.outer(c, c) / square
+        normal = np.outer(c, c) / square
+        turned = (np.outer(c, by_c) + np.outer(by_c, c)) / square - 2 * stretch * normal
+        direct = {"omega": self.drift_matrix / omega, "zeta": 2 * omega * normal}
+        drift = 2 * zeta * omega * turned + direct.get(name, 0.0)
         return NoiseDerivative(log_scale=float(unit + stretch), drift=tuple(map(tuple, drift.tolist())))
 
     def start(self, size: int, rng: np.random.Generator) -> FloatArray:
         """ξ, y/std(y) and y′/std(y′), shape (3, size)."""
         u, w = rng.standard_normal((2, size))
-        return np.array([self._unit * (self.c0 * u + self.c1 * self.omega * w), u, w])
+        return np.array([self._unit * (self._mixed @ (w, u)), u, w])
 
     @property
     def largest_step(self) -> float:
@@ -159,6 +157,3 @@ class Filter(Gaussian):
         kicks = 2 * math.sqrt(self.zeta * tau) * sizes * kicks
         of_w = unit * self.c1
         return FilterStep(sizes * flow[:, :2] / [1.0, tau], kicks, unit * self.c0, of_w * self.omega, of_w / h)
-
-
-_TURN = np.array([[0.0, -1.0], [1.0, 0.0]])

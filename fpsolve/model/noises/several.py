@@ -72,8 +72,8 @@ class Noises(Noise):
     @cached_property
     def valued(self) -> Noise:
         """The noise, or the noises, that have values; if all are white, the first of them, with the value 0."""
-        valued = [(name, noise) for name, noise in self.named if not noise.is_white] or [self.named[0]]
-        return valued[0][1] if len(valued) == 1 else self if len(valued) == len(self.named) else Noises(tuple(valued))
+        valued = {name: noise for name, noise in self.named if not noise.is_white} or dict(self.named[:1])
+        return self if len(valued) == len(self.named) else noises_of(valued)
 
     @property
     def _valued(self) -> Iterable[Noise]:
