@@ -357,7 +357,7 @@ DEFECTS: tuple[Defect, ...] = (
     ),
     Defect(
         "R14 the variance of noise (7) has 2/D₀",
-        "model/noises/reduction.py",
+        "model/noises/non_gaussian.py",
         "return 2 * self.D0 / (self.tau0 * self._bracket)",
         "return 2 / self.D0 / (self.tau0 * self._bracket)",
         "non_gaussian",
