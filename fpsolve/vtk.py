@@ -4,17 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from pathlib import Path
+from textwrap import wrap
 from typing import Any
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
 from fpsolve.arrays import FloatArray
+from fpsolve.data import written
 from fpsolve.files import write_text
-from fpsolve.model.parameters import parameter_lines, parameter_words
+from fpsolve.model.parameters import Parameter
 from fpsolve.model.problem import Problem
 from fpsolve.signals import signals_held
 
+LINE = 90
+"""Largest number of letters of a line of parameters."""
 Facts = Mapping[str, Any]
 """Field data by their names."""
 
@@ -22,10 +26,30 @@ Facts = Mapping[str, Any]
 def field_data(parameters: Facts, varied: Collection[str], problem: Problem) -> Facts:
     """The parameters, words in the name, and the words about those that a picture shows, if there are any, in ASCII."""
     known = {key: each._replace(value=parameters[key]) for key, each in problem.parameters.items() if key in parameters}
-    words = {"varied": parameter_words(known, varied), "held": "\n".join(parameter_lines(known, varied))}
+    words = {
+        "varied": ", ".join(f"{key} = {_valued(known[key])}" for key in varied),
+        "held": "\n".join(parameter_lines(known, varied)),
+    }
     named = {f"{key} = {each.value}": 1.0 for key, each in known.items() if isinstance(each.value, str)}
     numbers = {key: each for key, each in parameters.items() if f"{key} = {each}" not in named}
     return numbers | named | {name: text.replace("²", "^2") for name, text in words.items() if text}
+
+
+def parameter_lines(parameters: Mapping[str, Parameter], besides: Collection[str] = ()) -> list[str]:
+    """All parameters besides some with their units, in lines for the system and for the noise, none of them long."""
+    sections = dict[str, list[str]]()
+    for key, parameter in parameters.items():
+        if key not in besides:
+            section, _, name = key.rpartition(".")
+            sections.setdefault(section, []).append(f"{name} = {_valued(parameter)}".replace(" ", "\xa0"))
+    lines = [wrap(f"{section}: {', '.join(words)}", LINE) for section, words in sections.items()]
+    return [line.replace("\xa0", " ") for each in lines for line in each]
+
+
+def _valued(parameter: Parameter) -> str:
+    """The value of a parameter with its unit."""
+    text, unit = written(parameter.value), parameter.quantity.unit_in_words
+    return f"{text} ({unit})" if unit else text
 
 
 def write_between(path: Path, places: Sequence[FloatArray], data: Mapping[str, Any], facts: Facts) -> None:

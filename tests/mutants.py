@@ -81,8 +81,8 @@ DEFECTS: tuple[Defect, ...] = (
     Defect(
         "T4 a filter is damped half as much",
         "model/noises/filter.py",
-        "return self.omega * (2 * self.zeta * np.outer",
-        "return self.omega * (self.zeta * np.outer",
+        "self.omega * (2 * self.zeta * np.outer",
+        "self.omega * (self.zeta * np.outer",
         "filter",
     ),
     Defect(
@@ -185,7 +185,7 @@ DEFECTS: tuple[Defect, ...] = (
     ),
     Defect(
         "N3 the slope by the rate of a telegraph is twice as large",
-        "model/noises/markov_chain.py",
+        "model/noises/telegraph.py",
         "else NoiseDerivative(rates=FLIP)",
         "else NoiseDerivative(rates=((-2.0, 2.0), (2.0, -2.0)))",
         "telegraph",

@@ -192,7 +192,7 @@ def furstenberg_khasminskii(pair: PrincipalPair) -> float:
     problem, axis = pair.generator.problem, pair.space.phi
     if problem.dimension in GRIDS:
         raise ValueError("the formula is for two variables, but there are more; use lyapunov_exponent")
-    if len(problem.coloured.parts) > 1:
+    if len(problem.valued.parts) > 1:
         raise ValueError("the formula is for one noise that is not white, but there are several; use lyapunov_exponent")
     system, phi, at = problem.motion, axis.points[:, None], _of_zero(pair).space.xi.samples()
     rate = growth_rate(system, at.xi)(phi)

@@ -17,7 +17,7 @@ as under the measure changed by the martingale (φ, ξ) has the density T T*/⟨
 of time: by the renewal theorem it is as often near ln A as near any other value. For A → ∞ it bounds P(sup ‖x‖ ≥ A).
 
 ‖x‖ is the length of the vector of the variables of the system. With x = Sy and ρ = |y|/|x| its T(φ, ξ) is ρ^p T_y(ψ, ξ)
-of what is solved for y, see `model.frame`.
+of what is solved for y, see `model.coordinates`.
 """
 
 from __future__ import annotations
@@ -212,7 +212,8 @@ def solve_excursion(solver: ExponentSolver, *, phi: Start, xi: StartOfNoise, roo
     found = replace(found, stability_index=index)
     if unseen := solver.method.unseen():
         return replace(found, notes=(unseen,))
-    overshoot, is_smooth = problem.overshoot, problem.rises_smoothly
+    moved = problem.noise.motion(problem.system)
+    overshoot, is_smooth = moved.overshoot, moved.rises_smoothly
     p, pairs, notes = index.value, [solver.pair(index.value)], list[Message]()
     if problem.noise.is_bounded:
         least, most = _settled(solver, pairs, lambda pair: _extremes(pair, is_smooth) / _at_start(pair, phi, xi))
@@ -236,7 +237,7 @@ def check_start(problem: Problem, phi: Any, xi: Any) -> None:
     if isinstance(xi, str) and xi == STATIONARY:
         return
     value = real_number(xi, "xi")
-    if why := problem.coloured.misfit(value):
+    if why := problem.valued.misfit(value):
         raise ValueError(f"got xi = {value:g}{why}")
 
 

@@ -29,9 +29,9 @@ from fpsolve.exponent.method import (
     Pictures,
     Tolerance,
 )
+from fpsolve.exponent.subsystem import blocks_of, couples
 from fpsolve.messages import Code, Message
 from fpsolve.model.problem import ParameterDerivative, Problem
-from fpsolve.model.subsystem import couples
 
 
 class Blocks(Method):
@@ -42,7 +42,7 @@ class Blocks(Method):
     @cached_property
     def parts(self) -> tuple[Method, ...]:
         """The methods of the parts."""
-        own = [Problem(block, self.problem.noise.driving(block)) for block in self.problem.blocks]
+        own = [Problem(block, self.problem.noise.driving(block)) for block in blocks_of(self.problem)]
         return tuple(self.choose(each, self.settings) for each in own)
 
     @property
@@ -87,9 +87,9 @@ class Blocks(Method):
     def names(self) -> tuple[str, ...]:
         """The parts as sentences have them: "(x, v)", "along the ray at phi = 1.5708"."""
         if not (rays := self._rays):
-            return tuple(f"({', '.join(block.names)})" for block in self.problem.blocks)
+            return tuple(f"({', '.join(block.names)})" for block in blocks_of(self.problem))
         sides = [("along", phase) for phase in rays] + [("across", rays[0])]
-        return tuple(f"{side} the ray at phi = {phase:.6g}" for side, phase in sides[: len(self.problem.blocks)])
+        return tuple(f"{side} the ray at phi = {phase:.6g}" for side, phase in sides[: len(blocks_of(self.problem))])
 
     @property
     def interval(self) -> tuple[float, float]:
@@ -159,7 +159,7 @@ class Blocks(Method):
 
     def closes(self, key: str) -> bool:
         section, _, name = key.rpartition(".")
-        return section == self.problem.system.section and couples(self.problem.blocks, name)
+        return section == self.problem.system.section and couples(blocks_of(self.problem), name)
 
     def gradient(self, p: float, keys: Sequence[str]) -> FloatArray:
         """That of the part, which other parameters do not change."""
@@ -185,7 +185,7 @@ class Blocks(Method):
     def by_part(self, p: FloatArray) -> tuple[InvariantClass, ...]:
         """λ and Λ(p) of each, for p < 0 too. Raises `NotConverged`."""
         found = list[InvariantClass]()
-        for name, block, part in zip(self.names, self.problem.blocks, self.parts, strict=True):
+        for name, block, part in zip(self.names, blocks_of(self.problem), self.parts, strict=True):
             rows = np.array([part.row(point) for point in p.tolist()]).reshape(-1, len(Moment._fields))
             phase = None if not self._rays else self._rays[min(len(found), len(self._rays) - 1)]
             variables = () if self._rays else block.names

@@ -29,6 +29,7 @@ from fpsolve.fem.factors import Factors, one_thread
 from fpsolve.fem.generator import Generator, Pencil
 from fpsolve.fem.space import Space
 from fpsolve.messages import Code, Message, Remedy
+from fpsolve.model.plane import phase_speed
 from fpsolve.model.problem import Problem
 from fpsolve.theory.frozen import frozen_noise
 
@@ -210,7 +211,7 @@ def _is_rightmost(pair: PrincipalPair) -> bool:
     Where T lies between positive bounds, none is: E‖x(t)‖^p ≤ (max T/min T) exp(Λt) from every start.
     """
     problem, space = pair.generator.problem, pair.space
-    if problem.coloured.is_bounded and not space.is_tilted:
+    if problem.valued.is_bounded and not space.is_tilted:
         values = space.on_grid(pair.right)
         if np.min(values) > LEAST_OF_MOST * np.max(values):
             return True
@@ -248,7 +249,9 @@ def _has_other_positive(generator: Generator, p: float) -> bool:
     if generator.may_hold:
         return True
     if (frozen := frozen_noise(problem)) is None:
-        return problem.may_rest
+        ends = [np.sort(each.reached)[[0, -1]] for each in problem.valued.parts.values()]
+        speed = phase_speed(problem.motion, problem.at_values(ends))
+        return bool(np.any(np.abs(speed.mean) <= speed.amplitude))
     lines = generator.chosen.xi.lines
     return frozen.rests(p, lines[0], lines[-1]) if lines.size else frozen.rests(p)
 

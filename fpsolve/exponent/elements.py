@@ -303,15 +303,15 @@ class PlaneElements(Elements):
         return RTOL_OF_SEVERAL if self.is_dear(1.0) else RTOL
 
     def is_dear(self, p: float) -> bool:
-        return len(self.problem.coloured.parts) > 1
+        return len(self.problem.valued.parts) > 1
 
     @property
     def is_quick(self) -> bool:  # type: ignore[override]
-        return self.problem.coloured.variables == 1
+        return self.problem.valued.variables == 1
 
     @property
     def no_picture(self) -> str:  # type: ignore[override]
-        noise = self.problem.coloured
+        noise = self.problem.valued
         if len(noise.parts) > 1:
             several = "an eigenfunction of the phase and of several noises that are not white cannot be drawn"
             return f"{several}; make all of these noises white but one"
@@ -342,7 +342,7 @@ class PlaneElements(Elements):
         q, space, frozen = near.p, near.generator.chosen, frozen_noise(self.problem)
         if space.size > WORTH_A_TRY and abs(p - q) > max(0.5, 0.4 * min(abs(p), abs(q))):
             return False
-        if frozen is None or not self.problem.coloured.may_tilt:
+        if frozen is None or not self.problem.valued.may_tilt:
             return True
         return abs(frozen.tilt(frozen.center(p)) - space.xi.slope * p) <= MOST_TILT_AWAY
 
@@ -378,7 +378,7 @@ class PlaneElements(Elements):
 
     @property
     def has_witness(self) -> bool:  # type: ignore[override]
-        return frozen_noise(self.problem) is None and not self.problem.coloured.is_white
+        return frozen_noise(self.problem) is None and not self.problem.valued.is_white
 
     def bounds(self, p: FloatArray, value: FloatArray, error: FloatArray) -> tuple[Message, ...]:
         """That Λ(p) for p < −1 depends on the start, or nothing.

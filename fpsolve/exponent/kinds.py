@@ -8,6 +8,7 @@ from fpsolve.exponent.elements import GivenMesh, PlaneElements
 from fpsolve.exponent.method import Method, Settings
 from fpsolve.exponent.modes import Directions
 from fpsolve.exponent.stopped import Stopped
+from fpsolve.exponent.subsystem import blocks_of
 from fpsolve.model.problem import Problem, checked_problem
 
 MOST_BY_DIRECTIONS = 4
@@ -40,7 +41,7 @@ def kind_of(problem: Problem) -> type[Method]:
         return EvenMoments
     if not is_in_plane and problem.impulses:
         return StruckMoments
-    if problem.blocks:
+    if blocks_of(problem):
         return Blocks
     if is_in_plane:
         return PlaneElements

@@ -34,6 +34,8 @@ RTOL = 1e-8
 """Relative error that is wanted of two variables where a case names none."""
 RTOL_OF_SEVERAL = 1e-6
 """Relative error that is wanted of two variables under two noises that are not white."""
+RTOLS = {"gt": 1e-13, "lt": 1}
+"""The range of rtol."""
 TINIEST_P = 1e-9
 """For smaller |p| the error of Λ(p), which falls as p, has no scale, which may fall as p²: p counts as 0."""
 RTOL_BEYOND_PLANE = 1e-5

@@ -142,7 +142,7 @@ class DirectionStart(Start):
         )
         if nearest:
             return nearest.start.again(), nearest.pair
-        noises = (first_axis(noise, -math.log10(rtol)) for noise in problem.coloured.parts.values())
+        noises = (first_axis(noise, -math.log10(rtol)) for noise in problem.valued.parts.values())
         return cls(problem, Space((cls.directions(problem), *noises))), None
 
     @staticmethod

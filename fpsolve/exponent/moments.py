@@ -184,7 +184,7 @@ def refuse_open_hierarchy(problem: Problem, p: float) -> None:
     """Refuse a problem whose moments of order p do not close, or are too many. Raises `NoHierarchy`."""
     if not (p > 0 and p % 2 == 0):
         raise NoHierarchy(f"got p = {p:g}; the equations of the moments close for even p > 0 only; choose p = 2, 4, …")
-    for noise in problem.coloured.parts.values():
+    for noise in problem.valued.parts.values():
         if noise.basis not in BASES:
             raise NoHierarchy(
                 f"moments of even order are infinite under {noise.kind} noise with algebraic tails; take r0 <= 1"
@@ -198,7 +198,7 @@ def refuse_open_hierarchy(problem: Problem, p: float) -> None:
         raise NoHierarchy(f"got p = {p:g}; with a delay the equations of the moments are for p = 2; {REMEDY}")
     moments = math.comb(int(p) + problem.dimension - 1, problem.dimension - 1)
     count = moments
-    for noise in problem.coloured.parts.values():
+    for noise in problem.valued.parts.values():
         count *= BASES[noise.basis](noise, FIRST).size
     limits = (MOST_MOMENTS, MOST) if p > 2 else (math.inf, MOST_NUMBERS)
     for number, what, limit in zip((moments, count), ("moments", "equations"), limits, strict=True):
@@ -394,7 +394,7 @@ class Equations:
     def __init__(self, problem: Problem, p: int, units: FloatArray | None = None) -> None:
         self.problem, self.p, self.pasts = problem, p, problem.system.pasts
         self.dimension = problem.dimension - len(self.pasts)
-        named = problem.coloured.parts
+        named = problem.valued.parts
         self.noises, names = list(named.values()), list(named)
         drift, diffusions, impulses = problem.noise.motion(problem.system)
         steady, self._loads = np.zeros(2 * (problem.dimension,)), list[tuple[Any, int]]()

@@ -117,12 +117,11 @@ def critical_restitution(solver: ExponentSolver, jump: int | None = None) -> Est
         # λ is affine in ln R, and 0 at ln R_c
         lossless = solver.lyapunov_exponent().value * log.value / (log.value - system.jumps[jump or 0].log_factor)
         return Absent(Message(Code.ALWAYS_STABLE, symbol=system.impact_symbol, value=lossless))
-    value = system.impact_value(log.value)
+    value, slope = system.impact_value(log.value)
     if math.isnan(value):
         return Absent(Message(Code.NO_RESTITUTION))
     if value <= 0:
         return Absent(Message(Code.ALWAYS_UNSTABLE, symbol=system.impact_symbol, value=value))
-    slope = system.impact_slope(log.value)
     error, scale = slope * log.error_estimate + _EPS, max(1.0, slope * log.scale)
     return checked(Estimate(value, error, scale, quantity=quantity.CRITICAL_RESTITUTION), solver.method.refinement)
 
@@ -220,7 +219,7 @@ def _index(
 
 def _restitution_by_theory(problem: Problem) -> float:
     theory, system = second_order_or_none(problem), problem.system
-    return system.impact_value(theory.critical_log_factor) if theory and len(system.jumps) == 1 else math.nan
+    return system.impact_value(theory.critical_log_factor)[0] if theory and len(system.jumps) == 1 else math.nan
 
 
 LYAPUNOV_EXPONENT: Index = _index(quantity.LYAPUNOV_EXPONENT, lambda solver, _: solver.lyapunov_exponent())

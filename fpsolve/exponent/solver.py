@@ -23,16 +23,22 @@ from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.elements import doubt
 from fpsolve.exponent.error import Estimate, Failure, InvariantClass, Moment
 from fpsolve.exponent.kinds import choose
-from fpsolve.exponent.method import BUDGET, TINIEST_P, Budget, Method, Settings, Tolerance, checked_moments, refuse
+from fpsolve.exponent.method import (
+    BUDGET,
+    RTOLS,
+    TINIEST_P,
+    Budget,
+    Method,
+    Settings,
+    Tolerance,
+    checked_moments,
+    refuse,
+)
 from fpsolve.fem.generator import SMALL_P
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import Code, Message, Remedy, message_of
 from fpsolve.model import quantity
-from fpsolve.model.problem import (
-    RTOLS,
-    Problem,
-    checked_problem,
-)
+from fpsolve.model.problem import Problem, checked_problem
 from fpsolve.theory.frozen import eigenvalues_at
 
 if TYPE_CHECKING:

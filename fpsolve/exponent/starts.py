@@ -102,19 +102,19 @@ class Start:
 
 def first(problem: Problem, p: float, rtol: float, center: float | None = None) -> Space:
     """A first discretisation, small, for a tilted density around some z; None for where slow noise carries it."""
-    noise, digits = problem.coloured, -math.log10(rtol)
+    noise, digits = problem.valued, -math.log10(rtol)
     if len(noise.parts) == 1 and (of_kind := AXES.get(noise.basis)):
         axis, xi = of_kind(problem, p, digits, center)
         axes = [axis]
     else:
-        axes, xi = [first_axis(each, digits) for each in noise.parts.values()], problem.typical
+        axes, xi = [first_axis(each, digits) for each in noise.parts.values()], problem.extremes
     is_smooth = sum(axis.dimension for axis in axes) > 1
     return Space((_phase(problem.motion, xi, digits, is_smooth), *axes))
 
 
 def _of_tails(problem: Problem, p: float, digits: float, center: float | None) -> tuple[NoiseAxis, Xi]:
     """Cells around ξ = 0, their lines on both sides, further apart further out."""
-    noise, steps = problem.coloured, np.concatenate([[0.0], 3.0 * 1.5 ** np.arange(60)])
+    noise, steps = problem.valued, np.concatenate([[0.0], 3.0 * 1.5 ** np.arange(60)])
     side = np.append(steps[steps < 0.8 * REACH], REACH)
     lines = np.concatenate([-side[:0:-1], side])
     axis = CellAxis(noise, lines, np.full(lines.size - 1, round(2 + digits / 2)))
@@ -123,15 +123,15 @@ def _of_tails(problem: Problem, p: float, digits: float, center: float | None) -
 
 def _of_filter(problem: Problem, p: float, digits: float, center: float | None) -> tuple[NoiseAxis, Xi]:
     """With the tilt of the force that holds the noise at z."""
-    noise = problem.coloured
+    noise = problem.valued
     center = float(steady_places(problem, p)[0][0]) if center is None else center
     pull = noise.standard_deviation**2 * center / noise.spectral_density(0.0) if center else 0.0
-    return replace(first_axis(noise, digits), slope=pull / p), problem.typical  # type: ignore[call-arg]
+    return replace(first_axis(noise, digits), slope=pull / p), problem.extremes  # type: ignore[call-arg]
 
 
 def _of_diffusion(problem: Problem, p: float, digits: float, center: float | None) -> tuple[NoiseAxis, Xi]:
     """Polynomials with the tilt that has its peak at z."""
-    noise, frozen = problem.coloured, frozen_noise(problem)
+    noise, frozen = problem.valued, frozen_noise(problem)
     assert frozen is not None
     unit, end = noise.standard_deviation, noise.half_width / noise.standard_deviation
     center = frozen.center(p) if center is None else center
@@ -169,7 +169,7 @@ def other_centers(pair: PrincipalPair) -> list[float]:
     hardly ever passes: each has its own pair with T > 0 as far as that can be told, and only the larger eigenvalue is
     Λ.
     """
-    noise = pair.generator.problem.coloured
+    noise = pair.generator.problem.valued
     others = OTHERS.get(noise.basis) if len(noise.parts) == 1 else None
     return others(pair, pair.value - (1 - COMPARABLE) * abs(pair.value)) if others else []
 
@@ -185,7 +185,7 @@ def _of_filters(pair: PrincipalPair, least: float) -> list[float]:
 
 
 def _of_diffusions(pair: PrincipalPair, least: float) -> list[float]:
-    unit = pair.generator.problem.coloured.standard_deviation
+    unit = pair.generator.problem.valued.standard_deviation
     frozen = frozen_noise(pair.generator.problem)
     assert frozen is not None
     z, rate = frozen.peaks(pair.p)

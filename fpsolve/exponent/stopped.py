@@ -93,7 +93,7 @@ class StopStart(DirectionStart):
     @staticmethod
     def directions(problem: Problem) -> HalfSphereAxis:
         (at, _), system = looked_at(problem), problem.system
-        free, smooth = at.inside(mean_matrix(problem, system)), LinearMotion(system.epsilon, tuple(system.terms))
+        free, smooth = at.inside(mean_matrix(problem, system)), LinearMotion(system.terms, epsilon=system.epsilon)
         own = scipy.linalg.block_diag(_rotating(free[:2, :2]), _rotating(free[2:, 2:]))
         own = np.linalg.solve(np.array(at.coordinates), own)
         forms = second_moments(replace(problem, system=smooth), own)

@@ -87,7 +87,7 @@ class Generator:
 
     def __init__(self, problem: Problem, chosen: Space | CylinderMesh) -> None:
         if isinstance(chosen, CylinderMesh):
-            chosen = Space.on(chosen, problem.coloured, problem.frame.phase)
+            chosen = Space.on(chosen, problem.valued, problem.frame.phase)
         self.problem, self.chosen, self.size = problem, chosen, chosen.size
         self._spaces: dict[float, Space] = {}
         self._changes: dict[ParameterDerivative, tuple[Term, ...]] = {}
@@ -109,7 +109,7 @@ class Generator:
         if key not in self._spaces:
             if len(self._spaces) >= KEPT_SPACES:
                 del self._spaces[next(iter(self._spaces))]
-            noises = self.problem.coloured.parts.values()
+            noises = self.problem.valued.parts.values()
             self._spaces[key] = Space([phi, *(axis.of(noise, p) for axis, noise in zip(axes, noises, strict=True))])
         return self._spaces[key]
 

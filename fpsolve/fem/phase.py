@@ -381,7 +381,7 @@ class PlaneTerms(Terms):
 
     def _changed_loads(self, by: ParameterDerivative) -> Iterator[Term]:
         """Upwinding is held: [T] = 0 at a vertex but for the error of the elements."""
-        text, moved = "∂/∂θ", LinearMotion(self.system.epsilon, by.terms)
+        text, moved = "∂/∂θ", LinearMotion(by.terms, epsilon=self.system.epsilon)
         for struck, moved_by in zip(self._problem.impulses, by.impulses, strict=bool(by.impulses)):
             yield self._struck(struck, moved_by)
         faster = self._problem.wall_speeds(moved)

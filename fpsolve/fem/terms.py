@@ -112,7 +112,7 @@ class Terms:
     keeps_constants = False
 
     def __init__(self, problem: Problem, phi: Any, noises: Sequence[Any]) -> None:
-        self.phi, self.noises, self._names = phi, noises, tuple(problem.coloured.parts)
+        self.phi, self.noises, self._names = phi, noises, tuple(problem.valued.parts)
         self._problem, self.system = problem, problem.motion
 
     @cached_property

@@ -6,14 +6,14 @@ from .noises.bounded import Bounded as Bounded
 from .noises.bounded import SineWiener as SineWiener
 from .noises.filter import Filter as Filter
 from .noises.markov_chain import MarkovChain as MarkovChain
-from .noises.markov_chain import Telegraph as Telegraph
 from .noises.non_gaussian import NonGaussianNoise as NonGaussianNoise
-from .noises.non_gaussian import ReducedNoise as ReducedNoise
 from .noises.ornstein_uhlenbeck import OrnsteinUhlenbeck as OrnsteinUhlenbeck
 from .noises.ornstein_uhlenbeck import OrnsteinUhlenbeckByDeviation as OrnsteinUhlenbeckByDeviation
 from .noises.ornstein_uhlenbeck import OrnsteinUhlenbeckByIntensity as OrnsteinUhlenbeckByIntensity
 from .noises.poisson import Poisson as Poisson
+from .noises.reduction import ReducedNoise as ReducedNoise
 from .noises.several import Noises as Noises
+from .noises.telegraph import Telegraph as Telegraph
 from .noises.white import Interpretation as Interpretation
 from .noises.white import White as White
 from .plane import CoefficientMatrix as CoefficientMatrix

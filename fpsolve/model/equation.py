@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import math
 import unicodedata
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
 from fpsolve.arrays import FloatArray
-from fpsolve.model.plane import System, affine, written_sum
-from fpsolve.model.problem import Problem
+from fpsolve.model.noises.clock import Wave
+from fpsolve.model.plane import STEADY, Function, System, by_noise, written_sum
 
 
 def equations_of(system: System) -> list[str]:
@@ -23,17 +21,12 @@ def equations_of(system: System) -> list[str]:
     """
     whole, named = system.forced or system, len(system.noise_sections) > 1
     n = whole.dimension
-    still, driven = np.zeros((n, n)), dict[str, FloatArray]()
-    for term in whole.terms:
-        size = system.epsilon**term.order * np.array(term.matrix)
-        letter = f"ξ_{term.noise}" if named and term.noise else "ξ"
-        line = affine(term.g)
-        offset, slope = line or (0.0, 1.0)
-        still += offset * size
-        if slope:
-            own: Any = getattr(term.g, "f", None)  # cos kθ or sin kθ of the clock has k
-            name = letter if line else own.at(system.clock.nu) if hasattr(own, "multiple") else f"g({letter})"
-            driven[name] = driven.get(name, np.zeros((n, n))) + slope * size
+    sums, driven = by_noise(whole, whole.terms), dict[str, FloatArray]()
+    still = sums.pop(STEADY)
+    for (noise, g), matrix in sums.items():
+        letter, wave = f"ξ_{noise}" if named and noise else "ξ", g.f if isinstance(g, Function) else None
+        name = letter if wave is None else wave.at(system.clock.nu) if isinstance(wave, Wave) else f"g({letter})"
+        driven[name] = driven.get(name, 0.0) + matrix
     speed = float(still[0, 1])
     cubic = np.array(system.cubic.matrix) if system.cubic else np.zeros((n, 4))
     first = [still[0, 0], *cubic[0], *(each for matrix in driven.values() for each in matrix[0])]
@@ -43,8 +36,8 @@ def equations_of(system: System) -> list[str]:
     if n == 2 and speed != 0 and not any(first) and len(x) == 1:
         scale, names = np.array([speed, 1.0]), (x, _dotted(x, 1))
         bent = cubic[1] * speed ** np.array([1, 0, -1, -2])
-        by_noise = {name: each[1] * scale for name, each in driven.items()}
-        rows = [(_dotted(x, 2), still[1] * scale, bent, by_noise, names)]
+        by_name = {name: each[1] * scale for name, each in driven.items()}
+        rows = [(_dotted(x, 2), still[1] * scale, bent, by_name, names)]
     else:
         each = [{key: matrix[i] for key, matrix in driven.items()} for i in range(rates)]
         rows = [(f"d{names[i]}/dt", still[i], cubic[i], each[i], names) for i in range(rates)]
@@ -57,7 +50,7 @@ def _dotted(letter: str, count: int) -> str:
     return unicodedata.normalize("NFC", letter + "\u0307\u0308"[count - 1])
 
 
-def _sum(constant: FloatArray, cubic: FloatArray, by_noise: Mapping[str, FloatArray], states: Sequence[str]) -> str:
+def _sum(constant: FloatArray, cubic: FloatArray, driven: Mapping[str, FloatArray], states: Sequence[str]) -> str:
     """A sum of multiples of states, the constant ones first: "−x + 0.001 ẋ − 0.2 x² ẋ + 0.1 ξ ẋ"."""
     x, y = states[:2]
     products = f"{x}³", f"{x}² {y}", f"{x} {y}²", f"{y}³"
@@ -65,20 +58,7 @@ def _sum(constant: FloatArray, cubic: FloatArray, by_noise: Mapping[str, FloatAr
     terms += [(float(size), product) for size, product in zip(cubic, products, strict=True)]
     terms += [
         (float(size), f"{name} {s}".rstrip())
-        for name, row in by_noise.items()
+        for name, row in driven.items()
         for size, s in zip(row, states, strict=True)
     ]
     return written_sum(terms)
-
-
-def noise_sentences(problem: Problem) -> list[str]:
-    """Each noise in a sentence: its kind, and how strong and how slow it is."""
-    lines = list[str]()
-    for section, noise in zip(problem.system.noise_sections, problem.noise.parts.values(), strict=False):
-        size, time = noise.standard_deviation, noise.correlation_time
-        numbers = [f"standard deviation {size:.6g}"] if 0 < size < math.inf else []
-        numbers += [f"correlation time {time:.6g}"] if 0 < time < math.inf else []
-        name = f"ξ of [{section}]" if len(problem.noise.parts) > 1 else "ξ"
-        lines.append(f"{name} is noise of the kind {noise.kind}{', with ' if numbers else ''}{' and '.join(numbers)}.")
-        lines[-1] += f" The equation is meant in {noise.sense} sense." if noise.sense else ""
-    return lines

@@ -2,8 +2,7 @@
 
 A text is parsed, and one walk over its tree gives its value: nothing in it is ever run. A value is a polynomial in what
 the names stand for, at most of degree 3 in the state and 1 in the noise, whose coefficients are Taylor series in one
-parameter. So the matrices, their orders in ε and their derivatives are all exact. With series of no coefficients the
-walk only reads which names there are.
+parameter. So the matrices, their orders in ε and their derivatives are all exact.
 """
 
 from __future__ import annotations
@@ -12,8 +11,7 @@ import ast
 import math
 import re
 import warnings
-from collections import defaultdict
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache, partial
 from keyword import iskeyword
@@ -22,7 +20,7 @@ from operator import add
 from fpsolve.model.parameters import without_unit
 
 Series = tuple[float, ...]
-"""Taylor coefficients in one parameter, the value first; all in one calculation have one length, 0 to read alone."""
+"""Taylor coefficients in one parameter, the value first, three at most; all in one calculation have one length."""
 Monomial = tuple[tuple[str, ...], str, int]
 """The variables of the state that are multiplied, in order, a noise or "", and the power of ε."""
 NUMBER: Monomial = (), "", 0
@@ -118,9 +116,13 @@ class Form:
     def of(self, function: Callable[[Series], Series]) -> Form:
         """A function of it. Raises `_Unsuitable` where it is no number."""
         if (scalar := self.scalar) is not None:
-            return Form({NUMBER: function(scalar) if scalar else scalar})
+            return Form({NUMBER: function(scalar)})
         has_state, has_noise = (any(key[i] for key in self.parts) for i in (0, 1))
         raise _Unsuitable(*(NOT_LINEAR if has_state else NOT_AFFINE if has_noise else NO_POLYNOMIAL))
+
+
+OfTime = Callable[[str, str, str], Form | None]
+"""What a call is, by its name, its argument and how it is written; None where it is none of the time."""
 
 
 def constant(*series: float) -> Form:
@@ -132,29 +134,29 @@ def _product(a: Series, b: Series) -> Series:
     return tuple(sum(a[i] * b[k - i] for i in range(k + 1)) for k in range(len(a)))
 
 
+def _function(a: Series, value: float, slope: float, curvature: float) -> Series:
+    """A function of a series, of three coefficients at most, from its value and its first derivatives there."""
+    first, second = (*a[1:], 0.0, 0.0)[:2]
+    return (value, slope * first, slope * second + 0.5 * curvature * first**2)[: len(a)]
+
+
 def _exponential(a: Series) -> Series:
-    c = [math.exp(a[0])]
-    for k in range(1, len(a)):
-        c.append(sum(i * a[i] * c[k - i] for i in range(1, k + 1)) / k)
-    return tuple(c)
+    return _function(a, *3 * (math.exp(a[0]),))
 
 
-def _logarithm(a: Series, first: float) -> Series:
+def _logarithm(a: Series, value: float) -> Series:
     """ln of a series, whose first coefficient is known."""
-    c = [first]
-    for k in range(1, len(a)):
-        c.append((a[k] - sum(i * c[i] * a[k - i] for i in range(1, k)) / k) / a[0])
-    return tuple(c)
+    first, second = (each / a[0] for each in (*a[1:], 0.0, 0.0)[:2])
+    return (value, first, second - 0.5 * first * first)[: len(a)]
 
 
 def _power(a: Series, power: float) -> Series:
     """a^r. Raises `_Unsuitable` where it is no real number."""
     if a[0] < 0 and not power.is_integer():
         raise _Unsuitable(*NOT_REAL)
-    c = [1 / a[0] if power == -1 else a[0] ** power]
-    for k in range(1, len(a)) if any(a[1:]) else ():
-        c.append(sum((power * i - (k - i)) * a[i] * c[k - i] for i in range(1, k + 1)) / (k * a[0]))
-    return (*c, *a[len(c) :])
+    value = 1 / a[0] if power == -1 else a[0] ** power
+    slope = power * value / a[0] if any(a[1:]) else 0.0
+    return _function(a, value, slope, (power - 1) * slope / a[0] if slope else 0.0)
 
 
 FUNCTIONS: Mapping[str, Callable[[Series], Series]] = {
@@ -207,33 +209,11 @@ def _parsed(text: str) -> tuple[str, ast.expr]:
 
 @lru_cache(maxsize=1024)
 def names_in(text: str) -> frozenset[str]:
-    """The names in an expression, without those of functions and constants. Raises `ExpressionError`."""
-    names = defaultdict[str, Form](constant, dict.fromkeys(CONSTANTS, constant()))  # series of no coefficients
-    earlier = calls_of_time(text)
-    names |= dict.fromkeys(earlier, constant())
-    walk = _Walk(text, names, "it")
-    walk.value(walk.tree)
-    of_calls = [names_in(time) | {name} for name, time in earlier.values()]
-    return frozenset(names).union(*of_calls).difference(RESERVED, earlier, {TIME} if earlier else ())
-
-
-@lru_cache(maxsize=1024)
-def calls_of_time(text: str) -> Mapping[str, tuple[str, str]]:
-    """By what it writes as x(t - tau) or cos(nu*t) the name and the argument. Raises `ExpressionError`."""
-    found = dict[str, tuple[str, str]]()
-    for node in ast.walk(_parsed(text)[1]):
-        match node:
-            case ast.Call(func=ast.Name(id=name), args=[time], keywords=[]) if name not in {
-                *FUNCTIONS,
-                *_REMEDIES,
-            }.difference(WAVES):
-                inside = [*ast.walk(time)]
-                if any(isinstance(each, ast.Name) and each.id == TIME for each in inside):
-                    for each in inside:  # before anything is unparsed, as calls in calls take long
-                        if isinstance(each, ast.Call) and not _is_function(each.func):
-                            raise ExpressionError(f"has another call inside {name}(...); {_REMEDIES.get(name, _DELAY)}")
-                    found[_plain(node)] = name, _plain(time)
-    return found
+    """The names in an expression, without those of functions and constants, nor the time. Raises `ExpressionError`."""
+    nodes = [*ast.walk(_parsed(text)[1])]
+    has_time = any(isinstance(each, ast.Call) and not _is_function(each.func) for each in nodes)
+    names = frozenset(each.id for each in nodes if isinstance(each, ast.Name))
+    return names.difference(RESERVED, {TIME} if has_time else ())
 
 
 def _is_function(node: ast.expr) -> bool:
@@ -249,26 +229,27 @@ def _plain(node: ast.expr) -> str:
         raise ExpressionError(_TOO_DEEP) from None
 
 
-def evaluate(text: str, names: Mapping[str, Form], place: str) -> Form:
+def evaluate(text: str, names: Mapping[str, Form], place: str, of_time: OfTime | None = None) -> Form:
     """The value of an expression, all in floating-point numbers.
 
     Args:
         text: the expression.
         names: what names stand for; all series of one length.
         place: what it is, for messages: "v's rate".
+        of_time: what x(t - tau) and cos(nu*t) are, by their names, their arguments and how they are written; None
+            where there may be none of these.
 
     Raises:
         ExpressionError: it is no arithmetic, has other names, is not finite, or of too high a degree.
     """
-    walk = _Walk(text, names, place)
-    return walk.value(walk.tree)
+    line, tree = _parsed(text)
+    return _Walk(line, names, place, of_time).value(tree)
 
 
-def summands(text: str, names: Mapping[str, Form], place: str) -> Iterator[tuple[str, Form]]:
-    """The terms of an expression that is a sum, as they are written, with their values. Raises `ExpressionError`."""
-    walk = _Walk(text, names, place)
-    for sign, node in _chain(walk.tree, ast.Add, ast.Sub):
-        yield walk.written(node), Form({}).plus(walk.value(node), sign)
+def summands(text: str) -> list[tuple[float, str]]:
+    """The terms of an expression that is a sum, as they are written, with their signs. Raises `ExpressionError`."""
+    line, tree = _parsed(text)
+    return [(sign, line[node.col_offset : node.end_col_offset]) for sign, node in _chain(tree, ast.Add, ast.Sub)]
 
 
 def log_of(text: str, names: Mapping[str, Form], place: str) -> Series:
@@ -277,19 +258,20 @@ def log_of(text: str, names: Mapping[str, Form], place: str) -> Series:
     Raises:
         ExpressionError: as `evaluate`, or it is not positive.
     """
-    walk = _Walk(text, names, place)
-    scalar = walk.value(walk.tree).scalar
+    scalar = evaluate(text, names, place).scalar
     if scalar is None:
         raise ExpressionError(f"{place} must be a number or an expression in parameters; leave out the others")
-    match walk.tree:
+    line, tree = _parsed(text)
+    match tree:
         case ast.Call(func=ast.Name("exp"), args=[exponent]):
-            return walk.value(exponent).scalar or scalar
+            return evaluate(line[exponent.col_offset : exponent.end_col_offset], names, place).scalar or scalar
     if not scalar[0] > 0:
         raise ExpressionError(f"{place} is {scalar[0]:.6g}; must be > 0; change it or its parameters")
     if not 0.5 < scalar[0] < 2:
         return _logarithm(scalar, math.log(scalar[0]))
-    each = [form.scalar or (0.0,) for _, form in summands(text, names, place)]
-    return _logarithm(scalar, math.log1p(math.fsum([*(first for first, *_ in each), -1.0])))
+    forms = [(sign, evaluate(term, names, place)) for sign, term in summands(text)]
+    firsts = [sign * form.scalar[0] for sign, form in forms if form.scalar]
+    return _logarithm(scalar, math.log1p(math.fsum([*firsts, -1.0])))
 
 
 def _chain(node: ast.expr, *kinds: type[ast.operator]) -> list[tuple[float, ast.expr]]:
@@ -301,21 +283,24 @@ def _chain(node: ast.expr, *kinds: type[ast.operator]) -> list[tuple[float, ast.
     return [(1.0, node), *reversed(parts)]
 
 
+def shortened(text: str) -> str:
+    """What is written, cut to a readable length."""
+    return text if len(text) <= 60 else f"{text[:57]}..."
+
+
 class _Walk:
-    """The values of the nodes of one text: what is no arithmetic, and too many levels, are refused."""
+    """The values of the nodes of one line: what is no arithmetic, and too many levels, are refused."""
 
-    def __init__(self, text: str, names: Mapping[str, Form], place: str) -> None:
-        self._line, self.tree = _parsed(text)
-        self._names, self._place, self._level = names, place, 0
-        self._length = len(next((series for form in names.values() for series in form.parts.values()), (0.0,)))
-
-    def written(self, node: ast.expr) -> str:
-        """How a node is written, cut to a readable length."""
-        source = self._source(node)
-        return source if len(source) <= 60 else f"{source[:57]}..."
+    def __init__(self, line: str, names: Mapping[str, Form], place: str, of_time: OfTime | None) -> None:
+        self._line, self._names, self._place, self._of_time, self._level = line, names, place, of_time, 0
+        self._rest = next((series[1:] for form in names.values() for series in form.parts.values()), ())
 
     def _source(self, node: ast.expr) -> str:
         return self._line[node.col_offset : node.end_col_offset]
+
+    def written(self, node: ast.expr) -> str:
+        """How a node is written, cut to a readable length."""
+        return shortened(self._source(node))
 
     def _read(self, node: ast.expr) -> float:
         """A number with a sign or without; NaN for all else, as for True, 1j and 0x10."""
@@ -370,7 +355,7 @@ class _Walk:
         raise ExpressionError(f"has {self.written(node)}, which is no arithmetic; {_KNOWN}")
 
     def _number(self, value: float) -> Form:
-        return constant(*(value, *(0.0,) * self._length)[: self._length])
+        return constant(value, *(0.0 * each for each in self._rest))
 
     def _named(self, name: str) -> Form:
         if name in CONSTANTS:
@@ -395,12 +380,17 @@ class _Walk:
         return total.of(_INVERSE) if power < 0 else total
 
     def _call(self, node: ast.Call) -> Form:
-        name = self.written(node.func)
-        if name not in FUNCTIONS:
-            if (known := _plain(node)) in self._names:
-                return self._names[known]
-            remedy = _REMEDIES.get(name.lower(), f"the functions are {' and '.join(FUNCTIONS)}; write * for products")
-            raise ExpressionError(f"has {self.written(node)}, which calls no known function; {remedy}")
-        if len(node.args) != 1:
-            raise ExpressionError(f"has {self.written(node)}, but {name} takes one number; write {name}(...)")
-        return self.value(node.args[0]).of(FUNCTIONS[name])
+        name, remedy = self.written(node.func), f"the functions are {' and '.join(FUNCTIONS)}; write * for products"
+        if _is_function(node.func):
+            if len(node.args) != 1:
+                raise ExpressionError(f"has {self.written(node)}, but {name} takes one number; write {name}(...)")
+            return self.value(node.args[0]).of(FUNCTIONS[name])
+        if self._of_time and isinstance(node.func, ast.Name) and (name in WAVES or name not in _REMEDIES):
+            inside = [each for argument in node.args for each in ast.walk(argument)]
+            if len(node.args) == 1 and any(isinstance(each, ast.Name) and each.id == TIME for each in inside):
+                if any(isinstance(each, ast.Call) and not _is_function(each.func) for each in inside):
+                    raise ExpressionError(f"has another call inside {name}(...); {_REMEDIES.get(name, _DELAY)}")
+                if (found := self._of_time(name, _plain(node.args[0]), _plain(node))) is not None:
+                    return found
+        remedy = _REMEDIES.get(name.lower(), remedy)
+        raise ExpressionError(f"has {self.written(node)}, which calls no known function; {remedy}")

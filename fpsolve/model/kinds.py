@@ -5,45 +5,45 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import cache
 from importlib import import_module
-from typing import Any, Literal
+from operator import attrgetter
 
 from fpsolve.model.noise import Noise
 from fpsolve.model.plane import System
 
 SYSTEMS: Mapping[str, str] = {
-    "vibro-impact": "vibro_impact:VibroImpactOscillator",
-    "parametric": "parametric:ParametricOscillator",
-    "equations": "equations:EquationSystem",
-    "modes": "modal:ModalSystem",
+    "vibro-impact": "VibroImpactOscillator",
+    "parametric": "ParametricOscillator",
+    "equations": "EquationSystem",
+    "modes": "ModalSystem",
 }
 NOISES: Mapping[str, str] = {
-    "non-gaussian": "non_gaussian:NonGaussianNoise",
-    "ou-reduction": "non_gaussian:ReducedNoise",
-    "ornstein-uhlenbeck": "ornstein_uhlenbeck:OrnsteinUhlenbeck",
-    "sine-wiener": "bounded:SineWiener",
-    "white": "white:White",
-    "poisson": "poisson:Poisson",
-    "telegraph": "markov_chain:Telegraph",
-    "markov-chain": "markov_chain:MarkovChain",
-    "bounded": "bounded:Bounded",
-    "filter": "filter:Filter",
+    "non-gaussian": "NonGaussianNoise",
+    "ou-reduction": "ReducedNoise",
+    "ornstein-uhlenbeck": "OrnsteinUhlenbeck",
+    "sine-wiener": "SineWiener",
+    "white": "White",
+    "poisson": "Poisson",
+    "telegraph": "Telegraph",
+    "markov-chain": "MarkovChain",
+    "bounded": "Bounded",
+    "filter": "Filter",
 }
-
-
-def system_kind(name: str) -> type[System]:
-    """The class of a kind of system. Raises `ValueError` where there is none."""
-    return _kind(name, "systems")
-
-
-def noise_kind(name: str) -> type[Noise]:
-    """The class of a kind of noise. Raises `ValueError` where there is none."""
-    return _kind(name, "noises")
 
 
 @cache
-def _kind(name: str, room: Literal["systems", "noises"]) -> Any:
-    known = SYSTEMS if room == "systems" else NOISES
+def system_kind(name: str) -> type[System]:
+    """The class of a kind of system. Raises `ValueError` where there is none."""
+    return _kind(name, SYSTEMS)
+
+
+@cache
+def noise_kind(name: str) -> type[Noise]:
+    """The class of a kind of noise. Raises `ValueError` where there is none."""
+    return _kind(name, NOISES)
+
+
+def _kind(name: str, known: Mapping[str, str]) -> type:
     if name not in known:
         raise ValueError(f'got kind = "{name}"; must be one of {", ".join(known)}')
-    module, _, cls = known[name].partition(":")
-    return getattr(import_module(f"fpsolve.model.{room}.{module}"), cls)
+    kind: type = attrgetter(known[name])(import_module("fpsolve.model"))
+    return kind

@@ -10,7 +10,7 @@ import math
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -55,29 +55,52 @@ class Noise(Parametrised):
     kind overrides those that do not hold for it.
 
     Attributes:
-        has_states: whether ξ jumps between states. Such noise has no density, so that `log_density`, `diffusion` and
-            what follows from them do not apply.
         left_in_phase: share of the effect of two modes of φ that is left at least where T is not analytic, as where the
             phase rests in a state, or at φ that white noise does not move: there it falls unevenly, and ever more
             slowly.
-        approximates_spectrum: whether `spectral_density` is that of a simpler process which replaces this one.
-        variables: how many numbers, without the white noises, tell how it goes on.
-        may_tilt: whether a factor exp(s ξ) makes functions of ξ easier to resolve, as where P_s has a single peak.
-        has_peak: whether the spectral density may have a high peak at a frequency of the noise itself.
-        is_white: whether ξ has no value, as for white noise and impulses. Solvers see such noise as a chain with the
-            only state ξ = 0; it moves the system by diffusion or by impulses, see `motion`.
         of_xi: the names of the parameters whose unit contains that of ξ. Their declared unit is that for ξ in 1/time.
     """
 
     section: ClassVar[str] = "noise"
-    has_states: ClassVar[bool] = False
     left_in_phase: ClassVar[float] = 0.0
-    approximates_spectrum: ClassVar[bool] = False
-    variables: ClassVar[int] = 1
-    may_tilt: ClassVar[bool] = True
-    has_peak: bool = False
-    is_white: ClassVar[bool] = False
     of_xi: ClassVar[Sequence[str]] = ()
+
+    @property
+    def has_states(self) -> bool:
+        """Whether ξ jumps between states.
+
+        Such noise has no density, so that `log_density`, `diffusion` and what follows from them do not apply.
+        """
+        return False
+
+    @property
+    def is_white(self) -> bool:
+        """Whether ξ has no value, as for white noise and impulses.
+
+        Solvers see such noise as a chain with the only state ξ = 0; it moves the system by diffusion or by impulses,
+        see `motion`.
+        """
+        return False
+
+    @property
+    def variables(self) -> int:
+        """How many numbers, without the white noises, tell how it goes on."""
+        return 1
+
+    @property
+    def may_tilt(self) -> bool:
+        """Whether a factor exp(s ξ) makes functions of ξ easier to resolve, as where P_s has a single peak."""
+        return True
+
+    @property
+    def has_peak(self) -> bool:
+        """Whether the spectral density may have a high peak at a frequency of the noise itself."""
+        return False
+
+    @property
+    def approximates_spectrum(self) -> bool:
+        """Whether `spectral_density` is that of a simpler process which replaces this one."""
+        return False
 
     @property
     def sense(self) -> str:
@@ -88,6 +111,11 @@ class Noise(Parametrised):
     def parts(self) -> Mapping[str, Noise]:
         """The independent noises that this one consists of, by their names in the terms; by default itself alone."""
         return {"": self}
+
+    @property
+    def valued(self) -> Noise:
+        """Of several noises those that have values; where all are white, the first of them."""
+        return self
 
     @property
     @abstractmethod
@@ -182,7 +210,7 @@ class Noise(Parametrised):
         return np.asarray(min(self.half_width, 12 * self.standard_deviation) * np.linspace(-1, 1, 1001))
 
     @property
-    def typical(self) -> FloatArray:
+    def extremes(self) -> FloatArray:
         """The ends of the range where ξ is mostly; of a chain all states."""
         return min(2 * self.standard_deviation, self.half_width) * np.array([-1.0, 1.0])
 
@@ -230,18 +258,11 @@ class Noise(Parametrised):
         """
         raise NotImplementedError
 
-    def step(self, h: float, bias: float = 0.0) -> Any:
-        """One step of length h of dξ = (f(ξ) + σ²·bias) dt + σ dW, for the simulation.
+    def step(self, h: float, bias: float = 0.0) -> tuple[object, ...]:
+        """One step of length h of dξ = (f(ξ) + σ²·bias) dt + σ dW, for the simulation; see `noises.steps`.
 
         It follows from this equation alone, without P_s, so that the simulation is independent of what follows from
         P_s. A kind without `step` is not simulated.
-
-        Returns:
-            A named tuple of numbers whose class has a static method `draw(step, xi, xi_mean, xi_end, push, rng)` that
-            numba can compile. For a step that begins at `xi` it draws the mean of ξ over the step into `xi_mean` and
-            its end into `xi_end`, all of the shape (n,), and where there may be a bias it adds ∫f(ξ) dt to `push`. If
-            `start` returns several rows, `xi` has them too: `draw` then moves all rows but the first, ξ, which its
-            caller sets to `xi_end`.
         """
         raise NotImplementedError
 
@@ -283,6 +304,15 @@ class Noise(Parametrised):
         raise NotImplementedError(f"{type(self).__name__} states no derivative by {name}")
 
 
+class Gaussian(Noise):
+    """Noise whose law is Gaussian."""
+
+    def log_density(self, xi: ArrayLike) -> FloatArray:
+        """The logarithm of the Gaussian density with the standard deviation of ξ."""
+        z = np.asarray(xi, dtype=float) / self.standard_deviation
+        return -0.5 * z**2 - math.log(math.sqrt(2 * math.pi) * self.standard_deviation)
+
+
 class Memoryless(Noise):
     """Noise that has no value, see `is_white`: to solvers a chain that rests in its only state, ξ = 0."""
 
@@ -315,7 +345,7 @@ class Memoryless(Noise):
     def reached(self) -> FloatArray:
         return np.zeros(1)
 
-    typical = reached
+    extremes = reached
 
     def start(self, size: int, rng: np.random.Generator) -> FloatArray:
         """0: it has no value."""

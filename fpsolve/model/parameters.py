@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from enum import Enum
 from functools import cache
-from textwrap import wrap
 from typing import Annotated, Any, ClassVar, NamedTuple, Self, cast
 
 from pydantic import BaseModel, ConfigDict, Field
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
-from fpsolve.data import plain_unit, written
+from fpsolve.data import plain_unit
 from fpsolve.messages import Message
 from fpsolve.model.quantity import Quantity
 
@@ -30,8 +29,6 @@ GREEK = (
     r"omega|Gamma|Delta|Theta|Lambda|Xi|Pi|Sigma|Phi|Psi|Omega)_?(\d*|(?<=_)[a-zA-Z])"
 )
 """A name that is a Greek letter, with a number or a letter below it."""
-LINE = 90
-"""Largest number of letters of a line of parameters."""
 UNITS = {
     "%": (0.01, ""),
     "Hz": (2 * math.pi, ", in rad/time"),
@@ -39,6 +36,8 @@ UNITS = {
     "deg": (math.pi / 180, ", in rad"),
 }
 """The units that are known in numbers: by which factor to multiply, and what unit that gives."""
+Table = Mapping[str, Any]
+"""A table of a case file."""
 STRICT: ConfigDict = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
 """The rules of all tables: no unknown keys, no conversions, finite numbers only."""
 
@@ -139,7 +138,6 @@ class Parametrised:
         section: the first part of the keys of its parameters, such as "noise".
         words: parameters that the class itself decides, by their names.
         stated: what case files say of it besides its `fields`, such as the `words`, by its names.
-        inert: names of parameters on which the linear problem does not depend.
         variants: other classes of this kind, with other parameters; a table of a case file tells by its keys which.
     """
 
@@ -147,21 +145,21 @@ class Parametrised:
     section: ClassVar[str]
     words: ClassVar[Mapping[str, str]] = {}
     stated: ClassVar[Mapping[str, FieldInfo]] = {}
-    inert: ClassVar[Sequence[str]] = ()
     variants: ClassVar[Sequence[type[Parametrised]]] = ()
+    __pydantic_fields__: ClassVar[Mapping[str, FieldInfo]] = {}
 
     @classmethod
     def fields(cls) -> Mapping[str, FieldInfo]:
         """The ranges and meanings of the parameters by their names."""
-        return getattr(cls, "__pydantic_fields__", {})
+        return cls.__pydantic_fields__
 
     @classmethod
-    def takes(cls, key: str, table: Mapping[str, Any]) -> bool:
+    def takes(cls, key: str, table: Table) -> bool:
         """Whether a table of a case file may have a key besides the `fields` and what is `stated`."""
         return False
 
     @classmethod
-    def from_table(cls, table: Mapping[str, Any]) -> Parametrised:
+    def from_table(cls, table: Table) -> Parametrised:
         """What a table of a case file states. Raises `ValueError` where a parameter is out of range."""
         return cls(**table)
 
@@ -174,10 +172,15 @@ class Parametrised:
         """The values of the parameters by their names; the words of the class last."""
         found: dict[str, float | str] = {}
         for name in self.fields():
-            value = getattr(self, name)
+            value = vars(self)[name]
             if isinstance(value, Enum | int | float):
                 found[name] = str(value.value) if isinstance(value, Enum) else float(value)
         return {**found, **self.words}
+
+    @property
+    def inert(self) -> Sequence[str]:
+        """The names of parameters on which the linear problem does not depend."""
+        return ()
 
     @property
     def differentiable(self) -> Sequence[str]:
@@ -191,7 +194,8 @@ class Parametrised:
 
     def at(self, values: Mapping[str, float | str]) -> Self:
         """A system or a noise with other values of some parameters. Raises `ValueError` where one is out of range."""
-        return replace(self, **values)  # type: ignore[type-var]
+        made: Self = replace(cast("Any", self), **values)
+        return made
 
 
 @cache
@@ -213,25 +217,3 @@ def unknown_parameter(key: str) -> Quantity:
     greek = re.fullmatch(GREEK, key.rpartition(".")[2])
     latex = rf"$\{greek[1]}{f'_{{{greek[2]}}}' if greek[2] else ''}$" if greek else ""
     return Quantity(key, key, key, latex, "unknown")
-
-
-def parameter_words(parameters: Mapping[str, Parameter], keys: Collection[str]) -> str:
-    """Some of the parameters with their units, by dotted keys: "noise.D0 = 0.1 (1/time), noise.r0 = 0.9"."""
-    return ", ".join(f"{key} = {_valued(parameters[key])}" for key in keys)
-
-
-def parameter_lines(parameters: Mapping[str, Parameter], besides: Collection[str] = ()) -> list[str]:
-    """All parameters besides some with their units, in lines for the system and for the noise, none of them long."""
-    sections = dict[str, list[str]]()
-    for key, parameter in parameters.items():
-        if key not in besides:
-            section, _, name = key.rpartition(".")
-            sections.setdefault(section, []).append(f"{name} = {_valued(parameter)}".replace(" ", "\xa0"))
-    lines = [wrap(f"{section}: {', '.join(words)}", LINE) for section, words in sections.items()]
-    return [line.replace("\xa0", " ") for each in lines for line in each]
-
-
-def _valued(parameter: Parameter) -> str:
-    """The value of a parameter with its unit."""
-    text, unit = written(parameter.value), parameter.quantity.unit_in_words
-    return f"{text} ({unit})" if unit else text

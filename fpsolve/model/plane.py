@@ -11,11 +11,13 @@ from __future__ import annotations
 
 import math
 import re
+from abc import abstractmethod
+from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
-from typing import Any, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -27,6 +29,7 @@ from fpsolve.arrays import (
     Constant,
     FloatArray,
     Linear,
+    identity,
     is_whole,
     one,
     real_array,
@@ -139,6 +142,12 @@ class Function:
         return (offset, slope) if np.all(near) else None
 
 
+Driver = tuple[str, Constant | Linear | Function]
+"""The name of a noise, and a function of it."""
+STEADY: Driver = "", one
+"""What is driven by nothing."""
+
+
 def coefficient(g: Coefficient) -> Constant | Linear | Function:
     """A coefficient as a value. Raises `TypeError` where it is no function."""
     if isinstance(g, Constant | Linear | Function):
@@ -165,7 +174,9 @@ def written_coefficient(g: Constant | Linear | Function) -> str:
             return "" if value == 1 else f"{value:g} "
         case Linear():
             return "ξ "
-    return f"{getattr(g.f, '__name__', type(g.f).__name__)}(ξ) "
+    with suppress(AttributeError):
+        return f"{g.f.__name__}(ξ) "
+    return f"{type(g.f).__name__}(ξ) "
 
 
 def written_sum(terms: Iterable[tuple[float, str]]) -> str:
@@ -217,6 +228,12 @@ class CoefficientMatrix:
         object.__setattr__(self, "order", int(self.order))
         object.__setattr__(self, "matrix", tuple(map(tuple, entries.tolist())))
         object.__setattr__(self, "g", coefficient(self.g))
+
+    @property
+    def drivers(self) -> Sequence[tuple[Driver, float]]:
+        """What drives it, the noise and a function of it, each with a factor: nothing and ξ for a + bξ."""
+        (offset, slope), g = (line, identity) if (line := affine(self.g)) else ((0.0, 1.0), self.g)
+        return [(driver, c) for driver, c in ((STEADY, offset), ((self.noise, g), slope)) if c]
 
     @cached_property
     def h(self) -> Harmonics:
@@ -348,34 +365,26 @@ class Jump:
 
     def refuse(self, system: System, noise: Any) -> None:
         """Refuse it where a noise moves the phase across the ray, or nothing does. Raises `ValueError`."""
-        ray, names = f"the ray of a jump, phi = {self.phase:.6g}", [*noise.parts]
+        ray = f"the ray of a jump, phi = {self.phase:.6g}"
         x, u = (0.0 if abs(each) < 1e-15 else each for each in (math.cos(self.phase), -math.sin(self.phase)))
-        shares = u * x, u * u, -x * x, -x * u  # h = e′ᵀA e is the sum of these times the entries of A, in any units
-        driven = dict[str | None, list[tuple[CoefficientMatrix, FloatArray]]]()
+        shares = (u * x, u * u), (-x * x, -x * u)  # h = e′ᵀA e is the sum of these times the entries of A, in any units
+        speeds, limits, size = defaultdict[Driver, float](float), defaultdict[Driver, float](float), 0.0
         for term in system.terms:
-            if np.any(parts := np.multiply(shares, np.ravel(term.matrix))):
-                by = (term.noise if len(names) > 1 else names[0]) if is_driven(term.g) else None
-                driven.setdefault(by, []).append((term, parts))
-        total = size = 0.0
-        for name, own in driven.items():
-            one, xi = noise.parts.get(name or "", noise), np.array([0.0, 1.0])
-            if any(affine(term.g) is None for term, _ in own):
-                xi = one.reached
-            speeds, rounded = np.zeros(xi.size), 0.0
-            for term, parts in own:
-                strengths = system.epsilon**term.order * term.g(xi)
-                most, whole = float(np.max(np.abs(strengths))), float(np.abs(parts).sum())
-                speeds, size = speeds + sum(parts.tolist()) * strengths, size + whole * most
-                rounded += (ROUNDED * whole + OF_ENTRIES * term.fastest[0]) * most
-            if name is not None and not np.ptp(speeds) <= rounded:
-                which = f'the noise "{name}"' if name else f"{one.kind} noise"
+            parts = np.multiply(shares, term.matrix)
+            for driver, c in term.drivers:
+                strength, whole = abs(c) * system.epsilon**term.order, float(np.abs(parts).sum())
+                speeds[driver] += math.copysign(strength, c) * float(parts.sum())
+                limits[driver] += strength * (ROUNDED * whole + OF_ENTRIES * term.fastest[0])
+                size += strength * whole
+        for driver, speed in speeds.items():
+            if driver != STEADY and abs(speed) > limits[driver]:
+                which = f'the noise "{driver[0]}"' if len(noise.parts) > 1 else f"{noise.kind} noise"
                 raise ValueError(
                     f"{which} moves the phase across {ray}, which it does over no wall: x = 0, phi = pi/2 = "
                     "1.5707963267948966, is passed with the speed v whatever the noise; let it drive terms that do "
                     "not move the phase there, or remove the jump"
                 )
-            total += float(speeds[0])
-        if abs(total) <= ROUNDED * size:
+        if abs(speeds[STEADY]) <= ROUNDED * size:
             raise ValueError(
                 f"the phase does not pass {ray}: nothing moves it there, so that no path comes to this wall; remove "
                 "the jump"
@@ -496,7 +505,6 @@ class System(Parametrised):
         noise_unit: the unit of ξ.
         noise_sections: the sections of a case file that state the noises, with which the keys of their parameters
             begin: "noise", or, for one that terms call axial, "noise.axial".
-        impact_parameter: the name of a parameter that is in ln R of the only jump and nowhere else; empty for none.
         cubic: what is of degree 3 in its rates, on which the stationary response depends alone; None for nothing.
         stop: the wall of one coordinate of more than two variables; None without one.
         forced: it with its terms of degree 0, which multiply a last variable, 1; None without such terms.
@@ -507,15 +515,42 @@ class System(Parametrised):
 
     section: ClassVar[str] = "system"
     noise_unit: ClassVar[str] = "unknown"
-    cubic: CubicTerms | None = None
-    stop: Stop | None = None
-    forced: System | None = None
-    clock: Any = None
-    pasts: Sequence[tuple[int, float]] = ()
-    second_unit: float = 1.0
-    epsilon: float
-    terms: Sequence[CoefficientMatrix]
-    jumps: Sequence[Jump]
+
+    if TYPE_CHECKING:  # a field, a constant or a property
+
+        @property
+        @abstractmethod
+        def epsilon(self) -> float: ...
+        @property
+        @abstractmethod
+        def terms(self) -> Sequence[CoefficientMatrix]: ...
+        @property
+        @abstractmethod
+        def jumps(self) -> Sequence[Jump]: ...
+
+    @property
+    def cubic(self) -> CubicTerms | None:
+        return None
+
+    @property
+    def stop(self) -> Stop | None:
+        return None
+
+    @property
+    def forced(self) -> System | None:
+        return None
+
+    @property
+    def clock(self) -> Any:
+        return None
+
+    @property
+    def pasts(self) -> Sequence[tuple[int, float]]:
+        return ()
+
+    @property
+    def second_unit(self) -> float:
+        return 1.0
 
     @property
     def barriers(self) -> Sequence[Jump | Stop]:
@@ -574,32 +609,27 @@ class System(Parametrised):
         return ("noise",)
 
     @property
-    def impact_parameter(self) -> str:
-        return ""
-
-    @property
     def impact_symbol(self) -> str:
         """The symbol of its coefficient of restitution in sentences."""
         return "R"
 
-    def impact_value(self, log_factor: float) -> float:
-        """The coefficient of restitution of a wall with a given ln R, by its law; it may be out of range. Here R."""
-        with np.errstate(over="ignore"):
-            return float(np.exp(log_factor))
+    def impact_value(self, log_factor: float) -> tuple[float, float]:
+        """The coefficient of restitution of a wall with a given ln R, by its law, and its derivative by ln R.
 
-    def impact_slope(self, log_factor: float) -> float:
-        """Its derivative by ln R at a given ln R."""
-        return self.impact_value(log_factor)
+        It may be out of range. Here it is R.
+        """
+        with np.errstate(over="ignore"):
+            return (factor := float(np.exp(log_factor))), factor
 
 
 @dataclass(frozen=True)
 class LinearMotion(System):
-    """Terms and jumps alone: what is left of a system beside white noise, or in other coordinates, or its ∂/∂θ."""
+    """Matrices alone: what is left of a system beside white noise, or in other coordinates, or its ∂/∂θ."""
 
-    epsilon: float
-    terms: tuple[CoefficientMatrix, ...]
-    jumps: tuple[Jump, ...] = ()
-    pasts: Sequence[tuple[int, float]] = ()
+    terms: Sequence[CoefficientMatrix]
+    jumps: Sequence[Jump] = ()
+    epsilon: float = 1.0
+    pasts: Sequence[tuple[int, float]] = field(default=(), kw_only=True)
 
 
 class Motion(NamedTuple):
@@ -614,6 +644,17 @@ class Motion(NamedTuple):
     drift: System
     diffusions: Sequence[CoefficientMatrix] = ()
     impulses: Sequence[Impulse] = ()
+
+    @property
+    def overshoot(self) -> float:
+        """The largest factor by which ‖x‖ jumps upwards, 1 where it does not."""
+        struck = [float(np.linalg.norm(each.matrix, 2)) for each in self.impulses]
+        return max([1.0, *(math.exp(jump.log_factor) for jump in self.drift.jumps), *struck])
+
+    @property
+    def rises_smoothly(self) -> bool:
+        """Whether ‖x‖ is differentiable but where a wall makes it smaller."""
+        return self.overshoot == 1.0 and not self.impulses and all(each.q.vanishes for each in self.diffusions)
 
 
 class MotionDerivative(NamedTuple):
@@ -648,6 +689,32 @@ def split_by_noise(system: System, terms: Sequence[CoefficientMatrix]) -> tuple[
             steady.append(CoefficientMatrix(term.order, (offset * np.array(term.matrix)).tolist()))
         driven += slope * system.epsilon**term.order * np.array(term.matrix)
     return steady, driven
+
+
+def by_noise(system: System, terms: Sequence[CoefficientMatrix]) -> dict[Driver, FloatArray]:
+    """Sums, with the powers of ε, of what is steady, and of what each noise drives by each function."""
+    found: dict[Driver, FloatArray] = {STEADY: np.zeros((system.dimension, system.dimension))}
+    for term in terms:
+        for driver, c in term.drivers:
+            found[driver] = found.get(driver, 0.0) + c * system.epsilon**term.order * np.array(term.matrix)
+    return found
+
+
+def kept_phases(matrices: Sequence[FloatArray]) -> tuple[float, ...]:
+    """φ of the rays of a plane that all matrices keep, none or two, or one; 0 where they keep all rays."""
+    if len(matrices[0]) > 2:
+        return ()
+    pairs = [(turning(each), ROUNDED * float(np.linalg.norm(each))) for each in matrices]
+    turns = [(speed, limit) for speed, limit in pairs if abs(speed.mean) + speed.amplitude > limit]
+    if not turns:
+        return (0.0,)
+    first, _ = turns[0]
+    if abs(first.mean) > first.amplitude * (1 + 1e-12):
+        return ()
+    middle = math.atan2(first.sine, first.cosine)
+    away = math.acos(min(max(-first.mean / first.amplitude, -1.0), 1.0))
+    found = {0.5 * (middle + away) % math.pi, 0.5 * (middle - away) % math.pi}
+    return tuple(phi for phi in sorted(found) if all(abs(float(speed(phi))) <= limit for speed, limit in turns))
 
 
 def as_plane(terms: Sequence[CoefficientMatrix], size: float = 0.0) -> tuple[CoefficientMatrix, ...]:
@@ -697,13 +764,13 @@ def matrix_at(system: System, xi: Xi, orders: slice = slice(None)) -> FloatArray
 
     With several noises ξ is a mapping from their names to arrays, and its shape that of these broadcast together.
     """
-    named = {name: np.asarray(each, dtype=float) for name, each in xi.items()} if isinstance(xi, Mapping) else {}
-    rest = np.zeros(np.broadcast_shapes(*(each.shape for each in named.values()))) if named else np.asarray(xi, float)
-    total = np.zeros((*rest.shape, system.dimension, system.dimension))
+    named, others = (xi, 0.0) if isinstance(xi, Mapping) else ({}, xi)
+    shape = np.broadcast_shapes(np.shape(others), *map(np.shape, named.values()))
+    total = np.zeros((*shape, system.dimension, system.dimension))
     wanted = range(1 + max((term.order for term in system.terms), default=0))[orders]
     for term in system.terms:
         if term.order in wanted:
-            values = term.g(named.get(term.noise, rest))
+            values = np.asarray(term.g(np.asarray(named.get(term.noise, others), dtype=float)))
             total += system.epsilon**term.order * values[..., None, None] * np.array(term.matrix)
     return total
 
@@ -745,12 +812,3 @@ def angular_frequency(system: System) -> float:
         return math.sqrt(square)
     sizes = [system.epsilon**term.order * float(np.linalg.norm(term.matrix)) for term in system.terms]
     return float(np.linalg.norm(a)) or max(sizes) or 1.0
-
-
-def noise_strength(system: System) -> float:
-    """Σ ε^n |b| max|q| over g = a + bξ, b = 1 for other g: d ln a/dt for ξ = 1; for the paper's oscillator ε."""
-    total = 0.0
-    for term in system.terms:
-        slope = abs((affine(term.g) or (0.0, 1.0))[1])
-        total += slope * system.epsilon**term.order * float(abs(term.q.mean) + term.q.amplitude)
-    return total

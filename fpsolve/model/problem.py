@@ -5,16 +5,16 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
-from typing import Any
+from typing import cast
 
 import numpy as np
 
 from fpsolve.arrays import FloatArray, shown
 from fpsolve.messages import Code, Message, Remedy
+from fpsolve.model.coordinates import Frame, own_frame
 from fpsolve.model.expressions import TIME
-from fpsolve.model.frame import Frame, own_frame
 from fpsolve.model.noise import Noise, NoiseDerivative
 from fpsolve.model.noises.several import noises_of
 from fpsolve.model.parameters import DERIVED, Parameter, Parametrised
@@ -25,17 +25,16 @@ from fpsolve.model.plane import (
     System,
     Xi,
     angular_frequency,
+    by_noise,
     is_driven,
+    kept_phases,
     matrix_at,
     phase_speed,
 )
 from fpsolve.model.quantity import NOISE, Quantity, moment_at
-from fpsolve.model.subsystem import Subsystem, blocks_of, by_noise, resting_phases
 
 RATE = "1/time"
 """Unit of ξ for which the units of parameters of noises are stated."""
-RTOLS = {"gt": 1e-13, "lt": 1}
-"""The range of rtol."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +48,7 @@ class ParameterDerivative:
         noise: that of the noise; None where it does not change.
         diffusions: that of each of the `diffusions`; empty where none changes.
         impulses: that of each of the `impulses`, of its rate and of its exponent; empty where none changes.
-        part: which of the `coloured` noises changes.
+        part: which of the `valued` noises changes.
     """
 
     theta: float
@@ -74,6 +73,8 @@ class Problem:
         system: `VibroImpactOscillator`, or a `PlaneSystem`.
         noise: `OrnsteinUhlenbeck`, or `NonGaussianNoise` for Eq. (7) as it stands, or a `MarkovChain`; several noises
             as a mapping from the names that the terms have, or `Noises`.
+        held: the `frame` and the `rate_bound` of another problem: L(p) is smooth in parameters in one frame only. None
+            for its own.
 
     Raises:
         TypeError: one of them is something else.
@@ -84,6 +85,7 @@ class Problem:
 
     system: System
     noise: Noise
+    held: tuple[Frame, float] | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         if isinstance(self.noise, Mapping):
@@ -125,35 +127,28 @@ class Problem:
 
     def wall_speeds(self, motion: System) -> list[float]:
         """dφ/dt of a motion in the coordinates of `frame` at the ray of each jump, which no noise changes."""
-        speed = phase_speed(motion, self.typical)
+        speed = phase_speed(motion, self.extremes)
         return [float(np.ravel(speed(jump.phase))[0]) for jump in self.motion.jumps]
 
     @cached_property
-    def coloured(self) -> Noise:
+    def valued(self) -> Noise:
         """The noise, or of several those that have values; where all are white, the first of them."""
-        return self.noise if len(self.noise.parts) == 1 else self.noise.coloured  # type: ignore[attr-defined]
+        return self.noise.valued
 
     def named_noise(self, name: str) -> Noise:
         """The noise that terms name so; with one noise that one, whatever its name."""
         return self.noise.parts.get(name, self.noise)
 
     def at_values(self, values: Sequence[FloatArray]) -> Xi:
-        """ξ of all combinations of some values of each of the `coloured` noises, as `matrix_at` takes it."""
+        """ξ of all combinations of some values of each of the `valued` noises, as `matrix_at` takes it."""
         if len(values) == 1:
             return values[0]
-        return dict(zip(self.coloured.parts, np.meshgrid(*values, indexing="ij", sparse=True), strict=True))
+        return dict(zip(self.valued.parts, np.meshgrid(*values, indexing="ij", sparse=True), strict=True))
 
     @property
-    def typical(self) -> Xi:
-        """All combinations of the `typical` values of the noises."""
-        return self.at_values([each.typical for each in self.coloured.parts.values()])
-
-    @cached_property
-    def may_rest(self) -> bool:
-        """Whether the phase rests at some φ where noises have values at the ends of their ranges, or 12 std away."""
-        ends = [np.sort(each.reached)[[0, -1]] for each in self.coloured.parts.values()]
-        speed = phase_speed(self.motion, self.at_values(ends))
-        return bool(np.any(np.abs(speed.mean) <= speed.amplitude))
+    def extremes(self) -> Xi:
+        """All combinations of the `extremes` of the noises."""
+        return self.at_values([each.extremes for each in self.valued.parts.values()])
 
     @property
     def drift(self) -> System:
@@ -173,15 +168,18 @@ class Problem:
     @cached_property
     def frame(self) -> Frame:
         """The coordinates that it is solved in."""
-        return self._own[0]
+        return self.framed[0]
 
     @property
-    def size(self) -> float:
+    def rate_bound(self) -> float:
         """How fast it moves there at most, about, by all that moves it."""
-        return self._own[1]
+        return self.framed[1]
 
     @cached_property
-    def _own(self) -> tuple[Frame, float]:
+    def framed(self) -> tuple[Frame, float]:
+        """The frame and the bound."""
+        if self.held is not None:
+            return self.held
         if self.system.pasts:
             return Frame(np.eye(self.dimension).tolist()), float(np.linalg.norm(matrix_at(self.drift, 0.0), 2))
         return own_frame(
@@ -189,12 +187,6 @@ class Problem:
             self._moved,
             lambda name: ((noise := self.named_noise(name)).standard_deviation, noise.correlation_time),
         )
-
-    def in_frame_of(self, other: Problem) -> Problem:
-        """The problem in the coordinates of another one, as L(p) is smooth in parameters in the same ones only."""
-        held = Problem(self.system, self.noise)
-        held.__dict__["_own"] = other._own
-        return held
 
     @cached_property
     def motion(self) -> System:
@@ -211,39 +203,22 @@ class Problem:
         """The impulses that multiply the state at random times, in the same coordinates."""
         return [self.frame.exponent(each) for each in self._moved.impulses]
 
-    @property
-    def overshoot(self) -> float:
-        """The largest factor by which ‖x‖ jumps upwards, 1 where it does not."""
-        jumps = [math.exp(jump.log_factor) for jump in self.system.jumps]
-        struck = [float(np.linalg.norm(each.matrix, 2)) for each in self._moved.impulses]
-        return max([1.0, *jumps, *struck])
-
-    @property
-    def rises_smoothly(self) -> bool:
-        """Whether ‖x‖ is differentiable but where a wall makes it smaller."""
-        diffuses = any(not each.q.vanishes for each in self._moved.diffusions)
-        return self.overshoot == 1.0 and not self._moved.impulses and not diffuses
-
     @cached_property
-    def _resting(self) -> tuple[float, ...]:
+    def resting_phases(self) -> tuple[float, ...]:
+        """Phases in the frame of rays of a plane that are never left, nor reached; one, 0, where all rays are."""
         jolts = [each.matrix for each in self.diffusions] + [each.exponent for each in self.impulses]
-        return resting_phases([*map(np.array, jolts), *by_noise(self.motion, self.motion.terms)])
+        return kept_phases([*map(np.array, jolts), *by_noise(self.motion, self.motion.terms).values()])
 
     @cached_property
     def invariant_rays(self) -> tuple[float, ...]:
         """φ of rays that the phase never leaves, nor reaches, whatever the noise does; one alone where all rays are."""
-        return tuple(float(self.frame.own_phase(phi) % math.pi) for phi in self._resting)
-
-    @cached_property
-    def blocks(self) -> tuple[Subsystem, ...]:
-        """Blocks that can be solved by themselves, as all matrices are block triangular; empty where they are not."""
-        return blocks_of(self.system, np.array(self.frame.matrix), self._resting, self.size)
+        return tuple(float(self.frame.own_phase(phi) % math.pi) for phi in self.resting_phases)
 
     @property
     def unit_rate(self) -> float:
         """Its own unit of rates: ω or the size of the order 0, or of all where there is none."""
         has_own = np.any(matrix_at(self.motion, 0.0, slice(0, 1)))
-        return angular_frequency(self.motion) if has_own else self.size or 1.0
+        return angular_frequency(self.motion) if has_own else self.rate_bound or 1.0
 
     @property
     def is_driven(self) -> bool:
@@ -258,11 +233,8 @@ class Problem:
     @property
     def sections(self) -> Mapping[str, Parametrised]:
         """The system and the noise by what the keys of their parameters begin with, such as "noise.axial"."""
-        parts = self.noise.parts
-        if len(parts) == 1:
-            return {self.system.section: self.system, self.system.noise_sections[0]: self.noise}
         first = self.system.noise_sections[0]
-        noises = {f"noise.{name}" if name else first: noise for name, noise in parts.items()}
+        noises = {f"noise.{name}" if name else first: noise for name, noise in self.noise.parts.items()}
         return {self.system.section: self.system, **noises}
 
     @cached_property
@@ -272,21 +244,6 @@ class Problem:
             f"{section}.{name}": value for section, half in self.sections.items() for name, value in half.values.items()
         }
 
-    @cached_property
-    def form(self) -> str:
-        """All that it is but for the values of its parameters, as text.
-
-        The class of a kind that has words follows from these, which are among the values.
-        """
-        kinds = list[Any]()
-        for section, half in self.sections.items():
-            kind: Any = type(half)
-            values, name = repr(tuple(half.values.items())), "" if half.words else kind.__qualname__
-            names = [each.name for each in fields(kind) if each.repr and each.name not in half.values]
-            others = {each: repr(getattr(half, each)) for each in names}
-            kinds.append((section, name, {each: other for each, other in others.items() if other != values}))
-        return repr(kinds)
-
     @property
     def parameters(self) -> Mapping[str, Parameter]:
         """All parameters by their keys, with symbol, words, unit and range; no two have one symbol."""
@@ -295,7 +252,7 @@ class Problem:
             for name, value in half.values.items():
                 key = f"{section}.{name}"
                 quantity = replace(half.quantity_of(name), name=key, symbol=key)
-                if half is not self.system and name in half.of_xi and self.system.noise_unit != RATE:  # type: ignore[attr-defined]
+                if isinstance(half, Noise) and name in half.of_xi and self.system.noise_unit != RATE:
                     quantity = replace(quantity, unit="unknown")
                 found[key] = Parameter(value, quantity, type(half))
         signs = Counter(each.quantity.shown.strip("$") for each in found.values())
@@ -332,15 +289,9 @@ class Problem:
             if section not in known:
                 raise ValueError(f"got {key}; the parameters are {', '.join(self.values)}")
             new.setdefault(section, {})[name] = value
-        return self.made_of(
-            [_at(half, tuple(new[section].items())) if section in new else half for section, half in known.items()]
-        )
-
-    def made_of(self, halves: Sequence[Parametrised]) -> Problem:
-        """The problem of another system and other noises, in the order of `sections`."""
-        system, *noises = halves
-        made = noises[0] if len(noises) == 1 else dict(zip(self.noise.parts, noises, strict=True))
-        return Problem(system, made)  # type: ignore[arg-type]
+        halves = {key: _at(half, tuple(new[key].items())) if key in new else half for key, half in known.items()}
+        noises = dict(zip(self.noise.parts, [*halves.values()][1:], strict=True))
+        return Problem(cast("System", halves[self.system.section]), noises_of(cast("dict[str, Noise]", noises)))
 
     def derivative(self, key: str) -> ParameterDerivative:
         """∂/∂θ by one of the `differentiable` parameters. Raises `ValueError` for others."""
@@ -356,15 +307,20 @@ class Problem:
             if slope := self.system.clock_slope(name):
                 noise, part = NoiseDerivative(turning=slope), TIME
         else:
-            changed = name if len(self.noise.parts) == 1 else f"{part}.{name}"
+            changed = ".".join(filter(None, (part, name)))
             if not (own := self.named_noise(part)).is_white:
                 noise = own.derivative(name)
-        terms, diffusions, impulses = self.noise.changed_motion(self.system, terms, changed)
-        terms, diffusions = ([self.frame.term(each) for each in parts] for parts in (terms, diffusions))
-        impulses = [self.frame.exponent(each) for each in impulses]
-        axis = [*self.coloured.parts].index(part) if noise and len(self.coloured.parts) > 1 else 0
-        theta = float(self.values[key])
-        return ParameterDerivative(theta, tuple(terms), tuple(jumps), noise, tuple(diffusions), tuple(impulses), axis)
+        moved = self.noise.changed_motion(self.system, terms, changed)
+        axes = [*self.valued.parts]
+        return ParameterDerivative(
+            float(self.values[key]),
+            tuple(map(self.frame.term, moved.terms)),
+            tuple(jumps),
+            noise,
+            tuple(map(self.frame.term, moved.diffusions)),
+            tuple(map(self.frame.exponent, moved.impulses)),
+            axes.index(part) if part in axes else 0,
+        )
 
     def derivatives(self) -> Mapping[str, ParameterDerivative]:
         """∂/∂θ by all of the `differentiable` parameters, by their keys."""

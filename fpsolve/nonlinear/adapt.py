@@ -172,7 +172,7 @@ class Search:
         """One that serves weak noise, where a² has a law of the shape −δ_p/2 and the mean λ/κ."""
         shape, digits = self.index / 2, -math.log10(self.rtol)
         degree = round(4 + digits / 2)
-        plane = Plane(self.flow, self._circle(degree), first_axis(self.flow.problem.coloured, digits))
+        plane = Plane(self.flow, self._circle(degree), first_axis(self.flow.problem.valued, digits))
         most = float(np.max(np.abs(self.flow.rise(self.flow.cubic, plane.circle.points))))
         law = gamma(shape, scale=self.rate / max(mean_damping(plane), LEAST_DAMPING * most) / shape)
         bottom, top = (0.5 * math.log(max(law.ppf(q), 1e-300)) for q in (QUANTILE * self.rtol, 1 - self.rtol))

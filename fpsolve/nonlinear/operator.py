@@ -30,9 +30,9 @@ from scipy.sparse import csr_matrix
 from fpsolve.arrays import Coefficient, FloatArray, dense, one
 from fpsolve.fem.line import LineSpace
 from fpsolve.fem.noise_axes import NoiseAxis
+from fpsolve.model.confinement import amplitude_frame, mean_terms
 from fpsolve.model.plane import CoefficientMatrix
 from fpsolve.model.problem import Problem
-from fpsolve.model.settling import amplitude_frame, mean_terms
 
 HALF_TURN = np.array([-0.5, 0.5]) * math.pi
 """The phases where x₁ is not negative."""
@@ -101,7 +101,7 @@ class Flow:
     def log_unit(self) -> float:
         """The mean of γ: ln a where the cubic terms are as large as the linear ones, a unit of a."""
         rates = [float(np.linalg.norm(each)) for each in mean_terms(self.problem)]
-        return 0.5 * math.log((rates[0] or 1 / self.problem.coloured.correlation_time) / rates[1])
+        return 0.5 * math.log((rates[0] or 1 / self.problem.valued.correlation_time) / rates[1])
 
     @cached_property
     def linear(self) -> Sequence[Rate]:
@@ -233,7 +233,7 @@ class Plane:
 
     def flux(self, values: FloatArray) -> float:
         """∫P_s φ̇ρ at the wall, where no noise changes φ̇, of coefficients of φ and ξ."""
-        end, mean = self.flow.half_turn[1:], self.flow.problem.coloured.mean
+        end, mean = self.flow.half_turn[1:], self.flow.problem.valued.mean
         speed = sum(float(rate.g(mean)) * float(rate.h(end)[0]) for rate in self.flow.linear)
         return float(speed * (np.kron(self.circle.at(end)[0], self.xi_mean) @ values))
 

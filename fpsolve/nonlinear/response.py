@@ -25,9 +25,9 @@ from fpsolve.exponent.kinds import choose
 from fpsolve.exponent.method import Budget
 from fpsolve.exponent.quantities import lyapunov_exponent, stability_index
 from fpsolve.messages import Code, Message
+from fpsolve.model.confinement import no_response
 from fpsolve.model.problem import Problem, checked_problem
 from fpsolve.model.quantity import IMPACT_RATE
-from fpsolve.model.settling import no_response
 from fpsolve.nonlinear.adapt import Search, Settled
 from fpsolve.nonlinear.elimination import Solution
 from fpsolve.nonlinear.operator import Flow

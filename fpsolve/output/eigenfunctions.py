@@ -10,10 +10,10 @@ from fpsolve.exponent.density import Grid, on_nodes
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.kinds import choose
 from fpsolve.exponent.method import DIRECTIONS, PHASE_AND_NOISE
-from fpsolve.model.parameters import parameter_lines
 from fpsolve.model.quantity import PHASE
 from fpsolve.parts.nodes import FIELDS, Nodes
 from fpsolve.parts.surfaces import Picture, Surface, painted, picture_of
+from fpsolve.vtk import parameter_lines
 
 FINER = 2
 """So many times as many nodes either way as a file for ParaView has; there they carry polynomials."""

@@ -92,7 +92,7 @@ class Nodes:
     @property
     def y(self) -> FloatArray:
         """What stands along y at each z: ξ."""
-        return self.problem.coloured.standard_deviation * self.z
+        return self.problem.valued.standard_deviation * self.z
 
     @property
     def xi(self) -> FloatArray:
@@ -127,7 +127,7 @@ class Nodes:
 
     def seen(self, pair: PrincipalPair) -> Nodes:
         """The same where the tilted density, or that of the noise, is not negligible."""
-        densities = self.fields(pair).tilted_density.max(axis=0), self.problem.coloured.density(self.y)
+        densities = self.fields(pair).tilted_density.max(axis=0), self.problem.valued.density(self.y)
         living = np.flatnonzero(np.any([each > NEGLIGIBLE * each.max() for each in densities], axis=0))
         return replace(self, z_cells=self.z[None, living[0] : living[-1] + 1])
 
@@ -171,7 +171,7 @@ class Strips(Nodes):
 
     @property
     def xi(self) -> FloatArray:
-        return np.asarray(self.problem.coloured.reached)
+        return np.asarray(self.problem.valued.reached)
 
     def at_xi(self, values: FloatArray) -> FloatArray:
         return values[:, :: self.order + 1]
@@ -209,7 +209,7 @@ def _z_lines(pair: PrincipalPair) -> FloatArray:
 
     Outside it P_s and the tilted density are below `FAINT` of their largest values.
     """
-    xi, noise = cast("LineAxis", pair.space.xi), pair.generator.problem.coloured
+    xi, noise = cast("LineAxis", pair.space.xi), pair.generator.problem.valued
     if xi.lines.size:
         return xi.lines
     end = noise.half_width / noise.standard_deviation

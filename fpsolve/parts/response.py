@@ -69,7 +69,7 @@ def _density(found: StationaryResponse, grid: Grid) -> ResponseDensity:
     problem = found.problem
     a = (np.arange(amplitudes) + 0.5) * found.reach / amplitudes
     phi = found.flow.phases(phases)
-    xi = _values_of(problem.coloured, values)
+    xi = _values_of(problem.valued, values)
     whole = [found.density([each], phi, xi)[0] for each in a]  # one by one, which takes little memory
     of_plane = found.polar_density(a[:, None], phi)
     return ResponseDensity(

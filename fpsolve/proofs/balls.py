@@ -18,7 +18,7 @@ from fpsolve.arrays import FloatArray
 from fpsolve.errors import FpsolveError
 
 if TYPE_CHECKING:
-    from flint import arb
+    from flint import acb, arb
 
 PRECISION = 128
 """Bits of a midpoint: twice those of the floats in a certificate, as what is bounded are differences."""
@@ -54,6 +54,13 @@ def ball(number: float) -> arb:
     return flint.arb(number)
 
 
+def complex_ball(real: arb | float, imaginary: arb | float = 0.0) -> acb:
+    """A complex number."""
+    import flint
+
+    return flint.acb(real, imaginary)
+
+
 def each(function: Callable[[Any], Any], numbers: Any) -> Balls:
     """A function of each element, in the same shape."""
     found: Balls = np.frompyfunc(function, 1, 1)(numbers)
@@ -62,9 +69,7 @@ def each(function: Callable[[Any], Any], numbers: Any) -> Balls:
 
 def balls(numbers: Any) -> Balls:
     """Floats as exact numbers, in the same shape."""
-    from flint import arb
-
-    return each(arb, np.asarray(numbers, dtype=float))
+    return each(ball, np.asarray(numbers, dtype=float))
 
 
 def roots(count: int) -> Balls:
@@ -108,11 +113,9 @@ def _beyond(bound: arb, direction: float) -> float:
 
 def rounded(numbers: Balls) -> tuple[FloatArray, FloatArray]:
     """Floats near real balls, and by how much the balls may differ from them at most."""
-    from flint import arb
-
     near, radius = (
         np.fromiter(map(float, found), float, numbers.size).reshape(numbers.shape)
-        for found in (numbers.flat, map(arb.rad, numbers.flat))
+        for found in (numbers.flat, (number.rad() for number in numbers.flat))
     )
     return near, np.abs(near) * 2.0**-52 + radius * (1 + 2.0**-20) + TINY
 

@@ -16,12 +16,12 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from math import factorial, sqrt
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
 from fpsolve.arrays import FloatArray
-from fpsolve.proofs.balls import Balls, ball, balls, each, magnitudes, matrix_product, raised, roots
+from fpsolve.proofs.balls import Balls, ball, balls, complex_ball, each, magnitudes, matrix_product, raised, roots
 from fpsolve.proofs.statement import BasisKind, Cylinder
 
 ORDER = 8
@@ -293,12 +293,10 @@ class States(Basis):
 
     def diffused(self, u: Balls, noise: Cylinder) -> Balls:
         """Σ_n rates_mn u_n."""
-        from flint import acb
-
         assert noise.rates is not None
         parts = np.concatenate([each(lambda c: c.real, u), each(lambda c: c.imag, u)])
         real, imag = np.split(matrix_product(parts, noise.rates.T), 2)
-        return real + acb(0, 1) * imag
+        return real + complex_ball(0, 1) * imag
 
     def times_z(self, u: Balls, noise: Cylinder) -> Balls:
         """u times the value of the state."""
@@ -345,7 +343,7 @@ def _order(step: float, rest: float) -> int:
     return next((n for n in range(1, ORDER) if step < 1 and step**n / factorial(n) <= rest), ORDER)
 
 
-def hermite_table(y: Any, root: Any) -> Any:
+def hermite_table(y: Balls, root: Balls) -> Balls:
     """He_m(y)/√m!, shape (degrees, *y.shape), from y He_m = He_{m+1} + m He_{m−1}; `root` has √m of each degree."""
     table = [0 * y + 1, y]
     for m in range(1, len(root) - 1):

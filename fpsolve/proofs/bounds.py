@@ -12,15 +12,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from math import factorial, pi
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fpsolve.arrays import FloatArray
-from fpsolve.proofs.balls import Balls, above, ball, balls, below, each, magnitudes, raised, rounded
+from fpsolve.proofs.balls import Balls, above, ball, balls, below, complex_ball, each, magnitudes, raised, rounded
 from fpsolve.proofs.basis import Basis, added, padded, turned
 from fpsolve.proofs.statement import Cylinder
+
+if TYPE_CHECKING:
+    from flint import arb
 
 UPPER, LOWER = 1, -1
 """q of `verify`: of the upper and of the lower bound."""
@@ -99,7 +102,7 @@ class Phases:
     def __init__(self, count: int, waves: int) -> None:
         self._half = raised(pi / (2 * count))
         circle = [ball(i) / count for i in range(2 * count)]  # of π
-        cosines, sines = (np.array([float(getattr(turn, name)()) for turn in circle]) for name in ("cos_pi", "sin_pi"))
+        cosines, sines = np.array([[float(turn.cos_pi()), float(turn.sin_pi())] for turn in circle]).T
         turns = np.outer(2 * np.arange(count) + 1, np.arange(waves + 1)) % (2 * count)
         self._cosines, self._sines = cosines[turns], sines[turns]
 
@@ -145,7 +148,7 @@ class Trial:
     """
 
     noise: Cylinder
-    p: Any
+    p: arb | None
     mu: float
     basis: Basis
     cosine: FloatArray
@@ -154,10 +157,8 @@ class Trial:
     @cached_property
     def _u(self) -> Balls:
         """Coefficients of e^{2ikφ}."""
-        from flint import acb
-
         real, imag = balls(self.cosine), balls(-self.sine)
-        half, mirrored = ((real + sign * acb(0, 1) * imag) / 2 for sign in (1, -1))
+        half, mirrored = ((real + sign * complex_ball(0, 1) * imag) / 2 for sign in (1, -1))
         return np.concatenate([mirrored[:0:-1], half[:1] + mirrored[:1], half[1:]])
 
     @cached_property
@@ -271,7 +272,9 @@ class Bounder:
         bend = np.zeros((2, 1))
         if trial.p is not None:
             bend = trial.basis.gauge + np.array(self._range(cells.modes(trial.slope), divisor))
-        drift = [[bound(trial.noise.drift(z)) for z in balls(end)] for bound, end in ((below, low), (above, high))]
+        drift = [
+            [bound(each) for each in trial.noise.drift(balls(end))] for bound, end in ((below, low), (above, high))
+        ]
         slack = 8 * 2.0**-53 * (np.abs(np.array(drift)) + np.abs(bend[::-1]))
         inward = np.array(drift) - bend[::-1]
         return Bounds(mismatch, (inward[0] - slack[0], inward[1] + slack[1]))
@@ -291,8 +294,8 @@ class Bounder:
         steep, mismatch, growth = (list(zip(*(end.tolist() for end in pair), strict=True)) for pair in ranges)
         if sign < 0:
             steep, growth = ([(-high, -low) for low, high in pairs] for pairs in (steep, growth))
-        drift, slope = ([below(number) for number in numbers] for numbers in (sign * drifts[0], drifts[1]))
-        return [HeldBounds(*bounds) for bounds in zip(steep, mismatch, growth, drift, slope, strict=True)]
+        least = ([below(number) for number in numbers] for numbers in (sign * drifts[0], drifts[1]))
+        return [HeldBounds(*bounds) for bounds in zip(steep, mismatch, growth, *least, strict=True)]
 
     def _divisor(self, cells: Cells) -> Range:
         """Around u on every cell of φ and z; 1 for λ, where nothing is divided by f."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Annotated, Any, Self
+from typing import TYPE_CHECKING, Annotated, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -14,6 +14,9 @@ from fpsolve.proofs.balls import above, ball, below, precision
 from fpsolve.proofs.basis import OTHERS, Basis, Core
 from fpsolve.proofs.forms import FormCertificate
 from fpsolve.proofs.statement import BasisKind, Record, Statement
+
+if TYPE_CHECKING:
+    from flint import arb
 
 
 class MalformedProof(FpsolveError):
@@ -156,7 +159,7 @@ def follows(lower: float | None, upper: float | None, certificate: Certificate |
     return (lower is None or bool(ball(lower) <= low)) and (upper is None or bool(ball(upper) >= high))
 
 
-def _ends(certificate: Certificate | FormCertificate) -> tuple[Any, Any]:
+def _ends(certificate: Certificate | FormCertificate) -> tuple[arb, arb]:
     """The bounds of a certificate as balls, infinite where there is none."""
     low, high = (math.inf if side is None else side.delta for side in (certificate.lower, certificate.upper))
     return ball(certificate.mu) - ball(low), ball(certificate.mu) + ball(high)

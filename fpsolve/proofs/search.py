@@ -120,9 +120,7 @@ class Galerkin:
 
     def _turning(self, i: int, p: float) -> sp.csr_matrix:
         """F_i on the modes −K … K."""
-        from flint import arb
-
-        bands = self.noise.bands(i, arb(p), self.waves).astype(complex)
+        bands = self.noise.bands(i, ball(p), self.waves).astype(complex)
         size = bands.shape[1]
         rows = [sp.diags(bands[d][max(0, 1 - d) : size - max(0, d - 1)], 1 - d, shape=(size, size)) for d in range(3)]
         return sum(rows[1:], rows[0]).tocsr()

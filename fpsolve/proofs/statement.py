@@ -21,10 +21,9 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Literal, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from fpsolve.arrays import FloatArray, identity, one
@@ -38,16 +37,17 @@ from fpsolve.model.noises.ornstein_uhlenbeck import GaussianNoise
 from fpsolve.model.noises.several import noises_of
 from fpsolve.model.noises.white import Interpretation, White
 from fpsolve.model.plane import (
+    STEADY,
     CoefficientMatrix,
     System,
-    affine,
+    by_noise,
     matrix_at,
     rotating_coordinates,
     written_coefficient,
 )
 from fpsolve.model.problem import Problem, checked_problem
 from fpsolve.model.systems.plane_system import LinearSystem
-from fpsolve.proofs.balls import Balls, ball, balls
+from fpsolve.proofs.balls import Balls, ball, balls, complex_ball
 
 if TYPE_CHECKING:
     from flint import arb
@@ -184,14 +184,13 @@ class Statement(Record):
             ValueError: the speed of the phase at the ray of a jump has no one sign.
         """
         system, noise = problem.system, problem.noise
-        parts = np.zeros((2, 2, 2))
-        for term in system.terms:
-            line = affine(term.g)
-            if line is None:
-                told = written_coefficient(term.g).strip()
+        sums = by_noise(system, system.terms)
+        still = sums.pop(STEADY)
+        for _, g in sums:
+            if g != identity:
+                told = written_coefficient(g).strip()
                 raise TypeError(f"got the coefficient {told}; proofs are for coefficients a + b ξ")
-            parts += np.multiply.outer(line, system.epsilon**term.order * np.array(term.matrix))
-        still, driven = parts
+        driven = sum(sums.values(), np.zeros((2, 2)))
         if type(noise) is White and noise.interpretation == Interpretation.ITO:
             still = still - noise.s**2 / 2 * driven @ driven
         found = cls(
@@ -292,9 +291,9 @@ def _rotating(system: System) -> list[list[float]]:
     return (np.eye(2) if found is None else found).tolist()
 
 
-def _fractions(numbers: Any) -> NDArray[Any]:
+def _fractions(numbers: list[float] | list[list[float]]) -> Balls:
     """The exact values of floats."""
-    found: NDArray[Any] = np.vectorize(Fraction, otypes=[object])(numbers)
+    found: Balls = np.vectorize(Fraction, otypes=[object])(numbers)
     return found
 
 
@@ -333,19 +332,17 @@ class Cylinder:
         """Whether L = F₀ + ½ F₁²."""
         return self.law.kind == "white"
 
-    def drift(self, z: Any) -> Any:
+    def drift(self, z: Balls) -> Balls:
         """b(z)."""
         return self.slope * z / (1 - z * z) if self.is_bounded else self.slope * z
 
-    def drift_slope(self, z: Any) -> Any:
+    def drift_slope(self, z: Balls) -> Balls:
         """b′(z)."""
         return self.slope * (1 + z * z) / (1 - z * z) ** 2 if self.is_bounded else self.slope + 0 * z
 
     def bands(self, i: int, p: arb, waves: int) -> Balls:
         """F_i from mode k to mode k + d, shape (3, 2 waves + 1), d = −1, 0, 1 and k = −waves … waves."""
-        from flint import acb
-
-        turns = np.array([acb(0, 2 * k) + p * self.kappa for k in range(-waves, waves + 1)], dtype=object)
+        turns = np.array([complex_ball(0, 2 * k) + p * self.kappa for k in range(-waves, waves + 1)], dtype=object)
         return np.outer(self.h[i], turns) + p * self.q[i][:, None]
 
     def growth(self, i: int) -> Balls:
@@ -387,6 +384,6 @@ def _polar(a: Balls) -> tuple[Balls, Balls]:
 
 def _wave(mean: arb, cosine: arb, sine: arb) -> Balls:
     """Coefficients of mean + cosine cos 2φ + sine sin 2φ."""
-    from flint import acb
-
-    return np.array([acb(cosine / 2, sine / 2), acb(mean), acb(cosine / 2, -sine / 2)], dtype=object)
+    return np.array(
+        [complex_ball(cosine / 2, sine / 2), complex_ball(mean), complex_ball(cosine / 2, -sine / 2)], dtype=object
+    )

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 from fpsolve.case.case import Case
 from fpsolve.data import written
-from fpsolve.model.equation import noise_sentences
+from fpsolve.model.problem import Problem
 from fpsolve.page.limits import EACH
 from fpsolve.page.page import Block, Column, Sentence, filled
 
@@ -31,3 +32,16 @@ def show(case: Case) -> Iterator[Block]:
         rows.append([key, shown, quantity.unit_in_words, words])
     headings = "key", "value", "unit", "what it is"
     yield filled("", [Column(each, is_text=each != "value") for each in headings], rows)
+
+
+def noise_sentences(problem: Problem) -> list[str]:
+    """Each noise in a sentence: its kind, and how strong and how slow it is."""
+    lines = list[str]()
+    for section, noise in zip(problem.system.noise_sections, problem.noise.parts.values(), strict=False):
+        size, time = noise.standard_deviation, noise.correlation_time
+        numbers = [f"standard deviation {size:.6g}"] if 0 < size < math.inf else []
+        numbers += [f"correlation time {time:.6g}"] if 0 < time < math.inf else []
+        name = f"ξ of [{section}]" if len(problem.noise.parts) > 1 else "ξ"
+        lines.append(f"{name} is noise of the kind {noise.kind}{', with ' if numbers else ''}{' and '.join(numbers)}.")
+        lines[-1] += f" The equation is meant in {noise.sense} sense." if noise.sense else ""
+    return lines

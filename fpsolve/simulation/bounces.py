@@ -22,8 +22,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from fpsolve.model.confinement import amplitude_frame
 from fpsolve.model.plane import System, affine
-from fpsolve.model.settling import amplitude_frame
 from fpsolve.simulation.compiled import compiled, inlined
 from fpsolve.simulation.kernels import CHUNK
 from fpsolve.simulation.motions import drawn

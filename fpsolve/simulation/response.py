@@ -15,10 +15,10 @@ from fpsolve.data import Quantity, Result, dataset
 from fpsolve.drawing import canvas_of, draw_line, draw_plane, finish
 from fpsolve.errors import FpsolveError
 from fpsolve.messages import Code, Message
+from fpsolve.model.confinement import amplitude_frame, no_response
 from fpsolve.model.plane import Jump, System, angular_frequency, matrix_at
 from fpsolve.model.problem import Problem
 from fpsolve.model.quantity import IMPACT_RATE, OSCILLATOR_RESPONSE, ResponseQuantities
-from fpsolve.model.settling import amplitude_frame, no_response
 from fpsolve.simulation.batches import STEP_SECONDS, advance_all, standard_error
 from fpsolve.simulation.bounces import advance_and_count, motion_of
 from fpsolve.simulation.coefficients import starting_state

@@ -19,7 +19,7 @@ from numba.extending import overload
 
 from fpsolve.arrays import FloatArray
 from fpsolve.model.noise import Noise
-from fpsolve.model.noises.markov_chain import ChainStep
+from fpsolve.model.noises.steps import ChainStep
 from fpsolve.simulation.compiled import compiled
 from fpsolve.simulation.motions import drawn, exact_factors, factors, flow_on, picked
 from fpsolve.simulation.rays import Rays

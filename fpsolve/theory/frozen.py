@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fpsolve.arrays import FloatArray, IntArray
-from fpsolve.model.plane import matrix_at, noise_strength, squared_frequency
+from fpsolve.model.plane import System, affine, matrix_at, squared_frequency
 from fpsolve.model.problem import Problem
 
 SAMPLES = 601
@@ -51,9 +51,9 @@ def maxima(rate: FloatArray) -> IntArray:
 
 def steady_places(problem: Problem, p: float) -> tuple[FloatArray, FloatArray]:
     """z at which paths that hold slow Gaussian noise grow the fastest, the best first, and the rates pG − ξ²/2S(0)."""
-    noise = problem.coloured
+    noise = problem.valued
     unit, spectrum = noise.standard_deviation, noise.spectral_density(0.0)
-    reach = 2 * abs(p) * noise_strength(problem.motion) * spectrum
+    reach = 2 * abs(p) * _noise_strength(problem.motion) * spectrum
     xi = reach * np.linspace(-1, 1, 2 * SAMPLES - 1)
     rate = p * eigenvalues_at(problem, xi)[0] - (xi**2 / (2 * spectrum) if spectrum else 0.0)
     at = maxima(rate)
@@ -67,10 +67,10 @@ def swing(problem: Problem, p: float) -> tuple[float, float]:
     The rate is p⟨G⟩ − a²/4S(ω), the mean over a turn of ωt; where S is larger than at 0 it may exceed that of
     `steady_places`.
     """
-    noise: Any = problem.coloured
+    noise: Any = problem.valued
     peak = noise.omega * math.sqrt(max(1 - 2 * noise.zeta**2, 0.0))
     spectrum = max(noise.spectral_density(each) for each in (peak, *(noise.omega * FREQUENCIES)))
-    a = 4 * abs(p) * noise_strength(problem.motion) * spectrum * np.linspace(0, 1, SAMPLES)
+    a = 4 * abs(p) * _noise_strength(problem.motion) * spectrum * np.linspace(0, 1, SAMPLES)
     xi = a[:, None] * np.cos(math.pi * (np.arange(SWING_POINTS) + 0.5) / SWING_POINTS)
     rate = p * np.mean(eigenvalues_at(problem, xi)[0], axis=1) - a**2 / (4 * spectrum)
     best = int(np.argmax(rate))
@@ -93,7 +93,7 @@ class FrozenNoise:
     """
 
     def __init__(self, problem: Problem, z: FloatArray | None = None) -> None:
-        noise = problem.coloured
+        noise = problem.valued
         if not noise.is_diffusion:
             raise TypeError("there is no z to look for where ξ is no diffusion by itself")
         self.z, self._problem = _both_sides(problem) if z is None else z, problem
@@ -134,15 +134,24 @@ class FrozenNoise:
 
     def tilt(self, z: float) -> float:
         """s for which P_s exp(2s z) is the largest at z: −½(ln P_s)′."""
-        noise = self._problem.coloured
+        noise = self._problem.valued
         return -0.5 * float(np.interp(z, self.z, np.gradient(noise.log_density(self._xi), self.z)))
+
+
+def _noise_strength(system: System) -> float:
+    """Σ ε^n |b| max|q| over g = a + bξ, b = 1 for other g: d ln a/dt for ξ = 1; for the paper's oscillator ε."""
+    total = 0.0
+    for term in system.terms:
+        slope = abs((affine(term.g) or (0.0, 1.0))[1])
+        total += slope * system.epsilon**term.order * float(abs(term.q.mean) + term.q.amplitude)
+    return total
 
 
 def _both_sides(problem: Problem) -> FloatArray:
     """Points z as far out as slow noise carries a moment, denser near 0."""
-    noise = problem.coloured
+    noise = problem.valued
     unit = noise.standard_deviation
-    furthest = 5 * LARGEST_P * unit * noise_strength(problem.motion) * noise.correlation_time
+    furthest = 5 * LARGEST_P * unit * _noise_strength(problem.motion) * noise.correlation_time
     end = min(max(furthest, 1.0), 0.999 * noise.half_width / unit)
     spread = max(np.log(end / 1e-2), 1.0)
     side = end * np.sinh(spread * np.linspace(0, 1, SAMPLES)) / np.sinh(spread)
@@ -152,6 +161,6 @@ def _both_sides(problem: Problem) -> FloatArray:
 @lru_cache(8)
 def frozen_noise(problem: Problem) -> FrozenNoise | None:
     """The `FrozenNoise` of a problem; None beyond the plane, where ξ is no diffusion, or has algebraic tails."""
-    noise = problem.coloured
+    noise = problem.valued
     is_held = noise.is_diffusion and not noise.has_algebraic_tails
     return FrozenNoise(problem) if is_held and problem.dimension == 2 else None

@@ -117,7 +117,7 @@ def in_units(seed: int) -> tuple[Problem, float, float, np.ndarray]:
 def numbers_of_units(seed: int) -> Iterator[Number]:
     """λ, Λ(1) and Λ(2) in units beside the same in units of its own."""
     problem, rate, strength, basis = in_units(seed)
-    has_many = problem.dimension > 2 or problem.coloured.basis == "pairs" or len(problem.noise.parts) > 1
+    has_many = problem.dimension > 2 or problem.valued.basis == "pairs" or len(problem.noise.parts) > 1
     orders, rtol, one = (0.0, 1.0, 2.0), 1e-3 if has_many else 1e-7, np.eye(problem.dimension)
     own = elements(restated(problem, 1.0, 1.0, one), orders, rtol, 10.0)
     other = elements(restated(problem, rate, strength, basis), orders, rtol, 30.0)

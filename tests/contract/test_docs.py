@@ -12,9 +12,21 @@ from tempfile import TemporaryDirectory
 
 import matplotlib.pyplot as plt
 import pytest
+from numpy.testing import assert_allclose
 
 import fpsolve
-from fpsolve import make_mesh, sensitivities
+from fpsolve import (
+    Problem,
+    boundary,
+    explore,
+    lyapunov_exponent,
+    make_mesh,
+    moment_lyapunov,
+    sensitivities,
+    simulate,
+)
+from fpsolve.analysis import Axis
+from fpsolve.model import OrnsteinUhlenbeckByDeviation, ParametricOscillator
 from tests.contract.test_cases import CASES, ROOT
 from tests.kit import case_in, rates, solve_case
 
@@ -99,3 +111,19 @@ def test_slope_by_the_size_of_a_noise_of_the_page_is_that_by_its_factor_in_the_e
     problem = rates("x' = v; v' = -x - 0.2*v - k*xi*x", names["Uniform"](a=0.8, alpha=1.0), k=1.0)
     [slopes] = sensitivities(problem, 1.0, mesh=mesh).moments
     assert 0.8 * slopes["noise.a"].value == pytest.approx(slopes["system.k"].value, rel=1e-9)
+
+
+def test_noise_and_system_of_the_page_on_contributing_are_what_those_that_ship_are():
+    names, _ = typed(ROOT / "docs/contributing.md")
+    own = Problem(names["Pendulum"](length=1.0, damping=0.1), names["Wind"](size=0.5**0.5, duration=1.0))
+    known = Problem(ParametricOscillator(1.0, 0.1), OrnsteinUhlenbeckByDeviation(1.0, 0.5**0.5))
+    damping = Axis("system.damping", 0.1, 0.6)
+    for found in (
+        lambda each, _: moment_lyapunov(each, [1.0, 2.0]).value,
+        lambda each, _: lyapunov_exponent(each).value,
+        lambda each, _: simulate(each, [1.0], paths=64, time=100.0).lyapunov_exponent,
+        lambda each, size: [sensitivities(each, 2.0).moments[0][key].value for key in ("system.damping", size)],
+        lambda each, size: boundary(each, "moment(2) = 0", damping, Axis(size, 0.5, 2.0), nodes=3).branches[0].y,
+    ):
+        assert_allclose(found(own, "noise.size"), found(known, "noise.standard_deviation"), rtol=1e-9)
+    explore(own).close()

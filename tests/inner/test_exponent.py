@@ -17,7 +17,7 @@ from tests.numbers.test_identities import changed
 
 def on_sphere(problem, waves=4, **changes):
     """Directions with so many waves, and functions of the noise."""
-    noises = [replace(first_axis(each, 5), **changes) for each in problem.coloured.parts.values()]
+    noises = [replace(first_axis(each, 5), **changes) for each in problem.valued.parts.values()]
     return SphereStart(problem, Space((replace(SphereStart.directions(problem), waves=waves), *noises)))
 
 

@@ -39,7 +39,7 @@ def test_density_without_an_imposed_tail_falls_as_that_of_the_linear_system():
     own = {"omega": 1.0, "epsilon": 0.5, "restitution": 0.97, "c1": 0.1, "c2": 0.5, "c3": 0.2}
     problem = oscillator(0.3, 0.5, **own)
     circle = Elements(Flow(problem).phases(3), 12, is_closed=True)
-    plane = Plane(Flow(problem), circle, PolynomialAxis(problem.coloured, 12))
+    plane = Plane(Flow(problem), circle, PolynomialAxis(problem.valued, 12))
     with one_thread():
         found = solved(plane, Elements(np.linspace(-10, 1.8, 40), 7), Tail(1.0, plane.constant[None]))
     u = np.linspace(-5.5, -3, 101)

@@ -2,12 +2,12 @@ from .bounded import Bounded as Bounded
 from .bounded import SineWiener as SineWiener
 from .filter import Filter as Filter
 from .markov_chain import MarkovChain as MarkovChain
-from .markov_chain import Telegraph as Telegraph
 from .non_gaussian import NonGaussianNoise as NonGaussianNoise
-from .non_gaussian import ReducedNoise as ReducedNoise
 from .ornstein_uhlenbeck import OrnsteinUhlenbeck as OrnsteinUhlenbeck
 from .ornstein_uhlenbeck import OrnsteinUhlenbeckByDeviation as OrnsteinUhlenbeckByDeviation
 from .ornstein_uhlenbeck import OrnsteinUhlenbeckByIntensity as OrnsteinUhlenbeckByIntensity
+from .reduction import ReducedNoise as ReducedNoise
 from .several import Noises as Noises
+from .telegraph import Telegraph as Telegraph
 from .white import Interpretation as Interpretation
 from .white import White as White

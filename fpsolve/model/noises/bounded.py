@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from abc import abstractmethod
 from collections.abc import Sequence
-from typing import Annotated, ClassVar, Literal, NamedTuple
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,31 +13,8 @@ from numpy.typing import ArrayLike
 from fpsolve.arrays import FloatArray
 from fpsolve.model.faults import strict_dataclass
 from fpsolve.model.noise import Noise, NoiseDerivative
+from fpsolve.model.noises.steps import AngleStep
 from fpsolve.model.parameters import SIZE, parameter
-
-
-class AngleStep(NamedTuple):
-    """θ₁ = θ₀ + turn + kick ζ₁ and, of weak order 2, ξ̄ = A fade cos θ̄, ζ normal.
-
-    θ̄ = ½(θ₀ + θ₁) + spread ζ₂ is the mean of θ over the step, and fade that of cos(θ − θ̄).
-    """
-
-    amplitude: float
-    turn: float
-    kick: float
-    spread: float
-    fade: float
-
-    @staticmethod
-    def draw(step, xi, xi_mean, xi_end, push, rng):  # type: ignore[no-untyped-def]
-        """One step, see `Noise.step`; the rows of `xi` are ξ and θ."""
-        for i in range(xi_end.size):
-            start = xi[1, i]
-            end = start + step.turn + step.kick * rng.standard_normal()
-            middle = 0.5 * (start + end) + step.spread * rng.standard_normal()
-            xi[1, i] = end % (2 * math.pi)
-            xi_mean[i] = step.amplitude * step.fade * math.cos(middle)
-            xi_end[i] = step.amplitude * math.cos(end)
 
 
 class NoiseOfAngle(Noise):
@@ -47,19 +25,27 @@ class NoiseOfAngle(Noise):
     Coefficients have waves up to `harmonics` θ.
     """
 
-    amplitude: float
-    sigma: float
-    nu: float
-
     may_tilt: ClassVar[bool] = False
-    harmonics: ClassVar[int] = 1
+    harmonics = 1
+
+    if TYPE_CHECKING:  # a field, a constant or a property
+
+        @property
+        @abstractmethod
+        def amplitude(self) -> float: ...
+        @property
+        @abstractmethod
+        def sigma(self) -> float: ...
+        @property
+        @abstractmethod
+        def nu(self) -> float: ...
 
     @property
     def basis(self) -> Literal["polynomials", "waves"]:
         return "waves" if self.nu else "polynomials"
 
     @property
-    def has_peak(self) -> bool:  # type: ignore[override]
+    def has_peak(self) -> bool:
         """Whether ν > 0, so that the spectral density has peaks at ±ν."""
         return self.nu > 0
 
@@ -159,7 +145,7 @@ class SineWiener(NoiseOfAngle):
     ]
 
     kind: ClassVar[str] = "sine-wiener"
-    nu: ClassVar[float] = 0.0  # type: ignore[misc]
+    nu: ClassVar[float] = 0.0
     of_xi: ClassVar[Sequence[str]] = ("amplitude",)
 
     def derivative(self, name: str) -> NoiseDerivative:
@@ -206,7 +192,7 @@ class Bounded(NoiseOfAngle):
             raise ValueError("got nu = 0 and sigma = 0; ξ would be constant; let nu or sigma be positive")
 
     @property
-    def amplitude(self) -> float:  # type: ignore[override]
+    def amplitude(self) -> float:
         """μ."""
         return self.mu
 

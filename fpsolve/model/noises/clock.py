@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from copy import copy
 from dataclasses import dataclass, field, replace
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from fpsolve.arrays import FloatArray, identity
+from fpsolve.arrays import Coefficient, FloatArray, identity
 from fpsolve.model.expressions import TIME
 from fpsolve.model.noise import Noise
 from fpsolve.model.noises.bounded import NoiseOfAngle
@@ -29,8 +30,8 @@ class Wave:
     name: str
     multiple: int
 
-    def __call__(self, theta: Any) -> Any:
-        return getattr(np, self.name)(self.multiple * np.asarray(theta))
+    def __call__(self, theta: ArrayLike) -> FloatArray:
+        return np.asarray((np.cos if self.name == "cos" else np.sin)(self.multiple * np.asarray(theta)))
 
     @property
     def __name__(self) -> str:
@@ -51,17 +52,17 @@ class Clock(NoiseOfAngle):
     """
 
     nu: float = field(repr=False)
-    harmonics: int = field(repr=False)  # type: ignore[misc]
+    harmonics: int = field(repr=False)
 
     kind: ClassVar[str] = "clock"
-    sigma: ClassVar[float] = 0.0  # type: ignore[misc]
-    amplitude: ClassVar[float] = 1.0  # type: ignore[misc]
+    sigma: ClassVar[float] = 0.0
+    amplitude: ClassVar[float] = 1.0
     half_width: ClassVar[float] = math.pi
 
     def of_angle(self, theta: FloatArray) -> FloatArray:
         return np.asarray(theta, dtype=float)
 
-    def mean_of(self, g: Any) -> float:
+    def mean_of(self, g: Coefficient) -> float:
         """0, that of all waves."""
         return 0.0
 
@@ -74,11 +75,11 @@ class ClockWave(NoiseOfAngle):
     wave: Wave
 
     kind: ClassVar[str] = "wave"
-    sigma: ClassVar[float] = 0.0  # type: ignore[misc]
-    amplitude: ClassVar[float] = 1.0  # type: ignore[misc]
+    sigma: ClassVar[float] = 0.0
+    amplitude: ClassVar[float] = 1.0
 
     @property
-    def nu(self) -> float:  # type: ignore[override]
+    def nu(self) -> float:
         return self.wave.multiple * self.clock.nu
 
     @property

@@ -4,54 +4,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Any, ClassVar, Literal, NamedTuple
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike
 from pydantic import Field
 from pydantic.fields import FieldInfo
 
 from fpsolve.arrays import FloatArray
 from fpsolve.model.faults import strict_dataclass
-from fpsolve.model.noise import Noise, NoiseDerivative
-from fpsolve.model.parameters import ANY_SIGN, SIZE, parameter, stated_field
+from fpsolve.model.noise import Gaussian, NoiseDerivative
+from fpsolve.model.noises.steps import FilterStep, transition
+from fpsolve.model.parameters import ANY_SIGN, SIZE, Table, parameter, stated_field
 
 Pair = Annotated[tuple[float, float], Field(strict=False)]
 
 
-class FilterStep(NamedTuple):
-    """The exact transition of the filter, u = y and w = y′ over their standard deviations, with the mean of ξ.
-
-    With three normal numbers ζ for each path
-
-        (w₁, u₁, ū) = flow (w₀, u₀) + kicks (ζ₁, ζ₂, ζ₃),   ξ̄ = of_u ū + rise (u₁ − u₀),   ξ = of_u u + of_w w,
-
-    with flow of the shape (3, 2) and kicks a triangle.
-    """
-
-    flow: FloatArray
-    kicks: FloatArray
-    of_u: float
-    of_w: float
-    rise: float
-
-    @staticmethod
-    def draw(step, xi, xi_mean, xi_end, push, rng):  # type: ignore[no-untyped-def]
-        """One step, see `Noise.step`; the rows of `xi` are ξ, u and w."""
-        flow, kicks = step.flow, step.kicks
-        for i in range(xi_end.size):
-            u, w = xi[1, i], xi[2, i]
-            first, second, third = rng.standard_normal(), rng.standard_normal(), rng.standard_normal()
-            w_end = flow[0, 0] * w + flow[0, 1] * u + kicks[0, 0] * first
-            u_end = flow[1, 0] * w + flow[1, 1] * u + kicks[1, 0] * first + kicks[1, 1] * second
-            mean = flow[2, 0] * w + flow[2, 1] * u + kicks[2, 0] * first + kicks[2, 1] * second + kicks[2, 2] * third
-            xi[1, i], xi[2, i] = u_end, w_end
-            xi_mean[i] = step.of_u * mean + step.rise * (u_end - u)
-            xi_end[i] = step.of_u * u_end + step.of_w * w_end
-
-
 @strict_dataclass
-class Filter(Noise):
+class Filter(Gaussian):
     """Filtered white noise ξ = c₀y + c₁y′ with y″ + 2ζω y′ + ω²y = s Ẇ, y and y′ stationary.
 
     c₀ = 1, c₁ = 0 gives narrow-band noise if ζ is small. c₀ = 0, c₁ = 1 gives noise like that of sea waves, with S(0) =
@@ -92,7 +61,7 @@ class Filter(Noise):
             raise ValueError("got c0 = 0 and c1 = 0; ξ would be 0; let one of them differ from 0")
 
     @classmethod
-    def from_table(cls, table: Mapping[str, Any]) -> Filter:
+    def from_table(cls, table: Table) -> Filter:
         """The noise that a table of a case file states, where `output = [c0, c1]` may replace c0 and c1.
 
         Raises:
@@ -115,18 +84,17 @@ class Filter(Noise):
     @property
     def standard_deviation(self) -> float:
         """s √((c₀² + c₁²ω²)/(4ζω³))."""
-        return self._unit * math.hypot(self.c0, self.c1 * self.omega)
+        return self._unit * math.hypot(*self._mixed)
+
+    @property
+    def _mixed(self) -> FloatArray:
+        """(c₁ω, c₀): ξ is the sum of w and u with these, over std(y)."""
+        return np.array([self.c1 * self.omega, self.c0])
 
     @property
     def _unit(self) -> float:
         """The standard deviation of y, s/√(4ζω³)."""
         return 0.5 * self.s / math.sqrt(self.zeta * self.omega) / self.omega
-
-    @property
-    def direction(self) -> tuple[float, float]:
-        """(cos α, sin α) in ξ/std(ξ) = u cos α + w sin α, where u = y/std(y) and w = y′/std(y′)."""
-        size = math.hypot(self.c0, self.c1 * self.omega)
-        return self.c0 / size, self.c1 * self.omega / size
 
     @property
     def correlation_time(self) -> float:
@@ -151,53 +119,27 @@ class Filter(Noise):
         """M in du = −Mu dt + N dW, for u with the stationary covariance 1 and ξ = std(ξ) u₁, shape (2, 2).
 
         The covariance is 1 because M + Mᵀ = NNᵀ. For u = (y/std(y), y′/std(y′)) the matrix would be
-        ω((0, −1), (1, 2ζ)). Rotated by the angle α of `direction` it is M = ω(2ζ n nᵀ + ((0, −1), (1, 0))) with
-        n = (sin α, cos α).
+        ω((0, −1), (1, 2ζ)). Rotated so that u₁ ~ ξ it is M = ω(2ζ n nᵀ + ((0, −1), (1, 0))), n = (c₁ω, c₀)/‖(c₁ω, c₀)‖.
         """
-        return self.omega * (2 * self.zeta * np.outer(*2 * (self._normal,)) + _TURN)
-
-    @property
-    def _normal(self) -> FloatArray:
-        cosine, sine = self.direction
-        return np.array([sine, cosine])
+        c = self._mixed
+        return np.asarray(self.omega * (2 * self.zeta * np.outer(c, c) / (c @ c) + [[0.0, -1.0], [1.0, 0.0]]))
 
     def derivative(self, name: str) -> NoiseDerivative:
-        """The derivative of M and of ln std(ξ) at fixed u; ω, c₀ and c₁ also change the angle of `direction`."""
-        c, damping = np.array([self.c0, self.c1 * self.omega]), np.outer(self._normal, self._normal)
-        square = float(c @ c)
-
-        def turned(by_c: FloatArray) -> FloatArray:
-            """∂M/∂θ by the angle, whose ∂/∂θ is (c × ∂c)/c²; ∂n = (cos, −sin) of it."""
-            cosine, sine = self.direction
-            normal = np.outer(self._normal, [cosine, -sine]) * (c[0] * by_c[1] - c[1] * by_c[0]) / square
-            return np.asarray(2 * self.zeta * self.omega * (normal + normal.T))
-
-        match name:
-            case "s":
-                return NoiseDerivative(log_scale=1 / self.s)
-            case "zeta":
-                return NoiseDerivative(log_scale=-0.5 / self.zeta, drift=_rows(2 * self.omega * damping))
-            case "omega":
-                by_c = np.array([0.0, self.c1])
-                drift = self.drift_matrix / self.omega + turned(by_c)
-                return NoiseDerivative(log_scale=-1.5 / self.omega + float(c @ by_c) / square, drift=_rows(drift))
-        by_c = np.array([1.0, 0.0]) if name == "c0" else np.array([0.0, self.omega])
-        return NoiseDerivative(log_scale=float(c @ by_c) / square, drift=_rows(turned(by_c)))
-
-    @property
-    def diffusion(self) -> float:
-        """c₁s, the coefficient of dW in dξ."""
-        return self.c1 * self.s
-
-    def log_density(self, xi: ArrayLike) -> FloatArray:
-        """The logarithm of the Gaussian density of ξ, in the shape of ξ."""
-        z = np.asarray(xi, dtype=float) / self.standard_deviation
-        return -0.5 * z**2 - math.log(math.sqrt(2 * math.pi) * self.standard_deviation)
+        """The derivative of M and of ln std(ξ) at fixed u; ω, c₀ and c₁ also change n."""
+        c, omega, zeta = self._mixed, self.omega, self.zeta
+        by_c = np.array({"omega": (self.c1, 0.0), "c0": (0.0, 1.0), "c1": (omega, 0.0)}.get(name, (0.0, 0.0)))
+        unit = {"s": 1 / self.s, "zeta": -0.5 / zeta, "omega": -1.5 / omega}.get(name, 0.0)
+        square, stretch = c @ c, c @ by_c / (c @ c)
+        normal = np.outer(c, c) / square
+        turned = (np.outer(c, by_c) + np.outer(by_c, c)) / square - 2 * stretch * normal
+        direct = {"omega": self.drift_matrix / omega, "zeta": 2 * omega * normal}
+        drift = 2 * zeta * omega * turned + direct.get(name, 0.0)
+        return NoiseDerivative(log_scale=float(unit + stretch), drift=tuple(map(tuple, drift.tolist())))
 
     def start(self, size: int, rng: np.random.Generator) -> FloatArray:
         """ξ, y/std(y) and y′/std(y′), shape (3, size)."""
         u, w = rng.standard_normal((2, size))
-        return np.array([self._unit * (self.c0 * u + self.c1 * self.omega * w), u, w])
+        return np.array([self._unit * (self._mixed @ (w, u)), u, w])
 
     @property
     def largest_step(self) -> float:
@@ -207,41 +149,11 @@ class Filter(Noise):
     def step(self, h: float, bias: float = 0.0) -> FilterStep:
         """One exact step of length h of u′ = ωw, dw = −ω(u + 2ζw) dt + 2√(ζω) dW, see `Noise.step`, without a bias.
 
-        Here u = y/std(y) and w = y′/std(y′). The random part has the covariance of w, u and the mean of u over the
-        step, which are integrals of the responses to dW.
+        Here u = y/std(y) and w = y′/std(y′). With τ = ωh, w moves u/τ in a step, and that the mean of u over τ.
         """
-        t, unit = h * _NODES, self._unit
-        sums = np.array([at * _WEIGHTS @ self._flow(at * _NODES)[:, 1] for at in t])  # ∫u dt
-        flow, kick = self._flow(t), 2 * math.sqrt(self.zeta * self.omega)
-        responses = kick * np.stack([flow[:, 0, 0], flow[:, 1, 0], sums[:, 0] / h])
-        kicks = _root((responses * h * _WEIGHTS) @ responses.T)
-        whole = np.vstack([self._flow(np.array([h]))[0], _WEIGHTS @ flow[:, 1]])
-        return FilterStep(whole, kicks, unit * self.c0, unit * self.c1 * self.omega, unit * self.c1 / h)
-
-    def _flow(self, t: FloatArray) -> FloatArray:
-        """The matrices that take (w, u) to what it is after times t, shape (n, 2, 2)."""
-        square = (1 - self.zeta**2) * self.omega**2
-        rate = math.sqrt(abs(square))
-        fall = np.exp(-self.zeta * self.omega * t)
-        if square > 0:
-            even, odd = np.cos(rate * t), t * np.sinc(rate * t / np.pi)
-        elif rate:
-            even, odd = np.cosh(rate * t), np.sinh(rate * t) / rate
-        else:
-            even, odd = np.ones_like(t), t
-        damped, turned = self.zeta * self.omega * odd, self.omega * odd
-        return np.moveaxis(fall * np.array([[even - damped, -turned], [turned, even + damped]]), 2, 0)
-
-
-_TURN = np.array([[0.0, -1.0], [1.0, 0.0]])
-_NODES, _WEIGHTS = 0.5 * (np.polynomial.legendre.leggauss(32) + np.array([[1.0], [0.0]]))
-
-
-def _rows(matrix: FloatArray) -> tuple[tuple[float, ...], ...]:
-    return tuple(map(tuple, matrix.tolist()))
-
-
-def _root(covariance: FloatArray) -> FloatArray:
-    """Cholesky's factor of a covariance, each of its numbers in units of its own deviation."""
-    sizes = np.sqrt(np.diagonal(covariance))
-    return np.asarray(sizes[:, None] * np.linalg.cholesky(covariance / np.outer(sizes, sizes)))
+        tau, unit = self.omega * h, self._unit
+        sizes = np.array([[1.0], [tau], [tau]])
+        flow, kicks = transition([[-2 * self.zeta * tau, -(tau**2), 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+        kicks = 2 * math.sqrt(self.zeta * tau) * sizes * kicks
+        of_w = unit * self.c1
+        return FilterStep(sizes * flow[:, :2] / [1.0, tau], kicks, unit * self.c0, of_w * self.omega, of_w / h)

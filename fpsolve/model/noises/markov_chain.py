@@ -1,39 +1,25 @@
-"""Noise that jumps between states: telegraph noise and its kin."""
+"""Noise that jumps between states."""
 
 from __future__ import annotations
 
 import math
+from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Annotated, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import numpy as np
 from pydantic import Field
 from pydantic.fields import FieldInfo
+from scipy.sparse.csgraph import connected_components
 
 from fpsolve.arrays import ROUNDED, FloatArray, real_array, real_number, shown
-from fpsolve.model.faults import strict_dataclass
-from fpsolve.model.noise import Noise, NoiseDerivative
-from fpsolve.model.parameters import SIZE, parameter, stated_field
+from fpsolve.model.noise import Noise
+from fpsolve.model.noises.steps import ChainStep
+from fpsolve.model.parameters import SIZE, stated_field
 
 Row = Annotated[tuple[float, ...], Field(strict=False)]
-
-
-class ChainStep(NamedTuple):
-    """The law of the jumps, which come after exponential times: no step is made.
-
-    Attributes:
-        leaving: the rate at which each state is left, shape (n,).
-        reached: the probability that a state is followed by one of the first j + 1, shape (n, n).
-        values: ξ in each state, shape (n,).
-        sizes: what comes on top of ∫ξ dt where a state is reached, shape (n,).
-    """
-
-    leaving: FloatArray
-    reached: FloatArray
-    values: FloatArray
-    sizes: FloatArray
 
 
 class Chain(Noise):
@@ -44,12 +30,18 @@ class Chain(Noise):
         rates: Q, shape (n, n), from state to state; the sum of every row is 0.
     """
 
-    states: Sequence[float]
-    rates: Sequence[Sequence[float]]
-
     has_states: ClassVar[bool] = True
     left_in_phase: ClassVar[float] = 1.0
     may_tilt: ClassVar[bool] = False
+
+    if TYPE_CHECKING:  # a field or a property
+
+        @property
+        @abstractmethod
+        def states(self) -> Sequence[float]: ...
+        @property
+        @abstractmethod
+        def rates(self) -> Sequence[Sequence[float]]: ...
 
     @property
     def probabilities(self) -> FloatArray:
@@ -71,7 +63,7 @@ class Chain(Noise):
         is_state = np.any(np.isclose(self.states, xi, rtol=1e-9, atol=0))
         return "" if is_state else f"; must be one of the states, {', '.join(f'{each:g}' for each in self.states)}"
 
-    typical = reached
+    extremes = reached
 
     @property
     def standard_deviation(self) -> float:
@@ -155,8 +147,6 @@ class MarkovChain(Chain):
         for name, size in sizes.items():
             if not SIZE["ge"] <= size <= SIZE["le"]:
                 raise ValueError(f"got {name} of sizes up to {size:g}; must be from {SIZE['ge']:g} to {SIZE['le']:g}")
-        from scipy.sparse.csgraph import connected_components
-
         jumps = rates - np.diag(np.diagonal(rates))
         leaving = jumps.sum(axis=1)
         stated = -np.diagonal(rates)
@@ -174,44 +164,3 @@ class MarkovChain(Chain):
         """ξ = ±amplitude, each state left at this rate."""
         size, rate = real_number(amplitude, "amplitude"), real_number(rate, "rate")
         return cls((-size, size), ((-rate, rate), (rate, -rate)))
-
-
-FLIP = ((-1.0, 1.0), (1.0, -1.0))
-"""Rates of telegraph noise, in units of k."""
-
-
-@strict_dataclass
-class Telegraph(Chain):
-    """Telegraph noise ξ = ±a, each value left at the rate k: its correlation is a² exp(−2k|t|).
-
-    >>> Telegraph(a=0.5, k=1.0).spectral_density(0.0)  # S(ω) = 4ka²/(4k² + ω²)
-    0.25
-
-    Args:
-        a: 1e-15 to 1e15, in the unit of ξ.
-        k: 1e-15 to 1e15, in 1/time.
-
-    Raises:
-        ParameterError: a parameter is not a finite number in its range.
-    """
-
-    a: Annotated[float, parameter("amplitude", "a = 0.5", "$a$", "1/time", **SIZE)]
-    k: Annotated[float, parameter("rate of leaving each value", "k = 1.0", "$k$", "1/time", **SIZE)]
-
-    kind: ClassVar[str] = "telegraph"
-    of_xi: ClassVar[Sequence[str]] = ("a",)
-
-    @property
-    def states(self) -> Sequence[float]:  # type: ignore[override]
-        return -self.a, self.a
-
-    @property
-    def rates(self) -> Sequence[Sequence[float]]:  # type: ignore[override]
-        return tuple(tuple(self.k * each for each in row) for row in FLIP)
-
-    @property
-    def probabilities(self) -> FloatArray:
-        return np.array([0.5, 0.5])
-
-    def derivative(self, name: str) -> NoiseDerivative:
-        return NoiseDerivative(states=(-1.0, 1.0)) if name == "a" else NoiseDerivative(rates=FLIP)

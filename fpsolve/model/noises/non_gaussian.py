@@ -1,22 +1,24 @@
-"""The paper's coloured noise, Eqs. (7)-(14): the non-Gaussian process, and the Gaussian one that replaces it."""
+"""The paper's coloured noise, Eqs. (7)-(10): the non-Gaussian process."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Any, ClassVar, Literal, NamedTuple
+from typing import Annotated, ClassVar, Literal, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import Field
 from pydantic.fields import FieldInfo
+from scipy.special import betaln, xlog1py
 
 from fpsolve.arrays import FloatArray
-from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.faults import TableError, strict_dataclass
+from fpsolve.model.kinds import noise_kind
 from fpsolve.model.noise import Noise, NoiseDerivative
-from fpsolve.model.noises.ornstein_uhlenbeck import GaussianNoise, LinearStep, linear_step
-from fpsolve.model.parameters import SIZE, parameter, stated_field
+from fpsolve.model.noises.ornstein_uhlenbeck import GaussianNoise, Intensity, Memory
+from fpsolve.model.noises.steps import ImplicitStep, LinearStep, linear_step
+from fpsolve.model.parameters import Table, parameter, stated_field
 
 Departure = Annotated[
     float,
@@ -27,88 +29,57 @@ Departure = Annotated[
         ge=-1e6,
     ),
 ]
-NEAR_GAUSSIAN = 0.1
-"""|r₀ − 1| up to which the reduction is made."""
 _LARGE = 100.0
 """From it on four terms of a series of 1/x are exact to rounding."""
-_SMALL = 0.05
-"""Below it a series is closer than a difference of logarithms."""
 
 
-class ImplicitStep(NamedTuple):
-    """The implicit trapezoidal rule for Eq. (7), of weak order 2, which never leaves the support.
-
-    ξ₁ + pull ξ₁/(1 + cξ₁²) = ξ₀ − pull ξ₀/(1 + cξ₀²) + kick ζ + end₀ with pull = h/2τ₀ and ζ normal, and
-    ξ̄ = (ξ₀ + ξ₁)/2.
-    """
-
-    kick: float
-    end0: float
-    pull: float
-    curvature: float
-
-    @staticmethod
-    def draw(step, xi, xi_mean, xi_end, push, rng):  # type: ignore[no-untyped-def]
-        """One step, see `Noise.step`.
-
-        It is the root a ≥ 0 of (y − a)(1 + s a²) = pull a in units of 1/√|c|, s the sign of c, by Newton's method.
-        """
-        for i in range(xi.size):
-            xi_end[i] = rng.standard_normal()
-        unit = math.sqrt(abs(step.curvature))
-        sign = 1.0 if step.curvature > 0 else -1.0
-        pull = step.pull
-        for i in range(xi.size):
-            start = unit * xi[i]
-            before = start - pull * start / (1 + sign * start * start)
-            target = before + unit * (step.kick * xi_end[i] + step.end0)
-            y = abs(target)
-            if sign < 0:  # inside the support from the first guess on: the smaller root of (y − a)(1 − a) = k
-                edge = min(y, 1.0)
-                k = pull * edge / (1 + edge)
-                a = 0.5 * (y + 1 - math.sqrt((y - 1) * (y - 1) + 4 * k))
-            else:
-                a = y * (1 + y * y) / (1 + pull + y * y)
-            for _ in range(5):
-                square = 1 + sign * a * a
-                a += ((y - a) * square - pull * a) / (square + pull - 2 * sign * a * (y - a))
-            if sign < 0:
-                a = min(max(a, 0.0), 1 - 1e-15)
-            end = math.copysign(a, target)
-            push[i] += (before - start + end - target) / unit
-            xi_end[i] = end / unit
-            xi_mean[i] = 0.5 * (xi[i] + xi_end[i])
-
-
-def _treatment(usual: str) -> Mapping[str, FieldInfo]:
+def treatment(usual: str) -> Mapping[str, FieldInfo]:
     meaning = "Eq. (7) itself, or the reduction of Eqs. (12)-(14)"
-    kinds: Any = Literal["ou-reduction", "exact"]
-    return {"treatment": stated_field(kinds, meaning, 'treatment = "ou-reduction"', usual)}
+    return {"treatment": stated_field(Literal["ou-reduction", "exact"], meaning, 'treatment = "ou-reduction"', usual)}
 
 
 @strict_dataclass
 class TreatedNoise(Noise):
     """The noise of Eq. (7), taken as it stands or replaced by its reduction: a word, the treatment, tells which."""
 
-    D0: Annotated[float, parameter("noise intensity", "D0 = 0.1", "$D_0$", "1/time", **SIZE)]
-    tau0: Annotated[float, parameter("correlation time", "tau0 = 0.5", r"$\tau_0$", "time", **SIZE)]
+    D0: Intensity
+    tau0: Memory
     r0: Departure
 
-    stated: ClassVar[Mapping[str, FieldInfo]] = _treatment("exact")
+    stated: ClassVar[Mapping[str, FieldInfo]] = treatment("exact")
+
+    @property
+    def diffusion(self) -> float:
+        """√(2D₀)/τ₀, which is σ₀ of Eq. (14)."""
+        return math.sqrt(2 * self.D0) / self.tau0
+
+    @property
+    def _bracket(self) -> float:
+        """5 − 3r₀ of Eqs. (10) and (12), which rounding makes 0 for an r₀ just below 5/3."""
+        return 5 - 3 * self.r0
+
+    @property
+    def variance(self) -> float:
+        """⟨ξ²⟩ of Eq. (10): 2D₀/(τ₀(5 − 3r₀)) for r₀ < 5/3, otherwise ∞."""
+        return 2 * self.D0 / (self.tau0 * self._bracket) if self._bracket > 0 else math.inf
+
+    @property
+    def correlation_time(self) -> float:
+        """τ₁ of Eq. (12), that of the reduced noise, for r₀ < 5/3, otherwise ∞."""
+        return 2 * (2 - self.r0) / self._bracket * self.tau0 if self._bracket > 0 else math.inf
 
     @classmethod
-    def from_table(cls, table: Mapping[str, Any]) -> TreatedNoise:
+    def from_table(cls, table: Table) -> TreatedNoise:
         if table.get("treatment", cls.words["treatment"]) != cls.words["treatment"]:
             raise TableError(f'got "exact" beside kind = "{cls.kind}"; remove one of the two', "treatment")
         return cls(**{name: value for name, value in table.items() if name != "treatment"})
 
     def at(self, values: Mapping[str, float | str]) -> TreatedNoise:
         """The noise with other values of D₀, τ₀, r₀ or of its treatment, "exact" or "ou-reduction"."""
-        numbers: dict[str, Any] = {"D0": self.D0, "tau0": self.tau0, "r0": self.r0, **values}
-        treatment = numbers.pop("treatment", self.words["treatment"])
-        if treatment not in ("exact", "ou-reduction"):
+        numbers = {**self.values, **values}
+        if (treatment := numbers.pop("treatment")) not in ("exact", "ou-reduction"):
             raise ValueError(f'got {treatment!r} as a treatment of the noise; must be one of "exact", "ou-reduction"')
-        return (NonGaussianNoise if treatment == "exact" else ReducedNoise)(**numbers)
+        return cast("TreatedNoise", noise_kind("non-gaussian" if treatment == "exact" else treatment)(**numbers))
 
 
 @strict_dataclass
@@ -146,21 +117,6 @@ class NonGaussianNoise(TreatedNoise):
         return ("r0",)
 
     @property
-    def diffusion(self) -> float:
-        """√(2D₀)/τ₀, which is σ₀ of Eq. (14)."""
-        return math.sqrt(2 * self.D0) / self.tau0
-
-    @property
-    def variance(self) -> float:
-        """⟨ξ²⟩ of Eq. (10): 2D₀/(τ₀(5 − 3r₀)) for r₀ < 5/3, otherwise ∞."""
-        return 2 * self.D0 / (self.tau0 * self._bracket) if self._bracket > 0 else math.inf
-
-    @property
-    def _bracket(self) -> float:
-        """5 − 3r₀ of Eqs. (10) and (12), which rounding makes 0 for an r₀ just below 5/3."""
-        return 5 - 3 * self.r0
-
-    @property
     def standard_deviation(self) -> float:
         return math.sqrt(self.variance)
 
@@ -188,8 +144,6 @@ class NonGaussianNoise(TreatedNoise):
 
     def log_density(self, xi: ArrayLike) -> FloatArray:
         """ln P_s(ξ) of Eq. (9) with the exponent −1/(r₀ − 1), normalised in closed form; −∞ outside the support."""
-        from scipy.special import xlog1py  # takes a tenth of a second to import
-
         xi = np.asarray(xi, dtype=float)
         if self.r0 == 1:
             return self.ou_reduction().log_density(xi)
@@ -204,8 +158,6 @@ class NonGaussianNoise(TreatedNoise):
 
         For large x, where Γ functions would cancel, by ln Γ(x + ½) − ln Γ(x) = ½ ln x − 1/(8x) + 1/(192x³) − …
         """
-        from scipy.special import betaln
-
         a, size = 1 / abs(self.r0 - 1), 0.5 * math.log(abs(self.curvature))
         x = a + 1 if self.r0 < 1 else a - 0.5
         if x < _LARGE:
@@ -215,12 +167,7 @@ class NonGaussianNoise(TreatedNoise):
         return 0.5 * math.log(math.pi / x) - series - size
 
     @property
-    def correlation_time(self) -> float:
-        """τ₁ of Eq. (12), that of the reduced noise, for r₀ < 5/3, otherwise ∞."""
-        return 2 * (2 - self.r0) / self._bracket * self.tau0 if self._bracket > 0 else math.inf
-
-    @property
-    def may_tilt(self) -> bool:  # type: ignore[override]
+    def may_tilt(self) -> bool:
         """Whether exp(s ξ) has a mean."""
         return not self.has_algebraic_tails
 
@@ -236,7 +183,7 @@ class NonGaussianNoise(TreatedNoise):
         """S(ω) of the reduced noise, Eq. (16); that of Eq. (7) itself has no closed form."""
         return self.ou_reduction().spectral_density(omega)
 
-    def ou_reduction(self) -> ReducedNoise:
+    def ou_reduction(self) -> GaussianNoise:
         """The Ornstein-Uhlenbeck process of Eqs. (12)-(14) that stands for this one.
 
         Raises:
@@ -247,7 +194,7 @@ class NonGaussianNoise(TreatedNoise):
                 f"r0 = {self.r0} has an infinite variance (10), and no Ornstein-Uhlenbeck reduction, Eqs. (11)-(12); "
                 "choose r0 < 5/3"
             )
-        return ReducedNoise(D0=self.D0, tau0=self.tau0, r0=self.r0)
+        return cast("GaussianNoise", self.at({"treatment": "ou-reduction"}))
 
     def start(self, size: int, rng: np.random.Generator) -> FloatArray:
         """Eq. (9) as a beta or a Student variable."""
@@ -297,63 +244,9 @@ class NonGaussianNoise(TreatedNoise):
         return NoiseDerivative(0.0, lambda xi: u(xi) ** 2 * _curvature_of_log((self.r0 - 1) * u(xi)), end_exponent)
 
 
-@strict_dataclass
-class ReducedNoise(TreatedNoise, GaussianNoise):
-    """The Ornstein-Uhlenbeck process by which Eqs. (12)-(14) replace the noise of Eq. (7): α₀ = 1/τ₁, σ₀ = √(2D₀)/τ₀.
-
-    Args:
-        D0: noise intensity D₀, 1e-15 to 1e15, in 1/time.
-        tau0: correlation time τ₀, 1e-15 to 1e15.
-        r0: departure from the Gaussian noise, −1e6 ≤ r₀ < 5/3 (beyond, the variance (10) is infinite).
-
-    Raises:
-        ParameterError: a parameter is not a finite number in its range.
-    """
-
-    r0: Annotated[Departure, Field(lt=math.nextafter(5 / 3, 0))]  # at which 5 - 3 r0 is 0 already
-
-    kind: ClassVar[str] = "ou-reduction"
-    stated: ClassVar[Mapping[str, FieldInfo]] = _treatment("ou-reduction")
-    words: ClassVar[Mapping[str, str]] = {"treatment": "ou-reduction"}
-
-    @property
-    def alpha(self) -> float:  # type: ignore[override]
-        """α₀ = 1/τ₁ with τ₁ of Eq. (12)."""
-        return 1 / (2 * (2 - self.r0) / (5 - 3 * self.r0) * self.tau0)
-
-    @property
-    def sigma(self) -> float:  # type: ignore[override]
-        """σ₀ = √(2D₀)/τ₀, Eq. (14)."""
-        return math.sqrt(2 * self.D0) / self.tau0
-
-    @property
-    def replaces(self) -> NonGaussianNoise:
-        """The noise of Eq. (7)."""
-        return NonGaussianNoise(D0=self.D0, tau0=self.tau0, r0=self.r0)
-
-    @property
-    def remarks(self) -> Sequence[Message]:
-        """A remark on the reduction (12)-(14), made for r₀ near 1: the variance that it gives, against Eq. (10)."""
-        departure = abs(self.r0 - 1)
-        if departure <= NEAR_GAUSSIAN * (1 + 1e-9):  # to rounding
-            return ()
-        variances = {"reduced": self.standard_deviation**2, "variance": self.replaces.variance}
-        criterion = {"departure": departure, "most": NEAR_GAUSSIAN}
-        return (Message(Code.FAR_FROM_GAUSSIAN, **criterion, **variances, remedy=Remedy.NO_REDUCTION),)
-
-    def derivative(self, name: str) -> NoiseDerivative:
-        """∂/∂θ by D₀, τ₀ or r₀ of α₀ = (5 − 3r₀)/(2(2 − r₀)τ₀) and σ₀."""
-        match name:
-            case "D0":
-                return self.by_logarithms(0.5 / self.D0, 0.0)
-            case "tau0":
-                return self.by_logarithms(-1 / self.tau0, -1 / self.tau0)
-        return self.by_logarithms(0.0, 1 / (2 - self.r0) - 3 / (5 - 3 * self.r0))
-
-
 def _curvature_of_log(q: FloatArray) -> FloatArray:
-    """(ln(1 + q) − q/(1 + q))/q², which is ½ − ⅔q + ¾q² − … near 0."""
-    n = np.arange(2, 18)
-    series = np.polynomial.polynomial.polyval(q, (-1.0) ** n * (1 - 1 / n))
-    far = np.where(np.abs(q) < _SMALL, 1.0, q)
-    return np.where(np.abs(q) < _SMALL, series, (np.log1p(far) - far / (1 + far)) / far**2)
+    """(ln(1 + q) − q/(1 + q))/q², which is ½ − ⅔q + ¾q² − … near 0, where a difference of logarithms cancels."""
+    n, is_small = np.arange(2, 18), np.abs(q) < 0.05
+    series = np.polynomial.polynomial.polyval(np.where(is_small, q, 0.0), (-1.0) ** n * (1 - 1 / n))
+    far = np.where(is_small, 1.0, q)
+    return np.where(is_small, series, (np.log1p(far) - far / (1 + far)) / far**2)

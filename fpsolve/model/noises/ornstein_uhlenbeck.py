@@ -3,75 +3,36 @@
 from __future__ import annotations
 
 import math
+from abc import abstractmethod
 from collections.abc import Sequence
-from typing import Annotated, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Annotated, ClassVar, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from fpsolve.arrays import FloatArray
 from fpsolve.model.faults import strict_dataclass
-from fpsolve.model.noise import Noise, NoiseDerivative
+from fpsolve.model.noise import Gaussian, Noise, NoiseDerivative
+from fpsolve.model.noises.steps import LinearStep, linear_step
 from fpsolve.model.parameters import DERIVED, SIZE, parameter
 
-
-class LinearStep(NamedTuple):
-    """The exact transition: ξ₁ = decay ξ₀ + kick ζ₁ + end₀ and ξ̄ = mean ξ₀ + mean₁ ζ₁ + mean₂ ζ₂ + mean₀, ζ normal."""
-
-    rate: float
-    decay: float
-    kick: float
-    end0: float
-    mean: float
-    mean1: float
-    mean2: float
-    mean0: float
-
-    @staticmethod
-    def draw(step, xi, xi_mean, xi_end, push, rng):  # type: ignore[no-untyped-def]
-        """One step, see `Noise.step`."""
-        for i in range(xi.size):
-            xi_end[i] = rng.standard_normal()
-        for i in range(xi.size):
-            xi_mean[i] = rng.standard_normal()
-        for i in range(xi.size):
-            first, start = xi_end[i], xi[i]
-            xi_end[i] = step.decay * start + step.kick * first + step.end0
-            xi_mean[i] = step.mean * start + step.mean1 * first + step.mean2 * xi_mean[i] + step.mean0
-            push[i] -= step.rate * xi_mean[i]
+Intensity = Annotated[float, parameter("noise intensity", "D0 = 0.1", "$D_0$", "1/time", **SIZE)]
+Memory = Annotated[float, parameter("correlation time", "tau0 = 0.5", r"$\tau_0$", "time", **SIZE)]
 
 
-def linear_step(alpha: float, sigma: float, h: float, bias: float) -> LinearStep:
-    """The exact step of dξ = (−αξ + σ²b) dt + σ dW of length h."""
-    std, a, force = sigma / math.sqrt(2 * alpha), alpha * h, sigma**2 * bias
-    decay, mean = math.exp(-a), -math.expm1(-a) / a
-    # Variances of ξ₁ and ξ̄ and their covariance, in units of std²; the series avoids cancellation.
-    var_end, covariance = -math.expm1(-2 * a), a * mean**2
-    if a > 0.02:
-        var_mean = (2 * a + 4 * math.expm1(-a) - math.expm1(-2 * a)) / a**2
-    else:
-        var_mean = a * (2 / 3 - a / 2 + 7 * a**2 / 30 - a**3 / 12 + 31 * a**4 / 1260)
-    kick = math.sqrt(var_end)
-    mean1 = covariance / kick
-    return LinearStep(
-        rate=a,
-        decay=decay,
-        kick=std * kick,
-        end0=force / alpha * (1 - decay),
-        mean=mean,
-        mean1=std * mean1,
-        mean2=std * math.sqrt(var_mean - mean1**2),
-        mean0=force / alpha * (1 - mean),
-    )
-
-
-class GaussianNoise(Noise):
+class GaussianNoise(Gaussian):
     """A process with the law of Eq. (15), dξ = −α₀ ξ dt + σ₀ dW, whatever its parameters are."""
 
-    alpha: float
-    sigma: float
-
     of_xi: ClassVar[Sequence[str]] = ("D0", "sigma", "standard_deviation")
+
+    if TYPE_CHECKING:  # a field or a property
+
+        @property
+        @abstractmethod
+        def alpha(self) -> float: ...
+        @property
+        @abstractmethod
+        def sigma(self) -> float: ...
 
     @property
     def diffusion(self) -> float:
@@ -94,11 +55,6 @@ class GaussianNoise(Noise):
     def drift(self, xi: ArrayLike) -> FloatArray:
         """−α₀ ξ."""
         return -self.alpha * np.asarray(xi, dtype=float)
-
-    def log_density(self, xi: ArrayLike) -> FloatArray:
-        """Logarithm of the Gaussian density with variance σ₀²/(2α₀)."""
-        z = np.asarray(xi, dtype=float) / self.standard_deviation
-        return -0.5 * z**2 - math.log(math.sqrt(2 * math.pi) * self.standard_deviation)
 
     def spectral_density(self, omega: float) -> float:
         """S(ω) = σ₀²/(α₀² + ω²), Eq. (16)."""
@@ -132,17 +88,17 @@ class OrnsteinUhlenbeckByIntensity(GaussianNoise):
         ParameterError: a parameter is not a finite number in its range.
     """
 
-    D0: Annotated[float, parameter("noise intensity", "D0 = 0.1", "$D_0$", "1/time", **SIZE)]
-    tau0: Annotated[float, parameter("correlation time", "tau0 = 0.5", r"$\tau_0$", "time", **SIZE)]
+    D0: Intensity
+    tau0: Memory
 
     kind: ClassVar[str] = "ornstein-uhlenbeck"
 
     @property
-    def alpha(self) -> float:  # type: ignore[override]
+    def alpha(self) -> float:
         return 1 / self.tau0
 
     @property
-    def sigma(self) -> float:  # type: ignore[override]
+    def sigma(self) -> float:
         return math.sqrt(2 * self.D0) / self.tau0
 
     def derivative(self, name: str) -> NoiseDerivative:
@@ -162,19 +118,22 @@ class OrnsteinUhlenbeckByDeviation(GaussianNoise):
     """
 
     alpha: Annotated[float, parameter("relaxation rate", "alpha = 1.0", r"$\alpha$", "1/time", **SIZE)]
-    standard_deviation: float = parameter(  # type: ignore[assignment]
-        "standard deviation of the noise",
-        "standard_deviation = 0.7",
-        r"$\sigma_\xi$",
-        "1/time",
-        ge=SIZE["ge"],
-        le=SIZE["le"],
+    standard_deviation: float = cast(
+        "float",
+        parameter(
+            "standard deviation of the noise",
+            "standard_deviation = 0.7",
+            r"$\sigma_\xi$",
+            "1/time",
+            ge=SIZE["ge"],
+            le=SIZE["le"],
+        ),
     )
 
     kind: ClassVar[str] = "ornstein-uhlenbeck"
 
     @property
-    def sigma(self) -> float:  # type: ignore[override]
+    def sigma(self) -> float:
         return self.standard_deviation * math.sqrt(2 * self.alpha)
 
     def derivative(self, name: str) -> NoiseDerivative:

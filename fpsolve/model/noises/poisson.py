@@ -12,7 +12,7 @@ from pydantic import AfterValidator
 from fpsolve.arrays import FloatArray
 from fpsolve.model.faults import strict_dataclass
 from fpsolve.model.noise import Memoryless
-from fpsolve.model.noises.markov_chain import ChainStep
+from fpsolve.model.noises.steps import ChainStep
 from fpsolve.model.parameters import SIZE, parameter
 from fpsolve.model.plane import (
     CoefficientMatrix,
@@ -116,7 +116,7 @@ class Poisson(Memoryless):
             ValueError: a coefficient is no a + bξ, or impulses multiply the state by more than numbers hold.
         """
         terms, driven = split_by_noise(system, system.terms)
-        drift = LinearMotion(system.epsilon, tuple(terms), tuple(system.jumps))
+        drift = LinearMotion(tuple(terms), system.jumps, system.epsilon)
         if not driven.any():
             return Motion(drift)
         if float(np.max(np.abs(np.linalg.eigvals(driven)))) * max(map(abs, self.sizes)) > LARGEST:

@@ -25,7 +25,7 @@ class Noises(Noise):
     >>> from fpsolve import OrnsteinUhlenbeck
     >>> from fpsolve.model.noises.white import White
     >>> noises = Noises({"axial": OrnsteinUhlenbeck(alpha=1.0, sigma=0.3), "lateral": White(s=0.2)})
-    >>> noises.coloured.kind
+    >>> noises.valued.kind
     'ornstein-uhlenbeck'
 
     A function of the noises has one variable for each noise that has a value; white noise and impulses have none.
@@ -70,46 +70,41 @@ class Noises(Noise):
         return dict(self.named)
 
     @cached_property
-    def coloured(self) -> Noise:
+    def valued(self) -> Noise:
         """The noise, or the noises, that have values; if all are white, the first of them, with the value 0."""
-        valued = [(name, noise) for name, noise in self.named if not noise.is_white] or [self.named[0]]
-        return valued[0][1] if len(valued) == 1 else self if len(valued) == len(self.named) else Noises(tuple(valued))
+        valued = {name: noise for name, noise in self.named if not noise.is_white} or dict(self.named[:1])
+        return self if len(valued) == len(self.named) else noises_of(valued)
 
     @property
     def _valued(self) -> Iterable[Noise]:
-        return self.coloured.parts.values()
+        return self.valued.parts.values()
 
     @property
-    def values(self) -> Mapping[str, float | str]:
-        """The values of the parameters of all noises, by keys such as "axial.alpha"."""
-        return {f"{name}.{key}": value for name, noise in self.named for key, value in noise.values.items()}
-
-    @property
-    def is_white(self) -> bool:  # type: ignore[override]
+    def is_white(self) -> bool:
         """Whether all of the noises are white noise or impulses."""
         return all(noise.is_white for _, noise in self.named)
 
     @property
-    def has_states(self) -> bool:  # type: ignore[override]
-        """Whether all `coloured` noises jump between states."""
+    def has_states(self) -> bool:
+        """Whether all `valued` noises jump between states."""
         return all(noise.has_states for noise in self._valued)
 
     @property
     def is_diffusion(self) -> bool:
         """Whether only one noise has values, and is a diffusion by itself."""
-        return self.coloured is not self and self.coloured.is_diffusion
+        return self.valued is not self and self.valued.is_diffusion
 
     @property
     def is_random(self) -> bool:
         return any(noise.is_random for _, noise in self.named)
 
     @property
-    def approximates_spectrum(self) -> bool:  # type: ignore[override]
+    def approximates_spectrum(self) -> bool:
         """Whether the `spectral_density` of one of the noises is that of a simpler process which replaces it."""
         return any(noise.approximates_spectrum for _, noise in self.named)
 
     @property
-    def variables(self) -> int:  # type: ignore[override]
+    def variables(self) -> int:
         return sum(noise.variables for noise in self._valued)
 
     def misfit(self, xi: float) -> str:
@@ -117,7 +112,7 @@ class Noises(Noise):
 
     @property
     def standard_deviation(self) -> float:
-        """The largest standard deviation of the `coloured` noises."""
+        """The largest standard deviation of the `valued` noises."""
         return max(noise.standard_deviation for noise in self._valued)
 
     @property
@@ -148,11 +143,11 @@ class Noises(Noise):
     def motion(self, system: System) -> Motion:
         """The motion besides the white noises, and what all white noises add, each in its own `sense`."""
         moved = [
-            noise.motion(LinearMotion(system.epsilon, _driven(system.terms, name), tuple(system.jumps)))
+            noise.motion(LinearMotion(_driven(system.terms, name), system.jumps, system.epsilon))
             for name, noise in self._white
         ]
         terms = [*self._others(system.terms), *chain.from_iterable(each.drift.terms for each in moved)]
-        drift = LinearMotion(system.epsilon, tuple(terms), tuple(system.jumps))
+        drift = LinearMotion(tuple(terms), system.jumps, system.epsilon)
         return Motion(drift, *(list(chain.from_iterable(parts)) for parts in list(zip(*moved, strict=True))[1:]))
 
     def driving(self, system: System) -> Noise:
@@ -164,7 +159,7 @@ class Noises(Noise):
         part, _, parameter = name.rpartition(".")
         changed = [MotionDerivative(self._others(terms))]
         for own, noise in self._white:
-            driven = LinearMotion(system.epsilon, _driven(system.terms, own))
+            driven = LinearMotion(_driven(system.terms, own), epsilon=system.epsilon)
             changed.append(noise.changed_motion(driven, _driven(terms, own), parameter if part == own else ""))
         return MotionDerivative(*(list(chain.from_iterable(parts)) for parts in zip(*changed, strict=True)))
 
@@ -186,4 +181,4 @@ def _driven(terms: Sequence[CoefficientMatrix], name: str) -> tuple[CoefficientM
 
 def noises_of(named: Mapping[str, Noise]) -> Noise:
     """A noise of a mapping from names: `Noises`, or the only one. Raises as `Noises`."""
-    return next(iter(named.values())) if len(named) == 1 else Noises(named)  # type: ignore[arg-type]
+    return next(iter(named.values())) if len(named) == 1 else Noises(tuple(named.items()))

@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from enum import StrEnum
-from typing import Annotated, ClassVar, NamedTuple
+from typing import Annotated, ClassVar
 
 from fpsolve.arrays import FloatArray
 from fpsolve.model.faults import strict_dataclass
 from fpsolve.model.noise import Memoryless
+from fpsolve.model.noises.steps import WhiteStep
 from fpsolve.model.parameters import SIZE, parameter
 from fpsolve.model.plane import (
     CoefficientMatrix,
@@ -31,26 +32,6 @@ class Interpretation(StrEnum):
 
     STRATONOVICH = "stratonovich"
     ITO = "ito"
-
-
-class WhiteStep(NamedTuple):
-    """dW/dt in a step: its mean ΔW/h and the slope of the line with the same ∫W dt, both exactly.
-
-    Attributes:
-        mean, rise: their standard deviations 1/√h, and √3/√h of half the difference of the ends of the line.
-    """
-
-    mean: float
-    rise: float
-
-    @staticmethod
-    def draw(step, xi, xi_mean, xi_end, push, rng):  # type: ignore[no-untyped-def]
-        """One step, see `Noise.step`; its beginning is drawn anew, too."""
-        for i in range(xi.size):
-            xi_mean[i] = step.mean * rng.standard_normal()
-        for i in range(xi.size):
-            xi_end[i] = step.rise * rng.standard_normal()
-            xi[i] = -xi_end[i]
 
 
 @strict_dataclass
@@ -104,7 +85,7 @@ class White(Memoryless):
         diffusions = [_term(system, self.s * driven, _order(system))] if driven.any() else []
         if self.interpretation == Interpretation.ITO and diffusions:
             drift.append(_term(system, -0.5 * self.s**2 * driven @ driven, 2 * _order(system)))
-        return Motion(LinearMotion(system.epsilon, tuple(drift), tuple(system.jumps)), diffusions)
+        return Motion(LinearMotion(tuple(drift), system.jumps, system.epsilon), diffusions)
 
     def changed_motion(self, system: System, terms: Sequence[CoefficientMatrix], name: str = "") -> MotionDerivative:
         _, driven = split_by_noise(system, system.terms)

@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import math
 import re
+from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
-from functools import cached_property
-from typing import Annotated, Any, ClassVar, Self
+from functools import cached_property, partial
+from operator import itemgetter
+from typing import Annotated, ClassVar, Self, cast
 
 import numpy as np
 from pydantic import AfterValidator, BaseModel, BeforeValidator, Field
 from pydantic.fields import FieldInfo
 
-from fpsolve.arrays import ROUNDED, FloatArray, identity, one, real_number, shown
+from fpsolve.arrays import ROUNDED, Constant, FloatArray, Linear, identity, one, real_number, shown
+from fpsolve.drawing import is_math
 from fpsolve.messages import Code, Message, is_control
 from fpsolve.model.expressions import (
     HIGHEST_DEGREE,
@@ -25,17 +28,17 @@ from fpsolve.model.expressions import (
     Form,
     Monomial,
     Series,
-    calls_of_time,
     constant,
     evaluate,
     log_of,
     name_fault,
     names_in,
+    shortened,
     summands,
 )
 from fpsolve.model.faults import TableError, table_of
 from fpsolve.model.noises.clock import Clock, Wave
-from fpsolve.model.parameters import STRICT, parameter, stated_field, unknown_parameter, without_unit
+from fpsolve.model.parameters import STRICT, Table, parameter, stated_field, unknown_parameter, without_unit
 from fpsolve.model.plane import (
     MOST_VARIABLES,
     CoefficientMatrix,
@@ -57,8 +60,6 @@ MOST_PARAMETERS = 200
 _NEWTON = 60
 """Largest number of steps of Newton's method for the coefficient of restitution, which is cheap."""
 _COMBINED = 'a sum of several is for kind = "modes", whose masses tell how these share an impact'
-OTHER = 0.7310585786300049
-"""Difference to another value of a parameter that shows what depends on it: no round number."""
 
 
 def _printed(text: str) -> str:
@@ -68,8 +69,6 @@ def _printed(text: str) -> str:
 
 
 def _symbol(text: str) -> str:
-    from fpsolve.drawing import is_math
-
     symbol = _printed(text).strip().strip("$")
     if not is_math(f"${symbol}$"):
         raise ValueError(f"got {shown(text)}; must be a symbol that matplotlib can draw; write, for example, \\\\zeta")
@@ -100,10 +99,10 @@ class StatedWall(BaseModel):
     model_config = STRICT
 
     at: Annotated[str, parameter("where the wall is", 'at = "x = 0"')]
-    restitution: Annotated[Any, parameter("R of v+ = -R v-, a number or an expression", "restitution = 0.8")]
+    restitution: Annotated[object, parameter("R of v+ = -R v-, a number or an expression", "restitution = 0.8")]
 
 
-def _as_table(value: Any) -> Any:
+def _as_table(value: object) -> object:
     return value if isinstance(value, dict | StatedParameter) else {"value": value}
 
 
@@ -111,6 +110,32 @@ Parameters = dict[
     str, Annotated[StatedParameter, BeforeValidator(_as_table, json_schema_input_type=float | StatedParameter)]
 ]
 Texts = Annotated[tuple[str, ...], Field(strict=False, min_length=1, max_length=MOST_VARIABLES)]
+
+
+@contextmanager
+def placed(*place: str | int) -> Iterator[None]:
+    """Say where in a table a text is that is no arithmetic. Raises `TableError`."""
+    try:
+        yield
+    except ExpressionError as error:
+        raise TableError(str(error), *place) from None
+
+
+@dataclass
+class Read:
+    """What texts say.
+
+    Attributes:
+        rates: of the variables.
+        delays: by what is written as x(t - tau) the number of x, and tau.
+        speeds: by what is written as cos(nu*t) nu.
+        linear: the names in terms of degree 1.
+    """
+
+    rates: list[Form] = field(default_factory=list)
+    delays: dict[str, tuple[int, Series]] = field(default_factory=dict)
+    speeds: dict[str, Series] = field(default_factory=dict)
+    linear: set[str] = field(default_factory=set)
 
 
 @dataclass(frozen=True)
@@ -126,12 +151,14 @@ class Wall:
     restitution: float | str
 
 
-def walls_of(walls: Any) -> tuple[Wall, ...]:
+def walls_of(walls: object) -> tuple[Wall, ...]:
     """Walls from mappings with their keys. Raises `TableError`."""
+    found = list[Wall]()
     for number, wall in enumerate(walls if isinstance(walls, list | tuple) else (walls,)):
         if not isinstance(wall, Mapping) or set(wall) != {"at", "restitution"}:
             raise TableError(f"got {shown(wall)}; must have the keys at and restitution alone", "walls", number)
-    return tuple(Wall(**wall) for wall in walls)
+        found.append(Wall(**wall))
+    return tuple(found)
 
 
 @dataclass(frozen=True)
@@ -154,8 +181,8 @@ class EquationSystem(System):
         TableError: one of these is not what it must be, with its place.
     """
 
-    variables: tuple[str, ...]
-    drift: tuple[str, ...]
+    variables: Sequence[str]
+    drift: Sequence[str]
     named: tuple[tuple[str, float], ...] = ()
     noises: tuple[tuple[str, str], ...] = (("xi", "noise"),)
     walls: tuple[Wall, ...] = ()
@@ -181,8 +208,8 @@ class EquationSystem(System):
     }
 
     def __post_init__(self) -> None:
-        for key in ("variables", "drift"):
-            texts = tuple(each) if isinstance(each := getattr(self, key), list | tuple) else (each,)
+        for key, each in (("variables", self.variables), ("drift", self.drift)):
+            texts = tuple(each) if isinstance(each, list | tuple) else (each,)
             if not 1 <= len(texts) <= MOST_VARIABLES or not all(isinstance(text, str) for text in texts):
                 raise TableError(f"got {shown(each)}; must be a list of 1 to {MOST_VARIABLES} texts", key)
             object.__setattr__(self, key, texts)
@@ -203,7 +230,7 @@ class EquationSystem(System):
                 fault = "is the name of the small parameter; rename it"
             if fault:
                 raise TableError(f"got the name {shown(name)}; it {fault}", *path)
-        known = set[str]()
+        known = set[object]()
         for name, path in self._given_names():
             if name in known:
                 raise TableError(f"got the name {name} twice; all names must differ; rename one of them", *path)
@@ -243,7 +270,7 @@ class EquationSystem(System):
             raise TableError(f"got {found}; {why}; leave out walls", "walls")
         _ = self.stop, self.jumps  # refuse what they cannot be
 
-    def _given_names(self) -> Iterator[tuple[Any, Place]]:
+    def _given_names(self) -> Iterator[tuple[object, Place]]:
         """All names with their places."""
         yield from ((name, ("variables", i)) for i, name in enumerate(self.variables))
         yield from ((name, ("parameters", str(name))) for name, _ in self.named)
@@ -266,20 +293,18 @@ class EquationSystem(System):
         """The names in these. Raises `TableError`."""
         found = frozenset[str]()
         for text, place in self._texts():
-            try:
+            with placed(*place):
                 found |= names_in(text)
-            except ExpressionError as error:
-                raise TableError(str(error), *place) from None
         return found
 
     @classmethod
-    def takes(cls, key: str, table: Mapping[str, Any]) -> bool:
+    def takes(cls, key: str, table: Table) -> bool:
         """Besides what is `stated`, keys of parameters, whose values these replace, as `--set` writes them."""
         return key in table_of(table.get("parameters"))
 
     @classmethod
     def named_of(
-        cls, table: Mapping[str, Any], stated: Mapping[str, FieldInfo]
+        cls, table: Table, stated: Mapping[str, FieldInfo]
     ) -> tuple[tuple[tuple[str, float], ...], tuple[tuple[str, Quantity], ...]]:
         """The parameters of a table, those beside its `stated` keys in their place, and what they are.
 
@@ -303,7 +328,7 @@ class EquationSystem(System):
         return tuple(named.items()), quantities
 
     @classmethod
-    def from_table(cls, table: Mapping[str, Any]) -> EquationSystem:
+    def from_table(cls, table: Table) -> EquationSystem:
         named, quantities = cls.named_of(table, cls.stated)
         return cls(
             variables=table["variables"],
@@ -315,7 +340,7 @@ class EquationSystem(System):
         )
 
     @property
-    def epsilon(self) -> float:  # type: ignore[override]
+    def epsilon(self) -> float:
         """The parameter of this name; 1 where there is none."""
         return dict(self.named).get(EPSILON, 1.0)
 
@@ -351,126 +376,105 @@ class EquationSystem(System):
         for name in values:
             if name not in known:
                 raise ValueError(f"got {name}; the parameters are {', '.join(known) or 'none'}")
-        return replace(self, named=tuple({**known, **values}.items()))  # type: ignore[arg-type]
+        return replace(self, named=tuple({**dict(self.named), **cast("dict[str, float]", values)}.items()))
 
     @cached_property
-    def _rates(self) -> tuple[Form, ...]:
-        return self._rates_by("")
+    def _read(self) -> Read:
+        return self._read_by("")
 
-    def _rates_by(self, by: str) -> tuple[Form, ...]:
+    @property
+    def _rates(self) -> Sequence[Form]:
+        return self._read.rates
+
+    def _read_by(self, by: str) -> Read:
         """The rates, with their derivatives by a parameter. Raises `TableError`."""
+        read = Read()
         names = {
-            **{name: Form({((name,), "", 0): (1.0, 0.0)}) for name in (*self.variables, *self._delays)},
+            **{name: Form({((name,), "", 0): (1.0, 0.0)}) for name in self.variables},
             **{name: Form({((), name, 0): (1.0, 0.0)}) for name, _ in self.noises},
             **self._names(by),
         }
-        rates = list[Form]()
+        terms, of_time = list[tuple[int, float, str, Form]](), partial(self._of_time, read, by)
         for i, (variable, text) in enumerate(zip(self.variables, self.drift, strict=True)):
-            total, place = Form({}), f"{variable}'s rate"
-            try:
-                for written, form in summands(text, names, place) if text.strip() != "0" else ():
-                    if fault := next(filter(None, map(self._fault, form.parts)), ""):
-                        raise ExpressionError(f"the term {written} of {place} {fault}")
-                    total = total.plus(form)
-            except ExpressionError as error:
-                raise TableError(str(error), "drift", i) from None
-            rates.append(total)
-        return tuple(rates)
+            with placed("drift", i):
+                for sign, term in summands(text) if text.strip() != "0" else ():
+                    terms.append((i, sign, term, evaluate(term, names, f"{variable}'s rate", of_time)))
+        read.rates = [Form({})] * len(self.variables)
+        for i, sign, term, form in terms:
+            if fault := next(filter(None, (self._fault(each, bool(read.delays)) for each in form.parts)), ""):
+                raise TableError(f"the term {shortened(term)} of {self.variables[i]}'s rate {fault}", "drift", i)
+            if any(len(states) == 1 for states, _, _ in form.parts):
+                read.linear.update(names_in(term))
+            read.rates[i] = read.rates[i].plus(form, sign)
+        return read
 
     def _names(self, by: str) -> dict[str, Form]:
-        """What waves and parameters are, with their derivatives by a parameter."""
+        """What parameters are, with their derivatives by one of them."""
         names = {name: constant(value, float(name == by)) for name, value in self.named}
-        if EPSILON in names:
-            names[EPSILON] = Form({((), "", 1): (1.0, 0.0)})
-        return {**self._waves(by), **names}
+        return names | ({EPSILON: Form({((), "", 1): (1.0, 0.0)})} if EPSILON in names else {})
 
-    def _times(self, by: str = "") -> Iterator[tuple[Place, str, str, dict[Monomial, Series]]]:
-        """The place, the text, the name and the argument of each x(t - tau) and cos(nu*t). Raises `TableError`."""
-        calls = [(place, *call) for text, place in self._texts() for call in calls_of_time(text).items()]
-        names = {name: constant(value, float(name == by)) for name, value in self.named if calls}
+    def _of_time(self, read: Read, by: str, name: str, time: str, written: str) -> Form | None:
+        """What x(t - tau) is, and cos(nu*t + phi) by waves of the frequency nu; both are noted; else None."""
+        if name not in WAVES and not self.drift:
+            return None
+        names = {name: constant(value, float(name == by)) for name, value in self.named}
         names |= {name: Form({((name,), "", 0): (1.0, 0.0)}) for name in (*self.variables, TIME)}
         names |= {name: Form({((), name, 0): (1.0, 0.0)}) for name, _ in self.noises}
-        for place, written, (name, time) in calls:
-            try:
-                yield place, written, name, dict(evaluate(time, names, f"the time of {written}").parts)
-            except ExpressionError as error:
-                raise TableError(str(error), *place) from None
-
-    def _angles(self, by: str = "") -> Mapping[str, tuple[str, Series, Series]]:
-        """By what is written as cos(nu*t + phi) the name, nu and phi. Raises `TableError`."""
-        found = dict[str, tuple[str, Series, Series]]()
-        for place, written, name, parts in self._times(by):
-            if name in WAVES:
-                phase, speed = parts.pop(NUMBER, (0.0, 0.0)), parts.pop(((TIME,), "", 0), (0.0, 0.0))
-                if parts or not speed[0]:
-                    must = f"write {name}(nu*t), nu not 0, a number or an expression in the parameters"
-                    raise TableError(f"got {written}; {must}", *place)
-                found[written] = name, speed, phase
-        return found
+        parts = dict(evaluate(time, names, f"the time of {written}").parts)
+        (first, slope), speed = parts.pop(NUMBER, (0.0, 0.0)), parts.pop(((TIME,), "", 0), (0.0, 0.0))
+        if name in WAVES:
+            if parts or not speed[0]:
+                must = f"write {name}(nu*t), nu not 0, a number or an expression in the parameters"
+                raise ExpressionError(f"got {written}; {must}")
+            read.speeds[written] = speed
+            turned, sign = first if name == "cos" else first - 0.5 * math.pi, math.copysign(1.0, speed[0])
+            c, s = (round(each(turned), 16) for each in (math.cos, math.sin))
+            waves = {"cos": (c, -s * slope), "sin": (-sign * s, -sign * c * slope)}
+            return Form({((), f"{each} {abs(speed[0])!r}", 0): value for each, value in waves.items() if any(value)})
+        fault = "" if name in self.variables else f"{name} is none of the variables {', '.join(self.variables)}"
+        if parts or speed != (1.0, 0.0):
+            fault = (
+                "a delay may not depend on the state, the noise or the time: write x(t - tau), tau a number or an "
+                "expression in the parameters"
+            )
+        elif not fault and not -first > 0:
+            fault = f"the delay is {-first:g}; must be > 0; change it, or write {name}"
+        if fault:
+            raise ExpressionError(f"got {written}; {fault}")
+        read.delays[written] = self.variables.index(name), (-first, -slope)
+        return Form({((written,), "", 0): (1.0, 0.0)})
 
     @cached_property
     def clock(self) -> Clock | None:
-        frequencies = [abs(speed[0]) for _, speed, _ in self._angles().values()]
+        frequencies = [abs(speed) for speed, _ in self._read.speeds.values()]
         try:
             return Clock(*common_unit(frequencies, "frequencies")) if frequencies else None
         except ValueError as failure:
             raise TableError(str(failure), "drift" if self.drift else "stiffness") from None
 
     def clock_slope(self, name: str) -> float:
-        _, speed, _ = next(iter(self._angles(name).values()), ("", (1.0, 0.0), ()))
-        return speed[1] / speed[0] * self.clock.nu if self.clock else 0.0
-
-    def _waves(self, by: str) -> Mapping[str, Form]:
-        """What is written as cos(nu*t + phi), by those of multiples of the angle of the clock."""
-        found = dict[str, Form]()
-        for written, (name, (speed, _), (phase, slope)) in self._angles(by).items():
-            turned = phase if name == "cos" else phase - 0.5 * math.pi
-            c, s = (round(each(turned), 16) for each in (math.cos, math.sin))
-            sign, k = math.copysign(1.0, speed), round(abs(speed) / self.clock.nu)  # type: ignore[union-attr]
-            series = {"cos": (c, -s * slope), "sin": (-sign * s, -sign * c * slope)}
-            found[written] = Form({((), f"{each} {k}", 0): value for each, value in series.items() if any(value)})
-        return found
+        speed, slope = next(iter(self._read_by(name).speeds.values()), (1.0, 0.0))
+        return slope / speed * self.clock.nu if self.clock else 0.0
 
     @cached_property
-    def _delays(self) -> Mapping[str, tuple[int, float]]:
-        """By what is written as x(t - tau) the number of x, and tau. Raises `TableError`."""
-        found = dict[str, tuple[int, float]]()
-        for place, written, name, parts in self._times():
-            if name in WAVES:
-                continue
-            delay = -parts.pop(NUMBER, (0.0, 0.0))[0]
-            fault = "" if name in self.variables else f"{name} is none of the variables {', '.join(self.variables)}"
-            if parts != {((TIME,), "", 0): (1.0, 0.0)}:
-                fault = (
-                    "a delay may not depend on the state, the noise or the time: write x(t - tau), tau a number or an "
-                    "expression in the parameters"
-                )
-            elif not fault and not delay > 0:
-                fault = f"the delay is {delay:g}; must be > 0; change it, or write {name}"
-            if fault:
-                raise TableError(f"got {written}; {fault}", *place)
-            found[written] = self.variables.index(name), delay
-        return found
-
-    @cached_property
-    def pasts(self) -> tuple[tuple[int, float], ...]:  # type: ignore[override]
-        found = tuple(self._delays.values())
+    def pasts(self) -> tuple[tuple[int, float], ...]:
+        found = tuple((variable, delay) for variable, (delay, _) in self._read.delays.values())
         return found * 2 if len(found) == len(self.variables) == 1 else found  # a matrix has more than two rows here
 
-    def _fault(self, monomial: Monomial) -> str:
+    def _fault(self, monomial: Monomial, has_past: bool) -> str:
         """What is wrong with a product in a rate, and what to do; or nothing."""
         states, noise, _ = monomial
         degree, names = len(states), ", ".join(self.variables)
         told = f"is of degree {degree} in {names}"
         if degree == 0:
-            if self.pasts and noise:
+            if has_past and noise:
                 return ""
-            if self.pasts:
+            if has_past:
                 return f"shifts where {names} rest; leave it out, and measure them from there"
             return f"is not linear in {names}; multiply it by one of these, or leave it out"
         if degree == 1:
             return ""
-        if self.pasts:
+        if has_past:
             return f"{told}; with a delay all terms must be of degree 1: leave it out"
         if len(self.variables) != 2:
             return f"{told}; of any but two variables all terms must be of degree 1: leave it out"
@@ -486,38 +490,43 @@ class EquationSystem(System):
         """
         has_orders = EPSILON in dict(self.named)
         names = {name: section[6:] for name, section in self.noises} if len(self.noises) > 1 else {}
-        columns, matrices = [*self.variables, *last, *self._delays], dict[tuple[int, str], FloatArray]()
-        size = len(self.variables) + len(last) + len(self.pasts)
+        columns, size = [*self.variables, *last, *self._read.delays], len(self.variables) + len(last) + len(self.pasts)
+        matrices = defaultdict[tuple[int, str], FloatArray](lambda: np.zeros(2 * (size,)))
         for i, form in enumerate(rates):
             for (states, noise, power), series in form.parts.items():
-                if len(states) > 1 or not (states or last):
-                    continue
-                order = power if has_orders else int(bool(noise))
-                matrix = matrices.setdefault((order, noise), np.zeros(2 * (size,)))
-                matrix[i, columns.index((*states, *last)[0])] += series[at]
+                if len(states) == 1 or (last and not states):
+                    order = power if has_orders else int(bool(noise))
+                    matrices[order, noise][i, columns.index((*states, *last)[0])] += series[at]
         terms = [
-            CoefficientMatrix(order, matrix.tolist(), *_coefficient(noise, names))
-            for (order, noise), matrix in sorted(matrices.items(), key=lambda item: item[0])
+            CoefficientMatrix(order, matrix.tolist(), *self._coefficient(noise, names))
+            for (order, noise), matrix in sorted(matrices.items(), key=itemgetter(0))
             if at == 0 or matrix.any()
         ]
         return as_plane(terms, 0.0 if at else max((abs(matrix).max() for matrix in matrices.values()), default=0.0))
 
+    def _coefficient(self, noise: str, names: Mapping[str, str]) -> tuple[Constant | Linear | Function, str]:
+        """The coefficient of a noise, or of "cos 0.5", a wave of the clock, and the name of the noise in terms."""
+        wave, _, speed = noise.partition(" ")
+        if speed and self.clock:
+            return Function(Wave(wave, round(float(speed) / self.clock.nu))), TIME
+        return identity if noise else one, names.get(noise, "")
+
     @cached_property
-    def terms(self) -> tuple[CoefficientMatrix, ...]:  # type: ignore[override]
+    def terms(self) -> tuple[CoefficientMatrix, ...]:
         return self._terms_of(self._rates, 0)
 
     @cached_property
-    def forced(self) -> System | None:  # type: ignore[override]
+    def forced(self) -> System | None:
         if not any(not states for form in self._rates for states, _, _ in form.parts):
             return None
-        return LinearMotion(self.epsilon, self._terms_of(self._rates, 0, [""]), (), self.pasts)
+        return LinearMotion(self._terms_of(self._rates, 0, [""]), (), self.epsilon, pasts=self.pasts)
 
     @property
     def driven_by(self) -> frozenset[str]:
         return super().driven_by | (self.forced.driven_by if self.forced else frozenset())
 
     @cached_property
-    def cubic(self) -> CubicTerms | None:  # type: ignore[override]
+    def cubic(self) -> CubicTerms | None:
         """The terms of degree 3; None where there are none, or all are 0."""
         matrix = np.zeros((2, HIGHEST_DEGREE + 1))
         for i, form in enumerate(self._rates):
@@ -527,7 +536,7 @@ class EquationSystem(System):
         return CubicTerms(matrix.tolist()) if matrix.any() else None
 
     @cached_property
-    def jumps(self) -> tuple[Jump, ...]:  # type: ignore[override]
+    def jumps(self) -> tuple[Jump, ...]:
         """Where the phase passes the ray of the wall: x = 0 is φ = π/2, v = 0 is φ = 0."""
         if not self.walls or len(self.variables) > 2:
             return ()
@@ -540,7 +549,7 @@ class EquationSystem(System):
         return (Jump(math.pi / 2 if place == 0 else 0.0, log_factor, leading),)
 
     @cached_property
-    def stop(self) -> Stop | None:  # type: ignore[override]
+    def stop(self) -> Stop | None:
         """The wall of more than two variables. Raises `TableError`."""
         if not self.walls or len(self.variables) == 2:
             return None
@@ -582,18 +591,15 @@ class EquationSystem(System):
     def _log_factor(self, by: str = "", value: float | None = None, order: int = 1) -> tuple[float, ...]:
         """Taylor coefficients of ln R of the wall by a parameter, at a value of it. Raises `TableError`."""
         restitution = self.walls[0].restitution
-        named = dict(self.named) if value is None else {**dict(self.named), by: value}
-        try:
+        named = dict(self.named) | ({} if value is None else {by: value})
+        zeros = (0.0,) * (order - 1)
+        with placed("walls", 0, "restitution"):
             if isinstance(restitution, bool) or not isinstance(restitution, str | float | int):
                 must = "must be a number > 0, or an expression in the parameters"
                 raise ExpressionError(f"got {shown(restitution)}; {must}; write, for example, restitution = 0.8")
-            names = {
-                name: constant(each, *(float(name == by and k == 0) for k in range(order)))
-                for name, each in named.items()
-            }
-            return log_of(str(restitution), names, "the restitution")
-        except ExpressionError as error:
-            raise TableError(str(error), "walls", 0, "restitution") from None
+            names = {name: constant(each, float(name == by), *zeros) for name, each in named.items()}
+            logs = log_of(str(restitution), names, "the restitution")
+        return logs  # noqa: RET504
 
     @cached_property
     def _derivatives(self) -> Mapping[str, tuple[tuple[CoefficientMatrix, ...], tuple[float, ...]]]:
@@ -601,7 +607,7 @@ class EquationSystem(System):
         found = dict[str, tuple[tuple[CoefficientMatrix, ...], tuple[float, ...]]]()
         for name, _ in self.named:
             try:
-                terms = by_epsilon(self) if name == EPSILON else self._terms_of(self._rates_by(name), 1)
+                terms = by_epsilon(self) if name == EPSILON else self._terms_of(self._read_by(name).rates, 1)
                 slope = self._log_factor(name)[1] if self.walls else 0.0
             except TableError:
                 continue
@@ -609,44 +615,27 @@ class EquationSystem(System):
         return found
 
     @cached_property
-    def inert(self) -> Sequence[str]:  # type: ignore[override]
-        """The parameters that are in no term of degree 1: another value of theirs leaves all others as they are."""
-        if not any(len(states) != 1 for form in self._rates for states, _, _ in form.parts):
-            return ()
+    def inert(self) -> Sequence[str]:
+        """The parameters that are in no term of degree 1, but in others."""
         in_walls = frozenset[str]().union(*(names_in(str(wall.restitution)) for wall in self.walls))
-        return tuple(
-            name for name, value in self.named if name in self._used - in_walls and self._is_linear_same(name, value)
-        )
-
-    def _is_linear_same(self, name: str, value: float) -> bool:
-        if name == EPSILON:
-            return not any(term.order for term in self.terms)
-        try:
-            return replace(self, named=tuple({**self.values, name: abs(value) + OTHER}.items())).terms == self.terms  # type: ignore[arg-type]
-        except ValueError:
-            return False
+        return tuple(name for name, _ in self.named if name in self._used - in_walls - self._read.linear)
 
     @property
     def differentiable(self) -> Sequence[str]:
         return tuple(name for name in self._derivatives if name not in self.inert and self._keeps_ratios(name))
 
     def _keeps_ratios(self, name: str) -> bool:
-        """Whether delays, frequencies, and the coordinates of a wall remain with another value of a parameter."""
-        value = float(self.values[name])
-        with suppress(ValueError):
-            if max(map(len, self._recurring)) < 2 and self.stop is None:
-                return True
-            other = self.at({name: value + OTHER * 1e-3 * (abs(value) or 1.0)})
-            if self.stop is not None:
-                return other._wall_coordinates().tolist() == self._wall_coordinates().tolist()
-            shares = [np.divide(*pair) for pair in zip(other._recurring, self._recurring, strict=True) if pair[0]]
-            return all(np.ptp(each) <= ROUNDED * abs(each[0]) for each in shares)
-        return False
+        """Whether ratios of delays and of frequencies, and the coordinates of a wall, remain as a parameter changes."""
+        read = self._read_by(name)
+        recurring = [delay for _, delay in read.delays.values()], [*read.speeds.values()]
+        rates = [[slope / value for value, slope in each] for each in recurring if each]
+        alike = all(np.ptp(each) <= ROUNDED * max(map(abs, each)) for each in rates)
+        is_moved = self.stop and (self._moves_wall(name) or (self.stop.restitution == 1 and self._derivatives[name][1]))
+        return alike and not is_moved
 
-    @property
-    def _recurring(self) -> tuple[list[float], list[float]]:
-        """The delays, and the frequencies."""
-        return [delay for _, delay in self.pasts], [speed for _, (speed, _), _ in self._angles().values()]
+    def _moves_wall(self, name: str) -> bool:
+        """Whether the coordinates of a wall depend on a parameter."""
+        return name in names_in(self.drift[self._place()[0]])
 
     def derivative(self, name: str) -> tuple[tuple[CoefficientMatrix, ...], tuple[float, ...]]:
         """∂/∂θ of the terms and of ln R, exact but for rounding. Raises `ValueError` where it is infinite."""
@@ -654,34 +643,27 @@ class EquationSystem(System):
             raise ValueError(f"the derivative of the system by {name} is not finite; choose another value of {name}")
         return self._derivatives[name]
 
-    @property
-    def impact_parameter(self) -> str:
-        if not self.walls:
-            return ""
-        own = names_in(str(self.walls[0].restitution)) - {EPSILON}
-        return next(iter(own)) if len(own) == 1 and not own & self._used else ""
-
-    @property
+    @cached_property
     def _law(self) -> str:
-        """The parameter that is the coefficient of restitution: R = 1 for 1, and more for more; empty where R is."""
-        name = self.impact_parameter
-        if not name:
+        """The parameter that is the coefficient of restitution, in ln R alone: R = 1 for 1, and more for more."""
+        own = names_in(str(self.walls[0].restitution)) - {EPSILON} if self.walls else frozenset()
+        if len(own) != 1 or own & self._used:
             return ""
-        try:
+        (name,) = own
+        with suppress(TableError):
             at_one, slope = self._log_factor(name, 1.0)
-        except TableError:
-            return ""
-        return name if abs(at_one) <= ROUNDED and slope > 0 else ""
+            return name if abs(at_one) <= ROUNDED and slope > 0 else ""
+        return ""
 
     @property
     def impact_symbol(self) -> str:
         return self._law or super().impact_symbol
 
-    def impact_value(self, log_factor: float) -> float:
+    def impact_value(self, log_factor: float) -> tuple[float, float]:
         """The coefficient of restitution for which ln R has a given value, by Newton's method; NaN if not found."""
         if not (name := self._law):
             return super().impact_value(log_factor)
-        value, step = 1.0, math.inf
+        value, step, slope = 1.0, math.inf, 0.0
         for _ in range(_NEWTON):
             try:
                 known, slope = self._log_factor(name, value)
@@ -689,26 +671,12 @@ class EquationSystem(System):
                 step /= 2
                 value -= step
                 continue
-            if not slope:
+            if not slope or abs(step) <= 4e-16 * max(1.0, abs(value)):
                 break
             step = (log_factor - known) / slope
-            if abs(step) <= 4e-16 * max(1.0, abs(value)):
-                return value
             value += step
-        return value if abs(step) <= ROUNDED * max(1.0, abs(value)) else math.nan
-
-    def impact_slope(self, log_factor: float) -> float:
-        if not (name := self._law):
-            return super().impact_slope(log_factor)
-        return 1 / self._log_factor(name, self.impact_value(log_factor))[1]
-
-
-def _coefficient(noise: str, names: Mapping[str, str]) -> tuple[Any, str]:
-    """The coefficient of a noise, or of "cos 2" of the clock, and the name of the noise in terms."""
-    wave, _, multiple = noise.partition(" ")
-    if multiple:
-        return Function(Wave(wave, int(multiple))), TIME
-    return identity if noise else one, names.get(noise, "")
+        is_found = slope and abs(step) <= ROUNDED * max(1.0, abs(value))
+        return (value, 1 / slope) if is_found else (math.nan, math.nan)
 
 
 def _quantity(name: str, stated: StatedParameter) -> Quantity:

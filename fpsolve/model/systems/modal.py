@@ -5,18 +5,19 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Annotated, Any, ClassVar
+from functools import partial
+from typing import Annotated, ClassVar
 
 import numpy as np
 from pydantic import BeforeValidator, Field
 from pydantic.fields import FieldInfo
 
 from fpsolve.arrays import ROUNDED, FloatArray, real_number, shown
-from fpsolve.model.expressions import ExpressionError, Form, Monomial, Series, constant, evaluate
+from fpsolve.model.expressions import Form, Monomial, OfTime, Series, constant, evaluate, names_in
 from fpsolve.model.faults import TableError
-from fpsolve.model.parameters import stated_field
+from fpsolve.model.parameters import Table, stated_field
 from fpsolve.model.plane import MOST_VARIABLES
-from fpsolve.model.systems.equations import EPSILON, EquationSystem, Place, walls_of
+from fpsolve.model.systems.equations import EPSILON, EquationSystem, Place, Read, placed, walls_of
 
 Entry = float | str
 Matrix = Sequence[Sequence[Entry]]
@@ -140,7 +141,7 @@ class ModalSystem(EquationSystem):
         )
 
     @classmethod
-    def from_table(cls, table: Mapping[str, Any]) -> ModalSystem:
+    def from_table(cls, table: Table) -> ModalSystem:
         named, quantities = cls.named_of(table, cls.stated)
         given = {key: each for key, each in table.items() if key in cls.stated}
         walls = [each.model_dump() for each in table.get("walls", ())]
@@ -149,7 +150,7 @@ class ModalSystem(EquationSystem):
     def __post_init__(self) -> None:
         self._refuse_faults()
 
-    def _given_names(self) -> Iterator[tuple[Any, Place]]:
+    def _given_names(self) -> Iterator[tuple[object, Place]]:
         yield from ((name, ("modes",) if path[0] == "variables" else path) for name, path in super()._given_names())
 
     def _texts(self) -> Iterator[tuple[str, Place]]:
@@ -162,11 +163,11 @@ class ModalSystem(EquationSystem):
         is_used = any(noise == name and any(map(any, rows)) for _, noise, rows in self.matrices)
         return "" if is_used else f"{name} is in no matrix; write stiffness_noise or damping_noise"
 
-    def _rates_by(self, by: str) -> tuple[Form, ...]:
-        (mobility, change), n = self._mobility(by), len(self.variables) // 2
-        forces = _zeros(n, 2 * n)
+    def _read_by(self, by: str) -> Read:
+        (mobility, change), n, read = self._mobility(by), len(self.variables) // 2, Read(linear={*self._used})
+        forces, of_time = _zeros(n, 2 * n), partial(self._of_time, read, by)
         for place, noise, rows in self.matrices[1:]:
-            for (wave, power), matrix in _series(place, rows, self._names(by)).items():
+            for (wave, power), matrix in _series(place, rows, self._names(by), of_time).items():
                 if noise and wave:
                     raise TableError(f"has {wave}t; a noise may only be multiplied by numbers and parameters", *place)
                 off = np.abs(matrix[0] + matrix[0].T) > ROUNDED * np.max(np.abs(matrix[0]))
@@ -183,7 +184,8 @@ class ModalSystem(EquationSystem):
                 for name, *pair in zip(self.variables, *pairs, strict=True):
                     parts[(name,), noise, power] = tuple(pair)
         speeds = [Form({((name,), "", 0): (1.0, 0.0)}) for name in self.variables[1::2]]
-        return tuple(each for pair in zip(speeds, map(Form, found), strict=True) for each in pair)
+        read.rates.extend(each for pair in zip(speeds, map(Form, found), strict=True) for each in pair)
+        return read
 
     def _mobility(self, by: str = "") -> FloatArray:
         """M⁻¹, by which modes share an impact, and its derivative by a parameter. Raises `TableError`."""
@@ -216,16 +218,22 @@ class ModalSystem(EquationSystem):
         self._wall_row()
         return 0, 1, 1.0
 
+    def _moves_wall(self, name: str) -> bool:
+        """M⁻¹c changes in its direction, or c does."""
+        (mobility, change), row = self._mobility(name), self._wall_row()
+        shares, slopes = mobility @ row, change @ row
+        off = np.abs(np.outer(shares, slopes) - np.outer(slopes, shares))
+        is_turned = bool(np.any(off > ROUNDED * np.max(np.abs(shares)) * np.max(np.abs(slopes))))
+        return is_turned or name in names_in(str(self.walls[0].at).partition("=")[0])
+
     def _wall_row(self) -> FloatArray:
         """The displacement of the wall, a row of those of the modes. Raises `TableError`."""
         modes, at = self.variables[::2], str(self.walls[0].at)
         text, _, zero = at.partition("=")
-        try:
-            names = {name: constant(value) for name, value in self.named}
-            states = {name: Form({((name,), "", 0): (1.0,)}) for name in modes}
-            parts = evaluate(text, {**names, **states}, "at").parts
-        except ExpressionError as error:
-            raise TableError(str(error), "walls", 0, "at") from None
+        names = {name: constant(value) for name, value in self.named}
+        names |= {name: Form({((name,), "", 0): (1.0,)}) for name in modes}
+        with placed("walls", 0, "at"):
+            parts = evaluate(text, names, "at").parts
         found = {states: series[0] for (states, _, _), series in parts.items()}
         row = np.array([found.pop((name,), 0.0) for name in modes])
         if found or not row.any() or zero.strip().rstrip("0") not in ("", "0.") or "=" not in at:
@@ -239,22 +247,22 @@ def _zeros(*shape: int) -> defaultdict[tuple[str, int], FloatArray]:
     return defaultdict(lambda: np.zeros((2, *shape)))
 
 
-def _series(place: Place, rows: Rows, names: Mapping[str, Form]) -> Mapping[tuple[str, int], FloatArray]:
+def _series(
+    place: Place, rows: Rows, names: Mapping[str, Form], of_time: OfTime | None = None
+) -> Mapping[tuple[str, int], FloatArray]:
     """A matrix and its derivative by the waves and the powers of ε that multiply them. Raises `TableError`."""
     found = _zeros(len(rows), len(rows))
     for (i, j), entry in np.ndenumerate(np.array(rows, dtype=object)):
         if isinstance(entry, str):
-            try:
-                for (_, wave, power), series in evaluate(entry, names, "the entry").parts.items():
+            with placed(*place, i, j):
+                for (_, wave, power), series in evaluate(entry, names, "the entry", of_time).parts.items():
                     found[wave, power][:, i, j] = series
-            except ExpressionError as error:
-                raise TableError(str(error), *place, i, j) from None
         elif entry:
             found["", 0][0, i, j] = entry
     return found
 
 
-def _by_noise(key: str, given: Any, noises: Mapping[str, str]) -> Iterator[tuple[Place, str, Any]]:
+def _by_noise(key: str, given: object, noises: Mapping[str, str]) -> Iterator[tuple[Place, str, object]]:
     """The matrices of a key, each with its place and its noise, "" for none. Raises `TableError`."""
     if not key.endswith("_noise"):
         if given or key in ("mass", "stiffness") or not isinstance(given, list | tuple):
@@ -271,7 +279,7 @@ def _by_noise(key: str, given: Any, noises: Mapping[str, str]) -> Iterator[tuple
         yield from (((key,), name, given) for name in noises)
 
 
-def _count(mass: Any) -> int:
+def _count(mass: object) -> int:
     """The number of modes. Raises `TableError`."""
     if not isinstance(mass, list | tuple) or not 1 <= len(mass) <= MOST_MODES:
         must = f"must be a matrix of 1 to {MOST_MODES} rows, one for each mode"
@@ -279,7 +287,7 @@ def _count(mass: Any) -> int:
     return len(mass)
 
 
-def _rows(matrix: Any, count: int, place: Place) -> Rows:
+def _rows(matrix: object, count: int, place: Place) -> Rows:
     """The rows of a matrix, numbers and texts. Raises `TableError`."""
     stated = matrix if isinstance(matrix, list | tuple) else ()
     if [len(row) if isinstance(row, list | tuple) else 0 for row in stated] != [count] * count:
@@ -288,7 +296,7 @@ def _rows(matrix: Any, count: int, place: Place) -> Rows:
     return tuple(tuple(_entry(each, (*place, i, j)) for j, each in enumerate(row)) for i, row in enumerate(stated))
 
 
-def _entry(given: Any, place: Place) -> Entry:
+def _entry(given: object, place: Place) -> Entry:
     """An entry of a matrix. Raises `TableError`."""
     if isinstance(given, str):
         return given
@@ -299,7 +307,7 @@ def _entry(given: Any, place: Place) -> Entry:
         raise TableError(f"got {shown(given)}; {must}; write, for example, 1.0", *place) from None
 
 
-def _listed(given: Any) -> Any:
+def _listed(given: object) -> object:
     """Arrays of NumPy as lists."""
     if isinstance(given, Mapping):
         return {key: _listed(each) for key, each in given.items()}

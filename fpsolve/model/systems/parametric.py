@@ -46,17 +46,16 @@ class ParametricOscillator(System):
 
     kind: ClassVar[str] = "parametric"
     noise_unit: ClassVar[str] = "1/time²"
-    impact_parameter: ClassVar[str] = "restitution"
-    epsilon: ClassVar[float] = 1.0  # type: ignore[misc]
+    epsilon: ClassVar[float] = 1.0
 
     @property
-    def terms(self) -> Sequence[CoefficientMatrix]:  # type: ignore[override]
+    def terms(self) -> Sequence[CoefficientMatrix]:
         """The oscillator without noise, of order 0, and ξ times the displacement, of order 1."""
         free = ((0.0, 1.0), (-self.stiffness, -2 * self.damping))
         return CoefficientMatrix(0, free), CoefficientMatrix(1, ((0.0, 0.0), (-1.0, 0.0)), identity)
 
     @property
-    def jumps(self) -> Sequence[Jump]:  # type: ignore[override]
+    def jumps(self) -> Sequence[Jump]:
         """The wall, which the phase passes at speed 1."""
         return (Jump(math.pi / 2, math.log(self.restitution)),)
 

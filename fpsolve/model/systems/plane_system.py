@@ -5,20 +5,29 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import ClassVar, Self
+from typing import ClassVar, Self, cast
 
 import numpy as np
 
 from fpsolve.arrays import real_number, shown
 from fpsolve.model.faults import TableError
 from fpsolve.model.parameters import unknown_parameter
-from fpsolve.model.plane import MOST_VARIABLES, CoefficientMatrix, Jump, Stop, System, as_plane, by_epsilon, is_driven
+from fpsolve.model.plane import (
+    MOST_VARIABLES,
+    CoefficientMatrix,
+    Jump,
+    LinearMotion,
+    Stop,
+    as_plane,
+    by_epsilon,
+    is_driven,
+)
 from fpsolve.model.quantity import Quantity
 from fpsolve.model.systems.equations import EquationSystem, walls_of
 
 
 @dataclass(frozen=True)
-class PlaneSystem(System):
+class PlaneSystem(LinearMotion):
     """A linear system in the plane from its parts, see `System`.
 
     >>> from fpsolve.model import CoefficientMatrix
@@ -34,15 +43,10 @@ class PlaneSystem(System):
         ValueError: there is no term, or ε is not a positive number.
     """
 
-    terms: Sequence[CoefficientMatrix]
-    jumps: Sequence[Jump] = ()
-    epsilon: float = 1.0
-
     dimensions: ClassVar[Sequence[int]] = (2,)
 
     def __post_init__(self) -> None:
-        for name, kind in (("terms", CoefficientMatrix), ("jumps", Jump)):
-            given = getattr(self, name)
+        for name, given, kind in (("terms", self.terms, CoefficientMatrix), ("jumps", self.jumps, Jump)):
             stated = tuple(given) if isinstance(given, Iterable) else (None,)
             if not all(isinstance(each, kind) for each in stated):
                 raise TypeError(f"got {name} = {shown(given)}; must be a list, each a {kind.__name__}")
@@ -99,15 +103,11 @@ class PlaneSystem(System):
         Raises:
             ValueError: with the place and the term that is not what it must be.
         """
-        known = {
-            "parameters": {} if parameters is None else parameters,
-            "noises": {"xi": "noise"} if noises is None else noises,
-        }
-        for key, given in known.items():
+        parameters, noises = {} if parameters is None else parameters, {"xi": "noise"} if noises is None else noises
+        for key, given in (("parameters", parameters), ("noises", noises)):
             if not isinstance(given, Mapping):
                 raise TableError(f"got {shown(given)}; must be a mapping from names", key)
-        named, noise = (tuple(each.items()) for each in known.values())
-        return EquationSystem(variables, drift, named, noise, walls_of(walls))  # type: ignore[arg-type]
+        return EquationSystem(variables, drift, tuple(parameters.items()), tuple(noises.items()), walls_of(walls))
 
     @property
     def noise_sections(self) -> Sequence[str]:
@@ -126,7 +126,7 @@ class PlaneSystem(System):
         for name in values:
             if name != "epsilon":
                 raise ValueError(f"got {name}; the parameter is epsilon")
-        return replace(self, **values)  # type: ignore[arg-type]
+        return replace(self, epsilon=cast("float", values.get("epsilon", self.epsilon)))
 
     def derivative(self, name: str) -> tuple[tuple[CoefficientMatrix, ...], tuple[float, ...]]:
         return by_epsilon(self), ()

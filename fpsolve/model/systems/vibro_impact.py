@@ -80,7 +80,6 @@ class VibroImpactOscillator(System):
     kind: ClassVar[str] = "vibro-impact"
     section: ClassVar[str] = "oscillator"
     noise_unit: ClassVar[str] = "1/time"
-    impact_parameter: ClassVar[str] = "restitution"
     inert: ClassVar[Sequence[str]] = ("c2", "c3")
 
     @model_validator(mode="after")
@@ -106,7 +105,7 @@ class VibroImpactOscillator(System):
         return math.exp(p * self.log_impact_factor)
 
     @cached_property
-    def terms(self) -> tuple[CoefficientMatrix, ...]:  # type: ignore[override]
+    def terms(self) -> tuple[CoefficientMatrix, ...]:
         """Free oscillation, noise and damping in (x, ẋ/ω): dφ = ω dt; ε ξ (h₁, q₁); ε² c₁ (h₁, q₁), Eqs. (17)-(18)."""
         rotation = ((0.0, self.omega), (-self.omega, 0.0))
         return (
@@ -116,7 +115,7 @@ class VibroImpactOscillator(System):
         )
 
     @cached_property
-    def jumps(self) -> tuple[Jump, ...]:  # type: ignore[override]
+    def jumps(self) -> tuple[Jump, ...]:
         """The impacts, where cos φ = 0; to the order ε² both laws lose 1 − r."""
         return (Jump(math.pi / 2, self.log_impact_factor, -self._loss),)
 
@@ -127,7 +126,7 @@ class VibroImpactOscillator(System):
         return () if left > 0 else (Message(Code.IMPOSSIBLE_BOUNCE, left=left, factor=self.impact_factor()),)
 
     @cached_property
-    def cubic(self) -> CubicTerms | None:  # type: ignore[override]
+    def cubic(self) -> CubicTerms | None:
         """The damping −ε²(c₂x² + c₃ẋ²) of ẋ, in (x, ẋ/ω); None for c₂ = c₃ = 0."""
         square = self.epsilon**2
         damping = (0.0, -square * self.c2, 0.0, -square * self.c3 * self.omega**2)
@@ -138,7 +137,7 @@ class VibroImpactOscillator(System):
         return OSCILLATOR_RESPONSE
 
     @property
-    def second_unit(self) -> float:  # type: ignore[override]
+    def second_unit(self) -> float:
         """ω: the terms are those of (x, ẋ/ω)."""
         return self.omega
 
@@ -159,15 +158,12 @@ class VibroImpactOscillator(System):
     def impact_symbol(self) -> str:
         return "r"
 
-    def impact_value(self, log_factor: float) -> float:
-        """The r for which this law, with this ε, has a given ln R; it may be no coefficient of restitution."""
+    def impact_value(self, log_factor: float) -> tuple[float, float]:
+        """The r for which this law, with this ε, has a given ln R, and dr/d ln R; r may be out of its range."""
+        is_delta, square = self.impact == ImpactLaw.DELTA, self.epsilon**2
         with np.errstate(over="ignore"):
-            loss = -log_factor if self.impact == ImpactLaw.DELTA else -float(np.expm1(log_factor))
-        return 1 - loss / self.epsilon**2
-
-    def impact_slope(self, log_factor: float) -> float:
-        """dr/d ln R of this law at a given ln R."""
-        return (1.0 if self.impact == ImpactLaw.DELTA else math.exp(log_factor)) / self.epsilon**2
+            loss, slope = (-log_factor, 1.0) if is_delta else (-float(np.expm1(log_factor)), float(np.exp(log_factor)))
+        return 1 - loss / square, slope / square
 
     def h2(self, phi: ArrayLike) -> FloatArray:
         """h₂(φ) = c₁ h₁(φ); the impact adds nothing, as sin 2φ vanishes where it acts."""

@@ -10,13 +10,14 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
+from scipy.integrate import LSODA
+from scipy.optimize import brentq
 
 from fpsolve.arrays import ROUNDED, FloatArray
 from fpsolve.messages import Code, Message
-from fpsolve.model.frame import Frame
+from fpsolve.model.coordinates import Frame
 from fpsolve.model.plane import CoefficientMatrix, System, matrix_at
 from fpsolve.model.problem import Problem
 
@@ -60,7 +61,7 @@ def mean_terms(problem: Problem) -> tuple[FloatArray, FloatArray]:
     """The linear terms with the noise at its mean and the cubic terms, shapes (2, 2) and (2, 4), where ‖y‖ is a."""
     system, frame = problem.system, amplitude_frame(problem.system)
     assert system.cubic is not None
-    linear = frame.term(CoefficientMatrix(0, matrix_at(system, problem.coloured.mean).tolist()))
+    linear = frame.term(CoefficientMatrix(0, matrix_at(system, problem.valued.mean).tolist()))
     return np.array(linear.matrix), np.array(frame.cubic(system.cubic).matrix)
 
 
@@ -93,8 +94,6 @@ def _field(linear: FloatArray, cubic: FloatArray) -> Field:
 
 def _falls(field: Field, begin: float, most: float, phi: float) -> bool:
     """Whether the path from ln a = `begin` and a φ falls, in a half-turn to below `most`."""
-    from scipy.integrate import LSODA  # which takes long to import, and few need
-
     solver = LSODA(field, 0.0, np.array([begin, phi]), math.inf, rtol=1e-7, atol=1e-9)
     for _ in range(MOST_STEPS):
         solver.step()
@@ -107,9 +106,7 @@ def _falls(field: Field, begin: float, most: float, phi: float) -> bool:
     return False
 
 
-def _height_at(solver: Any, phi: float) -> float:
+def _height_at(solver: LSODA, phi: float) -> float:
     """ln a where the path passed a φ in its last step."""
-    from scipy.optimize import brentq
-
     path = solver.dense_output()
     return float(path(brentq(lambda t: path(t)[1] - phi, solver.t_old, solver.t))[0])

@@ -21,6 +21,7 @@ from scipy.linalg import solve_triangular
 
 from fpsolve.arrays import FloatArray
 from fpsolve.model.plane import (
+    STEADY,
     CoefficientMatrix,
     CubicTerms,
     Impulse,
@@ -28,7 +29,7 @@ from fpsolve.model.plane import (
     Matrix,
     Motion,
     System,
-    affine,
+    by_noise,
     is_driven,
     rotating_coordinates,
 )
@@ -100,7 +101,7 @@ class Frame:
         is_turn = np.all(abs(a - turned) <= ROUNDED * (abs(self._inverse) @ abs(free) @ abs(self._array)))
         steady = CoefficientMatrix(0, (turned if is_turn and len(a) == 2 else a).tolist())
         jumps = [replace(jump, phase=float(self.phase(np.array(jump.phase)))) for jump in system.jumps]
-        return LinearMotion(system.epsilon, (steady, *others), tuple(jumps))
+        return LinearMotion((steady, *others), tuple(jumps), system.epsilon)
 
     @property
     def parts(self) -> int:
@@ -143,15 +144,11 @@ def own_frame(n: int, motion: Motion, spread: Callable[[str], tuple[float, float
         spread: by the name of a noise the standard deviation of ξ and about how long it remembers its value.
     """
     (drift, diffusions, impulses), epsilon = motion, motion.drift.epsilon
-    sums = dict[str | None, FloatArray]()
-    for term in drift.terms:
-        for name, c in zip((None, term.noise), affine(term.g) or (0.0, 1.0), strict=True):
-            if c:
-                sums[name] = sums.get(name, 0.0) + c * epsilon**term.order * np.array(term.matrix)
-    parts = [(sums.pop(None, np.zeros((n, n))), 1.0, 0.0, 0.0, 0.0)]
+    sums = by_noise(drift, drift.terms)
+    parts = [(sums.pop(STEADY), 1.0, 0.0, 0.0, 0.0)]
     parts += [(epsilon**each.order * np.array(each.matrix), 0.0, 1.0, 0.0, 0.0) for each in diffusions]
     parts += [(np.array(each.exponent), each.rate, 0.0, 0.0, 0.0) for each in impulses]
-    parts += [(each, 0.0, 0.0, *spread(name or "")) for name, each in sums.items() if np.any(each)]
+    parts += [(each, 0.0, 0.0, *spread(key[0])) for key, each in sums.items() if np.any(each)]
     matrices = np.array([each for each, *_ in parts])
     linear, square, deviations, times = np.array([numbers for _, *numbers in parts]).T
 

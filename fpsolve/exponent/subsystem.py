@@ -7,9 +7,9 @@ Where all matrices of a system are block triangular in coordinates x = Σ V_k y_
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from fpsolve.arrays import ROUNDED, FloatArray
 from fpsolve.model.expressions import TIME
-from fpsolve.model.plane import BELOW, CoefficientMatrix, Jump, System, affine, as_plane, turning
+from fpsolve.model.plane import BELOW, CoefficientMatrix, Jump, System, as_plane, by_noise
+from fpsolve.model.problem import Problem
 from fpsolve.model.quantity import Quantity
 
 WORST_CONDITION = 100.0
@@ -47,11 +48,11 @@ class Subsystem(System):
     jumps: tuple[Jump, ...] = ()
 
     @property
-    def epsilon(self) -> float:  # type: ignore[override]
+    def epsilon(self) -> float:
         return self.whole.epsilon
 
     @cached_property
-    def terms(self) -> Sequence[CoefficientMatrix]:  # type: ignore[override]
+    def terms(self) -> Sequence[CoefficientMatrix]:
         return as_plane(self.part(self.whole.terms), self.size or 1.0)
 
     @property
@@ -119,50 +120,17 @@ class Subsystem(System):
         return as_plane(self.part(terms)), jumps if self.jumps else ()
 
 
-def by_noise(system: System, terms: Sequence[CoefficientMatrix]) -> list[FloatArray]:
-    """The sum of what no noise drives, and of what each noise drives; with a g that is no a + bξ all matrices."""
-    lines = [affine(term.g) for term in terms]
-    if None in lines:
-        return [np.array(term.matrix) for term in terms]
-    parts = dict[str | None, Any]()
-    for line, term in zip(lines, terms, strict=True):
-        for name, c in zip((None, term.noise), line or (), strict=True):
-            parts[name] = parts.get(name, 0.0) + c * system.epsilon**term.order * np.array(term.matrix)
-    return [*parts.values()]
-
-
-def resting_phases(matrices: Sequence[FloatArray]) -> tuple[float, ...]:
-    """φ of the rays of a plane that all matrices keep, none or two, or one; 0 where they keep all rays."""
-    if len(matrices[0]) > 2:
-        return ()
-    pairs = [(turning(each), ROUNDED * float(np.linalg.norm(each))) for each in matrices]
-    turns = [(speed, limit) for speed, limit in pairs if abs(speed.mean) + speed.amplitude > limit]
-    if not turns:
-        return (0.0,)
-    first, _ = turns[0]
-    if abs(first.mean) > first.amplitude * (1 + 1e-12):
-        return ()
-    middle = math.atan2(first.sine, first.cosine)
-    away = math.acos(min(max(-first.mean / first.amplitude, -1.0), 1.0))
-    found = {0.5 * (middle + away) % math.pi, 0.5 * (middle - away) % math.pi}
-    return tuple(phi for phi in sorted(found) if all(abs(float(speed(phi))) <= limit for speed, limit in turns))
-
-
-def blocks_of(system: System, frame: FloatArray, resting: Sequence[float], size: float) -> tuple[Subsystem, ...]:
+@lru_cache(maxsize=64)
+def blocks_of(problem: Problem) -> tuple[Subsystem, ...]:
     """The blocks that can be solved by themselves, as all matrices are block triangular; empty where they are not.
 
     Groups of the variables, of which each drives later ones alone: the strongly connected components of the union of
     the patterns of all matrices. Where there is one group, those of coordinates y that show more, if there are any. Of
     two variables ‖x‖ on the first of the rays that the phase never leaves, and on the second one, or else the distance
     from the first.
-
-    Args:
-        system: the system.
-        frame: S of x = Sy.
-        resting: the phases of y on these rays.
-        size: about how fast y moves.
     """
-    matrices, n, stop = by_noise(system, system.terms), system.dimension, system.stop
+    system, frame, resting = problem.system, np.array(problem.frame.matrix), problem.resting_phases
+    matrices, n, stop = [*by_noise(system, system.terms).values()], system.dimension, system.stop
     jumps, rounded, names, groups = tuple[Jump, ...](), 0.0, system.states, list[tuple[int, ...]]()
     if n == 2:
         if not resting:
@@ -184,7 +152,15 @@ def blocks_of(system: System, frame: FloatArray, resting: Sequence[float], size:
             basis, names = frame @ own, [f"y{str(k + 1).translate(BELOW)}" for k in range(n)]
     sides = tuple(map(tuple, basis.tolist()))
     return tuple(
-        Subsystem(system, sides, own, tuple(names[k] for k in own), rounded, size, jumps if own == (0, 1) else ())
+        Subsystem(
+            system,
+            sides,
+            own,
+            tuple(names[k] for k in own),
+            rounded,
+            problem.rate_bound,
+            jumps if own == (0, 1) else (),
+        )
         for own in (groups if n == 2 or len(groups) > 1 else ())
     )
 
@@ -201,14 +177,14 @@ def couples(blocks: Sequence[Subsystem], name: str) -> bool:
     is, as −V_k in place of V_k gives the opposite derivative of the couplings: Λ(p) is even in them.
     """
     whole = blocks[0].whole
-    changes = by_noise(whole, whole.derivative(name)[0])
+    changes = by_noise(whole, whole.derivative(name)[0]).values()
     if len(blocks) == 1:  # all rays are invariant
         return any(map(_turns, changes))
-    drives = reached(couplings(blocks, by_noise(whole, whole.terms)))
+    drives = reached(couplings(blocks, by_noise(whole, whole.terms).values()))
     return bool(np.any(drives.T & couplings(blocks, changes)))
 
 
-def couplings(blocks: Sequence[Subsystem], matrices: Sequence[FloatArray]) -> NDArray[np.bool_]:
+def couplings(blocks: Sequence[Subsystem], matrices: Iterable[FloatArray]) -> NDArray[np.bool_]:
     """Whether a block, the row, is driven by another one, the column, in some of the matrices, beyond rounding."""
     found = np.zeros((len(blocks), len(blocks)), dtype=bool)
     for matrix in (blocks[0].inside(each) for each in matrices):
