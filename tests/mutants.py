@@ -309,15 +309,15 @@ DEFECTS: tuple[Defect, ...] = (
     Defect(
         "R7 a curve of few degrees is not taken",
         "exponent/solver.py",
-        "curve = polynomial(self._node, start, end, self._allowed) or otherwise(",
-        "curve = polynomial(self._node, start, end, self._allowed) and otherwise(",
+        "if not parts:",
+        "if parts:",
         "curve",
     ),
     Defect(
         "R8 derivatives of a curve by p lack the sign of a term",
         "exponent/curve.py",
-        "return p * ratio.deriv(k)(p) + (k * ratio",
-        "return p * ratio.deriv(k)(p) - (k * ratio",
+        "p * slope + value, p * second",
+        "p * slope - value, p * second",
         "curve",
     ),
     Defect(

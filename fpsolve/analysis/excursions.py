@@ -36,6 +36,7 @@ from fpsolve.budget import unless_over_budget
 from fpsolve.data import Quantity, Result, dataset
 from fpsolve.drawing import add_legend, coloured, label_axes
 from fpsolve.errors import NotConverged
+from fpsolve.exponent.density import mean_functions, own_phases, phase_functions
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.method import Budget, refuse
@@ -285,24 +286,20 @@ def _inverse(of: Estimate, factor: float = 1.0) -> Estimate | None:
 def _growth(pair: PrincipalPair, psi: FloatArray, xi: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray]:
     """q over φ and values of the noises, and ρ^p as a factor of such tables."""
     problem, columns = pair.generator.problem, (-1, *[1] * len(xi))
-    phi = problem.frame.own_phase(psi)
-    stretch = problem.frame.length(phi) ** pair.p
+    phi, stretch = own_phases(pair, psi)
     rate: Harmonics = growth_rate(problem.drift, problem.at_values(xi))
     return rate(phi.reshape(columns)), stretch.reshape(columns)
 
 
 def _at_start(pair: PrincipalPair, phi: Start, xi: StartOfNoise) -> float:
     """T₀, the mean of T over the start, in the coordinates of the system."""
-    space, frame = pair.space, pair.generator.problem.frame
+    space = pair.space
     if phi == UNIFORM:
-        psi, weights = space.phi.finer_rule(frame.parts)
-        own = frame.own_phase(psi)
-        weights = weights * frame.length(own) ** pair.p / (space.phi.span * frame.density(own))
-        at_phi = weights @ space.phi.at(psi)
+        at_phi = mean_functions(pair)
     else:
         own = np.array([float(phi)])
-        psi, after = (space.phi.folded(frame.phase(own) + more) for more in (0.0, 1e-9))
-        at_phi = frame.length(own)[0] ** pair.p * dense(space.phi.at(psi, after))[0]
+        functions, length, _ = phase_functions(pair, own, own + 1e-9)
+        at_phi = length[0] ** pair.p * dense(functions)[0]
     means = space.product([at_phi, *(_mean_functions(axis, xi) for axis in space.noises)])
     return float(means @ pair.right)
 

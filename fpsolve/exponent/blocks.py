@@ -105,21 +105,29 @@ class Blocks(Method):
         """Why Λ(p) for p < 0 is not computed."""
         return Message(Code.NEGATIVE_OF_SEVERAL, parts=self.names)
 
-    def _refuse_negative(self, p: float) -> None:
+    def _parts_at(self, p: float) -> tuple[Method, ...]:
+        """The parts of which Λ(p) is the largest. Raises `NotConverged` for p < 0."""
         if p < self.interval[0] - TINIEST_P:
             raise NotConverged(self.refused)
+        return self.parts
+
+    def leading(self, p: float, tolerance: Tolerance | None = None) -> tuple[Method, bool]:
+        """The part whose Λ(p)/p is the largest, at p = 0 whose λ is, and whether it is so beyond the errors.
+
+        Raises:
+            NotConverged: that of a part is not resolved, or p < 0.
+        """
+        rates = [part.ratio_alone(p, tolerance) for part in self._parts_at(p)]
+        first, *others = sorted(range(len(rates)), key=lambda k: -rates[k][0])
+        value, error = rates[first]
+        return self.parts[first], all(value - rates[k][0] > error + rates[k][1] for k in others)
 
     def solution(self, p: float, tolerance: Tolerance | None = None) -> Any:
-        self._refuse_negative(p)
-        found, is_zero = [part.solution(p, tolerance) for part in self.parts], abs(p) < TINIEST_P
-        return max(found, key=lambda each: each.derivative if is_zero else each.value / p)
+        return self.leading(p, tolerance)[0].solution(p, tolerance)
 
-    def row(self, p: float) -> tuple[Moment, PrincipalPair | None]:
-        self._refuse_negative(p)
-        rows = [part.row(p) for part in self.parts]
-        if abs(p) < TINIEST_P:
-            return max(rows, key=lambda row: row[0].derivative)
-        return max(rows, key=lambda row: row[0].value / p)
+    def row(self, p: float) -> Moment:
+        rows = [part.row(p) for part in self._parts_at(p)]
+        return max(rows, key=lambda row: row.derivative if abs(p) < TINIEST_P else row.value / p)
 
     def pair(self, p: float) -> PrincipalPair:
         if self._rays:
@@ -127,37 +135,21 @@ class Blocks(Method):
         raise NotConverged(Message(Code.NO_EIGENFUNCTION_OF_BLOCKS, p=p, blocks=self.names))
 
     def ratio_alone(self, p: float, tolerance: Tolerance | None = None) -> tuple[float, float]:
-        self._refuse_negative(p)
-        return max(part.ratio_alone(p, tolerance) for part in self.parts)
+        return self.leading(p, tolerance)[0].ratio_alone(p, tolerance)
 
     def ratio(self, p: float, tolerance: Tolerance | None = None) -> tuple[float, float, float]:
-        self._refuse_negative(p)
-        return max(part.ratio(p, tolerance) for part in self.parts)
+        return self.leading(p, tolerance)[0].ratio(p, tolerance)
 
     def slope_error(self, p: float) -> float:
         return float(np.max([part.slope_error(p) for part in self.parts]))
-
-    def leading(self, p: float) -> Method:
-        """The part whose Λ(p), or for p = 0 whose λ, that of the problem is.
-
-        Raises:
-            NoSuchExponent: it is that of two parts, so that Λ(p) has no derivatives by parameters.
-            NotConverged: it is not resolved.
-        """
-        if len(self.parts) == 1:
-            return self.parts[0]
-        self._refuse_negative(p)
-        rates = [part.ratio_alone(p) for part in self.parts]
-        best, second = sorted(range(len(rates)), key=lambda k: -rates[k][0])[:2]
-        if rates[best][0] - rates[second][0] <= rates[best][1] + rates[second][1]:
-            raise NoSuchExponent(Message(Code.KINK, p=p or None))
-        return self.parts[best]
 
     def held(self, p: float, along: Along) -> tuple[Method, Along]:
         for key, by in along.items():
             if self.closes(key):
                 raise NotConverged(Message(Code.CLOSES_BLOCKS, key=key, value=by.theta))
-        part = self.leading(p)
+        part, is_alone = self.leading(p)
+        if not is_alone:
+            raise NoSuchExponent(Message(Code.KINK, p=p or None))
         own = part.problem
         known = {
             key: own.derivative(key) if key in own.differentiable else ParameterDerivative(by.theta)
@@ -170,33 +162,31 @@ class Blocks(Method):
         return section == self.problem.system.section and couples(self.problem.blocks, name)
 
     def gradient(self, p: float, keys: Sequence[str]) -> FloatArray:
-        part, along = self.held(p, {key: self.problem.derivative(key) for key in keys})
-        return part.gradient_along(p, [along[key] for key in keys])
+        """That of the part, which other parameters do not change."""
+        part, _ = self.held(p, {key: self.problem.derivative(key) for key in keys})
+        own = [key for key in keys if key in part.problem.differentiable]
+        slopes = dict(zip(own, part.gradient(p, own).tolist(), strict=True))
+        return np.array([slopes.get(key, 0.0) for key in keys])
 
     def variance_rate(self) -> Estimate:
-        rates = sorted((part.lyapunov_exponent() for part in self.parts), key=lambda each: -each.value)
-        if len(rates) > 1 and rates[0].value - rates[1].value <= rates[0].error_estimate + rates[1].error_estimate:
-            raise NoSuchExponent(Message(Code.NO_COMMON_RATE, value=rates[0].value))
-        return self._fastest.variance_rate()
+        part, is_alone = self.leading(0.0)
+        if not is_alone:
+            raise NoSuchExponent(Message(Code.NO_COMMON_RATE, value=part.ratio_alone(0.0)[0]))
+        return part.variance_rate()
 
-    @property
-    def _fastest(self) -> Method:
-        """The part of the largest λ."""
-        return max(self.parts, key=lambda part: part.lyapunov_exponent().value)
-
-    @property
+    @cached_property
     def around_zero(self) -> PairDerivatives:
-        return self._fastest.around_zero
+        return self.leading(0.0)[0].around_zero
 
-    @property
+    @cached_property
     def finer_around_zero(self) -> PairDerivatives:
-        return self._fastest.finer_around_zero
+        return self.leading(0.0)[0].finer_around_zero
 
     def by_part(self, p: FloatArray) -> tuple[InvariantClass, ...]:
         """λ and Λ(p) of each, for p < 0 too. Raises `NotConverged`."""
         found = list[InvariantClass]()
         for name, block, part in zip(self.names, self.problem.blocks, self.parts, strict=True):
-            rows = np.array([part.row(point)[0] for point in p.tolist()]).reshape(-1, len(Moment._fields))
+            rows = np.array([part.row(point) for point in p.tolist()]).reshape(-1, len(Moment._fields))
             phase = None if not self._rays else self._rays[min(len(found), len(self._rays) - 1)]
             variables = () if self._rays else block.names
             told = ", ".join(variables) or name

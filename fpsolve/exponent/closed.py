@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
 
 from fpsolve.arrays import FloatArray
 from fpsolve.budget import unless_over_budget
-from fpsolve.errors import NoHierarchy, NotConverged
-from fpsolve.exponent.eigen import PrincipalPair
-from fpsolve.exponent.error import Estimate, checked
-from fpsolve.exponent.method import RTOL_BEYOND_PLANE, Method, Tolerance, refuse
+from fpsolve.exponent.method import RTOL_BEYOND_PLANE, Method, Tolerance
 from fpsolve.exponent.moments import EvenMoment, constant_scale, even_moment
-from fpsolve.fem.factors import one_thread
 from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.problem import infinite
 from fpsolve.model.quantity import moment_at
@@ -66,33 +61,18 @@ class EvenMoments(Method):
 
     def solution(self, p: float, tolerance: Tolerance | None = None) -> EvenMoment:
         if p not in self._solved:
-            try:
-                with one_thread(), self.settings.meter.running():
-                    settings = self.settings
-                    found = even_moment(self.problem, p, rtol=OF_CLOSED * settings.rtol, budget=settings.budget)
-            except (NoHierarchy, ArithmeticError) as failure:
-                raise NotConverged(Message(Code.NOT_CONVERGED, p=p, reason=str(failure))) from failure
-            checked(Estimate(found.value, found.error, self.scale(p)), self.refinement, p)
+            with self.solving(p):
+                settings = self.settings
+                found = even_moment(self.problem, p, rtol=OF_CLOSED * settings.rtol, budget=settings.budget)
+            self.check(p, found.value, found.error)
             self._solved[p] = found
         return self._solved[p]
-
-    def pair(self, p: float) -> PrincipalPair:
-        refuse(self.reason(0.0, "an eigenfunction"))
-        return super().pair(p)
-
-    def ratio(self, p: float, tolerance: Tolerance | None = None) -> tuple[float, float, float]:
-        refuse(self.reason(0.0, "λ, or another number that follows from eigenfunctions,"))
-        return super().ratio(p, tolerance)
-
-    def gradient(self, p: float, keys: Sequence[str]) -> FloatArray:
-        return self.solution(p).gradient(keys) / p
 
     def bounds(self, p: FloatArray, value: FloatArray, error: FloatArray) -> tuple[Message, ...]:
         """What even moments say of λ, of Λ between them, and of δ_p; or nothing."""
         if not p.size:
             return ()
-        at, order = int(np.argmin(p)), np.argsort(p)
-        low = float(p[order][value[order] < -error[order]].max(initial=0.0))
+        at, low = int(np.argmin(p)), float(p[value < -error].max(initial=0.0))
         high = float(p[value > error].min(initial=np.inf))
         root = f"> {low:g}" * (low > 0) + " and " * (low > 0 and high < np.inf) + f"< {high:g}" * (high < np.inf)
         bound = float(value[at] + error[at]) / float(p[at])

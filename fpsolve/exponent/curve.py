@@ -4,13 +4,13 @@ In weak noise that is a polynomial to rounding at nine points of Chebyshev, with
 tolerance does not fall there. Every second point is one of the polynomial before. Where coefficients fall slowly, as
 n⁻² at a corner, which a convex Λ does not hide between two points, n times the last ones are left; where they fall
 fast, the square of what the polynomial before is off at the other points, over the values. In strong noise Λ has
-branch points beside the real axis, and there is none.
+branch points beside the real axis, and there is none: the interval is halved.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import partial
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -21,28 +21,40 @@ from fpsolve.arrays import FloatArray
 
 NEXT_TO_ZERO = 1e-3
 """Share of the interval; a point nearer to 0 is put there."""
+COUNTS = 5, 9, 17, 33
+"""Numbers of points of a polynomial, each tried where the one before is not enough."""
+Solve = Callable[[float], tuple[float, float]]
+"""Λ(p)/p at one p, at p = 0 λ, and the estimate of its error."""
 
 
-class Node(NamedTuple):
-    """What is solved at one p: Λ(p)/p, which is λ at p = 0, the estimate of its error, and Λ′(p)."""
-
-    ratio: float
-    error: float
-    slope: float
-
-
-class Curve(NamedTuple):
-    """Λ on an interval.
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """Λ on an interval by a polynomial of Λ(p)/p.
 
     Attributes:
-        nodes: the p that were solved, increasing.
-        derivative: the k-th derivative of Λ, by p and k.
-        errors: estimates of |error| of Λ and of Λ′, by p.
+        nodes: the p that were solved, increasing, with both ends.
+        ratio: the polynomial.
+        errors: of Λ(p)/p at these.
+        left: what it is off between them.
     """
 
     nodes: FloatArray
-    derivative: Callable[[FloatArray, int], FloatArray]
-    errors: Callable[[FloatArray], tuple[FloatArray, FloatArray]]
+    ratio: Chebyshev
+    errors: FloatArray
+    left: float
+
+    def ratio_error(self, p: FloatArray) -> FloatArray:
+        """What is left, and the errors at all nodes as much as they may grow between these."""
+        to_unit, degree = 2 / np.ptp(self.nodes), self.nodes.size - 1
+        own, table = (chebvander(to_unit * (x - self.nodes[0]) - 1, degree) for x in (self.nodes, p))
+        return self.left + np.abs(table @ np.linalg.inv(own)) @ self.errors
+
+    def values(self, p: FloatArray) -> Values:
+        """Λ and its derivatives; the error of Λ′ is that of Markov's bound on the slope of a polynomial."""
+        value, slope, second = (self.ratio.deriv(k)(p) for k in range(3))
+        steepness = 2 * (self.nodes.size - 1) ** 2 / np.ptp(self.nodes)
+        of_slope = np.max(self.ratio_error(self.nodes)) * (1 + steepness * np.abs(p))
+        return Values(p * value, p * slope + value, p * second + 2 * slope, self.ratio_error(p) * np.abs(p), of_slope)
 
 
 class Values(NamedTuple):
@@ -60,57 +72,47 @@ def values(curves: Sequence[Curve], p: FloatArray) -> Values:
     found, place = np.zeros((5, p.size)), np.searchsorted([curve.nodes[0] for curve in curves[1:]], p, side="right")
     for number, curve in enumerate(curves):
         own = p[place == number]
-        found[:, place == number] = *(curve.derivative(own, k) for k in range(3)), *curve.errors(own)
+        found[:, place == number] = curve.values(own)
     found[np.ix_([0, 3], p == 0)] = 0.0
     return Values(*found)
 
 
-def polynomial(
-    solve: Callable[[float], Node], low: float, high: float, allowed: Callable[[float], float]
-) -> Curve | None:
+def polynomials(solve: Solve, low: float, high: float, allowed: Callable[[float], float], most: int) -> list[Curve]:
+    """Λ by one polynomial, or by some on halves of the interval and of these; none where more are needed than most."""
+    rest, found = [(low, high)], list[Curve]()
+    while rest and len(found) + len(rest) <= most:
+        start, end = rest.pop()
+        if curve := polynomial(solve, start, end, allowed):
+            found.append(curve)
+        else:
+            middle = 0.5 * (start + end)
+            rest += (middle, end), (start, middle)
+    return [] if rest else found
+
+
+def polynomial(solve: Solve, low: float, high: float, allowed: Callable[[float], float]) -> Curve | None:
     """Λ by a polynomial, if at all points the error of Λ(p)/p is allowed, or twice that of the point at most."""
-    known, half, last = dict[float, Node](), 0.5 * (high - low), None
-    for count in (5, 9, 17):
+    half, last = 0.5 * (high - low), None
+    for count in COUNTS:
         points = low + half - half * np.cos(np.pi * np.arange(count) / (count - 1))
         points[-1] = high
         points[np.abs(points) < 2 * half * NEXT_TO_ZERO] = 0.0
         places = points.tolist()
-        known |= {p: solve(p) for p in sorted(places, key=abs, reverse=True) if p not in known}
-        ratios, errors, _ = np.array([known[p] for p in places]).T
+        known = {p: solve(p) for p in sorted(places, key=abs, reverse=True)}
+        ratios, errors = np.array([known[p] for p in places]).T
         ratio = Chebyshev.fit(points, ratios, count - 1, domain=(low, high))
         most = np.maximum([allowed(p) for p in places], 2 * errors)
         size = np.max(np.abs([ratios, most]))
-        beyond = ratio.coef[-1] ** 4 / size**3
+        left = abs(ratio.coef[-1])
         if last is not None:
             off = np.max(np.abs(last(points) - ratios))
             left = count * np.sum(np.abs(ratio.coef[-3:])) + off**2 / size
-            error = partial(_error, points, errors, left)
-            if np.all(error(points) <= most):
-                return _of_ratio(points, ratio, error)
-            beyond = left**2 / size
-        if beyond > np.min(most):  # what 17 points leave, about
+            curve = Curve(points, ratio, errors, left)
+            if np.all(curve.ratio_error(points) <= most):
+                return curve
+        if size * (left / size) ** ((COUNTS[-1] - 1) // (count - 1)) > np.min(
+            most
+        ):  # what the most points leave, about
             return None
         last = ratio
     return None
-
-
-def _error(points: FloatArray, errors: FloatArray, left: float, p: FloatArray) -> FloatArray:
-    """What is left, and the errors of all points as much as they may grow between these."""
-    own, table = (chebvander(2 * (x - points[0]) / np.ptp(points) - 1, points.size - 1) for x in (points, p))
-    return left + np.abs(table @ np.linalg.inv(own)) @ errors
-
-
-def _of_ratio(points: FloatArray, ratio: Chebyshev, error: Callable[[FloatArray], FloatArray]) -> Curve:
-    """Λ by Λ(p)/p with its error, and that of Λ′ by Markov's bound on the slope of a polynomial."""
-    steepness = 2 * (points.size - 1) ** 2 / np.ptp(points)
-    return Curve(points, partial(_derivative, ratio), partial(_errors, error, np.max(error(points)), steepness))
-
-
-def _derivative(ratio: Chebyshev, p: FloatArray, k: int) -> FloatArray:
-    return p * ratio.deriv(k)(p) + (k * ratio.deriv(k - 1)(p) if k else 0.0)
-
-
-def _errors(
-    error: Callable[[FloatArray], FloatArray], most: float, steepness: float, p: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    return error(p) * np.abs(p), most * (1 + steepness * np.abs(p))

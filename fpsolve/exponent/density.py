@@ -37,6 +37,7 @@ from fpsolve.drawing import QUARTERS, draw_colours, label_axes
 from fpsolve.errors import MeshError, OutputError, SingularMatrix
 from fpsolve.exponent.eigen import PrincipalPair, principal_pair
 from fpsolve.exponent.kinds import choose
+from fpsolve.exponent.modes import framed
 from fpsolve.exponent.stopped import looked_at
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.noise_axes import Samples
@@ -228,17 +229,35 @@ def plane_fields(pair: PrincipalPair, phi: FloatArray, inside: FloatArray, at: S
 
     T has mean 1 over P_s(ξ)/2π; with a tilt beyond `MOST_TILT`, which leaves T there to rounding, over P_s exp(2s z).
     """
-    axis, xi, frame = pair.space.phi, pair.space.xi, pair.generator.problem.frame
-    psi, weights = axis.finer_rule(frame.parts)
-    own, rule = frame.own_phase(psi), xi.samples()
+    xi, rule = pair.space.xi, pair.space.xi.samples()
     law = xi.law() * rule.factor if abs(xi.tilt) <= MOST_TILT else xi.rule.measure
-    over_phi = weights / frame.density(own) * frame.length(own) ** pair.p @ axis.at(psi) / axis.span
-    mean = over_phi @ pair.space.table(pair.right) @ (law @ rule.values)
+    mean = mean_functions(pair) @ pair.space.table(pair.right) @ (law @ rule.values)
+    functions, length, surface = phase_functions(pair, phi, inside)
+    right, adjoint, product = evaluated(pair, functions, at, length, surface)
+    return Fields(right / mean, adjoint * mean, product)
+
+
+def phase_functions(pair: PrincipalPair, phi: FloatArray, inside: FloatArray) -> tuple[Matrix, FloatArray, FloatArray]:
+    """The functions of the phase at φ, seen from the cells that hold `inside`; ρ, and dψ/dφ, see `frame`."""
+    axis, frame = pair.space.phi, pair.generator.problem.frame
     psi, cells = frame.phase(phi), frame.phase(inside)
     turned = axis.span * np.floor((cells - axis.lines[0]) / axis.span)
-    functions = axis.at(psi - turned, cells - turned)
-    right, adjoint, product = evaluated(pair, functions, at, frame.length(phi), frame.density(phi))
-    return Fields(right / mean, adjoint * mean, product)
+    return axis.at(psi - turned, cells - turned), frame.length(phi), frame.density(phi)
+
+
+def mean_functions(pair: PrincipalPair) -> FloatArray:
+    """The means of ρ^p times the functions of the phase over φ, shape (size,)."""
+    axis, frame = pair.space.phi, pair.generator.problem.frame
+    psi, weights = axis.finer_rule(frame.parts)
+    phi, stretch = own_phases(pair, psi)
+    return np.asarray(weights / frame.density(phi) * stretch @ axis.at(psi) / axis.span)
+
+
+def own_phases(pair: PrincipalPair, psi: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """φ at ψ, and ρ^p."""
+    frame = pair.generator.problem.frame
+    phi = frame.own_phase(psi)
+    return phi, frame.length(phi) ** pair.p
 
 
 @dataclass(frozen=True, eq=False)
@@ -377,7 +396,7 @@ def direction_map(pair: PrincipalPair) -> FloatArray:
         scales[q + 1] = size
     at, _ = looked_at(problem)
     return (
-        np.linalg.inv(np.array(at.coordinates) @ np.array(problem.frame.matrix) @ pair.space.phi.coordinates) * scales
+        np.linalg.solve(pair.space.phi.coordinates, framed(problem, np.linalg.inv(np.array(at.coordinates)))) * scales
     )
 
 

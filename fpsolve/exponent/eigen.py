@@ -137,8 +137,8 @@ def principal_pair(
     Args:
         generator: the discrete tilted generator.
         p: the moment.
-        start: the pair of a neighbouring p or of another generator, or several pairs, between which the eigenfunctions
-            are interpolated in p where they are of this generator; it saves time.
+        start: the pair of a neighbouring p or of another generator, or several pairs, whose tangents bound Λ(p); it
+            saves time.
 
     Raises:
         NumericalFailure: the numbers of L(p) are too large to be squared.
@@ -152,16 +152,14 @@ def principal_pair(
     if pairs or p == 0 or not _has_other_positive(generator, p):
         x = y = pencil.space.constant  # of weak noise, Eqs. (26) and (28)
         if pairs:
-            x, y = _carried(pairs, pencil, generator)
-        pair = _solved(pencil, generator, x, y)
+            nearest = min(pairs, key=lambda each: abs(each.p - p))
+            x, y = nearest.right, nearest.left
+            if nearest.generator is not generator:  # whose functions move with p
+                x, y = pencil.space.carry(np.array([x, y]), nearest.space)
+        pair = _reached(generator, pencil, x, y)
         if _is_principal(pair, pairs, goes_on=bool(pairs) and _share(pencil.space, pair, x, y) > MOSTLY):
             return pair
     return _rightmost_pair(pencil, generator, pair)
-
-
-def _solved(pencil: Pencil, generator: Generator, x: FloatArray, y: FloatArray) -> PrincipalPair:
-    """The pair that the iteration reaches from vectors T and T*."""
-    return _pair(generator, pencil, rayleigh_iteration(pencil, x, y, generator.problem.unit_rate))
 
 
 def _is_principal(pair: PrincipalPair, pairs: Sequence[PrincipalPair], goes_on: bool) -> bool:
@@ -186,7 +184,7 @@ def _rightmost_pair(pencil: Pencil, generator: Generator, reached: PrincipalPair
     was reached before. Raises `NotConverged`."""
     p, problem = pencil.p, generator.problem
     right, left, value, distance = _from_the_right(pencil, generator)
-    pair = _solved(pencil, generator, right, left)
+    pair = _reached(generator, pencil, right, left)
     defect = min(pair.sign_defects)
     if not (pair.residual <= BACKWARD_ERROR_LIMIT and defect <= POSITIVE and abs(pair.value - value) < distance):
         limits = {"limit": BACKWARD_ERROR_LIMIT, "most": POSITIVE}
@@ -263,9 +261,12 @@ def _share(space: Space, pair: PrincipalPair, x: FloatArray, y: FloatArray) -> f
 
 def _tangents(problem: Problem, p: float, pairs: Sequence[PrincipalPair]) -> float:
     """What Λ(p) is at least, as it is convex, by the pairs of this problem at other p; −∞ where there is none."""
-    own = (pair for pair in pairs if pair.generator.problem is problem and pair.p != p)
-    values = ((pair.value, pair.derivative * (p - pair.p)) for pair in own)
-    return max((start + rise - DOUBT * (abs(start) + abs(rise)) for start, rise in values), default=-math.inf)
+    least = -math.inf
+    for pair in pairs:
+        if pair.generator.problem is problem and pair.p != p:
+            rise = pair.derivative * (p - pair.p)
+            least = max(least, pair.value + rise - DOUBT * (abs(pair.value) + abs(rise)))
+    return least
 
 
 def spectrum(generator: Generator, p: float, k: int = 10) -> Any:
@@ -288,18 +289,6 @@ def spectrum(generator: Generator, p: float, k: int = 10) -> Any:
     half = scipy.linalg.solve_triangular(root, finite(generator.matrix(p).toarray()), lower=True)
     values = scipy.linalg.eigvals(scipy.linalg.solve_triangular(root, half.T, lower=True).T, overwrite_a=True)
     return values[np.lexsort((values.imag, -values.real))][:k]
-
-
-def _carried(pairs: Sequence[PrincipalPair], pencil: Pencil, generator: Generator) -> tuple[FloatArray, FloatArray]:
-    """Both eigenfunctions at p, by Lagrange interpolation between pairs of one generator, or from one of another."""
-    p, space, kept = pencil.p, pencil.space, [pair for pair in pairs if pair.generator is generator]
-    if not kept:
-        nearest = min(pairs, key=lambda pair: abs(pair.p - p))
-        right, left = space.carry(np.array([nearest.right, nearest.left]), nearest.space)
-        return right, left
-    nodes = np.array([pair.p for pair in kept])
-    weights = np.array([math.prod((p - q) / (node - q) for q in nodes if q != node) for node in nodes])
-    return weights @ [pair.right for pair in kept], weights @ [pair.left for pair in kept]
 
 
 def _from_the_right(pencil: Pencil, generator: Generator) -> tuple[FloatArray, FloatArray, float, float]:
@@ -364,7 +353,7 @@ class Iterate(NamedTuple):
 
 
 @np.errstate(divide="ignore", over="ignore", invalid="ignore")  # a start may be useless, as its residual tells then
-def rayleigh_iteration(pencil: Pencil, x: FloatArray, y: FloatArray, rate: float = math.inf) -> Iterate:
+def rayleigh_iteration(pencil: Pencil, x: FloatArray, y: FloatArray, rate: float) -> Iterate:
     """Two-sided Rayleigh quotient iteration (Ostrowski) until the backward error stops falling.
 
     It is small where it is so beside the norm of L, which fast noise makes large, and beside a rate of the system.
@@ -404,8 +393,12 @@ def _improved(factor: Factors, space: Space, shift: float, size: float, old: Ite
     return Iterate(shift + distance, error / size, x, y, mx, my)
 
 
-def _pair(generator: Generator, pencil: Pencil, found: Iterate) -> PrincipalPair:
-    """Normalise both vectors, judge their signs, and take Λ from the formula that rounding harms less."""
+def _reached(generator: Generator, pencil: Pencil, x: FloatArray, y: FloatArray) -> PrincipalPair:
+    """The pair that the iteration reaches from vectors T and T*: both are normalised, and their signs judged.
+
+    Λ is taken from the formula that rounding harms less.
+    """
+    found = rayleigh_iteration(pencil, x, y, generator.problem.unit_rate)
     p, space, operator = pencil.p, pencil.space, pencil.matrix
     images = operator @ found.x, operator.T @ found.y
     value = float(found.y @ images[0] / (found.y @ found.mx))  # without what elimination rounds off

@@ -18,16 +18,16 @@ import numpy as np
 
 from fpsolve.arrays import FloatArray
 from fpsolve.budget import unless_over_budget
-from fpsolve.errors import MeshError, NoHierarchy, NotConverged, SingularMatrix
-from fpsolve.exponent.changed import NEAR_ZERO, Changed
+from fpsolve.errors import NotConverged
 from fpsolve.exponent.eigen import (
     PairDerivatives,
     PrincipalPair,
+    length,
     principal_pair,
     second_derivative,
     slope_rounding,
 )
-from fpsolve.exponent.error import Estimate, Moment, Solution, checked
+from fpsolve.exponent.error import Moment, Solution
 from fpsolve.exponent.method import (
     PHASE_AND_NOISE,
     RTOL,
@@ -37,17 +37,14 @@ from fpsolve.exponent.method import (
     Search,
     Stage,
     Tolerance,
-    refuse,
 )
-from fpsolve.exponent.moments import EvenMoment, even_moment, moment_row
+from fpsolve.exponent.moments import EvenMoment, even_moment
 from fpsolve.exponent.starts import Start, first, has_cones, other_centers
 from fpsolve.fem.axis import FEW_UNKNOWNS
-from fpsolve.fem.factors import one_thread
 from fpsolve.fem.generator import SMALL_P, Generator
 from fpsolve.fem.space import Space
 from fpsolve.messages import Code, Message, Remedy
-from fpsolve.model import quantity
-from fpsolve.model.problem import ParameterDerivative, infinite
+from fpsolve.model.problem import infinite
 from fpsolve.theory.frozen import frozen_noise
 
 WORTH_A_TRY = FEW_UNKNOWNS
@@ -56,8 +53,6 @@ MOST_TILT_AWAY = 0.7
 """How far the tilt of a space may be from the best one at another p."""
 NEGLIGIBLE_P = 1e-30
 """Pairs at smaller |p| are those at p = 0, from which they differ by less than by rounding."""
-NEIGHBOURS = 6
-"""How many known eigenfunctions those of another p are interpolated from."""
 SLOWEST = 0.9
 """The largest ratio of two changes in turn that is reckoned with."""
 WIDER = 4.0
@@ -86,11 +81,10 @@ class Elements(Method):
     Attributes:
         spaces: what was solved, by p.
         has_witness: whether the equations of even moments are independent of L(p), and quick.
-        remedy: what to do where it is not resolved, or a budget does not suffice.
     """
 
     has_witness: bool = True
-    remedy: Remedy = Remedy.BUDGET
+    remedy = Remedy.BUDGET
 
     def __init__(self, *args: Any) -> None:
         super().__init__(*args)
@@ -99,8 +93,8 @@ class Elements(Method):
         self._failed = dict[float, tuple[type[NotConverged], Message]]()
 
     def _near(self, p: float) -> list[PrincipalPair]:
-        """Some pairs at the nearest p, the nearest first."""
-        return sorted((each.pair for each in self.spaces.values()), key=lambda pair: abs(pair.p - p))[:NEIGHBOURS]
+        """The pairs at other p, the nearest first."""
+        return [each.pair for each in sorted(self.spaces.values(), key=lambda each: abs(each.pair.p - p))]
 
     def solution(self, p: float, tolerance: Tolerance | None = None) -> Solution:
         """The principal eigenpair at p and its error, within a tolerance, the usual one if none is given.
@@ -117,7 +111,7 @@ class Elements(Method):
         if (known := self.spaces.get(p)) and known.error <= allowed(known.pair):
             return known
         try:
-            with one_thread(), self.settings.meter.running():
+            with self.solving(p):
                 search, found = Search(p, allowed, self.settings.budget, self.remedy), list[Solution]()
                 for stage, near in self.places(p, tolerance or self.tolerance, found):
                     found.append(search.settle(stage, near))
@@ -129,16 +123,6 @@ class Elements(Method):
             if tolerance is None:  # a tighter one may be out of reach where this is not
                 self._failed[p] = type(failure), failure.message
             raise failure from None
-        except MeshError as failure:
-            told = Message(Code.NOT_CONVERGED, p=p, reason=failure.message, remedy=self.remedy)
-            raise NotConverged(told) from failure
-        except (SingularMatrix, np.linalg.LinAlgError) as failure:
-            told = Message(Code.NOT_SOLVED, p=p, reason=str(failure), remedy=self.remedy)
-            raise NotConverged(told) from failure
-        except MemoryError as failure:
-            raise NotConverged(Message(Code.NO_MEMORY, remedy=Remedy.MEMORY)) from failure
-        except ArithmeticError as failure:
-            raise NotConverged(Message(Code.OUT_OF_RANGE, p=p, reason=str(failure))) from failure
         self.spaces[p] = solution
         return solution
 
@@ -181,18 +165,11 @@ class Elements(Method):
         Raises:
             NotConverged: it cannot be made, has more unknowns than the budget allows, or does not resolve it.
         """
-        reason: Message | str
-        if chosen.size > (most := self.most(chosen)):
+        if chosen.size > (most := self.settings.budget.most(chosen)):
             reason = Message(Code.UNKNOWNS_SPENT, unknowns=chosen.size, most=most)
-        else:
-            try:
-                with one_thread(), self.settings.meter.running():
-                    return self.pair_on(Generator(self.problem, chosen), pair.p, pair)
-            except (MeshError, SingularMatrix, np.linalg.LinAlgError) as failure:
-                reason = getattr(failure, "message", str(failure))
-            except MemoryError:
-                raise NotConverged(Message(Code.NO_MEMORY), remedy=Remedy.MEMORY) from None
-        raise NotConverged(Message(Code.NOT_FINER, p=pair.p, reason=reason, remedy=self.remedy))
+            raise NotConverged(Message(Code.NOT_FINER, p=pair.p, reason=reason), remedy=self.remedy)
+        with self.solving(pair.p):
+            return self.pair_on(Generator(self.problem, chosen), pair.p, pair)
 
     def near_zero(self, p: float, tolerance: Tolerance | None = None) -> Solution:
         """The solution at ±`SMALL_P` that a smaller p goes with."""
@@ -203,10 +180,6 @@ class Elements(Method):
         except NotConverged as failure:
             told = Message(Code.NEAR_ZERO, p=q, reason=failure.message)
             raise type(failure)(told, failure.partial) from failure
-
-    def most(self, space: Space) -> float:
-        """Number of unknowns that a finer space may have."""
-        return self.settings.budget.most(space)
 
     def _witness(self, p: float, value: float, error: float) -> None:
         """Refuse a value with this error that contradicts the even moment of the same p."""
@@ -224,10 +197,9 @@ class Elements(Method):
             return None
         if p not in self._even:
             found = None
-            with suppress(NoHierarchy, ArithmeticError), unless_over_budget():
-                with one_thread(), self.settings.meter.running():
-                    moment = even_moment(self.problem, p, 0.1 * self.tolerance(p, 0.0), MOST_EQUATIONS)
-                checked(Estimate(moment.value, moment.error, self.scale(p)), self.refinement, p)
+            with unless_over_budget(), self.solving(p):
+                moment = even_moment(self.problem, p, 0.1 * self.tolerance(p, 0.0), MOST_EQUATIONS)
+                self.check(p, moment.value, moment.error)
                 found = moment
             self._even[p] = found
         return self._even[p]
@@ -235,37 +207,36 @@ class Elements(Method):
     def pair(self, p: float) -> PrincipalPair:
         return self.solution(p).pair
 
-    def row(self, p: float) -> tuple[Moment, PrincipalPair | None]:
+    def row(self, p: float) -> Moment:
         """Λ(p) on the scale of the terms of Eq. (37) before they cancel.
 
         Near p = 0, where rounding is not proportional to p, it is that of Λ(p)/p.
         """
+        if self.number(p):
+            return super().row(p)
         try:
             solution = self.solution(p)
-            value, error, pair = solution.value, solution.error, solution.pair
+            value, error = solution.value, solution.error
             if p == 0:  # but for rounding, in every space
                 value, error = 0.0, 0.0
             elif abs(p) < TINY_P:
                 ratio, error = self.ratio_alone(p)
                 value, error = p * ratio, abs(p) * error
             if abs(p) >= TINIEST_P:  # else Λ has no scale
-                checked(Estimate(value, error, self.scale(p)), self.refinement, p)
+                self.check(p, value, error)
         except NotConverged:
             if even := self.even(p):
-                return moment_row(even), None
+                return Moment.of(even)
             raise
-        return Moment(value, pair.derivative, math.nan, error, pair.residual), pair
+        return Moment(value, solution.derivative, math.nan, error, solution.pair.residual)
 
     def ratio_alone(self, p: float, tolerance: Tolerance | None = None) -> tuple[float, float]:
         """Λ(p)/p and its error.
 
         Near p = 0 it is the mean of Λ′ from 0 to p, by two points of Gauss; its error is that at p = ±`SMALL_P`.
         """
-        if known := self.number(p):
-            return known.value / p, known.error / p
         if abs(p) >= TINY_P:
-            solution = self.solution(p, tolerance)
-            return solution.value / p, solution.error / abs(p)
+            return super().ratio_alone(p, tolerance)
         points = {p * (0.5 + shift) for shift in (-0.5 / math.sqrt(3), 0.5 / math.sqrt(3))}
         pairs = [self.solution(point, tolerance).pair for point in points]
         if self.reason(1.0):  # algebraic tails, of which Λ(p) for p < 0 hardly tells: their moments are finite
@@ -275,10 +246,10 @@ class Elements(Method):
         return float(np.mean([pair.derivative for pair in pairs])) + near.pair.correction / near.pair.p, error
 
     def ratio(self, p: float, tolerance: Tolerance | None = None) -> tuple[float, float, float]:
+        if abs(p) >= TINY_P:
+            return super().ratio(p, tolerance)
         value, error = self.ratio_alone(p, tolerance)
-        if abs(p) < TINY_P:  # ∫₀¹ s Λ″(sp) ds, by one point of Gauss
-            return value, 0.5 * second_derivative(self.solution(p * 2 / 3, tolerance).pair), error
-        return value, (self.solution(p, tolerance).derivative - value) / p, error
+        return value, 0.5 * self.around_zero.second_derivative, error
 
     def _among_tails(self, pair: PrincipalPair) -> tuple[float, float]:
         """λ from a pair at p = 0, on ever wider intervals of the noise, with what the ends and the first cells leave.
@@ -305,55 +276,20 @@ class Elements(Method):
         if abs(p) < TINIEST_P:
             return self.ratio_alone(0.0)[1]
         solution = self.solution(p)
-        with one_thread():
-            rest = slope_rounding(solution.pair) + (self._jump() if self.is_at_corner(p) else 0.0)
-            finer = self.finer_pair(solution.pair)
-            change = finer.derivative - solution.derivative
-            more = 0.25 * change
-            with suppress(NotConverged):
-                more = self.finer_pair(finer).derivative - finer.derivative
-            ratio = np.clip(more / (change or sys.float_info.min), 0.0, SLOWEST)
-            return float(1.5 * max(abs(change), abs(more)) / (1 - ratio) + rest)
+        rest = slope_rounding(solution.pair) + (self._jump() if self.is_at_corner(p) else 0.0)
+        finer = self.finer_pair(solution.pair)
+        change = finer.derivative - solution.derivative
+        more = 0.25 * change
+        with suppress(NotConverged):
+            more = self.finer_pair(finer).derivative - finer.derivative
+        ratio = np.clip(more / (change or sys.float_info.min), 0.0, SLOWEST)
+        return float(1.5 * max(abs(change), abs(more)) / (1 - ratio) + rest)
 
     def _jump(self) -> float:
         """What Λ′ rises at p = −1 if Λ″ on both sides does not explain it: there is any slope between at a corner."""
         low, high = (self.solution(-1 + side).pair for side in (-2 * AT_CORNER, 2 * AT_CORNER))
         rise, smooth = high.derivative - low.derivative, second_derivative(low) + second_derivative(high)
         return rise if rise > 3 * smooth * 2 * AT_CORNER else 0.0
-
-    def variance_rate(self) -> Estimate:
-        """Λ″(0), the asymptotic growth rate of the variance of ln ‖x‖.
-
-        Its error is what two finer discretisations change in it, as one change is small by chance; twice the first one
-        where the second has too many unknowns.
-        """
-        refuse(self.reason(1.0, quantity.VARIANCE_RATE.symbol))
-        scale = 2 * self.scales.quadratic
-        value, better = self.around_zero.second_derivative, self.finer_around_zero.second_derivative
-        error = 2 * abs(better - value)
-        with unless_over_budget():
-            finest = PairDerivatives(self.finer_pair(self.finer_around_zero.pair)).second_derivative
-            error, better = abs(finest - better) + 0.5 * error, finest
-        error += 10 * sys.float_info.epsilon * max(scale, abs(better))
-        return checked(Estimate(better, error, scale, quantity=quantity.VARIANCE_RATE), self.refinement)
-
-    @cached_property
-    def around_zero(self) -> PairDerivatives:
-        return PairDerivatives(self.solution(0.0).pair)
-
-    @cached_property
-    def finer_around_zero(self) -> PairDerivatives:
-        """For algebraic tails of a wider one. Raises `NotConverged`."""
-        return PairDerivatives(self.finer_pair(self.around_zero.pair))
-
-    def gradient_along(self, p: float, along: Sequence[ParameterDerivative]) -> FloatArray:
-        is_large = abs(p) >= NEAR_ZERO
-        around = PairDerivatives(self.solution(p).pair) if is_large else self.around_zero
-        changed = [Changed(around, by) for by in along]
-        if is_large:
-            return np.array([each.value.value / p for each in changed])
-        more = [0.5 * p * each.curvature.value if p else 0.0 for each in changed]
-        return np.array([each.slope.value for each in changed]) + more
 
 
 class PlaneElements(Elements):
@@ -418,7 +354,7 @@ class PlaneElements(Elements):
         """
         best = super().confirmed(search, found)
         chosen, p = best.pair.generator.chosen, search.p
-        if self.is_at_corner(p) and is_mixed(best.pair):
+        if self.is_at_corner(p) and length(PairDerivatives(best.pair).by_p) > MIXED * length(best.pair.right):
             halves = chosen.doubled()
             with unless_over_budget():
                 pair = self.pair_among(halves, best.pair)
@@ -484,28 +420,21 @@ class GivenMesh(PlaneElements):
     def allowed(self, tolerance: Tolerance, pair: PrincipalPair) -> float:
         return math.inf
 
-    def most(self, space: Space) -> float:
-        return math.inf
-
     def _among_tails(self, pair: PrincipalPair) -> tuple[float, float]:
         """λ, on the interval of the mesh, and what a wider one would change."""
         change = abs(self.pair_among(widened(pair.generator), pair).derivative - pair.derivative)
         return pair.derivative, change * WIDER / (WIDER - 1) + self._lacked(pair)
 
-    def doubts(self, pairs: Sequence[PrincipalPair]) -> tuple[Message, ...]:
+    def doubts(self, p: Sequence[float]) -> tuple[Message, ...]:
         """That slow noise may carry a moment elsewhere, where the mesh does not show it."""
+        pairs = [self.spaces[each].pair for each in p if each in self.spaces]
         elsewhere = ((pair.p, z) for pair in pairs for z in other_centers(pair))
         return tuple(Message(Code.CARRIED_ELSEWHERE, p=p, z=z, remedy=Remedy.REACH) for p, z in elsewhere)[:1]
 
 
-def doubt(error: float, known: Any) -> float:
-    """The difference beyond which a value with this error contradicts an even moment."""
-    return SURELY * (error + float(known.error)) + ROUNDED * abs(float(known.value))
-
-
-def is_mixed(pair: PrincipalPair) -> bool:
-    """Whether another eigenvalue is so near, and of another slope, that T changes all at once."""
-    return bool(np.linalg.norm(PairDerivatives(pair).by_p) > MIXED * np.linalg.norm(pair.right))
+def doubt(error: Any, known: Any) -> Any:
+    """The difference beyond which a value with this error, or each of some, contradicts an even moment."""
+    return SURELY * (error + known.error) + ROUNDED * abs(known.value)
 
 
 def widened(generator: Generator) -> Space:

@@ -121,6 +121,11 @@ class Moment(NamedTuple):
     error: float
     residual: float
 
+    @classmethod
+    def of(cls, found: Any) -> Moment:
+        """That of what is solved, without a pair."""
+        return cls(found.value, found.derivative, math.nan, found.error, math.nan)
+
 
 @dataclass(frozen=True, eq=False)
 class InvariantClass:

@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from functools import partial
-from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.interpolate import BPoly
 
 from fpsolve.arrays import FloatArray, real_array, real_numbers
 from fpsolve.data import Result, dataset
 from fpsolve.errors import NotConverged
-from fpsolve.exponent.curve import Curve, Node, Values, values
+from fpsolve.exponent.curve import Values, values
 from fpsolve.exponent.error import Absent, Estimate
 from fpsolve.exponent.kinds import choose
 from fpsolve.exponent.method import Budget, checked_moments
@@ -38,15 +34,15 @@ FEW = 17
 """Number of p of the interval at which a sign of Λ(p)/p is looked for, besides the nodes."""
 SHOWN = 201
 """So many p of the interval are drawn."""
-MOST_NODES = 200
-"""Number of p that pieces may take."""
+MOST_PARTS = 40
+"""Largest number of polynomials."""
 
 
 class MomentLyapunovFunction(Result):
     """Λ(p) of two variables on an interval of p, callable on arrays.
 
     It is solved at few p and is a polynomial of Λ(p)/p between these, see `exponent.curve`. Where none is accurate, as
-    in strong noise, it is made of cubic pieces by Λ and Λ′, each judged by a solve in its middle.
+    in strong noise, the interval is halved, and its halves are, until each part has one.
 
     >>> print(f"{MomentLyapunovFunction(problem, (-1.0, 3.0))(2.0):.9f}")
     -0.007397833
@@ -86,7 +82,7 @@ class MomentLyapunovFunction(Result):
             raise ValueError(f"the interval of p is {interval}; its ends must increase")
         self.interval = low, high
         self.solver = solver or solver_of(problem, mesh, rtol, budget)
-        self._curves = self.solver.curves(low, high, pieces)
+        self._curves = self.solver.curves(low, high, MOST_PARTS)
         self.nodes = np.unique([p for curve in self._curves for p in curve.nodes])
         at = self._values(self.nodes)
         if obstacle := broken_convexity(self.nodes, at.value, at.derivative, at.error, lambda: at.derivative_error):
@@ -159,40 +155,3 @@ class MomentLyapunovFunction(Result):
             raise ValueError(f"p must lie in [{low:g}, {high:g}], the interval of this function; make a wider one")
         found = values(self._curves, np.clip(points.ravel(), low, high))
         return Values(*(each.reshape(points.shape) for each in found))
-
-
-def pieces(solve: Callable[[float], Node], low: float, high: float, allowed: Callable[[float], float]) -> Curve:
-    """Λ by cubic pieces, halved until each meets its middle, or there are too many.
-
-    What is left falls from the middle to both ends as that of a cubic by values and slopes does.
-    """
-    ends = [low, *[0.0] * (low < 0 < high), high]
-    known, rest, settled = {p: solve(p) for p in ends}, [*pairwise(ends)], dict[float, tuple[float, float]]()
-    while rest:
-        a, b = rest.pop(0)
-        middle = 0.5 * (a + b)
-        known[middle] = solve(middle)
-        off = abs(float(_cubic(known, (a, b))(middle)) - middle * known[middle].ratio)
-        error = max(known[p].error for p in (a, middle, b))
-        if off <= max(allowed(middle), error) * abs(middle) or len(known) >= MOST_NODES:
-            settled[a] = b - a, off
-        else:
-            rest += (a, middle), (middle, b)
-    nodes, starts = np.array(sorted(known)), np.array(sorted(settled))
-    sizes, offs = np.array([settled[a] for a in starts.tolist()]).T
-    worst = max(each.error for each in known.values())
-    return Curve(nodes, _cubic(known, nodes.tolist()), partial(_errors, starts, sizes, offs, worst))
-
-
-def _errors(
-    starts: FloatArray, sizes: FloatArray, offs: FloatArray, worst: float, p: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """By what pieces were off in their middles, and the largest error of Λ(p)/p at a node."""
-    at = np.clip(np.searchsorted(starts, p, side="right") - 1, 0, None)
-    x, steep = (p - starts[at]) / sizes[at], 8 / sizes[at]
-    return 16 * offs[at] * (x * (1 - x)) ** 2 + worst * np.abs(p), steep * offs[at] + worst * (1 + steep * np.abs(p))
-
-
-def _cubic(known: dict[float, Node], points: Sequence[float]) -> BPoly:
-    """Λ between some p, by Λ and Λ′ there."""
-    return BPoly.from_derivatives(points, [[p * known[p].ratio, known[p].slope] for p in points])

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
-from functools import cached_property, partial
+from functools import cached_property
 from types import MappingProxyType
 from typing import Annotated, Any, ClassVar, NamedTuple, NoReturn, Protocol
 
@@ -13,17 +15,19 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fpsolve.arrays import FloatArray, real_numbers
-from fpsolve.budget import Meter, OverBudget, charge
+from fpsolve.budget import Meter, OverBudget, charge, unless_over_budget
 from fpsolve.errors import FpsolveError, MeshError, NoHierarchy, NoSuchExponent, NotConverged, SingularMatrix
+from fpsolve.exponent.changed import NEAR_ZERO, Changed
 from fpsolve.exponent.eigen import PairDerivatives, PrincipalPair
 from fpsolve.exponent.error import Absent, Estimate, Moment, checked
+from fpsolve.fem.factors import one_thread
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.fem.space import Space
 from fpsolve.messages import ALMOST_EVERY, Code, Message, Remedy
 from fpsolve.model.faults import strict_dataclass
 from fpsolve.model.parameters import parameter
 from fpsolve.model.problem import ParameterDerivative, Problem, infinite
-from fpsolve.model.quantity import LYAPUNOV_EXPONENT
+from fpsolve.model.quantity import LYAPUNOV_EXPONENT, VARIANCE_RATE
 from fpsolve.theory.perturbation import Scale, scale_of
 
 RTOL = 1e-8
@@ -145,6 +149,7 @@ class Method:
         ray: φ of a ray that the phase never leaves; None where there is none.
         is_computed: whether there is any Λ(p).
         spaces: solutions on elements, by p.
+        remedy: what to do where it is not resolved, or a budget does not suffice.
     """
 
     name: ClassVar[str] = "finite elements"
@@ -158,6 +163,7 @@ class Method:
     ray: float | None = None
     is_computed: bool = True
     spaces: Mapping[float, Any] = MappingProxyType({})
+    remedy: Remedy | None = None
 
     def __init__(self, problem: Problem, settings: Settings, choose: Callable[[Problem, Settings], Method]) -> None:
         self.problem, self.settings, self.choose = problem, settings, choose
@@ -217,20 +223,44 @@ class Method:
         """The sum of the absolute values of the terms of Eq. (37)."""
         return float(self.scales.moment(p))
 
-    @cached_property
-    def tolerance(self) -> Tolerance:
-        """The largest error allowed of a value of Λ(p); no method, as a cycle would keep matrices for long."""
-        return partial(tolerated, self.settings.rtol, self.settings.of_value, self.scales)
+    def tolerance(self, p: float, value: float) -> float:
+        """The largest error allowed of Λ(p), a share of it or of the terms of Eq. (37) before they cancel."""
+        rtol, of_value = self.settings.rtol, self.settings.of_value
+        return max(rtol * self.scale(p), max(rtol, of_value) * abs(value))
 
     @property
     def missed(self) -> Remedy | None:
         """What to do where an index misses rtol; None where that is found for each p as well as it can be."""
         return None if self.adapts else Remedy.MESH
 
+    def check(self, p: float, value: float, error: float) -> None:
+        """Refuse a value of Λ(p) of which its error leaves nothing. Raises `NotConverged`."""
+        checked(Estimate(value, error, self.scale(p)), self.refinement, p)
+
     @property
     def refinement(self) -> Remedy:
         """What to do where it should be resolved better."""
         return Remedy.SMALLER_RTOL if self.adapts else Remedy.MESH
+
+    @contextmanager
+    def solving(self, p: float) -> Iterator[None]:
+        """In the body one thread runs, whose seconds count.
+
+        Raises:
+            NotConverged: the functions cannot be made, numbers are too large, or there is not enough memory.
+        """
+        try:
+            with one_thread(), self.settings.meter.running():
+                yield
+        except (MeshError, NoHierarchy) as failure:
+            told = Message(Code.NOT_CONVERGED, p=p, reason=failure.message)
+            raise NotConverged(told, remedy=self.remedy) from failure
+        except (SingularMatrix, np.linalg.LinAlgError) as failure:
+            raise NotConverged(Message(Code.NOT_SOLVED, p=p, reason=str(failure)), remedy=self.remedy) from failure
+        except ArithmeticError as failure:
+            raise NotConverged(Message(Code.OUT_OF_RANGE, p=p, reason=str(failure))) from failure
+        except MemoryError as failure:
+            raise NotConverged(Message(Code.NO_MEMORY), remedy=Remedy.MEMORY) from failure
 
     def solution(self, p: float, tolerance: Tolerance | None = None) -> Any:
         """What is solved at p, within a tolerance, that of rtol if none is given.
@@ -242,13 +272,13 @@ class Method:
         """
         raise NotImplementedError
 
-    def row(self, p: float) -> tuple[Moment, PrincipalPair | None]:
-        """Λ(p), its slope and error, and the eigenpair if there is one. Raises `NotConverged`."""
-        found = self.solution(p)
-        return Moment(found.value, found.derivative, math.nan, found.error, math.nan), None
+    def row(self, p: float) -> Moment:
+        """Λ(p), its slope and error. Raises `NotConverged`."""
+        return Moment.of(self.number(p) or self.solution(p))
 
     def pair(self, p: float) -> PrincipalPair:
         """The principal eigenpair at p. Raises `NotConverged`, `NoSuchExponent`."""
+        refuse(self.reason(0.0, "an eigenfunction"))
         raise NoSuchExponent(Message(Code.NO_PAIR, p=p))
 
     def even(self, p: float) -> Any:
@@ -261,11 +291,12 @@ class Method:
 
     def ratio_alone(self, p: float, tolerance: Tolerance | None = None) -> tuple[float, float]:
         """Λ(p)/p, at p = 0 λ, and its error."""
-        found = self.solution(p, tolerance)
+        found = self.number(p) or self.solution(p, tolerance)
         return (found.value / p, found.error / abs(p)) if p else (found.derivative, found.error)
 
     def ratio(self, p: float, tolerance: Tolerance | None = None) -> tuple[float, float, float]:
         """Λ(p)/p, its derivative in p, and the error of the first."""
+        refuse(self.reason(0.0, "λ, or another number that follows from eigenfunctions,"))
         value, error = self.ratio_alone(p, tolerance)
         return value, (self.solution(p, tolerance).derivative - value) / p if p else math.nan, error
 
@@ -279,21 +310,46 @@ class Method:
         meaning = ALMOST_EVERY if self.reason(1.0) else ""
         return checked(Estimate(value, error, self.scales.linear, meaning, LYAPUNOV_EXPONENT), self.refinement)
 
-    def variance_rate(self) -> Estimate:
-        """Λ″(0). Raises `NotConverged`, `NoSuchExponent`."""
-        raise NoSuchExponent(Message(Code.NO_PAIR, p=0.0))
-
     def finer_pair(self, pair: PrincipalPair) -> PrincipalPair:
-        """That at the same p on a finer discretisation. Raises `NotConverged`."""
-        raise NoSuchExponent(Message(Code.NO_PAIR, p=pair.p))
+        """That at the same p on a finer discretisation, where there are pairs. Raises `NotConverged`."""
+        raise NotImplementedError
+
+    @cached_property
+    def around_zero(self) -> PairDerivatives:
+        """The pair at p = 0 and its derivatives. Raises `NotConverged`, `NoSuchExponent`."""
+        return PairDerivatives(self.pair(0.0))
+
+    @cached_property
+    def finer_around_zero(self) -> PairDerivatives:
+        """That of a finer discretisation, for algebraic tails of a wider one. Raises as `around_zero`."""
+        return PairDerivatives(self.finer_pair(self.around_zero.pair))
+
+    def variance_rate(self) -> Estimate:
+        """Λ″(0), the asymptotic growth rate of the variance of ln ‖x‖.
+
+        Its error is what two finer discretisations change in it, as one change is small by chance; twice the first one
+        where the second has too many unknowns. Raises `NotConverged`, `NoSuchExponent`.
+        """
+        refuse(self.reason(1.0, VARIANCE_RATE.symbol))
+        scale = 2 * self.scales.quadratic
+        value, better = self.around_zero.second_derivative, self.finer_around_zero.second_derivative
+        error = 2 * abs(better - value)
+        with unless_over_budget():
+            finest = PairDerivatives(self.finer_pair(self.finer_around_zero.pair)).second_derivative
+            error, better = abs(finest - better) + 0.5 * error, finest
+        error += 10 * sys.float_info.epsilon * max(scale, abs(better))
+        return checked(Estimate(better, error, scale, quantity=VARIANCE_RATE), self.refinement)
 
     def gradient(self, p: float, keys: Sequence[str]) -> FloatArray:
         """∂/∂θ of Λ(p)/p, at p = 0 of λ, by parameters. Raises `NotConverged`, `NoSuchExponent`."""
-        return self.gradient_along(p, [self.problem.derivative(key) for key in keys])
-
-    def gradient_along(self, p: float, along: Sequence[ParameterDerivative]) -> FloatArray:
-        """The same along some directions."""
-        raise NoSuchExponent(Message(Code.NO_PAIR, p=p))
+        if known := self.number(p):
+            return np.asarray(known.gradient(keys) / p)
+        along = [self.problem.derivative(key) for key in keys]
+        if abs(p) >= NEAR_ZERO:
+            around = PairDerivatives(self.pair(p))
+            return np.array([Changed(around, by).value.value / p for by in along])
+        changed = [Changed(self.around_zero, by) for by in along]
+        return np.array([each.slope.value + (0.5 * p * each.curvature.value if p else 0.0) for each in changed])
 
     def held(self, p: float, along: Along) -> tuple[Method, Along]:
         """The part whose Λ(p), at p = 0 whose λ, is that of the problem, and directions for it.
@@ -316,16 +372,6 @@ class Method:
         """δ_p by those of parts, or that it is nowhere; None where there are no parts."""
         return None
 
-    @property
-    def around_zero(self) -> PairDerivatives:
-        """The pair at p = 0 and its derivatives. Raises `NotConverged`."""
-        raise NoSuchExponent(Message(Code.NO_PAIR, p=0.0))
-
-    @property
-    def finer_around_zero(self) -> PairDerivatives:
-        """That of a finer discretisation. Raises `NotConverged`."""
-        return self.around_zero
-
     def bounds(self, p: FloatArray, value: FloatArray, error: FloatArray) -> tuple[Message, ...]:
         """What is known of other numbers."""
         return ()
@@ -334,8 +380,8 @@ class Method:
         """Why nobody looks at the extremes of T, which bound excursions; None where they are looked at."""
         return None if self.pictures.is_seen else Message(Code.EXCURSION_PLANE, count=self.problem.dimension)
 
-    def doubts(self, pairs: Sequence[PrincipalPair]) -> tuple[Message, ...]:
-        """Warnings about some pairs."""
+    def doubts(self, p: Sequence[float]) -> tuple[Message, ...]:
+        """Warnings about what was solved at some p."""
         return ()
 
 
@@ -343,11 +389,6 @@ def refuse(reason: Message | None) -> None:
     """Raise `NoSuchExponent` for a reason."""
     if reason:
         raise NoSuchExponent(reason)
-
-
-def tolerated(rtol: float, of_value: float, scales: Scale, p: float, value: float) -> float:
-    """rtol of the terms of Eq. (37) before they cancel, or it or `of_value` of Λ(p), whichever is the largest."""
-    return max(rtol * float(scales.moment(p)), max(rtol, of_value) * abs(value))
 
 
 def checked_moments(p: ArrayLike, method: Method, *, may_be_empty: bool = False) -> FloatArray:
@@ -375,22 +416,11 @@ class Stage(Protocol):
     def judged(self, found: Any, allowed: float) -> Any:
         """What is found with its error, of which no part much less than what is allowed need be known."""
 
-    def is_enough(self, found: Any) -> bool:
-        """Whether what is found within the tolerance needs no more, as for its slope."""
-
     def doubled(self, failure: Exception | None) -> Stage | None:
         """More functions, where nothing is found among these; None where that is no use."""
 
     def refined(self, found: Any, goal: float, stages: int, most: int) -> Stage | None:
         """Functions that should have an error of about a goal, after so many stages, with so many unknowns at most."""
-
-
-class Ended(Exception):
-    """No stage may follow, for a reason other than time."""
-
-    def __init__(self, reason: Message) -> None:
-        super().__init__(str(reason))
-        self.reason = reason
 
 
 @dataclass
@@ -444,32 +474,30 @@ class Search:
                     continue
                 allowed = self.allowed(near)
                 self.judged = found = stage.judged(near, allowed)
-                if found.error <= allowed and stage.is_enough(found):
+                if found.error <= allowed:
                     return found
                 if found.error / allowed < self.share:
                     self.best, self.share = found, found.error / allowed
                 if near.rounding > allowed:
-                    raise Ended(Message(Code.ROUNDED, size=near.rounding))
+                    raise NotConverged(Message(Code.ROUNDED, size=near.rounding))
                 stage = stage.refined(found, allowed, self.stages, self.budget.most(stage))
-        except (OverBudget, Ended) as failure:
-            if self.share <= 1:  # within the tolerance, but for its slope
-                return self.best
+        except NotConverged as failure:  # no stage may follow
             return self._stop(failure)
 
     def _begun(self, stage: Stage | None) -> Stage:
-        """A stage, which is counted. Raises `Ended`, `OverBudget`: it is beyond the budget, or there is none."""
+        """A stage, which is counted. Raises `NotConverged`: it is beyond the budget, or there is none."""
         if stage is None or self.stages >= MAX_STAGES:
-            raise Ended(Message(Code.MESHES_SPENT, count=self.stages))
+            raise NotConverged(Message(Code.MESHES_SPENT, count=self.stages))
         size, most = stage.size, self.budget.most(stage)
         if size > most:
-            raise Ended(Message(Code.UNKNOWNS_SPENT, unknowns=size, most=most))
+            raise NotConverged(Message(Code.UNKNOWNS_SPENT, unknowns=size, most=most))
         charge(size)
         self.stages += 1
         return stage
 
-    def _stop(self, ended: OverBudget | Ended) -> NoReturn:
+    def _stop(self, ended: NotConverged) -> NoReturn:
         """Raise `NotConverged`, or `OverBudget`, with the best that is found."""
-        reason, kind = ended.reason, OverBudget if isinstance(ended, OverBudget) else NotConverged
+        reason = ended.reason
         if self.best is not None:
             number = {"value": self.best.value, "error": self.best.error, "size": self.share}
             told = Message(Code.BUDGET_SPENT, p=self.p, reason=reason, **number)
@@ -478,4 +506,4 @@ class Search:
             said = last.message.advising(None) if isinstance(last, FpsolveError) else last and str(last)
             told = Message(Code.NOTHING_RESOLVED, p=self.p, reason=reason, is_thin=is_thin, last=said)
         remedy = None if reason.code is Code.ROUNDED else self.remedy
-        raise kind(told, self.best, remedy)
+        raise type(ended)(told, self.best, remedy)

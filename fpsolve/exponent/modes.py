@@ -25,9 +25,9 @@ from fpsolve.arrays import FloatArray
 from fpsolve.errors import NoHierarchy
 from fpsolve.exponent.eigen import PrincipalPair, principal_pair
 from fpsolve.exponent.elements import Elements
-from fpsolve.exponent.error import Moment, Solution, mode_effects
+from fpsolve.exponent.error import Solution, mode_effects
 from fpsolve.exponent.method import RTOL_BEYOND_PLANE, Stage, Tolerance
-from fpsolve.exponent.moments import EvenMoment, even_moment, mean_matrix, moment_row
+from fpsolve.exponent.moments import EvenMoment, even_moment, mean_matrix
 from fpsolve.exponent.powers import moment_form
 from fpsolve.exponent.starts import SHARE, Start
 from fpsolve.fem.directions import DirectionAxis, SphereAxis, group_dimensions
@@ -53,10 +53,6 @@ WORST_CONDITION = 100.0
 """Of the eigenvectors of the motion without noise, up to which they are the coordinates."""
 OF_CHANGES = 3.0
 """What is left after the correction, over that and the last change of the corrected value."""
-SETTLED_SLOPE = 3e-3
-"""Share of Λ′ by which it may change from one level to the next."""
-MOST_FOR_SLOPES = 4
-"""Number of levels after which a slope is taken as it is."""
 MINOR = 0.25
 """Share of the tolerance that elements, or polynomials of a noise, may lack where others are made finer."""
 MEASURED = 1.5
@@ -79,6 +75,11 @@ def second_moments(problem: Problem, own: FloatArray) -> tuple[FloatArray, Float
         each / np.trace(each) + THINNEST**2 * np.eye(len(own)) for each in (own.T @ q @ own, back @ moments @ back.T)
     )
     return q, moments
+
+
+def framed(problem: Problem, own: FloatArray) -> FloatArray:
+    """Coordinates of x as those of y, in which a problem is solved."""
+    return np.linalg.solve(np.array(problem.frame.matrix), own)
 
 
 def modal_coordinates(problem: Problem) -> tuple[FloatArray, float]:
@@ -122,11 +123,9 @@ class DirectionStart(Start):
 
     Attributes:
         before: solutions on coarser spaces.
-        near: a pair of another p, to begin with.
     """
 
     before: tuple[Solution, ...] = ()
-    near: PrincipalPair | None = None
 
     @property
     def generator(self) -> Generator:
@@ -134,15 +133,17 @@ class DirectionStart(Start):
         return Generator(self.problem, self.space)
 
     @classmethod
-    def at(cls, problem: Problem, p: float, rtol: float, known: Mapping[float, Solution]) -> Self:
-        """The coarsest functions, or some of the nearest p if one is known."""
+    def at(
+        cls, problem: Problem, p: float, rtol: float, known: Mapping[float, Solution]
+    ) -> tuple[Self, PrincipalPair | None]:
+        """The coarsest functions, or some of the nearest p if one is known, and the pair there."""
         nearest = min(
             (each for each in known.values() if each.start), key=lambda each: abs(each.pair.p - p), default=None
         )
         if nearest:
-            return replace(nearest.start.again(), before=(), near=nearest.pair)
+            return nearest.start.again(), nearest.pair
         noises = (first_axis(noise, -math.log10(rtol)) for noise in problem.coloured.parts.values())
-        return cls(problem, Space((cls.directions(problem), *noises)))
+        return cls(problem, Space((cls.directions(problem), *noises))), None
 
     @staticmethod
     def directions(problem: Problem) -> DirectionAxis:
@@ -156,31 +157,22 @@ class DirectionStart(Start):
     def solved(self, p: float, near: PrincipalPair | None) -> PrincipalPair:
         """The pair, from that of coarser functions, or from p to p."""
         generator = self.generator
-        pair = near or self.near or principal_pair(generator, 0.0)
+        pair = near or principal_pair(generator, 0.0)
         steps = max(math.ceil(abs(p - pair.p) / LARGEST_STEP), 1)
         for point in np.linspace(pair.p, p, steps + 1)[1:].tolist():
             pair = principal_pair(generator, point, start=pair)
         rounding = 2 * self.problem.dimension * sys.float_info.epsilon * abs(p) * self.problem.unit_rate
         return replace(pair, rounding=pair.rounding + rounding)  # an entry of S⁻¹AS is a sum of products twice
 
-    def _with(self, more: int, **changes: Any) -> Self:
-        """That with waves of higher degrees."""
-        waves = max(self.space.phi.waves + more, FIRST_WAVES)
-        return replace(self, space=self.space.with_axis(0, replace(self.space.phi, waves=waves)), **changes)
-
-    def change(self, pair: PrincipalPair) -> float:
-        """What waves of the next degree change in Λ(p), to first order."""
-        return float(np.sum(first_order_changes(pair, self._with(2).generator, 0)))
+    def changes_by(self, pair: PrincipalPair, k: int, finer: Any) -> FloatArray:
+        """What each of the new functions of a finer axis changes in Λ(p), to first order."""
+        return first_order_changes(pair, Generator(self.problem, self.space.with_axis(k, finer)), k)
 
     def lacking(self, pair: PrincipalPair, k: int, finer: Any) -> float:
-        """What is left without the new functions of a finer axis, by the sizes of what each of them changes.
-
-        What all of them change together may be small by chance.
-        """
+        """What is left without them, by the sizes of these changes, as their sum may be small by chance."""
         if finer.size == self.space.axes[k].size:  # there are no more
             return math.inf
-        generator = Generator(self.problem, self.space.with_axis(k, finer))
-        return MEASURED * float(np.sum(np.abs(first_order_changes(pair, generator, k))))
+        return MEASURED * float(np.sum(np.abs(self.changes_by(pair, k, finer))))
 
     def errors_of_axes(self, pair: PrincipalPair, allowed: float) -> tuple[float, ...]:
         """Of the elements and of each noise: the effects of the highest modes, or what is lacking if that is less.
@@ -235,7 +227,16 @@ class SphereStart(DirectionStart):
         return self.generators[waves]
 
     def again(self) -> SphereStart:
-        return self._with(-self.space.phi.waves)
+        return self.of_waves(FIRST_WAVES)
+
+    def of_waves(self, waves: int, before: tuple[Solution, ...] = ()) -> SphereStart:
+        """That with waves up to another degree, after solutions with those of lower ones."""
+        space = self.space.with_axis(0, replace(self.space.phi, waves=max(waves, FIRST_WAVES)))
+        return replace(self, space=space, before=before)
+
+    def change(self, pair: PrincipalPair) -> float:
+        """What waves of the next degree change in Λ(p), to first order."""
+        return float(np.sum(first_order_changes(pair, self.of_waves(self.space.phi.waves + 2).generator, 0)))
 
     def judged(self, pair: PrincipalPair, allowed: float) -> Solution:
         """The pair, corrected by what the next waves change, with what is left then; first the other parts of it.
@@ -250,23 +251,17 @@ class SphereStart(DirectionStart):
         change = pair.value - self.before[-1].pair.value if self.before else math.inf
         return Solution(pair, OF_CHANGES * (abs(change) + abs(pair.correction)), of_axes, start)
 
-    def is_enough(self, solution: Solution) -> bool:
-        """Whether Λ′, which is not corrected, has settled, or after so many levels is what it is; λ is corrected."""
-        change = abs(solution.derivative - self.before[-1].derivative)
-        is_settled = change <= SETTLED_SLOPE * abs(solution.derivative) or len(self.before) >= MOST_FOR_SLOPES
-        return is_settled or abs(solution.pair.p) <= SMALL_P
-
     def doubled(self, failure: Exception | None) -> SphereStart:
-        return self._with(2, before=())
+        return self.of_waves(self.space.phi.waves + 2)
 
     def refined(self, solution: Solution, goal: float, stages: int, most: int) -> SphereStart:
         """Waves of the next degree; or other elements and functions of the noise, with waves of the degree before."""
         of_axes = solution.measured or ()
-        if sum(of_axes) <= 0.5 * goal:
-            return self._with(2, before=(*self.before, solution))
         phi, share = self.space.phi, MINOR * goal
+        if sum(of_axes) <= 0.5 * goal:
+            return self.of_waves(phi.waves + 2, (solution,))
         found = self.finer(phi.finer(["degree"]) if of_axes[0] > share else phi, solution, share)
-        return SphereStart(self.problem, found)._with(phi.waves - 2 - found.phi.waves)
+        return SphereStart(self.problem, found).of_waves(phi.waves - 2)
 
 
 class Directions(Elements):
@@ -282,10 +277,9 @@ class Directions(Elements):
         if abs(p) < SMALL_P:
             yield from super().places(p, tolerance, found)
         elif known := self.spaces.get(p):
-            most = self.settings.budget.most(known.start)
-            yield known.start.refined(known, tolerance(p, known.value), 0, most), known.pair
+            yield known.start.refined(known, tolerance(p, known.value), 0, 0), known.pair
         else:
-            yield self.stage.at(self.problem, p, self.settings.rtol, self.spaces), None
+            yield self.stage.at(self.problem, p, self.settings.rtol, self.spaces)
 
     @property
     def no_surface(self) -> str:
@@ -297,9 +291,3 @@ class Directions(Elements):
 
     def number(self, p: float) -> EvenMoment | None:
         return self.even(p)
-
-    def row(self, p: float) -> tuple[Moment, PrincipalPair | None]:
-        return (moment_row(even), None) if (even := self.even(p)) else super().row(p)
-
-    def gradient(self, p: float, keys: Sequence[str]) -> FloatArray:
-        return known.gradient(keys) / p if (known := self.even(p)) else super().gradient(p, keys)

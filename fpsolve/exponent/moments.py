@@ -34,7 +34,6 @@ from fpsolve.budget import unless_over_budget
 from fpsolve.data import brief
 from fpsolve.errors import NoHierarchy
 from fpsolve.exponent.delays import DelayRates
-from fpsolve.exponent.error import Moment
 from fpsolve.exponent.matrices import MatrixRates
 from fpsolve.exponent.method import BUDGET, Budget, Search
 from fpsolve.exponent.powers import Moving, PowerRates, exponents, moment_form, moves, multinomials, of_signs
@@ -179,11 +178,6 @@ def constant_scale(problem: Problem) -> Scale:
     abscissa = abs(float(np.max(np.linalg.eigvals(mean).real)))
     is_moved = abscissa > ROUNDED * float(np.linalg.norm(mean))
     return Scale(abscissa if is_moved else problem.unit_rate, 0.0)
-
-
-def moment_row(found: EvenMoment) -> Moment:
-    """What a record holds of it."""
-    return Moment(found.value, math.nan, math.nan, found.error, math.nan)
 
 
 def refuse_open_hierarchy(problem: Problem, p: float) -> None:
@@ -364,9 +358,6 @@ class Level:
             return replace(found, change=math.inf)
         step = abs(self.before.value - found.value)
         return replace(found, change=found.change + step * (step > found.told + found.change + self.before.told))
-
-    def is_enough(self, found: EvenMoment) -> bool:
-        return True
 
     def doubled(self, failure: Exception | None) -> None:
         """Where these are not solved, more are not."""

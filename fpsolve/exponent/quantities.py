@@ -65,8 +65,12 @@ def impact_rate(solver: ExponentSolver, jump: int | None = None) -> Estimate | A
         NotConverged: it is not resolved.
         ValueError: there is no such jump.
     """
-    if (number := _ray(solver, jump)) is None:
-        return _not_one_ray(solver)
+    count = len(solver.problem.system.jumps)
+    if jump is None and count != 1:
+        return Absent(Message(Code.NOT_ONE_RAY, count=count or None))
+    number = 0 if jump is None else jump
+    if not is_whole(number, 0, count - 1):
+        raise ValueError(f"got jump = {shown(jump)}; must be a whole number from 0 to {count - 1}, or None")
     value, better = (_flux(each.pair, number) for each in (solver.method.around_zero, solver.method.finer_around_zero))
     generator = solver.method.finer_around_zero.pair.generator
     usual = generator.problem.unit_rate / math.pi
@@ -106,15 +110,12 @@ def critical_restitution(solver: ExponentSolver, jump: int | None = None) -> Est
         NotConverged: λ or N is not resolved.
         ValueError: there is no such jump.
     """
-    system = solver.problem.system
-    if (number := _ray(solver, jump)) is None:
-        return _not_one_ray(solver)
-    log = _critical_log_factor(solver, number)
+    log, system = _critical_log_factor(solver, jump), solver.problem.system
     if not log:
         return log
     if log.value > 0:
         # λ is affine in ln R, and 0 at ln R_c
-        lossless = solver.lyapunov_exponent().value * log.value / (log.value - system.jumps[number].log_factor)
+        lossless = solver.lyapunov_exponent().value * log.value / (log.value - system.jumps[jump or 0].log_factor)
         return Absent(Message(Code.ALWAYS_STABLE, symbol=system.impact_symbol, value=lossless))
     value = system.impact_value(log.value)
     if math.isnan(value):
@@ -124,20 +125,6 @@ def critical_restitution(solver: ExponentSolver, jump: int | None = None) -> Est
     slope = system.impact_slope(log.value)
     error, scale = slope * log.error_estimate + _EPS, max(1.0, slope * log.scale)
     return checked(Estimate(value, error, scale, quantity=quantity.CRITICAL_RESTITUTION), solver.method.refinement)
-
-
-def _ray(solver: ExponentSolver, jump: int | None) -> int | None:
-    """The place of a jump, or of the only one; None where that is not told. Raises `ValueError` where there is none."""
-    count = len(solver.problem.system.jumps)
-    if jump is None:
-        return 0 if count == 1 else None
-    if not is_whole(jump, 0, count - 1):
-        raise ValueError(f"got jump = {shown(jump)}; must be a whole number from 0 to {count - 1}, or None")
-    return jump
-
-
-def _not_one_ray(solver: ExponentSolver) -> Absent:
-    return Absent(Message(Code.NOT_ONE_RAY, count=len(solver.problem.system.jumps) or None))
 
 
 def _flux(pair: PrincipalPair, number: int) -> float:
@@ -236,12 +223,10 @@ def _restitution_by_theory(problem: Problem) -> float:
     return system.impact_value(theory.critical_log_factor) if theory and len(system.jumps) == 1 else math.nan
 
 
-def _root(solver: ExponentSolver, guess: float | None) -> Estimate | Absent:
-    return nonzero_root(solver, guess=guess)
-
-
 LYAPUNOV_EXPONENT: Index = _index(quantity.LYAPUNOV_EXPONENT, lambda solver, _: solver.lyapunov_exponent())
-STABILITY_INDEX: Index = _index(quantity.STABILITY_INDEX, _root, SEARCH_INTERVAL)
+STABILITY_INDEX: Index = _index(
+    quantity.STABILITY_INDEX, lambda solver, guess: nonzero_root(solver, guess=guess), SEARCH_INTERVAL
+)
 VARIANCE_RATE = _index(quantity.VARIANCE_RATE, lambda solver, _: solver.variance_rate())
 IMPACT_RATE = _index(quantity.IMPACT_RATE, lambda solver, _: impact_rate(solver))
 CRITICAL_IMPACT_FACTOR = _index(quantity.CRITICAL_IMPACT_FACTOR, lambda solver, _: critical_impact_factor(solver))

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import KW_ONLY, dataclass, field, replace
 from functools import cached_property, partial
-from itertools import pairwise, repeat
+from itertools import pairwise
 from numbers import Real
 from typing import TYPE_CHECKING, Any
 
@@ -18,13 +18,12 @@ from fpsolve.arrays import FloatArray, real_number, real_numbers, shown
 from fpsolve.budget import Meter, begin
 from fpsolve.data import Result, dataset
 from fpsolve.errors import NoSuchExponent, NotConverged
-from fpsolve.exponent.curve import Curve, Node, polynomial, values
+from fpsolve.exponent.curve import Curve, polynomials, values
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.elements import doubt
-from fpsolve.exponent.error import Estimate, Failure, InvariantClass, Moment, checked
+from fpsolve.exponent.error import Estimate, Failure, InvariantClass, Moment
 from fpsolve.exponent.kinds import choose
 from fpsolve.exponent.method import BUDGET, TINIEST_P, Budget, Method, Settings, Tolerance, checked_moments, refuse
-from fpsolve.fem.factors import one_thread
 from fpsolve.fem.generator import SMALL_P
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import Code, Message, Remedy, message_of
@@ -66,11 +65,9 @@ class MomentLyapunov(Result):
             bound of rounding, at least half a unit in the last place of the value, shape (n,).
         residual: backward error of the eigenpairs, shape (n,); NaN where there is none.
         solver: what solved them.
-        warnings: on the p where `error_estimate` exceeds rtol.
         curves: of which these are values; none where each p was solved.
         root: where Λ(p)/p changes its sign, near δ_p; None where that is not among the p, or Λ was not interpolated.
         failures: why some p are missing, or none is to be trusted.
-        notes: on them.
     """
 
     p: FloatArray
@@ -79,15 +76,31 @@ class MomentLyapunov(Result):
     error_estimate: FloatArray
     residual: FloatArray
     solver: ExponentSolver
-    warnings: tuple[Message, ...] = ()
     curves: tuple[Curve, ...] = field(default=(), repr=False)
     root: float | None = None
     failures: tuple[Failure, ...] = ()
-    notes: tuple[Message, ...] = ()
 
     def __post_init__(self) -> None:
         least = 0.5 * np.spacing(np.abs(self.value))
         object.__setattr__(self, "error_estimate", np.maximum(self.error_estimate, least))
+
+    @cached_property
+    def warnings(self) -> tuple[Message, ...]:
+        """On the p where `error_estimate` exceeds rtol, and on what was solved."""
+        p, method, rtol = self.p, self.solver.method, self.solver.rtol
+        size = np.where(np.abs(p) < TINIEST_P, math.inf, np.maximum(np.abs(self.value), method.scales.moment(p)))
+        shares = self.error_estimate / size
+        found = method.doubts([p for curve in self.curves for p in curve.nodes.tolist()] or p.tolist())
+        if not (count := np.count_nonzero(shares > rtol)):
+            return found
+        worst, remedy = int(np.argmax(shares)), Remedy.ROUNDING if method.adapts else Remedy.MESH
+        at = {"p": p[worst], "size": shares[worst]}
+        return Message(Code.RTOL_MISSED, rtol=rtol, count=count, of=p.size, **at, remedy=remedy), *found
+
+    @cached_property
+    def notes(self) -> tuple[Message, ...]:
+        """What Λ(p) says of other numbers."""
+        return self.solver.method.bounds(self.p, self.value, self.error_estimate)
 
     @cached_property
     def derivative(self) -> FloatArray:
@@ -220,41 +233,33 @@ class ExponentSolver:
         """λ and Λ(p) of each part, for p < 0 too; nothing where there are none. Raises `NotConverged`."""
         return self.method.by_part(real_numbers(p, "p", may_be_empty=True))
 
-    def curves(
-        self, low: float, high: float, otherwise: Callable[..., Curve | None] = lambda *_: None
-    ) -> tuple[Curve, ...]:
-        """Λ on an interval, of two variables: a polynomial, or what does otherwise, in two where a saddle has a corner.
+    def curves(self, low: float, high: float, most: int) -> tuple[Curve, ...]:
+        """Λ on an interval, of two variables: polynomials on its halves, and theirs, where one is not enough.
 
         Args:
-            low, high: the interval.
-            otherwise: takes the arguments of `polynomial` where there is none.
+            low, high: the interval; it falls in two where a saddle has a corner.
+            most: number of polynomials for each of these.
 
         Raises:
-            NotConverged: there is none.
+            NotConverged: there are none.
         """
         ends, found = [low, high], list[Curve]()
-        if not self.method.is_function:
-            raise NotConverged(Message(Code.NO_FUNCTION, low=low, high=high))
         if low < -1 < high and not eigenvalues_at(self.problem, 0.0)[2]:
             ends.insert(1, -1.0)
         for start, end in pairwise(ends):
-            with one_thread():
-                curve = polynomial(self._node, start, end, self._allowed) or otherwise(
-                    self._node, start, end, self._allowed
-                )
-            if curve is None:
+            parts = polynomials(self._node, start, end, self._allowed, most) if self.method.is_function else []
+            if not parts:
                 raise NotConverged(Message(Code.NO_FUNCTION, low=low, high=high))
-            found.append(curve)
+            found += parts
         return tuple(found)
 
     def _allowed(self, p: float) -> float:
         """The largest error of Λ(p)/p, and of λ."""
-        return self.method.tolerance(max(abs(p), SMALL_P), 0.0) / max(abs(p), SMALL_P)
+        size = max(abs(p), SMALL_P)
+        return self.method.tolerance(size, 0.0) / size
 
-    def _node(self, p: float) -> Node:
-        tolerance = partial(share_of, NODES * self._allowed(p))
-        ratio, error = self.method.ratio_alone(p, tolerance)
-        return Node(ratio, error, self.method.solution(p, tolerance).derivative if p else ratio)
+    def _node(self, p: float) -> tuple[float, float]:
+        return self.method.ratio_alone(p, partial(share_of, NODES * self._allowed(p)))
 
     def moments(
         self,
@@ -274,45 +279,32 @@ class ExponentSolver:
             NoSuchExponent: Λ(p) is infinite for one of the p.
         """
         points = checked_moments(p, self.method, may_be_empty=True)
-        is_kept, known = known is not None, {} if known is None else known
-        rows, solved, failures = dict[int, Moment](), dict[int, PrincipalPair](), list[Failure]()
-        for i in best_order(points):
-            point = float(points[i])
-            begin(f"Λ({point:g})")
-            if self.method.goes_on and point in known and not math.isnan(known[point].derivative):
-                rows[i] = known[point]
-                if not math.isnan(rows[i].derivative_error):
-                    self.slope_errors.setdefault(point, rows[i].derivative_error)
-                progress()
-                continue
+        earlier = known.items() if known and self.method.goes_on else ()
+        rows = {q: row for q, row in earlier if not math.isnan(row.derivative)}
+        for q, row in rows.items():
+            if not math.isnan(row.derivative_error):
+                self.slope_errors.setdefault(q, row.derivative_error)
+        failures = dict[float, Failure]()
+        inwards = np.lexsort((-np.abs(points), points < 0))  # as a mesh for a large |p| serves smaller ones
+        for q in points[inwards].tolist():
+            begin(f"Λ({q:g})")
             try:
-                rows[i], pair = self.method.row(point)
-                known[point] = rows[i]
-                if pair is not None:
-                    solved[i] = pair
-                    if is_kept:
-                        known[point] = rows[i]._replace(derivative_error=self.slope_error(point))
+                if q not in rows:
+                    row = rows[q] = self.method.row(q)
+                    if known is not None:
+                        has_pair = not math.isnan(row.residual)
+                        known[q] = row._replace(derivative_error=self.slope_error(q)) if has_pair else row
             except NotConverged as failure:
-                if point:
-                    failures.append(Failure(point, failure.message))
+                if q:
+                    failures[q] = Failure(q, failure.message)
                 else:  # Λ(0) = 0 even so
-                    rows[i] = Moment(0.0, math.nan, math.nan, 0.0, math.nan)
+                    rows[q] = Moment(0.0, math.nan, math.nan, 0.0, math.nan)
             progress()
-        pairs, found = tuple(solved[i] for i in sorted(solved)), points[sorted(rows)]
-        value, slope, _, errors, residuals = np.array([rows[i] for i in sorted(rows)]).reshape(-1, 5).T
+        found = np.array([q for q in points.tolist() if q in rows])
+        value, slope, _, errors, residuals = np.array([rows[q] for q in found.tolist()]).reshape(-1, 5).T
         if self.method.reason(1.0):
             slope = np.full_like(slope, math.nan)  # of p = 0, beside which there is no Λ(p)
-        return MomentLyapunov(
-            p=found,
-            value=value,
-            slope=slope,
-            error_estimate=errors,
-            residual=residuals,
-            solver=self,
-            warnings=(*missed(self, found, value, errors), *self.method.doubts(pairs)),
-            failures=tuple(failures),
-            notes=self.method.bounds(found, value, errors),
-        )
+        return MomentLyapunov(found, value, slope, errors, residuals, self, failures=tuple(failures.values()))
 
     def slope(self, p: float) -> float:
         """Λ′(p) by eigenfunctions; NaN where these are not found, or there are none."""
@@ -352,23 +344,6 @@ def solver_of(
 def share_of(most: float, p: float, value: float) -> float:
     """The tolerance of Λ(p) that leaves Λ(p)/p an error of this at most."""
     return most * abs(p)
-
-
-def best_order(p: FloatArray) -> Any:
-    """Indices of p, inwards from the largest and then from the smallest: a mesh for a large |p| serves smaller ones."""
-    return np.lexsort((-np.abs(p), p < 0))
-
-
-def missed(solver: ExponentSolver, p: FloatArray, value: FloatArray, error: FloatArray) -> tuple[Message, ...]:
-    """A warning about the p at which the estimated error exceeds rtol, or nothing."""
-    size = np.where(np.abs(p) < TINIEST_P, math.inf, np.maximum(np.abs(value), solver.method.scales.moment(p)))
-    shares = error / size
-    count = np.count_nonzero(shares > solver.rtol)
-    if not count:
-        return ()
-    worst, remedy = int(np.argmax(shares)), Remedy.ROUNDING if solver.method.adapts else Remedy.MESH
-    found = {"p": p[worst], "size": shares[worst]}
-    return (Message(Code.RTOL_MISSED, rtol=solver.rtol, count=count, of=p.size, **found, remedy=remedy),)
 
 
 def moment_lyapunov(
@@ -418,7 +393,7 @@ def solve_moments(
 
     Args:
         solver: of the problem.
-        p: one moment, or an array of shape (n,), which here may be empty; equal ones are solved once.
+        p: one moment, or an array of shape (n,), which here may be empty.
         progress: called once for each p, whatever the number of solves.
         known: Λ(p) of an earlier run, by p; it takes each p that is solved before `progress` is called.
 
@@ -426,54 +401,29 @@ def solve_moments(
         NoSuchExponent: Λ(p) is infinite for one of the p.
     """
     asked = checked_moments(p, solver.method, may_be_empty=True)
-    points, reports = np.array([*dict.fromkeys(asked.tolist())], dtype=float), repeat(progress, asked.size)
-
-    def report() -> None:
-        next(reports, lambda: None)()
-
-    result = None
-    if points.size > FEW_MOMENTS:
+    if np.unique(asked).size > FEW_MOMENTS:
         with suppress(NotConverged):
-            result = interpolated(solver, solver.curves(float(points.min()), float(points.max())), points)
-            if result.warnings and solver.method.adapts:  # single solves round less
-                result = None
-    if result is None:
-        result = solver.moments(points, progress=report, known=known)
-        if not result.failures and (obstacle := _obstacle(result)):
-            told = message_of(obstacle).advising(solver.method.refinement)
-            result = replace(result, failures=(Failure(None, told),))
-    for each in reports:
-        each()
-    return result if points.size == asked.size else _at(result, asked)
-
-
-def _at(result: MomentLyapunov, p: FloatArray) -> MomentLyapunov:
-    """A result at p some of which are equal, without those that failed."""
-    places = {each: i for i, each in enumerate(result.p.tolist())}
-    index = [places[each] for each in p.tolist() if each in places]
-    names = ("p", "value", "slope", "error_estimate", "residual")
-    return replace(result, **{name: getattr(result, name)[index] for name in names})
+            result = interpolated(solver, solver.curves(float(asked.min()), float(asked.max()), 1), asked)
+            if not (result.warnings and solver.method.adapts):  # single solves round less
+                for _ in asked:
+                    progress()
+                return result
+    result = solver.moments(asked, progress=progress, known=known)
+    if not result.failures and (obstacle := _obstacle(result)):
+        reason = message_of(obstacle).advising(solver.method.refinement)
+        result = replace(result, failures=(Failure(None, reason),))
+    return result
 
 
 def interpolated(solver: ExponentSolver, curves: tuple[Curve, ...], p: FloatArray) -> MomentLyapunov:
     """Λ at several p by curves; the residual is the largest of the nodes. Raises `NotConverged` if they contradict."""
-    value, derivative, _, error, _ = values(curves, p)
+    value, slope, _, error, _ = values(curves, p)
     for i in np.flatnonzero(p):
-        estimate = Estimate(float(value[i]), float(error[i]), solver.method.scale(p[i]))
-        checked(estimate, solver.method.refinement, float(p[i]))
-    pairs = [solver.method.solution(each).pair for curve in curves for each in curve.nodes.tolist()]
-    found = MomentLyapunov(
-        p=p,
-        value=value,
-        slope=derivative,
-        error_estimate=error,
-        residual=np.full(p.size, max(pair.residual for pair in pairs)),
-        solver=solver,
-        warnings=(*missed(solver, p, value, error), *solver.method.doubts(pairs)),
-        curves=curves,
-        root=sign_change(p, value, derivative),
-        notes=solver.method.bounds(p, value, error),
-    )
+        solver.method.check(float(p[i]), float(value[i]), float(error[i]))
+    nodes = [p for curve in curves for p in curve.nodes.tolist()]
+    residual = np.full(p.size, max(solver.method.solution(node).pair.residual for node in nodes))
+    root = sign_change(p, value, slope)
+    found = MomentLyapunov(p, value, slope, error, residual, solver, curves=curves, root=root)
     if obstacle := _obstacle(found):
         raise NotConverged(obstacle, remedy=solver.method.refinement)
     return found
@@ -503,18 +453,16 @@ def broken_convexity(
 ) -> Message | None:
     """Where a point, or Λ(0) = 0, lies below a tangent by more than the errors explain; or None, as Λ(p) is convex.
 
-    Tangents are those of the 1st, 2nd, 4th, 8th … p on each side, and of p = 0. The errors of the slopes are asked for
-    where those of the values do not suffice.
+    Tangents are those of the 1st, 2nd, 4th, 8th … p on each side. The errors of the slopes are asked for where those of
+    the values do not suffice.
     """
     if not p.size:
         return None
-    order, at_zero = np.argsort(p), np.flatnonzero(p == 0)[:1]
-    value = np.append(np.where(p == 0, 0.0, value), 0.0)  # but for rounding
+    order, value = np.argsort(p), np.where(p == 0, 0.0, value)  # but for rounding
     sides = [(order[:-k], order[k:]) for k in 2 ** np.arange((p.size - 1).bit_length())]
-    pairs = [*sides, *(side[::-1] for side in sides), (order, np.full(p.size, p.size))]
-    pairs += [(np.repeat(at_zero, p.size), np.tile(order, at_zero.size))]
-    own, other = np.concatenate(pairs, axis=1)
-    away, errors = np.append(p, 0.0)[other] - p[own], np.append(errors, 0.0)
+    own, other = np.concatenate([*sides, *(side[::-1] for side in sides), (order, np.full(p.size, p.size))], axis=1)
+    p, value, errors = (np.append(each, 0.0) for each in (p, value, errors))
+    away = p[other] - p[own]
     above = value[other] - (value[own] + slope[own] * away)
     above = np.where(np.isfinite(above), above, math.inf)  # where no slope is known
     slack = 10 * (errors[own] + errors[other]) + 1e-6 * np.abs(value[other])
@@ -523,7 +471,7 @@ def broken_convexity(
     worst = np.argmin(above + slack)
     if not above[worst] < -slack[worst]:
         return None
-    return Message(Code.NOT_CONVEX, p=p[own[worst]], other=np.append(p, 0.0)[other[worst]])
+    return Message(Code.NOT_CONVEX, p=p[own[worst]], other=p[other[worst]])
 
 
 def contradiction(
@@ -542,7 +490,7 @@ def contradiction(
     for q in sorted({2.0, *p[(p > 0) & (p % 2 == 0)].tolist()} if p.size else ()):
         if not (known := solver.method.even(q)):
             continue
-        slack = np.array([doubt(error, known) for error in errors]) * np.maximum(1.0, np.abs(p) / q)
+        slack = doubt(errors, known) * np.maximum(1.0, np.abs(p) / q)
         above, rise = value - p / q * known.value, slope * (q - p)
         is_wrong = np.where((p > 0) & (p < q), above, -above) > slack
         too_steep = value + rise - known.value - slack - SLOPE_SHARE * np.abs(rise)

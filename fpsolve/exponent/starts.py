@@ -16,7 +16,7 @@ import numpy as np
 from fpsolve.arrays import Coefficient, one
 from fpsolve.exponent.eigen import BACKWARD_ERROR_LIMIT, PrincipalPair, principal_pair
 from fpsolve.exponent.error import Solution, mode_effects
-from fpsolve.fem.axis import MOST_DEGREE, KroneckerSum, ModeEffects
+from fpsolve.fem.axis import MOST_DEGREE, KroneckerSum
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.noise_axes import CellAxis, NoiseAxis, PolynomialAxis
 from fpsolve.fem.phase import PhaseAxis
@@ -71,11 +71,11 @@ class Start:
         """The pair with its error by its highest modes."""
         return Solution(pair)
 
-    def is_enough(self, solution: Solution) -> bool:
-        return True
-
     def doubled(self, failure: Exception | None) -> Start:
-        return replace(self, space=self.space.doubled(_effects_of(failure)))
+        """More functions along the axes that lack most, by the pair that a failed search has reached, if any."""
+        pair: Any = getattr(failure, "partial", None)
+        is_pair = pair is not None and pair.residual <= BACKWARD_ERROR_LIMIT
+        return replace(self, space=self.space.doubled(mode_effects(pair) if is_pair else ()))
 
     def refined(self, solution: Solution, goal: float, stages: int, most: int) -> Start:
         """A place on which each cell should lack no more than its share of an error.
@@ -98,12 +98,6 @@ class Start:
             if found.size <= most:
                 break
         return replace(self, space=found)
-
-
-def _effects_of(failure: Exception | None) -> Sequence[ModeEffects | None]:
-    """Those of the pair that a failed search has reached; nothing where there is none."""
-    pair = getattr(failure, "partial", None)
-    return mode_effects(pair) if pair is not None and pair.residual <= BACKWARD_ERROR_LIMIT else ()
 
 
 def first(problem: Problem, p: float, rtol: float, center: float | None = None) -> Space:
@@ -177,20 +171,20 @@ def other_centers(pair: PrincipalPair) -> list[float]:
     """
     noise = pair.generator.problem.coloured
     others = OTHERS.get(noise.basis) if len(noise.parts) == 1 else None
-    return others(pair) if others else []
+    return others(pair, pair.value - (1 - COMPARABLE) * abs(pair.value)) if others else []
 
 
-def _of_filters(pair: PrincipalPair) -> list[float]:
+def _of_filters(pair: PrincipalPair, least: float) -> list[float]:
     problem, center = pair.generator.problem, pair.space.xi.center
     z, rate = steady_places(problem, pair.p)
-    found: list[float] = z[(np.abs(z - center) > 5) & (rate > comparable(pair.value))][:1].tolist()
+    found: list[float] = z[(np.abs(z - center) > 5) & (rate > least)][:1].tolist()
     if center:
         amplitude, swinging = swing(problem, pair.p)
-        found += [0.0] * (amplitude > 5 and swinging > comparable(pair.value))
+        found += [0.0] * (amplitude > 5 and swinging > least)
     return found
 
 
-def _of_diffusions(pair: PrincipalPair) -> list[float]:
+def _of_diffusions(pair: PrincipalPair, least: float) -> list[float]:
     unit = pair.generator.problem.coloured.standard_deviation
     frozen = frozen_noise(pair.generator.problem)
     assert frozen is not None
@@ -199,12 +193,12 @@ def _of_diffusions(pair: PrincipalPair) -> list[float]:
         return []
     mean = tilted_mean(pair, lambda xi: xi / unit)
     width = math.sqrt(tilted_mean(pair, lambda xi: (xi / unit - mean) ** 2))
-    far = (np.abs(z - mean) > 3 * width + 2) & (rate > comparable(pair.value))
+    far = (np.abs(z - mean) > 3 * width + 2) & (rate > least)
     return [float(z[far][np.argmax(rate[far])])] if np.any(far) else []
 
 
 OTHERS = {"pairs": _of_filters, "polynomials": _of_diffusions}
-"""`other_centers` of one noise by its `basis`; of others there are none."""
+"""`other_centers` of one noise by its `basis`, that grow at a least rate; of others there are none."""
 
 
 def tilted_mean(pair: PrincipalPair, g: Coefficient) -> float:
@@ -226,8 +220,3 @@ def has_cones(problem: Problem) -> bool:
     phi = np.linspace(0, math.pi, ROUND, endpoint=False)
     turns = phase_speed(problem.motion, noise.reached)(phi[:, None])
     return bool(np.any(np.all(turns > 0, axis=1)) and np.any(np.all(turns < 0, axis=1)))
-
-
-def comparable(value: float) -> float:
-    """The growth rate from which on a place may outdo one with a value."""
-    return value - (1 - COMPARABLE) * abs(value)

@@ -27,11 +27,10 @@ import scipy.linalg
 from fpsolve.arrays import FloatArray
 from fpsolve.exponent.eigen import PrincipalPair, slope_rounding
 from fpsolve.exponent.error import Solution
-from fpsolve.exponent.modes import Directions, DirectionStart, first_order_changes, second_moments
+from fpsolve.exponent.modes import Directions, DirectionStart, framed, second_moments
 from fpsolve.exponent.moments import mean_matrix
 from fpsolve.exponent.starts import SHARE
 from fpsolve.fem.directions import HalfSphereAxis
-from fpsolve.fem.generator import Generator
 from fpsolve.model.plane import LinearMotion, Stop, rotating_coordinates
 from fpsolve.model.problem import Problem
 
@@ -100,7 +99,7 @@ class StopStart(DirectionStart):
         forms = second_moments(replace(problem, system=smooth), own)
         q, moments = (np.diagonal(each).reshape(2, 2).sum(axis=1) for each in forms)
         return HalfSphereAxis(
-            np.linalg.solve(np.array(problem.frame.matrix), own * np.repeat((moments / q) ** 0.25, 2)),
+            framed(problem, own * np.repeat((moments / q) ** 0.25, 2)),
             0.5 * math.pi * np.array(AT_STOP),
             FIRST_DEGREE,
             FIRST_WAVES,
@@ -116,14 +115,14 @@ class StopStart(DirectionStart):
         _, *of_noises = self.errors_of_axes(pair, allowed)
         phi, found = self.space.phi, list[float]()
         for finer in map(phi.deeper, phi.ways):
-            generator = Generator(self.problem, self.space.with_axis(0, finer))
-            changes = first_order_changes(pair, generator, 0)
+            changes = self.changes_by(pair, 0, finer)
             found.append(math.sqrt(float(abs(np.sum(changes)) * np.sum(np.abs(changes)))))
         left = float(self._left(found) @ found)
         for each in self.before:
             step, lacked = abs(pair.value - each.pair.value), sum(each.start.changes)
             left = max(left, OF_STEP * step, OF_LAST[not each.start.is_first] * lacked)
-        return Solution(pair, 0.0, (left, *of_noises), replace(self, changes=tuple(found)))
+        search = 0.0 if self.before else math.inf  # of one space
+        return Solution(pair, search, (left, *of_noises), replace(self, changes=tuple(found)))
 
     def _left(self, changes: Sequence[float]) -> FloatArray:
         """What is left over the change in each direction."""
@@ -133,9 +132,6 @@ class StopStart(DirectionStart):
     def _stalls(self, changes: Sequence[float]) -> bool:
         """Whether the last step made functions in η finer and left more than `STALLED` of what these change."""
         return any("degree" in self.tried and changes[0] > STALLED * each.start.changes[0] for each in self.before)
-
-    def is_enough(self, solution: Solution) -> bool:
-        return bool(self.before)
 
     def doubled(self, failure: Exception | None) -> StopStart:
         return StopStart(self.problem, self.space.with_axis(0, self.space.phi.enriched()))

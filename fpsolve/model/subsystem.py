@@ -109,6 +109,10 @@ class Subsystem(System):
     def quantity_of(self, name: str) -> Quantity:
         return self.whole.quantity_of(name)
 
+    def at(self, values: Mapping[str, float | str]) -> Subsystem:
+        """The same block of the whole with other values, which leave it one."""
+        return replace(self, whole=self.whole.at(values))
+
     def derivative(self, name: str) -> tuple[tuple[CoefficientMatrix, ...], tuple[float, ...]]:
         """The derivative of the whole system, in the coordinates of this block."""
         terms, jumps = self.whole.derivative(name)

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fpsolve.arrays import FloatArray
-from fpsolve.exponent.density import Fields, plane_fields, refuse_more, xi_marginal
+from fpsolve.exponent.density import Fields, own_phases, plane_fields, refuse_more, xi_marginal
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.fem.noise_axes import LineAxis, Samples
 from fpsolve.model.problem import Problem
@@ -67,21 +67,21 @@ class Nodes:
             OutputError: T depends on more than φ and ξ.
         """
         refuse_more(pair)
-        space = pair.space
-        degrees = int(np.max(space.phi.degrees)), int(np.max(space.xi.modes))
+        axis, xi = pair.space.phi, pair.space.xi
+        degrees = int(np.max(axis.degrees)), int(np.max(xi.modes))
         order = min(MAX_ORDER, max(degrees))
         problem = pair.generator.problem
-        starts = np.sort(np.mod(problem.frame.own_phase(space.phi.lines[:-1]), space.phi.span))
-        starts = np.concatenate([starts + k * space.phi.span for k in range(space.phi.turns)])
+        starts = np.sort(np.mod(own_phases(pair, axis.lines[:-1])[0], axis.span))
+        starts = np.concatenate([starts + k * axis.span for k in range(axis.turns)])
         breaks = np.concatenate([[0.0], starts[(starts > 1e-9) & (starts < 2 * math.pi - 1e-9)], [2 * math.pi]])
         phi = _nodes(breaks, order, finer * _parts(degrees[0], order))
         if problem.noise.has_states:
-            return Strips(phi, _nodes(np.arange(0.5, space.xi.size + 1), order, 1), problem, order)
+            return Strips(phi, _nodes(np.arange(0.5, xi.size + 1), order, 1), problem, order)
         lines = _z_lines(pair)
         # P_s is shown by quadrilaterals as high as a noise unit, or higher far out, as in algebraic tails
         inner = np.minimum(abs(lines[:-1]), abs(lines[1:]))
         tall = math.ceil(np.max(np.diff(lines) / np.maximum(1.0, inner / 6)) - 1e-9)
-        z = _nodes(lines, order, finer * max(tall, _parts(degrees[1] if space.xi.lines.size else 0, order)))
+        z = _nodes(lines, order, finer * max(tall, _parts(degrees[1] if xi.lines.size else 0, order)))
         return cls(phi, z, problem, order)
 
     @property

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fpsolve.exponent import principal_pair
-from fpsolve.exponent.curve import Node, polynomial, values
+from fpsolve.exponent.curve import polynomial, values
 from fpsolve.exponent.modes import SphereStart, modal_coordinates
 from fpsolve.exponent.solver import broken_convexity
 from fpsolve.fem.space import Space, first_axis
@@ -52,7 +52,7 @@ def test_no_corner_of_a_curve_is_passed_over(size, corner):
         return np.exp(0.1 * p) + size * np.maximum(p - corner, 0.0)
 
     p = np.linspace(-1, 1, 501)
-    curve = polynomial(lambda p: Node(ratio(p), 1e-12, ratio(p)), -1.0, 1.0, lambda p: 1e-8)
+    curve = polynomial(lambda p: (ratio(p), 1e-12), -1.0, 1.0, lambda p: 1e-8)
     assert curve or size > 1e-8
     found = values([curve] if curve else [], p)
     assert np.all(np.abs(found.value - p * ratio(p)) <= found.error + 1e-15) or not curve

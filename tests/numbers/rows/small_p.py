@@ -25,7 +25,7 @@ def least() -> Quantity:
         for _ in range(5):
             pair = solver.pair(p)
             p -= pair.derivative / second_derivative(pair)
-        found, _ = solver.method.row(p)
+        found = solver.method.row(p)
         return found.value, found.error
 
     return Quantity("min Λ", solved)
