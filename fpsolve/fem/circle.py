@@ -50,7 +50,7 @@ class CircleAxis(CountedAxis):
         return Rule(theta, np.full(count, 1 / count), self.values_at(theta))
 
     @cached_property
-    def xi(self) -> FloatArray:  # type: ignore[override]
+    def xi(self) -> FloatArray:
         return np.asarray(self.noise.of_angle(self.rule.points))
 
     def values_at(self, theta: FloatArray) -> FloatArray:

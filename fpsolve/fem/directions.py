@@ -95,7 +95,7 @@ class Angle:
     @property
     def fitted(self) -> FloatArray:
         """The matrix from values at `points` to coefficients, shape (size, m)."""
-        return np.linalg.pinv(self.at(self.points))
+        return np.asarray(np.linalg.pinv(self.at(self.points)), dtype=float)
 
 
 def signs(_: int) -> Angle:

@@ -464,7 +464,7 @@ class StateAxis(NoiseAxis):
         return self.xi.size
 
     @cached_property
-    def xi(self) -> FloatArray:  # type: ignore[override]
+    def xi(self) -> FloatArray:
         return np.array(self.noise.states)
 
     @cached_property

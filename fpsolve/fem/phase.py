@@ -176,7 +176,7 @@ class PhaseAxis(DividedAxis):
     def _cellwise(self, f: FloatArray, of_test: FloatArray, of_trial: FloatArray, order: int) -> FloatArray:
         """∫ f v u in each cell, from f at the points of its rule; v and u have so many derivatives together."""
         weights = f * self._table.weights / self._sizes[:, None] ** order
-        return np.asarray((weights[:, None] * of_test.T) @ of_trial)
+        return np.asarray(of_test.T @ (weights[:, :, None] * of_trial))
 
     def diffusion(self, a: CoefficientMatrix, b: CoefficientMatrix) -> tuple[Matrix, Matrix, Matrix]:
         """∫ w D_a D_b T, D = h ∂φ + p q of two matrices: the coefficients of p⁰, p¹ and p².

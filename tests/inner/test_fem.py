@@ -9,7 +9,6 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.sparse import csr_matrix
 
-from fpsolve.arrays import one
 from fpsolve.fem.axis import KroneckerSum
 from fpsolve.fem.directions import HalfSphereAxis, SphereAxis
 from fpsolve.fem.factors import ArrayFactors, LevelFactors, SparseFactors
@@ -112,9 +111,9 @@ def test_quadratic_forms_on_a_sphere_move_as_they_do(axis):
     u, driven, diffused, v = fitted(axis, q, moved(a, q), moved(b, moved(b, q)), test).T
     b = CoefficientMatrix(0, b)
     (free, growth), parts = axis.driven(CoefficientMatrix(0, a)), axis.diffusion(b, b)
-    assert v @ (free + 2 * growth) @ u == pytest.approx(v @ axis.matrix(one) @ driven, rel=1e-5)
+    assert v @ (free + 2 * growth) @ u == pytest.approx(v @ axis.mass() @ driven, rel=1e-5)
     twice = sum(2**k * each for k, each in enumerate(parts))
-    assert v @ twice @ u == pytest.approx(v @ axis.matrix(one) @ diffused, rel=1e-5)
+    assert v @ twice @ u == pytest.approx(v @ axis.mass() @ diffused, rel=1e-5)
 
 
 def test_impact_on_the_half_sphere_keeps_the_other_mode():
