@@ -1,3 +1,4 @@
+# mypy: allow-untyped-defs, allow-untyped-calls
 """The motion of a system with cubic terms, compiled: each bounce is found, as the motion depends on the amplitude.
 
 Nothing here knows of phases, generators or eigenvalues: with x and u, the two variables in one unit, it is
@@ -52,7 +53,7 @@ class CubicMotion(NamedTuple):
     rows: int | slice
 
     @staticmethod
-    def move(m, h, y, xi, log_norm, push, counted, rng):  # type: ignore[no-untyped-def]
+    def move(m, h, y, xi, log_norm, push, counted, rng):
         """One step as that of a `Driven`; counts impacts."""
         mean, rise = np.empty(y.shape[1]), np.empty(y.shape[1])
         drawn(m.step, xi[m.rows], mean, rise, push, rng)
@@ -83,7 +84,7 @@ def motion_of(system: System, step: Any, rows: int | slice = 0) -> tuple[CubicMo
 
 
 @inlined
-def _force(m, xi, x, u):  # type: ignore[no-untyped-def]
+def _force(m, xi, x, u):
     """What the equation has besides the rotation with ω."""
     a, b, c, square = m.steady, m.driven, m.cubic, u * u
     f = (a[0] + xi * b[0] + (c[0] * x + c[1] * u) * x + c[2] * square) * x + (a[1] + xi * b[1] + c[3] * square) * u
@@ -92,13 +93,13 @@ def _force(m, xi, x, u):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def _bound(m, xi, rise, x, u):  # type: ignore[no-untyped-def]
+def _bound(m, xi, rise, x, u):
     """A bound of its rate in the step; where damping and drive cancel, their sizes still limit the step."""
     return m.sizes[0] + m.sizes[1] * (abs(xi) + abs(rise)) + m.sizes[2] * (x * x + u * u)
 
 
 @inlined
-def _runge_kutta(m, h, x, u, xi, rise):  # type: ignore[no-untyped-def]
+def _runge_kutta(m, h, x, u, xi, rise):
     """One step of Lawson's fourth-order rule under noise of mean `xi` that rises by 2 `rise`."""
     half_cos, half_sin = math.cos(0.5 * m.omega * h), math.sin(0.5 * m.omega * h)
     cos, sin = half_cos * half_cos - half_sin * half_sin, 2 * half_cos * half_sin
@@ -118,13 +119,13 @@ def _runge_kutta(m, h, x, u, xi, rise):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def _part(m, x, u, xi, rise, h, t, s):  # type: ignore[no-untyped-def]
+def _part(m, x, u, xi, rise, h, t, s):
     """The part from t to t + s of a step of length h."""
     return _runge_kutta(m, s, x, u, xi + rise * (2 * t + s - h) / h, rise * s / h)
 
 
 @compiled
-def _impact(m, x, u, xi, rise, h, t, s, beyond):  # type: ignore[no-untyped-def]
+def _impact(m, x, u, xi, rise, h, t, s, beyond):
     """The time from t to the impact, and u before it, by Newton's method inside a bracket; `beyond` is x at t + s."""
     low, high, at = 0.0, s, s * x / (x - beyond)
     u1 = u
@@ -142,7 +143,7 @@ def _impact(m, x, u, xi, rise, h, t, s, beyond):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def move(m, h, y, mean, rise):  # type: ignore[no-untyped-def]
+def move(m, h, y, mean, rise):
     """Move paths by one step of length h, in place, in parts that see each impact; returns how many there were.
 
     Args:
@@ -168,9 +169,7 @@ def move(m, h, y, mean, rise):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def advance_and_count(  # type: ignore[no-untyped-def]
-    m, h, y, xi, log_norm, push, counted, steps, looks, reach, plane, radial, sums, rng
-):
+def advance_and_count(m, h, y, xi, log_norm, push, counted, steps, looks, reach, plane, radial, sums, rng):
     """Advance paths, and after every `steps` steps count the states with an amplitude below `reach`, if that is > 0."""
     scale = radial.size / reach if reach > 0 else 0.0
     for _ in range(looks):

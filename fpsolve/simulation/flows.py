@@ -1,3 +1,4 @@
+# mypy: allow-untyped-defs, allow-untyped-calls
 """Linear motions of any number of variables, compiled: flows exp(A t)x, and the lines that they cross.
 
 The exponential of a matrix is the sum of its series where it is small, and is taken in parts where it is not, so that
@@ -27,21 +28,21 @@ _HUGE = 1e100
 
 
 @compiled
-def load(y, i, state):  # type: ignore[no-untyped-def]
+def load(y, i, state):
     """Take the state of one path out of those of all."""
     for r in range(state.size):
         state[r] = y[r, i]
 
 
 @compiled
-def store(y, i, state):  # type: ignore[no-untyped-def]
+def store(y, i, state):
     """Put it back."""
     for r in range(state.size):
         y[r, i] = state[r]
 
 
 @compiled
-def multiplied(matrix, state, other):  # type: ignore[no-untyped-def]
+def multiplied(matrix, state, other):
     """Multiply a state by a matrix, in place; `other` is room for one more."""
     n = state.size
     for r in range(n):
@@ -53,7 +54,7 @@ def multiplied(matrix, state, other):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def tamed(state):  # type: ignore[no-untyped-def]
+def tamed(state):
     """Bring a state that is about to overflow to the norm 1; returns the logarithm of what it had."""
     largest = 0.0
     for r in range(state.size):
@@ -66,7 +67,7 @@ def tamed(state):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _terms(size):  # type: ignore[no-untyped-def]
+def _terms(size):
     """How many terms of the series of the exponential of a matrix of this norm count."""
     count, rest = 1, size
     while rest > _REST:
@@ -76,13 +77,13 @@ def _terms(size):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def _side(rays, j, x, u):  # type: ignore[no-untyped-def]
+def _side(rays, j, x, u):
     """The distance from a line, with a sign."""
     return rays.across[j, 0] * x + rays.across[j, 1] * u
 
 
 @inlined
-def _crossings(rays, j, x, u, x1, u1):  # type: ignore[no-untyped-def]
+def _crossings(rays, j, x, u, x1, u1):
     """How often a line is crossed from x to x₁, which is not far; against its way it counts −1."""
     before, after = _side(rays, j, x, u) >= 0, _side(rays, j, x1, u1) >= 0
     if before == after:
@@ -92,7 +93,7 @@ def _crossings(rays, j, x, u, x1, u1):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def crossed(rays, begun, state, counted):  # type: ignore[no-untyped-def]
+def crossed(rays, begun, state, counted):
     """Count the lines that are crossed from one state to another, which is not far; returns the growth at them."""
     log = 0.0
     for j in range(rays.logs.size):
@@ -103,7 +104,7 @@ def crossed(rays, begun, state, counted):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def flow(rays, matrix, t, size, state, counted, other, begun):  # type: ignore[no-untyped-def]
+def flow(rays, matrix, t, size, state, counted, other, begun):
     """exp(A t) x in place, ‖A‖ ≤ size, in parts; returns the growth of the norm beyond that of the state."""
     reach, log, n = abs(t) * size, 0.0, state.size
     if not reach < _LIMIT * _MOST_PARTS:
@@ -125,7 +126,7 @@ def flow(rays, matrix, t, size, state, counted, other, begun):  # type: ignore[n
 
 
 @compiled
-def step_driven(matrices, wall, h, y, mean, rise, log_norm, counted, rng):  # type: ignore[no-untyped-def]
+def step_driven(matrices, wall, h, y, mean, rise, log_norm, counted, rng):
     """Move paths by one step of length h, in place, in parts where it is large.
 
     Args:
@@ -160,7 +161,7 @@ def step_driven(matrices, wall, h, y, mean, rise, log_norm, counted, rng):  # ty
 
 
 @compiled
-def _step(matrices, rays, h, y, mean, rise, log_norm, counted, begun, sizes, most):  # type: ignore[no-untyped-def]
+def _step(matrices, rays, h, y, mean, rise, log_norm, counted, begun, sizes, most):
     """One step of the paths whose ‖Ω‖ is below the most; where it was begun, and ‖Ω‖² of all, in the last arrays."""
     n, paths, lever = y.shape[0], y.shape[1], -h * h / 6
     omega, after = np.empty((n, n, paths)), np.empty((n, paths))
@@ -190,7 +191,7 @@ def _step(matrices, rays, h, y, mean, rise, log_norm, counted, begun, sizes, mos
 
 
 @compiled
-def _summed(omega, terms, begun, now, after):  # type: ignore[no-untyped-def]
+def _summed(omega, terms, begun, now, after):
     """exp Ω of all paths times what was begun with, by so many terms of its series; now is that in the beginning."""
     n, paths = begun.shape
     for k in range(terms, 0, -1):

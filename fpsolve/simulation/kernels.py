@@ -1,3 +1,4 @@
+# mypy: allow-untyped-defs, allow-untyped-calls
 """All paths of a batch, compiled: their steps, their growth, their weights, and how they are drawn anew.
 
 Sums and assignments are loops: those of whole arrays take numba seconds to compile, most for words of their errors.
@@ -23,7 +24,7 @@ _RESAMPLED = 0.5
 
 
 @compiled
-def _normalise(y, log_norm):  # type: ignore[no-untyped-def]
+def _normalise(y, log_norm):
     """Bring all states to the norm 1."""
     norms = np.zeros(y.shape[1])
     for r in range(y.shape[0]):
@@ -38,7 +39,7 @@ def _normalise(y, log_norm):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def advance(m, h, y, xi, log_norm, push, counted, steps, interval, rng):  # type: ignore[no-untyped-def]
+def advance(m, h, y, xi, log_norm, push, counted, steps, interval, rng):
     """Advance paths by `steps` steps of length h, in place.
 
     Args:
@@ -54,13 +55,13 @@ def advance(m, h, y, xi, log_norm, push, counted, steps, interval, rng):  # type
         part = slice(first, min(first + CHUNK, log_norm.size))
         ys, xis, logs, pushes = y[:, part], xi[:, part], log_norm[part], push[part]
         for step in range(1, steps + 1):
-            move(m, h, ys, xis, logs, pushes, counted, rng)  # type: ignore[no-untyped-call]
+            move(m, h, ys, xis, logs, pushes, counted, rng)
             if interval > 0 and (step % interval == 0 or step == steps):
                 _normalise(ys, logs)
 
 
 @compiled
-def add_windows(log_norm, starts, number, p, log_sums, log_squares):  # type: ignore[no-untyped-def]
+def add_windows(log_norm, starts, number, p, log_sums, log_squares):
     """Add Σ w and Σ w² of the windows of 2ʲ slices that end with this number of slices to sums kept as logarithms."""
     for j in range(starts.shape[0]):
         if number % (1 << j) == 0:
@@ -79,7 +80,7 @@ def add_windows(log_norm, starts, number, p, log_sums, log_squares):  # type: ig
 
 
 @compiled
-def advance_population(  # type: ignore[no-untyped-def]
+def advance_population(
     m, h, y, xi, log_norm, push, counted, log_weights, ancestors, exponents, steps, interval, log_z, rng
 ):
     """Advance a population by some steps; the weights are looked at after every `interval` steps."""
@@ -97,7 +98,7 @@ def advance_population(  # type: ignore[no-untyped-def]
 
 
 @compiled
-def close_slice(log_weights, ancestors, log_z):  # type: ignore[no-untyped-def]
+def close_slice(log_weights, ancestors, log_z):
     """The growth of ln Z in a slice of a population, and how many paths of its beginning carry it; begins the next."""
     n = log_weights.size
     largest = _largest(log_weights)
@@ -116,7 +117,7 @@ def close_slice(log_weights, ancestors, log_z):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _resample(y, xi, log_weights, ancestors, rng):  # type: ignore[no-untyped-def]
+def _resample(y, xi, log_weights, ancestors, rng):
     """Draw the paths anew if their weights differ too much, systematically; returns ln of the mean weight."""
     n = log_weights.size
     largest = _largest(log_weights)
@@ -147,7 +148,7 @@ def _resample(y, xi, log_weights, ancestors, rng):  # type: ignore[no-untyped-de
 
 
 @compiled
-def _choose(values, chosen):  # type: ignore[no-untyped-def]
+def _choose(values, chosen):
     """The values with these numbers, in place."""
     old = values.copy()
     for i in range(values.size):
@@ -155,7 +156,7 @@ def _choose(values, chosen):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _largest(values):  # type: ignore[no-untyped-def]
+def _largest(values):
     largest = -math.inf
     for i in range(values.size):
         largest = max(largest, values[i])

@@ -1,3 +1,4 @@
+# mypy: allow-untyped-defs, allow-untyped-calls
 """What moves paths, compiled: each noise with its share of A₀ by itself, in turn, between what happens to a path.
 
 Under a diffusion A(ξ) = A₀ + ξ A₁. A step of length h knows the mean m of ξ and, from its ends, the slope 2r/h of a
@@ -38,43 +39,43 @@ from fpsolve.simulation.stops import flow_to_floor, step_to_floor
 from fpsolve.simulation.walls import Floor, Rays
 
 
-def _draw(step, xi, xi_mean, xi_end, push, rng):  # type: ignore[no-untyped-def]
+def _draw(step, xi, xi_mean, xi_end, push, rng):
     """`draw` of the class of a step; this is what numba replaces by it."""
     raise NotImplementedError
 
 
 @overload(_draw)
-def _drawn_by_its_kind(step, xi, xi_mean, xi_end, push, rng):  # type: ignore[no-untyped-def]
+def _drawn_by_its_kind(step, xi, xi_mean, xi_end, push, rng):
     return step.instance_class.draw
 
 
 @compiled
-def draw(step, xi, xi_mean, xi_end, push, rng):  # type: ignore[no-untyped-def]
+def draw(step, xi, xi_mean, xi_end, push, rng):
     """The mean and the end of the noise in one step that begins at `xi`, see `Noise.step`."""
-    _draw(step, xi, xi_mean, xi_end, push, rng)  # type: ignore[no-untyped-call]
+    _draw(step, xi, xi_mean, xi_end, push, rng)
 
 
-def _first_row(state):  # type: ignore[no-untyped-def]
+def _first_row(state):
     """ξ of the state of a noise; this is what numba replaces."""
     raise NotImplementedError
 
 
 @overload(_first_row)
-def _first_row_by_shape(state):  # type: ignore[no-untyped-def]
+def _first_row_by_shape(state):
     return (lambda state: state) if state.ndim == 1 else (lambda state: state[0])
 
 
 @compiled
-def drawn(step, state, xi_mean, xi_rise, push, rng):  # type: ignore[no-untyped-def]
+def drawn(step, state, xi_mean, xi_rise, push, rng):
     """Move the state of a noise by one step, in which ξ is about mean + rise (2t/h − 1)."""
     draw(step, state, xi_mean, xi_rise, push, rng)
-    xi = _first_row(state)  # type: ignore[no-untyped-call]
+    xi = _first_row(state)
     for i in range(xi.size):
         xi[i], xi_rise[i] = xi_rise[i], 0.5 * (xi_rise[i] - xi[i])
 
 
 @inlined
-def _picked(reached, rng):  # type: ignore[no-untyped-def]
+def _picked(reached, rng):
     """A random number of a law, whose chances up to each are given."""
     mark, k = rng.random(), 0
     while reached[k] < mark:
@@ -94,7 +95,7 @@ class Driven(NamedTuple):
     rows: int | slice
 
     @staticmethod
-    def move(m, h, y, xi, log_norm, push, counted, rng):  # type: ignore[no-untyped-def]
+    def move(m, h, y, xi, log_norm, push, counted, rng):
         """One step of length h, in place.
 
         Args:
@@ -107,7 +108,7 @@ class Driven(NamedTuple):
         """
         mean, rise = np.empty(y.shape[1]), np.empty(y.shape[1])
         drawn(m.step, xi[m.rows], mean, rise, push, rng)
-        _step(m.matrices, m.wall, h, y, mean, rise, log_norm, counted, rng)  # type: ignore[no-untyped-call]
+        _step(m.matrices, m.wall, h, y, mean, rise, log_norm, counted, rng)
 
 
 class Switched(NamedTuple):
@@ -122,7 +123,7 @@ class Switched(NamedTuple):
     rows: int | slice
 
     @staticmethod
-    def move(m, h, y, xi, log_norm, push, counted, rng):  # type: ignore[no-untyped-def]
+    def move(m, h, y, xi, log_norm, push, counted, rng):
         """One step, of the length h of `whole`, as that of a `Driven`, with the number of a state in place of ξ."""
         states, chain, n = xi[m.rows], m.step, y.shape[0]
         state, other, begun = np.empty(n), np.empty(n), np.empty(n)
@@ -131,7 +132,7 @@ class Switched(NamedTuple):
             load(y, i, state)
             while left > 0:
                 stay = rng.standard_exponential() / chain.leaving[k]
-                log_norm[i] += _flow(m.wall, m, k, min(stay, left), h, state, counted, other, begun)  # type: ignore[no-untyped-call]
+                log_norm[i] += _flow(m.wall, m, k, min(stay, left), h, state, counted, other, begun)
                 left -= stay
                 if left > 0:
                     k = _picked(chain.reached[k], rng)
@@ -141,29 +142,29 @@ class Switched(NamedTuple):
             states[i] = k
 
 
-def _step(matrices, wall, h, y, mean, rise, log_norm, counted, rng):  # type: ignore[no-untyped-def]
+def _step(matrices, wall, h, y, mean, rise, log_norm, counted, rng):
     """One step under a line of ξ; this is what numba replaces by what the wall needs."""
     raise NotImplementedError
 
 
 @overload(_step)
-def _step_by_wall(matrices, wall, h, y, mean, rise, log_norm, counted, rng):  # type: ignore[no-untyped-def]
+def _step_by_wall(matrices, wall, h, y, mean, rise, log_norm, counted, rng):
     return (step_to_floor if wall.instance_class is Floor else step_driven).py_func
 
 
-def _flow(wall, m, k, t, h, state, counted, other, begun):  # type: ignore[no-untyped-def]
+def _flow(wall, m, k, t, h, state, counted, other, begun):
     """The motion in a state of a chain; this is what numba replaces by what the wall needs."""
     raise NotImplementedError
 
 
 @overload(_flow)
-def _flow_by_wall(wall, m, k, t, h, state, counted, other, begun):  # type: ignore[no-untyped-def]
+def _flow_by_wall(wall, m, k, t, h, state, counted, other, begun):
     if wall.instance_class is Floor:
         return lambda wall, m, k, t, h, state, counted, other, begun: flow_to_floor(
             wall, m.matrices[k], t, m.sizes[k], state, counted
         )
 
-    def over_rays(wall, m, k, t, h, state, counted, other, begun):  # type: ignore[no-untyped-def]
+    def over_rays(wall, m, k, t, h, state, counted, other, begun):
         if t < h or m.sizes[k] * h > 1:
             return flow(wall, m.matrices[k], t, m.sizes[k], state, counted, other, begun)
         for r in range(state.size):
@@ -182,7 +183,7 @@ class InTurn(NamedTuple):
     rows: FloatArray
 
     @staticmethod
-    def move(m, h, y, xi, log_norm, push, counted, rng):  # type: ignore[no-untyped-def]
+    def move(m, h, y, xi, log_norm, push, counted, rng):
         """One step as that of a `Driven`, of paths that take the noises in one order."""
         n, paths, past = m.size, y.shape[1], m.rows.size
         state = np.empty((n + past, paths))
@@ -194,37 +195,37 @@ class InTurn(NamedTuple):
             for c in range(past):
                 state[n + c, i] = y[m.rows[c] - later, i]
         is_forward = len(m.motions) == 1 or rng.random() < 0.5
-        _move_all(m.motions, is_forward, h, state, xi, log_norm, push, counted, rng)  # type: ignore[no-untyped-call]
+        _move_all(m.motions, is_forward, h, state, xi, log_norm, push, counted, rng)
         for r in range(y.shape[0] - 1, -1, -1):
             for i in range(paths):
                 y[r, i] = state[r, i] if r < n else y[r - n, i]
 
 
-def move(m, h, y, xi, log_norm, push, counted, rng):  # type: ignore[no-untyped-def]
+def move(m, h, y, xi, log_norm, push, counted, rng):
     """One step of any motion, see `Driven`; this is what numba replaces by `move` of its class."""
     raise NotImplementedError
 
 
 @overload(move)
-def _moved_by_its_kind(m, h, y, xi, log_norm, push, counted, rng):  # type: ignore[no-untyped-def]
+def _moved_by_its_kind(m, h, y, xi, log_norm, push, counted, rng):
     return m.instance_class.move
 
 
-def _move_all(motions, is_forward, h, y, xi, log_norm, push, counted, rng):  # type: ignore[no-untyped-def]
+def _move_all(motions, is_forward, h, y, xi, log_norm, push, counted, rng):
     """Motions in one order or in the other; this is what numba replaces, as each is of a type of its own."""
     raise NotImplementedError
 
 
 @overload(_move_all)
-def _moved_one_by_one(motions, is_forward, h, y, xi, log_norm, push, counted, rng):  # type: ignore[no-untyped-def]
+def _moved_one_by_one(motions, is_forward, h, y, xi, log_norm, push, counted, rng):
     if len(motions.types) == 0:
         return lambda motions, is_forward, h, y, xi, log_norm, push, counted, rng: None
 
-    def one_and_the_rest(motions, is_forward, h, y, xi, log_norm, push, counted, rng):  # type: ignore[no-untyped-def]
+    def one_and_the_rest(motions, is_forward, h, y, xi, log_norm, push, counted, rng):
         if is_forward:
-            move(motions[0], h, y, xi, log_norm, push, counted, rng)  # type: ignore[no-untyped-call]
-        _move_all(motions[1:], is_forward, h, y, xi, log_norm, push, counted, rng)  # type: ignore[no-untyped-call]
+            move(motions[0], h, y, xi, log_norm, push, counted, rng)
+        _move_all(motions[1:], is_forward, h, y, xi, log_norm, push, counted, rng)
         if not is_forward:
-            move(motions[0], h, y, xi, log_norm, push, counted, rng)  # type: ignore[no-untyped-call]
+            move(motions[0], h, y, xi, log_norm, push, counted, rng)
 
     return one_and_the_rest

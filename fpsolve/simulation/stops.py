@@ -1,3 +1,4 @@
+# mypy: allow-untyped-defs, allow-untyped-calls
 """Linear motions of three or more variables with a wall at rest for one of them, compiled: each impact is found.
 
 In the coordinates of a `Stop` the first variable is q ≥ 0, the second q̇, and an impact is q̇⁺ = −R q̇⁻ where q = 0.
@@ -39,7 +40,7 @@ _RELEASED = 1e-4
 
 
 @compiled
-def step_to_floor(matrices, wall, h, y, mean, rise, log_norm, counted, rng):  # type: ignore[no-untyped-def]
+def step_to_floor(matrices, wall, h, y, mean, rise, log_norm, counted, rng):
     """Move paths by one step of length h, in place, as `step_driven` does; only A₀ and A₁ of the matrices are used."""
     n, parts = y.shape[0], np.empty((_MOST_SPLIT + 2, 3))
     matrix, state = np.empty((n, n)), np.empty(n)
@@ -75,7 +76,7 @@ def step_to_floor(matrices, wall, h, y, mean, rise, log_norm, counted, rng):  # 
 
 
 @compiled
-def flow_to_floor(wall, matrix, t, size, state, counted):  # type: ignore[no-untyped-def]
+def flow_to_floor(wall, matrix, t, size, state, counted):
     """exp(A t) y in place with impacts, ‖A‖ ≤ size; counts the fast ones, and the time at rest. Returns 0."""
     n, is_released, series = state.size, False, np.empty((_MOST_TERMS + 1, state.size + 1))
     state[0] = abs(state[0])  # the start is on either side
@@ -111,7 +112,7 @@ def flow_to_floor(wall, matrix, t, size, state, counted):  # type: ignore[no-unt
 
 
 @compiled
-def _force(matrix, state):  # type: ignore[no-untyped-def]
+def _force(matrix, state):
     """q̈ of a state, or of a term of its series."""
     total = 0.0
     for c in range(matrix.shape[0]):
@@ -120,7 +121,7 @@ def _force(matrix, state):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _expand(matrix, state, d, is_held, series):  # type: ignore[no-untyped-def]
+def _expand(matrix, state, d, is_held, series):
     """The terms (A d)ᵏ y/k! of y(d τ), q held or not; returns how many count."""
     n, least, last, k = state.size, 0.0, math.inf, 0
     for r in range(n):
@@ -140,7 +141,7 @@ def _expand(matrix, state, d, is_held, series):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _first_zero(series, terms, begin):  # type: ignore[no-untyped-def]
+def _first_zero(series, terms, begin):
     """The first τ from `begin` on at which a power series is 0, 1 where it is positive up to 1."""
     bend, size, at = 0.0, 0.0, begin
     for k in range(terms):
