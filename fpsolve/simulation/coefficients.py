@@ -277,7 +277,7 @@ def coefficients(system: System, noise: Noise) -> Coefficients:
         even = np.diag(1 / _balance(folded.T @ every @ folded, 0.0)[variables])
     else:
         even = _even_coordinates(free, every)
-    back = np.linalg.inv(even)
+    back = np.asarray(np.linalg.inv(even), dtype=float)
     free, steady, loads = even @ free @ back, even @ steady @ back, [each.turned(even, back) for each in loads]
     half_turn = math.pi / _rate(free, sum(each.fluctuation**2 * each.time for each in loads))
     wall: Rays | Floor = _rays(system, even, steady)
