@@ -7,19 +7,16 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass, replace
 from threading import Event
-from typing import Any
 
 import numpy as np
 from numpy.random import SeedSequence, default_rng
 
 from fpsolve.arrays import FloatArray
-from fpsolve.model.noise import Noise
 from fpsolve.pool import processors
-from fpsolve.simulation.coefficients import Coefficients, SplitCoefficients, starting_state
-from fpsolve.simulation.kernels import RENORMALISED, TALLIES, add_windows, advance, advance_population, close_slice
-from fpsolve.simulation.motions import DrivenMotion, SwitchedMotion
+from fpsolve.simulation.coefficients import Coefficients, starting_state
+from fpsolve.simulation.kernels import RENORMALISED, add_windows, advance, advance_population, close_slice
+from fpsolve.simulation.motions import InTurn
 from fpsolve.simulation.setup import PROGRESS_STEPS, Estimator
-from fpsolve.simulation.spaces import DrivenSpace, SwitchedSpace
 
 _PORTION_SECONDS = 0.1
 STEP_SECONDS = 2e-8
@@ -36,7 +33,7 @@ class Plan:
 
     Attributes:
         known: the matrices of the problem, and its noise.
-        motion, noise_step, step: the motion, one step of the noise, and its length.
+        motion, step: what moves the paths, and the length of one step.
         p: orders of the moments, shape (n,).
         paths: in one batch.
         slice_steps: steps in one slice, the unit in which batches are advanced: one transient, of populations beyond
@@ -47,8 +44,7 @@ class Plan:
     """
 
     known: Coefficients
-    motion: DrivenMotion | SwitchedMotion | DrivenSpace | SwitchedSpace
-    noise_step: Any
+    motion: InTurn
     step: float
     p: FloatArray
     estimator: Estimator
@@ -57,11 +53,6 @@ class Plan:
     settling: int
     wanted: int
     levels: int
-
-    @property
-    def noise(self) -> Noise:
-        """The process."""
-        return self.known.noise
 
     @property
     def length(self) -> float:
@@ -74,7 +65,7 @@ class Plan:
         known, count = self.known, self.known.together
         h = count * self.step
         steps = self.slice_steps // count
-        return replace(self, motion=known.motion(h), noise_step=known.noise_step(h), step=h, slice_steps=steps)
+        return replace(self, motion=known.motion(h), step=h, slice_steps=steps)
 
     @property
     def slice_seconds(self) -> float:
@@ -94,16 +85,14 @@ class _Paths:
 
     Attributes:
         slices: how many are done after those.
+        counted: how many bounces there were after those; at a wall of several variables see `Floor`.
     """
 
     def __init__(self, plan: Plan, seed: SeedSequence) -> None:
         self.plan, self.rng = plan, default_rng(seed)
-        size = plan.known.size(plan.step)
-        self.x, self.u, self.xi = starting_state(plan.noise, plan.paths, self.rng, dimension=size)
-        if isinstance(plan.known, SplitCoefficients):  # whose noises have a row each
-            self.xi = np.atleast_2d(self.xi)
-        self.log_norm, self.push = np.zeros((2, plan.paths))
-        self.state = self.x, self.u, self.xi, self.log_norm, self.push
+        self.y, self.xi = starting_state(plan.known.noise, plan.paths, self.rng, plan.known.size(plan.step))
+        self.log_norm, self.counted = np.zeros(plan.paths), np.zeros(2)
+        self.state = self.y, self.xi, self.log_norm, np.zeros(plan.paths), self.counted
         self.slices = -plan.settling
 
     def advance(self, slices: int, stop: Event) -> None:
@@ -132,7 +121,6 @@ class PlainBatch(_Paths):
     Attributes:
         log_sums, log_squares: ln Σ w and ln Σ w² over paths and windows, w = ‖x(end)‖^p/‖x(start)‖^p, of shape
             (levels, p).
-        impacts: how many bounces there were; see `stops` of a wall of several variables.
         growth, variance: mean and variance of ln‖x‖ over the paths at the end of the last slice.
     """
 
@@ -141,17 +129,15 @@ class PlainBatch(_Paths):
         self.starts = np.zeros((plan.levels, plan.paths))
         self.log_sums = np.full((plan.levels, plan.p.size), -math.inf)
         self.log_squares = self.log_sums.copy()
-        self.impacts: complex = 0
         self.growth = self.variance = 0.0
 
     def _move(self, steps: int) -> None:
         plan = self.plan
-        impacts = advance(plan.motion, plan.noise_step, plan.step, *self.state, steps, RENORMALISED, self.rng)
-        self.impacts += impacts if self.slices >= 0 else 0
+        advance(plan.motion, plan.step, *self.state, steps, RENORMALISED, self.rng)
 
     def _close(self) -> None:
         if self.slices < 0:
-            self.log_norm[:] = 0
+            self.log_norm[:] = self.counted[:] = 0
             return
         add_windows(self.log_norm, self.starts, self.slices + 1, self.plan.p, self.log_sums, self.log_squares)
         self.growth, self.variance = float(np.mean(self.log_norm)), float(np.var(self.log_norm))
@@ -169,17 +155,17 @@ class Population(_Paths):
 
     Attributes:
         bias: b, which stays 0 where exp(b ξ) has no mean.
-        expected: growth of ln Z in a slice, about.
-        tallies: of the slices after settling, one record of `TALLIES`, shape (1,).
+        found: the growth of ln Z in each slice after settling, and how many paths of its beginning carry it, shape (2,
+            slices).
     """
 
     def __init__(self, plan: Plan, seed: SeedSequence, p: float, *, is_far: bool) -> None:
         super().__init__(plan, seed)
-        self.p, self.bias, self.expected = p, 0.0, 0.0
-        self._is_biased = p != 0 and self.xi.ndim == 1 and plan.noise.may_tilt
+        self.p, self.bias, self.found = p, 0.0, np.empty((2, plan.wanted))
+        self._is_biased = p != 0 and plan.known.noise.may_tilt
         if is_far and self._is_biased:
-            self.bias = p * plan.known.strength * plan.noise.relaxation_time
-        self.tallies = np.zeros(1, TALLIES)
+            self.bias = p * plan.known.strength * plan.known.noise.relaxation_time
+        self._motion = plan.known.motion(plan.step, self.bias)
         self._log_weights, self._ancestors = np.zeros(plan.paths), np.arange(plan.paths)
         self._log_z = np.zeros(2)  # of the weights that have been reset, and of all at the last slice
         exponent = abs(p) * plan.known.spread(plan.step)
@@ -187,30 +173,33 @@ class Population(_Paths):
 
     def _move(self, steps: int) -> None:
         plan = self.plan
-        bonus = 0.5 * (plan.noise.diffusion * self.bias) ** 2 * plan.step if self._is_biased else 0.0
+        bonus = 0.5 * (plan.known.noise.diffusion * self.bias) ** 2 * plan.step if self._is_biased else 0.0
         advance_population(
-            plan.motion, plan.known.noise_step(plan.step, self.bias), plan.step, *self.state, self._log_weights,
-            self._ancestors, (self.p, self.bias, bonus), steps, self._interval, self._log_z, self.rng,
+            self._motion, plan.step, *self.state, self._log_weights, self._ancestors, (self.p, self.bias, bonus), steps,
+            self._interval, self._log_z, self.rng,
         )  # fmt: skip
 
     def _close(self) -> None:
-        expected = self.expected if self.slices >= 0 else 0.0
-        growth = close_slice(self._log_weights, self._ancestors, self._log_z, expected, self.tallies)
-        if self.slices < 0:
-            self.expected = growth
-            self.tallies[:] = 0
+        found = close_slice(self._log_weights, self._ancestors, self._log_z)
+        if self.slices >= 0:
+            self.found[:, self.slices] = found
         if self._is_biased and 2 - self.plan.settling <= self.slices < -2:
             # α₀⟨ξ⟩/σ², under which Ornstein-Uhlenbeck noise has this mean
             weights = np.exp(self._log_weights - self._log_weights.max())
-            self.bias = float(np.average(self.xi, weights=weights)) / (2 * self.plan.noise.standard_deviation**2)
+            self.bias = float(np.average(self.xi[0], weights=weights)) / (
+                2 * self.plan.known.noise.standard_deviation**2
+            )
+            self._motion = self.plan.known.motion(self.plan.step, self.bias)
 
 
-def advance_all(advances: Sequence[Advance], wanted: int, seconds: float, progress: Callable[[], None]) -> bool:
+def advance_all(
+    advances: Sequence[Advance], wanted: int, seconds: float, progress: Callable[[], None], calls: int = PROGRESS_STEPS
+) -> bool:
     """Advance batches by the wanted number of units, each of which takes some `seconds`.
 
     Each processor has a thread, in which compiled code runs beside that in the others.
 
-    `progress` is called 100 times in all. An interrupt ends this early; returns whether it did.
+    `progress` is called so often in all. An interrupt ends this early; returns whether it did.
     """
     portion = max(1, min(math.ceil(wanted / PROGRESS_STEPS), round(_PORTION_SECONDS / seconds)))
     stop = Event()
@@ -222,7 +211,7 @@ def advance_all(advances: Sequence[Advance], wanted: int, seconds: float, progre
                 for each in advances:
                     futures.append(pool.submit(each, count, stop))
                 wait(futures)
-                for _ in range(PROGRESS_STEPS * (done + count) // wanted - PROGRESS_STEPS * done // wanted):
+                for _ in range(calls * (done + count) // wanted - calls * done // wanted):
                     progress()
             except KeyboardInterrupt:
                 stop.set()

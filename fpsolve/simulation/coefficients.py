@@ -6,10 +6,9 @@ What moves paths is imported where they are moved: case files are checked with t
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, field
-from functools import partial
-from typing import TYPE_CHECKING, Any, ClassVar
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.linalg import expm
@@ -17,24 +16,21 @@ from scipy.linalg import expm
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import FpsolveError
 from fpsolve.model.noise import Noise
+from fpsolve.model.noises.bounded import NoiseOfAngle
+from fpsolve.model.noises.steps import ChainStep
 from fpsolve.model.plane import (
+    CoefficientMatrix,
+    LinearMotion,
     System,
     affine,
     common_delay,
     is_driven,
-    matrix_at,
-    squared_frequency,
     written_coefficient,
 )
-from fpsolve.model.quantity import OF_STOPS
-from fpsolve.simulation.rays import Rays
+from fpsolve.simulation.walls import Floor, Rays
 
 if TYPE_CHECKING:
-    from fpsolve.simulation.delays import DelayedSpace
-    from fpsolve.simulation.motions import DrivenMotion, SwitchedMotion
-    from fpsolve.simulation.several import SplitMotion
-    from fpsolve.simulation.spaces import DrivenSpace, SplitSpace, SwitchedSpace
-    from fpsolve.simulation.stops import DrivenStop, SwitchedStop
+    from fpsolve.simulation.motions import Driven, InTurn, Switched
 
 FAST = 1e-3
 """Speed from which on impacts at a wall of several variables count, over the sum of all other variables."""
@@ -44,6 +40,8 @@ _UNRESOLVED = 1 / 30
 """Of the coefficient of [A₁, [A₁, A₀]] under white noise, its mean for given ∫dW and ∫W dt, as a share of s²h²."""
 ROUGHER = 3
 """How many steps are one of some batches, which tells the bias of a step, where that is of the order h²."""
+TURN, GROWTH, SPLIT = 0.5, 0.125, 0.06
+"""The turn, and the growth or kick, in one step at most; either where several noises move the state in turn."""
 _DELAYS = 8.0
 """Delays after which the start is forgotten, about."""
 _PARALLEL = 100.0
@@ -57,335 +55,294 @@ _PARTS = 64
 
 
 @dataclass(frozen=True)
-class Coefficients:
-    """A system as a noise moves it.
-
-    The coordinates are those in which the order 0, where it turns, is a rotation times a growth, and else has two
-    entries of one size beside its diagonal; of more than two variables it has such blocks, see `_modal_coordinates`. A
-    linear map of the state leaves Λ(p) alone.
+class Load:
+    """How one noise moves a system.
 
     Attributes:
-        noise: which it is.
-        steady: A₀, shape (n, n); under a chain A of each state, shape (states, n, n).
-        driven: A₁, shape (n, n); under white noise that of dW, under a chain 0.
-        strength: d ln‖x‖/dt for ξ = 1 at most; negative where it is ξ < 0 that makes more of it.
-        fluctuation: the standard deviation of what the noise adds to d ln‖x‖/dt; of white noise to ln‖x‖ in a unit of
-            time.
-        half_turn: π/ω, ω the largest; without rotation π times the time in which the direction of x is forgotten.
-        settling: the time in which it is forgotten how modes shared the motion; 0 where all turn alike.
-        rays: the lines of the jumps.
+        noise: it.
+        rows: those of its state among those of all noises, a number where it is one.
+        driven: A₁, shape (n, n), under white noise that of dW; under a chain what each state adds to A₀, shape (states,
+            n, n).
+        mean: the mean of what it adds to A₀.
+        moves: matrices M and weights w for which Σ w M ⊗ M is the variance of what it adds to A₀, of white noise and
+            impulses in a unit of time.
         arrivals: what multiplies the state where a state of a chain is reached, or where an impulse comes, shape
             (states, n, n); None under other noise.
-        of_wall: the names of what is noted at a wall of several variables.
     """
 
     noise: Noise
-    steady: FloatArray
+    rows: int | slice
     driven: FloatArray
-    strength: float
-    fluctuation: float
-    half_turn: float
-    rays: Rays
-    settling: float = 0.0
+    mean: FloatArray
+    moves: Sequence[tuple[float, FloatArray]]
     arrivals: FloatArray | None = None
-    of_wall: ClassVar[Sequence[str]] = ()
+
+    def turned(self, even: FloatArray, back: FloatArray) -> Load:
+        """The same in other coordinates."""
+        moves = [(weight, even @ each @ back) for weight, each in self.moves]
+        arrivals = None if self.arrivals is None else even @ self.arrivals @ back
+        return Load(self.noise, self.rows, even @ self.driven @ back, even @ self.mean @ back, moves, arrivals)
+
+    @property
+    def size(self) -> float:
+        """The standard deviation of ‖A₁‖ξ, of white noise in a unit of time."""
+        return math.sqrt(sum(weight * float(np.linalg.norm(each, 2)) ** 2 for weight, each in self.moves))
+
+    @property
+    def fluctuation(self) -> float:
+        """That of what the noise adds to d ln‖x‖/dt, of white noise to ln‖x‖ in a unit of time."""
+        return math.sqrt(sum(weight * _growth(each) ** 2 for weight, each in self.moves))
+
+    @property
+    def time(self) -> float:
+        """What a variance is multiplied by to be an intensity."""
+        return 1.0 if self.noise.is_white else 2 * min(self.noise.correlation_time, self.noise.period or math.inf)
+
+    def motion(self, steady: FloatArray, wall: Rays | Floor, h: float, bias: float) -> Driven | Switched:
+        """What moves paths by a step of length h, beside A₀."""
+        from fpsolve.simulation.motions import Driven, Switched
+
+        step = self.noise.step(h, bias)
+        if self.arrivals is not None:
+            matrices = steady + self.driven
+            sizes = np.linalg.norm(matrices, 2, axis=(1, 2))
+            return Switched(matrices, expm(h * matrices), self.arrivals, sizes, wall, step, self.rows)
+        double = _commutator(self.driven, _commutator(self.driven, steady))
+        if self.noise.is_white and isinstance(wall, Rays):
+            steady = steady + _UNRESOLVED * h * double
+        matrices = np.array([steady, self.driven, _commutator(steady, self.driven), double])
+        return Driven(matrices, wall, step, self.rows)
+
+
+@dataclass(frozen=True)
+class Coefficients:
+    """A system as noises move it.
+
+    The coordinates are those in which the order 0, where it turns, is a rotation times a growth, and else has two
+    entries of one size beside its diagonal; of more than two variables it has such blocks, see `_modal_coordinates`. A
+    linear map of the state leaves Λ(p) alone. With a `Stop` they are its own but for their units.
+
+    Attributes:
+        noise: all noises.
+        loads: each.
+        steady: A₀, shape (n, n), with a column for each past value.
+        wall: the lines of the jumps, or the wall of one of several variables.
+        half_turn: π/ω, ω the largest; without rotation π times the time in which the direction of x is forgotten.
+        settling: the time in which it is forgotten how modes shared the motion; 0 where all turn alike.
+        pasts: which variable is the one of each past value, and how long ago.
+    """
+
+    noise: Noise
+    loads: Sequence[Load]
+    steady: FloatArray
+    wall: Rays | Floor
+    half_turn: float
+    settling: float
+    pasts: Sequence[tuple[int, float]]
+
+    @property
+    def is_split(self) -> bool:
+        """Whether a step is of the order 2 whatever the noise is."""
+        return len(self.loads) > 1 or bool(self.pasts)
 
     @property
     def is_exact(self) -> bool:
         """Whether steps of any length leave nothing out."""
-        return self.arrivals is not None
-
-    @property
-    def dimension(self) -> int:
-        """n."""
-        return self.steady.shape[-1]
+        return not self.is_split and self.loads[0].arrivals is not None
 
     @property
     def together(self) -> int:
         """How many steps are a rough one; 1 where the bias of a step is of a higher order, or none."""
-        return ROUGHER if self.noise.is_white and not self.is_exact else 1
+        return ROUGHER if self.is_split or (self.noise.is_white and not self.is_exact) else 1
 
     @property
-    def order(self) -> int:
-        """The power of h that the bias of a step falls as, where it does not fall faster."""
-        return 2
+    def strength(self) -> float:
+        """Of one diffusion d ln‖x‖/dt for ξ = 1 at most; negative where it is ξ < 0 that makes more of it."""
+        driven = self.loads[0].driven
+        far = _FAR * self.noise.standard_deviation * driven
+        up, down = (np.linalg.eigvals(self.steady + side * far).real.max() for side in (1, -1))
+        return -_growth(driven) if down > up else _growth(driven)
 
     def size(self, h: float) -> int:
-        """The number of variables of a path that is moved in steps of length h."""
-        return self.dimension
+        """The number of variables of a path that is moved in steps of length h, with those of the past."""
+        past = max((round(delay / h) for _, delay in self.pasts), default=0)
+        return (len(self.steady) - len(self.pasts)) * (1 + past)
 
-    def motion(self, h: float) -> DrivenMotion | SwitchedMotion | DrivenSpace | SwitchedSpace:
-        """The numbers that move paths by a step of length h."""
-        from fpsolve.simulation.motions import DrivenMotion, SwitchedMotion
-        from fpsolve.simulation.spaces import DrivenSpace, SwitchedSpace
+    def motion(self, h: float, bias: float = 0.0) -> InTurn:
+        """What moves paths by a step of length h."""
+        from fpsolve.simulation.motions import InTurn
 
-        steady, driven, arrivals = self.steady, self.driven, self.arrivals
-        if arrivals is not None:
-            steady = np.broadcast_to(steady, arrivals.shape).copy()
-            if self.dimension == 2:
-                return SwitchedMotion(_rows(steady), arrivals, self.rays)
-            return SwitchedSpace(steady, expm(h * steady), arrivals, np.linalg.norm(steady, 2, axis=(1, 2)))
-        double = _commutator(driven, _commutator(driven, steady))
-        if self.noise.is_white:
-            steady = steady + _UNRESOLVED * h * double
-        matrices = np.array([steady, driven, _commutator(steady, driven), double])
-        return DrivenSpace(matrices) if self.dimension > 2 else DrivenMotion(_rows(matrices), self.rays)
-
-    def noise_step(self, h: float, bias: float = 0.0) -> Any:
-        """The step of the noise, see `Noise.step`."""
-        return self.noise.step(h, bias)
+        share = self.steady / len(self.loads)
+        motions = tuple(load.motion(share, self.wall, h, bias) for load in self.loads)
+        n = len(self.steady) - len(self.pasts)
+        rows = np.array([variable + n * round(delay / h) for variable, delay in self.pasts], dtype=int)
+        return InTurn(motions, n, rows)
 
     def spread(self, h: float) -> float:
-        """The standard deviation of what the noise adds to ln‖x‖ in a time h that it takes no note of."""
-        return self.fluctuation * (math.sqrt(h) if self.noise.is_white else h)
+        """The standard deviation of what the noises add to ln‖x‖ in a time h that they take no note of."""
+        return math.sqrt(sum(each.fluctuation**2 * (h if each.noise.is_white else h**2) for each in self.loads))
 
+    @property
+    def repeated(self) -> float:
+        """The delay, or the period of a harmonic load, without one a half-turn."""
+        if self.pasts:
+            return repeated_delay(self.pasts)
+        return max(each.noise.period for each in self.loads) or self.half_turn
 
-@dataclass(frozen=True)
-class StoppedCoefficients(Coefficients):
-    """A system with a `Stop`, whose coordinates these are, but for their units: q is the first, q̇ the second.
+    @property
+    def largest_step(self) -> tuple[float, str]:
+        """The largest step that is good to about 1e-4 of the strength of the noise, and what limits it.
 
-    Under white noise a path in a step comes to the wall at another time than the smooth one that is taken: `order` 1.
+        For A₀ = Ω + D with Ωᵀ = −Ω and ‖Ω‖ = ω, and for A₁ these are ω h ≤ `TURN`, ‖D‖ h ≤ `GROWTH`, ‖A₁‖ std(ξ) h ≤
+        `GROWTH`, or under white noise ‖A₁‖² h ≤ `GROWTH`, and the `largest_step` of the noise. Under a chain or
+        impulses, where a step is exact, it is 1/(2π) half-turns.
+        """
+        if self.is_exact:
+            return TURN * self.half_turn / math.pi, "the frequency"
+        turning = 0.5 * (self.steady - self.steady.T)
+        turn = float(np.linalg.norm(turning, 2))
+        rest = float(np.linalg.norm(self.steady - turning, 2))  # may underflow
+        most_turn, most = (2 * SPLIT, SPLIT) if self.is_split else (TURN, GROWTH)
+        kicks = [each.size**2 if each.noise.is_white else each.size for each in self.loads]
+        limits = {
+            "the frequency": most_turn / turn if turn else math.inf,
+            "the damping": most / rest if rest else math.inf,
+            "the strength of the noise": min((most / kick for kick in kicks if kick), default=math.inf),
+            "the correlation time of the noise": self.noise.largest_step,
+            "the delay": repeated_delay(self.pasts) / 4,
+        }
+        reason = min(limits, key=lambda name: limits[name])
+        return limits[reason], reason
 
-    Attributes:
-        restitution: R.
-        fast: how fast an impact must be over each of the |variables| to count, shape (n,).
-    """
+    @property
+    def default_step(self) -> float:
+        """Half the largest step, or less, so that a half-turn or a period is a whole number of steps, rough or not."""
+        unit = self.repeated / self.together
+        return unit / math.ceil(unit / (0.5 * self.largest_step[0]))
 
-    restitution: float = 1.0
-    fast: FloatArray = field(default_factory=lambda: np.zeros(0))
+    def transient(self, *, is_mixed: bool = True) -> float:
+        """The time after which ln E‖x‖^p grows like Λ(p) t: at least two half-turns π/ω and eight relaxation times.
 
-    order = 1
-    of_wall = tuple(OF_STOPS)
+        Of impulses that is eight times the mean time between two of them.
 
-    def motion(self, h: float) -> DrivenStop | SwitchedStop:  # type: ignore[override]
-        from fpsolve.simulation.stops import DrivenStop, SwitchedStop
-
-        if self.steady.ndim == 2:
-            matrices = np.array([self.steady, self.driven])
-            return DrivenStop(matrices, self.restitution, self.fast, float(self.noise.is_white))
-        return SwitchedStop(self.steady, np.linalg.norm(self.steady, 2, axis=(1, 2)), self.restitution, self.fast)
-
-
-@dataclass(frozen=True)
-class SplitCoefficients(Coefficients):
-    """A system as several noises move it; `driven` has a matrix for each, shape (noises, n, n), s with those of white.
-
-    Attributes:
-        sizes: the standard deviation of ‖A_k‖ξ_k of each; of white noise in a unit of time.
-    """
-
-    sizes: Sequence[tuple[float, bool]] = ()
-
-    is_exact, together = False, ROUGHER
-
-    def motion(self, h: float) -> SplitMotion | SplitSpace:  # type: ignore[override]
-        from fpsolve.simulation.several import SplitMotion
-        from fpsolve.simulation.spaces import SplitSpace
-
-        if self.dimension > 2:
-            return SplitSpace(self.driven, np.linalg.norm(self.driven, 2, axis=(1, 2)), expm(0.5 * h * self.steady))
-        return SplitMotion(_rows(np.concatenate([self.steady[None], self.driven])), self.rays)
-
-    def noise_step(self, h: float, bias: float = 0.0) -> Any:
-        from fpsolve.simulation.several import drivers
-
-        return drivers(self.noise.parts, h)
-
-    def spread(self, h: float) -> float:
-        return math.sqrt(sum(size**2 * (h if is_white else h**2) for size, is_white in self.sizes))
-
-
-@dataclass(frozen=True)
-class DelayedCoefficients(SplitCoefficients):
-    """A system with delays, which has a column for each of the `pasts` of its state."""
-
-    pasts: Sequence[tuple[int, float]] = ()
-
-    def size(self, h: float) -> int:
-        return (self.dimension - len(self.pasts)) * (1 + round(max(delay for _, delay in self.pasts) / h))
-
-    def motion(self, h: float) -> DelayedSpace:  # type: ignore[override]
-        from fpsolve.simulation.delays import DelayedSpace
-
-        n = self.dimension - len(self.pasts)
-        rows = np.array([variable + n * round(delay / h) for variable, delay in self.pasts])
-        return DelayedSpace(self.steady[:n].copy(), self.driven[:, :n].copy(), rows)
+        It is a whole number of half-turns, in which the oscillation cancels that the start from the stationary law
+        leaves in weak noise; beside a harmonic load, with which the growth goes up and down for ever, a whole number of
+        periods. Beyond the plane it is, if `is_mixed`, at least as long as the modes remember how they shared the
+        motion.
+        """
+        relaxation = max((each.noise.relaxation_time for each in self.loads if not each.noise.period), default=0.0)
+        needed = max(2 * self.half_turn, 8 * relaxation, is_mixed * self.settling)
+        return self.repeated * math.ceil(needed / self.repeated)
 
 
 def refuse(system: System, noise: Noise) -> None:
     """Refuse what no scheme moves. Raises `FpsolveError`."""
-    if noise.motion(system).impulses and (system.pasts or system.stop):
-        told = "simulation under impulses is for systems without a delay and a wall of more than two variables"
-        raise FpsolveError(f"{told}; take an even p, which needs none")
     if system.stop and (len(noise.parts) > 1 or system.clock):
         raise FpsolveError("simulation of a wall of more than two variables is for one noise, without periodic terms")
-    bent = [term.g for term in system.terms if affine(term.g) is None]
-    if bent and (not noise.has_states or len(noise.parts) > 1):
-        found = f"but one has g = {written_coefficient(bent[0]).strip()}"
-        need = f"terms that are a + b*xi under a {type(noise).__name__}, {found}"
-        raise FpsolveError(f"simulation is for {need}; use the finite elements")
+    for term in system.terms:
+        if affine(term.g) is None and not noise.parts.get(term.noise, noise).has_states:
+            found = f"but one has g = {written_coefficient(term.g).strip()}"
+            need = f"terms that are a + b*xi under a {type(noise).__name__}, {found}"
+            raise FpsolveError(f"simulation is for {need}; use the finite elements")
 
 
 def starting_state(
-    noise: Noise, paths: int, rng: np.random.Generator, amplitude: float = 1.0, dimension: int = 2
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """x, u and the state of the noise, of paths of one amplitude, with uniform directions and stationary noise.
-
-    The phases are in front of the wall, where they stand for all. Beyond the plane u has a row for each variable but x.
-    """
-    if dimension > 2:
-        state = rng.standard_normal((dimension, paths))
-        state *= amplitude / np.linalg.norm(state, axis=0)
-        return state[0].copy(), state[1:].copy(), noise.start(paths, rng)
-    phase = rng.uniform(0, math.pi, paths)
-    return amplitude * np.sin(phase), amplitude * np.cos(phase), noise.start(paths, rng)
+    noise: Noise, paths: int, rng: np.random.Generator, size: int, amplitude: float = 1.0
+) -> tuple[FloatArray, FloatArray]:
+    """The states of paths of one amplitude and those of their noises, with uniform directions and stationary noise."""
+    state = rng.standard_normal((size, paths))
+    return state * (amplitude / np.linalg.norm(state, axis=0)), np.atleast_2d(noise.start(paths, rng))
 
 
-def repeated_delay(system: System) -> float:
-    """The time of which all delays of a system are multiples, ∞ without any. Raises `ValueError`: there is none."""
-    return common_delay(system.pasts)[0] if system.pasts else math.inf
+def repeated_delay(pasts: Sequence[tuple[int, float]]) -> float:
+    """The time of which all delays are multiples, ∞ without any. Raises `ValueError`: there is none."""
+    return common_delay(pasts)[0] if pasts else math.inf
 
 
-def split_coefficients(system: System, noise: Noise) -> SplitCoefficients:
-    """The matrices of a system under several noises."""
-    moved = noise.motion(system).drift
-    zero = np.zeros((system.dimension, system.dimension))
-    steady, driven, sizes = zero.copy(), list[FloatArray](), list[tuple[float, bool]]()
-    for term in moved.terms:
-        if line := affine(term.g):
-            steady += line[0] * system.epsilon**term.order * np.array(term.matrix)
-    every = sum((np.abs(system.epsilon**term.order * np.array(term.matrix)) for term in system.terms), zero)
-    if system.pasts:
-        variables = [*range(len(zero) - len(system.pasts)), *(variable for variable, _ in system.pasts)]
-        folded = np.eye(len(zero))[variables]
-        even = np.diag(1 / _balance(folded.T @ every @ folded, 0.0)[variables])
-    else:
-        even = _even_coordinates(matrix_at(moved, 0.0, slice(0, 1)), every)
-    back, intensity, intensities, loads = np.linalg.inv(even), 0.0, list[float](), list[tuple[FloatArray, Any]]()
-    free = even @ matrix_at(moved, 0.0, slice(0, 1)) @ back
-    for name, part in noise.parts.items():
-        own = [term for term in system.terms if is_driven(term.g) and term.noise == name]
-        total = sum(
-            (line[1] * system.epsilon**term.order * np.array(term.matrix) for term in own if (line := affine(term.g))),
-            zero,
-        )
-        size = float(np.linalg.norm(even @ total @ back, 2))
-        if part.is_white:
-            sizes.append((size * math.sqrt(part.spectral_density(0.0)), True))
-            driven.append(total * math.sqrt(part.spectral_density(0.0)))
-            intensity += sizes[-1][0] ** 2
-            intensities.append(1.0)
-        else:
-            sizes.append((size * part.standard_deviation, False))
-            driven.append(total)
-            time = min(part.correlation_time, part.period or math.inf)
-            intensity += 2 * sizes[-1][0] ** 2 * time
-            exchanged = 0.0 if part.period else _exchanged(free, part)
-            intensities.append(2 * part.standard_deviation**2 * time * exchanged)
-            loads += [(even @ total @ back, part)] if part.period else []
-    half_turn = math.pi / _rate(free, intensity)
-    if system.pasts:
-        kind: Any = partial(DelayedCoefficients, pasts=system.pasts)
-        settling = _DELAYS * max(delay for _, delay in system.pasts)
-    else:
-        kind = SplitCoefficients
-        moves = zip(intensities, even @ np.array(driven) @ back, strict=True)
-        settling = _settling(free, list(moves), half_turn, loads)
-    return kind(
-        noise,
-        even @ steady @ back,
-        even @ np.array(driven) @ back,
-        0.0,
-        math.sqrt(intensity),
-        half_turn,
-        _rays(system, even, even @ steady @ back),
-        settling,
-        sizes=sizes,
-    )
-
-
-def coefficients(system: System, noise: Any) -> Coefficients:
-    """The matrices of a system under a noise that can be simulated."""
-    if len(noise.parts) > 1 or system.pasts:
-        return split_coefficients(system, noise)
-    moved, diffusions, struck = noise.motion(system)
-    is_switched = noise.has_states and not noise.is_white
-    driven = zero = np.zeros((system.dimension, system.dimension))
-    if is_switched:
-        steady = matrix_at(moved, noise.reached)
-    else:
-        lines = [(system.epsilon**term.order * np.array(term.matrix), affine(term.g)) for term in moved.terms]
-        steady = sum((line[0] * matrix for matrix, line in lines if line), zero)
-        driven = sum((line[1] * matrix for matrix, line in lines if line), zero)
-        driven = sum((system.epsilon**each.order * np.array(each.matrix) for each in diffusions), driven)
-    free = np.tensordot(noise.probabilities, steady, 1) if is_switched else matrix_at(moved, 0.0, slice(0, 1))
-    if not free.any():
-        free = steady.mean(axis=0) if is_switched else steady
-    every = np.abs(steady).max(axis=0) if is_switched else np.abs(steady) + np.abs(driven)
-    kind: Any = Coefficients
+def coefficients(system: System, noise: Noise) -> Coefficients:
+    """The matrices of a system under noises that can be simulated."""
+    terms, loads = noise.motion(system).drift.terms, _loads(system, noise)
+    steady = _without_noise(system, terms)
+    mean = sum((each.mean for each in loads), np.zeros_like(steady))
+    free = _without_noise(system, [term for term in terms if term.order == 0]) + mean
+    free = free if free.any() else steady + mean
+    every = sum((np.max([np.abs(m) for _, m in each.moves], axis=0) for each in loads), np.abs(steady + mean))
     if (stop := system.stop) is not None:
         rows = np.array(stop.coordinates)
         scales = _balance(np.abs(rows) @ every @ np.abs(np.linalg.inv(rows)))
-        even = rows / scales[:, None]
-        kind = partial(StoppedCoefficients, restitution=stop.restitution, fast=FAST * scales / scales[1])
+        even: FloatArray = rows / scales[:, None]
+    elif system.pasts:
+        variables = [*range(len(free) - len(system.pasts)), *(variable for variable, _ in system.pasts)]
+        folded = np.eye(len(free))[variables]
+        even = np.diag(1 / _balance(folded.T @ every @ folded, 0.0)[variables])
     else:
         even = _even_coordinates(free, every)
-    back = np.linalg.inv(even)
-    free, steady, driven = even @ free @ back, even @ steady @ back, even @ driven @ back
-    around = steady - np.tensordot(noise.probabilities, steady, 1) if is_switched else steady
-    arrivals = np.broadcast_to(np.eye(len(free)), steady.shape).copy() if is_switched else None
-    if struck:
-        arrivals = even @ np.array([each.matrix for each in struck]) @ back
-        strength = fluctuation = math.sqrt(sum(each.rate * each.strength**2 for each in struck))
-    elif is_switched:
-        strength = fluctuation = math.sqrt(noise.probabilities @ np.sum(around**2, axis=(1, 2)) / 2)
-    else:
-        deviation = 1.0 if noise.is_white else noise.standard_deviation
-        strength = float(np.max(np.abs(np.linalg.eigvalsh(driven + driven.T) / 2)))
-        fluctuation = strength * deviation
-        up, down = (np.linalg.eigvals(steady + side * _FAR * deviation * driven).real.max() for side in (1, -1))
-        strength *= -1.0 if down > up else 1.0
-    time = 1.0 if noise.is_white else 2 * noise.correlation_time
-    half_turn = math.pi / _rate(free, fluctuation**2 * time)
-    if stop is not None and (square := -free[0, 1] * free[1, 0]) > 0:  # an impact in each half-turn is like damping
-        half_turn = math.pi / math.sqrt(square)
-        free[1, 1] += 2 * math.log(stop.restitution) / half_turn
-    time *= _exchanged(free, noise)
-    if is_switched:
-        moves = [(time * share, each) for share, each in zip(noise.probabilities, around, strict=True)]
-    elif struck:
-        moves = [(each.rate, even @ np.array(each.exponent) @ back) for each in struck]
-    else:
-        moves = [(time if noise.is_white else time * noise.standard_deviation**2, driven)]
-    found: Coefficients = kind(
-        noise,
-        steady,
-        driven,
-        strength,
-        fluctuation,
-        half_turn,
-        _rays(system, even, steady),
-        _settling(free, moves, half_turn),
-        arrivals,
-    )
+    back = np.asarray(np.linalg.inv(even), dtype=float)
+    free, steady, loads = even @ free @ back, even @ steady @ back, [each.turned(even, back) for each in loads]
+    half_turn = math.pi / _rate(free, sum(each.fluctuation**2 * each.time for each in loads))
+    wall: Rays | Floor = _rays(system, even, steady)
+    if stop is not None:
+        wall = Floor(stop.restitution, FAST * scales / scales[1], float(noise.is_white))
+        if (square := -free[0, 1] * free[1, 0]) > 0:  # an impact in each half-turn is like damping
+            half_turn = math.pi / math.sqrt(square)
+            free[1, 1] += 2 * math.log(stop.restitution) / half_turn
+    settling = _DELAYS * max((delay for _, delay in system.pasts), default=0.0) or _settling(free, loads, half_turn)
+    return Coefficients(noise, loads, steady, wall, half_turn, settling, system.pasts)
+
+
+def _without_noise(system: System, terms: Sequence[CoefficientMatrix]) -> FloatArray:
+    """The sum of terms without what noises multiply."""
+    zero = np.zeros((system.dimension, system.dimension))
+    return sum((line[0] * _matrix(system, term) for term in terms if (line := affine(term.g))), zero)
+
+
+def _matrix(system: System, term: CoefficientMatrix) -> FloatArray:
+    """ε^order A."""
+    return system.epsilon**term.order * np.array(term.matrix)
+
+
+def _loads(system: System, noise: Noise) -> list[Load]:
+    """How each noise moves a system, in its own coordinates."""
+    found, row, rng, zero = list[Load](), 0, np.random.default_rng(0), np.zeros((system.dimension, system.dimension))
+    parts: Mapping[str, Any] = noise.parts
+    for name, part in parts.items():
+        own = [term for term in system.terms if is_driven(term.g) and (len(noise.parts) == 1 or term.noise == name)]
+        lines, shapes = [affine(term.g) or (0.0, 0.0) for term in own], [_matrix(system, term) for term in own]
+        _, diffusions, impulses = part.motion(LinearMotion(own, epsilon=system.epsilon))
+        count = len(np.atleast_2d(part.start(1, rng)))
+        rows = row if count == 1 else slice(row, row + count)
+        row += count
+        if isinstance(step := part.step(1.0), ChainStep):
+            driven: FloatArray = np.zeros((step.values.size, *zero.shape))
+            for term, (offset, _), shape in zip(own, lines, shapes, strict=True):
+                driven += (term.g(step.values) - offset)[:, None, None] * shape
+            arrivals = np.array([each.matrix for each in impulses] or [np.eye(len(zero))] * step.values.size)
+            mean = np.tensordot(part.probabilities, driven[: part.probabilities.size], 1)
+            moves = [(each.rate, np.array(each.exponent)) for each in impulses]
+            moves = moves or [*zip(part.probabilities, driven - mean, strict=False)]
+            found.append(Load(part, rows, driven, mean, moves, arrivals))
+        elif part.is_white:
+            driven = sum((_matrix(system, each) for each in diffusions), zero)
+            found.append(Load(part, rows, driven, zero, [(1.0, driven)]))
+        else:
+            driven = sum((slope * shape for (_, slope), shape in zip(lines, shapes, strict=True)), zero)
+            found.append(Load(part, rows, driven, zero, [(part.standard_deviation**2, driven)]))
     return found
 
 
+def _growth(matrix: FloatArray) -> float:
+    """d ln‖x‖/dt at most, or at least, the larger of both sizes."""
+    return float(np.max(np.abs(np.linalg.eigvalsh(matrix + matrix.T) / 2)))
+
+
 def _rate(free: FloatArray, intensity: float) -> float:
-    """ω where a motion turns, else the rate at which two directions come together."""
-    n = len(free)
-    square = float(squared_frequency(free)) if n == 2 else _fastest(free)
-    if square > 0:
-        return math.sqrt(square)
-    shear = float(np.linalg.norm(free - np.trace(free) / n * np.eye(n), 2))
-    return max(math.sqrt(-square), (shear**2 * intensity) ** (1 / 3)) or intensity or 1.0
-
-
-def _fastest(free: FloatArray) -> float:
-    """The largest ω², or without rotation minus the square of half the difference of the eigenvalues."""
+    """The largest ω where a motion turns, else the rate at which two directions come together."""
     values = np.linalg.eigvals(free)
-    omega, spread = float(np.max(values.imag)), float(np.ptp(values.real)) / 2
-    return omega**2 if omega > 0 else -(spread**2)
+    if (omega := float(np.max(values.imag))) > 0:
+        return omega
+    shear = float(np.linalg.norm(free - np.trace(free) / len(free) * np.eye(len(free)), 2))
+    spread = float(np.ptp(values.real)) / 2
+    return max(spread, (shear**2 * intensity) ** (1 / 3)) or intensity or 1.0
 
 
 def _exchanged(free: FloatArray, noise: Noise) -> float:
@@ -401,40 +358,39 @@ def _exchanged(free: FloatArray, noise: Noise) -> float:
     return min(float(np.mean(densities)) / max(noise.spectral_density(0.0), 1e-300), 1.0)
 
 
-def _settling(
-    free: FloatArray,
-    driven: Sequence[tuple[float, FloatArray]],
-    half_turn: float,
-    loads: Sequence[tuple[FloatArray, Any]] = (),
-) -> float:
+def _settling(free: FloatArray, loads: Sequence[Load], half_turn: float) -> float:
     """Six times that in which E‖x‖² forgets how the modes shared it; 0 in the plane without harmonic loads.
 
     It is that under white noises, Σ ½ I (B ⊗ 1 + 1 ⊗ B)² for pairs (I, B), on symmetric matrices: where the noise has a
     memory, about, see `_exchanged`. What turns meanwhile is forgotten sooner, as it averages out. With harmonic loads
     it is that from period to period.
     """
-    n = len(free)
-    if n == 2 and not loads:
+    n, waves = len(free), list[tuple[FloatArray, NoiseOfAngle]]()
+    for load in loads:
+        if isinstance(load.noise, NoiseOfAngle) and load.noise.period:
+            waves.append((load.driven, load.noise))
+    if n <= 2 and not waves:
         return 0.0
     pairs = [(i, j) for i in range(n) for j in range(i + 1)]
     even = np.zeros((n * n, len(pairs)))
     for k, (i, j) in enumerate(pairs):
         even[i * n + j, k] = even[j * n + i, k] = 1.0
     even /= np.linalg.norm(even, axis=0)
-    one = np.eye(n)
-    rates = np.kron(free, one) + np.kron(one, free)
-    for intensity, matrix in driven:
-        both = np.kron(matrix, one) + np.kron(one, matrix)
-        rates = rates + 0.5 * intensity * both @ both
+
+    def both(matrix: FloatArray) -> FloatArray:
+        return np.kron(matrix, np.eye(n)) + np.kron(np.eye(n), matrix)
+
+    rates = both(free)
+    for load in loads:
+        intensity = 0.0 if load.noise.period else 0.5 * load.time * _exchanged(free, load.noise)
+        rates = rates + sum(intensity * weight * both(each) @ both(each) for weight, each in load.moves)
     rates = even.T @ rates @ even
-    if loads:
-        waves = [(even.T @ (np.kron(a, one) + np.kron(one, a)) @ even, load) for a, load in loads]
-        starts = [load.start(1, np.random.default_rng(0))[1] for _, load in waves]
-        turn, h = np.eye(len(rates)), max(load.period for _, load in waves) / _PARTS
+    if waves:
+        rng = np.random.default_rng(0)
+        held = [(even.T @ both(matrix) @ even, wave.start(1, rng)[1], wave) for matrix, wave in waves]
+        turn, h = np.eye(len(rates)), max(wave.period for _, wave in waves) / _PARTS
         for t in h * (0.5 + np.arange(_PARTS)):
-            now = [
-                load.amplitude * np.cos(start + load.nu * t) * a for (a, load), start in zip(waves, starts, strict=True)
-            ]
+            now = [wave.amplitude * np.cos(start + wave.nu * t) * matrix for matrix, start, wave in held]
             turn = expm(h * sum(now, rates)) @ turn
         values = np.log(np.linalg.eigvals(turn).astype(complex)) / (h * _PARTS)
     else:
@@ -505,9 +461,3 @@ def _rays(system: System, even: FloatArray, steady: FloatArray) -> Rays:
 
 def _commutator(a: FloatArray, b: FloatArray) -> FloatArray:
     return a @ b - b @ a
-
-
-def _rows(matrices: FloatArray) -> FloatArray:
-    """(t, p, q, r) of each matrix: half its trace, and the rest ((p, q), (r, −p))."""
-    half = 0.5 * (matrices[:, 0, 0] + matrices[:, 1, 1])
-    return np.stack([half, 0.5 * (matrices[:, 0, 0] - matrices[:, 1, 1]), matrices[:, 0, 1], matrices[:, 1, 0]], axis=1)

@@ -21,10 +21,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import chain, cycle
+from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.special import logsumexp
 
 from fpsolve.arrays import FloatArray, real_number
@@ -36,7 +37,6 @@ from fpsolve.model.problem import Problem
 from fpsolve.model.quantity import EFFECTIVE_PATHS, IMPACTS, LYAPUNOV_EXPONENT, MOMENT, OF_STOPS, VARIANCE_RATE, P
 from fpsolve.simulation.batches import PlainBatch, Plan, Population, advance_all, standard_error
 from fpsolve.simulation.coefficients import coefficients
-from fpsolve.simulation.kernels import TALLIES
 from fpsolve.simulation.setup import (
     BATCHES,
     FEWER,
@@ -45,18 +45,17 @@ from fpsolve.simulation.setup import (
     TRANSIENTS,
     Estimator,
     check_settings,
-    default_step,
     obstacles,
     simulated_parts,
-    transient,
 )
+from fpsolve.simulation.walls import Floor, Rays
 
 if TYPE_CHECKING:
     import xarray
     from matplotlib.axes import Axes
 
-ROUGH = {1: (6, 7, 14, 15, 22, 23, 30, 31), 2: (14, 15, 30, 31)}
-"""The batches of rough steps by the order of their bias, of populations as many near as far."""
+ROUGH = {Floor: (1, (6, 7, 14, 15, 22, 23, 30, 31)), Rays: (2, (14, 15, 30, 31))}
+"""By the wall the order of the bias of a step, and the batches of rough steps, of populations as many near as far."""
 FEW: Mapping[Estimator, int] = {"direct": 5000, "population": 1000}
 """With fewer effective paths there is no estimate. Direct runs that miss the rare large ‖x‖^p have both more effective
 paths and a smaller mean, so that estimates near a lower bound would be too small."""
@@ -126,10 +125,8 @@ class MonteCarlo(Result):
 
     def to_xarray(self) -> xarray.Dataset:
         """Λ(p) over p, λ and Λ″(0), with their standard errors; NaN where too few paths carry a moment."""
-        p, value, error, effective = (
-            np.array([getattr(each, name) for each in self.estimates], dtype=float)
-            for name in ("p", "value", "standard_error", "effective_paths")
-        )
+        each = [(each.p, each.value, each.standard_error, each.effective_paths) for each in self.estimates]
+        p, value, error, effective = np.array(each, dtype=float).reshape(-1, 4).T
         kind = "standard error"
         numbers = {
             MOMENT: value,
@@ -143,9 +140,11 @@ class MonteCarlo(Result):
         }
         for name, (of, of_error) in self.wall.items():
             numbers |= {OF_STOPS[name]: of, OF_STOPS[name].error(kind): of_error}
-        settings = {name: getattr(self, name) for name in ("paths", "time", "step", "seed")}
         estimator = ", ".join(dict.fromkeys(each.estimator for each in self.estimates))
-        more = {**settings, "estimator": estimator, "interrupted": int(self.interrupted), "warnings": self.warnings}
+        more: dict[str, Any] = {
+            "paths": self.paths, "time": self.time, "step": self.step, "seed": self.seed, "estimator": estimator,
+            "interrupted": int(self.interrupted), "warnings": self.warnings,
+        }  # fmt: skip
         return dataset(MOMENT.words, "Monte Carlo", numbers, {P: p}, self.parameters, **more)
 
     def _draw(self, found: xarray.Dataset, axes: Axes, **kwargs: Any) -> None:
@@ -199,16 +198,10 @@ def simulate(
         NotConverged: the numbers overflowed.
         KeyboardInterrupt: before two transients were done.
     """
-    how: dict[str, Any] = {"paths": paths, "time": time, "step": step, "seed": seed}
+    how: dict[str, Any] = {"paths": paths, "time": time, "step": step, "seed": seed, "progress": progress}
     if estimator is not None:
-        return _simulated(problem, p, estimator, progress=progress, **how)
-    is_counted = cycle((True, False))
-
-    def half() -> None:
-        if next(is_counted):
-            progress()
-
-    found = _simulated(problem, p, "direct", progress=half, **how)
+        return _simulated(problem, p, estimator, PROGRESS_STEPS, **how)
+    found = _simulated(problem, p, "direct", PROGRESS_STEPS // 2, **how)
     few = [each.p for each in found.estimates if each.value is None]
     if found.interrupted:
         return found
@@ -218,7 +211,7 @@ def simulate(
         return found
     few = [few[i] for i in dict.fromkeys(np.linspace(0, len(few) - 1, MOST_POPULATIONS).round().astype(int).tolist())]
     try:
-        more = _simulated(problem, few, "population", progress=half, **how)
+        more = _simulated(problem, few, "population", PROGRESS_STEPS // 2, **how)
     except KeyboardInterrupt:
         return replace(found, interrupted=True)
     known = {each.p: each for each in more.estimates}
@@ -231,6 +224,7 @@ def _simulated(
     problem: Problem,
     p: float | Sequence[float],
     estimator: Estimator,
+    calls: int,
     *,
     paths: int,
     time: float | None,
@@ -244,16 +238,15 @@ def _simulated(
     check_settings(problem, p, estimator, paths, seed)
     for name, sentence in obstacles(oscillator, noise, time=time, step=step).items():
         raise ValueError(f"{name}: {sentence}")
-    h = default_step(oscillator, noise) if step is None else step
-    settling, known = transient(oscillator, noise), coefficients(oscillator, noise)
+    known = coefficients(oscillator, noise)
+    h, settling = known.default_step if step is None else step, known.transient()
     is_plane, is_direct = known.settling == 0, estimator == "direct"
-    length = settling if is_direct else transient(oscillator, noise, is_mixed=False)
+    length = settling if is_direct else known.transient(is_mixed=False)
     time = (TRANSIENTS if is_plane else FEWER) * settling if time is None else time
     wanted = max(2, round(time / length))
     plan = Plan(
         known=known,
         motion=known.motion(h),
-        noise_step=known.noise_step(h),
         step=h,
         p=np.atleast_1d(np.array(p, dtype=float)),
         estimator=estimator,
@@ -263,10 +256,11 @@ def _simulated(
         wanted=wanted,
         levels=min(_LEVELS, wanted.bit_length()) if is_direct else 0,
     )
-    rough = ROUGH[known.order] if known.together > 1 else ()
+    power, some = ROUGH[type(known.wall)]
+    rough = some if known.together > 1 else ()
     plans = [plan.rougher if i in rough else plan for i in range(BATCHES)]
     groups = [[i for i in range(BATCHES) if i not in rough], *([*rough] for _ in rough[:1])]
-    share = 1 / (known.together**known.order - 1) if rough else 0.0
+    share = 1 / (known.together**power - 1) if rough else 0.0
     weights = np.array([1 + share, -share])[: len(groups)]
     # each batch has a stream of random numbers of its own
     seeds = [each.spawn(1 + plan.p.size) for each in np.random.SeedSequence(seed).spawn(BATCHES)]
@@ -280,7 +274,7 @@ def _simulated(
     ]
     batches = [*plain, *chain.from_iterable(populations)]
     advances = [batch.advance for batch in batches]
-    interrupted = advance_all(advances, plan.settling + plan.wanted, plan.slice_seconds, progress)
+    interrupted = advance_all(advances, plan.settling + plan.wanted, plan.slice_seconds, progress, calls)
     slices = np.array([batch.slices for batch in batches])
     if slices.min() < 2:
         raise KeyboardInterrupt
@@ -295,17 +289,22 @@ def _simulated(
         else population_estimates(plan, [each for i in group for each in populations[i]])
         for group in groups
     ]
-    estimates = [_joined(each, weights) for each in zip(*(each for each, _ in found), strict=True)]
-    at_wall = np.array([batch.impacts for batch in plain]) / (times * plan.paths)
-    of_wall = [_counted([values[group] for group in groups]) for values in (at_wall.real, at_wall.imag)]
+    at_wall = np.array([batch.counted for batch in plain]).T / (times * plan.paths)
+    of_wall = [_counted([values[group] for group in groups]) for values in at_wall]
     (rate, error), (variance_rate, variance_rate_error) = (
         _at_no_step([(values[group].mean(), standard_error(values[group])) for group in groups], weights)
         for values in (exponents, variance_rates)
     )
-    estimates = [
-        replace(each, value=each.p * rate, standard_error=abs(each.p) * error) if 0 < abs(each.p) < _TINY else each
-        for each in estimates
-    ]
+    estimates = list[MomentEstimate]()
+    for k, order in enumerate(plan.p.tolist()):
+        value, deviation = _at_no_step([each[k, :2] for each, _ in found], weights)
+        effective = float(np.nan_to_num(sum(each[k, 2] for each, _ in found)))
+        if abs(order) < _TINY:
+            value, deviation = order * rate, abs(order) * error
+        is_known = order == 0 or (math.isfinite(value + deviation) and effective >= FEW[estimator])
+        estimates.append(
+            MomentEstimate(order, value if is_known else None, deviation if is_known else None, estimator, effective)
+        )
     stopped = [Message(Code.STOPPED, share=slices.mean() / plan.wanted)] if interrupted else []
     return MonteCarlo(
         estimates=tuple(estimates),
@@ -317,17 +316,17 @@ def _simulated(
         time=float(slices.mean()) * plan.length,
         step=h,
         seed=seed,
-        impacts=int(sum(batch.impacts for batch in plain).real),
+        impacts=int(sum(batch.counted[0] for batch in plain)),
         warnings=(*_missing(estimates), *found[0][1], *stopped),
         interrupted=interrupted,
         parameters=problem.values,
-        wall=dict(zip(known.of_wall, of_wall, strict=False)),
+        wall=dict(zip(OF_STOPS if isinstance(known.wall, Floor) else (), of_wall, strict=False)),
     )
 
 
-def _at_no_step(found: Sequence[tuple[Any, Any]], weights: FloatArray) -> tuple[float, float]:
-    """A number and its standard error by the batches of each step, without the bias of the step; NaN if one is None."""
-    values, errors = np.array(found, dtype=float).T
+def _at_no_step(found: Sequence[ArrayLike], weights: FloatArray) -> tuple[float, float]:
+    """A number and its standard error by the batches of each step, without the bias of the step."""
+    values, errors = np.array(found).T
     return float(weights @ values), float(np.linalg.norm(weights * errors))
 
 
@@ -337,17 +336,10 @@ def _counted(values: Sequence[FloatArray]) -> tuple[float, float]:
     return float(values[0].mean()), math.hypot(standard_error(values[0]), off)
 
 
-def _joined(found: Sequence[MomentEstimate], weights: FloatArray) -> MomentEstimate:
-    """The same of an estimate, without a value where too few paths of all batches carry the mean."""
-    value, error = _at_no_step([(each.value, each.standard_error) for each in found], weights)
-    effective = sum(each.effective_paths for each in found)
-    is_known = not math.isnan(value) and (found[0].p == 0 or effective >= FEW[found[0].estimator])
-    told = {"value": value, "standard_error": error} if is_known else {"value": None, "standard_error": None}
-    return replace(found[0], effective_paths=effective, **told)
-
-
-def direct_estimates(plan: Plan, batches: Sequence[PlainBatch]) -> tuple[list[MomentEstimate], list[Message]]:
-    """Λ(p) by the slope of ln M between t and 2t; its error by the jackknife over batches; and warnings."""
+def direct_estimates(plan: Plan, batches: Sequence[PlainBatch]) -> tuple[FloatArray, list[Message]]:
+    """Λ(p) by the slope of ln M between t and 2t, its error by the jackknife over batches, how many paths carry it; and
+    warnings.
+    """
     levels = min(plan.levels, min(batch.slices for batch in batches).bit_length())
     windows = np.array([[batch.slices >> j for j in range(levels)] for batch in batches], dtype=float)[:, :, None]
     log_sums = np.array([batch.log_sums[:levels] for batch in batches])
@@ -358,36 +350,34 @@ def direct_estimates(plan: Plan, batches: Sequence[PlainBatch]) -> tuple[list[Mo
     times = plan.length * 2.0 ** np.arange(levels - 1)[:, None]
     slopes = np.diff(total - np.log(windows.sum(axis=0)), axis=0) / times
     rests = np.diff(log_rest - np.log(windows.sum(axis=0) - windows), axis=1) / times
-    estimates, warnings = list[MomentEstimate](), list[Message]()
+    estimates, warnings = list[tuple[float, ...]](), list[Message]()
     needed = FEW["direct"] * len(batches) / BATCHES
     for k, p in enumerate(plan.p):
         usable = np.flatnonzero((share[1:, k] >= _KEPT) & (effective[1:, k] >= needed))
         j = int(usable[-1]) if usable.size else 0
         found = _jackknife(slopes[j, k], rests[:, j, k])
-        estimates.append(_estimate(plan, p, found, float(effective[j + 1, k])))
+        estimates.append((*found, effective[j + 1, k]))
         if j > 0:
             change, uncertainty = _jackknife(slopes[j, k] - slopes[j - 1, k], rests[:, j, k] - rests[:, j - 1, k])
             warnings += _drift(plan, p, change, uncertainty)
-    return estimates, warnings
+    return np.array(estimates).reshape(-1, 3), warnings
 
 
-def population_estimates(plan: Plan, populations: Sequence[Population]) -> tuple[list[MomentEstimate], list[Message]]:
-    """Λ(p) by the mean growth of ln Z, corrected by half its variance; its error by batches; and warnings.
+def population_estimates(plan: Plan, populations: Sequence[Population]) -> tuple[FloatArray, list[Message]]:
+    """Λ(p) by the mean growth of ln Z, corrected by half its variance, its error by batches; the rest as above.
 
     Every second batch has started far away, see `Population`. Where the two kinds disagree the moment has two places;
     each batch then gives the growth of one of them, which is a lower bound, and the larger growth counts.
     """
-    tallies = np.array([each.tallies[0] for each in populations], TALLIES).reshape(-1, plan.p.size)
-    expected = np.array([each.expected for each in populations]).reshape(-1, plan.p.size)
-    count, excess = tallies["count"], tallies["excess"]
-    mean = excess / count
-    variance = tallies["squares"] / count - mean**2
-    neighbours = 2 * excess - tallies["first"] - tallies["last"]
-    covariance = (tallies["products"] - mean * neighbours) / (count - 1) + mean**2
-    lost = count / np.maximum(count - 3, 1)  # as all three are around a mean of the same slices
-    growth = (expected + mean + lost * np.maximum(0.5 * variance + covariance, 0)) / plan.length
-    trends = (tallies["numbered"] - (count - 1) / 2 * excess) / count
-    estimates, warnings = list[MomentEstimate](), list[Message]()
+    count = min(each.slices for each in populations)
+    found = np.array([each.found[:, :count] for each in populations]).reshape(-1, plan.p.size, 2, count)
+    mean, effective = np.moveaxis(found.mean(axis=-1), -1, 0)
+    off = found[..., 0, :] - mean[..., None]
+    variance, covariance = np.mean(off**2, axis=-1), np.sum(off[..., 1:] * off[..., :-1], axis=-1) / (count - 1)
+    lost = count / max(count - 3, 1)  # as all three are around a mean of the same slices
+    growth = (mean + lost * np.maximum(0.5 * variance + covariance, 0)) / plan.length
+    trends = off @ (np.arange(count) - (count - 1) / 2) / count
+    estimates, warnings = list[tuple[float, ...]](), list[Message]()
     for k, p in enumerate(plan.p):
         used = slice(None)
         near, far = growth[::2, k], growth[1::2, k]
@@ -395,19 +385,9 @@ def population_estimates(plan: Plan, populations: Sequence[Population]) -> tuple
         if abs(gap) > DRIFT * gap_error > 0:
             used = slice(int(gap > 0), None, 2)
             warnings.append(Message(Code.TWO_PLACES, p=p, gap=abs(gap), size=abs(gap) / gap_error))
-        carrying = float(np.sum(tallies["effective"][used, k] / count[used, k]))
-        estimates.append(_estimate(plan, p, (float(growth[used, k].mean()), standard_error(growth[used, k])), carrying))
+        estimates.append((growth[used, k].mean(), standard_error(growth[used, k]), np.sum(effective[used, k])))
         warnings += _drift(plan, p, float(trends[used, k].mean()), standard_error(trends[used, k]))
-    return estimates, warnings
-
-
-def _estimate(plan: Plan, p: float, found: tuple[float, float], effective: float) -> MomentEstimate:
-    """An estimate by the batches of one step; Λ(0) = 0."""
-    if p == 0:
-        return MomentEstimate(0.0, 0.0, 0.0, plan.estimator, effective)
-    if bool(np.all(np.isfinite(found))) and math.isfinite(effective):
-        return MomentEstimate(float(p), *found, plan.estimator, effective)
-    return MomentEstimate(float(p), None, None, plan.estimator, 0.0)
+    return np.array(estimates).reshape(-1, 3), warnings
 
 
 def _missing(estimates: Sequence[MomentEstimate]) -> Iterator[Message]:

@@ -1,9 +1,9 @@
+# mypy: allow-untyped-defs, allow-untyped-calls
 """All paths of a batch, compiled: their steps, their growth, their weights, and how they are drawn anew.
 
 Sums and assignments are loops: those of whole arrays take numba seconds to compile, most for words of their errors.
 
-What moves them is a motion of `motions`, `several` or `spaces`, and the `step` of the kind of noise. State: x, u and
-that of the noise of each path, see `motions` and `spaces`, changed in place.
+What moves them is one of the motions, and their state as there.
 """
 
 from __future__ import annotations
@@ -11,91 +11,57 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba.extending import overload
 
 from fpsolve.simulation.compiled import compiled
+from fpsolve.simulation.motions import move
 
-CHUNK = 256
+CHUNK = 128
 """Paths that are advanced together, so that they stay in the cache and the processor can take several at once."""
 RENORMALISED = 4
 """Steps after which a path has the norm 1 again."""
 _RESAMPLED = 0.5
 """The share of effective paths at which a population is drawn anew."""
-TALLIES = np.dtype(
-    [(name, float) for name in ("count", "excess", "squares", "products", "numbered", "effective", "first", "last")]
-)
-"""Of the slices of a population, d being the growth of ln Z beyond what is expected: how many; Σd; Σd²; Σd × the d
-before; Σd × the number of the slice, from 0; Σ effective paths among those of a slice ago; the first and the last d."""
-
-
-def _move(m, noise, h, x, u, xi, log_norm, push, room, rng):  # type: ignore[no-untyped-def]
-    """`move` of the class of a motion; this is what numba replaces by it."""
-    raise NotImplementedError
-
-
-@overload(_move)
-def _moved_by_its_kind(m, noise, h, x, u, xi, log_norm, push, room, rng):  # type: ignore[no-untyped-def]
-    return m.instance_class.move
-
-
-def _normalise(x, u, log_norm):  # type: ignore[no-untyped-def]
-    """Bring all states to the norm 1; this is what numba replaces by the number of their variables."""
-    raise NotImplementedError
-
-
-@overload(_normalise)
-def _normalised_by_shape(x, u, log_norm):  # type: ignore[no-untyped-def]
-    def plane(x, u, log_norm):  # type: ignore[no-untyped-def]
-        for i in range(x.size):
-            norm = math.sqrt(x[i] * x[i] + u[i] * u[i])
-            log_norm[i] += math.log(norm)
-            x[i] /= norm
-            u[i] /= norm
-
-    def space(x, u, log_norm):  # type: ignore[no-untyped-def]
-        norms = np.empty(x.size)
-        for i in range(x.size):
-            norms[i] = x[i] * x[i]
-        for k in range(u.shape[0]):
-            for i in range(x.size):
-                norms[i] += u[k, i] * u[k, i]
-        for i in range(x.size):
-            norms[i] = math.sqrt(norms[i])
-            log_norm[i] += math.log(norms[i])
-            x[i] /= norms[i]
-        for k in range(u.shape[0]):
-            for i in range(x.size):
-                u[k, i] /= norms[i]
-
-    return plane if u.ndim == 1 else space
 
 
 @compiled
-def advance(m, noise, h, x, u, xi, log_norm, push, steps, interval, rng):  # type: ignore[no-untyped-def]
-    """Advance paths by `steps` steps of length h, in place, and return how often they crossed lines of jumps.
+def _normalise(y, log_norm):
+    """Bring all states to the norm 1."""
+    norms = np.zeros(y.shape[1])
+    for r in range(y.shape[0]):
+        for i in range(norms.size):
+            norms[i] += y[r, i] * y[r, i]
+    for i in range(norms.size):
+        norms[i] = math.sqrt(norms[i])
+        log_norm[i] += math.log(norms[i])
+    for r in range(y.shape[0]):
+        for i in range(norms.size):
+            y[r, i] /= norms[i]
+
+
+@compiled
+def advance(m, h, y, xi, log_norm, push, counted, steps, interval, rng):
+    """Advance paths by `steps` steps of length h, in place.
 
     Args:
-        m, noise: a motion and the `step` of a noise of this h.
-        x, u, xi: the state of the paths, and that of their noise.
-        log_norm: ln ‖(x, u)‖ that has been taken out of the state; after every `interval` steps, and at the end, it
-            takes in what the state has grown by, and the state has the norm 1 again.
+        m: a motion for steps of this h.
+        y, xi: the state of the paths, and that of their noises.
+        log_norm: ln ‖y‖ that has been taken out of the state; after every `interval` steps, and at the end, it takes in
+            what the state has grown by, and the state has the norm 1 again; never if `interval` is 0.
         push: takes in ∫f(ξ) dt, see `draw`.
+        counted: takes in what has happened, see `Driven`.
         rng: a `numpy.random.Generator`.
     """
-    room = np.empty((5, CHUNK))
-    crossed = 0
-    for first in range(0, x.size, CHUNK):
-        part = slice(first, min(first + CHUNK, x.size))
-        xs, us, xis, logs, pushes = x[part], u[..., part], xi[..., part], log_norm[part], push[part]
+    for first in range(0, log_norm.size, CHUNK):
+        part = slice(first, min(first + CHUNK, log_norm.size))
+        ys, xis, logs, pushes = y[:, part], xi[:, part], log_norm[part], push[part]
         for step in range(1, steps + 1):
-            crossed += _move(m, noise, h, xs, us, xis, logs, pushes, room, rng)  # type: ignore[no-untyped-call]
-            if step % interval == 0 or step == steps:
-                _normalise(xs, us, logs)  # type: ignore[no-untyped-call]
-    return crossed
+            move(m, h, ys, xis, logs, pushes, counted, rng)
+            if interval > 0 and (step % interval == 0 or step == steps):
+                _normalise(ys, logs)
 
 
 @compiled
-def add_windows(log_norm, starts, number, p, log_sums, log_squares):  # type: ignore[no-untyped-def]
+def add_windows(log_norm, starts, number, p, log_sums, log_squares):
     """Add Σ w and Σ w² of the windows of 2ʲ slices that end with this number of slices to sums kept as logarithms."""
     for j in range(starts.shape[0]):
         if number % (1 << j) == 0:
@@ -114,26 +80,26 @@ def add_windows(log_norm, starts, number, p, log_sums, log_squares):  # type: ig
 
 
 @compiled
-def advance_population(  # type: ignore[no-untyped-def]
-    m, noise, h, x, u, xi, log_norm, push, log_weights, ancestors, exponents, steps, interval, log_z, rng
+def advance_population(
+    m, h, y, xi, log_norm, push, counted, log_weights, ancestors, exponents, steps, interval, log_z, rng
 ):
     """Advance a population by some steps; the weights are looked at after every `interval` steps."""
     done = 0
     p, bias, bonus = exponents
     while done < steps:
         count = min(interval, steps - done)
-        for i in range(x.size):
+        for i in range(log_norm.size):
             log_norm[i], push[i] = 0.0, 0.0
-        advance(m, noise, h, x, u, xi, log_norm, push, count, np.int64(RENORMALISED), rng)  # else compiled for this 4
-        for i in range(x.size):
+        advance(m, h, y, xi, log_norm, push, counted, count, np.int64(RENORMALISED), rng)  # else compiled for this 4
+        for i in range(log_norm.size):
             log_weights[i] += p * log_norm[i] + bias * push[i] + bonus * count
-        log_z[0] += _resample(x, u, xi, log_weights, ancestors, rng)
+        log_z[0] += _resample(y, xi, log_weights, ancestors, rng)
         done += count
 
 
 @compiled
-def close_slice(log_weights, ancestors, log_z, expected, tallies):  # type: ignore[no-untyped-def]
-    """Add a slice of a population to its `TALLIES`, and begin the next one; returns the growth of ln Z in it."""
+def close_slice(log_weights, ancestors, log_z):
+    """The growth of ln Z in a slice of a population, and how many paths of its beginning carry it; begins the next."""
     n = log_weights.size
     largest = _largest(log_weights)
     shares = np.zeros(n)
@@ -146,25 +112,14 @@ def close_slice(log_weights, ancestors, log_z, expected, tallies):  # type: igno
         ancestors[i] = i
     now = log_z[0] + largest + math.log(total / n)
     growth = now - log_z[1]
-    excess, record = growth - expected, tallies[0]
-    if record.count == 0:
-        record.first = excess
-    else:
-        record.products += excess * record.last
-    record.numbered += excess * record.count
-    record.count += 1
-    record.excess += excess
-    record.squares += excess * excess
-    record.effective += total**2 / squares
-    record.last = excess
     log_z[1] = now
-    return growth
+    return growth, total**2 / squares
 
 
 @compiled
-def _resample(x, u, xi, log_weights, ancestors, rng):  # type: ignore[no-untyped-def]
+def _resample(y, xi, log_weights, ancestors, rng):
     """Draw the paths anew if their weights differ too much, systematically; returns ln of the mean weight."""
-    n = x.size
+    n = log_weights.size
     largest = _largest(log_weights)
     weights, total, squares = np.empty(n), 0.0, 0.0
     for i in range(n):
@@ -182,19 +137,18 @@ def _resample(x, u, xi, log_weights, ancestors, rng):  # type: ignore[no-untyped
             reached += weights[k]
         chosen[i] = k
         mark += spacing
-    _choose(x, chosen)
     _choose(ancestors, chosen)
-    for numbers in u.reshape(-1, n):
-        _choose(numbers, chosen)
-    for numbers in xi.reshape(-1, n):
-        _choose(numbers, chosen)
+    for r in range(y.shape[0]):
+        _choose(y[r], chosen)
+    for r in range(xi.shape[0]):
+        _choose(xi[r], chosen)
     for i in range(n):
         log_weights[i] = 0.0
     return largest + math.log(spacing)
 
 
 @compiled
-def _choose(values, chosen):  # type: ignore[no-untyped-def]
+def _choose(values, chosen):
     """The values with these numbers, in place."""
     old = values.copy()
     for i in range(values.size):
@@ -202,7 +156,7 @@ def _choose(values, chosen):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _largest(values):  # type: ignore[no-untyped-def]
+def _largest(values):
     largest = -math.inf
     for i in range(values.size):
         largest = max(largest, values[i])

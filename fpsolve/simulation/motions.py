@@ -1,7 +1,5 @@
-"""Any linear motion in the plane, compiled: ẋ = A(ξ) x, whose norm grows by R where x crosses the line of a ray.
-
-A jump multiplies the state and leaves its direction alone, and so does the flow of a linear system with a factor. So a
-jump may be made at any time of the step in which the line is crossed: what counts is how often it is.
+# mypy: allow-untyped-defs, allow-untyped-calls
+"""What moves paths, compiled: each noise with its share of A₀ by itself, in turn, between what happens to a path.
 
 Under a diffusion A(ξ) = A₀ + ξ A₁. A step of length h knows the mean m of ξ and, from its ends, the slope 2r/h of a
 line with that mean. The flow of this line is exp Ω to the order 4 (W. Magnus, Comm. Pure Appl. Math. 7, 1954),
@@ -15,68 +13,69 @@ stands in A₀: a scheme of strong order 3/2 and weak order 2.
 Under a chain the motion between two jumps of ξ is exp(A t), and these come after exponential times: nothing is left
 out. So it is between impulses, each of which multiplies the state: they are a chain whose state is the last one's size.
 
-Rows of arrays are not taken out of them where a path is moved, which takes numba longer than all else.
+Of K noises each moves the state with A₀/K, in their order or in the opposite one, each as likely (S. Ninomiya and
+N. Victoir, Appl. Math. Finance 15, 2008): of weak order 2, whatever the noises are.
 
-State: x, u and that of the noise of each path, ξ or the number of a state, arrays of shape (n,) changed in place; of
-noise with more numbers a row for each, shape (numbers, n), ξ being the first. A matrix is stored as half its trace t
-and the rest ((p, q), (r, −p)), whose square is p² + qr times one.
+With delays the variables at past times stand below those of now, as variables that do not change in a step. They are
+those at its beginning or those at its end, each as likely, and the same for all: the means of their products are those
+of the trapezoidal rule.
+
+State: y of shape (variables, paths), with delays with those a step ago below those of now, and so on; that of the
+noises, ξ or the number of a state, of noise with more numbers a row for each, ξ being the first, shape (rows, paths).
+Both are changed in place.
 """
 
 from __future__ import annotations
 
-import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+import numpy as np
 from numba.extending import overload
 
 from fpsolve.arrays import FloatArray
 from fpsolve.simulation.compiled import compiled, inlined
-from fpsolve.simulation.rays import Rays
-
-_LIMIT = 0.75**2
-"""p² + ½(q² + r²) of Ω above which a step is taken in parts: below, series are exact, and no turn is overlooked."""
-_MOST_PARTS = 10_000
-_HUGE = 1e100
-"""Square of a norm from which on it is taken out of the state."""
+from fpsolve.simulation.flows import crossed, flow, load, multiplied, step_driven, store, tamed
+from fpsolve.simulation.stops import flow_to_floor, step_to_floor
+from fpsolve.simulation.walls import Floor, Rays
 
 
-def _draw(step, xi, xi_mean, xi_end, push, rng):  # type: ignore[no-untyped-def]
+def _draw(step, xi, xi_mean, xi_end, push, rng):
     """`draw` of the class of a step; this is what numba replaces by it."""
     raise NotImplementedError
 
 
 @overload(_draw)
-def _drawn_by_its_kind(step, xi, xi_mean, xi_end, push, rng):  # type: ignore[no-untyped-def]
+def _drawn_by_its_kind(step, xi, xi_mean, xi_end, push, rng):
     return step.instance_class.draw
 
 
 @compiled
-def draw(step, xi, xi_mean, xi_end, push, rng):  # type: ignore[no-untyped-def]
+def draw(step, xi, xi_mean, xi_end, push, rng):
     """The mean and the end of the noise in one step that begins at `xi`, see `Noise.step`."""
-    _draw(step, xi, xi_mean, xi_end, push, rng)  # type: ignore[no-untyped-call]
+    _draw(step, xi, xi_mean, xi_end, push, rng)
 
 
-def _first_row(state):  # type: ignore[no-untyped-def]
+def _first_row(state):
     """ξ of the state of a noise; this is what numba replaces."""
     raise NotImplementedError
 
 
 @overload(_first_row)
-def _first_row_by_shape(state):  # type: ignore[no-untyped-def]
+def _first_row_by_shape(state):
     return (lambda state: state) if state.ndim == 1 else (lambda state: state[0])
 
 
 @compiled
-def drawn(step, state, xi_mean, xi_rise, push, rng):  # type: ignore[no-untyped-def]
+def drawn(step, state, xi_mean, xi_rise, push, rng):
     """Move the state of a noise by one step, in which ξ is about mean + rise (2t/h − 1)."""
     draw(step, state, xi_mean, xi_rise, push, rng)
-    xi = _first_row(state)  # type: ignore[no-untyped-call]
+    xi = _first_row(state)
     for i in range(xi.size):
         xi[i], xi_rise[i] = xi_rise[i], 0.5 * (xi_rise[i] - xi[i])
 
 
 @inlined
-def picked(reached, rng):  # type: ignore[no-untyped-def]
+def _picked(reached, rng):
     """A random number of a law, whose chances up to each are given."""
     mark, k = rng.random(), 0
     while reached[k] < mark:
@@ -84,238 +83,149 @@ def picked(reached, rng):  # type: ignore[no-untyped-def]
     return k
 
 
-class DrivenMotion(NamedTuple):
-    """A₀, A₁, [A₀, A₁] and [A₁, [A₁, A₀]] as rows (t, p, q, r), shape (4, 4)."""
+class Driven(NamedTuple):
+    """A diffusion or white noise: A₀, A₁, [A₀, A₁] and [A₁, [A₁, A₀]], shape (4, n, n), and the step of the noise.
+
+    `rows` are those of its state among those of all noises, a number where it is one.
+    """
 
     matrices: FloatArray
-    rays: Rays
+    wall: Rays | Floor
+    step: Any
+    rows: int | slice
 
     @staticmethod
-    def move(m, noise, h, x, u, xi, log_norm, push, room, rng):  # type: ignore[no-untyped-def]
-        """One step of length h, in place; returns how often lines were crossed.
+    def move(m, h, y, xi, log_norm, push, counted, rng):
+        """One step of length h, in place.
 
         Args:
-            m, noise: this, and the `step` of a diffusion or of white noise.
-            x, u, xi: the state of the paths, and that of their noise.
+            m: this.
+            y, xi: the state of the paths, and that of all noises.
             log_norm: takes in what the norm has grown by beyond that of the state.
             push: takes in ∫f(ξ) dt, see `draw`.
-            room: for 5 numbers of each path.
+            counted: takes in how often lines were crossed; at a `Floor` fast impacts and the time at rest of all.
             rng: a `numpy.random.Generator`.
         """
-        mean, rise = room[0, : x.size], room[1, : x.size]
-        drawn(noise, xi, mean, rise, push, rng)
-        return step_driven(m, h, x, u, mean, rise, log_norm, room[2], room[3], room[4])
+        mean, rise = np.empty(y.shape[1]), np.empty(y.shape[1])
+        drawn(m.step, xi[m.rows], mean, rise, push, rng)
+        _step(m.matrices, m.wall, h, y, mean, rise, log_norm, counted, rng)
 
 
-class SwitchedMotion(NamedTuple):
-    """A of each state as rows (t, p, q, r), shape (states, 4), and what multiplies x on arrival, (states, 2, 2)."""
+class Switched(NamedTuple):
+    """A chain or impulses: A of each state, exp(A h), what multiplies y on arrival, and ‖A‖, one for each state."""
 
     matrices: FloatArray
+    whole: FloatArray
     arrivals: FloatArray
-    rays: Rays
+    sizes: FloatArray
+    wall: Rays | Floor
+    step: Any
+    rows: int | slice
 
     @staticmethod
-    def move(m, noise, h, x, u, xi, log_norm, push, room, rng):  # type: ignore[no-untyped-def]
-        """As that of a `DrivenMotion`, with the `step` of a chain and the numbers of its states in the place of ξ."""
-        return step_switched(m, noise, h, x, u, xi, log_norm, rng)
+    def move(m, h, y, xi, log_norm, push, counted, rng):
+        """One step, of the length h of `whole`, as that of a `Driven`, with the number of a state in place of ξ."""
+        states, chain, n = xi[m.rows], m.step, y.shape[0]
+        state, other, begun = np.empty(n), np.empty(n), np.empty(n)
+        for i in range(y.shape[1]):
+            k, left = int(states[i]), h
+            load(y, i, state)
+            while left > 0:
+                stay = rng.standard_exponential() / chain.leaving[k]
+                log_norm[i] += _flow(m.wall, m, k, min(stay, left), h, state, counted, other, begun)
+                left -= stay
+                if left > 0:
+                    k = _picked(chain.reached[k], rng)
+                    multiplied(m.arrivals[k], state, other)
+            log_norm[i] += tamed(state)
+            store(y, i, state)
+            states[i] = k
 
 
-_C = tuple(1 / math.factorial(2 * k) for k in range(9))
-_S = tuple(1 / math.factorial(2 * k + 1) for k in range(9))
+def _step(matrices, wall, h, y, mean, rise, log_norm, counted, rng):
+    """One step under a line of ξ; this is what numba replaces by what the wall needs."""
+    raise NotImplementedError
 
 
-@inlined
-def _cosh(y):  # type: ignore[no-untyped-def]
-    """cosh √y, to 1e-15 for |y| ≤ `_LIMIT`."""
-    return 1 + y * (_C[1] + y * (_C[2] + y * (_C[3] + y * (_C[4] + y * (_C[5] + y * (_C[6] + y * _C[7]))))))
+@overload(_step)
+def _step_by_wall(matrices, wall, h, y, mean, rise, log_norm, counted, rng):
+    return (step_to_floor if wall.instance_class is Floor else step_driven).py_func
 
 
-@inlined
-def _sinh(y):  # type: ignore[no-untyped-def]
-    """sinh √y/√y, to 1e-15 for |y| ≤ `_LIMIT`."""
-    return 1 + y * (_S[1] + y * (_S[2] + y * (_S[3] + y * (_S[4] + y * (_S[5] + y * (_S[6] + y * _S[7]))))))
+def _flow(wall, m, k, t, h, state, counted, other, begun):
+    """The motion in a state of a chain; this is what numba replaces by what the wall needs."""
+    raise NotImplementedError
 
 
-@inlined
-def _side(rays, j, x, u):  # type: ignore[no-untyped-def]
-    """The distance from a line, with a sign."""
-    return rays.across[j, 0] * x + rays.across[j, 1] * u
+@overload(_flow)
+def _flow_by_wall(wall, m, k, t, h, state, counted, other, begun):
+    if wall.instance_class is Floor:
+        return lambda wall, m, k, t, h, state, counted, other, begun: flow_to_floor(
+            wall, m.matrices[k], t, m.sizes[k], state, counted
+        )
+
+    def over_rays(wall, m, k, t, h, state, counted, other, begun):
+        if t < h or m.sizes[k] * h > 1:
+            return flow(wall, m.matrices[k], t, m.sizes[k], state, counted, other, begun)
+        for r in range(state.size):
+            begun[r] = state[r]
+        multiplied(m.whole[k], state, other)
+        return crossed(wall, begun, state, counted)
+
+    return over_rays
 
 
-@inlined
-def _crossings(rays, j, x, u, x1, u1):  # type: ignore[no-untyped-def]
-    """How often a line is crossed from x to x₁, which is not far; against its way it counts −1."""
-    before, after = _side(rays, j, x, u) >= 0, _side(rays, j, x1, u1) >= 0
-    if before == after:
-        return 0
-    is_forward = after == (rays.along[j, 0] * x1 + rays.along[j, 1] * u1 >= 0)
-    return 1 if is_forward == (rays.ways[j] > 0) else -1
+class InTurn(NamedTuple):
+    """The motions by all noises, as a tuple, of `size` variables now, and the row of each past value below them."""
+
+    motions: Any
+    size: int
+    rows: FloatArray
+
+    @staticmethod
+    def move(m, h, y, xi, log_norm, push, counted, rng):
+        """One step as that of a `Driven`, of paths that take the noises in one order."""
+        n, paths, past = m.size, y.shape[1], m.rows.size
+        state = np.empty((n + past, paths))
+        for r in range(n):
+            for i in range(paths):
+                state[r, i] = y[r, i]
+        for i in range(paths if past else 0):
+            later = n if rng.random() < 0.5 else 0  # rows by which values at the end of the step are nearer
+            for c in range(past):
+                state[n + c, i] = y[m.rows[c] - later, i]
+        is_forward = len(m.motions) == 1 or rng.random() < 0.5
+        _move_all(m.motions, is_forward, h, state, xi, log_norm, push, counted, rng)
+        for r in range(y.shape[0] - 1, -1, -1):
+            for i in range(paths):
+                y[r, i] = state[r, i] if r < n else y[r - n, i]
 
 
-@compiled
-def step_driven(m, h, x, u, mean, rise, log_norm, x_end, u_end, care):  # type: ignore[no-untyped-def]
-    """Move paths by one step of length h, in place, and return how often they crossed lines.
-
-    Args:
-        m: a `DrivenMotion`.
-        x, u: the state.
-        mean, rise: ξ in the step is mean + rise (2t/h − 1).
-        log_norm: takes in what the norm has grown by beyond that of the state.
-        x_end, u_end, care: room for as many numbers.
-    """
-    t0, p0, q0, r0 = m.matrices[0]
-    t1, p1, q1, r1 = m.matrices[1]
-    _, p2, q2, r2 = m.matrices[2]
-    _, p3, q3, r3 = m.matrices[3]
-    n, lever = x.size, -h * h / 6
-    for i in range(n):
-        a, b = h * mean[i], lever * rise[i]
-        c = 0.6 * b * b / h
-        p = h * p0 + a * p1 + b * p2 + c * p3
-        q = h * q0 + a * q1 + b * q2 + c * q3
-        r = h * r0 + a * r1 + b * r2 + c * r3
-        square = p * p + q * r
-        cosh, sinh = _cosh(square), _sinh(square)
-        x_end[i] = (cosh + sinh * p) * x[i] + sinh * q * u[i]
-        u_end[i] = sinh * r * x[i] + (cosh - sinh * p) * u[i]
-        log_norm[i] += h * t0 + a * t1
-        care[i] = 0.0 if p * p + 0.5 * (q * q + r * r) < _LIMIT else 2.0
-    rays, crossed = m.rays, 0
-    for j in range(rays.logs.size):
-        for i in range(n):
-            before, after = _side(rays, j, x[i], u[i]), _side(rays, j, x_end[i], u_end[i])
-            care[i] = max(care[i], 0.0 if before * after > 0 else 1.0)
-    for i in range(n):
-        if care[i] == 2:
-            x_end[i], u_end[i], log, count = _in_parts(m, h, x[i], u[i], mean[i], rise[i])
-            log_norm[i] += log
-            crossed += count
-        elif care[i] == 1:
-            for j in range(rays.logs.size):
-                count = _crossings(rays, j, x[i], u[i], x_end[i], u_end[i])
-                log_norm[i] += count * rays.logs[j]
-                crossed += count
-        x[i], u[i] = x_end[i], u_end[i]
-    return crossed
+def move(m, h, y, xi, log_norm, push, counted, rng):
+    """One step of any motion, see `Driven`; this is what numba replaces by `move` of its class."""
+    raise NotImplementedError
 
 
-@inlined
-def _flow(m, x, u, h, mean, rise):  # type: ignore[no-untyped-def]
-    """The state after a time h, but for the growth of the norm by half traces."""
-    a, b = h * mean, -h * h / 6 * rise
-    c = 0.6 * b * b / h
-    p = h * m.matrices[0, 1] + a * m.matrices[1, 1] + b * m.matrices[2, 1] + c * m.matrices[3, 1]
-    q = h * m.matrices[0, 2] + a * m.matrices[1, 2] + b * m.matrices[2, 2] + c * m.matrices[3, 2]
-    r = h * m.matrices[0, 3] + a * m.matrices[1, 3] + b * m.matrices[2, 3] + c * m.matrices[3, 3]
-    square = p * p + q * r
-    cosh, sinh = _cosh(square), _sinh(square)
-    return (cosh + sinh * p) * x + sinh * q * u, sinh * r * x + (cosh - sinh * p) * u
+@overload(move)
+def _moved_by_its_kind(m, h, y, xi, log_norm, push, counted, rng):
+    return m.instance_class.move
 
 
-@compiled
-def _in_parts(m, h, x, u, mean, rise):  # type: ignore[no-untyped-def]
-    """One step in parts that are small enough: the state, its growth beside that by half traces, and the crossings."""
-    rays, log, crossed = m.rays, 0.0, 0
-    largest = 0.0
-    for xi in (mean - rise, mean + rise):
-        p = m.matrices[0, 1] + xi * m.matrices[1, 1]
-        q = m.matrices[0, 2] + xi * m.matrices[1, 2]
-        r = m.matrices[0, 3] + xi * m.matrices[1, 3]
-        largest = max(largest, p * p + 0.5 * (q * q + r * r))
-    size = h * math.sqrt(largest / _LIMIT)
-    if not size < _MOST_PARTS:
-        return math.nan, math.nan, math.nan, 0
-    parts = 1 + int(size)
-    s = h / parts
-    for part in range(parts):
-        xi, slope = mean + rise * ((2 * part + 1) / parts - 1), rise / parts
-        x1, u1 = _flow(m, x, u, s, xi, slope)
-        for j in range(rays.logs.size):
-            count = _crossings(rays, j, x, u, x1, u1)
-            log += count * rays.logs[j]
-            crossed += count
-        norm = math.sqrt(x1 * x1 + u1 * u1)
-        log += math.log(norm)
-        x, u = x1 / norm, u1 / norm
-    return x, u, log, crossed
+def _move_all(motions, is_forward, h, y, xi, log_norm, push, counted, rng):
+    """Motions in one order or in the other; this is what numba replaces, as each is of a type of its own."""
+    raise NotImplementedError
 
 
-@compiled
-def step_switched(m, chain, h, x, u, states, log_norm, rng):  # type: ignore[no-untyped-def]
-    """Move paths by a time h, in place, with all jumps of the noise in it, and return how often they crossed lines.
+@overload(_move_all)
+def _moved_one_by_one(motions, is_forward, h, y, xi, log_norm, push, counted, rng):
+    if len(motions.types) == 0:
+        return lambda motions, is_forward, h, y, xi, log_norm, push, counted, rng: None
 
-    Args:
-        m, chain: a `SwitchedMotion` and the `step` of a chain.
-        x, u: the state.
-        states: the number of that of the noise.
-        log_norm: takes in what the norm has grown by beyond that of the state.
-        rng: a `numpy.random.Generator`.
-    """
-    crossed = 0
-    for i in range(x.size):
-        k, left = int(states[i]), h
-        while left > 0:
-            stay = rng.standard_exponential() / chain.leaving[k]
-            t = min(stay, left)
-            x[i], u[i], log, count = exact_flow(m, k, t, x[i], u[i])
-            log_norm[i] += log
-            crossed += count
-            left -= stay
-            if left > 0:
-                k = picked(chain.reached[k], rng)
-                a, b, c, d = m.arrivals[k, 0, 0], m.arrivals[k, 0, 1], m.arrivals[k, 1, 0], m.arrivals[k, 1, 1]
-                x[i], u[i] = a * x[i] + b * u[i], c * x[i] + d * u[i]
-                square = x[i] * x[i] + u[i] * u[i]
-                if not 1 / _HUGE < square < _HUGE:
-                    log_norm[i] += 0.5 * math.log(square)
-                    x[i] /= math.sqrt(square)
-                    u[i] /= math.sqrt(square)
-        states[i] = k
-    return crossed
+    def one_and_the_rest(motions, is_forward, h, y, xi, log_norm, push, counted, rng):
+        if is_forward:
+            move(motions[0], h, y, xi, log_norm, push, counted, rng)
+        _move_all(motions[1:], is_forward, h, y, xi, log_norm, push, counted, rng)
+        if not is_forward:
+            move(motions[0], h, y, xi, log_norm, push, counted, rng)
 
-
-@inlined
-def exact_flow(m, k, t, x, u):  # type: ignore[no-untyped-def]
-    """exp(A t) x: its direction, the growth of the norm beyond it, and the crossings, none of which is overlooked."""
-    return flow_on(m, k, exact_factors(m, k, t), x, u)
-
-
-@compiled
-def exact_factors(m, k, t):  # type: ignore[no-untyped-def]
-    """c, s, the growth of the norm and the half-turns of exp(A t) = ± e^growth (c + s B), B the rest of A."""
-    half_trace, p, q, r = m.matrices[k, 0], m.matrices[k, 1], m.matrices[k, 2], m.matrices[k, 3]
-    square, growth = p * p + q * r, half_trace * t
-    if square < 0:  # it turns, and crosses each line once in every half-turn
-        omega = math.sqrt(-square)
-        turns = int(omega * t / math.pi)
-        angle = omega * t - turns * math.pi
-        return math.cos(angle), math.sin(angle) / omega, growth, turns
-    if square > 0:
-        rate = math.sqrt(square)
-        fall = -math.expm1(-2 * rate * t)
-        return 1 - 0.5 * fall, 0.5 * fall / rate, growth + rate * t, 0
-    return 1.0, t, growth, 0
-
-
-@inlined
-def factors(m, k, t):  # type: ignore[no-untyped-def]
-    """The same, by series where it is small."""
-    half_trace, p, q, r = m.matrices[k, 0], m.matrices[k, 1], m.matrices[k, 2], m.matrices[k, 3]
-    square = (p * p + q * r) * t * t
-    if abs(square) > _LIMIT:
-        return exact_factors(m, k, t)
-    return _cosh(square), t * _sinh(square), half_trace * t, 0
-
-
-@compiled
-def flow_on(m, k, factors, x, u):  # type: ignore[no-untyped-def]
-    """The same of x by its factors."""
-    p, q, r = m.matrices[k, 1], m.matrices[k, 2], m.matrices[k, 3]
-    cosh, sinh, log, turns = factors
-    x1, u1 = (cosh + sinh * p) * x + sinh * q * u, sinh * r * x + (cosh - sinh * p) * u
-    crossed = 0
-    for j in range(m.rays.logs.size):
-        count = turns + int((_side(m.rays, j, x, u) >= 0) != (_side(m.rays, j, x1, u1) >= 0))
-        log += count * m.rays.logs[j]
-        crossed += count
-    return x1, u1, log, crossed
+    return one_and_the_rest

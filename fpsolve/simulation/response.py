@@ -20,8 +20,8 @@ from fpsolve.model.plane import Jump, System, angular_frequency, matrix_at
 from fpsolve.model.problem import Problem
 from fpsolve.model.quantity import IMPACT_RATE, OSCILLATOR_RESPONSE, ResponseQuantities
 from fpsolve.simulation.batches import STEP_SECONDS, advance_all, standard_error
-from fpsolve.simulation.bounces import advance_and_count, motion_of
-from fpsolve.simulation.coefficients import starting_state
+from fpsolve.simulation.bounces import CubicMotion, advance_and_count, motion_of
+from fpsolve.simulation.coefficients import coefficients, starting_state
 from fpsolve.simulation.setup import BATCHES, simulated_parts
 
 if TYPE_CHECKING:
@@ -137,23 +137,22 @@ class _Batch:
     """Paths of the nonlinear system, and what has been counted of them."""
 
     def __init__(
-        self, laws: tuple[Any, Any, float], steps: int, state: tuple[FloatArray, ...], rng: np.random.Generator
+        self, motion: CubicMotion, step: float, steps: int, state: tuple[FloatArray, ...], rng: np.random.Generator
     ) -> None:
-        self.laws, self.steps, self.rng = laws, steps, rng
-        self.x, self.u, self.xi = state
-        self.push = np.zeros(self.x.size)
+        self.motion, self.step, self.steps, self.rng = motion, step, steps, rng
+        self.y, _ = state
+        self.counted, self.reach = np.zeros(2), 0.0
+        self.state = *state, *np.zeros((2, self.y.shape[1])), self.counted
         self.plane, self.radial = np.zeros((BINS, 2 * BINS)), np.zeros(BINS)
         self.sums = np.zeros(SUMS)
-        self.impacts, self.reach = 0, 0.0
 
     def advance(self, looks: int, stop: Event) -> None:
         """Go on for some looks; with reach > 0 count the states up to this amplitude."""
-        if stop.is_set():
-            return
-        self.impacts += advance_and_count(
-            *self.laws, self.x, self.u, self.xi, self.push, self.steps, looks, self.reach, self.plane, self.radial,
-            self.sums, self.rng,
-        )  # fmt: skip
+        if not stop.is_set():
+            advance_and_count(
+                self.motion, self.step, *self.state, self.steps, looks, self.reach, self.plane, self.radial, self.sums,
+                self.rng,
+            )  # fmt: skip
 
 
 def simulated_response(
@@ -183,22 +182,23 @@ def simulated_response(
     system, noise = simulated_parts(problem)
     if reason := no_simulation(problem):
         raise FpsolveError(reason)
-    motion, first = motion_of(system)
+    [load] = coefficients(system, noise).loads
+    motion, first = motion_of(system, noise.step(step), load.rows)
     steps = max(1, round(math.pi / (angular_frequency(system) * step * _LOOKS)))
     between = steps * step
     memory = max(1 / exponent, 2 * variance_rate / exponent**2)
     settling, looks = math.ceil(5 * memory / between), math.ceil(max(time, 20 * memory) / between)
-    laws, size = (motion, noise.step(step), step), math.ceil(paths / BATCHES)
+    size = math.ceil(paths / BATCHES)
     amplitude = math.sqrt(exponent / _damping(system))
     rngs = [np.random.default_rng(each) for each in np.random.SeedSequence(seed, spawn_key=(1,)).spawn(BATCHES)]
-    batches = [_Batch(laws, steps, starting_state(noise, size, rng, amplitude), rng) for rng in rngs]
+    batches = [_Batch(motion, step, steps, starting_state(noise, size, rng, 2, amplitude), rng) for rng in rngs]
     seconds = STEP_SECONDS * size * steps
     advances = [batch.advance for batch in batches]
     if advance_all(advances, settling, seconds, progress):
         raise KeyboardInterrupt
-    reach = _MARGIN * max(float(np.max(np.hypot(batch.x, batch.u))) for batch in batches)
+    reach = _MARGIN * max(float(np.max(np.hypot(*batch.y))) for batch in batches)
     for batch in batches:
-        batch.impacts, batch.reach = 0, reach
+        batch.counted[:], batch.reach = 0, reach
     interrupted = advance_all(advances, looks, seconds, progress)
     count = np.array([batch.sums[-1] for batch in batches])
     if count.min() == 0:
@@ -208,7 +208,7 @@ def simulated_response(
     radial = np.array([batch.radial for batch in batches]) / count[:, None] / (reach / BINS)
     cells = sum(batch.plane for batch in batches) / count.sum() / (reach / BINS) ** 2
     x_edges, v_edges, density = _in_variables(system, first, reach, cells)
-    impacts = sum(batch.impacts for batch in batches) / (size * len(batches) * duration)
+    impacts = sum(batch.counted[0] for batch in batches) / (size * len(batches) * duration)
     return Response(
         means={name: (float(each.mean()), standard_error(each)) for name, each in _means(system, first, sums).items()},
         x_edges=x_edges,

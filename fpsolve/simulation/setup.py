@@ -6,19 +6,15 @@ import math
 from collections.abc import Sequence
 from typing import Literal, get_args
 
-import numpy as np
-
 from fpsolve.arrays import is_whole, real_numbers, shown
 from fpsolve.errors import FpsolveError, NoSuchExponent
 from fpsolve.model.noise import Noise
 from fpsolve.model.noises.clock import waves_apart
 from fpsolve.model.plane import SAME_DELAY, System
 from fpsolve.model.problem import Problem, checked_problem, infinite
-from fpsolve.simulation.coefficients import ROUGHER, SplitCoefficients, coefficients, refuse, repeated_delay
+from fpsolve.simulation.coefficients import ROUGHER, coefficients, refuse, repeated_delay
 
 Estimator = Literal["direct", "population"]
-SPLIT = 0.06
-"""The turn, growth or kick in one step at most where several noises move the state in turn."""
 BATCHES = 32
 """Independent sets of paths, from whose differences the errors are read."""
 PATHS, TRANSIENTS, FEWER = 32_768, 64, 16
@@ -43,7 +39,7 @@ def simulated_parts(problem: Problem) -> tuple[System, Noise]:
     if system.clock:
         system, noise = waves_apart(system, noise)
     try:
-        repeated_delay(system)
+        repeated_delay(system.pasts)
     except ValueError as failure:
         raise FpsolveError(f"simulation is in steps that divide each delay, but {failure}") from failure
     refuse(system, noise)
@@ -71,88 +67,21 @@ def check_settings(problem: Problem, p: float | Sequence[float], estimator: Esti
         )
 
 
-def largest_step(oscillator: System, noise: Noise) -> tuple[float, str]:
-    """The largest step that is good to about 1e-4 of the strength of the noise, and what limits it.
-
-    For A₀ = ω((0, 1), (−1, 0)) + D, beyond the plane Ω + D with Ωᵀ = −Ω and ‖Ω‖ = ω, and for A₁ these are ω h ≤ ½,
-    ‖D‖ h ≤ ⅛, ‖A₁‖ std(ξ) h ≤ ⅛, or under white noise ‖A₁‖² h ≤ ⅛, and the `largest_step` of the noise. Under a chain
-    or impulses, where a step is exact, it is 1/(2π) half-turns.
-    """
-    known = coefficients(oscillator, noise)
-    if known.is_exact:
-        return 0.5 * known.half_turn / math.pi, "the frequency"
-    turning = 0.5 * (known.steady - known.steady.T)
-    turn = float(np.linalg.norm(turning, 2))
-    rest = float(np.linalg.norm(known.steady - turning, 2))  # may underflow
-    if isinstance(known, SplitCoefficients):
-        strengths = [SPLIT / (size**2 if is_white else size) for size, is_white in known.sizes if size]
-        split = {
-            "the frequency": 2 * SPLIT / turn if turn else math.inf,
-            "the damping": SPLIT / rest if rest else math.inf,
-            "the strength of the noise": min(strengths, default=math.inf),
-            "the correlation time of the noise": noise.largest_step,
-            "the delay": repeated_delay(oscillator) / 4,
-        }
-        reason = min(split, key=lambda name: split[name])
-        return split[reason], reason
-    driven = float(np.linalg.norm(known.driven, 2))
-    limits = {
-        "the frequency": 0.5 / turn if turn else math.inf,
-        "the damping": 0.125 / rest if rest else math.inf,
-        "the strength of the noise": math.inf,
-        "the correlation time of the noise": noise.largest_step,
-    }
-    if driven:
-        limits["the strength of the noise"] = 0.125 / (
-            driven**2 if noise.is_white else driven * noise.standard_deviation
-        )
-    reason = min(limits, key=lambda name: limits[name])
-    return limits[reason], reason
-
-
-def transient(oscillator: System, noise: Noise, *, is_mixed: bool = True) -> float:
-    """The time after which ln E‖x‖^p grows like Λ(p) t: at least two half-turns π/ω and eight relaxation times.
-
-    Of impulses that is eight times the mean time between two of them.
-
-    It is a whole number of half-turns, in which the oscillation cancels that the start from the stationary law leaves
-    in weak noise; beside a harmonic load, with which the growth goes up and down for ever, a whole number of periods.
-    Beyond the plane it is, if `is_mixed`, at least as long as the modes remember how they shared the motion.
-    """
-    known, unit = coefficients(oscillator, noise), _repeated(oscillator, noise)
-    relaxation_time = max((part.relaxation_time for part in noise.parts.values() if not part.period), default=0.0)
-    return unit * math.ceil(max(2 * known.half_turn, 8 * relaxation_time, is_mixed * known.settling) / unit)
-
-
-def default_step(oscillator: System, noise: Noise) -> float:
-    """Half the largest step, or less, so that a half-turn π/ω or a period is a whole number of steps, rough or not."""
-    unit = _repeated(oscillator, noise) / coefficients(oscillator, noise).together
-    return unit / math.ceil(unit / (0.5 * largest_step(oscillator, noise)[0]))
-
-
-def _repeated(oscillator: System, noise: Noise) -> float:
-    """The delay, or the period of a harmonic load, without one a half-turn."""
-    if math.isfinite(delay := repeated_delay(oscillator)):
-        return delay
-    return max(part.period for part in noise.parts.values()) or coefficients(oscillator, noise).half_turn
-
-
 def obstacles(
     oscillator: System, noise: Noise, *, time: float | None = None, step: float | None = None
 ) -> dict[str, str]:
     """Why a simulation with this length and this step would not be right: a sentence for each of "time" and "step"."""
-    found = {}
-    largest, reason = largest_step(oscillator, noise)
-    settling = transient(oscillator, noise)
-    h, least = default_step(oscillator, noise), settling / _LONGEST
+    found, known = {}, coefficients(oscillator, noise)
+    largest, reason = known.largest_step
+    settling = known.transient()
+    h, least, unit = known.default_step, settling / _LONGEST, known.repeated / ROUGHER
     if step is not None and not step > 0:
         found["step"] = f"got {step:g}; must be > 0 and <= {largest:.4g}; make it positive, or leave it out"
     elif step is not None and step > largest * (1 + 1e-12):
         found["step"] = (
             f"got {step:g}, too large for {reason}; must be > 0 and <= {largest:.4g}; reduce it, or leave it out"
         )
-    elif step is not None and not _divides(step, oscillator):
-        unit = repeated_delay(oscillator) / ROUGHER
+    elif step is not None and known.pasts and abs(unit / step - round(unit / step)) > SAME_DELAY * unit / step:
         near = unit / math.ceil(unit / step)
         found["step"] = f"got {step:.10g}; must be a third, a sixth, … of the delay, such as {near:.10g}"
     elif step is not None and step < least <= largest:
@@ -172,9 +101,3 @@ def obstacles(
     elif time is not None and time > _LONGEST * settling:
         found["time"] = f"got {time:g}; must be <= {_LONGEST * settling:.4g}, a million transients; reduce it"
     return found
-
-
-def _divides(step: float, system: System) -> bool:
-    """Whether the delays of a system are whole numbers of rough steps."""
-    parts = repeated_delay(system) / (ROUGHER * step)
-    return not math.isfinite(parts) or abs(parts - round(parts)) <= SAME_DELAY * parts

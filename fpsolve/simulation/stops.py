@@ -1,29 +1,28 @@
+# mypy: allow-untyped-defs, allow-untyped-calls
 """Linear motions of three or more variables with a wall at rest for one of them, compiled: each impact is found.
 
-In the coordinates of a `Stop` x is q ≥ 0, the first row of u is q̇, and an impact is q̇⁺ = −R q̇⁻ where q = 0. While ξ is
-held q(t) is a power series, and its first zero is found from below: where |g″| ≤ M no zero of g is passed by steps of
-2g/(s + √(s² + 2Mg)), s = max(0, −g′), which are Newton's near a zero. Chattering is over where the geometric series of
-its flights, 2q̇/(|q̈|(1 − R)), is short beside all other times. Then q rests until q̈ > 0, and the others move alone.
+In the coordinates of a `Stop` the first variable is q ≥ 0, the second q̇, and an impact is q̇⁺ = −R q̇⁻ where q = 0.
+While ξ is held q(t) is a power series, and its first zero is found from below: where |g″| ≤ M no zero of g is passed by
+steps of 2g/(s + √(s² + 2Mg)), s = max(0, −g′), which are Newton's near a zero. Chattering is over where the geometric
+series of its flights, 2q̇/(|q̈|(1 − R)), is short beside all other times. Then q rests until q̈ > 0, and the others move
+alone.
 
 Under a chain ξ is held between its jumps: nothing is left out. Under a diffusion it is held over each half of a step,
 at mean ∓ ⅔ rise, which has the mean and the first moment of the line that `motions` takes, and the order 4 (S. Blanes
 and P. C. Moan, Appl. Numer. Math. 56, 2006); q̇ is the rate of q in both. Under white noise a part of a step is halved,
 by the law of ΔW and ∫W dt of its halves, until it cannot reach the wall, or the noise does little to q̇.
 
-State: as in `spaces`. A move returns the number of fast impacts and, as its imaginary part, the time at rest of all.
+State: as in `flows`. The wall is a `Floor`.
 """
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
-from fpsolve.arrays import FloatArray
 from fpsolve.simulation.compiled import compiled
-from fpsolve.simulation.motions import drawn, picked
-from fpsolve.simulation.spaces import _load, _store, _tamed
+from fpsolve.simulation.flows import load, store, tamed
 
 _SHORT = 1e-6
 """‖A‖ times the length of all further flights, at which chattering is over."""
@@ -40,85 +39,46 @@ _RELEASED = 1e-4
 """Share of a part after which a mass that has left the wall may be there again."""
 
 
-class DrivenStop(NamedTuple):
-    """A₀ and A₁, shape (2, n, n), R, what an impact is compared with, over each of the |variables|, and 1 for dW."""
-
-    matrices: FloatArray
-    restitution: float
-    fast: FloatArray
-    is_white: float
-
-    @staticmethod
-    def move(m, noise, h, x, u, xi, log_norm, push, room, rng):  # type: ignore[no-untyped-def]
-        """One step as that of a `DrivenMotion`."""
-        mean, rise = room[0, : x.size], room[1, : x.size]
-        drawn(noise, xi, mean, rise, push, rng)
-        n, total, parts = m.fast.size, 0j, np.empty((_MOST_SPLIT + 2, 3))
-        matrix, state, series = np.empty((n, n)), np.empty(n), np.empty((_MOST_TERMS + 1, n + 1))
-        for i in range(x.size):
-            _load(x, u, i, state)
-            parts[0], top = (h, mean[i] * h, -rise[i] * h / 6), 0
-            while top >= 0:
-                s, w, area = parts[top]
-                kick, force, least = 0.0, 0.0, 0.0
-                for c in range(n):
-                    kick += (c > 0) * m.matrices[1, 1, c] * state[c]
-                    force += m.matrices[0, 1, c] * state[c]
-                    least += m.fast[c] * abs(state[c])
-                kick, speed = abs(kick) * math.sqrt(s) * m.is_white, abs(state[1])
-                is_near = abs(state[0]) < s * (speed + abs(force) * s + _WIDE * kick)
-                if is_near and speed < _RESOLVED * kick and kick > _FINEST * least and top < _MOST_SPLIT:
-                    z, more = math.sqrt(s) / 4 * rng.standard_normal(), math.sqrt(s / 12) * rng.standard_normal()
-                    first = 0.5 * s, 0.5 * w + 1.5 * area + z, 0.25 * area - 0.5 * z + 0.5 * more
-                    parts[top] = 0.5 * s, w - first[1], first[2] - more
-                    top += 1
-                    parts[top] = first
-                    continue
-                top -= 1
-                for side in (0.5, -0.5):
-                    value, size = (w + 8 * side * area) / s, 0.0
-                    for r in range(n):
-                        for c in range(n):
-                            matrix[r, c] = m.matrices[0, r, c] + value * m.matrices[1, r, c]
-                            size += matrix[r, c] ** 2
-                    total += _flown(m, matrix, 0.5 * s, math.sqrt(size), state, series)
-            log_norm[i] += _tamed(state)
-            _store(x, u, i, state)
-        return total
-
-
-class SwitchedStop(NamedTuple):
-    """A of each state, shape (states, n, n), their norms, R, and the speeds as in a `DrivenStop`."""
-
-    matrices: FloatArray
-    sizes: FloatArray
-    restitution: float
-    fast: FloatArray
-
-    @staticmethod
-    def move(m, noise, h, x, u, xi, log_norm, push, room, rng):  # type: ignore[no-untyped-def]
-        """One step as that of a `SwitchedMotion`."""
-        n, total = m.fast.size, 0j
-        state, series = np.empty(n), np.empty((_MOST_TERMS + 1, n + 1))
-        for i in range(x.size):
-            k, left = int(xi[i]), h
-            _load(x, u, i, state)
-            while left > 0:
-                stay = rng.standard_exponential() / noise.leaving[k]
-                total += _flown(m, m.matrices[k], min(stay, left), m.sizes[k], state, series)
-                left -= stay
-                if left > 0:
-                    k = picked(noise.reached[k], rng)
-            log_norm[i] += _tamed(state)
-            _store(x, u, i, state)
-            xi[i] = k
-        return total
+@compiled
+def step_to_floor(matrices, wall, h, y, mean, rise, log_norm, counted, rng):
+    """Move paths by one step of length h, in place, as `step_driven` does; only A₀ and A₁ of the matrices are used."""
+    n, parts = y.shape[0], np.empty((_MOST_SPLIT + 2, 3))
+    matrix, state = np.empty((n, n)), np.empty(n)
+    for i in range(y.shape[1]):
+        load(y, i, state)
+        parts[0], top = (h, mean[i] * h, -rise[i] * h / 6), 0
+        while top >= 0:
+            s, w, area = parts[top]
+            kick, force, least = 0.0, 0.0, 0.0
+            for c in range(n):
+                kick += (c > 0) * matrices[1, 1, c] * state[c]
+                force += matrices[0, 1, c] * state[c]
+                least += wall.fast[c] * abs(state[c])
+            kick, speed = abs(kick) * math.sqrt(s) * wall.is_white, abs(state[1])
+            is_near = abs(state[0]) < s * (speed + abs(force) * s + _WIDE * kick)
+            if is_near and speed < _RESOLVED * kick and kick > _FINEST * least and top < _MOST_SPLIT:
+                z, more = math.sqrt(s) / 4 * rng.standard_normal(), math.sqrt(s / 12) * rng.standard_normal()
+                first = 0.5 * s, 0.5 * w + 1.5 * area + z, 0.25 * area - 0.5 * z + 0.5 * more
+                parts[top] = 0.5 * s, w - first[1], first[2] - more
+                top += 1
+                parts[top] = first
+                continue
+            top -= 1
+            for side in (0.5, -0.5):
+                value, size = (w + 8 * side * area) / s, 0.0
+                for r in range(n):
+                    for c in range(n):
+                        matrix[r, c] = matrices[0, r, c] + value * matrices[1, r, c]
+                        size += matrix[r, c] ** 2
+                flow_to_floor(wall, matrix, 0.5 * s, math.sqrt(size), state, counted)
+        log_norm[i] += tamed(state)
+        store(y, i, state)
 
 
 @compiled
-def _flown(m, matrix, t, size, state, series):  # type: ignore[no-untyped-def]
-    """Move a state by ẏ = A y, ‖A‖ ≤ size, for a time t, in place; fast impacts and, imaginary, the time at rest."""
-    n, count, rest, is_released = state.size, 0, 0.0, False
+def flow_to_floor(wall, matrix, t, size, state, counted):
+    """exp(A t) y in place with impacts, ‖A‖ ≤ size; counts the fast ones, and the time at rest. Returns 0."""
+    n, is_released, series = state.size, False, np.empty((_MOST_TERMS + 1, state.size + 1))
     state[0] = abs(state[0])  # the start is on either side
     if not t * size < _MOST_PARTS:
         state[:] = math.nan
@@ -136,23 +96,23 @@ def _flown(m, matrix, t, size, state, series):  # type: ignore[no-untyped-def]
                 state[r] = state[r] * at + series[k, r]
         is_released = is_held and at < 1
         if is_held:
-            rest += at * d
+            counted[1] += at * d
         elif at < 1:
             least = 0.0
             for r in range(2, n):
-                least += m.fast[r] * abs(state[r])
-            count += abs(state[1]) > least
-            state[0], state[1] = 0.0, m.restitution * abs(state[1])
+                least += wall.fast[r] * abs(state[r])
+            counted[0] += abs(state[1]) > least
+            state[0], state[1] = 0.0, wall.restitution * abs(state[1])
             force = _force(matrix, state)
-            if force < 0 and 2 * state[1] * size <= -_SHORT * force * (1 - m.restitution):
+            if force < 0 and 2 * state[1] * size <= -_SHORT * force * (1 - wall.restitution):
                 state[1] = 0.0
         t -= at * d
         state[0] = max(state[0], 0.0)
-    return complex(count, rest)
+    return 0.0
 
 
 @compiled
-def _force(matrix, state):  # type: ignore[no-untyped-def]
+def _force(matrix, state):
     """q̈ of a state, or of a term of its series."""
     total = 0.0
     for c in range(matrix.shape[0]):
@@ -161,7 +121,7 @@ def _force(matrix, state):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _expand(matrix, state, d, is_held, series):  # type: ignore[no-untyped-def]
+def _expand(matrix, state, d, is_held, series):
     """The terms (A d)ᵏ y/k! of y(d τ), q held or not; returns how many count."""
     n, least, last, k = state.size, 0.0, math.inf, 0
     for r in range(n):
@@ -181,7 +141,7 @@ def _expand(matrix, state, d, is_held, series):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _first_zero(series, terms, begin):  # type: ignore[no-untyped-def]
+def _first_zero(series, terms, begin):
     """The first τ from `begin` on at which a power series is 0, 1 where it is positive up to 1."""
     bend, size, at = 0.0, 0.0, begin
     for k in range(terms):

@@ -161,25 +161,24 @@ def paths_of(case: Case, look: Callable[[], None]) -> Answer:
     """ln‖x(t)‖ of ten simulated paths, and the motion of one of them, whose wall throws it back."""
     from fpsolve.simulation.coefficients import coefficients, starting_state  # which compiles
     from fpsolve.simulation.kernels import RENORMALISED, advance
-    from fpsolve.simulation.setup import default_step, obstacles, simulated_parts, transient
+    from fpsolve.simulation.setup import obstacles, simulated_parts
 
     system, noise = simulated_parts(case.problem)
     for name, sentence in obstacles(system, noise).items():
         raise FpsolveError(f"{name}: {sentence}")
-    h, known = default_step(system, noise), coefficients(system, noise)
-    motion, step, rng = known.motion(h), known.noise_step(h), np.random.default_rng(case.monte_carlo.seed)
-    x, u, xi = starting_state(noise, PATHS, rng, dimension=known.dimension)
+    known, rng = coefficients(system, noise), np.random.default_rng(case.monte_carlo.seed)
+    h = known.default_step
+    motion, (y, xi) = known.motion(h), starting_state(noise, PATHS, rng, known.size(h))
     log_norm, push = np.zeros((2, PATHS))
-    state = x, u, xi, log_norm, push
 
     def followed(count: int) -> Iterator[tuple[float, FloatArray, float]]:
         """Points with the time, ln‖x‖ of all paths, and the first variable of the first one."""
         for k in range(POINTS + 1):
-            yield k * count * h, log_norm.copy(), float(x[0] * math.exp(log_norm[0]))
+            yield k * count * h, log_norm.copy(), float(y[0, 0] * math.exp(log_norm[0]))
             look()
-            advance(motion, step, h, *state, count, RENORMALISED, rng)
+            advance(motion, h, y, xi, log_norm, push, np.zeros(2), count, RENORMALISED, rng)
 
-    long = max(1, round(64 * transient(system, noise) / h / POINTS))
+    long = max(1, round(64 * known.transient() / h / POINTS))
     time, logs, _ = zip(*followed(long), strict=True)
     log_norm[:] = 0.0
     near = max(1, round(PERIODS * known.half_turn / h / POINTS)) if math.isfinite(known.half_turn) else 1

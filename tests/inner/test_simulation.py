@@ -10,31 +10,25 @@ from scipy.linalg import expm
 
 from fpsolve.model import VibroImpactOscillator, White
 from fpsolve.simulation.bounces import motion_of, move
-from fpsolve.simulation.coefficients import Coefficients
+from fpsolve.simulation.coefficients import Load
 from fpsolve.simulation.estimators import population_estimates
-from fpsolve.simulation.motions import step_driven
-from fpsolve.simulation.rays import Rays
-from fpsolve.simulation.spaces import step_driven_space
+from fpsolve.simulation.flows import step_driven
+from fpsolve.simulation.walls import Rays
 from tests.conftest import UNIT_NOISE
 from tests.oracles import kronecker
 
 A0, A1 = np.random.default_rng(1).uniform(-1.0, 1.0, (2, 3, 3))
 NO_RAYS = Rays(*map(np.zeros, ((0, 2), (0, 2), 0, 0)))
-SIZES = pytest.mark.parametrize("n", [2, pytest.param(3, marks=pytest.mark.slow)])
+SIZES = pytest.mark.parametrize("n", [2, 3])
 
 
 def along(noise, h, n, means, rises):
     """The state after steps under given means and rises of ξ, shapes (steps, paths)."""
-    motion = Coefficients(noise, A0[:n, :n], A1[:n, :n], 0.0, 0.0, 1.0, NO_RAYS).motion(h)
-    paths = means.shape[1]
-    state, logs, room = np.zeros((n, paths)), np.zeros(paths), np.empty((3, paths))
+    motion = Load(noise, 0, A1[:n, :n], A1, []).motion(A0[:n, :n], NO_RAYS, h, 0.0)
+    state, logs = np.zeros((n, means.shape[1])), np.zeros(means.shape[1])
     state[0] = 1.0
-    for each in zip(means, rises, strict=True):
-        given = *map(np.array, each), logs
-        if n == 2:
-            step_driven(motion, h, *state, *given, *room)
-        else:
-            step_driven_space(motion, h, state[0], state[1:], *given)
+    for mean, rise in zip(means, rises, strict=True):
+        step_driven(motion.matrices, NO_RAYS, h, state, mean, rise, logs, np.zeros(2), None)
     return np.exp(logs) * state
 
 
@@ -71,10 +65,10 @@ def test_a_coarse_step_under_white_noise_keeps_the_mean_to_second_order(n):
 
 def moved(R, h, u, gain, steps):
     """x, ẋ and the impacts at a wall of ẍ + x = g ẋ, from x = 0 on."""
-    m, _ = motion_of(VibroImpactOscillator(1.0, R, gain, 1.0, impact="restitution"))
-    x, u, none, *room = np.array([[0.0], [u], [0.0], [0.0], [0.0]])
-    count = sum(move(m, h, x, u, none, none, *room, room[0] > 0) for _ in range(steps))
-    return x[0], u[0], count
+    m, _ = motion_of(VibroImpactOscillator(1.0, R, gain, 1.0, impact="restitution"), None)
+    y, none = np.array([[0.0], [u]]), np.zeros(1)
+    count = sum(move(m, h, y, none, none) for _ in range(steps))
+    return *np.copysign(1.0, y[0]) * y[:, 0], count
 
 
 @pytest.mark.parametrize(("R", "h", "steps"), [(1.0, 0.3, 10475), (0.99, 0.7, 4490), (0.9, 20.3 * math.pi, 1)])
@@ -102,9 +96,9 @@ def test_a_gain_between_impacts_has_order_four(gain):
 
 def test_estimate_and_error_of_populations_are_those_of_normal_growth(rng):
     """Of growth in each slice as N(1, 4), Λ = 1 + 4/2: 400 times."""
-    plan, n, off = SimpleNamespace(p=np.array([2.0]), length=1.0, estimator="population"), np.arange(64), []
+    plan, off = SimpleNamespace(p=np.array([2.0]), length=1.0, estimator="population"), []
     for _ in range(400):
-        sums = [(64, d.sum(), d @ d, d[1:] @ d[:-1], d @ n, 1e6, d[0], d[-1]) for d in rng.normal(1, 2, (32, 64))]
-        [[found], _] = population_estimates(plan, [SimpleNamespace(tallies=[each], expected=0.0) for each in sums])
-        off.append((found.value - 3) / found.standard_error)
+        grown = [np.array([each, np.full(64, 1e6)]) for each in rng.normal(1, 2, (32, 64))]
+        [[value, error, _]], _ = population_estimates(plan, [SimpleNamespace(found=each, slices=64) for each in grown])
+        off.append((value - 3) / error)
     assert 0.8 < np.mean(np.square(off)) < 1.25
