@@ -85,14 +85,14 @@ class _Paths:
 
     Attributes:
         slices: how many are done after those.
-        counted: how many bounces there were after those; at a wall of several variables see `Floor`.
+        tally: how many bounces there were after those; at a wall of several variables see `Floor`.
     """
 
     def __init__(self, plan: Plan, seed: SeedSequence) -> None:
         self.plan, self.rng = plan, default_rng(seed)
         self.y, self.xi = starting_state(plan.known.noise, plan.paths, self.rng, plan.known.size(plan.step))
-        self.log_norm, self.counted = np.zeros(plan.paths), np.zeros(2)
-        self.state = self.y, self.xi, self.log_norm, np.zeros(plan.paths), self.counted
+        self.log_norm, self.tally = np.zeros(plan.paths), np.zeros(2)
+        self.state = self.y, self.xi, self.log_norm, np.zeros(plan.paths), self.tally
         self.slices = -plan.settling
 
     def advance(self, slices: int, stop: Event) -> None:
@@ -137,7 +137,7 @@ class PlainBatch(_Paths):
 
     def _close(self) -> None:
         if self.slices < 0:
-            self.log_norm[:] = self.counted[:] = 0
+            self.log_norm[:] = self.tally[:] = 0
             return
         add_windows(self.log_norm, self.starts, self.slices + 1, self.plan.p, self.log_sums, self.log_squares)
         self.growth, self.variance = float(np.mean(self.log_norm)), float(np.var(self.log_norm))

@@ -53,11 +53,11 @@ class CubicMotion(NamedTuple):
     rows: int | slice
 
     @staticmethod
-    def move(m, h, y, xi, log_norm, push, counted, rng):
+    def move(m, h, y, xi, log_norm, push, tally, rng):
         """One step as that of a `Driven`; counts impacts."""
         mean, rise = np.empty(y.shape[1]), np.empty(y.shape[1])
         drawn(m.step, xi[m.rows], mean, rise, push, rng)
-        counted[0] += move(m, h, y, mean, rise)
+        tally[0] += move(m, h, y, mean, rise)
 
 
 def motion_of(system: System, step: Any, rows: int | slice = 0) -> tuple[CubicMotion, int]:
@@ -169,11 +169,11 @@ def move(m, h, y, mean, rise):
 
 
 @compiled
-def advance_and_count(m, h, y, xi, log_norm, push, counted, steps, looks, reach, plane, radial, sums, rng):
+def advance_and_count(m, h, y, xi, log_norm, push, tally, steps, looks, reach, plane, radial, sums, rng):
     """Advance paths, and after every `steps` steps count the states with an amplitude below `reach`, if that is > 0."""
     scale = radial.size / reach if reach > 0 else 0.0
     for _ in range(looks):
-        advance(m, h, y, xi, log_norm, push, counted, steps, np.int64(0), rng)
+        advance(m, h, y, xi, log_norm, push, tally, steps, np.int64(0), rng)
         if reach <= 0:
             continue
         for i in range(log_norm.size):

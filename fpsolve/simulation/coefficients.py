@@ -19,6 +19,7 @@ from fpsolve.model.noise import Noise
 from fpsolve.model.noises.bounded import NoiseOfAngle
 from fpsolve.model.noises.steps import ChainStep
 from fpsolve.model.plane import (
+    SAME_DELAY,
     CoefficientMatrix,
     LinearMotion,
     System,
@@ -189,6 +190,11 @@ class Coefficients:
             return repeated_delay(self.pasts)
         return max(each.noise.period for each in self.loads) or self.half_turn
 
+    def divides(self, step: float) -> bool:
+        """Whether some steps, three at a time, are the delay, if there is one."""
+        count = self.repeated / ROUGHER / step
+        return not self.pasts or abs(count - round(count)) <= SAME_DELAY * count
+
     @property
     def largest_step(self) -> tuple[float, str]:
         """The largest step that is good to about 1e-4 of the strength of the noise, and what limits it.
@@ -237,6 +243,10 @@ class Coefficients:
 
 def refuse(system: System, noise: Noise) -> None:
     """Refuse what no scheme moves. Raises `FpsolveError`."""
+    try:
+        repeated_delay(system.pasts)
+    except ValueError as failure:
+        raise FpsolveError(f"simulation is in steps that divide each delay, but {failure}") from failure
     if system.stop and (len(noise.parts) > 1 or system.clock):
         raise FpsolveError("simulation of a wall of more than two variables is for one noise, without periodic terms")
     for term in system.terms:

@@ -289,7 +289,7 @@ def _simulated(
         else population_estimates(plan, [each for i in group for each in populations[i]])
         for group in groups
     ]
-    at_wall = np.array([batch.counted for batch in plain]).T / (times * plan.paths)
+    at_wall = np.array([batch.tally for batch in plain]).T / (times * plan.paths)
     of_wall = [_counted([values[group] for group in groups]) for values in at_wall]
     (rate, error), (variance_rate, variance_rate_error) = (
         _at_no_step([(values[group].mean(), standard_error(values[group])) for group in groups], weights)
@@ -316,7 +316,7 @@ def _simulated(
         time=float(slices.mean()) * plan.length,
         step=h,
         seed=seed,
-        impacts=int(sum(batch.counted[0] for batch in plain)),
+        impacts=int(sum(batch.tally[0] for batch in plain)),
         warnings=(*_missing(estimates), *found[0][1], *stopped),
         interrupted=interrupted,
         parameters=problem.values,

@@ -93,18 +93,18 @@ def _crossings(rays, j, x, u, x1, u1):
 
 
 @compiled
-def crossed(rays, begun, state, counted):
+def crossed(rays, begun, state, tally):
     """Count the lines that are crossed from one state to another, which is not far; returns the growth at them."""
     log = 0.0
     for j in range(rays.logs.size):
         count = _crossings(rays, j, begun[0], begun[1], state[0], state[1])
         log += count * rays.logs[j]
-        counted[0] += count
+        tally[0] += count
     return log
 
 
 @compiled
-def flow(rays, matrix, t, size, state, counted, other, begun):
+def flow(rays, matrix, t, size, state, tally, other, begun):
     """exp(A t) x in place, ‖A‖ ≤ size, in parts; returns the growth of the norm beyond that of the state."""
     reach, log, n = abs(t) * size, 0.0, state.size
     if not reach < _LIMIT * _MOST_PARTS:
@@ -121,12 +121,12 @@ def flow(rays, matrix, t, size, state, counted, other, begun):
                     other[r] += matrix[r, c] * state[c]
             for r in range(n):
                 state[r] = begun[r] + s / k * other[r]
-        log += crossed(rays, begun, state, counted) + tamed(state)
+        log += crossed(rays, begun, state, tally) + tamed(state)
     return log
 
 
 @compiled
-def step_driven(matrices, wall, h, y, mean, rise, log_norm, counted, rng):
+def step_driven(matrices, wall, h, y, mean, rise, log_norm, tally, rng):
     """Move paths by one step of length h, in place, in parts where it is large.
 
     Args:
@@ -134,11 +134,11 @@ def step_driven(matrices, wall, h, y, mean, rise, log_norm, counted, rng):
         y: the state.
         mean, rise: ξ in the step is mean + rise (2t/h − 1).
         log_norm: takes in what the norm has grown by beyond that of the state.
-        counted: takes in how often lines were crossed, as its first number.
+        tally: takes in how often lines were crossed, as its first number.
         rng: what other walls draw from.
     """
     begun, sizes = np.empty(y.shape), np.zeros(mean.size)
-    _step(matrices, wall, h, y, mean, rise, log_norm, counted, begun, sizes, _LIMIT)
+    _step(matrices, wall, h, y, mean, rise, log_norm, tally, begun, sizes, _LIMIT)
     xi, change = np.empty(1), np.empty(1)
     for i in range(mean.size):
         if sizes[i] < _LIMIT * _LIMIT:
@@ -154,14 +154,14 @@ def step_driven(matrices, wall, h, y, mean, rise, log_norm, counted, rng):
         for part in range(parts):
             xi[0], change[0] = mean[i] + rise[i] * ((2 * part + 1) / parts - 1), rise[i] / parts
             _step(
-                matrices, wall, h / parts, y[:, path], xi, change, log_norm[path], counted, begun[:, path], sizes[path],
+                matrices, wall, h / parts, y[:, path], xi, change, log_norm[path], tally, begun[:, path], sizes[path],
                 math.inf,
             )  # fmt: skip
             log_norm[i] += tamed(y[:, i])
 
 
 @compiled
-def _step(matrices, rays, h, y, mean, rise, log_norm, counted, begun, sizes, most):
+def _step(matrices, rays, h, y, mean, rise, log_norm, tally, begun, sizes, most):
     """One step of the paths whose ‖Ω‖ is below the most; where it was begun, and ‖Ω‖² of all, in the last arrays."""
     n, paths, lever = y.shape[0], y.shape[1], -h * h / 6
     omega, after = np.empty((n, n, paths)), np.empty((n, paths))
@@ -187,7 +187,7 @@ def _step(matrices, rays, h, y, mean, rise, log_norm, counted, begun, sizes, mos
         for i in range(paths):
             count = _crossings(rays, j, begun[0, i], begun[1, i], y[0, i], y[1, i])
             log_norm[i] += count * rays.logs[j]
-            counted[0] += count
+            tally[0] += count
 
 
 @compiled

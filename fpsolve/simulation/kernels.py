@@ -39,7 +39,7 @@ def _normalise(y, log_norm):
 
 
 @compiled
-def advance(m, h, y, xi, log_norm, push, counted, steps, interval, rng):
+def advance(m, h, y, xi, log_norm, push, tally, steps, interval, rng):
     """Advance paths by `steps` steps of length h, in place.
 
     Args:
@@ -48,14 +48,14 @@ def advance(m, h, y, xi, log_norm, push, counted, steps, interval, rng):
         log_norm: ln ‖y‖ that has been taken out of the state; after every `interval` steps, and at the end, it takes in
             what the state has grown by, and the state has the norm 1 again; never if `interval` is 0.
         push: takes in ∫f(ξ) dt, see `draw`.
-        counted: takes in what has happened, see `Driven`.
+        tally: takes in what has happened, see `Driven`.
         rng: a `numpy.random.Generator`.
     """
     for first in range(0, log_norm.size, CHUNK):
         part = slice(first, min(first + CHUNK, log_norm.size))
         ys, xis, logs, pushes = y[:, part], xi[:, part], log_norm[part], push[part]
         for step in range(1, steps + 1):
-            move(m, h, ys, xis, logs, pushes, counted, rng)
+            move(m, h, ys, xis, logs, pushes, tally, rng)
             if interval > 0 and (step % interval == 0 or step == steps):
                 _normalise(ys, logs)
 
@@ -81,7 +81,7 @@ def add_windows(log_norm, starts, number, p, log_sums, log_squares):
 
 @compiled
 def advance_population(
-    m, h, y, xi, log_norm, push, counted, log_weights, ancestors, exponents, steps, interval, log_z, rng
+    m, h, y, xi, log_norm, push, tally, log_weights, ancestors, exponents, steps, interval, log_z, rng
 ):
     """Advance a population by some steps; the weights are looked at after every `interval` steps."""
     done = 0
@@ -90,7 +90,7 @@ def advance_population(
         count = min(interval, steps - done)
         for i in range(log_norm.size):
             log_norm[i], push[i] = 0.0, 0.0
-        advance(m, h, y, xi, log_norm, push, counted, count, np.int64(RENORMALISED), rng)  # else compiled for this 4
+        advance(m, h, y, xi, log_norm, push, tally, count, np.int64(RENORMALISED), rng)  # else compiled for this 4
         for i in range(log_norm.size):
             log_weights[i] += p * log_norm[i] + bias * push[i] + bonus * count
         log_z[0] += _resample(y, xi, log_weights, ancestors, rng)

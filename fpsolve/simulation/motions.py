@@ -95,7 +95,7 @@ class Driven(NamedTuple):
     rows: int | slice
 
     @staticmethod
-    def move(m, h, y, xi, log_norm, push, counted, rng):
+    def move(m, h, y, xi, log_norm, push, tally, rng):
         """One step of length h, in place.
 
         Args:
@@ -103,12 +103,12 @@ class Driven(NamedTuple):
             y, xi: the state of the paths, and that of all noises.
             log_norm: takes in what the norm has grown by beyond that of the state.
             push: takes in ∫f(ξ) dt, see `draw`.
-            counted: takes in how often lines were crossed; at a `Floor` fast impacts and the time at rest of all.
+            tally: takes in how often lines were crossed; at a `Floor` fast impacts and the time at rest of all.
             rng: a `numpy.random.Generator`.
         """
         mean, rise = np.empty(y.shape[1]), np.empty(y.shape[1])
         drawn(m.step, xi[m.rows], mean, rise, push, rng)
-        _step(m.matrices, m.wall, h, y, mean, rise, log_norm, counted, rng)
+        _step(m.matrices, m.wall, h, y, mean, rise, log_norm, tally, rng)
 
 
 class Switched(NamedTuple):
@@ -123,7 +123,7 @@ class Switched(NamedTuple):
     rows: int | slice
 
     @staticmethod
-    def move(m, h, y, xi, log_norm, push, counted, rng):
+    def move(m, h, y, xi, log_norm, push, tally, rng):
         """One step, of the length h of `whole`, as that of a `Driven`, with the number of a state in place of ξ."""
         states, chain, n = xi[m.rows], m.step, y.shape[0]
         state, other, begun = np.empty(n), np.empty(n), np.empty(n)
@@ -132,7 +132,7 @@ class Switched(NamedTuple):
             load(y, i, state)
             while left > 0:
                 stay = rng.standard_exponential() / chain.leaving[k]
-                log_norm[i] += _flow(m.wall, m, k, min(stay, left), h, state, counted, other, begun)
+                log_norm[i] += _flow(m.wall, m, k, min(stay, left), h, state, tally, other, begun)
                 left -= stay
                 if left > 0:
                     k = _picked(chain.reached[k], rng)
@@ -142,35 +142,35 @@ class Switched(NamedTuple):
             states[i] = k
 
 
-def _step(matrices, wall, h, y, mean, rise, log_norm, counted, rng):
+def _step(matrices, wall, h, y, mean, rise, log_norm, tally, rng):
     """One step under a line of ξ; this is what numba replaces by what the wall needs."""
     raise NotImplementedError
 
 
 @overload(_step)
-def _step_by_wall(matrices, wall, h, y, mean, rise, log_norm, counted, rng):
+def _step_by_wall(matrices, wall, h, y, mean, rise, log_norm, tally, rng):
     return (step_to_floor if wall.instance_class is Floor else step_driven).py_func
 
 
-def _flow(wall, m, k, t, h, state, counted, other, begun):
+def _flow(wall, m, k, t, h, state, tally, other, begun):
     """The motion in a state of a chain; this is what numba replaces by what the wall needs."""
     raise NotImplementedError
 
 
 @overload(_flow)
-def _flow_by_wall(wall, m, k, t, h, state, counted, other, begun):
+def _flow_by_wall(wall, m, k, t, h, state, tally, other, begun):
     if wall.instance_class is Floor:
-        return lambda wall, m, k, t, h, state, counted, other, begun: flow_to_floor(
-            wall, m.matrices[k], t, m.sizes[k], state, counted
+        return lambda wall, m, k, t, h, state, tally, other, begun: flow_to_floor(
+            wall, m.matrices[k], t, m.sizes[k], state, tally
         )
 
-    def over_rays(wall, m, k, t, h, state, counted, other, begun):
+    def over_rays(wall, m, k, t, h, state, tally, other, begun):
         if t < h or m.sizes[k] * h > 1:
-            return flow(wall, m.matrices[k], t, m.sizes[k], state, counted, other, begun)
+            return flow(wall, m.matrices[k], t, m.sizes[k], state, tally, other, begun)
         for r in range(state.size):
             begun[r] = state[r]
         multiplied(m.whole[k], state, other)
-        return crossed(wall, begun, state, counted)
+        return crossed(wall, begun, state, tally)
 
     return over_rays
 
@@ -183,7 +183,7 @@ class InTurn(NamedTuple):
     rows: FloatArray
 
     @staticmethod
-    def move(m, h, y, xi, log_norm, push, counted, rng):
+    def move(m, h, y, xi, log_norm, push, tally, rng):
         """One step as that of a `Driven`, of paths that take the noises in one order."""
         n, paths, past = m.size, y.shape[1], m.rows.size
         state = np.empty((n + past, paths))
@@ -195,37 +195,37 @@ class InTurn(NamedTuple):
             for c in range(past):
                 state[n + c, i] = y[m.rows[c] - later, i]
         is_forward = len(m.motions) == 1 or rng.random() < 0.5
-        _move_all(m.motions, is_forward, h, state, xi, log_norm, push, counted, rng)
+        _move_all(m.motions, is_forward, h, state, xi, log_norm, push, tally, rng)
         for r in range(y.shape[0] - 1, -1, -1):
             for i in range(paths):
                 y[r, i] = state[r, i] if r < n else y[r - n, i]
 
 
-def move(m, h, y, xi, log_norm, push, counted, rng):
+def move(m, h, y, xi, log_norm, push, tally, rng):
     """One step of any motion, see `Driven`; this is what numba replaces by `move` of its class."""
     raise NotImplementedError
 
 
 @overload(move)
-def _moved_by_its_kind(m, h, y, xi, log_norm, push, counted, rng):
+def _moved_by_its_kind(m, h, y, xi, log_norm, push, tally, rng):
     return m.instance_class.move
 
 
-def _move_all(motions, is_forward, h, y, xi, log_norm, push, counted, rng):
+def _move_all(motions, is_forward, h, y, xi, log_norm, push, tally, rng):
     """Motions in one order or in the other; this is what numba replaces, as each is of a type of its own."""
     raise NotImplementedError
 
 
 @overload(_move_all)
-def _moved_one_by_one(motions, is_forward, h, y, xi, log_norm, push, counted, rng):
+def _moved_one_by_one(motions, is_forward, h, y, xi, log_norm, push, tally, rng):
     if len(motions.types) == 0:
-        return lambda motions, is_forward, h, y, xi, log_norm, push, counted, rng: None
+        return lambda motions, is_forward, h, y, xi, log_norm, push, tally, rng: None
 
-    def one_and_the_rest(motions, is_forward, h, y, xi, log_norm, push, counted, rng):
+    def one_and_the_rest(motions, is_forward, h, y, xi, log_norm, push, tally, rng):
         if is_forward:
-            move(motions[0], h, y, xi, log_norm, push, counted, rng)
-        _move_all(motions[1:], is_forward, h, y, xi, log_norm, push, counted, rng)
+            move(motions[0], h, y, xi, log_norm, push, tally, rng)
+        _move_all(motions[1:], is_forward, h, y, xi, log_norm, push, tally, rng)
         if not is_forward:
-            move(motions[0], h, y, xi, log_norm, push, counted, rng)
+            move(motions[0], h, y, xi, log_norm, push, tally, rng)
 
     return one_and_the_rest

@@ -30,16 +30,16 @@ if TYPE_CHECKING:
 
 BINS = 100
 SUMS = 5
-"""x, x², u² and the amplitude of the counted states, and how many they are."""
+"""x, x², u² and the amplitude of the tally states, and how many they are."""
 OUTSIDE = Quantity("outside", "outside", "share of the counts outside of the cells")
 _MARGIN = 1.5
-"""Range of the histograms over the largest amplitude after the transient; what lies outside is counted apart."""
+"""Range of the histograms over the largest amplitude after the transient; what lies outside is tally apart."""
 PHASES = 64
 """Over which the damping is averaged."""
 LEAST_DAMPING = 0.01
 """The least damping with which paths start, over the largest one at a phase."""
 _LOOKS = 8
-"""How often in a half-turn π/ω the state is counted."""
+"""How often in a half-turn π/ω the state is tally."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -134,15 +134,15 @@ class Response(Result):
 
 
 class _Batch:
-    """Paths of the nonlinear system, and what has been counted of them."""
+    """Paths of the nonlinear system, and what has been tally of them."""
 
     def __init__(
         self, motion: CubicMotion, step: float, steps: int, state: tuple[FloatArray, ...], rng: np.random.Generator
     ) -> None:
         self.motion, self.step, self.steps, self.rng = motion, step, steps, rng
         self.y, _ = state
-        self.counted, self.reach = np.zeros(2), 0.0
-        self.state = *state, *np.zeros((2, self.y.shape[1])), self.counted
+        self.tally, self.reach = np.zeros(2), 0.0
+        self.state = *state, *np.zeros((2, self.y.shape[1])), self.tally
         self.plane, self.radial = np.zeros((BINS, 2 * BINS)), np.zeros(BINS)
         self.sums = np.zeros(SUMS)
 
@@ -198,7 +198,7 @@ def simulated_response(
         raise KeyboardInterrupt
     reach = _MARGIN * max(float(np.max(np.hypot(*batch.y))) for batch in batches)
     for batch in batches:
-        batch.counted[:], batch.reach = 0, reach
+        batch.tally[:], batch.reach = 0, reach
     interrupted = advance_all(advances, looks, seconds, progress)
     count = np.array([batch.sums[-1] for batch in batches])
     if count.min() == 0:
@@ -208,7 +208,7 @@ def simulated_response(
     radial = np.array([batch.radial for batch in batches]) / count[:, None] / (reach / BINS)
     cells = sum(batch.plane for batch in batches) / count.sum() / (reach / BINS) ** 2
     x_edges, v_edges, density = _in_variables(system, first, reach, cells)
-    impacts = sum(batch.counted[0] for batch in batches) / (size * len(batches) * duration)
+    impacts = sum(batch.tally[0] for batch in batches) / (size * len(batches) * duration)
     return Response(
         means={name: (float(each.mean()), standard_error(each)) for name, each in _means(system, first, sums).items()},
         x_edges=x_edges,

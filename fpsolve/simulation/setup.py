@@ -10,9 +10,9 @@ from fpsolve.arrays import is_whole, real_numbers, shown
 from fpsolve.errors import FpsolveError, NoSuchExponent
 from fpsolve.model.noise import Noise
 from fpsolve.model.noises.clock import waves_apart
-from fpsolve.model.plane import SAME_DELAY, System
+from fpsolve.model.plane import System
 from fpsolve.model.problem import Problem, checked_problem, infinite
-from fpsolve.simulation.coefficients import ROUGHER, coefficients, refuse, repeated_delay
+from fpsolve.simulation.coefficients import ROUGHER, coefficients, refuse
 
 Estimator = Literal["direct", "population"]
 BATCHES = 32
@@ -38,10 +38,6 @@ def simulated_parts(problem: Problem) -> tuple[System, Noise]:
         raise FpsolveError(f"simulation is for {need}; use the finite elements")
     if system.clock:
         system, noise = waves_apart(system, noise)
-    try:
-        repeated_delay(system.pasts)
-    except ValueError as failure:
-        raise FpsolveError(f"simulation is in steps that divide each delay, but {failure}") from failure
     refuse(system, noise)
     return system, noise
 
@@ -81,7 +77,7 @@ def obstacles(
         found["step"] = (
             f"got {step:g}, too large for {reason}; must be > 0 and <= {largest:.4g}; reduce it, or leave it out"
         )
-    elif step is not None and known.pasts and abs(unit / step - round(unit / step)) > SAME_DELAY * unit / step:
+    elif step is not None and not known.divides(step):
         near = unit / math.ceil(unit / step)
         found["step"] = f"got {step:.10g}; must be a third, a sixth, … of the delay, such as {near:.10g}"
     elif step is not None and step < least <= largest:

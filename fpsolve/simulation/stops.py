@@ -40,7 +40,7 @@ _RELEASED = 1e-4
 
 
 @compiled
-def step_to_floor(matrices, wall, h, y, mean, rise, log_norm, counted, rng):
+def step_to_floor(matrices, wall, h, y, mean, rise, log_norm, tally, rng):
     """Move paths by one step of length h, in place, as `step_driven` does; only A₀ and A₁ of the matrices are used."""
     n, parts = y.shape[0], np.empty((_MOST_SPLIT + 2, 3))
     matrix, state = np.empty((n, n)), np.empty(n)
@@ -70,13 +70,13 @@ def step_to_floor(matrices, wall, h, y, mean, rise, log_norm, counted, rng):
                     for c in range(n):
                         matrix[r, c] = matrices[0, r, c] + value * matrices[1, r, c]
                         size += matrix[r, c] ** 2
-                flow_to_floor(wall, matrix, 0.5 * s, math.sqrt(size), state, counted)
+                flow_to_floor(wall, matrix, 0.5 * s, math.sqrt(size), state, tally)
         log_norm[i] += tamed(state)
         store(y, i, state)
 
 
 @compiled
-def flow_to_floor(wall, matrix, t, size, state, counted):
+def flow_to_floor(wall, matrix, t, size, state, tally):
     """exp(A t) y in place with impacts, ‖A‖ ≤ size; counts the fast ones, and the time at rest. Returns 0."""
     n, is_released, series = state.size, False, np.empty((_MOST_TERMS + 1, state.size + 1))
     state[0] = abs(state[0])  # the start is on either side
@@ -96,12 +96,12 @@ def flow_to_floor(wall, matrix, t, size, state, counted):
                 state[r] = state[r] * at + series[k, r]
         is_released = is_held and at < 1
         if is_held:
-            counted[1] += at * d
+            tally[1] += at * d
         elif at < 1:
             least = 0.0
             for r in range(2, n):
                 least += wall.fast[r] * abs(state[r])
-            counted[0] += abs(state[1]) > least
+            tally[0] += abs(state[1]) > least
             state[0], state[1] = 0.0, wall.restitution * abs(state[1])
             force = _force(matrix, state)
             if force < 0 and 2 * state[1] * size <= -_SHORT * force * (1 - wall.restitution):
