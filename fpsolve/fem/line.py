@@ -141,7 +141,7 @@ class LineSpace:
     def _form(self, values: csr_matrix, f: FloatArray | float) -> csr_matrix:
         """∫ w f of the products of functions, without what is zero but for rounding."""
         matrix = csr_matrix(values.T @ diags(self.measure * f) @ values)
-        matrix.data[np.abs(matrix.data) < 1e-16 * np.max(np.abs(matrix.data))] = 0
+        matrix.data[np.abs(matrix.data) < 1e-16 * np.max(np.abs(matrix.data), initial=0.0)] = 0
         matrix.eliminate_zeros()
         return matrix
 

@@ -368,23 +368,29 @@ class Jump:
         ray = f"the ray of a jump, phi = {self.phase:.6g}"
         x, u = (0.0 if abs(each) < 1e-15 else each for each in (math.cos(self.phase), -math.sin(self.phase)))
         shares = (u * x, u * u), (-x * x, -x * u)  # h = e′ᵀA e is the sum of these times the entries of A, in any units
-        speeds, limits, size = defaultdict[Driver, float](float), defaultdict[Driver, float](float), 0.0
+        moved, total, size = defaultdict[str | None, list[tuple[Any, float, float]]](list), 0.0, 0.0
         for term in system.terms:
             parts = np.multiply(shares, term.matrix)
             for driver, c in term.drivers:
-                strength, whole = abs(c) * system.epsilon**term.order, float(np.abs(parts).sum())
-                speeds[driver] += math.copysign(strength, c) * float(parts.sum())
-                limits[driver] += strength * (ROUNDED * whole + OF_ENTRIES * term.fastest[0])
-                size += strength * whole
-        for driver, speed in speeds.items():
-            if driver != STEADY and abs(speed) > limits[driver]:
-                which = f'the noise "{driver[0]}"' if len(noise.parts) > 1 else f"{noise.kind} noise"
+                strength, whole = c * system.epsilon**term.order, float(np.abs(parts).sum())
+                limit = abs(strength) * (ROUNDED * whole + OF_ENTRIES * term.fastest[0])
+                moved[None if driver == STEADY else driver[0]].append((driver[1], strength * float(parts.sum()), limit))
+                size += abs(strength) * whole
+        for name, own in moved.items():
+            is_linear = all(affine(g) for g, _, _ in own)
+            xi = np.array([0.0, 1.0]) if is_linear or name is None else noise.parts.get(name, noise).reached
+            speeds, limits = (
+                sum(row) for row in zip(*((v * g(xi), e * np.abs(g(xi))) for g, v, e in own), strict=True)
+            )
+            if name is not None and np.ptp(speeds) > np.max(limits):
+                which = f'the noise "{name}"' if len(noise.parts) > 1 else f"{noise.kind} noise"
                 raise ValueError(
                     f"{which} moves the phase across {ray}, which it does over no wall: x = 0, phi = pi/2 = "
                     "1.5707963267948966, is passed with the speed v whatever the noise; let it drive terms that do "
                     "not move the phase there, or remove the jump"
                 )
-        if abs(speeds[STEADY]) <= ROUNDED * size:
+            total += float(speeds[0])
+        if abs(total) <= ROUNDED * size:
             raise ValueError(
                 f"the phase does not pass {ray}: nothing moves it there, so that no path comes to this wall; remove "
                 "the jump"

@@ -181,7 +181,9 @@ class Problem:
         if self.held is not None:
             return self.held
         if self.system.pasts:
-            return Frame(np.eye(self.dimension).tolist()), float(np.linalg.norm(matrix_at(self.drift, 0.0), 2))
+            return Frame(tuple(map(tuple, np.eye(self.dimension).tolist()))), float(
+                np.linalg.norm(matrix_at(self.drift, 0.0), 2)
+            )
         return own_frame(
             self.dimension,
             self._moved,

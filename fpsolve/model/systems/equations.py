@@ -281,6 +281,8 @@ class EquationSystem(System):
         if name in self._used:
             return ""
         others = sorted(self._used.difference(self.variables, dict(self.named), dict(self.noises)))
+        if not others:
+            _ = self._read  # its fault may be why the noise is in none
         named = f', or name the noise, noises = {{ {others[0]} = "{section}" }}' if others else ", or remove it"
         return f"{name} is in no rate; write it into drift{named}"
 
