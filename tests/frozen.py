@@ -2,8 +2,8 @@
 
 `python -m tests.frozen [begin]` solves them again, of those alone whose name begins so if that is given, and prints
 which have gone wrong: off the truth by more than what is stated, stated with an error above the tolerance or ten times
-the frozen one, or not given any more within the default budget. `python -m tests.frozen write` and then `python -m
-tests.frozen truth` write frozen.json: each number as its users get it, and once at the smallest rtol that converges.
+the frozen one, or not given any more within the default budget. In frozen.json is each number as its users got it, and
+once at the smallest rtol that converged.
 
 Every number is asked for alone, as a user would: Λ(p), λ, δ_p, Λ″(0), and Λ of some p of a curve of many.
 """
@@ -34,11 +34,6 @@ from fpsolve.model import NonGaussianNoise, Telegraph, VibroImpactOscillator, Wh
 
 ROOT = Path(__file__).parents[1]
 FILE = Path(__file__).with_suffix(".json")
-FINER = (1e-5, 1e-4, 1e-3, 1e-2, 1e-1)
-"""Shares of the usual rtol at which the truth is tried, the smallest first."""
-SMALLEST = 1e-12
-SECONDS = 10.0
-"""For each of these tries."""
 MOST_SECONDS = 30.0
 """Of a processor for one number; one that takes longer counts as not given."""
 CURVE = 33
@@ -75,16 +70,14 @@ class Number:
         of = f"{self.name}({self.p:.6g})" if math.isfinite(self.p) else self.name
         return of if self.parameters == 1 else f"set {self.parameters}, {of}"
 
-    def solved(self, rtol: float | None = None, seconds: float | None = None) -> tuple[float, float, bool]:
+    def solved(self) -> tuple[float, float, bool]:
         """Value, stated error, and whether that meets the tolerance. Raises what fpsolve raises."""
-        budget = Budget() if seconds is None else Budget(seconds=seconds)
-        usual: dict[str, Any] = {"rtol": self.rtol if rtol is None else rtol, "budget": budget}
         if self.name in ("Λ", "curve"):
             points = np.array([self.p])
-            if self.name == "curve" and rtol is None:
+            if self.name == "curve":
                 points = np.union1d(np.linspace(*self.interval, CURVE), points)
             try:
-                found = moment_lyapunov(self.problem, points, **usual)
+                found = moment_lyapunov(self.problem, points, rtol=self.rtol)
             except NotConverged as failure:
                 if self.name != "curve" or not hasattr(failure.partial, "p"):
                     raise
@@ -97,9 +90,9 @@ class Number:
             within = error <= max(found.solver.rtol * size, ROUNDED * size)
             return value, error, within or any(each.code is Code.RTOL_MISSED for each in found.warnings)
         if self.name == "Λ″":
-            index = solver_of(self.problem, None, usual["rtol"], budget).variance_rate()
+            index = solver_of(self.problem, None, self.rtol, Budget()).variance_rate()
         else:
-            index = {"λ": lyapunov_exponent, "δ_p": stability_index}[self.name](self.problem, **usual)
+            index = {"λ": lyapunov_exponent, "δ_p": stability_index}[self.name](self.problem, rtol=self.rtol)
         if not index:
             raise NotConverged(str(index))
         return index.value, index.error_estimate, True
@@ -113,12 +106,12 @@ def _stop(*_: object) -> None:
     raise Late
 
 
-def limited(number: Number, *arguments: float) -> tuple[float, float, bool]:
+def limited(number: Number) -> tuple[float, float, bool]:
     """`Number.solved` within `MOST_SECONDS`. Raises `NotConverged` where that is not enough."""
     signal.signal(signal.SIGPROF, _stop)
     signal.setitimer(signal.ITIMER_PROF, MOST_SECONDS)
     try:
-        return number.solved(*arguments)
+        return number.solved()
     except Late:
         raise NotConverged("it takes too long") from None
     finally:
@@ -246,30 +239,6 @@ def frozen(task: tuple[str, Callable[[], Iterator[Number]]]) -> tuple[str, dict[
     return name, found
 
 
-def truth(task: tuple[str, Callable[[], Iterator[Number]]]) -> tuple[str, dict[str, Any]]:
-    """Each number at the smallest rtol that converges, or by its second method: value and error."""
-    name, numbers = task
-    found, hopeless = dict[str, Any](), set[tuple[int, float]]()
-    for number in numbers():
-        if number.known is not None:
-            found[number.key] = [number.known, 1e-8 * abs(number.known)]
-            continue
-        usual = number.rtol or choose(number.problem).usual_rtol
-        for share in FINER:
-            rtol = max(share * usual, SMALLEST)
-            if (id(number.problem), rtol) in hopeless:
-                continue
-            try:
-                value, error, _ = limited(number, rtol, SECONDS)
-            except (FpsolveError, ArithmeticError, ValueError):
-                if number.problem.dimension > 2:
-                    hopeless.add((id(number.problem), rtol))
-                continue
-            found[number.key] = [value, error]
-            break
-    return name, found
-
-
 def wrong(before: dict[str, Any] | None, now: list[Any], true: list[float] | None) -> str:
     """How a number has gone wrong; empty where it has not."""
     known = before["user"] if before else None
@@ -287,33 +256,22 @@ def wrong(before: dict[str, Any] | None, now: list[Any], true: list[float] | Non
     return "; ".join(told)
 
 
-def main(word: str = "", name: str = "") -> int:
-    """Write, or compare."""
-    is_written = word in ("write", "truth")
-    begin = name if is_written else word
+def main(begin: str = "") -> int:
+    """Compare."""
     wanted = [task for task in tasks() if task[0].startswith(begin)]
-    stored = json.loads(FILE.read_text(encoding="utf-8")) if FILE.exists() else {}
+    stored = json.loads(FILE.read_text(encoding="utf-8"))
     count, worse, seconds = 0, 0, [0.0, 0.0]
     with multiprocessing.get_context("spawn").Pool(2, maxtasksperchild=8) as pool:
-        for each, numbers in pool.imap_unordered(truth if word == "truth" else frozen, wanted):
+        for each, numbers in pool.imap_unordered(frozen, wanted):
             count += len(numbers)
-            entry = stored.setdefault(each, {})
             for key, number in numbers.items():
-                if is_written:
-                    entry.setdefault(key, {})["truth" if word == "truth" else "user"] = number
-                    continue
-                before = entry.get(key)
+                before = stored.get(each, {}).get(key)
                 seconds[0] += before["user"][-1] if before else 0.0
                 seconds[1] += number[-1]
                 if told := wrong(before, number, before and before.get("truth")):
                     worse += 1
                     print(f"{each}, {key}: {told}", flush=True)
-            if is_written:
-                print(f"{each}: {len(numbers)}", flush=True)
-                FILE.write_text(
-                    json.dumps(dict(sorted(stored.items())), ensure_ascii=False, indent=0) + "\n", encoding="utf-8"
-                )
-    print(f"{count} numbers", "" if is_written else f"{worse} wrong; {seconds[0]:.0f} s before, {seconds[1]:.0f} s now")
+    print(f"{count} numbers, {worse} wrong; {seconds[0]:.0f} s before, {seconds[1]:.0f} s now")
     return int(worse > 0)
 
 

@@ -8,7 +8,7 @@ import pytest
 from rich.console import Console
 
 from fpsolve import ExponentSolver, NotConverged, Problem
-from fpsolve.budget import Meter, begin, charge, watched
+from fpsolve.budget import Meter, begin, charge, timed, watched
 from fpsolve.exponent import Budget, critical_restitution, impact_rate
 from fpsolve.exponent.root import nonzero_root
 from fpsolve.workflow import Phase
@@ -76,6 +76,14 @@ def test_numbers_of_a_set_have_one_meter_and_its_watch_sees_which_is_solved(proc
         with refused(match=r" 10 s "):  # as before
             charge(80)
     assert (inner, meter.spent, seen) == (meter, 6.0, [("λ", 1, 70)])
+
+
+def test_work_that_would_not_end_in_time_at_the_pace_of_the_last_one_is_not_begun(processor):
+    with Meter(5.0).running():
+        with timed(70):
+            processor.now += 1.0
+        with pytest.raises(NotConverged):
+            timed(281).__enter__()  # 4.01 s
 
 
 SOLVING = Phase("case", "solving", 400, SETS)

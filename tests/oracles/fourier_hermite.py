@@ -24,21 +24,17 @@ def moment_lyapunov(
     *,
     alpha: float,
     sigma: float,
-    omega: float,
-    epsilon: float,
-    c1: float,
-    log_R: float,
-    p: float,
     harmonics: int,
     hermite: int,
+    **oscillator: float,
 ) -> float:
     """Λ(p) for the Ornstein-Uhlenbeck noise dξ = −α ξ dt + σ dW, Eq. (15).
 
-    `log_R` is ln R, the jump of the log-amplitude at each impact.  The basis holds the waves 2nφ,
-    n ≤ `harmonics`, times `hermite` functions He_m(z)/√m!, z = ξ/std, std² = σ²/2α.
+    `oscillator` is omega, epsilon, c1, log_R, p; ln R is the jump of the log-amplitude at each impact.  The basis
+    holds the waves 2nφ, n ≤ `harmonics`, times `hermite` functions He_m(z)/√m!, z = ξ/std, std² = σ²/2α.
     """
     noise = _gaussian_noise(alpha, sigma, hermite)
-    return _principal(noise, harmonics, omega, epsilon, c1, log_R, p)
+    return _principal(noise, harmonics, **oscillator)
 
 
 def moment_lyapunov_bounded_noise(
@@ -46,13 +42,9 @@ def moment_lyapunov_bounded_noise(
     D0: float,
     tau0: float,
     r0: float,
-    omega: float,
-    epsilon: float,
-    c1: float,
-    log_R: float,
-    p: float,
     harmonics: int,
     gegenbauer: int,
+    **oscillator: float,
 ) -> float:
     """Λ(p) for the non-Gaussian noise of Eqs. (7)-(9) itself, r0 < 1.
 
@@ -62,20 +54,16 @@ def moment_lyapunov_bounded_noise(
     if not r0 < 1:
         raise ValueError(f"r0 = {r0}: the support is bounded for r0 < 1 only")
     noise = bounded_noise(D0, tau0, r0, gegenbauer)
-    return _principal(noise, harmonics, omega, epsilon, c1, log_R, p)
+    return _principal(noise, harmonics, **oscillator)
 
 
 def spectrum(
     *,
     alpha: float,
     sigma: float,
-    omega: float,
-    epsilon: float,
-    c1: float,
-    log_R: float,
-    p: float,
     harmonics: int,
     hermite: int,
+    **oscillator: float,
 ) -> np.ndarray:
     """All eigenvalues on the full circle, rightmost first; shape ((2 `harmonics` + 1) · `hermite`,), complex.
 
@@ -84,7 +72,7 @@ def spectrum(
     """
     noise = _gaussian_noise(alpha, sigma, hermite)
     k = np.arange(-harmonics, harmonics + 1)
-    parts = [_generator(noise, k[k % 2 == parity], omega, epsilon, c1, log_R, p) for parity in (0, 1)]
+    parts = [_generator(noise, k[k % 2 == parity], **oscillator) for parity in (0, 1)]
     values = np.concatenate([la.eigvals(part.toarray()) for part in parts])
     return values[np.lexsort((values.imag, -values.real))]
 
