@@ -376,15 +376,26 @@ class Jump:
                 speeds[driver] += math.copysign(strength, c) * float(parts.sum())
                 limits[driver] += strength * (ROUNDED * whole + OF_ENTRIES * term.fastest[0])
                 size += strength * whole
+        total, names = speeds.pop(STEADY, 0.0), defaultdict[str, list[Driver]](list)
         for driver, speed in speeds.items():
-            if driver != STEADY and abs(speed) > limits[driver]:
-                which = f'the noise "{driver[0]}"' if len(noise.parts) > 1 else f"{noise.kind} noise"
+            if abs(speed) > limits[driver]:
+                names[driver[0] if len(noise.parts) > 1 else ""].append(driver)
+        for name, own in names.items():
+            one = noise.parts.get(name, noise)
+            # of two or three values of a chain a function may be a constant, or two of them the same
+            xi = np.array([0.0, 1.0]) if all(g == identity for _, g in own) else one.reached
+            values = [(driver, driver[1](xi)) for driver in own]
+            reached = np.sum([speeds[driver] * value for driver, value in values], axis=0)
+            limit = sum(limits[driver] * float(np.max(np.abs(value))) for driver, value in values)
+            if not np.ptp(reached) <= limit:
+                which = f'the noise "{name}"' if len(noise.parts) > 1 else f"{one.kind} noise"
                 raise ValueError(
                     f"{which} moves the phase across {ray}, which it does over no wall: x = 0, phi = pi/2 = "
                     "1.5707963267948966, is passed with the speed v whatever the noise; let it drive terms that do "
                     "not move the phase there, or remove the jump"
                 )
-        if abs(speeds[STEADY]) <= ROUNDED * size:
+            total += float(reached[0])
+        if abs(total) <= ROUNDED * size:
             raise ValueError(
                 f"the phase does not pass {ray}: nothing moves it there, so that no path comes to this wall; remove "
                 "the jump"
