@@ -458,14 +458,12 @@ def _balance(matrix: FloatArray, least: float = _ONE_WAY) -> FloatArray:
 
 
 def _rays(system: System, even: FloatArray, mean: FloatArray) -> Rays:
-    """The lines of the jumps in even coordinates, in which this is the mean of A(ξ)."""
-    if not system.jumps:
-        return Rays(np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0), np.zeros(0))
+    """The lines of the jumps, of the plane alone, in even coordinates, in which this is the mean of A(ξ)."""
     phases = np.array([jump.phase for jump in system.jumps])
-    along = np.stack([np.cos(phases), -np.sin(phases)], axis=1) @ even.T
+    along = np.stack([np.cos(phases), -np.sin(phases)], axis=1) @ even.T[:2, :2]
     along /= np.linalg.norm(along, axis=1, keepdims=True)
     across = along[:, ::-1] * np.array([1.0, -1.0])
-    ways = np.copysign(1.0, np.sum(across * (along @ mean.T), axis=1))
+    ways = np.copysign(1.0, np.sum(across * (along @ mean.T[:2, :2]), axis=1))
     return Rays(along, across, np.array([jump.log_factor for jump in system.jumps]), ways)
 
 

@@ -301,7 +301,7 @@ def _simulated(
         effective = float(np.nan_to_num(sum(each[k, 2] for each, _ in found)))
         is_known = math.isfinite(value + deviation) and effective >= FEW[estimator]
         if abs(order) < _TINY:
-            value, deviation, is_known = order * rate, abs(order) * error, True
+            value, deviation, is_known = order * rate if order else 0.0, abs(order) * error, True
         estimates.append(
             MomentEstimate(order, value if is_known else None, deviation if is_known else None, estimator, effective)
         )
