@@ -290,7 +290,7 @@ def coefficients(system: System, noise: Noise) -> Coefficients:
     back = np.asarray(np.linalg.inv(even), dtype=float)
     free, steady, loads = even @ free @ back, even @ steady @ back, [each.turned(even, back) for each in loads]
     half_turn = math.pi / _rate(free, sum(each.fluctuation**2 * each.time for each in loads))
-    wall: Rays | Floor = _rays(system, even, steady)
+    wall: Rays | Floor = _rays(system, even, steady + sum(each.mean for each in loads))
     if stop is not None:
         wall = Floor(stop.restitution, FAST * scales / scales[1], float(noise.is_white))
         if (square := -free[0, 1] * free[1, 0]) > 0:  # an impact in each half-turn is like damping
@@ -322,7 +322,7 @@ def _loads(system: System, noise: Noise) -> list[Load]:
         count = len(np.atleast_2d(part.start(1, rng)))
         rows = row if count == 1 else slice(row, row + count)
         row += count
-        if isinstance(step := part.step(1.0), ChainStep):
+        if isinstance(step := part.step(min(1.0, part.largest_step)), ChainStep):
             driven: FloatArray = np.zeros((step.values.size, *zero.shape))
             for term, (offset, _), shape in zip(own, lines, shapes, strict=True):
                 driven += (term.g(step.values) - offset)[:, None, None] * shape
@@ -457,15 +457,13 @@ def _balance(matrix: FloatArray, least: float = _ONE_WAY) -> FloatArray:
     return np.exp(np.linalg.lstsq(sides, gaps, rcond=None)[0])
 
 
-def _rays(system: System, even: FloatArray, steady: FloatArray) -> Rays:
-    """The lines of the jumps in even coordinates."""
-    if not system.jumps:
-        return Rays(np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0), np.zeros(0))
+def _rays(system: System, even: FloatArray, mean: FloatArray) -> Rays:
+    """The lines of the jumps, of the plane alone, in even coordinates, in which this is the mean of A(ξ)."""
     phases = np.array([jump.phase for jump in system.jumps])
-    along = np.stack([np.cos(phases), -np.sin(phases)], axis=1) @ even.T
+    along = np.stack([np.cos(phases), -np.sin(phases)], axis=1) @ even.T[:2, :2]
     along /= np.linalg.norm(along, axis=1, keepdims=True)
     across = along[:, ::-1] * np.array([1.0, -1.0])
-    ways = np.copysign(1.0, np.sum(across * (along @ steady.reshape(-1, 2, 2)[0].T), axis=1))
+    ways = np.copysign(1.0, np.sum(across * (along @ mean.T[:2, :2]), axis=1))
     return Rays(along, across, np.array([jump.log_factor for jump in system.jumps]), ways)
 
 

@@ -299,9 +299,9 @@ def _simulated(
     for k, order in enumerate(plan.p.tolist()):
         value, deviation = _at_no_step([each[k, :2] for each, _ in found], weights)
         effective = float(np.nan_to_num(sum(each[k, 2] for each, _ in found)))
+        is_known = math.isfinite(value + deviation) and effective >= FEW[estimator]
         if abs(order) < _TINY:
-            value, deviation = order * rate, abs(order) * error
-        is_known = order == 0 or (math.isfinite(value + deviation) and effective >= FEW[estimator])
+            value, deviation, is_known = order * rate if order else 0.0, abs(order) * error, True
         estimates.append(
             MomentEstimate(order, value if is_known else None, deviation if is_known else None, estimator, effective)
         )
