@@ -379,10 +379,9 @@ class Jump:
         for name, own in moved.items():
             is_linear = all(affine(g) for g, _, _ in own)
             xi = np.array([0.0, 1.0]) if is_linear or name is None else noise.parts.get(name, noise).reached
-            speeds, limits = (
-                sum(row) for row in zip(*((v * g(xi), e * np.abs(g(xi))) for g, v, e in own), strict=True)
-            )
-            if name is not None and np.ptp(speeds) > np.max(limits):
+            speeds = sum(speed * g(xi) for g, speed, _ in own)
+            limit = np.max(sum(limit * np.abs(g(xi)) for g, _, limit in own))
+            if name is not None and not np.ptp(speeds) <= limit:
                 which = f'the noise "{name}"' if len(noise.parts) > 1 else f"{noise.kind} noise"
                 raise ValueError(
                     f"{which} moves the phase across {ray}, which it does over no wall: x = 0, phi = pi/2 = "
