@@ -177,7 +177,7 @@ def simulate(
     none, and KeyboardInterrupt is raised.
 
     >>> simulate(problem, [1.0], paths=64, time=100.0, seed=1)
-    MonteCarlo(λ = -0.0045... ± 3e-04, Λ(p) at 1 p, 64 paths)
+    MonteCarlo(λ = -0.0041... ± 4e-04, Λ(p) at 1 p, 64 paths)
 
     Args:
         problem: any linear motion, an oscillator without its c₂ and c₃, and its noise.
