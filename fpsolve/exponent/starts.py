@@ -71,6 +71,9 @@ class Start:
         """The pair with its error by its highest modes."""
         return Solution(pair)
 
+    def is_enough(self, found: Solution) -> bool:
+        return True
+
     def doubled(self, failure: Exception | None) -> Start:
         """More functions along the axes that lack most, by the pair that a failed search has reached, if any."""
         pair: Any = getattr(failure, "partial", None)

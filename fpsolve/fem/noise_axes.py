@@ -534,7 +534,7 @@ def _end_logarithm(count: int, exponent: float, a: float) -> FloatArray:
 
 def slope_along(g: Coefficient, xi: FloatArray, moved: FloatArray) -> FloatArray:
     """g′(ξ) ∂ξ/∂θ, from the points ξ and ∂ξ/∂θ there."""
-    step = STEP * (np.abs(xi).max() or 1.0) / max(np.abs(moved).max(), 1e-300)
+    step = STEP * (np.abs(xi).max() or 1.0) / (np.abs(moved).max() or 1.0)
     return np.asarray((g(xi + step * moved) - g(xi - step * moved)) / (2 * step))
 
 
