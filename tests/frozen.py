@@ -120,10 +120,10 @@ def limited(number: Number) -> tuple[float, float, bool]:
 
 def of_problem(problem: Problem, p: tuple[float, ...], interval: tuple[float, float] | None = None) -> Iterator[Number]:
     """Single Λ(p), λ, δ_p and Λ″ of two variables, λ of more, and some p of a curve."""
-    low, high = choose(problem).interval
-    p = tuple(each for each in p if low <= each <= high)
-    yield from (Number(problem, "Λ", each) for each in p)
-    if not choose(problem).has_pairs:
+    method = choose(problem)
+    low, high = method.interval
+    yield from (Number(problem, "Λ", each) for each in p if not method.reason(each))
+    if not method.has_pairs:
         return
     yield Number(problem, "λ")
     if problem.dimension > 2:
