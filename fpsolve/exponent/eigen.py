@@ -218,23 +218,30 @@ def _is_rightmost(pair: PrincipalPair) -> bool:
     pencil, source = pair.generator.at(pair.p), space.weighed(space.constant)
     seen = [side for side in (0, 1) if not space.phi.is_followed or pair.sign_defects[side] <= POSITIVE]
     near, far = (pair.eigenvalue + shift * problem.unit_rate for shift in BESIDE_IT)
-    factor = pencil.factorised(near)
+    factor: Any = pencil.factorised(near)
 
-    def is_positive(side: int) -> bool:
-        operator, both = pencil.shifted(far), [pair.right, pair.left]
-        operator = operator.T if side else operator
-        inverse = LinearOperator(2 * source.shape, lambda v: factor.solve(v, transposed=bool(side)), dtype=float)
+    def solutions(side: int) -> list[FloatArray]:
+        operator, is_left = pencil.shifted(far), bool(side)
+        operator = operator.T if is_left else operator
+        inverse = LinearOperator(2 * source.shape, lambda v: factor.solve(v, transposed=is_left), dtype=float)
         moved = LinearOperator(2 * source.shape, lambda v: operator @ v, dtype=float)
         solution, failed = gmres(moved, source, M=inverse, rtol=RESOLVED, restart=STEPS, maxiter=1)
-        if failed:
-            solution = pencil.factorised(far).solve(source, transposed=bool(side))
-        for each in (inverse @ source, solution):
-            both[side] = -each
-            if _sign_defects(space, *both)[side] > SURELY_POSITIVE:
-                return False
-        return True
+        return [inverse @ source, *([] if failed else [solution])]
 
-    return not seen or (all if space.phi.has_adjoint else any)(map(is_positive, seen))
+    def is_positive(side: int, solution: FloatArray) -> bool:
+        both = [pair.right, pair.left]
+        both[side] = -solution
+        return _sign_defects(space, *both)[side] <= SURELY_POSITIVE
+
+    found = {side: solutions(side) for side in seen}
+    failed = [side for side in seen if len(found[side]) == 1 and is_positive(side, found[side][0])]
+    if failed:
+        factor = None  # there is room for the next ones
+        factor = pencil.factorised(far)
+        for side in failed:
+            found[side].append(factor.solve(source, transposed=bool(side)))
+    positive = (all(is_positive(side, each) for each in found[side]) for side in seen)
+    return not seen or (all if space.phi.has_adjoint else any)(positive)
 
 
 def _has_other_positive(generator: Generator, p: float) -> bool:

@@ -142,9 +142,11 @@ class LevelFactors:
         self._shape, self._axis = operator.shape, axis
         terms = list(map(list, operator.terms))
         lasts = np.stack([dense(term.pop(axis)) for term in terms])
-        befores = np.stack([reduce(np.kron, map(dense, others)).T.ravel() for others in terms])  # type: ignore[arg-type]
         count, most = len(lasts[0]), LARGEST_GROWTH * operator.norm
         m, (rows, columns) = operator.size // count, np.nonzero(np.any(lasts, axis=0))
+        befores = np.empty((len(terms), m**2))
+        for before, others in zip(befores, terms, strict=True):
+            before[:] = reduce(np.kron, map(dense, others)).T.ravel()  # type: ignore[arg-type]
         band = max(1, int(np.max(np.abs(rows - columns), initial=0)))
         groups = np.split(np.arange(count), range(count % band or band, count, band))
         ends = m * np.cumsum([0, *(group.size for group in groups)])
