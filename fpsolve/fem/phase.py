@@ -313,16 +313,18 @@ class Wall(NamedTuple):
 class PlaneTerms(Terms):
     """L(p) of two variables. Args as those of `Terms`.
 
-    Of a term of the motion h = e′ᵀA e, and at each φ-vertex there is the point load
+    The motion and the walls add, with the phase speed v = Σ ε^n g h, h = e′ᵀA e, the jump [T] = T(φ⁺) − T(φ⁻) and the
+    mean {T} of the two traces at a φ-vertex,
 
-        ∫ P_s (v {w} − ½θ [w]) [T]
+        Σ over cells:                       ∫∫ P_s w (v ∂φT + p Σ ε^n g q T) dφ dξ
+        Σ over vertices without a wall:     ∫ P_s (v {w} [T] − ½θ [w] [T]) dξ
+        Σ over walls:                       ∫ P_s |v| w (R^p T₊ − T₋) dξ
 
-    with the phase speed v = Σ ε^n g h, the mean {w} and the jump [w] = w(φ⁺) − w(φ⁻) of its two traces. θ = |v| is
-    upwinding; for polynomials of ξ, which cannot follow its kink, θ is its size for the typical ξ, |Σ ε^n h| over what
-    no noise drives + Σ ε^n |h| (mean of g²)^½ over the rest. At a wall v is one number for all ξ, and θ = |v|. The wall
-    is the point load (R^p − 1)|v| δ(φ − φ_j) T of the trace of T that v brings, T(φ⁺) on w(φ⁻) for v > 0 and T(φ⁻) on
-    w(φ⁺) for v < 0, so that T jumps by R^p. The vertex has |v| times the same trace: it is left out there, and the wall
-    has R^p, as a tiny R^p would be rounded beside 1.
+    Upwinding is θ = |v|; where v has one sign for all ξ the first two loads are v w [T] with w of the cell that paths
+    leave. Polynomials of ξ cannot follow the kink of |v|: θ is then its size for the typical ξ, |Σ ε^n h| over the
+    terms that no noise drives + Σ ε^n |h| (mean of g²)^½ over the others. At a wall v is one number for all ξ. Paths go
+    from the trace T₋ there, also that of w, to T₊, and T₋ = R^p T₊. The load is written as (R^p − 1)|v| δ(φ − φ_j) T₊,
+    but made of R^p alone, as a tiny R^p would be rounded beside 1.
 
     White noise: see `PhaseAxis.diffusion`. Impulses exp(B) add their rate times |exp(B)e|^p T(ψ) − T, ψ being where
     they take φ, see `PhaseAxis.impulses`.
@@ -336,29 +338,29 @@ class PlaneTerms(Terms):
             speed, xi = system.epsilon**term.order * term.h(self._vertices), noises[self._at(term.noise)]
             if not is_driven(term.g):
                 steady += float(term.g(0.0)) * speed
-            elif not xi.is_local:
+            else:
                 square = xi.constant @ (xi.mass(lambda xi, g=term.g: g(xi) ** 2) @ xi.constant)
                 driven += abs(speed) * math.sqrt(square / (xi.constant @ (xi.matrix(one) @ xi.constant)))
-        self._theta = abs(steady) + driven  # for the typical ξ
-        brought = 0.0 * self._jump  # to a wall
-        # where θ = |v|, and the sign of v where that is the same for all ξ, otherwise 0
-        is_exact, direction = np.full(self._vertices.size, False), np.zeros(self._vertices.size)
+        self._upwinding = abs(steady) + driven  # for the typical ξ
+        after_walls = 0.0 * self._jump  # |v| T₊ is in the term of the wall
+        # where θ = |v| for every ξ, and the sign of v where that is the same for all ξ, otherwise 0
+        is_pointwise, direction = np.full(self._vertices.size, False), np.zeros(self._vertices.size)
         if all(axis.is_local for axis in noises):
             rates = matrix_at(system, problem.at_values([axis.samples().xi for axis in noises]))
             speed = turning(rates.reshape(-1, 1, 2, 2))(self._vertices)
-            is_exact, direction = ~is_exact, 1.0 * np.all(speed > 0, axis=0) - np.all(speed < 0, axis=0)
+            is_pointwise, direction = ~is_pointwise, 1.0 * np.all(speed > 0, axis=0) - np.all(speed < 0, axis=0)
         self._walls = list[Wall]()
         for jump, v in zip(system.jumps, problem.wall_speeds(system), strict=True):
             at = vertices_at(phi.lines, jump.phase)
-            is_exact[at], direction[at] = True, math.copysign(1.0, v)
+            is_pointwise[at], direction[at] = True, math.copysign(1.0, v)
             left, right = phi.left_trace[at], phi.right_trace[at]
             self._walls.append(Wall(jump, v, left.T @ right if v > 0 else right.T @ left))
             at_wall = np.isin(np.arange(self._vertices.size), at).astype(float)
-            brought = brought + by_rows(at_wall, phi.right_trace if v > 0 else -phi.left_trace)
-        self._step, self._two_way = self._jump - brought, np.flatnonzero(is_exact & (direction == 0))
-        self._theta[is_exact] = 0.0
+            after_walls = after_walls + by_rows(at_wall, phi.right_trace if v > 0 else -phi.left_trace)
+        self._free_jump, self._two_way = self._jump - after_walls, np.flatnonzero(is_pointwise & (direction == 0))
+        self._upwinding[is_pointwise] = 0.0
         # nothing is left of the other side: where ξ is large that would count
-        self._trace = 0.5 * (phi.right_trace + phi.left_trace) - by_rows(0.5 * direction, self._jump)
+        self._leaving = 0.5 * (phi.right_trace + phi.left_trace) - by_rows(0.5 * direction, self._jump)
 
     @property
     def keeps_constants(self) -> bool:  # type: ignore[override]
@@ -372,8 +374,8 @@ class PlaneTerms(Terms):
             yield self._struck(struck)
         # −½ ∫ P_s θ [w] [T] at the φ-vertices where the phase runs both ways, or θ is not |v|
         text, jump = "upwind loads between cells", self._jump
-        if np.any(self._theta):
-            yield self._term(-0.5 * jump.T @ by_rows(self._theta, jump), one, text)
+        if np.any(self._upwinding):
+            yield self._term(-0.5 * jump.T @ by_rows(self._upwinding, jump), one, text)
         yield from self._upwind(text)
         for ray, v, delta in self._walls:
             text = f"(R^p − 1) |dφ/dt| δ(φ − {ray.phase:.6g} mod π), R = {math.exp(ray.log_factor):.6g}"
@@ -393,7 +395,7 @@ class PlaneTerms(Terms):
 
     def _matrices(self, term: CoefficientMatrix) -> tuple[Matrix, Matrix]:
         """h ∂φ with the loads at the φ-vertices, and q."""
-        loads = self._trace.T @ by_rows(term.h(self._vertices), self._step)
+        loads = self._leaving.T @ by_rows(term.h(self._vertices), self._free_jump)
         return self.phi.convection(term.h) + loads, self.phi.mass(term.q)
 
     def _written(self, term: CoefficientMatrix) -> tuple[str, str, str]:

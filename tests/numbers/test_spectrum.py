@@ -8,12 +8,14 @@ from fpsolve import (
     ExponentSolver,
     NonGaussianNoise,
     OrnsteinUhlenbeck,
+    PlaneSystem,
     Problem,
     VibroImpactOscillator,
     make_mesh,
 )
 from fpsolve.exponent import principal_pair, spectrum
 from fpsolve.fem import Generator
+from fpsolve.model import Noises, Telegraph
 from tests.oracles import fourier_hermite
 
 UNIT = OrnsteinUhlenbeck(alpha=1.0, sigma=1.0)
@@ -74,6 +76,19 @@ def test_nothing_lies_right_of_the_principal_eigenvalue_of_what_is_chosen(proble
     for p in (-1.5, 0.7, 2.0):
         pair = ExponentSolver(problem, rtol=rtol).pair(p)
         assert spectrum(pair.generator, p, 1)[0].real <= pair.value + 1e-8 * max(1.0, abs(pair.value))
+
+
+def test_spectrum_beside_the_principal_pair_is_that_without_another_weak_noise():
+    """Without upwinding by the chain beside the Gaussian noise a pair that no path has stood at -3e-4."""
+    turned = PlaneSystem.of_equations(
+        ("x", "v"), ("3*a*v + 0.5*x + b*x", "-3*a*x - 0.5*v - b*v"), noises={"a": "noise.a", "b": "noise.b"}
+    )
+    alone = PlaneSystem.of_equations(("x", "v"), ("3*xi*v + 0.5*x", "-3*xi*x - 0.5*v"))
+    chain = Telegraph(1.0, 0.05)
+    both = Noises({"a": chain, "b": OrnsteinUhlenbeck(1.0, 0.02)})
+    pairs = [ExponentSolver(each, rtol=1e-4).pair(2.0) for each in (Problem(turned, both), Problem(alone, chain))]
+    ours, right = (spectrum(each.generator, 2.0, 3) for each in pairs)
+    np.testing.assert_allclose(ours, right, atol=1e-3)
 
 
 @pytest.mark.slow
