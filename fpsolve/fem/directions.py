@@ -9,8 +9,11 @@ matrix, t_i = de_i/dθ_i, a_ij = e_iᵀX_ij e_j, b_ij = t_iᵀX_ij e_j, c = cos 
     q = c² a₁₁ + cs (a₁₂ + a₂₁) + s² a₂₂,      measure c^(n₁ − 1) s^(n₂ − 1) dη dθ₁ dθ₂,      div h = tr X − n q.
 
 The functions are continuous elements in η times functions of e₁ times functions of e₂. Those of e₂ that are not
-constant vanish at η = 0, where e₂ has no say, those of e₁ at η = π/2. Without upwinding pairs that no path has may lie
-on the right: jumps of ∂u/∂η between elements are penalised by γ h² N⁻³ β (cs)², β the norm of the growth.
+constant vanish at η = 0, where e₂ has no say, those of e₁ at η = π/2. There is no upwinding. A penalty on the jumps of
+slopes between elements keeps spurious eigenvalues from the right of Λ: in the measure, with N the degree, h the mean
+size of two elements, M the mean of the matrix over the noise and β = ½‖M + Mᵀ‖,
+
+    −γ β Σ h² N⁻³ ∫ (cs)² [∂ηv] [∂ηu]      over the vertices in η, γ chosen.
 
 On the whole sphere u is even, as x and −x are one direction: waves of θ₁ and θ₂ of even total degree.
 
@@ -22,8 +25,8 @@ hit the wall, and come back at π/2,
 
 The functions of e₁ are continuous elements in θ₁, both of whose ends have values of their own. The wall is the point
 load ω δ(θ₁ + π/2) (ρ^p u(η′, π/2, θ₂) − u): as the noise moves no path over it, one flux. Where the first mass is at
-rest at the stop, η = π/2, impacts come ever faster, and T is a root of the distance. Jumps of ∂u/∂θ₁ are penalised,
-too; the bounds on the speeds across the jumps are 1 and 1/cos η here.
+rest at the stop, η = π/2, impacts come ever faster, and T is a root of the distance. The penalty has s² in place of
+(cs)², so that it holds there, too, and jumps of ∂u/∂θ₁ have one with 1/cos η.
 """
 
 from __future__ import annotations
@@ -367,12 +370,12 @@ class DirectionAxis(Axis):
         )
 
     def penalty(self) -> Matrix:
-        """What is added against pairs that no path has."""
+        """The penalty on jumps of slopes, over β."""
         in_eta = _jumps(self.line, self._speeds(np.cos(self.lines[1:-1]), np.sin(self.lines[1:-1])))
         return -self._assembled([(in_eta, self._images[0].T @ self._images[0])])
 
     def _speeds(self, c: FloatArray, s: FloatArray) -> FloatArray:
-        """The measure times the bound on the speed across jumps of ∂u/∂η, over β."""
+        """The measure times the weight of the penalty, (cs)²."""
         first, second = self.dimensions
         return c ** (first + 1) * s ** (second + 1)
 
@@ -540,10 +543,18 @@ class DirectionTerms(Terms):
     def _written(self, term: CoefficientMatrix) -> tuple[str, str, str]:
         return "h·∇", "q", "(h·∇ + p q)² of white noise"
 
+    @cached_property
+    def _mean(self) -> FloatArray:
+        """The matrix of the motion of y in the mean over the noise."""
+        total, noise = 0.0 * self.phi.coordinates, self._problem.named_noise
+        for term in self.system.terms:
+            size = self.system.epsilon**term.order * noise(term.noise).mean_of(term.g)
+            total += size * self.phi.inside(term)
+        return total
+
     def _loads(self) -> Iterator[Term]:
         """The penalty, as slopes jump by the error of the elements alone."""
-        free = sum((self.phi.inside(term) for term in self.system.terms if term.order == 0), 0.0 * self.phi.coordinates)
-        size = float(np.linalg.norm(free + free.T, 2)) / 2
+        size = float(np.linalg.norm(self._mean + self._mean.T, 2)) / 2
         yield self._term(size * self.phi.penalty(), one, "penalty on jumps of ∂u/∂η")
 
     def _changed_loads(self, by: ParameterDerivative) -> Iterator[Term]:
@@ -564,8 +575,6 @@ class StopTerms(DirectionTerms):
 
     def _stop(self, struck: Callable[[float, float, int], Matrix], text: str, size: float = 1.0) -> Term:
         stop: Any = self._problem.system.stop
-        omega = sum(
-            self.system.epsilon**each.order * each.g(0.0) * self.phi.inside(each)[0, 1] for each in self.system.terms
-        )
+        omega = self._mean[0, 1]
         words = f"{text}, ω = {omega:.6g}, R = {stop.restitution:.6g}"
         return self._term(lambda p, k: size * omega * struck(math.log(stop.restitution), p, k), one, words)

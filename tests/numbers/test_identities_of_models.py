@@ -538,3 +538,13 @@ def test_simulated_exponent_with_a_delay_lacks_the_bias_of_its_step():
         root -= 0.2 * (root + 1 - 0.4 * math.exp(-root))
     assert abs(found.lyapunov_exponent - root) <= 4 * found.lyapunov_exponent_error
     assert found.lyapunov_exponent_error <= 1e-5
+
+
+def test_unit_of_the_noise_changes_no_digit_of_three_variables():
+    """ε is stated, so that the noise, not multiplied by it, has the order 0 of the motion without noise."""
+    text = "x' = v; v' = -x - 0.2*v + k*xi*x + 0.2*y; y' = epsilon*x - 0.5*y"
+    values = [
+        moment_lyapunov(rates(text, OrnsteinUhlenbeck(1.0, unit), k=0.3 / unit, epsilon=0.3), 1.0, rtol=1e-3).value
+        for unit in (1.0, 1e-3)
+    ]
+    assert_allclose(*values, rtol=1e-12)
