@@ -386,10 +386,21 @@ class DirectionAxis(Axis):
         return first.length * second.length
 
     @property
+    def _inner(self) -> slice:
+        """Some of the points of η."""
+        return slice(None, None, max(1, self.degree // 4))
+
+    @property
     def inner_values(self) -> LinearOperator:
         """Values at points of η and of both angles."""
         of_theta = np.kron(*(each.at(each.points[:, ::2]) for each in self.angles))
-        return self._along(self._tables[0][:: max(1, self.degree // 4)], of_theta[:, self._own])
+        return self._along(self._tables[0][self._inner], of_theta[:, self._own])
+
+    @property
+    def inner_measure(self) -> FloatArray:
+        """What each of these points stands for, but for a factor; those of the angles are evenly spread."""
+        of_theta = np.ones(math.prod(each.points[0, ::2].size for each in self.angles))
+        return np.kron(self.line.measure[self._inner], of_theta)
 
     def projection(self, other: DirectionAxis) -> LinearOperator:
         mixed = self.line.values.T @ diags(self.line.measure) @ other.line.at(self.line.points)

@@ -276,6 +276,11 @@ class PhaseAxis(DividedAxis):
         """The basis functions at five points inside each cell, shape (5 m, size)."""
         return self.at((self.lines[:-1, None] + self._sizes[:, None] * np.linspace(0.1, 0.9, 5)).ravel())
 
+    @property
+    def inner_measure(self) -> FloatArray:
+        """What each of these points stands for in ∫ dφ, shape (5 m,)."""
+        return np.repeat(self._sizes / 5, 5)
+
     def projection(self, other: PhaseAxis) -> Matrix:
         """The matrix that takes a function of another space to its projection on this one, shape (size, other.size)."""
         return self.values.T @ (diags(self.weights) @ other.at(self.points))

@@ -146,5 +146,6 @@ class Space:
 
     @property
     def grid_measure(self) -> FloatArray:
-        """∫ of the weight of the noises at the points of that grid, the same for each φ."""
-        return np.asarray(reduce(np.multiply.outer, (axis.rule.measure for axis in self.noises)))
+        """What the points of that grid stand for in an integral with the weights of all axes, but for a factor."""
+        measures = [self.phi.inner_measure, *(axis.rule.measure for axis in self.noises)]
+        return np.asarray(reduce(np.multiply.outer, measures))

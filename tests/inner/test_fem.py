@@ -12,7 +12,10 @@ from scipy.sparse import csr_matrix
 from fpsolve.fem.axis import KroneckerSum
 from fpsolve.fem.directions import HalfSphereAxis, SphereAxis
 from fpsolve.fem.factors import ArrayFactors, LevelFactors, SparseFactors
-from fpsolve.model import CoefficientMatrix
+from fpsolve.fem.noise_axes import StateAxis
+from fpsolve.fem.phase import PhaseAxis
+from fpsolve.fem.space import Space
+from fpsolve.model import CoefficientMatrix, Telegraph
 
 TWO_THREADS = """
 from threading import Event, Thread
@@ -84,6 +87,15 @@ def test_all_kinds_of_factors_solve_the_same_equations(rng, sizes):
     for factors in (ArrayFactors(matrix.copy()), *by_levels, SparseFactors(operator)):
         assert_allclose(factors.solve(several), np.linalg.solve(matrix, several), rtol=1e-8, atol=1e-10)
         assert_allclose(factors.solve(b, transposed=True), np.linalg.solve(matrix.T, b), rtol=1e-8, atol=1e-10)
+
+
+def test_share_of_what_is_negative_is_that_of_phi_and_not_of_thin_cells():
+    lines = np.pi / 2 + np.array([0.0, 0.01, 0.02, 0.03, np.pi])
+    phi = PhaseAxis(lines, np.full(4, 2))
+    space = Space([phi, StateAxis(Telegraph(1.0, 1.0))])
+    below = np.where(phi.cells < 3, -phi.constant, phi.constant)
+    values, measure = space.on_grid(space.product([below, np.ones(2)])), space.grid_measure
+    assert measure[values < 0].sum() / measure.sum() == pytest.approx(0.03 / np.pi)
 
 
 HALF = HalfSphereAxis(np.eye(4), np.array([0, np.pi / 2]), 10, 2, np.array([-0.5, 0.5]) * np.pi, 12)
