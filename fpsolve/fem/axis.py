@@ -115,8 +115,8 @@ class Axis:
 
     Attributes:
         lines: the vertices of cells; none where the functions are of the whole axis.
-        most_unknowns: of a space with this first axis and no chain, with which a process takes 1.5 GB.
-        is_chain: whether each function is coupled to few next to it alone, as polynomials of noise are.
+        most_unknowns: of a space with this first axis and no axis with a band, with which a process takes 1.5 GB.
+        band: how many functions next to it on each side one is coupled to by ξ; 0 where there is no such order.
         slowest: two more modes are taken to leave this share of the effect of the highest two at least.
         slope: s/p of the factor exp(s z) that every function carries, which moves with p.
         turns: how often the axis fits on the full circle; 1 for noise.
@@ -129,7 +129,7 @@ class Axis:
     __dataclass_fields__: ClassVar[dict[str, Any]]
     lines = NO_LINES
     most_unknowns = 35_000
-    is_chain = False
+    band = 0
     slowest, slope, turns = 0.0, 0.0, 1
     nested: Any = None
     is_followed, has_adjoint = False, True

@@ -29,7 +29,10 @@ class CircleAxis(CountedAxis):
     """
 
     word = "waves"
-    is_chain = True
+
+    @property
+    def band(self) -> int:  # type: ignore[override]
+        return 2 * self.noise.harmonics
 
     @property
     def size(self) -> int:

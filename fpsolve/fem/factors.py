@@ -132,7 +132,7 @@ class LevelFactors:
 
     Args:
         operator: the sum.
-        axis: its functions are in the levels: as few in each as are coupled to others, as both waves of a k.
+        axis: its functions are in the levels, in each as many as its matrices have diagonals on one side.
 
     Raises:
         SingularMatrix: a P_k is singular, of functions that noise moves only by way of those of another level.

@@ -321,7 +321,10 @@ class PolynomialAxis(CountedAxis, LineAxis):
     p: float = 1.0
 
     word = "polynomials"
-    is_chain = True
+
+    @property
+    def band(self) -> int:  # type: ignore[override]
+        return 1 if math.isinf(self.noise.half_width) else 3
 
     @property
     def size(self) -> int:

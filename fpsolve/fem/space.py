@@ -51,9 +51,9 @@ class Space:
         size: the number of unknowns.
         turns: how often the domain fits on the full circle.
         is_tilted: whether the functions move with p.
-        chain: the longest axis that is a chain, along which generators are eliminated; None where there is none.
-        most_unknowns: so many that a process takes 1.5 GB: three squares of a block for each level and eight for the
-            terms, otherwise as measured.
+        chain: the longest axis with a band, along which generators are eliminated; None where there is none.
+        most_unknowns: so many that a process takes 1.5 GB: `LevelFactors` have three squares of a block for each band
+            of functions, and terms eight for one function; otherwise as measured.
     """
 
     def __init__(self, axes: Sequence[Any]) -> None:
@@ -61,10 +61,12 @@ class Space:
         self.phi, self.noises, self.xi = axes[0], self.axes[1:], axes[1]
         self.shape, self.turns = tuple(axis.size for axis in axes), self.phi.turns
         self.size, self.is_tilted = math.prod(self.shape), any(axis.slope for axis in axes)
-        chains = [k for k, axis in enumerate(axes) if axis.is_chain]
+        chains = [k for k, axis in enumerate(axes) if axis.band]
         self.chain = max(chains, key=self.shape.__getitem__, default=None)
-        levels = 0 if self.chain is None else self.shape[self.chain]
-        self.most_unknowns = int(levels * math.sqrt(MOST_BYTES / 8 / (3 * levels + 8))) or self.phi.most_unknowns
+        self.most_unknowns = self.phi.most_unknowns
+        if self.chain is not None:
+            count, band = self.shape[self.chain], axes[self.chain].band
+            self.most_unknowns = int(count * math.sqrt(MOST_BYTES / 8 / (3 * band * count + 8)))
 
     @classmethod
     def on(cls, mesh: CylinderMesh, noise: Noise, phase: Callable[[FloatArray], FloatArray] = np.asarray) -> Space:

@@ -2,6 +2,7 @@
 
 import os
 import sys
+from dataclasses import replace
 from subprocess import run
 
 import numpy as np
@@ -9,13 +10,14 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.sparse import csr_matrix
 
+from fpsolve.arrays import identity, one
 from fpsolve.fem.axis import KroneckerSum
 from fpsolve.fem.directions import HalfSphereAxis, SphereAxis
 from fpsolve.fem.factors import ArrayFactors, LevelFactors, SparseFactors
 from fpsolve.fem.noise_axes import StateAxis
 from fpsolve.fem.phase import PhaseAxis
-from fpsolve.fem.space import Space
-from fpsolve.model import CoefficientMatrix, Telegraph
+from fpsolve.fem.space import Space, first_axis
+from fpsolve.model import Bounded, CoefficientMatrix, NonGaussianNoise, OrnsteinUhlenbeck, Telegraph
 
 TWO_THREADS = """
 from threading import Event, Thread
@@ -96,6 +98,15 @@ def test_share_of_what_is_negative_is_that_of_phi_and_not_of_thin_cells():
     below = np.where(phi.cells < 3, -phi.constant, phi.constant)
     values, measure = space.on_grid(space.product([below, np.ones(2)])), space.grid_measure
     assert measure[values < 0].sum() / measure.sum() == pytest.approx(0.03 / np.pi)
+
+
+@pytest.mark.parametrize(
+    "noise", [OrnsteinUhlenbeck(1.0, 1.0), NonGaussianNoise(1.0, 0.5, 0.9), Bounded(1.0, 1.0, 1.0)]
+)
+def test_axis_has_the_band_of_its_matrices_by_which_memory_is_foreseen(noise):
+    axis = replace(first_axis(noise, 8.0), **({"slope": 0.3} if noise.basis == "polynomials" else {}))
+    places = [np.nonzero(axis.matrix(g)) for g in (one, identity, None)]
+    assert axis.band == max(int(np.abs(rows - columns).max(initial=0)) for rows, columns in places)
 
 
 HALF = HalfSphereAxis(np.eye(4), np.array([0, np.pi / 2]), 10, 2, np.array([-0.5, 0.5]) * np.pi, 12)
