@@ -17,7 +17,7 @@ from fpsolve import (
     VibroImpactOscillator,
 )
 from fpsolve.model import Bounded, CoefficientMatrix, Jump, MarkovChain, White
-from fpsolve.theory import first_order_eigenfunction, scale_of, second_order
+from fpsolve.theory import FrozenNoise, first_order_eigenfunction, scale_of, second_order
 from tests.kit import itself, matrices
 from tests.numbers.second import LOAD, spring
 from tests.oracles import perturbation
@@ -166,3 +166,15 @@ def test_first_order_eigenfunction_solves_eq_32_for_both_directions_of_rotation(
     more = Problem(PlaneSystem([*terms, CoefficientMatrix(1, ROTATION)]), noise)
     with pytest.raises(FpsolveError):
         first_order_eigenfunction(more, 1.4, phi, 0.9)
+
+
+def test_slow_noise_is_looked_at_where_its_cube_carries_the_moment():
+    """Of the stiffness 1 + 10ξ³ far out F = p(10|ξ|³)^½ − ξ²/2S(0), the largest at |ξ| = 22.5 p² S(0)²."""
+    terms = CoefficientMatrix(0, ((0.0, 1.0), (-1.0, -0.2))), CoefficientMatrix(1, ((0.0, 0.0), (-10.0, 0.0)), cube)
+    noise = OrnsteinUhlenbeck(alpha=1 / 30, sigma=0.1 * math.sqrt(2 / 30))
+    z, _ = FrozenNoise(Problem(PlaneSystem(terms), noise)).peaks(2.0)
+    assert -0.1 * z[0] == pytest.approx(22.5 * 2**2 * 0.6**2, rel=1e-2)
+
+
+def cube(xi):
+    return np.asarray(xi) ** 3
