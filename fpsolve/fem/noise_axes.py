@@ -363,10 +363,11 @@ class PolynomialAxis(CountedAxis, LineAxis):
 
     @cached_property
     def _ends(self) -> tuple[float, float]:
-        """a + b − 1, and 1 − b: by so much more does P_s fall at the ends."""
+        """a + b − 1, and 1 − b: by so much more does P_s fall at the ends. b < 1 is taken for 0, for a ≤ 0 for 1."""
         middle, near = self.noise.squared_diffusion(self.noise.half_width * np.array([0.0, 1 - NEAR_END]))
-        missing = 0.0 if near < VANISHES * middle else 1.0
-        return self.noise.end_exponent - missing, missing
+        a = self.noise.end_exponent
+        missing = float(a > 0 and near >= VANISHES * middle)  # the weight must be integrable
+        return a - missing, missing
 
     @property
     def _log_mass(self) -> float:

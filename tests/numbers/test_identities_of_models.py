@@ -35,6 +35,7 @@ from fpsolve.model import (
     LinearSystem,
     MarkovChain,
     ModalSystem,
+    Noise,
     ParametricOscillator,
     SineWiener,
     Telegraph,
@@ -548,3 +549,28 @@ def test_unit_of_the_noise_changes_no_digit_of_three_variables():
         for unit in (1.0, 1e-3)
     ]
     assert_allclose(*values, rtol=1e-12)
+
+
+class Uniform(Noise):
+    """Noise on (−1, 1) of the density ½, σ² = (1 − ξ²)^power; where it does not vanish ξ is reflected at the ends."""
+
+    kind, values, half_width, standard_deviation, correlation_time, diffusion = "u", {}, 1.0, 3**-0.5, 1.0, 1.0
+
+    def __init__(self, power):
+        self.power = power
+
+    def spectral_density(self, omega):
+        return 1.0
+
+    def squared_diffusion(self, xi):
+        return np.maximum(1 - np.asarray(xi) ** 2, 0) ** self.power
+
+    def log_density(self, xi):
+        return np.where(np.abs(xi) < 1, -math.log(2), -math.inf)
+
+
+@pytest.mark.parametrize("power", [0.0, 1.0])
+def test_noise_of_any_power_at_its_ends_has_the_number_of_a_mesh(power):
+    problem = rates("x' = v; v' = -x - 0.2*v - xi*x", Uniform(power))
+    found, by_cells = (moment_lyapunov(problem, 2.0, mesh=mesh) for mesh in (None, make_mesh(xi_cells=8)))
+    assert abs(found.value - by_cells.value) <= found.error_estimate + by_cells.error_estimate < 1e-6
