@@ -35,7 +35,7 @@ class PairAxis(CountedAxis):
     slope: float = 0.0
     p: float = 1.0
 
-    word, dimension, levels = "pairs", 2, ()
+    word, dimension = "pairs", 2
 
     @property
     def size(self) -> int:
