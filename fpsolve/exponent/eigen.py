@@ -421,7 +421,7 @@ def _reached(generator: Generator, pencil: Pencil, x: FloatArray, y: FloatArray)
     if generator.keeps_constants:
         forcing, total = generator.matrix(p, is_forcing=True), weight @ x
         of_noise = _of_noises(space)
-        doubtful = abs(x) + generator.loss * abs(x - constant)
+        doubtful = abs(x) + generator.rounding_growth * abs(x - constant)
         bound = _EPS * float((constant @ (abs(forcing) @ doubtful) + abs(of_noise) @ doubtful) / total)
         if bound < rounding:
             value, rounding = float((constant @ (forcing @ x) + of_noise @ x) / total), bound

@@ -74,7 +74,7 @@ def impact_rate(solver: ExponentSolver, jump: int | None = None) -> Estimate | A
     value, better = (_flux(each.pair, number) for each in (solver.method.around_zero, solver.method.finer_around_zero))
     generator = solver.method.finer_around_zero.pair.generator
     usual = generator.problem.unit_rate / math.pi
-    rounding, lost = 10 * _EPS * max(usual, better), _EPS * generator.loss * usual
+    rounding, lost = 10 * _EPS * max(usual, better), _EPS * generator.rounding_growth * usual
     error = abs(better - value) + (rounding if better > lost else lost)
     return checked(Estimate(better, error, usual, quantity=quantity.IMPACT_RATE), solver.method.refinement)
 

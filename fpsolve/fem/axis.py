@@ -95,7 +95,7 @@ def split(lines: FloatArray, effects: ModeEffects, share: float) -> tuple[FloatA
     halved where its halves take fewer unknowns, as effects fall faster in them.
     """
     rate, needed = effects.fall, effects.needed(max(share, 1e-290) / math.sqrt(effects.degrees.size))
-    needed = np.maximum(needed, np.minimum(effects.degrees, needed + 1))
+    needed = np.maximum(needed, np.minimum(effects.degrees, needed + 1))  # at most one degree less
     in_half = needed * rate / (rate + HALVING)
     is_split = (2 * in_half + 2 < needed + 1) & (effects.degrees >= SPLIT_DEGREE) & (needed > effects.degrees)
     is_split |= needed > MOST_DEGREE
@@ -115,12 +115,12 @@ class Axis:
         most_unknowns: of a space with this first axis and no axis with a band, with which a process takes 1.5 GB.
         band: how many functions next to it on each side one is coupled to by ξ; 0 where there is no such order.
         slowest: two more modes are taken to leave this share of the effect of the highest two at least.
-        slope: s/p of the factor exp(s z) that every function carries, which moves with p.
-        turns: how often the axis fits on the full circle; 1 for noise.
+        slope: the tilt over p: s/p of the factor exp(s z) that every function carries.
+        turns: 2 for φ on the half circle, of which T* is normalised on both; 1 otherwise.
         nested: the matrix to the coefficients of a hierarchical basis, in which the functions up to each degree span
             the space of that degree; None where the basis is one.
-        is_followed: whether pairs are followed from p = 0 on, as T and T* may not be resolved enough to be judged.
-        has_adjoint: whether T* is a function.
+        is_followed: whether pairs are followed from p = 0 on; signs of T and T*, not resolved enough, then decide less.
+        has_adjoint: whether T* is a function: otherwise its signs alone need not be right.
     """
 
     __dataclass_fields__: ClassVar[dict[str, Any]]

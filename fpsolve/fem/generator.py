@@ -46,7 +46,7 @@ class Pencil:
 
     @cached_property
     def numerical_abscissa(self) -> float:
-        """About the largest ω of ½(L + Lᵀ)v = ωMv, rather above it, by some steps of Lanczos from a start of all v."""
+        """About the largest ω of ½(L + Lᵀ)v = ωMv, by some steps of Lanczos, and their residual: no bound."""
         space, rows, betas = self.space, [0.0], [0.0]
         unit = csc_matrix(space.phi.matrix(one))
         solve = sparse_lu(unit).solve
@@ -165,8 +165,8 @@ class Generator:
         return KroneckerSum(parts or [(0.0 * self.chosen.phi.matrix(one), *(axis.matrix(one) for axis in axes))])
 
     @cached_property
-    def loss(self) -> float:
-        """About how many times its rounding elimination may harm T − 1: the size of L, free of forcing, over a rate."""
+    def rounding_growth(self) -> float:
+        """By about how much LU factors amplify rounding in T − 1: the size of L, free of forcing, over a rate."""
         size = abs(next(iter(self._terms.phases(0.0).values()))).sum(axis=0).max()
         for axis in self.space(0.0).noises:
             size += abs(axis.matrix(None)).sum(axis=0).max()

@@ -105,9 +105,10 @@ class LineSpace:
 
     @cached_property
     def nested(self) -> csr_matrix:
-        """The matrix to coefficients of bubbles whose sums by degree, with linear functions, are those of lower degree.
+        """The matrix to the coefficients of linear vertex functions and bubbles, shape (size, size).
 
-        What the vertex functions hold of the bubbles is given to these, shape (size, size).
+        What a vertex function holds of the bubbles is added to their coefficients: the sum up to a degree is then the
+        function of that degree.
         """
         bubbles, vertices = np.broadcast_arrays(self._dofs[:, 2:, None], self._dofs[:, None, :2])
         shape = (self.size, self.size)

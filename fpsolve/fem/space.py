@@ -46,7 +46,7 @@ class Space:
         axes: that of φ, or of directions, and that of each noise.
         phi: the first one.
         noises: those of all noises.
-        xi: that of the noise of a problem with one.
+        xi: the first of these.
         shape: the number of functions along each axis.
         size: the number of unknowns.
         turns: how often the domain fits on the full circle.

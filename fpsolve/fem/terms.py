@@ -71,9 +71,9 @@ class Term:
     """One term of L(p): a coefficient of p times an operator with a factor for each axis.
 
     Attributes:
-        order: the power of ε with which it begins; the power itself is in the operator.
+        order: the power of ε with which it begins, 0 for what forcing leaves out; the power itself is in the operator.
         of_p: the coefficient.
-        phase: the matrix of φ; where p is in more than the coefficient, a function of p.
+        phase: the matrix of the first axis; where p is in more than the coefficient, a function of p that gives it.
         noises: its functions of the noises.
         text: the term as a reader would write it.
         is_wall: whether it is R^p of a wall, which is 1 where nothing is lost: forcing is R^p − 1.
