@@ -191,11 +191,13 @@ def _rightmost_pair(pencil: Pencil, generator: Generator, reached: PrincipalPair
         limits = {"limit": BACKWARD_ERROR_LIMIT, "most": POSITIVE}
         told = Message(Code.NO_EIGENVALUE, p=p, residual=pair.residual, size=defect, **limits)
         raise NotConverged(told, pair, Remedy.BOTH_AXES)
+    if not _has_other_positive(generator, p):
+        return pair
     others = [reached.value] if reached and reached.residual <= BACKWARD_ERROR_LIMIT else []
     if generator.may_hold and generator.size <= SURVEYED_UNKNOWNS:
         others.append(float(spectrum(generator, p, 1)[0].real))
     rightmost = max(others, default=-math.inf)
-    if _has_other_positive(generator, p) and rightmost - pair.value > 1e-6 * max(abs(rightmost), problem.unit_rate):
+    if rightmost - pair.value > 1e-6 * max(abs(rightmost), problem.unit_rate):
         told = Message(Code.LARGER_EIGENVALUE, p=p, rightmost=rightmost, value=pair.value)
         raise NotConverged(told, pair, Remedy.PHASE)
     return pair
@@ -256,8 +258,9 @@ def _has_other_positive(generator: Generator, p: float) -> bool:
     if generator.may_hold:
         return True
     if (frozen := frozen_noise(problem)) is None:
-        ends = [np.sort(each.reached)[[0, -1]] for each in problem.valued.parts.values()]
-        speed = phase_speed(problem.motion, problem.at_values(ends))
+        values = [each.reached for each in problem.valued.parts.values()]
+        every = [each[:: max(each.size // 100, 1)] for each in values]  # a state of a chain, and any other tenth value
+        speed = phase_speed(problem.motion, problem.at_values(every))
         return bool(np.any(np.abs(speed.mean) <= speed.amplitude))
     lines = generator.chosen.xi.lines
     return frozen.rests(p, lines[0], lines[-1]) if lines.size else frozen.rests(p)

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Iterator, Sequence
-from contextlib import suppress
 from dataclasses import replace
 from functools import cached_property, partial
 from typing import Any
@@ -17,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from fpsolve.arrays import FloatArray
-from fpsolve.budget import unless_over_budget
+from fpsolve.budget import OverBudget, unless_over_budget
 from fpsolve.errors import NotConverged
 from fpsolve.exponent.eigen import (
     PairDerivatives,
@@ -90,6 +89,7 @@ class Elements(Method):
         super().__init__(*args)
         self._even = dict[float, EvenMoment | None]()
         self.spaces: dict[float, Solution] = {}
+        self._accepted = dict[float, float]()  # the largest error that was allowed
         self._failed = dict[float, tuple[type[NotConverged], Message]]()
 
     def _near(self, p: float) -> list[PrincipalPair]:
@@ -108,7 +108,7 @@ class Elements(Method):
             kind, message = self._failed[p]
             raise kind(message)
         allowed = partial(self.allowed, tolerance or self.tolerance)
-        if (known := self.spaces.get(p)) and known.error <= allowed(known.pair):
+        if (known := self.spaces.get(p)) and min(known.error, self._accepted[p]) <= allowed(known.pair):
             return known
         try:
             with self.solving(p):
@@ -123,7 +123,7 @@ class Elements(Method):
             if tolerance is None:  # a tighter one may be out of reach where this is not
                 self._failed[p] = type(failure), failure.message
             raise failure from None
-        self.spaces[p] = solution
+        self.spaces[p], self._accepted[p] = solution, allowed(solution.pair)
         return solution
 
     def places(self, p: float, tolerance: Tolerance, found: Sequence[Solution]) -> Iterator[tuple[Stage, Any]]:
@@ -224,10 +224,10 @@ class Elements(Method):
                 value, error = p * ratio, abs(p) * error
             if abs(p) >= TINIEST_P:  # else Λ has no scale
                 self.check(p, value, error)
-        except NotConverged:
-            if even := self.even(p):
-                return Moment.of(even)
-            raise
+        except NotConverged as failure:
+            if isinstance(failure, OverBudget) or not (even := self.even(p)):
+                raise
+            return Moment.of(even)
         return Moment(value, solution.derivative, math.nan, error, solution.pair.residual)
 
     def ratio_alone(self, p: float, tolerance: Tolerance | None = None) -> tuple[float, float]:
@@ -280,7 +280,7 @@ class Elements(Method):
         finer = self.finer_pair(solution.pair)
         change = finer.derivative - solution.derivative
         more = 0.25 * change
-        with suppress(NotConverged):
+        with unless_over_budget():
             more = self.finer_pair(finer).derivative - finer.derivative
         ratio = np.clip(more / (change or sys.float_info.min), 0.0, SLOWEST)
         return float(1.5 * max(abs(change), abs(more)) / (1 - ratio) + rest)

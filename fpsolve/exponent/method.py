@@ -487,7 +487,7 @@ class Search:
                     raise NotConverged(Message(Code.ROUNDED, size=near.rounding))
                 stage = stage.refined(found, allowed, self.stages, self.budget.most(stage))
         except NotConverged as failure:  # no stage may follow
-            if self.share <= 1:  # within the tolerance, but for its slope
+            if self.share <= 1 and not isinstance(failure, OverBudget):  # within the tolerance, but not its slope
                 return self.best
             return self._stop(failure)
 

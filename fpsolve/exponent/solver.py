@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fpsolve.arrays import FloatArray, real_number, real_numbers, shown
-from fpsolve.budget import Meter, begin
+from fpsolve.budget import Meter, OverBudget, begin, unless_over_budget
 from fpsolve.data import Result, dataset
 from fpsolve.errors import NoSuchExponent, NotConverged
 from fpsolve.exponent.curve import Curve, polynomials, values
@@ -320,11 +320,13 @@ class ExponentSolver:
 
     def slope_error(self, p: float) -> float:
         """Estimate of |error of Λ′(p)|; NaN where none is known."""
-        if p not in self.slope_errors:
-            self.slope_errors[p] = math.nan
-            with suppress(NotConverged, NoSuchExponent):
-                self.slope_errors[p] = self.method.slope_error(p)
-        return self.slope_errors[p]
+        with suppress(OverBudget, NoSuchExponent):  # which leave no number, and may be gone the next time
+            if p not in self.slope_errors:
+                found = math.nan
+                with unless_over_budget():
+                    found = self.method.slope_error(p)
+                self.slope_errors[p] = found
+        return self.slope_errors.get(p, math.nan)
 
     def lyapunov_exponent(self) -> Estimate:
         """λ, Eq. (2), the growth rate of almost every path. Raises `NotConverged`, `NoSuchExponent`."""
@@ -408,12 +410,15 @@ def solve_moments(
     """
     asked = checked_moments(p, solver.method, may_be_empty=True)
     if np.unique(asked).size > FEW_MOMENTS:
-        with suppress(NotConverged):
-            result = interpolated(solver, solver.curves(float(asked.min()), float(asked.max()), 1), asked)
-            if not (result.warnings and solver.method.adapts):  # single solves round less
-                for _ in asked:
-                    progress()
-                return result
+        try:
+            with unless_over_budget():
+                result = interpolated(solver, solver.curves(float(asked.min()), float(asked.max()), 1), asked)
+                if not (result.warnings and solver.method.adapts):  # single solves round less
+                    for _ in asked:
+                        progress()
+                    return result
+        except OverBudget:  # a p among its nodes has no number either
+            solver = solver.of(choose(solver.problem, solver.method.settings))
     result = solver.moments(asked, progress=progress, known=known)
     if not result.failures and (obstacle := _obstacle(result)):
         reason = message_of(obstacle).advising(solver.method.refinement)
@@ -444,7 +449,8 @@ def sign_change(p: FloatArray, value: FloatArray, slope: FloatArray) -> float | 
     if not sides.size:
         return None
     i = sides[0] + int(abs(ratio[sides[0] + 1]) < abs(ratio[sides[0]]))
-    return float(np.clip(p[i] - ratio[i] * p[i] / rise[i], p[sides[0]], p[sides[0] + 1]))
+    root = p[i] - ratio[i] * p[i] / rise[i] if rise[i] else p[i]
+    return float(np.clip(root, p[sides[0]], p[sides[0] + 1]))
 
 
 def _obstacle(result: MomentLyapunov) -> Message | None:
