@@ -63,7 +63,7 @@ TOLERANCE = 1e-13
 """Error that is wanted where none is named, over the terms that Λ is the sum of."""
 LOOSEST = 1e-4
 """Largest error that ends the search, over these terms: with fewer functions the effects may be small by chance."""
-MEANINGLESS = 1e-3
+LARGEST_ERROR = 1e-3
 """Error over these terms that leaves nothing of a value."""
 STEP = 1e-4
 """Share of a parameter by which it is varied to differentiate H."""
@@ -155,7 +155,7 @@ def even_moment(
     with unless_over_budget():
         last = search.settle(Level(equations, (FIRST,) * len(equations.noises), most))
         return last
-    if (last := search.judged) and last.error <= (MEANINGLESS * last.scale if tolerance is None else tolerance):
+    if (last := search.judged) and last.error <= (LARGEST_ERROR * last.scale if tolerance is None else tolerance):
         return last
     if search.failure:
         raise NoHierarchy(str(search.failure))

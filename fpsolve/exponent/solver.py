@@ -26,6 +26,7 @@ from fpsolve.exponent.kinds import choose
 from fpsolve.exponent.method import (
     BUDGET,
     RTOLS,
+    SMALL_P,
     TINIEST_P,
     Budget,
     Method,
@@ -34,7 +35,6 @@ from fpsolve.exponent.method import (
     checked_moments,
     refuse,
 )
-from fpsolve.fem.generator import SMALL_P
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import Code, Message, Remedy, message_of
 from fpsolve.model import quantity
@@ -308,7 +308,7 @@ class ExponentSolver:
             progress()
         found = np.array([q for q in points.tolist() if q in rows])
         value, slope, _, errors, residuals = np.array([rows[q] for q in found.tolist()]).reshape(-1, 5).T
-        if self.method.reason(1.0):
+        if self.method.lacks_moments:
             slope = np.full_like(slope, math.nan)  # of p = 0, beside which there is no Λ(p)
         return MomentLyapunov(found, value, slope, errors, residuals, self, failures=tuple(failures.values()))
 
@@ -433,24 +433,17 @@ def interpolated(solver: ExponentSolver, curves: tuple[Curve, ...], p: FloatArra
         solver.method.check(float(p[i]), float(value[i]), float(error[i]))
     nodes = [p for curve in curves for p in curve.nodes.tolist()]
     residual = np.full(p.size, max(solver.method.solution(node).pair.residual for node in nodes))
-    root = sign_change(p, value, slope)
-    found = MomentLyapunov(p, value, slope, error, residual, solver, curves=curves, root=root)
+    found = MomentLyapunov(p, value, slope, error, residual, solver, curves=curves, root=sign_change(p, value))
     if obstacle := _obstacle(found):
         raise NotConverged(obstacle, remedy=solver.method.refinement)
     return found
 
 
-def sign_change(p: FloatArray, value: FloatArray, slope: FloatArray) -> float | None:
-    """Where Λ(p)/p, which increases, changes its sign, by one step of Newton; None where it does not."""
-    order = np.argsort(p)
-    order = order[p[order] != 0]
-    p, ratio, rise = p[order], value[order] / p[order], slope[order] - value[order] / p[order]
-    sides = np.flatnonzero((ratio[:-1] <= 0) & (ratio[1:] > 0))
-    if not sides.size:
-        return None
-    i = sides[0] + int(abs(ratio[sides[0] + 1]) < abs(ratio[sides[0]]))
-    root = p[i] - ratio[i] * p[i] / rise[i] if rise[i] else p[i]
-    return float(np.clip(root, p[sides[0]], p[sides[0] + 1]))
+def sign_change(p: FloatArray, value: FloatArray) -> float | None:
+    """Where Λ(p)/p, which increases, changes its sign, on the line between its values; None where it does not."""
+    p, value = np.array(sorted(zip(p, value, strict=True))).T
+    ratio = value[p != 0] / p[p != 0]
+    return float(np.interp(0.0, ratio, p[p != 0])) if np.any(ratio <= 0) and np.any(ratio > 0) else None
 
 
 def _obstacle(result: MomentLyapunov) -> Message | None:
