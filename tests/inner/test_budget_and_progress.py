@@ -2,18 +2,22 @@
 
 import io
 import re
+from contextlib import suppress
 from functools import partial
 
+import numpy as np
 import pytest
 from rich.console import Console
 
 from fpsolve import ExponentSolver, NotConverged, Problem
 from fpsolve.budget import Meter, begin, charge, timed, watched
-from fpsolve.exponent import Budget, critical_restitution, impact_rate
+from fpsolve.exponent import Budget, critical_restitution, impact_rate, solve_moments
 from fpsolve.exponent.root import nonzero_root
+from fpsolve.model import White
 from fpsolve.workflow import Phase
 from fpsolve.workflow.progress import MOMENTS, SETS, Bars
 from tests.conftest import FIG1, FIG1_NOISE, sampled
+from tests.kit import rates
 
 
 class Clock:
@@ -58,6 +62,28 @@ def test_budget_ends_a_number_and_never_changes_it(name, processor):
         NotConverged, match=r"take some .* s of processor time together, more than budget\.seconds = .*budget$"
     ):
         NUMBERS[name](ExponentSolver(problem, budget=Budget(seconds=0.1 * spent)))
+
+
+THREE = rates("x' = v; v' = -x - 0.2*v - xi*x + 0.5*z; z' = -z - 0.4*v", White(s=0.4))
+
+
+@pytest.mark.parametrize(
+    ("problem", "p"),
+    [(Problem(FIG1, FIG1_NOISE), np.linspace(-2, 2, 17)), pytest.param(THREE, 1, marks=pytest.mark.slow)],
+)
+def test_budget_ends_a_curve_or_a_slope_and_never_changes_them(problem, p, processor):
+    """Both ends and the middle are nodes of the curve."""
+
+    def solved(seconds):
+        with suppress(NotConverged):  # of its witness
+            found = solve_moments(ExponentSolver(problem, rtol=1e-5, budget=Budget(seconds=seconds)), p)
+            return {*found.value, *found.slope, *found.derivative_error}
+        return set()
+
+    processor.tick, begin = 1.0, processor.now
+    whole, spent = solved(1e6), processor.now - begin
+    for share in (0.15, 0.3, 0.5, 0.7, 0.9):
+        assert {each for each in solved(share * spent) if not np.isnan(each)} <= whole
 
 
 def test_numbers_of_a_set_have_one_meter_and_its_watch_sees_which_is_solved(processor):

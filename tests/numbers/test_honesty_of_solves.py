@@ -1,6 +1,5 @@
 """What an error estimate and a warning promise, and what is said where there is no number."""
 
-import itertools
 import math
 import re
 import time
@@ -19,15 +18,7 @@ from fpsolve import (
     moment_lyapunov,
     stability_index,
 )
-from fpsolve.exponent import (
-    INDICES,
-    Budget,
-    Estimate,
-    critical_impact_factor,
-    critical_restitution,
-    impact_rate,
-    solve_moments,
-)
+from fpsolve.exponent import INDICES, Budget, Estimate, critical_impact_factor, critical_restitution, impact_rate
 from fpsolve.model import Jump, ParametricOscillator, White
 from tests.kit import rates
 from tests.numbers.rows.oscillator import PAPER, UNIT, WEAK, elastic, paper, series, slow
@@ -82,33 +73,6 @@ def test_a_budget_ends_a_search_with_the_best_value(budget):
     with pytest.raises(NotConverged) as again:
         solver.solution(2.0)
     assert str(again.value) == str(caught.value)
-
-
-THREE = rates("x' = v; v' = -x - 0.2*v - xi*x + 0.5*z; z' = -z - 0.4*v", White(s=0.4))
-
-
-@pytest.mark.parametrize(
-    ("problem", "p"),
-    [(Problem(paper(), WEAK), np.linspace(-2.0, 2.0, 17)), pytest.param(THREE, [1.0], marks=pytest.mark.slow)],
-    ids=["curve", "waves"],
-)
-def test_numbers_do_not_depend_on_the_seconds_that_they_may_take(monkeypatch, problem, p):
-    """A processor whose time passes whenever it is asked for; nodes of a curve that is not finished are among the p."""
-
-    def solved(seconds: float) -> set[tuple[float, str, float]]:
-        ticks = itertools.count()
-        monkeypatch.setattr(time, "thread_time", lambda: float(next(ticks)))
-        solver = ExponentSolver(problem, rtol=1e-5, budget=Budget(seconds=seconds))
-        found = solve_moments(solver, p)
-        columns = {"value": found.value, "slope": found.slope, "of slope": found.derivative_error}
-        numbers = {(q, name, x) for name, of in columns.items() for q, x in zip(found.p, of, strict=True)}
-        seen.append(next(ticks))
-        return {each for each in numbers if not math.isnan(each[2])}
-
-    seen: list[int] = []
-    whole = solved(1e9)
-    for share in (0.3, 0.6, 0.9):
-        assert solved(share * seen[0]) <= whole
 
 
 def test_moment_at_a_corner_is_solved_once():
