@@ -2,7 +2,6 @@
 
 import io
 import re
-from contextlib import suppress
 from functools import partial
 
 import numpy as np
@@ -13,11 +12,9 @@ from fpsolve import ExponentSolver, NotConverged, Problem
 from fpsolve.budget import Meter, begin, charge, timed, watched
 from fpsolve.exponent import Budget, critical_restitution, impact_rate, solve_moments
 from fpsolve.exponent.root import nonzero_root
-from fpsolve.model import White
 from fpsolve.workflow import Phase
 from fpsolve.workflow.progress import MOMENTS, SETS, Bars
 from tests.conftest import FIG1, FIG1_NOISE, sampled
-from tests.kit import rates
 
 
 class Clock:
@@ -64,25 +61,17 @@ def test_budget_ends_a_number_and_never_changes_it(name, processor):
         NUMBERS[name](ExponentSolver(problem, budget=Budget(seconds=0.1 * spent)))
 
 
-THREE = rates("x' = v; v' = -x - 0.2*v - xi*x + 0.5*z; z' = -z - 0.4*v", White(s=0.4))
-
-
-@pytest.mark.parametrize(
-    ("problem", "p"),
-    [(Problem(FIG1, FIG1_NOISE), np.linspace(-2, 2, 17)), pytest.param(THREE, 1, marks=pytest.mark.slow)],
-)
-def test_budget_ends_a_curve_or_a_slope_and_never_changes_them(problem, p, processor):
-    """Both ends and the middle are nodes of the curve."""
+def test_budget_ends_a_curve_and_never_changes_it(processor):
+    """Both ends and the middle of the p are nodes."""
 
     def solved(seconds):
-        with suppress(NotConverged):  # of its witness
-            found = solve_moments(ExponentSolver(problem, rtol=1e-5, budget=Budget(seconds=seconds)), p)
-            return {*found.value, *found.slope, *found.derivative_error}
-        return set()
+        solver = ExponentSolver(Problem(FIG1, FIG1_NOISE), rtol=1e-5, budget=Budget(seconds=seconds))
+        found = solve_moments(solver, np.linspace(-2, 2, 17))
+        return {*found.value, *found.slope, *found.derivative_error}
 
     processor.tick, begin = 1.0, processor.now
     whole, spent = solved(1e6), processor.now - begin
-    for share in (0.15, 0.3, 0.5, 0.7, 0.9):
+    for share in (0.3, 0.6, 0.9):
         assert {each for each in solved(share * spent) if not np.isnan(each)} <= whole
 
 
