@@ -27,10 +27,10 @@ from fpsolve.arrays import FloatArray
 from fpsolve.data import Result, dataset
 from fpsolve.drawing import add_legend, draw_bars
 from fpsolve.errors import NoSuchExponent, NotConverged
-from fpsolve.exponent.changed import NEAR_ZERO, Changed
+from fpsolve.exponent.changed import Changed
 from fpsolve.exponent.eigen import PairDerivatives
 from fpsolve.exponent.error import Estimate
-from fpsolve.exponent.method import Budget, checked_moments
+from fpsolve.exponent.method import NEAR_ZERO, Budget, checked_moments
 from fpsolve.exponent.root import nonzero_root
 from fpsolve.exponent.solver import ExponentSolver, solver_of
 from fpsolve.fem.mesh import CylinderMesh
@@ -234,7 +234,7 @@ class Gradient:
         """∂Λ(p)/∂θ. Raises `NotConverged`, `NoSuchExponent`."""
         if p == 0:
             return dict.fromkeys(self._along, Estimate(0.0, 0.0, 0.0))
-        if known := self._method.number(p):
+        if known := self._method.preferred_even(p):
             along = self._along
             slopes = {key: known.slope(key) for key in along}
             sizes = {key: known.scale / abs(by.theta) if by.theta else abs(slopes[key][0]) for key, by in along.items()}

@@ -151,7 +151,7 @@ class Distance:
     def found(self, sample: Sample) -> Estimate:
         """The quantity at θ. Raises `NotConverged`."""
         value, error, scale = self.target.level + sample.value, sample.error, sample.scale
-        if self.target.kind == "stability_index" and self.target.value:
+        if self.target.kind == "stability_index":
             ratio, slope, error = self.method(sample.at).ratio(self.target.value)
             value, error, scale = self.target.value - ratio / slope, error / slope, 1.0
         return Estimate(value, error, scale, quantity=self.target.quantity)

@@ -9,6 +9,7 @@ E‖x‖^p of one of them grows as Λ_i(p). For p < 0 it depends on how the x_i 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import Any
@@ -141,7 +142,8 @@ class Blocks(Method):
         return self.leading(p, tolerance)[0].ratio(p, tolerance)
 
     def slope_error(self, p: float) -> float:
-        return float(np.max([part.slope_error(p) for part in self.parts]))
+        part, is_alone = self.leading(p)
+        return float(np.max([each.slope_error(p) for each in ([part] if is_alone else self.parts)]))
 
     def held(self, p: float, along: Along) -> tuple[Method, Along]:
         for key, by in along.items():
@@ -200,5 +202,9 @@ class Blocks(Method):
         """The least of theirs, as for p > 0 Λ(p) is the largest of them."""
         if len(self.parts) > 1 and self.lyapunov_exponent().value > 0:
             return Absent(self.refused)
-        roots = [index(part) for part in self.parts if part.problem.system.driven_by]
-        return min((each for each in roots if each), key=lambda each: each.value, default=nowhere)
+        found = [index(part) for part in self.parts if part.problem.system.driven_by]
+        least = min((each for each in found if each), key=lambda each: each.value, default=nowhere)
+        unknown = [each for each in found if not each and each.reason.code is Code.NO_ROOT_REACHED]
+        beyond = {each.reason.data["high"]: each for each in unknown}  # where these may have one
+        first = min(beyond, default=math.inf)
+        return beyond[first] if first < (least.value if least else math.inf) else least

@@ -16,8 +16,6 @@ from fpsolve.fem.axis import KroneckerSum
 from fpsolve.model.problem import ParameterDerivative
 
 _EPS = sys.float_info.epsilon
-NEAR_ZERO = 1e-4
-"""For smaller |p| ∂Λ/∂θ / p is taken from its derivatives at p = 0."""
 
 
 class Changed:

@@ -47,12 +47,12 @@ class EvenMoments(Method):
         """The size of the noise is that of what it does to the fastest modes."""
         return constant_scale(self.problem)
 
-    def number(self, p: float) -> EvenMoment | None:
+    def preferred_even(self, p: float) -> EvenMoment | None:
         return self.solution(p) if self.has(p) else None
 
     def even(self, p: float) -> EvenMoment | None:
         with unless_over_budget():  # of a witness nothing is told
-            return self.number(p)
+            return self.preferred_even(p)
         return None
 
     @cached_property

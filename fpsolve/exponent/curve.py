@@ -20,7 +20,7 @@ from numpy.polynomial.chebyshev import chebvander
 from fpsolve.arrays import FloatArray
 
 NEXT_TO_ZERO = 1e-3
-"""Share of the interval; a point nearer to 0 is put there."""
+"""Share of the interval; a point within it that is nearer to 0 is put there."""
 COUNTS = 5, 9, 17, 33
 """Numbers of points of a polynomial, each tried where the one before is not enough."""
 Solve = Callable[[float], tuple[float, float]]
@@ -95,8 +95,9 @@ def polynomial(solve: Solve, low: float, high: float, allowed: Callable[[float],
     half, last = 0.5 * (high - low), None
     for count in COUNTS:
         points = low + half - half * np.cos(np.pi * np.arange(count) / (count - 1))
-        points[-1] = high
-        points[np.abs(points) < 2 * half * NEXT_TO_ZERO] = 0.0
+        points[[0, -1]] = low, high
+        inner = points[1:-1]
+        inner[np.abs(inner) < 2 * half * NEXT_TO_ZERO] = 0.0
         places = points.tolist()
         known = {p: solve(p) for p in sorted(places, key=abs, reverse=True)}
         ratios, errors = np.array([known[p] for p in places]).T

@@ -42,7 +42,7 @@ NEAR = 0.03
 """Share of σ − 2a from which on Newton's method finds Λ."""
 MOST_POLISHES = 10
 """Largest number of steps of Newton's method."""
-SETTLED = 1e-10
+SAME_ROOT = 1e-10
 """Change of a over its size, or that of 1/τ, that is none."""
 NEGATIVE = 1e-6
 """Share of the largest second moment by which one may be negative that should not be."""
@@ -244,7 +244,7 @@ class DelayRates:
             whole[-size:] = sum(now) - found.real * np.eye(size, whole.shape[1], k=len(whole) - size)
             roots = np.linalg.eigvals(whole) + found.real
             before, found = found, max(roots[abs(roots.imag) * last <= degree], key=lambda root: root.real)
-            if abs(found.real - before.real) <= SETTLED * (abs(found) + 1 / last):
+            if abs(found.real - before.real) <= SAME_ROOT * (abs(found) + 1 / last):
                 return complex(found)
             degree *= GROWTH
         raise NoHierarchy(f"the largest growth rate without noise is not found for a delay so long; {REMEDY}")
@@ -259,7 +259,7 @@ class DelayRates:
         low = 2 * self._slowest.real
         size = abs(low) + 1 / self._last
         if self.is_still:
-            return Eigenpair(low, x, x / (x @ x), 2 * SETTLED * size, size)
+            return Eigenpair(low, x, x / (x @ x), 2 * SAME_ROOT * size, size)
         gap = (1 + self._count) * max(bound, 0.0) + NEAR * size - low
         least, stride = NEAREST * (abs(low) + gap), STRIDE
         while gap > least and stride > NEAR:
@@ -269,7 +269,7 @@ class DelayRates:
                 stride *= 0.5
         if gap > least:
             return self._settled(low + gap)
-        if abs(self._slowest.imag) * self._last <= SETTLED:  # else Z is 0/0 next to there
+        if abs(self._slowest.imag) * self._last <= SAME_ROOT:  # else Z is 0/0 next to there
             found = self._settled(low + gap)
             if abs(found.value - low) <= gap and found.change < gap:
                 return found

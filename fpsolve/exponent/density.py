@@ -60,7 +60,7 @@ PHASES = 16
 """Half turns of both phases together are looked at from so many; at a stop turns of the second one."""
 RESOLVED = 1e-3
 """By how much the integral of the tilted density over the nodes may miss 1."""
-SETTLED = 0.02
+LARGEST_CHANGE = 0.02
 """Total variation between two densities in turn from which on the finer one is taken."""
 MOST_DIRECTIONS = 3000
 """Largest number of functions of directions that are made for a density alone: seconds of work."""
@@ -188,7 +188,7 @@ def densities(pair: PrincipalPair) -> Densities:
     """
     found, problem = on_nodes(pair), pair.generator.problem
     with suppress(SingularMatrix, MeshError), unless_over_budget():  # what there is stands, with its error
-        while not found.error <= SETTLED and (finer := found.grid.finer(found.pair)):
+        while not found.error <= LARGEST_CHANGE and (finer := found.grid.finer(found.pair)):
             new = on_nodes(principal_pair(Generator(problem, finer), pair.p, start=found.pair))
             old = found.on(new.grid)
             _, *changes = (np.abs(after - before) for after, before in zip(new.fields, old.fields, strict=True))

@@ -24,7 +24,8 @@ from scipy.sparse.linalg import ArpackError, ArpackNoConvergence, LinearOperator
 from fpsolve.arrays import FloatArray, finite, one
 from fpsolve.data import brief
 from fpsolve.errors import NotConverged, NumericalFailure, SingularMatrix
-from fpsolve.fem.axis import KroneckerSum
+from fpsolve.exponent.rightmost import NEAR_ENOUGH, NEARER
+from fpsolve.fem.axis import FEW_UNKNOWNS, KroneckerSum
 from fpsolve.fem.factors import Factors, one_thread
 from fpsolve.fem.generator import Generator, Pencil
 from fpsolve.fem.space import Space
@@ -62,10 +63,6 @@ MAX_ITERATIONS = 12
 """Number of LU factors in an iteration."""
 MAX_SHIFTS = 12
 """Number of shifts of a search from the right."""
-SHIFT_RATIO = 0.15
-"""Distance of a shift from the value found with the one before, over the distance of that one."""
-NEAR_ENOUGH = 1e-3
-"""Change of the value, over its distance from the shift, at which a search from the right ends."""
 NEIGHBOURS = 6
 """Eigenvalues nearest to a shift among which the real one is looked for."""
 SUBSPACES = 24, 48, 96
@@ -80,8 +77,6 @@ MAX_SPECTRUM_UNKNOWNS = 4000
 """Largest number of unknowns of which all eigenvalues are computed."""
 LARGEST_NORM = 1e150
 """Of L(p): vectors of this size have lengths."""
-SURVEYED_UNKNOWNS = 600
-"""Up to so many, a chain is checked by all eigenvalues."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -191,11 +186,13 @@ def _rightmost_pair(pencil: Pencil, generator: Generator, reached: PrincipalPair
         limits = {"limit": BACKWARD_ERROR_LIMIT, "most": POSITIVE}
         told = Message(Code.NO_EIGENVALUE, p=p, residual=pair.residual, size=defect, **limits)
         raise NotConverged(told, pair, Remedy.BOTH_AXES)
+    if not _has_other_positive(generator, p):
+        return pair
     others = [reached.value] if reached and reached.residual <= BACKWARD_ERROR_LIMIT else []
-    if generator.may_hold and generator.size <= SURVEYED_UNKNOWNS:
+    if generator.may_hold and generator.size <= FEW_UNKNOWNS:  # of a chain
         others.append(float(spectrum(generator, p, 1)[0].real))
     rightmost = max(others, default=-math.inf)
-    if _has_other_positive(generator, p) and rightmost - pair.value > 1e-6 * max(abs(rightmost), problem.unit_rate):
+    if rightmost - pair.value > 1e-6 * max(abs(rightmost), problem.unit_rate):
         told = Message(Code.LARGER_EIGENVALUE, p=p, rightmost=rightmost, value=pair.value)
         raise NotConverged(told, pair, Remedy.PHASE)
     return pair
@@ -256,8 +253,9 @@ def _has_other_positive(generator: Generator, p: float) -> bool:
     if generator.may_hold:
         return True
     if (frozen := frozen_noise(problem)) is None:
-        ends = [np.sort(each.reached)[[0, -1]] for each in problem.valued.parts.values()]
-        speed = phase_speed(problem.motion, problem.at_values(ends))
+        values = [each.reached for each in problem.valued.parts.values()]
+        every = [each[:: max(each.size // 100, 1)] for each in values]  # a state of a chain, and any other tenth value
+        speed = phase_speed(problem.motion, problem.at_values(every))
         return bool(np.any(np.abs(speed.mean) <= speed.amplitude))
     lines = generator.chosen.xi.lines
     return frozen.rests(p, lines[0], lines[-1]) if lines.size else frozen.rests(p)
@@ -306,14 +304,14 @@ def _from_the_right(pencil: Pencil, generator: Generator) -> tuple[FloatArray, F
 
     For a real shift σ > Λ no eigenvalue of L is nearer to σ than Λ. The first shift is the largest eigenvalue of the
     symmetric part of L, about, and a margin, to the right of the eigenvalues of the discrete L; each further one keeps
-    `SHIFT_RATIO` of the distance. Complex pairs that come of the truncation may be nearer; they are passed over.
+    `NEARER` of the distance. Complex pairs that come of the truncation may be nearer; they are passed over.
     """
     space, value = pencil.space, math.inf
     right = left = space.constant
     shift = pencil.numerical_abscissa + 0.1 * generator.problem.unit_rate
     for step in range(MAX_SHIFTS):
         if step:
-            shift = value + SHIFT_RATIO * (shift - value)
+            shift = value + NEARER * (shift - value)
         factor: Any = None  # there is room for the next ones
         factor, last = pencil.factorised(shift), value
         right, value = _nearest(lambda v, lu=factor: -lu.solve(space.weighed(v)), right, shift, pencil.p)

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Iterator, Sequence
-from contextlib import suppress
 from dataclasses import replace
 from functools import cached_property, partial
 from typing import Any
@@ -17,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from fpsolve.arrays import FloatArray
-from fpsolve.budget import unless_over_budget
+from fpsolve.budget import OverBudget, unless_over_budget
 from fpsolve.errors import NotConverged
 from fpsolve.exponent.eigen import (
     PairDerivatives,
@@ -29,10 +28,13 @@ from fpsolve.exponent.eigen import (
 )
 from fpsolve.exponent.error import Moment, Solution
 from fpsolve.exponent.method import (
+    NEGLIGIBLE_P,
     PHASE_AND_NOISE,
     RTOL,
     RTOL_OF_SEVERAL,
+    SMALL_P,
     TINIEST_P,
+    TINY_P,
     Method,
     Search,
     Stage,
@@ -41,18 +43,14 @@ from fpsolve.exponent.method import (
 from fpsolve.exponent.moments import EvenMoment, even_moment
 from fpsolve.exponent.starts import Start, first, has_cones, other_centers
 from fpsolve.fem.axis import FEW_UNKNOWNS
-from fpsolve.fem.generator import SMALL_P, Generator
+from fpsolve.fem.generator import Generator
 from fpsolve.fem.space import Space
 from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.problem import infinite
 from fpsolve.theory.frozen import frozen_noise
 
-WORTH_A_TRY = FEW_UNKNOWNS
-"""Unknowns of a system that takes less time than finding another one."""
 MOST_TILT_AWAY = 0.7
 """How far the tilt of a space may be from the best one at another p."""
-NEGLIGIBLE_P = 1e-30
-"""Pairs at smaller |p| are those at p = 0, from which they differ by less than by rounding."""
 SLOWEST = 0.9
 """The largest ratio of two changes in turn that is reckoned with."""
 WIDER = 4.0
@@ -71,8 +69,6 @@ SURELY = 10.0
 """Multiple of the errors of two values from which on they contradict each other."""
 ROUNDED = 1e-6
 """Share of the values themselves that is added to that."""
-TINY_P = 1e-3
-"""Below it Λ(p)/p is a mean of Λ′, as rounding is not proportional to p."""
 
 
 class Elements(Method):
@@ -90,6 +86,7 @@ class Elements(Method):
         super().__init__(*args)
         self._even = dict[float, EvenMoment | None]()
         self.spaces: dict[float, Solution] = {}
+        self._accepted = dict[float, float]()  # the largest error that was allowed
         self._failed = dict[float, tuple[type[NotConverged], Message]]()
 
     def _near(self, p: float) -> list[PrincipalPair]:
@@ -108,7 +105,7 @@ class Elements(Method):
             kind, message = self._failed[p]
             raise kind(message)
         allowed = partial(self.allowed, tolerance or self.tolerance)
-        if (known := self.spaces.get(p)) and known.error <= allowed(known.pair):
+        if (known := self.spaces.get(p)) and min(known.error, self._accepted[p]) <= allowed(known.pair):
             return known
         try:
             with self.solving(p):
@@ -123,7 +120,7 @@ class Elements(Method):
             if tolerance is None:  # a tighter one may be out of reach where this is not
                 self._failed[p] = type(failure), failure.message
             raise failure from None
-        self.spaces[p] = solution
+        self.spaces[p], self._accepted[p] = solution, allowed(solution.pair)
         return solution
 
     def places(self, p: float, tolerance: Tolerance, found: Sequence[Solution]) -> Iterator[tuple[Stage, Any]]:
@@ -173,7 +170,7 @@ class Elements(Method):
 
     def near_zero(self, p: float, tolerance: Tolerance | None = None) -> Solution:
         """The solution at ±`SMALL_P` that a smaller p goes with."""
-        side = p or (-1.0 if self.reason(1.0) else 1.0)  # on which Λ is finite
+        side = p or (-1.0 if self.lacks_moments else 1.0)  # on which Λ is finite
         q = math.copysign(SMALL_P, side)
         try:
             return self.solution(q, tolerance)
@@ -212,7 +209,7 @@ class Elements(Method):
 
         Near p = 0, where rounding is not proportional to p, it is that of Λ(p)/p.
         """
-        if self.number(p):
+        if self.preferred_even(p):
             return super().row(p)
         try:
             solution = self.solution(p)
@@ -224,10 +221,10 @@ class Elements(Method):
                 value, error = p * ratio, abs(p) * error
             if abs(p) >= TINIEST_P:  # else Λ has no scale
                 self.check(p, value, error)
-        except NotConverged:
-            if even := self.even(p):
-                return Moment.of(even)
-            raise
+        except NotConverged as failure:
+            if isinstance(failure, OverBudget) or not (even := self.even(p)):
+                raise
+            return Moment.of(even)
         return Moment(value, solution.derivative, math.nan, error, solution.pair.residual)
 
     def ratio_alone(self, p: float, tolerance: Tolerance | None = None) -> tuple[float, float]:
@@ -239,7 +236,7 @@ class Elements(Method):
             return super().ratio_alone(p, tolerance)
         points = {p * (0.5 + shift) for shift in (-0.5 / math.sqrt(3), 0.5 / math.sqrt(3))}
         pairs = [self.solution(point, tolerance).pair for point in points]
-        if self.reason(1.0):  # algebraic tails, of which Λ(p) for p < 0 hardly tells: their moments are finite
+        if self.lacks_moments:  # algebraic tails, of which Λ(p) for p < 0 hardly tells: their moments are finite
             return self._among_tails(pairs[0])
         near = self.near_zero(p, tolerance)
         error = near.error / abs(near.pair.p) + slope_rounding(pairs[0])
@@ -280,7 +277,7 @@ class Elements(Method):
         finer = self.finer_pair(solution.pair)
         change = finer.derivative - solution.derivative
         more = 0.25 * change
-        with suppress(NotConverged):
+        with unless_over_budget():
             more = self.finer_pair(finer).derivative - finer.derivative
         ratio = np.clip(more / (change or sys.float_info.min), 0.0, SLOWEST)
         return float(1.5 * max(abs(change), abs(more)) / (1 - ratio) + rest)
@@ -340,7 +337,7 @@ class PlaneElements(Elements):
     def _serves(self, near: PrincipalPair, p: float) -> bool:
         """Whether the space of another p is of use: a large one far away is not, nor one with another tilt."""
         q, space, frozen = near.p, near.generator.chosen, frozen_noise(self.problem)
-        if space.size > WORTH_A_TRY and abs(p - q) > max(0.5, 0.4 * min(abs(p), abs(q))):
+        if space.size > FEW_UNKNOWNS and abs(p - q) > max(0.5, 0.4 * min(abs(p), abs(q))):
             return False
         if frozen is None or not self.problem.valued.may_tilt:
             return True
@@ -358,7 +355,7 @@ class PlaneElements(Elements):
             halves = chosen.doubled()
             with unless_over_budget():
                 pair = self.pair_among(halves, best.pair)
-                return replace(best, search=2 * abs(pair.value - best.value))
+                return replace(best, unresolved=2 * abs(pair.value - best.value))
             return self.confirmed(search, [search.settle(Start(self.problem, halves))])
         if self.settings.rtol <= SURELY_SEEN or abs(p) < SMALL_P:
             return best
@@ -370,7 +367,7 @@ class PlaneElements(Elements):
         if change <= best.error:
             return best
         if change + finer.error <= search.allowed(finer.pair):
-            return replace(finer, search=finer.search + change)
+            return replace(finer, unresolved=finer.unresolved + change)
         return self.confirmed(search, [finer])
 
     def is_at_corner(self, p: float) -> bool:

@@ -177,14 +177,14 @@ class Solution:
 
     Attributes:
         pair: the principal pair.
-        search: what is left of a correction by finer functions of directions, or shown by halved cells of φ.
+        unresolved: what is left of a correction by finer functions of directions, or shown by halved cells of φ.
         measured: what finer functions of each axis, or of all, change; None where the effects of the highest modes
             tell.
         start: the place where it was found, and its functions; None where these are just those of the pair.
     """
 
     pair: PrincipalPair
-    search: float = 0.0
+    unresolved: float = 0.0
     measured: tuple[float, ...] | None = None
     start: Any = None
 
@@ -214,7 +214,7 @@ class Solution:
         of_axes = self.measured
         if of_axes is None:
             of_axes = tuple(each.error for each in self.effects if each)
-        return sum(of_axes) + sum(self.truncation) + self.pair.rounding + self.search
+        return sum(of_axes) + sum(self.truncation) + self.pair.rounding + self.unresolved
 
 
 def mode_effects(pair: PrincipalPair) -> tuple[ModeEffects | None, ...]:

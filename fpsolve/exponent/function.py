@@ -115,7 +115,7 @@ class MomentLyapunovFunction(Result):
     def root(self) -> float | None:
         """Where Λ(p)/p changes its sign in the interval, or None."""
         p = np.union1d(self.nodes, np.linspace(*self.interval, FEW))
-        return sign_change(p, self(p), self.derivative(p))
+        return sign_change(p, self(p))
 
     def lyapunov_exponent(self) -> Estimate:
         """λ = Λ′(0), Eq. (2), solved at p = 0. Raises `NotConverged`."""

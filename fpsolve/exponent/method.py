@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from fpsolve.arrays import FloatArray, real_numbers
 from fpsolve.budget import Meter, OverBudget, charge, unless_over_budget
 from fpsolve.errors import FpsolveError, MeshError, NoHierarchy, NoSuchExponent, NotConverged, SingularMatrix
-from fpsolve.exponent.changed import NEAR_ZERO, Changed
+from fpsolve.exponent.changed import Changed
 from fpsolve.exponent.eigen import PairDerivatives, PrincipalPair
 from fpsolve.exponent.error import Absent, Estimate, Moment, checked
 from fpsolve.fem.factors import one_thread
@@ -36,10 +36,18 @@ RTOL_OF_SEVERAL = 1e-6
 """Relative error that is wanted of two variables under two noises that are not white."""
 RTOLS = {"gt": 1e-13, "lt": 1}
 """The range of rtol."""
-TINIEST_P = 1e-9
-"""For smaller |p| the error of Λ(p), which falls as p, has no scale, which may fall as p²: p counts as 0."""
 RTOL_BEYOND_PLANE = 1e-5
 """Relative error that is wanted of three and four variables."""
+SMALL_P = 1e-2
+"""For smaller |p| the discretisation is chosen at this one, as Λ and its error go to zero together."""
+TINY_P = 1e-3
+"""Below it Λ(p)/p is a mean of Λ′, as rounding is not proportional to p."""
+NEAR_ZERO = 1e-4
+"""For smaller |p| ∂Λ/∂θ / p is taken from its derivatives at p = 0."""
+TINIEST_P = 1e-9
+"""For smaller |p| the error of Λ(p), which falls as p, has no scale, which may fall as p²: p counts as 0."""
+NEGLIGIBLE_P = 1e-30
+"""Pairs at smaller |p| are those at p = 0, from which they differ by less than by rounding."""
 MAX_STAGES = 60
 """Number of stages of a search, of all its places."""
 UNSOLVED = MeshError, NoHierarchy, NotConverged, SingularMatrix, np.linalg.LinAlgError
@@ -199,14 +207,19 @@ class Method:
         return self.reason(0.0) is None
 
     @property
+    def lacks_moments(self) -> bool:
+        """Whether there is no Λ(p) of some p, as of p > 0 for algebraic tails, and of all but even p by equations."""
+        return bool(self.reason(1.0))
+
+    @property
     def interval(self) -> tuple[float, float]:
         """The p for which Λ(p) is computed, as a closed interval."""
-        return (0.0, 0.0) if self.reason(1.0) else (-math.inf, math.inf)
+        return (0.0, 0.0) if self.lacks_moments else (-math.inf, math.inf)
 
     @property
     def goes_on(self) -> bool:
         """Whether numbers of an earlier run do in place of solutions, which others need for their messages."""
-        return not self.reason(1.0)
+        return not self.lacks_moments
 
     def is_dear(self, p: float) -> bool:
         """Whether Λ(p) takes elements of three axes or more, and so seconds."""
@@ -276,7 +289,7 @@ class Method:
 
     def row(self, p: float) -> Moment:
         """Λ(p), its slope and error. Raises `NotConverged`."""
-        return Moment.of(self.number(p) or self.solution(p))
+        return Moment.of(self.preferred_even(p) or self.solution(p))
 
     def pair(self, p: float) -> PrincipalPair:
         """The principal eigenpair at p. Raises `NotConverged`, `NoSuchExponent`."""
@@ -287,13 +300,13 @@ class Method:
         """Λ(p) of an even p by equations without directions, as a witness; None where there is none."""
         return None
 
-    def number(self, p: float) -> Any:
-        """Λ(p) by these equations, where that is its number; None for others."""
+    def preferred_even(self, p: float) -> Any:
+        """What `even` gives, where this method prefers it to any other Λ(p); else None."""
         return None
 
     def ratio_alone(self, p: float, tolerance: Tolerance | None = None) -> tuple[float, float]:
         """Λ(p)/p, at p = 0 λ, and its error."""
-        found = self.number(p) or self.solution(p, tolerance)
+        found = self.preferred_even(p) or self.solution(p, tolerance)
         return (found.value / p, found.error / abs(p)) if p else (found.derivative, found.error)
 
     def ratio(self, p: float, tolerance: Tolerance | None = None) -> tuple[float, float, float]:
@@ -309,7 +322,7 @@ class Method:
     def lyapunov_exponent(self) -> Estimate:
         """λ, Eq. (2), the growth rate of almost every path: Λ′(0) but for algebraic tails. Raises `NotConverged`."""
         value, error = self.ratio_alone(0.0)
-        meaning = ALMOST_EVERY if self.reason(1.0) else ""
+        meaning = ALMOST_EVERY if self.lacks_moments else ""
         return checked(Estimate(value, error, self.scales.linear, meaning, LYAPUNOV_EXPONENT), self.refinement)
 
     def finer_pair(self, pair: PrincipalPair) -> PrincipalPair:
@@ -344,7 +357,7 @@ class Method:
 
     def gradient(self, p: float, keys: Sequence[str]) -> FloatArray:
         """∂/∂θ of Λ(p)/p, at p = 0 of λ, by parameters. Raises `NotConverged`, `NoSuchExponent`."""
-        if known := self.number(p):
+        if known := self.preferred_even(p):
             return np.asarray(known.gradient(keys) / p)
         along = [self.problem.derivative(key) for key in keys]
         if abs(p) >= NEAR_ZERO:
@@ -487,7 +500,7 @@ class Search:
                     raise NotConverged(Message(Code.ROUNDED, size=near.rounding))
                 stage = stage.refined(found, allowed, self.budget.most(stage))
         except NotConverged as failure:  # no stage may follow
-            if self.share <= 1:  # within the tolerance, but for its slope
+            if self.share <= 1 and not isinstance(failure, OverBudget):  # within the tolerance, but not its slope
                 return self.best
             return self._stop(failure)
 

@@ -26,13 +26,13 @@ from fpsolve.errors import NoHierarchy
 from fpsolve.exponent.eigen import PrincipalPair, principal_pair
 from fpsolve.exponent.elements import Elements
 from fpsolve.exponent.error import Solution, mode_effects
-from fpsolve.exponent.method import RTOL_BEYOND_PLANE, Stage, Tolerance
+from fpsolve.exponent.method import RTOL_BEYOND_PLANE, SMALL_P, Stage, Tolerance
 from fpsolve.exponent.moments import EvenMoment, even_moment, mean_matrix
 from fpsolve.exponent.powers import moment_form
 from fpsolve.exponent.starts import SHARE, Start
 from fpsolve.fem.directions import DirectionAxis, SphereAxis, group_dimensions
 from fpsolve.fem.factors import factorised
-from fpsolve.fem.generator import SMALL_P, Generator
+from fpsolve.fem.generator import Generator
 from fpsolve.fem.space import Space, first_axis
 from fpsolve.messages import Remedy
 from fpsolve.model.problem import Problem
@@ -299,5 +299,5 @@ class Directions(Elements):
     def is_dear(self, p: float) -> bool:
         return p <= 0 or p % 2 != 0
 
-    def number(self, p: float) -> EvenMoment | None:
+    def preferred_even(self, p: float) -> EvenMoment | None:
         return self.even(p)

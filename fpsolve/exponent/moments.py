@@ -32,7 +32,7 @@ from scipy.sparse.linalg import norm
 from fpsolve.arrays import ROUNDED, Coefficient, FloatArray, one
 from fpsolve.budget import unless_over_budget
 from fpsolve.data import brief
-from fpsolve.errors import NoHierarchy
+from fpsolve.errors import NoHierarchy, NoSuchExponent
 from fpsolve.exponent.delays import DelayRates
 from fpsolve.exponent.matrices import MatrixRates
 from fpsolve.exponent.method import BUDGET, Budget, Search
@@ -63,7 +63,7 @@ TOLERANCE = 1e-13
 """Error that is wanted where none is named, over the terms that Λ is the sum of."""
 LOOSEST = 1e-4
 """Largest error that ends the search, over these terms: with fewer functions the effects may be small by chance."""
-MEANINGLESS = 1e-3
+LARGEST_ERROR = 1e-3
 """Error over these terms that leaves nothing of a value."""
 STEP = 1e-4
 """Share of a parameter by which it is varied to differentiate H."""
@@ -155,7 +155,7 @@ def even_moment(
     with unless_over_budget():
         last = search.settle(Level(equations, (FIRST,) * len(equations.noises), most))
         return last
-    if (last := search.judged) and last.error <= (MEANINGLESS * last.scale if tolerance is None else tolerance):
+    if (last := search.judged) and last.error <= (LARGEST_ERROR * last.scale if tolerance is None else tolerance):
         return last
     if search.failure:
         raise NoHierarchy(str(search.failure))
@@ -273,6 +273,7 @@ class EvenMoment:
 
         Raises:
             ValueError: there is no such parameter.
+            NoSuchExponent: there are no such problems on one side of it.
         """
         problem = self.equations.problem
         at = float(problem.values[key])
@@ -283,10 +284,10 @@ class EvenMoment:
                 coarse, slope = (polyfit(offsets[:k], values[:k], k - 1)[1] for k in (3, len(offsets)))
                 lacking = STEEPNESS * max(self.counts) * abs(step / at if at else 1.0) * self.error
                 return slope / step, (abs(slope - coarse) + self.rounding + self.change + lacking) / step
-        raise ValueError(f"got {key}; Λ(p) has no slope by it")
+        raise NoSuchExponent(f"got {key}; Λ(p) has no slope by it")
 
     def gradient(self, keys: Sequence[str]) -> FloatArray:
-        """∂Λ(p)/∂θ of some parameters. Raises `ValueError`."""
+        """∂Λ(p)/∂θ of some parameters. Raises as `slope`."""
         return np.array([self.slope(key)[0] for key in keys])
 
     def _with(self, problem: Problem) -> float:

@@ -71,6 +71,8 @@ def impact_rate(solver: ExponentSolver, jump: int | None = None) -> Estimate | A
     number = 0 if jump is None else jump
     if not is_whole(number, 0, count - 1):
         raise ValueError(f"got jump = {shown(jump)}; must be a whole number from 0 to {count - 1}, or None")
+    if solver.problem.invariant_rays:  # the phase never passes one, and so no jump twice
+        return Estimate(0.0, 0.0, 0.0, quantity=quantity.IMPACT_RATE)
     value, better = (_flux(each.pair, number) for each in (solver.method.around_zero, solver.method.finer_around_zero))
     generator = solver.method.finer_around_zero.pair.generator
     usual = generator.problem.unit_rate / math.pi

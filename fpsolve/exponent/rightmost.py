@@ -21,7 +21,7 @@ ROUNDING = 10 * sys.float_info.epsilon
 """Error by rounding, over the terms of a sum."""
 NEARER = 0.15
 """Share of σ − Λ that the next σ keeps."""
-SETTLED = 1e-3
+NEAR_ENOUGH = 1e-3
 """Change of Λ over σ − Λ with which the search ends."""
 MOST_STEPS = 60
 """Largest number of σ."""
@@ -113,7 +113,7 @@ class Rates(Protocol):
             if last - value > PASSED * away:
                 x, value, sigma = start, last, last + away
                 break
-            if abs(value - last) <= SETTLED * (sigma - value):
+            if abs(value - last) <= NEAR_ENOUGH * (sigma - value):
                 break
             away = sigma - value
             sigma = value + NEARER * away

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fpsolve.arrays import FloatArray, real_number, real_numbers, shown
-from fpsolve.budget import Meter, begin
+from fpsolve.budget import Meter, OverBudget, begin, unless_over_budget
 from fpsolve.data import Result, dataset
 from fpsolve.errors import NoSuchExponent, NotConverged
 from fpsolve.exponent.curve import Curve, polynomials, values
@@ -26,6 +26,7 @@ from fpsolve.exponent.kinds import choose
 from fpsolve.exponent.method import (
     BUDGET,
     RTOLS,
+    SMALL_P,
     TINIEST_P,
     Budget,
     Method,
@@ -34,7 +35,6 @@ from fpsolve.exponent.method import (
     checked_moments,
     refuse,
 )
-from fpsolve.fem.generator import SMALL_P
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import Code, Message, Remedy, message_of
 from fpsolve.model import quantity
@@ -308,7 +308,7 @@ class ExponentSolver:
             progress()
         found = np.array([q for q in points.tolist() if q in rows])
         value, slope, _, errors, residuals = np.array([rows[q] for q in found.tolist()]).reshape(-1, 5).T
-        if self.method.reason(1.0):
+        if self.method.lacks_moments:
             slope = np.full_like(slope, math.nan)  # of p = 0, beside which there is no Λ(p)
         return MomentLyapunov(found, value, slope, errors, residuals, self, failures=tuple(failures.values()))
 
@@ -320,11 +320,13 @@ class ExponentSolver:
 
     def slope_error(self, p: float) -> float:
         """Estimate of |error of Λ′(p)|; NaN where none is known."""
-        if p not in self.slope_errors:
-            self.slope_errors[p] = math.nan
-            with suppress(NotConverged, NoSuchExponent):
-                self.slope_errors[p] = self.method.slope_error(p)
-        return self.slope_errors[p]
+        with suppress(OverBudget, NoSuchExponent):  # which leave no number, and may be gone the next time
+            if p not in self.slope_errors:
+                found = math.nan
+                with unless_over_budget():
+                    found = self.method.slope_error(p)
+                self.slope_errors[p] = found
+        return self.slope_errors.get(p, math.nan)
 
     def lyapunov_exponent(self) -> Estimate:
         """λ, Eq. (2), the growth rate of almost every path. Raises `NotConverged`, `NoSuchExponent`."""
@@ -408,12 +410,15 @@ def solve_moments(
     """
     asked = checked_moments(p, solver.method, may_be_empty=True)
     if np.unique(asked).size > FEW_MOMENTS:
-        with suppress(NotConverged):
-            result = interpolated(solver, solver.curves(float(asked.min()), float(asked.max()), 1), asked)
-            if not (result.warnings and solver.method.adapts):  # single solves round less
-                for _ in asked:
-                    progress()
-                return result
+        try:
+            with unless_over_budget():
+                result = interpolated(solver, solver.curves(float(asked.min()), float(asked.max()), 1), asked)
+                if not (result.warnings and solver.method.adapts):  # single solves round less
+                    for _ in asked:
+                        progress()
+                    return result
+        except OverBudget:  # a p among its nodes has no number either
+            solver = solver.of(choose(solver.problem, solver.method.settings))
     result = solver.moments(asked, progress=progress, known=known)
     if not result.failures and (obstacle := _obstacle(result)):
         reason = message_of(obstacle).advising(solver.method.refinement)
@@ -428,23 +433,17 @@ def interpolated(solver: ExponentSolver, curves: tuple[Curve, ...], p: FloatArra
         solver.method.check(float(p[i]), float(value[i]), float(error[i]))
     nodes = [p for curve in curves for p in curve.nodes.tolist()]
     residual = np.full(p.size, max(solver.method.solution(node).pair.residual for node in nodes))
-    root = sign_change(p, value, slope)
-    found = MomentLyapunov(p, value, slope, error, residual, solver, curves=curves, root=root)
+    found = MomentLyapunov(p, value, slope, error, residual, solver, curves=curves, root=sign_change(p, value))
     if obstacle := _obstacle(found):
         raise NotConverged(obstacle, remedy=solver.method.refinement)
     return found
 
 
-def sign_change(p: FloatArray, value: FloatArray, slope: FloatArray) -> float | None:
-    """Where Λ(p)/p, which increases, changes its sign, by one step of Newton; None where it does not."""
-    order = np.argsort(p)
-    order = order[p[order] != 0]
-    p, ratio, rise = p[order], value[order] / p[order], slope[order] - value[order] / p[order]
-    sides = np.flatnonzero((ratio[:-1] <= 0) & (ratio[1:] > 0))
-    if not sides.size:
-        return None
-    i = sides[0] + int(abs(ratio[sides[0] + 1]) < abs(ratio[sides[0]]))
-    return float(np.clip(p[i] - ratio[i] * p[i] / rise[i], p[sides[0]], p[sides[0] + 1]))
+def sign_change(p: FloatArray, value: FloatArray) -> float | None:
+    """Where Λ(p)/p, which increases, changes its sign, on the line between its values; None where it does not."""
+    p, value = np.array(sorted(zip(p, value, strict=True))).T
+    ratio = value[p != 0] / p[p != 0]
+    return float(np.interp(0.0, ratio, p[p != 0])) if np.any(ratio <= 0) and np.any(ratio > 0) else None
 
 
 def _obstacle(result: MomentLyapunov) -> Message | None:

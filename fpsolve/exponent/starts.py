@@ -72,11 +72,12 @@ class Start:
     def is_enough(self, found: Solution) -> bool:
         return True
 
-    def doubled(self, failure: Exception | None) -> Start:
+    def doubled(self, failure: Exception | None) -> Start | None:
         """More functions along the axes that lack most, by the pair that a failed search has reached, if any."""
         pair: Any = getattr(failure, "partial", None)
         is_pair = pair is not None and pair.residual <= BACKWARD_ERROR_LIMIT
-        return replace(self, space=self.space.doubled(mode_effects(pair) if is_pair else ()))
+        found = self.space.doubled(mode_effects(pair) if is_pair else ())
+        return replace(self, space=found) if found.size > self.space.size else None
 
     def refined(self, solution: Solution, goal: float, most: int) -> Start:
         """A place on which each cell should lack no more than its share of an error.

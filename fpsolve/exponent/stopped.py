@@ -121,8 +121,8 @@ class StopStart(DirectionStart):
         for each in self.before:
             step, lacked = abs(pair.value - each.pair.value), sum(each.start.changes)
             left = max(left, OF_STEP * step, OF_LAST[not each.start.is_first] * lacked)
-        search = 0.0 if self.before else math.inf  # of one space
-        return Solution(pair, search, (left, *of_noises), replace(self, changes=tuple(found)))
+        unresolved = 0.0 if self.before else math.inf  # of one space
+        return Solution(pair, unresolved, (left, *of_noises), replace(self, changes=tuple(found)))
 
     def _left(self, changes: Sequence[float]) -> FloatArray:
         """What is left over the change in each direction."""

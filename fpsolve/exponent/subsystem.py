@@ -139,11 +139,12 @@ def blocks_of(problem: Problem) -> tuple[Subsystem, ...]:
         rays, names = np.stack([np.cos(phases), -np.sin(phases)]), ("", "")
         basis, rounded = frame @ rays, ROUNDED * float(np.linalg.cond(rays))
         groups = [(0,), (1,)] if any(map(_turns, matrices)) else [(0,)]
-    elif stop is not None:  # in its coordinates, of which the first two are one block
+    elif stop is not None:  # in its coordinates, of which the first two must be one block, as a part has no stop
         basis, rounded, names = np.linalg.inv(np.array(stop.coordinates)), ROUNDED, stop.names(names)
         pattern = np.sum([abs(stop.inside(each)) for each in matrices], axis=0)
         pattern[1, 0] += 1.0
-        groups = components(pattern)
+        found = components(pattern)
+        groups = found if (0, 1) in found else []
         jumps = (Jump(math.pi / 2, math.log(stop.restitution)),)
     else:
         basis, groups = np.eye(n), components(np.sum(np.abs(matrices), axis=0))

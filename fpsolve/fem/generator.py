@@ -22,8 +22,6 @@ from fpsolve.fem.terms import Term, Terms, power_of_epsilon
 from fpsolve.model.problem import ParameterDerivative, Problem
 from fpsolve.superlu import sparse_lu
 
-SMALL_P = 1e-2
-"""For smaller |p| the discretisation is chosen at this one, as Λ and its error go to zero together."""
 KEPT_SPACES = 40
 """Number of spaces, of the last p, whose matrices are kept."""
 LANCZOS_STEPS = 16

@@ -38,10 +38,13 @@ SPRING = "x' = v; v' = -x - 0.2*v - xi*x"
 NEIGHBOURS = Problem(paper(), MarkovChain(np.linspace(-1, 1, 60), np.ones((60, 60)) - np.eye(60)))
 CHAIN, STRUCK = rates(SPRING, TELEGRAPH), rates(SPRING, Poisson(1.0, (1.0,)))
 STIFF = rates("x' = v; v' = -1e16*x - 0.1*v - xi*x", White(s=0.1))
+DRIVEN = "q' = v; v' = -q - 0.1*v - xi*q + 0.3*y; y' = 0.5*q - y; z' = y - 2*z"
 BOTH, PAIRS = rates(BEAM, [GAUSSIAN, TELEGRAPH]), rates(TEXTS["pairs"], White(s=1.0))
 ALIKE = rates(SPRING + "; y' = w; w' = -y - 0.2*w - xi*y", White(s=0.6))
 STILL, FOUR = CoefficientMatrix(0, [[0.0, 1.0], [-1.0, -0.2]]), CoefficientMatrix(0, np.eye(4).tolist())
 RAYS = Problem(PlaneSystem([STILL], [Jump(0.0, -0.1), Jump(math.pi / 2, -0.1)]), WEAK)
+SINKS = CoefficientMatrix(0, [[0.0, 1.0], [-2.0, -3.0]]), CoefficientMatrix(1, np.eye(2).tolist(), itself)
+RESTING = Problem(PlaneSystem(SINKS, [Jump(math.pi / 2, 0.0)]), UNIT)
 FAR = Problem(paper(0.1, 0.5, -1.0, 10.0), OrnsteinUhlenbeck(alpha=1.0, sigma=0.3))
 
 
@@ -161,6 +164,7 @@ def test_negative_moments_of_blocks_are_refused_alone():
     with pytest.raises(NotConverged, match=r"for p < 0 is not computed: .* choose p >= 0, or solve each") as failure:
         moment(PAIRS, [-1.0, -1e-6, 0.5, 2.0])
     assert failure.value.partial.p.tolist() == [0.5, 2.0]
+    assert ExponentSolver(rates(DRIVEN, UNIT, [{"at": "q = 0", "restitution": 0.6}])).by_class([]) == ()  # has no wall
     found = ExponentSolver(PAIRS).by_class([-1.0, 2.0])
     assert [(each.name, each.value.size) for each in found] == [("x, v", 2), ("y, w", 2)]
 
@@ -171,6 +175,7 @@ ABSENT = {
     "critical_restitution(ExponentSolver(walled(TELEGRAPH, 0.9)))": (
         r"almost surely stable for every R in \(0, 1\], as λ without loss is -0.033"
     ),
+    "critical_restitution(ExponentSolver(RESTING))": "as if the motion did not turn",
     "stability_index(FAR)": r"^Λ\(p\) has no root p ≠ 0 in \[-20, 20\]",
     "stability_index(rates(TEXTS['pairs'], White(s=2.0)))": "for p < 0 is not computed",
     "stability_index(kubo(UNIT))": "0",

@@ -4,12 +4,13 @@ import io
 import re
 from functools import partial
 
+import numpy as np
 import pytest
 from rich.console import Console
 
 from fpsolve import ExponentSolver, NotConverged, Problem
 from fpsolve.budget import Meter, begin, charge, timed, watched
-from fpsolve.exponent import Budget, critical_restitution, impact_rate
+from fpsolve.exponent import Budget, critical_restitution, impact_rate, solve_moments
 from fpsolve.exponent.root import nonzero_root
 from fpsolve.workflow import Phase
 from fpsolve.workflow.progress import MOMENTS, SETS, Bars
@@ -58,6 +59,20 @@ def test_budget_ends_a_number_and_never_changes_it(name, processor):
         NotConverged, match=r"take some .* s of processor time together, more than budget\.seconds = .*budget$"
     ):
         NUMBERS[name](ExponentSolver(problem, budget=Budget(seconds=0.1 * spent)))
+
+
+def test_budget_ends_a_curve_and_never_changes_it(processor):
+    """Both ends and the middle of the p are nodes."""
+
+    def solved(seconds):
+        solver = ExponentSolver(Problem(FIG1, FIG1_NOISE), rtol=1e-5, budget=Budget(seconds=seconds))
+        found = solve_moments(solver, np.linspace(-2, 2, 17))
+        return {*found.value, *found.slope, *found.derivative_error}
+
+    processor.tick, begin = 1.0, processor.now
+    whole, spent = solved(1e6), processor.now - begin
+    for share in (0.3, 0.6, 0.9):
+        assert {each for each in solved(share * spent) if not np.isnan(each)} <= whole
 
 
 def test_numbers_of_a_set_have_one_meter_and_its_watch_sees_which_is_solved(processor):

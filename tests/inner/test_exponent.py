@@ -26,7 +26,7 @@ def test_what_finer_waves_change_is_told_to_first_order():
     found = [principal_pair(each.generator, 1.0) for each in (start, finer)]
     change, solution = found[1].value - found[0].value, start.judged(found[0], 1.0)
     assert start.change(found[0]) == pytest.approx(change, rel=0.1)
-    assert abs(solution.pair.value - found[1].value) < min(0.1 * abs(change), solution.search)
+    assert abs(solution.pair.value - found[1].value) < min(0.1 * abs(change), solution.unresolved)
 
 
 def test_what_polynomials_of_the_noise_lack_is_told():

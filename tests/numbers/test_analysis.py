@@ -393,6 +393,7 @@ def test_design_of_one_parameter_has_the_value_of_the_closed_form(problem, targe
     assert found_there == pytest.approx(value, abs=1e-8)
     assert abs(found_there - value) <= 10 * estimate.error_estimate + 1e-8
     assert found.found.value == pytest.approx(found.target.value, abs=1e-9)
+    assert (found.found.scale == 1) == target.startswith("stability_index")  # other numbers have a unit
     assert found.problem.values[key] == estimate.value
     assert found.solves <= (12 if problem is not SQUARE else 60)
 

@@ -134,9 +134,11 @@ def test_moment_at_a_corner_that_is_hardly_round_is_between_chord_and_tangents()
     assert found.error_estimate[0] < 1e-4
 
 
-@pytest.mark.parametrize("interval", [(-2.0, 2.0), (0.0, 4.0), (-1.0, 0.0)])
-def test_functions_have_zero_as_a_node(interval):
-    assert 0.0 in MomentLyapunovFunction(Problem(paper(), WEAK), interval, rtol=1e-6).nodes
+@pytest.mark.parametrize("interval", [(-2.0, 2.0), (0.0, 4.0), (-1.0, 0.0), (-0.002, 4.0), (1e-4, 1.0)])
+def test_functions_have_both_ends_as_nodes_and_zero_if_it_is_not_next_to_one(interval):
+    nodes = MomentLyapunovFunction(Problem(paper(), WEAK), interval, rtol=1e-6).nodes
+    assert (*nodes[[0, -1]],) == interval
+    assert 0.0 in nodes or 0 < abs(interval[0]) < 0.01
 
 
 def test_stability_index_of_a_function_on_one_side_of_zero_lies_on_the_other():

@@ -19,7 +19,8 @@ from fpsolve import (
     stability_index,
 )
 from fpsolve.exponent import INDICES, Budget, Estimate, critical_impact_factor, critical_restitution, impact_rate
-from fpsolve.model import Jump, ParametricOscillator
+from fpsolve.model import Jump, ParametricOscillator, White
+from tests.kit import rates
 from tests.numbers.rows.oscillator import PAPER, UNIT, WEAK, elastic, paper, series, slow
 
 COARSE = make_mesh(phi_cells=1, phi_degree=4, xi_cells=2, xi_degree=5)
@@ -72,6 +73,21 @@ def test_a_budget_ends_a_search_with_the_best_value(budget):
     with pytest.raises(NotConverged) as again:
         solver.solution(2.0)
     assert str(again.value) == str(caught.value)
+
+
+def test_moment_at_a_corner_is_solved_once():
+    """Its error is beyond the tolerance."""
+    solver = ExponentSolver(rates("x' = 0.5*x + xi*v; v' = -0.5*v + xi*x", White(s=0.2)))
+    assert solver.pair(-1.0) is solver.pair(-1.0)
+
+
+def test_slope_of_a_block_has_its_own_error():
+    first = "x' = v; v' = -x - 0.2*v - xi*x"
+    found, alone = (
+        moment_lyapunov(rates(text, HALF), 1.0, rtol=1e-5)
+        for text in (f"{first}; y' = w; w' = -2*y - 0.9*w - 0.9*xi*y + x", first)
+    )
+    assert found.derivative_error == pytest.approx(alone.derivative_error)
 
 
 def test_a_tolerance_out_of_reach_harms_no_other():
