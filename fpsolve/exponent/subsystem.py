@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fpsolve.arrays import ROUNDED, FloatArray
+from fpsolve.model.coordinates import framed
 from fpsolve.model.expressions import TIME
 from fpsolve.model.plane import BELOW, CoefficientMatrix, Jump, System, as_plane, by_noise
 from fpsolve.model.problem import Problem
@@ -129,7 +130,8 @@ def blocks_of(problem: Problem) -> tuple[Subsystem, ...]:
     two variables ‖x‖ on the first of the rays that the phase never leaves, and on the second one, or else the distance
     from the first.
     """
-    system, frame, resting = problem.system, np.array(problem.frame.matrix), problem.resting_phases
+    system, found = problem.system, framed(problem)
+    frame, resting = found.frame.array, found.resting_phases
     matrices, n, stop = [*by_noise(system, system.terms).values()], system.dimension, system.stop
     jumps, rounded, names, groups = tuple[Jump, ...](), 0.0, system.states, list[tuple[int, ...]]()
     if n == 2:
@@ -158,7 +160,7 @@ def blocks_of(problem: Problem) -> tuple[Subsystem, ...]:
             own,
             tuple(names[k] for k in own),
             rounded,
-            problem.rate_bound,
+            found.rate_bound,
             jumps if own == (0, 1) else (),
         )
         for own in (groups if n == 2 or len(groups) > 1 else ())

@@ -45,8 +45,9 @@ from fpsolve.fem.element import EXTRA_POINTS, gauss_legendre
 from fpsolve.fem.line import LineSpace
 from fpsolve.fem.mesh import halved, middles
 from fpsolve.fem.terms import OfMoment, Term, Terms
+from fpsolve.model.coordinates import Framed
 from fpsolve.model.plane import CoefficientMatrix
-from fpsolve.model.problem import ParameterDerivative, Problem
+from fpsolve.model.problem import ParameterDerivative
 
 SLOPE_PENALTY = 0.02
 """Factor γ of the penalty on jumps of slopes."""
@@ -417,9 +418,9 @@ class DirectionAxis(Axis):
         of_theta = np.einsum("xi,xj->xij", of_first, of_second).reshape(len(of_eta), -1)[:, self._own]
         return np.einsum("xi,xj->xij", of_eta, of_theta).reshape(len(of_eta), -1)[:, self._kept]
 
-    def terms(self, problem: Problem, noises: Sequence[Any]) -> DirectionTerms:
+    def terms(self, framed: Framed, noises: Sequence[Any]) -> DirectionTerms:
         """L(p) on these functions times those of each noise."""
-        return DirectionTerms(problem, self, noises)
+        return DirectionTerms(framed, self, noises)
 
 
 def group_dimensions(n: int) -> tuple[int, int]:
@@ -498,8 +499,8 @@ class HalfSphereAxis(DirectionAxis):
     def _speeds(self, c: FloatArray, s: FloatArray) -> FloatArray:
         return c * s**3
 
-    def terms(self, problem: Problem, noises: Sequence[Any]) -> StopTerms:
-        return StopTerms(problem, self, noises)
+    def terms(self, framed: Framed, noises: Sequence[Any]) -> StopTerms:
+        return StopTerms(framed, self, noises)
 
     def struck(self, log_factor: float, p: float, derivative: int = 0) -> Matrix:
         """∂ᵏ/∂pᵏ of ∫ v (ρ^p u(η′, π/2, θ₂) − u) over θ₁ = −π/2."""
@@ -563,7 +564,7 @@ class StopTerms(DirectionTerms):
             yield self._stop(self.phi.changed_impacts, "∂/∂θ", log_factor)
 
     def _stop(self, struck: Callable[[float, float, int], Matrix], text: str, size: float = 1.0) -> Term:
-        stop: Any = self._problem.system.stop
+        stop: Any = self._framed.problem.system.stop
         omega = sum(
             self.system.epsilon**each.order * each.g(0.0) * self.phi.inside(each)[0, 1] for each in self.system.terms
         )

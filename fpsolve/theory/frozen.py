@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fpsolve.arrays import FloatArray, IntArray
-from fpsolve.model.plane import System, affine, matrix_at, squared_frequency
+from fpsolve.model.coordinates import framed
+from fpsolve.model.plane import affine, matrix_at, squared_frequency
 from fpsolve.model.problem import Problem
 
 SAMPLES = 601
@@ -33,7 +34,7 @@ def eigenvalues_at(problem: Problem, xi: ArrayLike) -> tuple[FloatArray, FloatAr
     Where A(ξ) has real eigenvalues they are the rates; where the phase turns, their common real part and the jumps,
     each once in half a turn.
     """
-    a = matrix_at(problem.drift, xi)
+    a = matrix_at(framed(problem).motion, xi)
     half, square = 0.5 * (a[..., 0, 0] + a[..., 1, 1]), squared_frequency(a)
     root, turns = np.sqrt(np.abs(square)), square > 0
     turning = half + root / math.pi * sum(jump.log_factor for jump in problem.system.jumps)
@@ -53,7 +54,7 @@ def steady_places(problem: Problem, p: float) -> tuple[FloatArray, FloatArray]:
     """z at which paths that hold slow Gaussian noise grow the fastest, the best first, and the rates pG − ξ²/2S(0)."""
     noise = problem.valued
     unit, spectrum = noise.standard_deviation, noise.spectral_density(0.0)
-    reach = 2 * abs(p) * _noise_strength(problem.motion) * spectrum
+    reach = 2 * abs(p) * _noise_strength(problem) * spectrum
     xi = reach * np.linspace(-1, 1, 2 * SAMPLES - 1)
     rate = p * eigenvalues_at(problem, xi)[0] - (xi**2 / (2 * spectrum) if spectrum else 0.0)
     at = maxima(rate)
@@ -70,7 +71,7 @@ def swing(problem: Problem, p: float) -> tuple[float, float]:
     noise: Any = problem.valued
     peak = noise.omega * math.sqrt(max(1 - 2 * noise.zeta**2, 0.0))
     spectrum = max(noise.spectral_density(each) for each in (peak, *(noise.omega * FREQUENCIES)))
-    a = 4 * abs(p) * _noise_strength(problem.motion) * spectrum * np.linspace(0, 1, SAMPLES)
+    a = 4 * abs(p) * _noise_strength(problem) * spectrum * np.linspace(0, 1, SAMPLES)
     xi = a[:, None] * np.cos(math.pi * (np.arange(SWING_POINTS) + 0.5) / SWING_POINTS)
     rate = p * np.mean(eigenvalues_at(problem, xi)[0], axis=1) - a**2 / (4 * spectrum)
     best = int(np.argmax(rate))
@@ -138,9 +139,9 @@ class FrozenNoise:
         return -0.5 * float(np.interp(z, self.z, np.gradient(noise.log_density(self._xi), self.z)))
 
 
-def _noise_strength(system: System) -> float:
+def _noise_strength(problem: Problem) -> float:
     """Σ ε^n |b| max|q| over g = a + bξ, b = 1 for other g: d ln a/dt for ξ = 1; for the paper's oscillator ε."""
-    total = 0.0
+    system, total = framed(problem).motion, 0.0
     for term in system.terms:
         slope = abs((affine(term.g) or (0.0, 1.0))[1])
         total += slope * system.epsilon**term.order * float(abs(term.q.mean) + term.q.amplitude)
@@ -151,7 +152,7 @@ def _both_sides(problem: Problem) -> FloatArray:
     """Points z as far out as slow noise carries a moment, denser near 0."""
     noise = problem.valued
     unit = noise.standard_deviation
-    furthest = 5 * LARGEST_P * unit * _noise_strength(problem.motion) * noise.correlation_time
+    furthest = 5 * LARGEST_P * unit * _noise_strength(problem) * noise.correlation_time
     end = min(max(furthest, 1.0), 0.999 * noise.half_width / unit)
     spread = max(np.log(end / 1e-2), 1.0)
     side = end * np.sinh(spread * np.linspace(0, 1, SAMPLES)) / np.sinh(spread)
