@@ -113,15 +113,15 @@ def critical_restitution(solver: ExponentSolver, jump: int | None = None) -> Est
     log, system = _critical_log_factor(solver, jump), solver.problem.system
     if not log:
         return log
+    symbol, value, slope = system.restitution_at(log.value)
     if log.value > 0:
         # λ is affine in ln R, and 0 at ln R_c
         lossless = solver.lyapunov_exponent().value * log.value / (log.value - system.jumps[jump or 0].log_factor)
-        return Absent(Message(Code.ALWAYS_STABLE, symbol=system.impact_symbol, value=lossless))
-    value, slope = system.impact_value(log.value)
+        return Absent(Message(Code.ALWAYS_STABLE, symbol=symbol, value=lossless))
     if math.isnan(value):
         return Absent(Message(Code.NO_RESTITUTION))
     if value <= 0:
-        return Absent(Message(Code.ALWAYS_UNSTABLE, symbol=system.impact_symbol, value=value))
+        return Absent(Message(Code.ALWAYS_UNSTABLE, symbol=symbol, value=value))
     error, scale = slope * log.error_estimate + _EPS, max(1.0, slope * log.scale)
     return checked(Estimate(value, error, scale, quantity=quantity.CRITICAL_RESTITUTION), solver.method.refinement)
 
@@ -219,7 +219,7 @@ def _index(
 
 def _restitution_by_theory(problem: Problem) -> float:
     theory, system = second_order_or_none(problem), problem.system
-    return system.impact_value(theory.critical_log_factor)[0] if theory and len(system.jumps) == 1 else math.nan
+    return system.restitution_at(theory.critical_log_factor)[1] if theory and len(system.jumps) == 1 else math.nan
 
 
 LYAPUNOV_EXPONENT: Index = _index(quantity.LYAPUNOV_EXPONENT, lambda solver, _: solver.lyapunov_exponent())

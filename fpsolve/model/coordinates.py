@@ -47,6 +47,8 @@ BARELY = 0.99
 """Share of the rates at which the search for a frame ends. S changes by powers of two: hardly anything is rounded."""
 MOST_TURNED = 4
 """Largest number of variables of which frames are tried."""
+FOREVER, WHITE = (1.0, 1e100), (1e100, 1e-200)
+"""Standard deviation and correlation time of what is constant, and of white noise of the intensity 1, as limits."""
 MOST_STEPS = 400
 """Largest number of steps of this search: some 60 for each variable and unit of 1e18."""
 OF_PRODUCTS = 1e-14
@@ -201,10 +203,11 @@ def is_free(term: CoefficientMatrix) -> bool:
 def own_frame(problem: Problem, moved: Motion) -> tuple[Frame, float]:
     """The frame in which a motion is small, x itself where that is hardly worse; and its size there, a rate.
 
-    That is ‖A‖ + Σ‖B‖² + Σ r‖C‖ + Σ min(s‖D‖, τs²‖D‖²), A all that no noise drives, B of white noise, C of impulses
-    at the rate r, D of noise with the standard deviation s and the correlation time τ: what the rates of growth and of
-    the phase may be. In a frame in which the order 0 is growth and a uniform rotation the phase is the smoothest, so
-    that this one is taken where there is one and the size hardly larger; else other scales if these suffice.
+    That is Σ min(s‖D‖, τs²‖D‖²), D of noise with the standard deviation s and the correlation time τ: what the rates of
+    growth and of the phase may be. What no noise drives never changes, so that it is ‖A‖; of white noise it is ‖B‖²; of
+    impulses at the rate r it is r‖C‖. In a frame in which the order 0 is growth and a uniform rotation the phase is the
+    smoothest, so that this one is taken where there is one and the size hardly larger; else other scales if these
+    suffice.
 
     Args:
         problem: the system and its noise.
@@ -212,21 +215,20 @@ def own_frame(problem: Problem, moved: Motion) -> tuple[Frame, float]:
     """
     (drift, diffusions, impulses), epsilon, n = moved, moved.drift.epsilon, problem.dimension
     sums = by_noise(drift, drift.terms)
-    parts = [(sums.pop(STEADY), 1.0, 0.0, 0.0, 0.0)]
-    parts += [(epsilon**each.order * np.array(each.matrix), 0.0, 1.0, 0.0, 0.0) for each in diffusions]
-    parts += [(np.array(each.exponent), each.rate, 0.0, 0.0, 0.0) for each in impulses]
+    parts = [(sums.pop(STEADY), *FOREVER)]
+    parts += [(epsilon**each.order * np.array(each.matrix), *WHITE) for each in diffusions]
+    parts += [(each.rate * np.array(each.exponent), *FOREVER) for each in impulses]
     for (name, _), each in sums.items():
         noise = problem.named_noise(name)
         if each.any():
-            parts.append((each, 0.0, 0.0, noise.standard_deviation, noise.correlation_time))
-    matrices = np.array([each for each, *_ in parts])
-    linear, square, deviations, times = np.array([numbers for _, *numbers in parts]).T
+            parts.append((each, noise.standard_deviation, noise.correlation_time))
+    matrices, deviations, times = (np.array(each) for each in zip(*parts, strict=True))
 
     def size(frame: FloatArray) -> float:
         turned = np.linalg.inv(frame) @ matrices @ frame
         norms = np.sqrt(np.einsum("kij,kij->k", turned, turned))
         strengths = deviations * norms
-        return float(linear @ norms + square @ norms**2 + strengths @ np.minimum(1.0, strengths * times))
+        return float(strengths @ np.minimum(1.0, strengths * times))
 
     own = best = np.eye(n)
     least, choice = size(own), [own]

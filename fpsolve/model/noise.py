@@ -281,7 +281,16 @@ class Noise(Parametrised):
         return type(self).step is not Noise.step
 
     def motion(self, system: System, name: str | None = None) -> Motion:
-        """How this noise moves a system whose terms call it so, with None whatever; by default along a path of ξ."""
+        """How this noise moves a system whose terms call it so, with None whatever; by default along a path of ξ.
+
+        Raises:
+            ValueError: it has algebraic tails, and there are more than two variables.
+        """
+        if self.has_algebraic_tails and system.dimension > 2:
+            raise ValueError(
+                f"got {self.kind} noise for {system.dimension} variables; noise with algebraic tails is for two "
+                "variables only: take another kind, or r0 <= 1"
+            )
         return Motion(system)
 
     def driving(self, system: System) -> Noise:

@@ -600,18 +600,13 @@ class System(Parametrised):
     def noise_sections(self) -> Sequence[str]:
         return ("noise",)
 
-    @property
-    def impact_symbol(self) -> str:
-        """The symbol of its coefficient of restitution in sentences."""
-        return "R"
+    def restitution_at(self, log_factor: float) -> tuple[str, float, float]:
+        """The symbol of the coefficient of restitution, its value at a wall with a given ln R, and ∂/∂ ln R of it.
 
-    def impact_value(self, log_factor: float) -> tuple[float, float]:
-        """The coefficient of restitution of a wall with a given ln R, by its law, and its derivative by ln R.
-
-        It may be out of range. Here it is R.
+        The value is by the law of the wall, and may be out of range. Here it is R.
         """
         with np.errstate(over="ignore"):
-            return (factor := float(np.exp(log_factor))), factor
+            return "R", (factor := float(np.exp(log_factor))), factor
 
 
 @dataclass(frozen=True)

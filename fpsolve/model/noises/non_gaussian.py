@@ -19,7 +19,6 @@ from fpsolve.model.noise import Noise, NoiseDerivative
 from fpsolve.model.noises.ornstein_uhlenbeck import GaussianNoise, Intensity, Memory
 from fpsolve.model.noises.steps import ImplicitStep, LinearStep, linear_step
 from fpsolve.model.parameters import Table, parameter, stated_field
-from fpsolve.model.plane import Motion, System
 
 Departure = Annotated[
     float,
@@ -179,15 +178,6 @@ class NonGaussianNoise(TreatedNoise):
     @property
     def tails_beyond(self) -> tuple[str, float, str] | None:
         return ("r0", 1.0, 'use treatment = "ou-reduction"') if self.has_algebraic_tails else None
-
-    def motion(self, system: System, name: str | None = None) -> Motion:
-        """As of any noise. Raises `ValueError`: it has algebraic tails, and there are more than two variables."""
-        if self.has_algebraic_tails and system.dimension > 2:
-            raise ValueError(
-                f"got {self.kind} noise for {system.dimension} variables; noise with algebraic tails is for two "
-                "variables only: take another kind, or r0 <= 1"
-            )
-        return super().motion(system)
 
     def spectral_density(self, omega: float) -> float:
         """S(ω) of the reduced noise, Eq. (16); that of Eq. (7) itself has no closed form."""
