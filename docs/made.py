@@ -89,7 +89,7 @@ def script(path: Path) -> str:
     """The script that draws the figure of a case."""
     case, text = fpsolve.load_case(path), path.read_text(encoding="utf-8")
     words = re.match(r"(?:#:.*\n)?((?:#.*\n)*)", text).group(1).replace("# ", "").replace("#", "")
-    own = not case.method.has_pairs or case.problem.has_algebraic_tails  # there are no other p
+    own = not case.method.has_pairs or case.problem.noise.has_algebraic_tails  # there are no other p
     few = case.figure.x == "p" and case.moments.values.size < 8 and not own
     sets = [] if own else ["output={ quantities = ['moment', 'lyapunov_exponent', 'stability_index'] }"]
     if few:

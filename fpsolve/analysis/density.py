@@ -194,14 +194,15 @@ def furstenberg_khasminskii(pair: PrincipalPair) -> float:
         raise ValueError("the formula is for two variables, but there are more; use lyapunov_exponent")
     if len(problem.valued.parts) > 1:
         raise ValueError("the formula is for one noise that is not white, but there are several; use lyapunov_exponent")
-    system, phi, at = problem.motion, axis.points[:, None], _of_zero(pair).space.xi.samples()
+    framed = pair.generator.framed
+    system, phi, at = framed.motion, axis.points[:, None], _of_zero(pair).space.xi.samples()
     rate = growth_rate(system, at.xi)(phi)
-    for each in problem.diffusions:  # ½ h q′, by which q ∘ dW has a mean
+    for each in framed.diffusions:  # ½ h q′, by which q ∘ dW has a mean
         rate = rate + 0.5 * system.epsilon ** (2 * each.order) * each.h(phi) * each.q.slope(phi)
-    for struck in problem.impulses:
+    for struck in framed.impulses:
         rate = rate + struck.rate * np.log(struck.stretched(phi)[0])
     growth = float(axis.weights @ (rate * evaluated(pair, axis.values, at).T_adjoint) @ at.measure)
-    for jump, speed in zip(system.jumps, problem.wall_speeds(system), strict=True):
+    for jump, speed in zip(system.jumps, framed.wall_speeds(system), strict=True):
         met = (axis.left_trace if speed > 0 else axis.right_trace)[vertices_at(axis.lines, jump.phase)]
         growth += abs(speed) * jump.log_factor * float(np.sum(evaluated(pair, met, at).T_adjoint @ at.measure))
     return pair.space.turns * growth

@@ -32,6 +32,7 @@ from fpsolve.exponent.method import (
 )
 from fpsolve.exponent.subsystem import blocks_of, couples
 from fpsolve.messages import Code, Message
+from fpsolve.model.coordinates import framed
 from fpsolve.model.problem import ParameterDerivative, Problem
 
 
@@ -78,7 +79,7 @@ class Blocks(Method):
 
     @property
     def _rays(self) -> tuple[float, ...]:
-        return self.problem.invariant_rays
+        return framed(self.problem).invariant_rays
 
     @property
     def ray(self) -> float | None:  # type: ignore[override]

@@ -37,7 +37,7 @@ class Changed:
         x, y, turns = pair.right, pair.left, pair.space.turns
         parts = turns * np.array([y @ (KroneckerSum([term]) @ x) for term in self._operator(0).terms])
         sizes, scale = turns * float(abs(y) @ (abs(self._operator(0)) @ abs(x))), float(np.sum(np.abs(parts)))
-        of_pair = (pair.residual + _EPS) * self._around.size / pair.generator.problem.unit_rate
+        of_pair = (pair.residual + _EPS) * self._around.size / pair.generator.framed.unit_rate
         return Estimate(float(np.sum(parts)), _EPS * sizes + of_pair * scale, scale)
 
     @cached_property

@@ -11,7 +11,7 @@ from fpsolve.budget import unless_over_budget
 from fpsolve.exponent.method import RTOL_BEYOND_PLANE, Method, Tolerance
 from fpsolve.exponent.moments import EvenMoment, constant_scale, even_moment
 from fpsolve.messages import Code, Message, Remedy
-from fpsolve.model.problem import infinite
+from fpsolve.model.coordinates import infinite
 from fpsolve.model.quantity import moment_at
 from fpsolve.theory.perturbation import Scale
 

@@ -28,7 +28,7 @@ from fpsolve.arrays import FloatArray, IntArray, dense, finite
 from fpsolve.errors import NoHierarchy
 from fpsolve.exponent.powers import Moving, PowerRates, moment_form
 from fpsolve.exponent.rightmost import REMEDY, ROUNDING, Eigenpair
-from fpsolve.model.plane import common_delay
+from fpsolve.model.plane import common_unit
 
 MOST_SIZE = 4000
 """Largest number of values of moments at all times of a polynomial."""
@@ -93,7 +93,7 @@ class DelayRates:
             NoHierarchy: the delays are no multiples of one.
         """
         try:
-            unit, count = common_delay(pasts)
+            unit, count = common_unit([delay for _, delay in pasts], "delays")
         except ValueError as failure:
             raise NoHierarchy(str(failure)) from failure
         drift, squares = moving.of_squares()

@@ -37,7 +37,7 @@ from fpsolve.drawing import QUARTERS, draw_colours, label_axes
 from fpsolve.errors import MeshError, OutputError, SingularMatrix
 from fpsolve.exponent.eigen import PrincipalPair, principal_pair
 from fpsolve.exponent.kinds import choose
-from fpsolve.exponent.modes import framed
+from fpsolve.exponent.modes import inside_frame
 from fpsolve.exponent.stopped import looked_at
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.noise_axes import Samples
@@ -110,7 +110,7 @@ class Grid:
         """The points of the rule of a pair, on the full circle. Raises `OutputError`."""
         refuse_more(pair)
         problem, axis, at = pair.generator.problem, pair.space.phi, pair.space.xi.samples()
-        frame, noise = problem.frame, problem.noise_quantity
+        frame, noise = pair.generator.framed.frame, problem.noise_quantity
         phi = frame.own_phase(np.concatenate([axis.points + k * axis.span for k in range(axis.turns)]))
         weights, phi = np.tile(axis.weights, axis.turns) / frame.density(phi), np.mod(phi, 2 * np.pi)
         order = np.argsort(phi)
@@ -239,7 +239,7 @@ def plane_fields(pair: PrincipalPair, phi: FloatArray, inside: FloatArray, at: S
 
 def phase_functions(pair: PrincipalPair, phi: FloatArray, inside: FloatArray) -> tuple[Matrix, FloatArray, FloatArray]:
     """The functions of the phase at φ, seen from the cells that hold `inside`; ρ, and dψ/dφ, see `frame`."""
-    axis, frame = pair.space.phi, pair.generator.problem.frame
+    axis, frame = pair.space.phi, pair.generator.framed.frame
     psi, cells = frame.phase(phi), frame.phase(inside)
     turned = axis.span * np.floor((cells - axis.lines[0]) / axis.span)
     return axis.at(psi - turned, cells - turned), frame.length(phi), frame.density(phi)
@@ -247,7 +247,7 @@ def phase_functions(pair: PrincipalPair, phi: FloatArray, inside: FloatArray) ->
 
 def mean_functions(pair: PrincipalPair) -> FloatArray:
     """The means of ρ^p times the functions of the phase over φ, shape (size,)."""
-    axis, frame = pair.space.phi, pair.generator.problem.frame
+    axis, frame = pair.space.phi, pair.generator.framed.frame
     psi, weights = axis.finer_rule(frame.parts)
     phi, stretch = own_phases(pair, psi)
     return np.asarray(weights / frame.density(phi) * stretch @ axis.at(psi) / axis.span)
@@ -255,7 +255,7 @@ def mean_functions(pair: PrincipalPair) -> FloatArray:
 
 def own_phases(pair: PrincipalPair, psi: FloatArray) -> tuple[FloatArray, FloatArray]:
     """φ at ψ, and ρ^p."""
-    frame = pair.generator.problem.frame
+    frame = pair.generator.framed.frame
     phi = frame.own_phase(psi)
     return phi, frame.length(phi) ** pair.p
 
@@ -395,9 +395,8 @@ def direction_map(pair: PrincipalPair) -> FloatArray:
     for q, size in oscillators(problem).items():
         scales[q + 1] = size
     at, _ = looked_at(problem)
-    return (
-        np.linalg.solve(pair.space.phi.coordinates, framed(problem, np.linalg.inv(np.array(at.coordinates)))) * scales
-    )
+    inside = inside_frame(problem, np.linalg.inv(np.array(at.coordinates)))
+    return np.linalg.solve(pair.space.phi.coordinates, inside) * scales
 
 
 def xi_marginal(pair: PrincipalPair, at: Samples) -> FloatArray:

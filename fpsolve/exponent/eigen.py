@@ -169,7 +169,7 @@ def _is_principal(pair: PrincipalPair, pairs: Sequence[PrincipalPair], goes_on: 
     if pair.residual > BACKWARD_ERROR_LIMIT or pair.value < tangent or min(pair.sign_defects) > most:
         return False
     if pair.p == 0:
-        return abs(pair.value) <= BESIDE_IT[0] * generator.problem.unit_rate
+        return abs(pair.value) <= BESIDE_IT[0] * generator.framed.unit_rate
     if not goes_on and math.isinf(tangent) and _has_other_positive(generator, pair.p):
         return False
     return not generator.may_hold or _is_rightmost(pair)
@@ -178,7 +178,7 @@ def _is_principal(pair: PrincipalPair, pairs: Sequence[PrincipalPair], goes_on: 
 def _rightmost_pair(pencil: Pencil, generator: Generator, reached: PrincipalPair | None) -> PrincipalPair:
     """The pair that is found from the right, of which no eigenvalue lies further to the right, nor that of a pair that
     was reached before. Raises `NotConverged`."""
-    p, problem = pencil.p, generator.problem
+    p, unit = pencil.p, generator.framed.unit_rate
     right, left, value, distance = _from_the_right(pencil, generator)
     pair = _reached(generator, pencil, right, left)
     defect = min(pair.sign_defects)
@@ -192,7 +192,7 @@ def _rightmost_pair(pencil: Pencil, generator: Generator, reached: PrincipalPair
     if generator.may_hold and generator.size <= FEW_UNKNOWNS:  # of a chain
         others.append(float(spectrum(generator, p, 1)[0].real))
     rightmost = max(others, default=-math.inf)
-    if rightmost - pair.value > 1e-6 * max(abs(rightmost), problem.unit_rate):
+    if rightmost - pair.value > 1e-6 * max(abs(rightmost), unit):
         told = Message(Code.LARGER_EIGENVALUE, p=p, rightmost=rightmost, value=pair.value)
         raise NotConverged(told, pair, Remedy.PHASE)
     return pair
@@ -214,7 +214,7 @@ def _is_rightmost(pair: PrincipalPair) -> bool:
             return True
     pencil, source = pair.generator.at(pair.p), space.weighed(space.constant)
     seen = [side for side in (0, 1) if not space.phi.is_followed or pair.sign_defects[side] <= POSITIVE]
-    near, far = (pair.eigenvalue + shift * problem.unit_rate for shift in BESIDE_IT)
+    near, far = (pair.eigenvalue + shift * pair.generator.framed.unit_rate for shift in BESIDE_IT)
     factor: Any = pencil.factorised(near)
 
     def solutions(side: int) -> list[FloatArray]:
@@ -255,7 +255,7 @@ def _has_other_positive(generator: Generator, p: float) -> bool:
     if (frozen := frozen_noise(problem)) is None:
         values = [each.reached for each in problem.valued.parts.values()]
         every = [each[:: max(each.size // 100, 1)] for each in values]  # a state of a chain, and any other tenth value
-        speed = phase_speed(problem.motion, problem.at_values(every))
+        speed = phase_speed(generator.framed.motion, problem.valued.combined(every))
         return bool(np.any(np.abs(speed.mean) <= speed.amplitude))
     lines = generator.chosen.xi.lines
     return frozen.rests(p, lines[0], lines[-1]) if lines.size else frozen.rests(p)
@@ -308,7 +308,7 @@ def _from_the_right(pencil: Pencil, generator: Generator) -> tuple[FloatArray, F
     """
     space, value = pencil.space, math.inf
     right = left = space.constant
-    shift = pencil.numerical_abscissa + 0.1 * generator.problem.unit_rate
+    shift = pencil.numerical_abscissa + 0.1 * generator.framed.unit_rate
     for step in range(MAX_SHIFTS):
         if step:
             shift = value + NEARER * (shift - value)
@@ -406,7 +406,7 @@ def _reached(generator: Generator, pencil: Pencil, x: FloatArray, y: FloatArray)
 
     Λ is taken from the formula that rounding harms less.
     """
-    found = rayleigh_iteration(pencil, x, y, generator.problem.unit_rate)
+    found = rayleigh_iteration(pencil, x, y, generator.framed.unit_rate)
     p, space, operator = pencil.p, pencil.space, pencil.matrix
     images = operator @ found.x, operator.T @ found.y
     value = float(found.y @ images[0] / (found.y @ found.mx))  # without what elimination rounds off
@@ -425,7 +425,7 @@ def _reached(generator: Generator, pencil: Pencil, x: FloatArray, y: FloatArray)
             value, rounding = float((constant @ (forcing @ x) + of_noise @ x) / total), bound
     if p == 0:  # where Λ = 0
         rounding = max(rounding, abs(value))
-    for each in generator.problem.diffusions:  # of growth ½p²q² − ½pq², which cancels beside p = 1
+    for each in generator.framed.diffusions:  # of growth ½p²q² − ½pq², which cancels beside p = 1
         rounding += _EPS * (abs(p) + p * p) * (generator.problem.system.epsilon**each.order * each.fastest[1]) ** 2
     return PrincipalPair(
         p=p,
@@ -496,7 +496,7 @@ class PairDerivatives:
 
     @cached_property
     def _factor(self) -> Factors:
-        return self._pencil.factorised(self.pair.eigenvalue + BESIDE_IT[0] * self.pair.generator.problem.unit_rate)
+        return self._pencil.factorised(self.pair.eigenvalue + BESIDE_IT[0] * self.pair.generator.framed.unit_rate)
 
     def solve(self, source: FloatArray, *, adjoint: bool = False) -> FloatArray:
         """v from the load f; each refinement leaves 1e-6 of a rate over the gap of the spectrum."""

@@ -46,7 +46,7 @@ from fpsolve.fem.axis import FEW_UNKNOWNS
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.space import Space
 from fpsolve.messages import Code, Message, Remedy
-from fpsolve.model.problem import infinite
+from fpsolve.model.coordinates import infinite
 from fpsolve.theory.frozen import frozen_noise
 
 MOST_TILT_AWAY = 0.7

@@ -33,13 +33,14 @@ def choose(problem: Problem, settings: Settings | None = None) -> Method:
 def kind_of(problem: Problem) -> type[Method]:
     """The method of a problem, if it is none of one's own."""
     is_in_plane, stop = problem.dimension <= 2, problem.system.stop
-    if stop and (problem.dimension != MOST_BY_DIRECTIONS or problem.impulses):
+    impulses = problem.noise.motion(problem.system).impulses
+    if stop and (problem.dimension != MOST_BY_DIRECTIONS or impulses):
         return Simulated
     if problem.system.pasts:
         return DelayMoments
     if problem.dimension > MOST_BY_DIRECTIONS:
         return EvenMoments
-    if not is_in_plane and problem.impulses:
+    if not is_in_plane and impulses:
         return StruckMoments
     if blocks_of(problem):
         return Blocks

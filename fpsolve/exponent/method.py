@@ -24,9 +24,10 @@ from fpsolve.fem.factors import one_thread
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.fem.space import Space
 from fpsolve.messages import ALMOST_EVERY, Code, Message, Remedy
+from fpsolve.model.coordinates import infinite
 from fpsolve.model.faults import strict_dataclass
 from fpsolve.model.parameters import parameter
-from fpsolve.model.problem import ParameterDerivative, Problem, infinite
+from fpsolve.model.problem import ParameterDerivative, Problem
 from fpsolve.model.quantity import LYAPUNOV_EXPONENT, VARIANCE_RATE
 from fpsolve.theory.perturbation import Scale, scale_of
 

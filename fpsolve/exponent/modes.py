@@ -35,6 +35,7 @@ from fpsolve.fem.factors import factorised
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.space import Space, first_axis
 from fpsolve.messages import Remedy
+from fpsolve.model.coordinates import framed
 from fpsolve.model.problem import Problem
 
 FIRST_WAVES = 2
@@ -81,9 +82,9 @@ def second_moments(problem: Problem, own: FloatArray) -> tuple[FloatArray, Float
     return q, moments
 
 
-def framed(problem: Problem, own: FloatArray) -> FloatArray:
+def inside_frame(problem: Problem, own: FloatArray) -> FloatArray:
     """Coordinates of x as those of y, in which a problem is solved."""
-    return np.linalg.solve(np.array(problem.frame.matrix), own)
+    return np.asarray(np.linalg.solve(framed(problem).frame.array, own))
 
 
 def modal_coordinates(problem: Problem) -> tuple[FloatArray, float]:
@@ -93,11 +94,11 @@ def modal_coordinates(problem: Problem) -> tuple[FloatArray, float]:
     for rotations, whatever the coordinates x are. T is about (yᵀQy)^½p, and T* a power of yᵀ(E yyᵀ)⁻¹y, so that the
     layer lies at ½ ln(q₁/q₂), q being the mean of Q on each of the two groups of y.
     """
-    free = mean_matrix(problem, problem.motion)
+    free = mean_matrix(problem, framed(problem).motion)
     rates, own = scipy.linalg.cdf2rdf(*np.linalg.eig(free))
     if np.linalg.cond(own) > WORST_CONDITION:
         rates, (_, own) = np.eye(len(free)), scipy.linalg.matrix_balance(free, permute=False)
-    q, moments = second_moments(problem, np.array(problem.frame.matrix) @ own)
+    q, moments = second_moments(problem, framed(problem).frame.array @ own)
     modes = (rates != 0) | np.eye(len(free), dtype=bool)
     units = (modes @ np.diagonal(moments) / (modes @ np.diagonal(q))) ** 0.25
     sizes, axes = np.linalg.eigh(units[:, None] * q * units)
@@ -165,7 +166,7 @@ class DirectionStart(Start):
         steps = max(math.ceil(abs(p - pair.p) / LARGEST_STEP), 1)
         for point in np.linspace(pair.p, p, steps + 1)[1:].tolist():
             pair = principal_pair(generator, point, start=pair)
-        rounding = 2 * self.problem.dimension * sys.float_info.epsilon * abs(p) * self.problem.unit_rate
+        rounding = 2 * self.problem.dimension * sys.float_info.epsilon * abs(p) * framed(self.problem).unit_rate
         return replace(pair, rounding=pair.rounding + rounding)  # an entry of S⁻¹AS is a sum of products twice
 
     def changes_by(self, pair: PrincipalPair, k: int, finer: Any) -> FloatArray:

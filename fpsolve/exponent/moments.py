@@ -40,6 +40,7 @@ from fpsolve.exponent.powers import Moving, PowerRates, exponents, moment_form, 
 from fpsolve.exponent.rightmost import REMEDY, ROUNDING
 from fpsolve.fem.space import BASES
 from fpsolve.messages import Remedy
+from fpsolve.model.coordinates import framed
 from fpsolve.model.noise import Noise
 from fpsolve.model.plane import System
 from fpsolve.model.problem import Problem
@@ -174,10 +175,10 @@ def mean_matrix(problem: Problem, motion: System) -> FloatArray:
 def constant_scale(problem: Problem) -> Scale:
     """The scale of Λ(p) where even p alone are computed: constant terms, with the mean of the noise."""
     now = problem.dimension - len(problem.system.pasts)
-    mean = mean_matrix(problem, problem.motion)[:now, :now]
+    mean = mean_matrix(problem, problem.noise.motion(problem.system).drift)[:now, :now]
     abscissa = abs(float(np.max(np.linalg.eigvals(mean).real)))
     is_moved = abscissa > ROUNDED * float(np.linalg.norm(mean))
-    return Scale(abscissa if is_moved else problem.unit_rate, 0.0)
+    return Scale(abscissa if is_moved else framed(problem).unit_rate, 0.0)
 
 
 def refuse_open_hierarchy(problem: Problem, p: float) -> None:

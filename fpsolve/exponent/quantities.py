@@ -39,6 +39,7 @@ from fpsolve.exponent.solver import ExponentSolver, solver_of
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import Code, Message
 from fpsolve.model import quantity
+from fpsolve.model.coordinates import framed
 from fpsolve.model.problem import ParameterDerivative, Problem
 from fpsolve.model.quantity import MOMENT as MOMENT
 from fpsolve.model.quantity import Quantity as Quantity
@@ -71,11 +72,11 @@ def impact_rate(solver: ExponentSolver, jump: int | None = None) -> Estimate | A
     number = 0 if jump is None else jump
     if not is_whole(number, 0, count - 1):
         raise ValueError(f"got jump = {shown(jump)}; must be a whole number from 0 to {count - 1}, or None")
-    if solver.problem.invariant_rays:  # the phase never passes one, and so no jump twice
+    if framed(solver.problem).invariant_rays:  # the phase never passes one, and so no jump twice
         return Estimate(0.0, 0.0, 0.0, quantity=quantity.IMPACT_RATE)
     value, better = (_flux(each.pair, number) for each in (solver.method.around_zero, solver.method.finer_around_zero))
     generator = solver.method.finer_around_zero.pair.generator
-    usual = generator.problem.unit_rate / math.pi
+    usual = generator.framed.unit_rate / math.pi
     rounding, lost = 10 * _EPS * max(usual, better), _EPS * generator.rounding_growth * usual
     error = abs(better - value) + (rounding if better > lost else lost)
     return checked(Estimate(better, error, usual, quantity=quantity.IMPACT_RATE), solver.method.refinement)
@@ -115,15 +116,15 @@ def critical_restitution(solver: ExponentSolver, jump: int | None = None) -> Est
     log, system = _critical_log_factor(solver, jump), solver.problem.system
     if not log:
         return log
+    symbol, value, slope = system.restitution_at(log.value)
     if log.value > 0:
         # λ is affine in ln R, and 0 at ln R_c
         lossless = solver.lyapunov_exponent().value * log.value / (log.value - system.jumps[jump or 0].log_factor)
-        return Absent(Message(Code.ALWAYS_STABLE, symbol=system.impact_symbol, value=lossless))
-    value, slope = system.impact_value(log.value)
+        return Absent(Message(Code.ALWAYS_STABLE, symbol=symbol, value=lossless))
     if math.isnan(value):
         return Absent(Message(Code.NO_RESTITUTION))
     if value <= 0:
-        return Absent(Message(Code.ALWAYS_UNSTABLE, symbol=system.impact_symbol, value=value))
+        return Absent(Message(Code.ALWAYS_UNSTABLE, symbol=symbol, value=value))
     error, scale = slope * log.error_estimate + _EPS, max(1.0, slope * log.scale)
     return checked(Estimate(value, error, scale, quantity=quantity.CRITICAL_RESTITUTION), solver.method.refinement)
 
@@ -221,7 +222,7 @@ def _index(
 
 def _restitution_by_theory(problem: Problem) -> float:
     theory, system = second_order_or_none(problem), problem.system
-    return system.impact_value(theory.critical_log_factor)[0] if theory and len(system.jumps) == 1 else math.nan
+    return system.restitution_at(theory.critical_log_factor)[1] if theory and len(system.jumps) == 1 else math.nan
 
 
 LYAPUNOV_EXPONENT: Index = _index(quantity.LYAPUNOV_EXPONENT, lambda solver, _: solver.lyapunov_exponent())

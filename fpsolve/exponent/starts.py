@@ -21,6 +21,7 @@ from fpsolve.fem.generator import Generator
 from fpsolve.fem.noise_axes import CellAxis, NoiseAxis, PolynomialAxis
 from fpsolve.fem.phase import PhaseAxis
 from fpsolve.fem.space import Space, first_axis
+from fpsolve.model.coordinates import framed
 from fpsolve.model.plane import System, Xi, phase_speed
 from fpsolve.model.problem import Problem
 from fpsolve.theory.frozen import frozen_noise, steady_places, swing
@@ -108,9 +109,9 @@ def first(problem: Problem, p: float, rtol: float, center: float | None = None) 
         axis, xi = of_kind(problem, p, digits, center)
         axes = [axis]
     else:
-        axes, xi = [first_axis(each, digits) for each in noise.parts.values()], problem.extremes
+        axes, xi = [first_axis(each, digits) for each in noise.parts.values()], problem.valued.extremes
     is_smooth = sum(axis.dimension for axis in axes) > 1
-    return Space((_phase(problem.motion, xi, digits, is_smooth), *axes))
+    return Space((_phase(framed(problem).motion, xi, digits, is_smooth), *axes))
 
 
 def _of_tails(problem: Problem, p: float, digits: float, center: float | None) -> tuple[NoiseAxis, Xi]:
@@ -127,7 +128,7 @@ def _of_filter(problem: Problem, p: float, digits: float, center: float | None) 
     noise = problem.valued
     center = float(steady_places(problem, p)[0][0]) if center is None else center
     pull = noise.standard_deviation**2 * center / noise.spectral_density(0.0) if center else 0.0
-    return replace(first_axis(noise, digits), slope=pull / p), problem.extremes  # type: ignore[call-arg]
+    return replace(first_axis(noise, digits), slope=pull / p), problem.valued.extremes  # type: ignore[call-arg]
 
 
 def _of_diffusion(problem: Problem, p: float, digits: float, center: float | None) -> tuple[NoiseAxis, Xi]:
@@ -219,5 +220,5 @@ def has_cones(problem: Problem) -> bool:
     if not noise.is_bounded or len(noise.parts) > 1 or noise.is_white:
         return False
     phi = np.linspace(0, math.pi, ROUND, endpoint=False)
-    turns = phase_speed(problem.motion, noise.reached)(phi[:, None])
+    turns = phase_speed(framed(problem).motion, noise.reached)(phi[:, None])
     return bool(np.any(np.all(turns > 0, axis=1)) and np.any(np.all(turns < 0, axis=1)))

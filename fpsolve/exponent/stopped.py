@@ -27,7 +27,7 @@ import scipy.linalg
 from fpsolve.arrays import FloatArray
 from fpsolve.exponent.eigen import PrincipalPair, slope_rounding
 from fpsolve.exponent.error import Solution
-from fpsolve.exponent.modes import Directions, DirectionStart, framed, second_moments
+from fpsolve.exponent.modes import Directions, DirectionStart, inside_frame, second_moments
 from fpsolve.exponent.moments import mean_matrix
 from fpsolve.exponent.starts import SHARE
 from fpsolve.fem.directions import HalfSphereAxis
@@ -99,7 +99,7 @@ class StopStart(DirectionStart):
         forms = second_moments(replace(problem, system=smooth), own)
         q, moments = (np.diagonal(each).reshape(2, 2).sum(axis=1) for each in forms)
         return HalfSphereAxis(
-            framed(problem, own * np.repeat((moments / q) ** 0.25, 2)),
+            inside_frame(problem, own * np.repeat((moments / q) ** 0.25, 2)),
             0.5 * math.pi * np.array(AT_STOP),
             FIRST_DEGREE,
             FIRST_WAVES,

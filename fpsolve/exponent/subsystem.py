@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fpsolve.arrays import ROUNDED, FloatArray
+from fpsolve.model.coordinates import framed
 from fpsolve.model.expressions import TIME
 from fpsolve.model.plane import BELOW, CoefficientMatrix, Jump, System, as_plane, by_noise
 from fpsolve.model.problem import Problem
@@ -129,7 +130,8 @@ def blocks_of(problem: Problem) -> tuple[Subsystem, ...]:
     two variables ‖x‖ on the first of the rays that the phase never leaves, and on the second one, or else the distance
     from the first.
     """
-    system, frame, resting = problem.system, np.array(problem.frame.matrix), problem.resting_phases
+    system, motion = problem.system, framed(problem)
+    frame, resting = motion.frame.array, motion.resting_phases
     matrices, n, stop = [*by_noise(system, system.terms).values()], system.dimension, system.stop
     jumps, rounded, names, groups = tuple[Jump, ...](), 0.0, system.states, list[tuple[int, ...]]()
     if n == 2:
@@ -143,8 +145,8 @@ def blocks_of(problem: Problem) -> tuple[Subsystem, ...]:
         basis, rounded, names = np.linalg.inv(np.array(stop.coordinates)), ROUNDED, stop.names(names)
         pattern = np.sum([abs(stop.inside(each)) for each in matrices], axis=0)
         pattern[1, 0] += 1.0
-        found = components(pattern)
-        groups = found if (0, 1) in found else []
+        together = components(pattern)
+        groups = together if (0, 1) in together else []
         jumps = (Jump(math.pi / 2, math.log(stop.restitution)),)
     else:
         basis, groups = np.eye(n), components(np.sum(np.abs(matrices), axis=0))
@@ -159,7 +161,7 @@ def blocks_of(problem: Problem) -> tuple[Subsystem, ...]:
             own,
             tuple(names[k] for k in own),
             rounded,
-            problem.rate_bound,
+            motion.rate_bound,
             jumps if own == (0, 1) else (),
         )
         for own in (groups if n == 2 or len(groups) > 1 else ())

@@ -48,8 +48,9 @@ from fpsolve.fem.element import EXTRA_POINTS, gauss_legendre
 from fpsolve.fem.line import LineSpace
 from fpsolve.fem.mesh import halved, middles
 from fpsolve.fem.terms import OfMoment, Term, Terms
+from fpsolve.model.coordinates import Framed
 from fpsolve.model.plane import CoefficientMatrix
-from fpsolve.model.problem import ParameterDerivative, Problem
+from fpsolve.model.problem import ParameterDerivative
 
 SLOPE_PENALTY = 0.02
 """Factor γ of the penalty on jumps of slopes."""
@@ -400,7 +401,7 @@ class DirectionAxis(Axis):
     def inner_measure(self) -> FloatArray:
         """What each of these points stands for, but for a factor; those of the angles are evenly spread."""
         of_theta = np.ones(math.prod(each.points[0, ::2].size for each in self.angles))
-        return np.kron(self.line.measure[self._inner], of_theta)
+        return np.asarray(np.kron(self.line.measure[self._inner], of_theta))
 
     def projection(self, other: DirectionAxis) -> LinearOperator:
         mixed = self.line.values.T @ diags(self.line.measure) @ other.line.at(self.line.points)
@@ -431,9 +432,9 @@ class DirectionAxis(Axis):
         of_theta = np.einsum("xi,xj->xij", of_first, of_second).reshape(len(of_eta), -1)[:, self._own]
         return np.einsum("xi,xj->xij", of_eta, of_theta).reshape(len(of_eta), -1)[:, self._kept]
 
-    def terms(self, problem: Problem, noises: Sequence[Any]) -> DirectionTerms:
+    def terms(self, framed: Framed, noises: Sequence[Any]) -> DirectionTerms:
         """L(p) on these functions times those of each noise."""
-        return DirectionTerms(problem, self, noises)
+        return DirectionTerms(framed, self, noises)
 
 
 def group_dimensions(n: int) -> tuple[int, int]:
@@ -512,8 +513,8 @@ class HalfSphereAxis(DirectionAxis):
     def _speeds(self, c: FloatArray, s: FloatArray) -> FloatArray:
         return c * s**3
 
-    def terms(self, problem: Problem, noises: Sequence[Any]) -> StopTerms:
-        return StopTerms(problem, self, noises)
+    def terms(self, framed: Framed, noises: Sequence[Any]) -> StopTerms:
+        return StopTerms(framed, self, noises)
 
     def struck(self, log_factor: float, p: float, derivative: int = 0) -> Matrix:
         """∂ᵏ/∂pᵏ of ∫ v (ρ^p u(η′, π/2, θ₂) − u) over θ₁ = −π/2."""
@@ -557,7 +558,7 @@ class DirectionTerms(Terms):
     @cached_property
     def _mean(self) -> FloatArray:
         """The matrix of the motion of y in the mean over the noise."""
-        total, noise = 0.0 * self.phi.coordinates, self._problem.named_noise
+        total, noise = 0.0 * self.phi.coordinates, self._framed.problem.named_noise
         for term in self.system.terms:
             size = self.system.epsilon**term.order * noise(term.noise).mean_of(term.g)
             total += size * self.phi.inside(term)
@@ -585,7 +586,7 @@ class StopTerms(DirectionTerms):
             yield self._stop(self.phi.changed_impacts, "∂/∂θ", log_factor)
 
     def _stop(self, struck: Callable[[float, float, int], Matrix], text: str, size: float = 1.0) -> Term:
-        stop: Any = self._problem.system.stop
+        stop: Any = self._framed.problem.system.stop
         omega = self._mean[0, 1]
         words = f"{text}, ω = {omega:.6g}, R = {stop.restitution:.6g}"
         return self._term(lambda p, k: size * omega * struck(math.log(stop.restitution), p, k), one, words)

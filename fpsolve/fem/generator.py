@@ -19,6 +19,7 @@ from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.fem.noise_axes import NoiseAxis
 from fpsolve.fem.space import Space
 from fpsolve.fem.terms import Term, Terms, power_of_epsilon
+from fpsolve.model.coordinates import framed
 from fpsolve.model.problem import ParameterDerivative, Problem
 from fpsolve.superlu import sparse_lu
 
@@ -84,13 +85,14 @@ class Generator:
     """
 
     def __init__(self, problem: Problem, chosen: Space | CylinderMesh) -> None:
+        self.framed = framed(problem)
         if isinstance(chosen, CylinderMesh):
-            chosen = Space.on(chosen, problem.valued, problem.frame.phase)
+            chosen = Space.on(chosen, problem.valued, self.framed.frame.phase)
         self.problem, self.chosen, self.size = problem, chosen, chosen.size
         self._spaces: dict[float, Space] = {}
         self._changes: dict[ParameterDerivative, tuple[Term, ...]] = {}
         self._last: Pencil | None = None
-        self._terms: Terms = chosen.phi.terms(problem, self.space(0.0).noises)
+        self._terms: Terms = chosen.phi.terms(self.framed, self.space(0.0).noises)
         self.keeps_constants = self._terms.keeps_constants
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -99,7 +101,8 @@ class Generator:
 
     def __str__(self) -> str:
         lines = [f"  {power_of_epsilon(term.order):<2}  {term.text}" for term in self._terms.all]
-        return "\n".join([f"L(p), Eq. (19){self.problem.frame.words} the sum of", *lines])
+        where = "" if self.framed.frame.is_itself else " in coordinates of its own,"
+        return "\n".join([f"L(p), Eq. (19){where} the sum of", *lines])
 
     def space(self, p: float) -> Space:
         """Trial and test functions; the tilt of those of ξ moves with p, and each axis has tables of its own."""
@@ -168,4 +171,4 @@ class Generator:
         size = abs(next(iter(self._terms.phases(0.0).values()))).sum(axis=0).max()
         for axis in self.space(0.0).noises:
             size += abs(axis.matrix(None)).sum(axis=0).max()
-        return float(30 * size / self.problem.unit_rate)
+        return float(30 * size / self.framed.unit_rate)

@@ -26,6 +26,7 @@ from fpsolve.fem.element import (
 from fpsolve.fem.mesh import SAME_LINE, middles
 from fpsolve.fem.terms import At, OfMoment, Term, Terms
 from fpsolve.messages import Code, Message
+from fpsolve.model.coordinates import Framed
 from fpsolve.model.plane import (
     CoefficientMatrix,
     Harmonics,
@@ -38,7 +39,7 @@ from fpsolve.model.plane import (
     phase_speed,
     turning,
 )
-from fpsolve.model.problem import ParameterDerivative, Problem
+from fpsolve.model.problem import ParameterDerivative
 
 PENALTY = 2.0
 """Factor η·size/(degree + 1)² of the interior penalty method."""
@@ -285,9 +286,9 @@ class PhaseAxis(DividedAxis):
         """The matrix that takes a function of another space to its projection on this one, shape (size, other.size)."""
         return self.values.T @ (diags(self.weights) @ other.at(self.points))
 
-    def terms(self, problem: Problem, noises: Sequence[Any]) -> PlaneTerms:
+    def terms(self, framed: Framed, noises: Sequence[Any]) -> PlaneTerms:
         """L(p) on these functions times those of each noise."""
-        return PlaneTerms(problem, self, noises)
+        return PlaneTerms(framed, self, noises)
 
     def _assembled(self, blocks: FloatArray) -> Matrix:
         """The matrix with a block for each cell; its rows are those of the test functions."""
@@ -335,8 +336,8 @@ class PlaneTerms(Terms):
     they take φ, see `PhaseAxis.impulses`.
     """
 
-    def __init__(self, problem: Problem, phi: PhaseAxis, noises: Sequence[Any]) -> None:
-        super().__init__(problem, phi, noises)
+    def __init__(self, framed: Framed, phi: PhaseAxis, noises: Sequence[Any]) -> None:
+        super().__init__(framed, phi, noises)
         system, self._jump, self._vertices = self.system, phi.jump, phi.lines[:-1]
         steady, driven = np.zeros(self._vertices.size), np.zeros(self._vertices.size)
         for term in system.terms:
@@ -351,11 +352,11 @@ class PlaneTerms(Terms):
         # where θ = |v| for every ξ, and the sign of v where that is the same for all ξ, otherwise 0
         is_pointwise, direction = np.full(self._vertices.size, False), np.zeros(self._vertices.size)
         if all(axis.is_local for axis in noises):
-            rates = matrix_at(system, problem.at_values([axis.samples().xi for axis in noises]))
+            rates = matrix_at(system, framed.problem.valued.combined([axis.samples().xi for axis in noises]))
             speed = turning(rates.reshape(-1, 1, 2, 2))(self._vertices)
             is_pointwise, direction = ~is_pointwise, 1.0 * np.all(speed > 0, axis=0) - np.all(speed < 0, axis=0)
         self._walls = list[Wall]()
-        for jump, v in zip(system.jumps, problem.wall_speeds(system), strict=True):
+        for jump, v in zip(system.jumps, framed.wall_speeds(system), strict=True):
             at = vertices_at(phi.lines, jump.phase)
             is_pointwise[at], direction[at] = True, math.copysign(1.0, v)
             left, right = phi.left_trace[at], phi.right_trace[at]
@@ -372,10 +373,10 @@ class PlaneTerms(Terms):
         for term in self.system.terms:
             if term.order == 0 and (term.h.amplitude or not term.q.vanishes):
                 return False
-        return all(each.order for each in self._problem.diffusions)
+        return all(each.order for each in self._framed.diffusions)
 
     def _loads(self) -> Iterator[Term]:
-        for struck in self._problem.impulses:
+        for struck in self._framed.impulses:
             yield self._struck(struck)
         # −½ ∫ P_s θ [w] [T] at the φ-vertices where the phase runs both ways, or θ is not |v|
         text, jump = "upwind loads between cells", self._jump
@@ -389,9 +390,9 @@ class PlaneTerms(Terms):
     def _changed_loads(self, by: ParameterDerivative) -> Iterator[Term]:
         """Upwinding is held: [T] = 0 at a vertex but for the error of the elements."""
         text, moved = "∂/∂θ", LinearMotion(by.terms, epsilon=self.system.epsilon)
-        for struck, moved_by in zip(self._problem.impulses, by.impulses, strict=bool(by.impulses)):
+        for struck, moved_by in zip(self._framed.impulses, by.impulses, strict=bool(by.impulses)):
             yield self._struck(struck, moved_by)
-        faster = self._problem.wall_speeds(moved)
+        faster = self._framed.wall_speeds(moved)
         for k, (ray, v, delta) in enumerate(self._walls):
             if by.jumps:
                 yield self._term(by.jumps[k] * abs(v) * delta, one, text, OfMoment(1, ray.log_factor), order=2)

@@ -21,8 +21,9 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from fpsolve.arrays import Coefficient, Matrix, one
+from fpsolve.model.coordinates import Framed
 from fpsolve.model.plane import CoefficientMatrix, written_coefficient
-from fpsolve.model.problem import ParameterDerivative, Problem
+from fpsolve.model.problem import ParameterDerivative
 
 Noises = tuple[Coefficient | None, ...]
 """For each noise the g of ∫P_s g u v, or None for its generator, ∫P_s v L_ξ u."""
@@ -100,7 +101,7 @@ class Terms:
     """L(p) of a problem, and ∂L(p)/∂θ, term by term, on whatever functions of the phase or of directions.
 
     Args:
-        problem: whose motion it is, and what white noise adds to it.
+        framed: the motion, and what white noise adds to it.
         phi: the functions of the phase, or of directions.
         noises: those of each noise.
 
@@ -111,9 +112,9 @@ class Terms:
 
     keeps_constants = False
 
-    def __init__(self, problem: Problem, phi: Any, noises: Sequence[Any]) -> None:
-        self.phi, self.noises, self._names = phi, noises, tuple(problem.valued.parts)
-        self._problem, self.system = problem, problem.motion
+    def __init__(self, framed: Framed, phi: Any, noises: Sequence[Any]) -> None:
+        self.phi, self.noises, self._names = phi, noises, tuple(framed.problem.valued.parts)
+        self._framed, self.system = framed, framed.motion
 
     @cached_property
     def all(self) -> Sequence[Term]:
@@ -124,7 +125,7 @@ class Terms:
             found.append(self._term(self.phi.matrix(one), None, text, of=name))
         for term in self.system.terms:
             found += self._driven(term)
-        for each in self._problem.diffusions:
+        for each in self._framed.diffusions:
             found += self._diffused([(0.5, each, each)])
         return [*found, *self._loads()]
 
@@ -139,9 +140,10 @@ class Terms:
 
     def changed(self, by: ParameterDerivative) -> Iterator[Term]:
         """∂L(p)/∂θ of the same terms; what makes functions smooth is held."""
+        by = self._framed.changed(by)
         for term in by.terms:
             yield from self._driven(term)
-        for own, other in zip(self._problem.diffusions, by.diffusions, strict=bool(by.diffusions)):
+        for own, other in zip(self._framed.diffusions, by.diffusions, strict=bool(by.diffusions)):
             yield from self._diffused([(0.5, own, other), (0.5, other, own)])
         yield from self._changed_loads(by)
 

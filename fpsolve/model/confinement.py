@@ -78,15 +78,13 @@ def comes_down(problem: Problem) -> bool:
 
 
 def _field(linear: FloatArray, cubic: FloatArray) -> Field:
-    """d ln a and dφ in a time that runs as fast as the path moves; a path takes some 1,000 of these, so no arrays."""
-    (a11, a12), (a21, a22) = linear.tolist()
-    (c10, c11, c12, c13), (c20, c21, c22, c23) = cubic.tolist()
+    """d ln a and dφ in a time that runs as fast as the path moves."""
+    whole = np.hstack([linear, cubic])
 
     def field(_: float, state: FloatArray) -> tuple[float, float]:
         height, phi = state.tolist()
         square, x, y = math.exp(min(2 * height, MOST)), math.cos(phi), -math.sin(phi)
-        f = a11 * x + a12 * y + square * (((c10 * x + c11 * y) * x + c12 * y * y) * x + c13 * y**3)
-        g = a21 * x + a22 * y + square * (((c20 * x + c21 * y) * x + c22 * y * y) * x + c23 * y**3)
+        f, g = (whole @ [x, y, *(square * x ** (3 - k) * y**k for k in range(4))]).tolist()
         return (x * f + y * g) / (1 + square), (y * f - x * g) / (1 + square)
 
     return field

@@ -11,15 +11,15 @@ and ρ(φ) = |S⁻¹e(φ)|,
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, reduce
+from functools import cached_property, lru_cache, reduce
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.linalg import solve_triangular
 
 from fpsolve.arrays import FloatArray
+from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.plane import (
     STEADY,
     CoefficientMatrix,
@@ -29,10 +29,15 @@ from fpsolve.model.plane import (
     Matrix,
     Motion,
     System,
+    angular_frequency,
     by_noise,
     is_driven,
+    kept_phases,
+    phase_speed,
     rotating_coordinates,
 )
+from fpsolve.model.problem import ParameterDerivative, Problem
+from fpsolve.model.quantity import moment_at
 
 MOST_PARTS = 1000
 """Largest number of parts of a rule in the phase of the frame."""
@@ -42,9 +47,11 @@ BARELY = 0.99
 """Share of the rates at which the search for a frame ends. S changes by powers of two: hardly anything is rounded."""
 MOST_TURNED = 4
 """Largest number of variables of which frames are tried."""
+FOREVER, WHITE = (1.0, 1e100), (1e100, 1e-200)
+"""Standard deviation and correlation time of what is constant, and of white noise of the intensity 1, as limits."""
 MOST_STEPS = 400
 """Largest number of steps of this search: some 60 for each variable and unit of 1e18."""
-ROUNDED = 1e-14
+OF_PRODUCTS = 1e-14
 """Share of the terms of an entry of S⁻¹AS that is rounding."""
 
 
@@ -59,46 +66,42 @@ class Frame:
     matrix: Matrix
 
     @cached_property
-    def _array(self) -> FloatArray:
+    def array(self) -> FloatArray:
+        """S as an array."""
         return np.array(self.matrix)
 
     @property
     def is_itself(self) -> bool:
         """Whether S = 1, so that y is x."""
-        return np.array_equal(self._array, np.eye(len(self._array)))
-
-    @property
-    def words(self) -> str:
-        """What is said of it."""
-        return "" if self.is_itself else " in coordinates of its own,"
+        return np.array_equal(self.array, np.eye(len(self.array)))
 
     @cached_property
     def _inverse(self) -> FloatArray:
-        return np.asarray(solve_triangular(self._array, np.eye(len(self._array)), lower=True))
+        return np.asarray(solve_triangular(self.array, np.eye(len(self.array)), lower=True))
 
     def term(self, term: CoefficientMatrix) -> CoefficientMatrix:
         """A term for y, with the matrix S⁻¹AS."""
-        return replace(term, matrix=(self._inverse @ np.array(term.matrix) @ self._array).tolist())
+        return replace(term, matrix=(self._inverse @ np.array(term.matrix) @ self.array).tolist())
 
     def cubic(self, terms: CubicTerms) -> CubicTerms:
         """Cubic terms for y: S⁻¹ C of the products of Sy."""
-        first, second = self._array
+        first, second = self.array
         products = [reduce(np.convolve, [first] * (3 - k) + [second] * k) for k in range(4)]
         return CubicTerms((self._inverse @ np.array(terms.matrix) @ np.array(products)).tolist())
 
     def exponent(self, of: Impulse) -> Impulse:
         """An impulse, or its derivative, for y."""
-        return replace(of, exponent=(self._inverse @ np.array(of.exponent) @ self._array).tolist())
+        return replace(of, exponent=(self._inverse @ np.array(of.exponent) @ self.array).tolist())
 
     def motion(self, system: System) -> System:
         """A system for y, the terms of order 0 that no noise drives as one; a rotation is one exactly."""
         if self.is_itself:
             return system
         others = [self.term(term) for term in system.terms if not is_free(term)]
-        free = _free(system.terms, len(self.matrix))
-        a = self._inverse @ free @ self._array
+        free = by_noise(system, [*filter(is_free, system.terms)])[STEADY]
+        a = self._inverse @ free @ self.array
         turned = 0.5 * (np.trace(a) * np.eye(len(a)) + a - a.T)
-        is_turn = np.all(abs(a - turned) <= ROUNDED * (abs(self._inverse) @ abs(free) @ abs(self._array)))
+        is_turn = np.all(abs(a - turned) <= OF_PRODUCTS * (abs(self._inverse) @ abs(free) @ abs(self.array)))
         steady = CoefficientMatrix(0, (turned if is_turn and len(a) == 2 else a).tolist())
         jumps = [replace(jump, phase=float(self.phase(np.array(jump.phase)))) for jump in system.jumps]
         return LinearMotion((steady, *others), tuple(jumps), system.epsilon)
@@ -106,7 +109,7 @@ class Frame:
     @property
     def parts(self) -> int:
         """The number of parts of a cell of ψ over which dφ/dψ is integrated: the more, the more φ and ψ differ."""
-        return min(math.ceil(float(np.linalg.cond(self._array))), MOST_PARTS)
+        return min(math.ceil(float(np.linalg.cond(self.array))), MOST_PARTS)
 
     def phase(self, phi: FloatArray) -> FloatArray:
         """ψ(φ), which is φ at odd multiples of π/2."""
@@ -114,7 +117,7 @@ class Frame:
 
     def own_phase(self, psi: ArrayLike) -> FloatArray:
         """φ(ψ)."""
-        return _turned(self._array, psi)
+        return _turned(self.array, psi)
 
     def length(self, phi: FloatArray) -> FloatArray:
         """ρ(φ), how long y is for a unit vector x."""
@@ -125,43 +128,117 @@ class Frame:
         return np.asarray(np.linalg.det(self._inverse) / self.length(phi) ** 2)
 
 
+class Framed:
+    """The motion of a problem in the coordinates in which it is solved, see `framed`.
+
+    Attributes:
+        problem: the system and its noise.
+        frame: S.
+        rate_bound: how fast it moves there at most, about, by all that moves it.
+        motion: the system along a path of ξ: what is left of it beside white noise.
+        diffusions: ε^order B of every Bx ∘ dW by which white noise moves the state.
+        impulses: what multiplies the state at random times.
+    """
+
+    def __init__(self, problem: Problem) -> None:
+        moved = problem.noise.motion(problem.system)
+        self.frame, self.rate_bound = frame, _ = own_frame(problem, moved)
+        self.problem, self.motion = problem, frame.motion(moved.drift)
+        self.diffusions = [frame.term(each) for each in moved.diffusions]
+        self.impulses = [frame.exponent(each) for each in moved.impulses]
+
+    def changed(self, by: ParameterDerivative) -> ParameterDerivative:
+        """A derivative of the problem in the same coordinates, as L(p) is smooth in parameters in one frame only."""
+        terms, diffusions = (tuple(map(self.frame.term, each)) for each in (by.terms, by.diffusions))
+        return replace(by, terms=terms, diffusions=diffusions, impulses=tuple(map(self.frame.exponent, by.impulses)))
+
+    @cached_property
+    def unit_rate(self) -> float:
+        """Its own unit of rates: ω or the size of the order 0, or of all where there is none."""
+        return angular_frequency(self.motion) or self.rate_bound or 1.0
+
+    def wall_speeds(self, motion: System) -> list[float]:
+        """dφ/dt of a motion at the ray of each jump, which no noise changes."""
+        speed = phase_speed(motion, self.problem.valued.extremes)
+        return [float(np.ravel(speed(jump.phase))[0]) for jump in self.motion.jumps]
+
+    @cached_property
+    def resting_phases(self) -> tuple[float, ...]:
+        """Phases of rays of a plane that are never left, nor reached; one, 0, where all rays are."""
+        jolts = [each.matrix for each in self.diffusions] + [each.exponent for each in self.impulses]
+        return kept_phases([*map(np.array, jolts), *by_noise(self.motion, self.motion.terms).values()])
+
+    @cached_property
+    def invariant_rays(self) -> tuple[float, ...]:
+        """φ of these in the coordinates of the system."""
+        return tuple(float(self.frame.own_phase(phi) % math.pi) for phi in self.resting_phases)
+
+
+@lru_cache(64)
+def framed(problem: Problem) -> Framed:
+    """That of a problem, made once."""
+    return Framed(problem)
+
+
+def infinite(problem: Problem, p: float, symbol: str = "") -> Message | None:
+    """Why there is no finite Λ(p), at p = 0 no λ: algebraic tails of the noise, or jumps on a ray that is never left.
+
+    Args:
+        problem: a motion and its noise.
+        p: the moment.
+        symbol: what the number is called; that of Λ(p) if none is given.
+    """
+    if p and problem.noise.has_algebraic_tails and problem.is_driven:
+        return Message(Code.TAILS, what=symbol or moment_at(p).symbol, remedy=Remedy.REDUCTION)
+    if any(jump.log_factor for jump in problem.system.jumps) and (rays := framed(problem).invariant_rays):
+        return Message(Code.INVARIANT_RAY, p=p, phase=rays[0])
+    return None
+
+
 def is_free(term: CoefficientMatrix) -> bool:
     """Whether a term is of order 0, and no noise drives it."""
     return term.order == 0 and not is_driven(term.g)
 
 
-def own_frame(n: int, motion: Motion, spread: Callable[[str], tuple[float, float]]) -> tuple[Frame, float]:
+def own_frame(problem: Problem, moved: Motion) -> tuple[Frame, float]:
     """The frame in which a motion is small, x itself where that is hardly worse; and its size there, a rate.
 
-    That is ‖A‖ + Σ‖B‖² + Σ r‖C‖ + Σ min(s‖D‖, τs²‖D‖²), A all that no noise drives, B of white noise, C of impulses
-    at the rate r, D of noise with the standard deviation s and the correlation time τ: what the rates of growth and of
-    the phase may be. In a frame in which the order 0 is growth and a uniform rotation the phase is the smoothest, so
-    that this one is taken where there is one and the size hardly larger; else other scales if these suffice.
+    That is Σ min(s‖D‖, τs²‖D‖²), D of noise with the standard deviation s and the correlation time τ: what the rates of
+    growth and of the phase may be. What no noise drives never changes, so that it is ‖A‖; of white noise it is ‖B‖²; of
+    impulses at the rate r it is r‖C‖. In a frame in which the order 0 is growth and a uniform rotation the phase is the
+    smoothest, so that this one is taken where there is one and the size hardly larger; else other scales if these
+    suffice.
 
     Args:
-        n: the dimension of the state.
-        motion: what moves the state.
-        spread: by the name of a noise the standard deviation of ξ and about how long it remembers its value.
+        problem: the system and its noise.
+        moved: how the noise moves it.
     """
-    (drift, diffusions, impulses), epsilon = motion, motion.drift.epsilon
+    (drift, diffusions, impulses), epsilon, n = moved, moved.drift.epsilon, problem.dimension
     sums = by_noise(drift, drift.terms)
-    parts = [(sums.pop(STEADY), 1.0, 0.0, 0.0, 0.0)]
-    parts += [(epsilon**each.order * np.array(each.matrix), 0.0, 1.0, 0.0, 0.0) for each in diffusions]
-    parts += [(np.array(each.exponent), each.rate, 0.0, 0.0, 0.0) for each in impulses]
-    parts += [(each, 0.0, 0.0, *spread(key[0])) for key, each in sums.items() if np.any(each)]
-    matrices = np.array([each for each, *_ in parts])
-    linear, square, deviations, times = np.array([numbers for _, *numbers in parts]).T
+    parts = [(sums.pop(STEADY), *FOREVER)]
+    parts += [(epsilon**each.order * np.array(each.matrix), *WHITE) for each in diffusions]
+    parts += [(each.rate * np.array(each.exponent), *FOREVER) for each in impulses]
+    for (name, _), each in sums.items():
+        noise = problem.named_noise(name)
+        if each.any():
+            parts.append((each, noise.standard_deviation, noise.correlation_time))
+    matrices, deviations, times = (np.array(each) for each in zip(*parts, strict=True))
 
     def size(frame: FloatArray) -> float:
         turned = np.linalg.inv(frame) @ matrices @ frame
         norms = np.sqrt(np.einsum("kij,kij->k", turned, turned))
         strengths = deviations * norms
-        return float(linear @ norms + square @ norms**2 + strengths @ np.minimum(1.0, strengths * times))
+        return float(strengths @ np.minimum(1.0, strengths * times))
 
     own = best = np.eye(n)
     least, choice = size(own), [own]
     for is_scaling in (True, False) if n <= MOST_TURNED else ():
-        steps = [own + step for step in _steps(n, is_scaling)]
+        steps = [  # y_i twice or half, and with half of y_j more or less
+            own + change * np.outer(own[i], own[j])
+            for i in range(1, n)
+            for j in range(i if is_scaling else 0, i + 1)
+            for change in ((1.0, -0.5) if i == j else (0.5, -0.5))
+        ]
         for _ in range(MOST_STEPS):
             found, number = min((size(best @ step), k) for k, step in enumerate(steps))
             if not found < BARELY * least:
@@ -170,26 +247,12 @@ def own_frame(n: int, motion: Motion, spread: Callable[[str], tuple[float, float
         else:  # as what is nilpotent, which is as small as one likes
             least, best = size(own), own
         choice.append(best)
-    if n == 2 and (rotating := rotating_coordinates(_free(drift.terms, n))) is not None:
+    free = by_noise(drift, [*filter(is_free, drift.terms)])[STEADY]
+    if n == 2 and (rotating := rotating_coordinates(free)) is not None:
         (first, _), (lower, last) = rotating
         choice.insert(0, np.array([[1.0, 0.0], [lower / first, last / abs(first)]]))
     chosen = next((each for each in choice if size(each) <= HARDLY * least), own)
     return Frame(tuple(map(tuple, chosen.tolist()))), least
-
-
-def _steps(n: int, is_scaling: bool) -> Iterator[FloatArray]:
-    """What is added to 1 for the factors of S that are tried: y_i twice or half, and with half of y_j more or less."""
-    for i in range(1, n):
-        for j in range(i if is_scaling else 0, i + 1):
-            for size in (1.0, -0.5) if i == j else (0.5, -0.5):
-                step = np.zeros((n, n))
-                step[i, j] = size
-                yield step
-
-
-def _free(terms: Sequence[CoefficientMatrix], n: int) -> FloatArray:
-    """The sum of the matrices of order 0 that no noise drives, shape (n, n)."""
-    return sum((float(term.g(0.0)) * np.array(term.matrix) for term in terms if is_free(term)), np.zeros((n, n)))
 
 
 def _unit(phi: FloatArray) -> FloatArray:

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from fpsolve.arrays import Coefficient, FloatArray, nothing
 from fpsolve.model.parameters import Parametrised
-from fpsolve.model.plane import CoefficientMatrix, Motion, MotionDerivative, System
+from fpsolve.model.plane import CoefficientMatrix, Motion, MotionDerivative, System, Xi
 
 STAY = 'write xi = "stationary"'
 """What to do where a value of ξ is no start."""
@@ -209,9 +209,13 @@ class Noise(Parametrised):
         """
         return np.asarray(min(self.half_width, 12 * self.standard_deviation) * np.linspace(-1, 1, 1001))
 
+    def combined(self, values: Sequence[ArrayLike]) -> Xi:
+        """ξ of all combinations of some values of each of its `parts`, as `matrix_at` takes it."""
+        return values[0]
+
     @property
-    def extremes(self) -> FloatArray:
-        """The ends of the range where ξ is mostly; of a chain all states."""
+    def extremes(self) -> Xi:
+        """The ends of the range where ξ is mostly; of a chain all states; of several noises all combinations."""
         return min(2 * self.standard_deviation, self.half_width) * np.array([-1.0, 1.0])
 
     def misfit(self, xi: float) -> str:
@@ -276,21 +280,33 @@ class Noise(Parametrised):
         """Whether this kind states a `step`."""
         return type(self).step is not Noise.step
 
-    def motion(self, system: System) -> Motion:
-        """How this noise moves a system; by default only along a path of ξ."""
+    def motion(self, system: System, name: str | None = None) -> Motion:
+        """How this noise moves a system whose terms call it so, with None whatever; by default along a path of ξ.
+
+        Raises:
+            ValueError: it has algebraic tails, and there are more than two variables.
+        """
+        if self.has_algebraic_tails and system.dimension > 2:
+            raise ValueError(
+                f"got {self.kind} noise for {system.dimension} variables; noise with algebraic tails is for two "
+                "variables only: take another kind, or r0 <= 1"
+            )
         return Motion(system)
 
     def driving(self, system: System) -> Noise:
         """The noises of these that drive a part of the system; the first one where none does."""
         return self
 
-    def changed_motion(self, system: System, terms: Sequence[CoefficientMatrix], name: str = "") -> MotionDerivative:
+    def changed_motion(
+        self, system: System, terms: Sequence[CoefficientMatrix], by: str = "", name: str | None = None
+    ) -> MotionDerivative:
         """The derivative ∂/∂θ of the `motion`.
 
         Args:
             system: the system.
             terms: ∂/∂θ of its terms; empty if θ is a parameter of the noise.
-            name: the name of θ if it is a parameter of the noise, else empty.
+            by: the name of θ if it is a parameter of the noise, else empty.
+            name: what the terms call the noise.
         """
         return MotionDerivative(terms)
 

@@ -12,11 +12,10 @@ from __future__ import annotations
 import math
 import re
 from abc import abstractmethod
-from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -79,8 +78,7 @@ class Harmonics:
 
     @property
     def vanishes(self) -> bool:
-        parts = self.mean, self.cosine, self.sine
-        return not any(part.any() if isinstance(part, np.ndarray) else part for part in parts)
+        return not np.any([self.mean, self.cosine, self.sine])
 
 
 def turning(a: FloatArray) -> Harmonics:
@@ -309,11 +307,11 @@ class Impulse:
     @cached_property
     def matrix(self) -> FloatArray:
         """exp(B)."""
-        return _exponential(self.exponent)
+        return np.asarray(expm(np.array(self.exponent)))
 
     def stretched(self, phi: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """|exp(B)e| of a unit vector e at φ, and the φ that it comes to."""
-        x, u = np.tensordot(self.matrix, _direction(phi), 1)
+        x, u = np.tensordot(self.matrix, [np.cos(phi), -np.sin(phi)], 1)
         return np.hypot(x, u), np.arctan2(-u, x)
 
     @property
@@ -322,12 +320,6 @@ class Impulse:
         return float(np.max(np.abs(np.log(np.linalg.svd(self.matrix, compute_uv=False)))))
 
 
-@lru_cache(maxsize=64)
-def _exponential(exponent: Matrix) -> FloatArray:
-    return np.asarray(expm(np.array(exponent)))
-
-
-@lru_cache(maxsize=64)
 def changed_exponential(exponent: Matrix, change: Matrix) -> FloatArray:
     """∂ exp(B) for ∂B, shape (2, 2)."""
     return np.asarray(expm_frechet(np.array(exponent), np.array(change), compute_expm=False))
@@ -367,21 +359,16 @@ class Jump:
         """Refuse it where a noise moves the phase across the ray, or nothing does. Raises `ValueError`."""
         ray = f"the ray of a jump, phi = {self.phase:.6g}"
         x, u = (0.0 if abs(each) < 1e-15 else each for each in (math.cos(self.phase), -math.sin(self.phase)))
-        shares = (u * x, u * u), (-x * x, -x * u)  # h = e′ᵀA e is the sum of these times the entries of A, in any units
-        moved, total, size = defaultdict[str | None, list[tuple[Any, float, float]]](list), 0.0, 0.0
-        for term in system.terms:
-            parts = np.multiply(shares, term.matrix)
-            for driver, c in term.drivers:
-                strength, whole = c * system.epsilon**term.order, float(np.abs(parts).sum())
-                limit = abs(strength) * (ROUNDED * whole + OF_ENTRIES * term.fastest[0])
-                moved[None if driver == STEADY else driver[0]].append((driver[1], strength * float(parts.sum()), limit))
-                size += abs(strength) * whole
-        for name, own in moved.items():
-            is_linear = all(affine(g) for g, _, _ in own)
-            xi = np.array([0.0, 1.0]) if is_linear or name is None else noise.parts.get(name, noise).reached
-            speeds = sum(speed * g(xi) for g, speed, _ in own)
-            limit = np.max(sum(limit * np.abs(g(xi)) for g, _, limit in own))
-            if name is not None and not np.ptp(speeds) <= limit:
+        shares = np.array([[u * x, u * u], [-x * x, -x * u]])  # h = e′ᵀA e is Σ of these times the entries of A
+        sums = by_noise(system, system.terms)
+        total, size = float(np.sum(shares * sums[STEADY])), sum(float(np.sum(abs(shares * a))) for a in sums.values())
+        for name in dict.fromkeys(name for name, g in sums if g != one):
+            own = {g: a for (each, g), a in sums.items() if each == name and g != one}
+            xi = np.array([0.0, 1.0]) if {*own} == {identity} else noise.parts.get(name, noise).reached
+            speeds = sum(np.sum(shares * a) * g(xi) for g, a in own.items())
+            rounding = {g: ROUNDED * np.sum(abs(shares * a)) + OF_ENTRIES * np.linalg.norm(a) for g, a in own.items()}
+            limit = np.max(sum(rounding[g] * np.abs(g(xi)) for g in own))
+            if not np.ptp(speeds) <= limit:
                 which = f'the noise "{name}"' if len(noise.parts) > 1 else f"{noise.kind} noise"
                 raise ValueError(
                     f"{which} moves the phase across {ray}, which it does over no wall: x = 0, phi = pi/2 = "
@@ -613,18 +600,13 @@ class System(Parametrised):
     def noise_sections(self) -> Sequence[str]:
         return ("noise",)
 
-    @property
-    def impact_symbol(self) -> str:
-        """The symbol of its coefficient of restitution in sentences."""
-        return "R"
+    def restitution_at(self, log_factor: float) -> tuple[str, float, float]:
+        """The symbol of the coefficient of restitution, its value at a wall with a given ln R, and ∂/∂ ln R of it.
 
-    def impact_value(self, log_factor: float) -> tuple[float, float]:
-        """The coefficient of restitution of a wall with a given ln R, by its law, and its derivative by ln R.
-
-        It may be out of range. Here it is R.
+        The value is by the law of the wall, and may be out of range. Here it is R.
         """
         with np.errstate(over="ignore"):
-            return (factor := float(np.exp(log_factor))), factor
+            return "R", (factor := float(np.exp(log_factor))), factor
 
 
 @dataclass(frozen=True)
@@ -670,19 +652,24 @@ class MotionDerivative(NamedTuple):
     impulses: Sequence[Impulse] = ()
 
 
-def _direction(phi: ArrayLike) -> FloatArray:
-    """e at φ, shape (2, *φ.shape)."""
-    return np.stack([np.cos(phi), -np.sin(phi)])
-
-
-def split_by_noise(system: System, terms: Sequence[CoefficientMatrix]) -> tuple[list[CoefficientMatrix], FloatArray]:
+def split_by_noise(
+    system: System, terms: Sequence[CoefficientMatrix], name: str | None
+) -> tuple[list[CoefficientMatrix], FloatArray]:
     """Terms without what a noise that has no value multiplies, and the sum of that, with the powers of ε.
+
+    Args:
+        system: whose terms they are, or are derivatives of.
+        terms: these.
+        name: what they call the noise; None for any.
 
     Raises:
         ValueError: a coefficient is no a + bξ.
     """
     steady, driven = [], np.zeros((system.dimension, system.dimension))
     for term in terms:
+        if is_driven(term.g) and name not in (None, term.noise):
+            steady.append(term)
+            continue
         line = affine(term.g)
         if line is None:
             raise ValueError(
@@ -736,11 +723,6 @@ def as_plane(terms: Sequence[CoefficientMatrix], size: float = 0.0) -> tuple[Coe
     speed = 4.0 ** math.floor(math.log(size, 4)) if size else 0.0
     turn = (CoefficientMatrix(0, ((0.0, speed), (-speed, 0.0))),) if speed else ()
     return *turn, *(replace(term, matrix=(term.matrix[0][0] * np.eye(2)).tolist()) for term in terms)
-
-
-def common_delay(pasts: Sequence[tuple[int, float]]) -> tuple[float, int]:
-    """τ of which all delays are multiples, and the largest multiple. Raises `ValueError` where there is none."""
-    return common_unit([delay for _, delay in pasts], "delays")
 
 
 def common_unit(values: Sequence[float], name: str) -> tuple[float, int]:
@@ -807,13 +789,10 @@ def rotating_coordinates(a: FloatArray) -> FloatArray | None:
 
 
 def angular_frequency(system: System) -> float:
-    """The system's own unit of rates: ω where its order 0 rotates, else the norm of the order 0, or of all without one.
+    """The system's own unit of rates: ω where its order 0 rotates, else the norm of the order 0.
 
     ω is the imaginary part of the eigenvalues of the matrix of order 0, beyond the plane the largest.
     """
     a = matrix_at(system, 0.0, slice(0, 1))
     square = float(squared_frequency(a)) if len(a) == 2 else float(np.max(np.linalg.eigvals(a).imag)) ** 2
-    if square > 0:
-        return math.sqrt(square)
-    sizes = [system.epsilon**term.order * float(np.linalg.norm(term.matrix)) for term in system.terms]
-    return float(np.linalg.norm(a)) or max(sizes) or 1.0
+    return math.sqrt(square) if square > 0 else float(np.linalg.norm(a))

@@ -2,36 +2,22 @@
 
 from __future__ import annotations
 
-import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import cast
 
 import numpy as np
 
-from fpsolve.arrays import FloatArray, shown
-from fpsolve.messages import Code, Message, Remedy
-from fpsolve.model.coordinates import Frame, own_frame
+from fpsolve.arrays import shown
+from fpsolve.messages import Message
 from fpsolve.model.expressions import TIME
 from fpsolve.model.noise import Noise, NoiseDerivative
 from fpsolve.model.noises.several import noises_of
 from fpsolve.model.parameters import DERIVED, Parameter, Parametrised
-from fpsolve.model.plane import (
-    CoefficientMatrix,
-    Impulse,
-    Motion,
-    System,
-    Xi,
-    angular_frequency,
-    by_noise,
-    is_driven,
-    kept_phases,
-    matrix_at,
-    phase_speed,
-)
-from fpsolve.model.quantity import NOISE, Quantity, moment_at
+from fpsolve.model.plane import CoefficientMatrix, Impulse, System, is_driven
+from fpsolve.model.quantity import NOISE, Quantity
 
 RATE = "1/time"
 """Unit of ξ for which the units of parameters of noises are stated."""
@@ -39,24 +25,24 @@ RATE = "1/time"
 
 @dataclass(frozen=True)
 class ParameterDerivative:
-    """∂/∂θ of a problem, all at fixed φ and ξ, in the coordinates of its `frame`, which are held as well.
+    """∂/∂θ of a problem, all at fixed x and ξ.
 
     Attributes:
         theta: the value of θ.
         terms: Σ ε^n g(ξ) A x of these is ∂/∂θ of the motion.
+        diffusions: that of each of its diffusions; empty where none changes.
+        impulses: that of each of its impulses, of its rate and of its exponent; empty where none changes.
         jumps: ∂ ln R/∂θ of each of the jumps of the motion; empty where none changes.
         noise: that of the noise; None where it does not change.
-        diffusions: that of each of the `diffusions`; empty where none changes.
-        impulses: that of each of the `impulses`, of its rate and of its exponent; empty where none changes.
         part: which of the `valued` noises changes.
     """
 
     theta: float
     terms: tuple[CoefficientMatrix, ...] = ()
-    jumps: tuple[float, ...] = ()
-    noise: NoiseDerivative | None = None
     diffusions: tuple[CoefficientMatrix, ...] = ()
     impulses: tuple[Impulse, ...] = ()
+    jumps: tuple[float, ...] = ()
+    noise: NoiseDerivative | None = None
     part: int = 0
 
 
@@ -73,8 +59,6 @@ class Problem:
         system: `VibroImpactOscillator`, or a `PlaneSystem`.
         noise: `OrnsteinUhlenbeck`, or `NonGaussianNoise` for Eq. (7) as it stands, or a `MarkovChain`; several noises
             as a mapping from the names that the terms have, or `Noises`.
-        held: the `frame` and the `rate_bound` of another problem: L(p) is smooth in parameters in one frame only. None
-            for its own.
 
     Raises:
         TypeError: one of them is something else.
@@ -85,7 +69,6 @@ class Problem:
 
     system: System
     noise: Noise
-    held: tuple[Frame, float] | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         if isinstance(self.noise, Mapping):
@@ -109,26 +92,15 @@ class Problem:
                 stated = ", ".join(map(shown, given)) if len(given) > 1 else "one without a name"
                 remedy = 'give one for each name, such as Problem(system, {"axial": ..., "lateral": ...})'
                 raise ValueError(f"{told}, but the noises given are {stated}; {remedy}")
-        if any(noise.is_white for noise in given.values()):
-            _ = self._moved  # refuses what has no meaning
+        self.noise.motion(self.system)  # refuses what has no meaning
         for wall in self.system.barriers:
             wall.refuse(self.system, self.noise)
-        if self.dimension > 2 and self.noise.has_algebraic_tails:
-            raise ValueError(
-                f"got {self.noise.kind} noise for {self.dimension} variables; noise with algebraic tails is for two "
-                "variables only: take another kind, or r0 <= 1"
-            )
         if not self.noise.is_random:
             raise ValueError(
                 "only the start of this noise is random, as of a harmonic load, so that Λ(p) is p times the largest "
                 "real part of the Floquet exponents: compute these from the equation over one period, or add a random "
                 "noise"
             )
-
-    def wall_speeds(self, motion: System) -> list[float]:
-        """dφ/dt of a motion in the coordinates of `frame` at the ray of each jump, which no noise changes."""
-        speed = phase_speed(motion, self.extremes)
-        return [float(np.ravel(speed(jump.phase))[0]) for jump in self.motion.jumps]
 
     @cached_property
     def valued(self) -> Noise:
@@ -139,98 +111,15 @@ class Problem:
         """The noise that terms name so; with one noise that one, whatever its name."""
         return self.noise.parts.get(name, self.noise)
 
-    def at_values(self, values: Sequence[FloatArray]) -> Xi:
-        """ξ of all combinations of some values of each of the `valued` noises, as `matrix_at` takes it."""
-        if len(values) == 1:
-            return values[0]
-        return dict(zip(self.valued.parts, np.meshgrid(*values, indexing="ij", sparse=True), strict=True))
-
-    @property
-    def extremes(self) -> Xi:
-        """All combinations of the `extremes` of the noises."""
-        return self.at_values([each.extremes for each in self.valued.parts.values()])
-
-    @property
-    def drift(self) -> System:
-        """The system along a path of ξ, with the drift that white noise adds."""
-        return self._moved.drift
-
-    @cached_property
-    def _moved(self) -> Motion:
-        """How the noise moves the system, in the coordinates of the system."""
-        return self.noise.motion(self.system)
-
     @cached_property
     def dimension(self) -> int:
         """The number of variables of the state, with those of the past that move it."""
         return self.system.dimension
 
-    @cached_property
-    def frame(self) -> Frame:
-        """The coordinates that it is solved in."""
-        return self.framed[0]
-
-    @property
-    def rate_bound(self) -> float:
-        """How fast it moves there at most, about, by all that moves it."""
-        return self.framed[1]
-
-    @cached_property
-    def framed(self) -> tuple[Frame, float]:
-        """The frame and the bound."""
-        if self.held is not None:
-            return self.held
-        if self.system.pasts:
-            return Frame(tuple(map(tuple, np.eye(self.dimension).tolist()))), float(
-                np.linalg.norm(matrix_at(self.drift, 0.0), 2)
-            )
-        return own_frame(
-            self.dimension,
-            self._moved,
-            lambda name: ((noise := self.named_noise(name)).standard_deviation, noise.correlation_time),
-        )
-
-    @cached_property
-    def motion(self) -> System:
-        """The system along a path of ξ, in the coordinates of `frame`: what is left of it beside white noise."""
-        return self.frame.motion(self.drift)
-
-    @cached_property
-    def diffusions(self) -> Sequence[CoefficientMatrix]:
-        """ε^order B of every Bx ∘ dW by which white noise moves the state, in the same coordinates."""
-        return [self.frame.term(each) for each in self._moved.diffusions]
-
-    @cached_property
-    def impulses(self) -> Sequence[Impulse]:
-        """The impulses that multiply the state at random times, in the same coordinates."""
-        return [self.frame.exponent(each) for each in self._moved.impulses]
-
-    @cached_property
-    def resting_phases(self) -> tuple[float, ...]:
-        """Phases in the frame of rays of a plane that are never left, nor reached; one, 0, where all rays are."""
-        jolts = [each.matrix for each in self.diffusions] + [each.exponent for each in self.impulses]
-        return kept_phases([*map(np.array, jolts), *by_noise(self.motion, self.motion.terms).values()])
-
-    @cached_property
-    def invariant_rays(self) -> tuple[float, ...]:
-        """φ of rays that the phase never leaves, nor reaches, whatever the noise does; one alone where all rays are."""
-        return tuple(float(self.frame.own_phase(phi) % math.pi) for phi in self.resting_phases)
-
-    @property
-    def unit_rate(self) -> float:
-        """Its own unit of rates: ω or the size of the order 0, or of all where there is none."""
-        has_own = np.any(matrix_at(self.motion, 0.0, slice(0, 1)))
-        return angular_frequency(self.motion) if has_own else self.rate_bound or 1.0
-
     @property
     def is_driven(self) -> bool:
         """Whether a noise moves the state; one of strength 0 does not, and Λ(p) is p times the growth rate."""
         return any(is_driven(term.g) and np.any(term.matrix) for term in self.system.terms)
-
-    @property
-    def has_algebraic_tails(self) -> bool:
-        """Whether the noise that moves the state has such tails, so that no Λ(p), p ≠ 0, is computed."""
-        return self.noise.has_algebraic_tails and self.is_driven
 
     @property
     def sections(self) -> Mapping[str, Parametrised]:
@@ -300,10 +189,9 @@ class Problem:
         if key not in self.differentiable:
             raise ValueError(f"got {key}; the parameters to differentiate by are {', '.join(self.differentiable)}")
         section, _, name = key.rpartition(".")
-        terms: Sequence[CoefficientMatrix] = ()
-        jumps: Sequence[float] = ()
-        noise, changed = None, ""
         part = dict(zip(self.sections, ["", *self.noise.parts], strict=True))[section]
+        terms, jumps, changed = tuple[CoefficientMatrix, ...](), tuple[float, ...](), ""
+        noise: NoiseDerivative | None = None
         if section == self.system.section:
             terms, jumps = self.system.derivative(name)
             if slope := self.system.clock_slope(name):
@@ -312,15 +200,14 @@ class Problem:
             changed = ".".join(filter(None, (part, name)))
             if not (own := self.named_noise(part)).is_white:
                 noise = own.derivative(name)
-        moved = self.noise.changed_motion(self.system, terms, changed)
-        axes = [*self.valued.parts]
+        moved, axes = self.noise.changed_motion(self.system, terms, changed), [*self.valued.parts]
         return ParameterDerivative(
             float(self.values[key]),
-            tuple(map(self.frame.term, moved.terms)),
+            tuple(moved.terms),
+            tuple(moved.diffusions),
+            tuple(moved.impulses),
             tuple(jumps),
             noise,
-            tuple(map(self.frame.term, moved.diffusions)),
-            tuple(map(self.frame.exponent, moved.impulses)),
             axes.index(part) if part in axes else 0,
         )
 
@@ -354,18 +241,3 @@ def checked_problem(problem: object) -> Problem:
         return problem
     remedy = "must be a Problem, made of a system and a noise: Problem(system, noise)"
     raise TypeError(f"got problem = {shown(problem)}; {remedy}")
-
-
-def infinite(problem: Problem, p: float, symbol: str = "") -> Message | None:
-    """Why there is no finite Λ(p), at p = 0 no λ: algebraic tails of the noise, or jumps on a ray that is never left.
-
-    Args:
-        problem: a motion and its noise.
-        p: the moment.
-        symbol: what the number is called; that of Λ(p) if none is given.
-    """
-    if p and problem.has_algebraic_tails:
-        return Message(Code.TAILS, what=symbol or moment_at(p).symbol, remedy=Remedy.REDUCTION)
-    if any(jump.log_factor for jump in problem.motion.jumps) and (rays := problem.invariant_rays):
-        return Message(Code.INVARIANT_RAY, p=p, phase=rays[0])
-    return None

@@ -31,6 +31,7 @@ from fpsolve.arrays import Coefficient, FloatArray, dense, one
 from fpsolve.fem.line import LineSpace
 from fpsolve.fem.noise_axes import NoiseAxis
 from fpsolve.model.confinement import amplitude_frame, mean_terms
+from fpsolve.model.coordinates import framed
 from fpsolve.model.plane import CoefficientMatrix
 from fpsolve.model.problem import Problem
 
@@ -86,7 +87,8 @@ class Flow:
     @cached_property
     def sense(self) -> float:
         """1 where the phase grows at the wall, −1 where it falls; 1 without a wall."""
-        return math.copysign(1.0, math.fsum(self.problem.wall_speeds(self.problem.motion)))
+        moved = framed(self.problem)
+        return math.copysign(1.0, math.fsum(moved.wall_speeds(moved.motion)))
 
     @cached_property
     def log_factor(self) -> float:

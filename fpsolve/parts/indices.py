@@ -20,7 +20,7 @@ from fpsolve.exponent.quantities import (
     Index,
 )
 from fpsolve.messages import Code, Message, message_of
-from fpsolve.model.problem import infinite
+from fpsolve.model.coordinates import infinite
 from fpsolve.model.quantity import MEAN_SQUARE
 from fpsolve.page.page import Block, Column, filled
 from fpsolve.parts.intervals import INTERVAL, spreads_of

@@ -24,7 +24,7 @@ from fpsolve.model.plane import (
     LinearMotion,
     System,
     affine,
-    common_delay,
+    common_unit,
     is_driven,
     written_coefficient,
 )
@@ -266,7 +266,7 @@ def starting_state(
 
 def repeated_delay(pasts: Sequence[tuple[int, float]]) -> float:
     """The time of which all delays are multiples, ∞ without any. Raises `ValueError`: there is none."""
-    return common_delay(pasts)[0] if pasts else math.inf
+    return common_unit([delay for _, delay in pasts], "delays")[0] if pasts else math.inf
 
 
 def coefficients(system: System, noise: Noise) -> Coefficients:

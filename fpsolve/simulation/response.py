@@ -184,7 +184,8 @@ def simulated_response(
         raise FpsolveError(reason)
     [load] = coefficients(system, noise).loads
     motion, first = motion_of(system, noise.step(step), load.rows)
-    steps = max(1, round(math.pi / (angular_frequency(system) * step * _LOOKS)))
+    rate = angular_frequency(system) or float(np.linalg.norm(matrix_at(system, 0.0))) or 1.0
+    steps = max(1, round(math.pi / (rate * step * _LOOKS)))
     between = steps * step
     memory = max(1 / exponent, 2 * variance_rate / exponent**2)
     settling, looks = math.ceil(5 * memory / between), math.ceil(max(time, 20 * memory) / between)

@@ -8,10 +8,11 @@ from typing import Literal, get_args
 
 from fpsolve.arrays import is_whole, real_numbers, shown
 from fpsolve.errors import FpsolveError, NoSuchExponent
+from fpsolve.model.coordinates import infinite
 from fpsolve.model.noise import Noise
 from fpsolve.model.noises.clock import waves_apart
 from fpsolve.model.plane import System
-from fpsolve.model.problem import Problem, checked_problem, infinite
+from fpsolve.model.problem import Problem, checked_problem
 from fpsolve.simulation.coefficients import ROUGHER, coefficients, refuse
 
 Estimator = Literal["direct", "population"]

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fpsolve.arrays import FloatArray, IntArray
+from fpsolve.model.coordinates import framed
 from fpsolve.model.plane import matrix_at, squared_frequency
 from fpsolve.model.problem import Problem
 
@@ -33,7 +34,7 @@ def eigenvalues_at(problem: Problem, xi: ArrayLike) -> tuple[FloatArray, FloatAr
     Where A(ξ) has real eigenvalues they are the rates; where the phase turns, their common real part and the jumps,
     each once in half a turn.
     """
-    a = matrix_at(problem.drift, xi)
+    a = matrix_at(framed(problem).motion, xi)
     half, square = 0.5 * (a[..., 0, 0] + a[..., 1, 1]), squared_frequency(a)
     root, turns = np.sqrt(np.abs(square)), square > 0
     turning = half + root / math.pi * sum(jump.log_factor for jump in problem.system.jumps)
@@ -140,7 +141,7 @@ class FrozenNoise:
 
 def _noise_strength(problem: Problem) -> float:
     """Σ ε^n max|q| max|g(ξ) − g(0)|/|ξ| over what the noise reaches; for the paper's oscillator ε."""
-    total, system = 0.0, problem.motion
+    system, total = framed(problem).motion, 0.0
     for term in system.terms:
         xi = problem.named_noise(term.noise).reached
         rise = np.abs(term.g(xi) - term.g(0.0)) / np.where(xi, np.abs(xi), np.inf)

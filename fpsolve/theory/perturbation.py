@@ -26,6 +26,7 @@ from numpy.typing import ArrayLike
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import NoPerturbationTheory
 from fpsolve.messages import Code, Message
+from fpsolve.model.coordinates import framed
 from fpsolve.model.plane import (
     Harmonics,
     affine,
@@ -135,10 +136,10 @@ def harmonic_loads(problem: Problem) -> Sequence[str]:
 @lru_cache(8)
 def _of_random_noise(problem: Problem) -> SecondOrder:
     """ε²Λ₂(p) without what harmonic loads change."""
-    system, noises = problem.motion, problem.noise.parts
+    (system, diffusions, impulses), noises = problem.noise.motion(problem.system), problem.noise.parts
     if problem.dimension > 2:
         raise NoPerturbationTheory("perturbation theory is for two variables only")
-    if problem.impulses:
+    if impulses:
         raise NoPerturbationTheory("perturbation theory is for weak noise, not for impulses")
     driven = {name: np.zeros((2, 2)) for name, noise in noises.items() if not (noise.is_white and len(noises) > 1)}
     steady = matrix_at(system, 0.0, slice(0, 1))
@@ -172,7 +173,7 @@ def _of_random_noise(problem: Problem) -> SecondOrder:
                 f"{noise.standard_deviation:.3g}"
             )
         of_noise.append((q, at_rest, at_twice))
-    for each in problem.diffusions:
+    for each in diffusions:
         if each.order != 1:
             raise NoPerturbationTheory(f"perturbation theory is for white noise of order 1, not {each.order}")
         of_noise.append((_growth(each.matrix, frame), 1.0, 1.0))  # beside nothing: no path of white noise drives
@@ -263,7 +264,8 @@ def scale_of(problem: Problem) -> Scale:
     strength c and correlation time τ counts by c min(1, c τ). White noise counts by the largest ½(h q′ + q²) and ½q².
     A jump counts once in a half-turn. Impulses that stretch by e^s count by their rate times s min(1, s).
     """
-    system, of_noises = problem.motion, dict[str, float]()
+    own, of_noises = framed(problem), dict[str, float]()
+    system = own.motion
     steady = np.zeros((problem.dimension, problem.dimension))
     for term in system.terms:
         size = system.epsilon**term.order * term.fastest[1]
@@ -276,20 +278,20 @@ def scale_of(problem: Problem) -> Scale:
             typical = np.asarray(term.g(noise.mean + noise.standard_deviation * np.array([-1.0, 1.0])))
             driven = size * float(np.sqrt(np.mean(typical**2)))
         of_noises[term.noise] = of_noises.get(term.noise, 0.0) + driven
-    jumps = sum(abs(jump.log_factor) for jump in system.jumps) * problem.unit_rate / math.pi
+    jumps = sum(abs(jump.log_factor) for jump in system.jumps) * own.unit_rate / math.pi
     driven = 0.0
     for name, size in of_noises.items():
         driven += size * min(1.0, size * problem.named_noise(name).correlation_time) if size else 0.0
-    for each in problem.diffusions:
+    for each in own.diffusions:
         h, q = (system.epsilon**each.order * speed for speed in each.fastest)
         driven += 0.5 * q * max(h, q)
-    driven += sum(each.rate * each.strength * min(1.0, each.strength) for each in problem.impulses)
+    driven += sum(each.rate * each.strength * min(1.0, each.strength) for each in own.impulses)
     sizes = Scale(float(np.max(np.abs(np.linalg.eigvals(steady).real))) + jumps + driven, driven)
     theory = None
     with suppress(NoPerturbationTheory):
         theory = _of_random_noise(problem)
     found = theory.scale if theory and theory.scale.moment(2.0) <= sizes.moment(2.0) else sizes
-    return replace(found, linear=found.linear or found.quadratic or problem.unit_rate)  # λ may be 0 exactly
+    return replace(found, linear=found.linear or found.quadratic or own.unit_rate)  # λ may be 0 exactly
 
 
 def _growth(matrix: Any, frame: FloatArray) -> Harmonics:

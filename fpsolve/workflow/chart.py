@@ -202,7 +202,7 @@ def _closed_forms(
         for j, v in enumerate(shares):
             try:
                 here = problem.at({x.key: float(x.value(u)), y.key: float(y.value(v))})
-                theory = second_order(replace(here, held=problem.framed))  # as own coordinates take most of the time
+                theory = second_order(here)
             except (ValueError, NoPerturbationTheory):  # no such problem, or not this form of one
                 continue
             linear[j, i], quadratic[j, i] = theory.lyapunov_exponent, theory.quadratic

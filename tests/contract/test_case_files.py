@@ -169,7 +169,7 @@ def test_reduced_and_exact_noise_have_one_perturbation_theory(tmp_path):
     case = case_in(tmp_path, SMALL + 'vary.noise.treatment = ["ou-reduction", "exact"]')
     reduced, exact = case.curves()
     assert reduced.noise == ReducedNoise(D0=1.0, tau0=1.0, r0=0.9)
-    assert exact.noise == reduced.noise.replaces == NonGaussianNoise(D0=1.0, tau0=1.0, r0=0.9)
+    assert exact.noise == reduced.noise.at({"treatment": "exact"}) == NonGaussianNoise(D0=1.0, tau0=1.0, r0=0.9)
     assert len({second_order(each.problem).moment_exponent(2.0) for each in (reduced, exact)}) == 1
 
 

@@ -174,7 +174,7 @@ def test_reduction_of_eq_7_has_the_numbers_of_eqs_12_to_14_and_notes_its_varianc
         ou, share = noise.ou_reduction(), 2 * (2 - r0) / (5 - 3 * r0)
         assert ou.alpha == pytest.approx(2 / share, rel=1e-15)
         assert ou.sigma == pytest.approx(math.sqrt(2.0) * 2, rel=1e-15)
-        assert (ou.replaces, ou.at({"treatment": "exact"})) == (noise, noise)
+        assert ou.at({"treatment": "exact"}) == noise
         notes = [*ou.remarks]
         assert len(notes) == (not is_near)
         if notes:

@@ -123,6 +123,14 @@ class NoiseOfAngle(Noise):
         """The smaller of 0.1/σ² and 0.1π/ν, a tenth of the times in which the angle diffuses by 1 or turns by π."""
         return min(0.1 / self.sigma**2 if self.sigma else math.inf, 0.1 * math.pi / self.nu if self.nu else math.inf)
 
+    def derivative(self, name: str) -> NoiseDerivative:
+        """The amplitude scales ξ, ν changes the speed of the phase, σ its diffusion. Λ is even in ν and in σ."""
+        if name == "nu":
+            return NoiseDerivative(turning=1.0)
+        if name == "sigma":
+            return NoiseDerivative(1 / self.sigma if self.sigma else 0.0)
+        return NoiseDerivative(1 / self.amplitude, log_scale=1 / self.amplitude)
+
 
 @strict_dataclass
 class SineWiener(NoiseOfAngle):
@@ -147,11 +155,6 @@ class SineWiener(NoiseOfAngle):
     kind: ClassVar[str] = "sine-wiener"
     nu: ClassVar[float] = 0.0
     of_xi: ClassVar[Sequence[str]] = ("amplitude",)
-
-    def derivative(self, name: str) -> NoiseDerivative:
-        """∂/∂A stretches ξ, and ∂/∂σ is that of σ alone."""
-        a = 1 / self.amplitude
-        return NoiseDerivative(a, log_scale=a) if name == "amplitude" else NoiseDerivative(1 / self.sigma)
 
 
 @strict_dataclass
@@ -195,14 +198,3 @@ class Bounded(NoiseOfAngle):
     def amplitude(self) -> float:
         """μ."""
         return self.mu
-
-    def derivative(self, name: str) -> NoiseDerivative:
-        """The derivative by μ, ν or σ: μ scales ξ, ν changes the speed of the phase, σ its diffusion.
-
-        Λ is even in ν and in σ.
-        """
-        if name == "nu":
-            return NoiseDerivative(turning=1.0)
-        if name == "mu":
-            return NoiseDerivative(1 / self.mu, log_scale=1 / self.mu)
-        return NoiseDerivative(1 / self.sigma if self.sigma else 0.0)

@@ -99,7 +99,7 @@ class Filter(Gaussian):
     @property
     def correlation_time(self) -> float:
         """The decay time of the envelope, 1/(ζω) for ζ ≤ 1, or of the slower of two exponentials for ζ > 1."""
-        return (self._overdamped if self.zeta > 1 else 1 / self.zeta) / self.omega
+        return max(self._overdamped, 1 / self.zeta) / self.omega
 
     relaxation_time = correlation_time
 

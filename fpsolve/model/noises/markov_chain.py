@@ -46,10 +46,9 @@ class Chain(Noise):
     @property
     def probabilities(self) -> FloatArray:
         """π, the stationary probabilities: πQ = 0, shape (n,)."""
-        rates = np.array(self.rates)
-        equations = np.vstack([rates.T / np.abs(rates).max(), np.ones(len(self.states))])
-        solution = np.linalg.lstsq(equations, np.append(np.zeros(len(self.states)), 1.0), rcond=None)[0]
-        return np.asarray(solution / solution.sum(), dtype=float)
+        equations = np.array(self.rates).T
+        equations[-1] = 1.0  # in place of one that follows from the others
+        return np.linalg.solve(equations, np.eye(len(equations))[-1])
 
     @property
     def mean(self) -> float:

@@ -109,13 +109,13 @@ class Poisson(Memoryless):
         reached = np.tile(np.append(np.cumsum(self.shares)[:-1], 1.0), (sizes.size, 1))
         return ChainStep(np.full(sizes.size, self.rate), reached, np.zeros(sizes.size), sizes)
 
-    def motion(self, system: System) -> Motion:
+    def motion(self, system: System, name: str | None = None) -> Motion:
         """The motion between impulses, and one impulse for each size, in their order, by which the simulation draws.
 
         Raises:
             ValueError: a coefficient is no a + bξ, or impulses multiply the state by more than numbers hold.
         """
-        terms, driven = split_by_noise(system, system.terms)
+        terms, driven = split_by_noise(system, system.terms, name)
         drift = LinearMotion(tuple(terms), system.jumps, system.epsilon)
         if not driven.any():
             return Motion(drift)
@@ -127,12 +127,14 @@ class Poisson(Memoryless):
         ]
         return Motion(drift, (), impulses)
 
-    def changed_motion(self, system: System, terms: Sequence[CoefficientMatrix], name: str = "") -> MotionDerivative:
-        drift, changed = split_by_noise(system, terms)
-        by_rate = 1.0 / self.rate if name == "rate" else 0.0
-        impulses = [
+    def changed_motion(
+        self, system: System, terms: Sequence[CoefficientMatrix], by: str = "", name: str | None = None
+    ) -> MotionDerivative:
+        drift, changed = split_by_noise(system, terms, name)
+        by_rate, known = 1.0 / self.rate if by == "rate" else 0.0, self.motion(system, name).impulses
+        impulses = [  # none of what is not driven
             Impulse(by_rate * each.rate, (size * changed).tolist())
-            for each, size in zip(self.motion(system).impulses, self.sizes, strict=False)  # none of what is not driven
+            for each, size in zip(known, self.sizes, strict=False)
         ]
         return MotionDerivative(drift, (), impulses)
 

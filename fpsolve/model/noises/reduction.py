@@ -49,11 +49,6 @@ class ReducedNoise(TreatedNoise, GaussianNoise):
         return self.diffusion
 
     @property
-    def replaces(self) -> TreatedNoise:
-        """The noise of Eq. (7)."""
-        return self.at({"treatment": "exact"})
-
-    @property
     def remarks(self) -> Sequence[Message]:
         """A remark on the reduction (12)-(14), made for r₀ near 1: the variance that it gives, against Eq. (10)."""
         departure = abs(self.r0 - 1)

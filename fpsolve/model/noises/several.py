@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import chain
 from typing import ClassVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from fpsolve.arrays import FloatArray, shown
 from fpsolve.model.noise import STAY, Noise
-from fpsolve.model.plane import CoefficientMatrix, LinearMotion, Motion, MotionDerivative, System, is_driven
+from fpsolve.model.plane import CoefficientMatrix, Impulse, Motion, MotionDerivative, System, Xi
 
 MOST_WITH_AXES = 2
 """Noises that have values at most: each of them is a dimension more."""
@@ -74,6 +74,13 @@ class Noises(Noise):
         """The noise, or the noises, that have values; if all are white, the first of them, with the value 0."""
         valued = {name: noise for name, noise in self.named if not noise.is_white} or dict(self.named[:1])
         return self if len(valued) == len(self.named) else noises_of(valued)
+
+    def combined(self, values: Sequence[ArrayLike]) -> Xi:
+        return dict(zip(self.parts, np.meshgrid(*values, indexing="ij", sparse=True), strict=True))
+
+    @property
+    def extremes(self) -> Xi:
+        return self.combined([np.asarray(noise.extremes) for noise in self.parts.values()])
 
     @property
     def _valued(self) -> Iterable[Noise]:
@@ -140,43 +147,34 @@ class Noises(Noise):
     def largest_step(self) -> float:
         return min(noise.largest_step for _, noise in self.named)
 
-    def motion(self, system: System) -> Motion:
+    def motion(self, system: System, name: str | None = None) -> Motion:
         """The motion besides the white noises, and what all white noises add, each in its own `sense`."""
-        moved = [
-            noise.motion(LinearMotion(_driven(system.terms, name), system.jumps, system.epsilon))
-            for name, noise in self._white
-        ]
-        terms = [*self._others(system.terms), *chain.from_iterable(each.drift.terms for each in moved)]
-        drift = LinearMotion(tuple(terms), system.jumps, system.epsilon)
-        return Motion(drift, *(list(chain.from_iterable(parts)) for parts in list(zip(*moved, strict=True))[1:]))
+        drift, diffusions, jolts = system, list[CoefficientMatrix](), list[Impulse]()
+        for own, noise in self._white:
+            drift, diffused, struck = noise.motion(drift, own)
+            diffusions += diffused
+            jolts += struck
+        return Motion(drift, diffusions, jolts)
 
     def driving(self, system: System) -> Noise:
         first = system.noise_sections[0].removeprefix("noise.")
         known = {name: noise for name, noise in self.named if name in system.driven_by}
         return noises_of(known or {first: self.parts[first]})
 
-    def changed_motion(self, system: System, terms: Sequence[CoefficientMatrix], name: str = "") -> MotionDerivative:
-        part, _, parameter = name.rpartition(".")
-        changed = [MotionDerivative(self._others(terms))]
+    def changed_motion(
+        self, system: System, terms: Sequence[CoefficientMatrix], by: str = "", name: str | None = None
+    ) -> MotionDerivative:
+        (part, _, parameter), diffusions, jolts = by.rpartition("."), list[CoefficientMatrix](), list[Impulse]()
         for own, noise in self._white:
-            driven = LinearMotion(_driven(system.terms, own), epsilon=system.epsilon)
-            changed.append(noise.changed_motion(driven, _driven(terms, own), parameter if part == own else ""))
-        return MotionDerivative(*(list(chain.from_iterable(parts)) for parts in zip(*changed, strict=True)))
+            terms, diffused, struck = noise.changed_motion(system, terms, parameter if part == own else "", own)
+            diffusions += diffused
+            jolts += struck
+        return MotionDerivative(terms, diffusions, jolts)
 
     @property
     def _white(self) -> list[tuple[str, Noise]]:
         """The white noises with their names."""
         return [(name, noise) for name, noise in self.named if noise.is_white]
-
-    def _others(self, terms: Sequence[CoefficientMatrix]) -> list[CoefficientMatrix]:
-        """The terms that no white noise drives."""
-        white = {name for name, _ in self._white}
-        return [term for term in terms if not (is_driven(term.g) and term.noise in white)]
-
-
-def _driven(terms: Sequence[CoefficientMatrix], name: str) -> tuple[CoefficientMatrix, ...]:
-    """The terms that a noise drives."""
-    return tuple(term for term in terms if is_driven(term.g) and term.noise == name)
 
 
 def noises_of(named: Mapping[str, Noise]) -> Noise:

@@ -18,7 +18,7 @@ from fpsolve.model.plane import (
     Motion,
     MotionDerivative,
     System,
-    affine,
+    is_driven,
     split_by_noise,
 )
 
@@ -75,31 +75,29 @@ class White(Memoryless):
         """One step of dW, without a bias; s is in the matrix that the noise drives."""
         return WhiteStep(1 / math.sqrt(h), math.sqrt(3 / h))
 
-    def motion(self, system: System) -> Motion:
+    def motion(self, system: System, name: str | None = None) -> Motion:
         """The drift in the sense of Stratonovich, and s A of the term that the noise drives, as one matrix.
 
         Raises:
             ValueError: a coefficient is no a + bξ.
         """
-        drift, driven = split_by_noise(system, system.terms)
-        diffusions = [_term(system, self.s * driven, _order(system))] if driven.any() else []
+        drift, driven = split_by_noise(system, system.terms, name)
+        orders = [term.order for term in system.terms if is_driven(term.g) and name in (None, term.noise)]
+        diffusions = [_term(system, self.s * driven, min(orders))] if driven.any() else []
         if self.interpretation == Interpretation.ITO and diffusions:
-            drift.append(_term(system, -0.5 * self.s**2 * driven @ driven, 2 * _order(system)))
+            drift.append(_term(system, -0.5 * self.s**2 * driven @ driven, 2 * min(orders)))
         return Motion(LinearMotion(tuple(drift), system.jumps, system.epsilon), diffusions)
 
-    def changed_motion(self, system: System, terms: Sequence[CoefficientMatrix], name: str = "") -> MotionDerivative:
-        _, driven = split_by_noise(system, system.terms)
-        drift, changed = split_by_noise(system, terms)
-        by_s = 1.0 if name == "s" else 0.0
+    def changed_motion(
+        self, system: System, terms: Sequence[CoefficientMatrix], by: str = "", name: str | None = None
+    ) -> MotionDerivative:
+        _, driven = split_by_noise(system, system.terms, name)
+        drift, changed = split_by_noise(system, terms, name)
+        by_s = 1.0 if by == "s" else 0.0
         if self.interpretation == Interpretation.ITO:
             square = changed @ driven + driven @ changed
             drift.append(_term(system, -0.5 * self.s**2 * square - by_s * self.s * driven @ driven, 0))
         return MotionDerivative(drift, [_term(system, by_s * driven + self.s * changed, 0)] if driven.any() else [])
-
-
-def _order(system: System) -> int:
-    """The lowest order of what ξ multiplies."""
-    return min(term.order for term in system.terms if (affine(term.g) or (0.0, 0.0))[1])
 
 
 def _term(system: System, matrix: FloatArray, order: int) -> CoefficientMatrix:

@@ -657,14 +657,10 @@ class EquationSystem(System):
             return name if abs(at_one) <= ROUNDED and slope > 0 else ""
         return ""
 
-    @property
-    def impact_symbol(self) -> str:
-        return self._law or super().impact_symbol
-
-    def impact_value(self, log_factor: float) -> tuple[float, float]:
-        """The coefficient of restitution for which ln R has a given value, by Newton's method; NaN if not found."""
+    def restitution_at(self, log_factor: float) -> tuple[str, float, float]:
+        """By Newton's method; NaN if it is not found."""
         if not (name := self._law):
-            return super().impact_value(log_factor)
+            return super().restitution_at(log_factor)
         value, step, slope = 1.0, math.inf, 0.0
         for _ in range(_NEWTON):
             try:
@@ -678,7 +674,7 @@ class EquationSystem(System):
             step = (log_factor - known) / slope
             value += step
         is_found = slope and abs(step) <= ROUNDED * max(1.0, abs(value))
-        return (value, 1 / slope) if is_found else (math.nan, math.nan)
+        return (name, value, 1 / slope) if is_found else (name, math.nan, math.nan)
 
 
 def _quantity(name: str, stated: StatedParameter) -> Quantity:

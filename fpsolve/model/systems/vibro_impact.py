@@ -154,16 +154,12 @@ class VibroImpactOscillator(System):
             case _:
                 return by_epsilon(self), (-2 * self.epsilon * (1 - self.restitution) * bounce,)
 
-    @property
-    def impact_symbol(self) -> str:
-        return "r"
-
-    def impact_value(self, log_factor: float) -> tuple[float, float]:
-        """The r for which this law, with this ε, has a given ln R, and dr/d ln R; r may be out of its range."""
+    def restitution_at(self, log_factor: float) -> tuple[str, float, float]:
+        """r, the value for which this law, with this ε, has a given ln R, and dr/d ln R; it may be out of its range."""
         is_delta, square = self.impact == ImpactLaw.DELTA, self.epsilon**2
         with np.errstate(over="ignore"):
             loss, slope = (-log_factor, 1.0) if is_delta else (-float(np.expm1(log_factor)), float(np.exp(log_factor)))
-        return 1 - loss / square, slope / square
+        return "r", 1 - loss / square, slope / square
 
     def h2(self, phi: ArrayLike) -> FloatArray:
         """h₂(φ) = c₁ h₁(φ); the impact adds nothing, as sin 2φ vanishes where it acts."""
