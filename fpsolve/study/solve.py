@@ -6,10 +6,9 @@ noise.)
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 from time import process_time
-from typing import TypeVar
 
 import numpy as np
 
@@ -24,10 +23,9 @@ from fpsolve.model.quantity import LYAPUNOV_EXPONENT
 from fpsolve.parts.every import BY_NAME, PARTS
 from fpsolve.parts.moments import CLASSES, Moments
 from fpsolve.parts.moments import PART as MOMENTS
-from fpsolve.parts.part import Asked, Entry, Job, Limit, Part, Reason, attempt, idle
+from fpsolve.parts.part import Asked, Entry, Job, Limit, Part, Reason, attempt
 from fpsolve.results.curve import NO_MOMENTS, CurveResult
 
-Told = TypeVar("Told")
 ANEW: Limit = (0.0, 0.0)
 """The limit of what failed for a reason that may be gone the next time."""
 
@@ -43,27 +41,23 @@ def solve_curve(job: Job) -> Job:
     planned = [part for part in PARTS if part.symbol and part.name in job.asked]
     p = job.asked[MOMENTS.name]["p"]
     job.meter.planned = len(p) + len(planned)
-    try:
-        with job.meter.running():
-            if MOMENTS.name not in job.entries:  # moments of even order take little
-                attempt(lambda: [job.solver.method.even(each) for each in p], MOMENTS.symbol)
-            first = [BY_NAME[LYAPUNOV_EXPONENT.name]] if choose(job.curve.problem).is_dear(0.0) else []
-            for part in dict.fromkeys((*first, *PARTS)):
-                is_known = part.name in job.entries
-                if part.solve is None or part.name not in job.asked or (is_known and part.draw is None):
-                    continue
-                if part is not MOMENTS:
-                    begin(part.symbol)
-                started = process_time()
-                found = attempt(partial(part.solve, job, job.asked[part.name]), part.symbol)
-                if is_known:  # it was drawn again, and its numbers stay as they are
-                    continue
-                job.add(part.name, _entry(job, part, found, process_time() - started))
-                if part is MOMENTS and isinstance(found, Reason):  # nor will there be anything else
-                    break
-    except KeyboardInterrupt:
-        job.keep(job)
-        raise
+    with job.meter.running():
+        if MOMENTS.name not in job.entries:  # moments of even order take little
+            attempt(lambda: [job.solver.method.even(each) for each in p], MOMENTS.symbol)
+        first = [BY_NAME[LYAPUNOV_EXPONENT.name]] if choose(job.curve.problem).is_dear(0.0) else []
+        for part in dict.fromkeys((*first, *PARTS)):
+            is_known = part.name in job.entries
+            if part.solve is None or part.name not in job.asked or (is_known and part.draw is None):
+                continue
+            if part is not MOMENTS:
+                begin(part.symbol)
+            started = process_time()
+            found = attempt(partial(part.solve, job, job.asked[part.name]), part.symbol)
+            if is_known:  # it was drawn again, and its numbers stay as they are
+                continue
+            job.add(part.name, _entry(job, part, found, process_time() - started))
+            if part is MOMENTS and isinstance(found, Reason):  # nor will there be anything else
+                break
     return job
 
 
@@ -82,21 +76,8 @@ def _may_pass(message: Message) -> bool:
     return message.tells_of(Code.NO_MEMORY) or message.tells_of(Code.FAULT)
 
 
-def solve_set(
-    job: Job,
-    tell: Callable[[Job], Told],
-    progress: Callable[[], None] = idle,
-    keep: Callable[[Job], None] = idle,
-) -> Told:
-    """The task: solves a set; one which contradicts itself, or overflows, fails.
-
-    Args:
-        job: the set, with what is known of it.
-        tell: makes of it what is returned, which pickles.
-        progress: called after each moment; only where the task stays in this process.
-        keep: takes the job as it grows, every `SOON` seconds at most, and when the work is interrupted.
-    """
-    job.progress, job.keep = progress, keep
+def solve_set(job: Job) -> Job:
+    """Solve what is not known of a set; one which contradicts itself, or overflows, fails."""
     p = np.array(job.asked[MOMENTS.name]["p"])
     if text := obstacle(job.curve.base, job.curve.varied, p, with_moments=False):
         found: Job | Reason = Reason("failed", message_of(f"{job.line}{text}"), job.curve.label)
@@ -104,7 +85,7 @@ def solve_set(
         found = attempt(partial(solve_curve, job), job.curve.label)
     if isinstance(found, Reason):
         job.add(MOMENTS.name, Entry(None, found, limit=ANEW))
-    return tell(job)
+    return job
 
 
 def result_of(job: Job) -> CurveResult:
