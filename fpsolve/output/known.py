@@ -13,8 +13,8 @@ from fpsolve.case.case import Case, Curve
 from fpsolve.output.records import Entries, Records, key_of, made, plain
 from fpsolve.output.tables import says_more
 from fpsolve.parts.every import BY_NAME
-from fpsolve.parts.moments import PART as MOMENTS
-from fpsolve.parts.part import Asked, Entry, Job, Limit, Numerics, Reason
+from fpsolve.parts.moments import QUESTION as MOMENTS
+from fpsolve.parts.question import Asked, Entry, Job, Limit, Numerics, Reason
 from fpsolve.results.curve import CurveResult
 from fpsolve.study.columns import row_of, table_of
 from fpsolve.study.solve import everything, result_of
@@ -26,13 +26,13 @@ ROW = "row"
 
 
 def names_of(asked: Asked, numerics: Numerics) -> dict[str, str]:
-    """What the entries of parts are called in the records of a set: by a digest of all that their numbers follow from.
+    """What the entries of a set are called in its records: by a digest of all that their numbers follow from.
 
     A budget is none of this: a number is the same under any.
     """
     solver = numerics.rtol, plain(numerics.mesh)
     of_row = {name: each for name, each in asked[MOMENTS.name].items() if name != "p"}
-    names = {name: key_of(each, *(solver if BY_NAME[name].uses_solver else ())) for name, each in asked.items()}
+    names = {name: key_of(each, *solver) for name, each in asked.items()}
     return {name: f"{name}-{key[:16]}" for name, key in (names | {ROW: key_of(of_row, *solver)}).items()}
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from fpsolve.case.case import Case
 from fpsolve.model.quantity import LYAPUNOV_EXPONENT
-from fpsolve.parts.part import Job, Part, Settings, attempt
+from fpsolve.parts.question import Job, Question, Settings, attempt
 
 
 def _settings(case: Case, number: int) -> Settings:
@@ -32,4 +32,4 @@ def _solve(job: Job, settings: Settings) -> dict[str, Any]:
     return {**space.phi.facts, **space.xi.facts, "unknowns": space.size}
 
 
-PART: Part = Part("discretisation", _settings, _solve, dict[str, Any])
+QUESTION: Question = Question("discretisation", _settings, _solve, dict[str, Any])

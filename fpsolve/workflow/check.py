@@ -19,8 +19,8 @@ from fpsolve.exponent.quantities import INDICES
 from fpsolve.messages import Message
 from fpsolve.page.limits import EACH, ROWS
 from fpsolve.page.page import Block, Column, Grid, Sentence
-from fpsolve.parts.moments import PART as MOMENTS
-from fpsolve.parts.part import Asked, Job, Numerics, Settings
+from fpsolve.parts.moments import QUESTION as MOMENTS
+from fpsolve.parts.question import Asked, Job, Numerics, Settings
 from fpsolve.pool import Pool, serial
 from fpsolve.results.curve import CurveResult
 from fpsolve.study.solve import result_of, solve_set

@@ -10,7 +10,7 @@ from fpsolve.case.sections import MonteCarloSection
 from fpsolve.exponent.method import Budget
 from fpsolve.files import alone, atomic
 from fpsolve.output.known import ROW, names_of, set_key
-from fpsolve.parts.part import Numerics
+from fpsolve.parts.question import Numerics
 from fpsolve.workflow.simulate import simulation_key
 from tests.kit import COSTLY, LEAN, TEXT, case_in, read_json, run
 
