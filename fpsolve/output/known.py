@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from bisect import bisect_left, insort
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from typing import Any
@@ -10,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from fpsolve.case.case import Case, Curve
+from fpsolve.model.quantity import STATUS
 from fpsolve.output.records import Entries, Records, key_of, made, plain
 from fpsolve.output.tables import says_more
 from fpsolve.parts.every import BY_NAME
@@ -87,7 +87,7 @@ class Results(Sequence[CurveResult]):
         self._asked = everything(case, 1), everything(case, 2)
         self._names = [names_of(each, self._numerics) for each in self._asked]
         self.table, self.says = table_of(case), np.ones(case.planned, dtype=bool)
-        self.whole, self._numbers = set[int](), list[int]()
+        self.whole = set[int]()
         self._kept: dict[int, CurveResult] = {}
         for job in self._jobs():
             if job.is_whole:
@@ -103,8 +103,6 @@ class Results(Sequence[CurveResult]):
     def add(self, job: Job) -> CurveResult:
         """Take what is known of a curve into the table."""
         number, result = job.curve.number, result_of(job)
-        if not self.has(number):
-            insort(self._numbers, number)
         if job.is_whole:
             self.whole.add(number)
         if number <= KEPT:
@@ -136,7 +134,7 @@ class Results(Sequence[CurveResult]):
     @property
     def telling(self) -> Iterator[CurveResult]:
         """Those of which more is said than their numbers."""
-        return (self.of(number) for number in self._numbers if self.says[number - 1])
+        return (self.of(number) for number in self.numbers if self.says[number - 1])
 
     def of(self, number: int) -> CurveResult:
         """That of the curve with a number."""
@@ -144,12 +142,19 @@ class Results(Sequence[CurveResult]):
 
     def has(self, number: int) -> bool:
         """Whether anything is known of the curve with a number."""
-        place = bisect_left(self._numbers, number)
-        return self._numbers[place : place + 1] == [number]
+        return bool(np.isfinite(self.table[STATUS.name].values[number - 1]))
+
+    @property
+    def numbers(self) -> list[int]:
+        """Those of the curves of which anything is known."""
+        return (np.flatnonzero(np.isfinite(self.table[STATUS.name].values)) + 1).tolist()
 
     def __len__(self) -> int:
-        return len(self._numbers)
+        return len(self.numbers)
+
+    def __iter__(self) -> Iterator[CurveResult]:
+        return map(self.of, self.numbers)
 
     def __getitem__(self, index: Any) -> Any:
-        numbers = self._numbers[index]
+        numbers = self.numbers[index]
         return [*map(self.of, numbers)] if isinstance(numbers, list) else self.of(numbers)
