@@ -145,11 +145,12 @@ class Pool:
         These are asked to end, and raise `KeyboardInterrupt` before their next factorisation; who catches it may give
         what is done by then. What is not begun, and what a cluster works on, is given up.
         """
+        ending: Iterable[Future[Any]] = [future for future in self._waiting if future.done()]
         if isinstance(self._executor, Processes):
             self._executor.end.value = True
-        ending = [future for future in self._waiting if not future.cancel()]
-        for future in futures.as_completed(ending):
-            if future.exception() is None:
+            ending = futures.as_completed([future for future in self._waiting if not future.cancel()])
+        for future in ending:
+            if not future.cancelled() and future.exception() is None:
                 yield self._waiting[future], future.result()
 
     def map(self, task: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:

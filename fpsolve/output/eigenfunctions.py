@@ -2,27 +2,18 @@
 
 from __future__ import annotations
 
-import math
-import re
-from collections.abc import Iterator, Sequence
 from functools import partial
-from pathlib import Path
 from typing import Literal
 
-import numpy as np
-
 from fpsolve.arrays import shown
-from fpsolve.case.case import Case
 from fpsolve.exponent.density import Grid, on_nodes
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.kinds import choose
 from fpsolve.exponent.method import DIRECTIONS, PHASE_AND_NOISE
-from fpsolve.model.quantity import NOISE, PHASE
+from fpsolve.model.quantity import PHASE
 from fpsolve.output.surfaces import Picture, Surface, painted, picture_of
-from fpsolve.page.page import Drawing
-from fpsolve.parts.nodes import FIELDS, FURTHEST, Nodes
-from fpsolve.results.curve import CurveResult, SimulatedCurve
-from fpsolve.vtk import name_at, parameter_lines, pyvista_module
+from fpsolve.parts.nodes import FIELDS, Nodes
+from fpsolve.vtk import parameter_lines
 
 FINER = 2
 """So many times as many nodes either way as a file for ParaView has; there they carry polynomials."""
@@ -86,49 +77,3 @@ def _picture_over_noise(pair: PrincipalPair, field: str, cmap: str) -> Picture:
 
 DRAWN = {PHASE_AND_NOISE.part: _picture_over_noise, DIRECTIONS.part: _picture_of_directions}
 """What draws each of the `Pictures`."""
-
-
-def figures(case: Case, result: CurveResult, folder: Path, _: SimulatedCurve | None) -> Iterator[Drawing]:
-    """A picture at one p for a page, where the eigenfunction was written."""
-    source = folder / name_at(f"eigenfunctions{result.curve.suffix}", case.usual_p)
-    if case.method.pictures == PHASE_AND_NOISE and case.shown.size and source.is_file():
-        title = f"Eigenfunction T(φ, ξ) of p = {case.usual_p:g}{result.curve.of}"
-        yield Drawing(title, partial(_paint, source), kind="png")
-
-
-def _paint(source: Path, paths: Sequence[Path], heading: str) -> None:
-    """The picture of a file."""
-    for path in paths:
-        picture_of(surface_from(source)).save(path)
-
-
-def surface_from(path: Path) -> Surface:
-    """T of a file, on the nodes of the elements."""
-    grid = pyvista_module().read(path)
-    phi, xi = np.asarray(grid.points)[:, :2].T
-    count = int(np.argmax(phi != phi[0])) or phi.size
-    rows = (-1, count)
-    z, facts = np.asarray(grid.point_data["z"]).reshape(rows)[0], grid.field_data
-    along, y = bytes(facts["along_y"]).decode(), xi.reshape(rows)[0]
-    is_lines = not along.startswith("noise xi")  # y is the number of a state, each a strip on which T is constant
-    if is_lines:
-        numbers, near = np.unique(np.round(y), return_index=True)
-        stated = [float(each) for each in re.findall(r"xi = (\S+?)(?:;|$)", along)]
-        y = y.copy()
-        y[near] = stated if len(stated) == numbers.size else numbers
-    else:
-        near = np.flatnonzero(np.abs(z) <= FURTHEST)
-        near = near if near.size > 1 else np.arange(z.size)
-    impacts = [each for each in np.asarray(facts["impacts"]).tolist() if not math.isnan(each)]
-    about = {"phi": PHASE.attributes, "xi": {**NOISE.attributes, "units": "1"}, "values": FIELDS["T"].attributes}
-    return Surface(
-        phi=phi.reshape(rows)[:, :1].T,
-        xi=y[near],
-        values=np.asarray(grid.point_data["T"]).reshape(rows)[:, near],
-        about=about,
-        name="T",
-        title=f"p = {float(facts['p'][0]):g}, Λ(p) = {float(facts['Lambda'][0]):.6g}",
-        lines=bytes(facts["held"]).decode().splitlines() if "held" in facts else (),
-        impacts=[each % (2 * math.pi) for each in impacts],
-        is_lines=is_lines,
-    )

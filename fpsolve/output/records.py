@@ -35,7 +35,8 @@ from fpsolve.pool import Pool
 _OF_ANOTHER_FORM = LookupError, TypeError, AttributeError, ValueError, ArithmeticError, RecursionError, zlib.error
 """What is raised where data have another form than what is made of them."""
 Entries = dict[str, Any]
-Item, Found = TypeVar("Item"), TypeVar("Found")
+Item = TypeVar("Item")
+Found = TypeVar("Found")
 
 
 class Records:

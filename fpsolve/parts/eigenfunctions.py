@@ -113,7 +113,7 @@ def question_of_pictures(
         symbol,
         said=lambda found, *_: found,
         files=files,
-        is_drawn_anew=True,
+        is_picture=True,
     )
 
 

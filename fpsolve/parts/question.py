@@ -236,7 +236,7 @@ class Question:
         lacks: why some of what is asked for is not there.
         numbers: those of a curve that a case asks for, by their quantities; of none, the quantities without numbers.
         files: writes into a folder what a curve has beyond the tables.
-        is_drawn_anew: whether files show more than a record holds, so that it is solved again for them.
+        is_picture: whether its files show more than a record holds, so that it is solved again for them.
     """
 
     name: str
@@ -248,4 +248,4 @@ class Question:
     lacks: Callable[[Any, Settings], Iterable[Message]] = _nothing
     numbers: Callable[[Case, CurveResult | None], Mapping[Quantity, Any]] = _no_numbers
     files: Callable[[Any, Curve, Path], None] | None = None
-    is_drawn_anew: bool = False
+    is_picture: bool = False

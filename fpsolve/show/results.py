@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from fpsolve.case.case import Case
-from fpsolve.case.sections import RESPONSE, SENSITIVITIES
-from fpsolve.exponent.method import DIRECTIONS, PHASE_AND_NOISE
-from fpsolve.output import directions, eigenfunctions, response, sensitivities
 from fpsolve.output.figures import main_figure, rate_figure
+from fpsolve.output.pictures import FIGURES
 from fpsolve.page.limits import EACH, PICTURES, ROWS_OVER_P
 from fpsolve.page.page import Block, Drawing, Sentence
 from fpsolve.parts.every import BY_NAME
@@ -20,15 +18,6 @@ from fpsolve.show import curves
 from fpsolve.show.numbers import OF_CURVE, moment_grid
 from fpsolve.show.verdict import meaning, verdicts
 from fpsolve.study.columns import table_of
-
-Figures = Callable[[Case, CurveResult, Path, SimulatedCurve | None], Iterator[Drawing]]
-FIGURES: Mapping[str, Figures] = {
-    RESPONSE: response.figures,
-    SENSITIVITIES: sensitivities.figures,
-    PHASE_AND_NOISE.part: eigenfunctions.figures,
-    DIRECTIONS.part: directions.figures,
-}
-"""Of a curve in a folder, beside its simulation if there is one, by the names of questions."""
 
 
 def show(

@@ -366,9 +366,8 @@ def prove_case(
         written = monotonic()
         with shown_at_the_end(report):
             try:
-                records, kept_as = Records(folder / PROVEN_RECORDS), {"read": verified, "entries": record_of}
-                known: Any = answered(records, workers, answer, plan.questions(), key=_key, **kept_as)
-                for _, found, is_known in known:
+                records, kept_as = Records(folder / PROVEN_RECORDS), dict[str, Any](read=verified, entries=record_of)
+                for _, found, is_known in answered(records, workers, answer, plan.questions(), key=_key, **kept_as):
                     answers.append(found)
                     progress(failed=not found.is_proven, known=is_known)
                     if monotonic() - written > EVERY and len(answers) % plan.each == 0:

@@ -45,7 +45,7 @@ class Solved:
 
     Attributes:
         record: what was solved now.
-        files: the contents of its files, by their names in the folder of the case.
+        files: the contents of its pictures, by their names in the folder of the case.
         interrupted: whether the work was.
     """
 
@@ -55,7 +55,7 @@ class Solved:
 
 
 def solved(job: Job) -> Solved:
-    """The task: solves a set and writes its files; where it is interrupted, what is done by then."""
+    """The task: solves a set and draws its pictures; where it is interrupted, what is done by then."""
     try:
         solve_set(job)
         return Solved(record_of(job), contents_of(job))
@@ -64,16 +64,14 @@ def solved(job: Job) -> Solved:
 
 
 def contents_of(job: Job) -> dict[str, bytes]:
-    """The files of a set by their names, written into a folder of their own: a cluster may lack that of the case."""
-    questions = [BY_NAME[name] for name in job.asked if BY_NAME[name].files]
-    if not questions:
+    """The pictures of a set by their names, drawn in a folder of their own: a cluster may not have that of the case."""
+    if not job.pictures:
         return {}
     with TemporaryDirectory() as place:
         folder = Path(place)
-        for each in questions:
-            found = (job.pictures.get if each.is_drawn_anew else job.found)(each.name)
-            if each.files and found:
-                each.files(found, job.curve, folder)
+        for name, found in job.pictures.items():
+            if draw := BY_NAME[name].files:
+                draw(found, job.curve, folder)
         files = (path for path in sorted(folder.rglob("*")) if path.is_file())
         return {path.relative_to(folder).as_posix(): path.read_bytes() for path in files}
 
@@ -127,7 +125,7 @@ class Sweep:
         """Solve what is not known yet, and draw; tables are written first, if anything is missing, and as they grow."""
         if self.done < self.case.planned:
             self.write_tables()
-        draws = [any(BY_NAME[name].files for name in self.results.asked(number)) for number in (1, 2)]
+        draws = [any(BY_NAME[name].is_picture for name in self.results.asked(number)) for number in (1, 2)]
         numbers = range(1, self.case.planned + 1)
         left = [number for number in numbers if draws[number > 1] or number not in self.results.whole]
         if len(left) < self.case.planned:
@@ -151,7 +149,7 @@ class Sweep:
                 raise
 
     def _take(self, job: Job, each: Solved) -> bool:
-        """Keep what became of a set, and its files; whether it has failed."""
+        """Keep what became of a set, and its pictures; whether it has failed."""
         is_failed = bool(each.record) and self.results.put(job.curve.number, each.record).status.fails
         for name, content in each.files.items():
             with atomic(self.folder / name) as draft:
@@ -170,9 +168,14 @@ class Sweep:
         self._due = monotonic() + REST * (monotonic() - started)
 
     def write_all(self) -> None:
-        """Write the tables, results.nc, and the series over the curves."""
+        """Write the tables, results.nc, the series over the curves, and the files of what records hold."""
         self.write_tables()
         write_curves(self.case, self.folder)
+        recorded = [BY_NAME[name] for name in self.results.asked(1) if not BY_NAME[name].is_picture]
+        writers = {each.name: each.files for each in recorded if each.files}
+        for result in self.results if writers else ():
+            for name in writers.keys() & result.parts.keys():
+                writers[name](result.parts[name], result.curve, self.folder)
         table = self.results.table
         write_dataset(self.case, table, self.folder, self.facts)
         numbers = [each.values for each in table.values() if each.quantity not in (*COUNTS, STATUS, SECONDS)]

@@ -183,7 +183,9 @@ class Simulations:
     def _curves(self, progress: Advance, pool: Pool | None) -> Iterator[SimulatedCurve]:
         """The simulations in the order of the curves; an interrupt (Ctrl-C) ends them with what is done."""
         asked: dict[str, Any] = {"orders": self.case.simulated.tolist(), "setting": self.case.monte_carlo}
-        task = partial(simulate_curve, **asked, **({} if pool else {"progress": progress}))
+        task = partial(simulate_curve, **asked)
+        if pool is None:
+            task = partial(task, progress=progress)
         with pool or serial() as workers:
             kept: dict[str, Any] = {"read": simulated_of, "entries": record_of}
             found = answered(

@@ -126,10 +126,10 @@ def test_a_response_that_fails_costs_no_other_number(tmp_path, monkeypatch, rais
 def test_a_simulation_that_fails_keeps_the_curves_before_it(tmp_path, monkeypatch):
     original = simulate.simulate_curve
 
-    def failing(curve, *others):
+    def failing(curve, **asked):
         if curve.number == 2:
             raise NotConverged("the simulation overflowed")
-        return original(curve, *others)
+        return original(curve, **asked)
 
     monkeypatch.setattr(simulate, "simulate_curve", failing)
     text = "[moments]\np = [1.0]\n[output]\nquantities = ['moment']\n[monte_carlo]\npaths = 32\ntime = 40.0\n"
