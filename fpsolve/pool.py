@@ -17,7 +17,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from concurrent import futures
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import chain, islice
@@ -26,6 +26,7 @@ from types import ModuleType
 from typing import Any, TypeVar
 
 from fpsolve.arrays import is_whole, shown
+from fpsolve.budget import Meter, watched
 from fpsolve.errors import FpsolveError, WorkersDied
 
 Item = TypeVar("Item")
@@ -43,6 +44,8 @@ LOOK_SECONDS = 1.0
 MOST_JOBS = 1000
 """Largest number of processes on this machine; each needs an open file."""
 _limits: list[int] = []
+_of_worker = ExitStack()
+"""What holds in a worker as long as it lives."""
 ANEW = "what was finished is kept, and the same command goes on"
 """What is said where workers have died."""
 STOPPED = "the scheduler has stopped; the same command goes on where this one stopped"
@@ -92,6 +95,7 @@ class Pool:
     has_workers: Callable[[], bool] = lambda: True
     is_elsewhere: bool = False
     _executor: Executor | None = field(default=None, init=False, repr=False)
+    _waiting: dict[Future[Any], Any] = field(default_factory=dict, init=False, repr=False)
 
     def __enter__(self) -> Pool:
         return self
@@ -117,7 +121,8 @@ class Pool:
                 source = chain([item], source)
                 break
             yield item, task(item)
-        waiting = dict[Future[Result], Item]()
+        waiting: dict[Future[Result], Item] = {}
+        self._waiting = waiting
         try:
             while True:
                 for item in islice(source, max(SUBMITTED, 2 * self.size) - len(waiting)):
@@ -125,13 +130,28 @@ class Pool:
                 if not waiting:
                     return
                 for future in self._done([next(iter(waiting))] if in_order else waiting):
-                    yield waiting.pop(future), future.result()
+                    yield waiting[future], future.result()
+                    del waiting[future]
         except CancelledError:
             raise WorkersDied(STOPPED) from None
         except Exception as failure:
             if isinstance(failure, BrokenExecutor) or type(failure).__name__ == "KilledWorker":  # as Dask calls it
                 raise WorkersDied(f"a worker has died, perhaps for lack of memory; {ANEW}") from None
             raise
+
+    def rest(self) -> Iterator[tuple[Any, Any]]:
+        """After an interrupt of `run` what the workers have: what is done, and what tasks on processes here end with.
+
+        These are asked to end, and raise `KeyboardInterrupt` before their next factorisation; who catches it may give
+        what is done by then. What is not begun, and what a cluster works on, is given up.
+        """
+        ending: Iterable[Future[Any]] = [future for future in self._waiting if future.done()]
+        if isinstance(self._executor, Processes):
+            self._executor.end.value = True
+            ending = futures.as_completed([future for future in self._waiting if not future.cancel()])
+        for future in ending:
+            if not future.cancelled() and future.exception() is None:
+                yield self._waiting[future], future.result()
 
     def map(self, task: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
         """The results in the order of the items, see `run`."""
@@ -159,7 +179,7 @@ class Pool:
 
 def serial() -> Pool:
     """This process alone, item by item."""
-    return Pool(lambda: _processes(1), own_seconds=math.inf)
+    return Pool(partial(Processes, 1), own_seconds=math.inf)
 
 
 def parallel(count: int | None = None, tasks: int = MOST_JOBS) -> Pool:
@@ -178,7 +198,7 @@ def parallel(count: int | None = None, tasks: int = MOST_JOBS) -> Pool:
     size = min(count or processors(), tasks)
     if size == 1:
         return serial()
-    return Pool(partial(_processes, size), _kill, size, START_SECONDS if count is None else 0.0)
+    return Pool(partial(Processes, size), _kill, size, START_SECONDS if count is None else 0.0)
 
 
 def cluster(address: str) -> Pool:
@@ -249,22 +269,34 @@ def _version() -> str:
     return __version__
 
 
-def _processes(count: int) -> Executor:
-    """New processes, in which nothing of this one is copied, neither its locks nor its threads."""
-    context = multiprocessing.get_context("spawn")
-    return futures.ProcessPoolExecutor(count, mp_context=context, initializer=_begin_worker)
+class Processes(futures.ProcessPoolExecutor):
+    """New processes, in which nothing of this one is copied, neither its locks nor its threads.
+
+    Attributes:
+        end: memory that they share, true once they shall end what they do; without a lock, as they may be killed.
+    """
+
+    def __init__(self, count: int) -> None:
+        context = multiprocessing.get_context("spawn")
+        self.end: Any = context.RawValue("b", False)
+        super().__init__(count, mp_context=context, initializer=_begin_worker, initargs=(self.end,))
 
 
-def _begin_worker() -> None:
+def _begin_worker(end: Any) -> None:
     """A worker has one processor, one share of the memory, and ends when what started it does, however that ends."""
     limit_processors(1)
     parent = multiprocessing.parent_process()
+
+    def look(_: Meter) -> None:
+        if end.value:
+            raise KeyboardInterrupt
 
     def end_with_parent() -> None:
         if parent is not None:
             parent.join()
             os._exit(1)
 
+    _of_worker.enter_context(watched(look))
     threading.Thread(target=end_with_parent, daemon=True).start()
 
 

@@ -18,7 +18,7 @@ from fpsolve.case import Case
 from fpsolve.cli import main
 from fpsolve.model import CoefficientMatrix, LinearSystem, Noise, System
 from fpsolve.output.known import names_of, read_into, record_of
-from fpsolve.parts.part import Job, Numerics
+from fpsolve.parts.question import Job, Numerics
 from fpsolve.results import CurveResult, SimulatedCurve
 from fpsolve.study.solve import everything, result_of, solve_curve
 from fpsolve.workflow.simulate import simulate_curve

@@ -344,12 +344,12 @@ def boundary(
     check_axes(problem, x, y)
     if nodes is not None and not is_whole(nodes, 2):
         raise ValueError(f"got nodes = {shown(nodes)}; must be a whole number from 2")
-    line = begun(target_of(target), x, y, problem, step=step, nodes=nodes, budget=budget or Budget())
+    line = untraced(target_of(target), x, y, problem, step=step, nodes=nodes, budget=budget or Budget())
     *_, whole = line.solve(progress=progress, stepped=progress)
     return whole
 
 
-def begun(
+def untraced(
     target: Target,
     x: Axis,
     y: Axis,

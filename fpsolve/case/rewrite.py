@@ -13,9 +13,9 @@ import tomlkit
 from tomlkit.items import Comment, Table
 
 from fpsolve.case.case import Case
+from fpsolve.case.keys import get, put
 from fpsolve.case.toml import document_of, loads
 from fpsolve.explain import is_number
-from fpsolve.model.faults import table_of
 
 
 def rewritten(
@@ -42,8 +42,7 @@ def rewritten(
     for key, value in values.items():
         _set(data, key, value)
     for key, each in lists.items():
-        section, _, name = key.partition(".")
-        data.setdefault(section, {})[name] = [*each]
+        put(data, key, [*each])
     return _with_data(case.text, data) + more
 
 
@@ -52,8 +51,8 @@ def _data(case: Case, folder: Path) -> dict[str, Any]:
     document = document_of(case.text)
     for change in case.overrides:
         document.override(change, change)
-    if file := table_of(document.data.get("mesh")).get("file"):
-        document.data["mesh"]["file"] = Path(os.path.relpath(case.path.parent / file, folder)).as_posix()
+    if file := get(document.data, "mesh.file"):
+        put(document.data, "mesh.file", Path(os.path.relpath(case.path.parent / file, folder)).as_posix())
     return document.data
 
 
@@ -61,14 +60,10 @@ def _set(data: dict[str, Any], key: str, value: float | str) -> None:
     """Set a parameter where a case states it, or else as the only value of a key that is varied."""
     section, _, name = key.rpartition(".")
     for base in (section, "system") if section == "oscillator" else (section,):
-        for inner in ((), ("parameters",)):
-            table: Any = data
-            for part in (*base.split("."), *inner):
-                table = table_of(table).get(part)
-            stated: Any = table_of(table).get(name)
-            for place, last in ((table, name), (stated, "value")):
-                if is_number(table_of(place).get(last)):
-                    place[last] = value
+        for place in (f"{base}.{name}", f"{base}.parameters.{name}"):
+            for each in (place, f"{place}.value"):
+                if is_number(get(data, each)):
+                    put(data, each, value)
                     return
     data.setdefault("vary", {})[key] = [value]
 

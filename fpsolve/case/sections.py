@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 import re
 from bisect import bisect_left
-from collections.abc import Container, Mapping
+from collections.abc import Iterable, Mapping
 from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
@@ -28,6 +28,7 @@ from fpsolve.analysis.axis import Axis
 from fpsolve.analysis.excursions import STATIONARY
 from fpsolve.analysis.target import EXAMPLES, Target, target_of
 from fpsolve.arrays import FloatArray
+from fpsolve.case.keys import leaves
 from fpsolve.errors import MeshError
 from fpsolve.explain import (
     BY_KIND,
@@ -46,7 +47,6 @@ from fpsolve.exponent.method import RTOL, RTOL_BEYOND_PLANE, RTOL_OF_SEVERAL, RT
 from fpsolve.exponent.quantities import INDICES, MOMENT, QUANTITIES, DrawnName, QuantityName
 from fpsolve.fem.mesh import MAX_CELLS, MAX_DEGREE, CylinderMesh, make_mesh, read_mesh
 from fpsolve.messages import is_control
-from fpsolve.model.faults import table_of
 from fpsolve.model.parameters import Section, parameter
 from fpsolve.model.quantity import DERIVATIVE, RATE_FUNCTION, Quantity, moment_at
 from fpsolve.simulation.setup import BATCHES, MAX_PATHS, PATHS, Estimator
@@ -141,23 +141,18 @@ def same(value: Value, other: Value) -> bool:
     return math.isclose(value, other, rel_tol=SAME)  # type: ignore[arg-type]
 
 
-def flat(table: Mapping[str, Any], whole: Container[str] = (), section: str = "") -> dict[str, Any]:
+def flat(table: Mapping[str, Any], whole: Iterable[str] = ()) -> dict[str, Any]:
     """Nested tables as one: noise.D0 = 1.0 means the same as "noise.D0" = 1.0.
 
     Args:
         table: with the values of keys, or tables of them; a range is a value.
         whole: the keys whose tables are values, not sections.
-        section: the first part of all keys, with a dot.
     """
     result: dict[str, Any] = {}
-    for name, item in table.items():
-        key = section + name
-        inner = table_of(item)
-        is_section = inner and key not in whole and not inner.keys() & RANGE
-        for each, value in (flat(inner, whole, f"{key}.") if is_section else {key: item}).items():
-            if each in result:
-                raise ValueError(f"{each} stands twice, once with quotes and once without; remove one of them")
-            result[each] = value
+    for key, value in leaves(table, {*whole, *RANGE}):
+        if key in result:
+            raise ValueError(f"{key} stands twice, once with quotes and once without; remove one of them")
+        result[key] = value
     return result
 
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from fpsolve.case.keys import get, put
 from fpsolve.errors import CaseError, Fault
 from fpsolve.messages import is_control
 from fpsolve.model.parameters import without_unit
@@ -179,10 +180,7 @@ class Document:
             if len(assigned) != 1:
                 raise ValueError(f"must be one key=value, but there are {len(assigned)} here")
             path: Keys = assigned[0]
-            value: Any = loads(text)
-            for key in path:
-                value = value[key]
-            _assign(self.data, dotted(path).split("."), value)
+            put(self.data, dotted(path), get(loads(text), dotted(path)))
         except RecursionError:
             self.faults.append(Fault(typed, None, _TOO_DEEP))
         except ValueError as error:
@@ -201,20 +199,6 @@ def _quoted_if_bare(text: str) -> str:
     key, _, value = map(str.strip, text.partition("="))
     is_word = re.fullmatch(r"[A-Za-z./~][\w./~ -]*", value) and value not in ("true", "false", "nan", "inf")
     return f'{key}="{value}"' if is_word else text
-
-
-def _assign(table: dict[str, Any], path: Sequence[str], value: Any) -> None:
-    """Set a key that stands in nested tables or, with its dots, quoted in one."""
-    rest = ".".join(path)
-    key = max((key for key in table if f"{rest}.".startswith(f"{key}.")), key=len, default=path[0])
-    inner = path[key.count(".") + 1 :]
-    if not inner:
-        table[key] = value
-        return
-    child = table.setdefault(key, {})
-    if not isinstance(child, dict):
-        raise ValueError(f"{key} is not a table, so it has no key {inner[0]}")
-    _assign(child, inner, value)
 
 
 def read_document(

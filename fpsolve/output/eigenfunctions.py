@@ -11,8 +11,8 @@ from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.kinds import choose
 from fpsolve.exponent.method import DIRECTIONS, PHASE_AND_NOISE
 from fpsolve.model.quantity import PHASE
+from fpsolve.output.surfaces import Picture, Surface, painted, picture_of
 from fpsolve.parts.nodes import FIELDS, Nodes
-from fpsolve.parts.surfaces import Picture, Surface, painted, picture_of
 from fpsolve.vtk import parameter_lines
 
 FINER = 2

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from bisect import bisect_left, insort
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from typing import Any
@@ -10,29 +9,32 @@ from typing import Any
 import numpy as np
 
 from fpsolve.case.case import Case, Curve
+from fpsolve.model.quantity import STATUS
 from fpsolve.output.records import Entries, Records, key_of, made, plain
 from fpsolve.output.tables import says_more
+from fpsolve.parts.discretisation import QUESTION as DISCRETISATION
+from fpsolve.parts.discretisation import largest_of
 from fpsolve.parts.every import BY_NAME
-from fpsolve.parts.moments import PART as MOMENTS
-from fpsolve.parts.part import Asked, Entry, Job, Limit, Numerics, Reason
+from fpsolve.parts.moments import QUESTION as MOMENTS
+from fpsolve.parts.question import Asked, Entry, Job, Largest, Limit, Numerics, Reason
 from fpsolve.results.curve import CurveResult
 from fpsolve.study.columns import row_of, table_of
 from fpsolve.study.solve import everything, result_of
 
 KEPT = 100
 """So many results stay in memory, as of few curves all are asked for again."""
-ROW = "row"
-"""What the entries of Λ(p) are called, before their p."""
+ROW, LARGEST = "row", "largest"
+"""What the entries of Λ(p) are called, before their p; or before this of what the largest p was solved on."""
 
 
 def names_of(asked: Asked, numerics: Numerics) -> dict[str, str]:
-    """What the entries of parts are called in the records of a set: by a digest of all that their numbers follow from.
+    """What the entries of a set are called in its records: by a digest of all that their numbers follow from.
 
     A budget is none of this: a number is the same under any.
     """
     solver = numerics.rtol, plain(numerics.mesh)
     of_row = {name: each for name, each in asked[MOMENTS.name].items() if name != "p"}
-    names = {name: key_of(each, *(solver if BY_NAME[name].uses_solver else ())) for name, each in asked.items()}
+    names = {name: key_of(each, *solver) for name, each in asked.items()}
     return {name: f"{name}-{key[:16]}" for name, key in (names | {ROW: key_of(of_row, *solver)}).items()}
 
 
@@ -44,6 +46,8 @@ def record_of(job: Job) -> Entries:
         limit = job.new[MOMENTS.name].limit if MOMENTS.name in job.new else job.numerics.limit
         known = ((p, job.rows[p]) for p in job.asked[MOMENTS.name]["p"] if p in job.rows)
         record |= {f"{names[ROW]} {p!r}": plain((row, limit)) for p, row in known}
+    if record and "solver" in vars(job) and DISCRETISATION.name not in job.entries and (largest := largest_of(job)):
+        record[f"{names[ROW]} {LARGEST}"] = plain(largest)
     return record
 
 
@@ -56,6 +60,8 @@ def read_into(job: Job, record: Entries, names: Mapping[str, str], *, is_all: bo
             entry = Entry(*own, made(Limit | None, limit))
             if is_all or job.numerics.settles(entry.limit):
                 job.entries[name] = entry
+    with suppress(ValueError, KeyError):
+        job.largest = made(Largest, record[f"{names[ROW]} {LARGEST}"])
     for p in job.asked[MOMENTS.name]["p"]:
         with suppress(ValueError, KeyError):
             row, limit = made(tuple[tuple[float, ...], Limit | None], record[f"{names[ROW]} {p!r}"])
@@ -87,7 +93,7 @@ class Results(Sequence[CurveResult]):
         self._asked = everything(case, 1), everything(case, 2)
         self._names = [names_of(each, self._numerics) for each in self._asked]
         self.table, self.says = table_of(case), np.ones(case.planned, dtype=bool)
-        self.whole, self._numbers = set[int](), list[int]()
+        self.whole = set[int]()
         self._kept: dict[int, CurveResult] = {}
         for job in self._jobs():
             if job.is_whole:
@@ -103,8 +109,6 @@ class Results(Sequence[CurveResult]):
     def add(self, job: Job) -> CurveResult:
         """Take what is known of a curve into the table."""
         number, result = job.curve.number, result_of(job)
-        if not self.has(number):
-            insort(self._numbers, number)
         if job.is_whole:
             self.whole.add(number)
         if number <= KEPT:
@@ -136,7 +140,7 @@ class Results(Sequence[CurveResult]):
     @property
     def telling(self) -> Iterator[CurveResult]:
         """Those of which more is said than their numbers."""
-        return (self.of(number) for number in self._numbers if self.says[number - 1])
+        return (self.of(number) for number in self.numbers if self.says[number - 1])
 
     def of(self, number: int) -> CurveResult:
         """That of the curve with a number."""
@@ -144,12 +148,19 @@ class Results(Sequence[CurveResult]):
 
     def has(self, number: int) -> bool:
         """Whether anything is known of the curve with a number."""
-        place = bisect_left(self._numbers, number)
-        return self._numbers[place : place + 1] == [number]
+        return bool(np.isfinite(self.table[STATUS.name].values[number - 1]))
+
+    @property
+    def numbers(self) -> list[int]:
+        """Those of the curves of which anything is known."""
+        return (np.flatnonzero(np.isfinite(self.table[STATUS.name].values)) + 1).tolist()
 
     def __len__(self) -> int:
-        return len(self._numbers)
+        return len(self.numbers)
+
+    def __iter__(self) -> Iterator[CurveResult]:
+        return map(self.of, self.numbers)
 
     def __getitem__(self, index: Any) -> Any:
-        numbers = self._numbers[index]
+        numbers = self.numbers[index]
         return [*map(self.of, numbers)] if isinstance(numbers, list) else self.of(numbers)

@@ -14,25 +14,29 @@ import math
 import os
 import zlib
 from base64 import b64decode, b64encode
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import fields, is_dataclass
 from errno import ENOSPC
 from functools import cache
 from hashlib import sha256
+from itertools import tee
 from pathlib import Path
 from types import NoneType, UnionType
-from typing import Any, Literal, get_args, get_origin, get_type_hints
+from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
 
 import numpy as np
 
 from fpsolve import __version__
 from fpsolve.arrays import FloatArray
 from fpsolve.messages import Message
+from fpsolve.pool import Pool
 
 _OF_ANOTHER_FORM = LookupError, TypeError, AttributeError, ValueError, ArithmeticError, RecursionError, zlib.error
 """What is raised where data have another form than what is made of them."""
 Entries = dict[str, Any]
+Item = TypeVar("Item")
+Found = TypeVar("Found")
 
 
 class Records:
@@ -101,6 +105,48 @@ def _parsed(line: bytes) -> tuple[str, bytes] | None:
         return (str(head["key"]), content) if mark and zlib.crc32(content) == head["crc32"] else None
     except (ValueError, KeyError, TypeError, RecursionError):
         return None
+
+
+def answered(
+    records: Records,
+    pool: Pool,
+    task: Callable[[Item], Found],
+    items: Iterable[Item],
+    *,
+    key: Callable[[Item], str],
+    read: Callable[[Entries, Item], Found | None],
+    entries: Callable[[Found], Entries],
+) -> Iterator[tuple[Item, Found, bool]]:
+    """What is found of each item, in their order, and whether an earlier run had; what is new is recorded as it comes.
+
+    Args:
+        records: of the items.
+        pool: does the tasks of those that are not known.
+        task: finds something of an item; can be pickled.
+        items: are taken twice.
+        key: what the record of an item is found by.
+        read: gives what its record has; None, or raises `ValueError`, where that is nothing.
+        entries: the record of what was found; empty of what is not kept.
+    """
+    earlier, new = dict[str, Found | None](), dict[str, Found]()
+
+    def known(item: Item) -> Found | None:
+        if (name := key(item)) not in earlier:
+            earlier[name] = None
+            with suppress(ValueError):
+                earlier[name] = read(records.get(name), item)
+        return earlier[name]
+
+    ahead, items = tee(items)
+    fresh = pool.run(task, (each for each in ahead if known(each) is None))
+    for item in items:
+        found = known(item)
+        while found is None and key(item) not in new:
+            each, one = next(fresh)
+            new[key(each)] = one
+            if record := entries(one):
+                records.put(key(each), record)
+        yield item, found or new[key(item)], found is not None
 
 
 def key_of(*content: Any) -> str:

@@ -25,7 +25,7 @@ from fpsolve.case.remedies import CASE_WORDS
 from fpsolve.files import draft
 from fpsolve.messages import message_of
 from fpsolve.model.quantity import MOMENT, STATUS, Quantity
-from fpsolve.parts.every import PARTS
+from fpsolve.output.beyond import BEYOND
 from fpsolve.results.curve import CurveResult, Status
 from fpsolve.results.table import Table, plain
 from fpsolve.study.columns import COUNTS, table_of
@@ -201,4 +201,4 @@ def says_more(case: Case, result: CurveResult) -> bool:
 
 def _beyond_tables(case: Case, result: CurveResult) -> dict[str, Any]:
     """What neither results.nc nor a CSV file has."""
-    return {name: each for part in PARTS for name, each in part.content(case, result).items()}
+    return {name: each for about in BEYOND for name, each in about(case, result).items()}

@@ -9,8 +9,7 @@ Field data are numbers, as meshio refuses texts: a text is the codes of its lett
 from __future__ import annotations
 
 import math
-import re
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from importlib.resources import files
@@ -30,12 +29,9 @@ from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.method import PHASE_AND_NOISE, Pictures
 from fpsolve.files import write_text
 from fpsolve.messages import Code, Message
-from fpsolve.model.quantity import MOMENT, NOISE, PHASE
-from fpsolve.page.page import Drawing
-from fpsolve.parts.nodes import FIELDS, FURTHEST, Nodes
-from fpsolve.parts.part import Job, Part, Reason, Settings, attempt
-from fpsolve.parts.surfaces import Surface, picture_of
-from fpsolve.results.curve import CurveResult, SimulatedCurve
+from fpsolve.model.quantity import MOMENT
+from fpsolve.parts.nodes import Nodes
+from fpsolve.parts.question import Job, Question, Reason, Settings, attempt
 from fpsolve.vtk import Facts, collection_of, field_data, name_at, pyvista_module, write_points, write_series
 
 CURVES = "curves.pvd"
@@ -97,33 +93,31 @@ def _solve(job: Job, settings: Settings) -> tuple[Message, ...]:
     return tuple(said)
 
 
-def part_of_pictures(
+def question_of_pictures(
     pictures: Pictures,
     symbol: str,
     solve: Callable[[Job, Settings], tuple[Message, ...]],
-    draw: Callable[[Any, Curve, Path], None],
-    figures: Callable[[Case, CurveResult, Path], Iterator[Drawing]],
-) -> Part:
-    """The part of the cases of which there are such pictures; what it finds is what was said when they were solved.
+    files: Callable[[Any, Curve, Path], None],
+) -> Question:
+    """That of the cases of which there are such pictures; what it finds is what was said when they were solved.
 
     Args:
         pictures: what is drawn.
-        symbol, solve, draw: see `Part`.
-        figures: of what was written into a folder; empty where that was nothing.
+        symbol, solve, files: see `Question`.
     """
+    return Question(
+        pictures.part,
+        lambda case, number: shown_of(case, number) if case.method.pictures == pictures else None,
+        solve,
+        tuple[Message, ...],
+        symbol,
+        said=lambda found, *_: found,
+        files=files,
+        is_picture=True,
+    )
 
-    def settings(case: Case, number: int) -> Settings | None:
-        return shown_of(case, number) if case.method.pictures == pictures else None
 
-    def drawings(case: Case, result: CurveResult, folder: Path, _: SimulatedCurve | None) -> Iterator[Drawing]:
-        if case.method.pictures == pictures:
-            yield from figures(case, result, folder)
-
-    kind = tuple[Message, ...]
-    return Part(pictures.part, settings, solve, kind, symbol, said=lambda found, *_: found, draw=draw, figures=drawings)
-
-
-def _draw(found: Eigenfunctions, curve: Curve, folder: Path) -> None:
+def _files(found: Eigenfunctions, curve: Curve, folder: Path) -> None:
     """Write the eigenfunctions of a curve; with the first curve the stationary density too, if that is wanted."""
     if found.stationary is None:
         return
@@ -234,50 +228,4 @@ def _write_grid(path: Path, grid: Nodes, data: Mapping[str, FloatArray], facts: 
     write_points(path, pyvista.UnstructuredGrid(cells, grid.points()), shown, {**axes, **facts})
 
 
-def _figures(case: Case, result: CurveResult, folder: Path) -> Iterator[Drawing]:
-    """A picture at one p for a page, where the eigenfunction was written."""
-    source = folder / name_at(f"eigenfunctions{result.curve.suffix}", case.usual_p)
-    if case.shown.size and source.is_file():
-        title = f"Eigenfunction T(φ, ξ) of p = {case.usual_p:g}{result.curve.of}"
-        yield Drawing(title, partial(_paint, source), kind="png")
-
-
-def _paint(source: Path, paths: Sequence[Path], heading: str) -> None:
-    """The picture of a file."""
-    for path in paths:
-        picture_of(surface_from(source)).save(path)
-
-
-def surface_from(path: Path) -> Surface:
-    """T of a file, on the nodes of the elements."""
-    grid = pyvista_module().read(path)
-    phi, xi = np.asarray(grid.points)[:, :2].T
-    count = int(np.argmax(phi != phi[0])) or phi.size
-    rows = (-1, count)
-    z, facts = np.asarray(grid.point_data["z"]).reshape(rows)[0], grid.field_data
-    along, y = bytes(facts["along_y"]).decode(), xi.reshape(rows)[0]
-    is_lines = not along.startswith("noise xi")  # y is the number of a state, each a strip on which T is constant
-    if is_lines:
-        numbers, near = np.unique(np.round(y), return_index=True)
-        stated = [float(each) for each in re.findall(r"xi = (\S+?)(?:;|$)", along)]
-        y = y.copy()
-        y[near] = stated if len(stated) == numbers.size else numbers
-    else:
-        near = np.flatnonzero(np.abs(z) <= FURTHEST)
-        near = near if near.size > 1 else np.arange(z.size)
-    impacts = [each for each in np.asarray(facts["impacts"]).tolist() if not math.isnan(each)]
-    about = {"phi": PHASE.attributes, "xi": {**NOISE.attributes, "units": "1"}, "values": FIELDS["T"].attributes}
-    return Surface(
-        phi=phi.reshape(rows)[:, :1].T,
-        xi=y[near],
-        values=np.asarray(grid.point_data["T"]).reshape(rows)[:, near],
-        about=about,
-        name="T",
-        title=f"p = {float(facts['p'][0]):g}, Λ(p) = {float(facts['Lambda'][0]):.6g}",
-        lines=bytes(facts["held"]).decode().splitlines() if "held" in facts else (),
-        impacts=[each % (2 * math.pi) for each in impacts],
-        is_lines=is_lines,
-    )
-
-
-PART: Part = part_of_pictures(PHASE_AND_NOISE, EIGENFUNCTIONS, _solve, _draw, _figures)
+QUESTION: Question = question_of_pictures(PHASE_AND_NOISE, EIGENFUNCTIONS, _solve, _files)

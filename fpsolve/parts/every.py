@@ -1,4 +1,4 @@
-"""All parts, in the order of work: what needs another part stands after it."""
+"""All questions, in the order of work: what needs another one stands after it."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ from fpsolve.parts import (
     response,
     sensitivities,
 )
-from fpsolve.parts.part import Part
+from fpsolve.parts.question import Question
 
-PARTS: tuple[Part, ...] = (
-    moments.PART,
-    rate_function.PART,
-    *indices.PARTS,
+QUESTIONS: tuple[Question, ...] = (
+    moments.QUESTION,
+    rate_function.QUESTION,
+    *indices.INDEX_QUESTIONS,
     indices.THEORY,
     moments.CLASSES,
-    excursions.PART,
-    response.PART,
-    sensitivities.PART,
-    intervals.PART,
-    eigenfunctions.PART,
-    directions.PART,
-    discretisation.PART,
+    excursions.QUESTION,
+    response.QUESTION,
+    sensitivities.QUESTION,
+    intervals.QUESTION,
+    eigenfunctions.QUESTION,
+    directions.QUESTION,
+    discretisation.QUESTION,
 )
 """Each is solved, said and written in this order."""
-BY_NAME = {part.name: part for part in PARTS}
-"""All parts by their names."""
+BY_NAME = {each.name: each for each in QUESTIONS}
+"""All of them by their names."""

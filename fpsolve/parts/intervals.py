@@ -13,7 +13,7 @@ from fpsolve.analysis.spreads import LEVEL, UNCERTAIN, Spread, spread_of
 from fpsolve.case.case import Case
 from fpsolve.exponent.quantities import INDICES, MOMENT
 from fpsolve.model.quantity import Quantity
-from fpsolve.parts.part import Part
+from fpsolve.parts.question import Question
 from fpsolve.results.curve import CurveResult
 
 INTERVAL = f"{LEVEL:.0%} interval"
@@ -71,28 +71,4 @@ def _numbers(case: Case, result: CurveResult | None) -> Mapping[Quantity, Any]:
     }
 
 
-def _content(case: Case, result: CurveResult) -> Mapping[str, Any]:
-    """What is uncertain of a curve, and how that of the parameters is."""
-    if not (case.uncertain and result.curve.is_possible):
-        return {}
-    found, laws = spreads_of(case, result), case.uncertain.laws(result.curve.problem)
-    content = {
-        "level": LEVEL,
-        "laws": {
-            key: {name: getattr(each, name) for name in ("value", "sd", "mean", "deviation")}
-            for key, each in laws.items()
-        },
-        **{name: _plain(found.indices[name]) if name in found.indices else None for name in UNCERTAIN},
-        "moments": [{"p": p, **_plain(each)} for p, each in found.moments.items()],
-    }
-    return {"uncertainty": content}
-
-
-def _plain(spread: Spread) -> dict[str, float]:
-    """A spread to first order as files have it."""
-    return {name: getattr(spread, name) for name in ("mean", "deviation", *ENDS)} | {
-        "probability_below_0": spread.below
-    }
-
-
-PART: Part = Part("intervals", numbers=_numbers, content=_content)
+QUESTION: Question = Question("intervals", numbers=_numbers)

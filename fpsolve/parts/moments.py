@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -12,20 +11,13 @@ import numpy as np
 from fpsolve.case.case import Case, Curve
 from fpsolve.case.sections import OF_MOMENTS
 from fpsolve.data import Quantity
-from fpsolve.exponent.error import Failure, InvariantClass, Moment, digits
+from fpsolve.exponent.error import Failure, InvariantClass, Moment
 from fpsolve.exponent.solver import solve_moments
 from fpsolve.messages import Code, Message
-from fpsolve.model.quantity import LYAPUNOV_EXPONENT, MOMENT, OVER_P
-from fpsolve.page.page import Column, Grid
-from fpsolve.parts.intervals import INTERVAL, spreads_of
-from fpsolve.parts.part import Job, Numerics, Part, Settings
+from fpsolve.model.quantity import MOMENT, OVER_P
+from fpsolve.parts.question import UNFINISHED, Job, Numerics, Question, Settings
 from fpsolve.results.curve import CurveResult, MomentColumns
-from fpsolve.results.table import pair
-from fpsolve.results.text import interval, percent, units_in_words
 from fpsolve.theory.perturbation import perturbed_moments, weak_noise_note
-
-STAR = "* for the noise reduced by Eqs. (12)-(14)"
-"""The remark on perturbation theory of another noise than that which is solved."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,38 +88,19 @@ def _numbers(case: Case, result: CurveResult | None) -> Mapping[Quantity, Any]:
     return {each: result and getattr(result.moments, name) for name, each in of_p.items()}
 
 
-def moment_grid(case: Case, result: CurveResult) -> Grid:
-    """Λ(p) at each p, with its error, its interval, and perturbation theory."""
-    found, spreads, is_reduced = result.moments, spreads_of(case, result).moments, result.curve.theory_reduces_noise
-    has_theory = any(map(math.isfinite, found.perturbation))
-    columns = [Column("p"), Column(MOMENT.symbol), Column("± error")]
-    columns += [Column(INTERVAL), Column("P(Λ < 0)")] * bool(spreads)
-    theory = Column(f"perturbation, Eq. {MOMENT.closed_form}{'*' if is_reduced else ''}", 1)
-    columns += [theory, Column("difference", 2)] * has_theory
-    remarks = STAR * (is_reduced and has_theory), units_in_words(case.units.time, [MOMENT])
-    grid = Grid("", columns, remark="; ".join(filter(None, remarks)))
-    for p, value, error, closed in zip(found.p, found.value, found.error_estimate, found.perturbation, strict=True):
-        spread = spreads.get(float(p))
-        uncertain = ["", ""] if spread is None else [interval(spread.low, spread.high), percent(spread.below)]
-        compared = [f"{closed + 0.0:.6g}", f"{value - closed + 0.0:.2e}"] * has_theory
-        shown = f"{error:.0e}" if error else "0"
-        grid.rows.append([f"{p + 0.0:g}", digits(value, error), shown, *uncertain * bool(spreads), *compared])
-    return grid
-
-
-PART: Part = Part(
+QUESTION: Question = Question(
     MOMENT.name,
     _settings,
     _solve,
     Moments,
     said=lambda found, *_: (*found.warnings, *found.notes),
+    lacks=lambda found, _: (each.reason for each in found.failures),
     numbers=_numbers,
-    reasons=lambda found: (each.reason for each in found.failures),
 )
 
 
 def _solve_classes(job: Job, settings: Settings) -> tuple[InvariantClass, ...]:
-    return job.solver.by_class(job.columns.p) if PART.name in job.entries else ()
+    return job.solver.by_class(job.columns.p) if QUESTION.name in job.entries else ()
 
 
 def _said_of_classes(classes: Sequence[InvariantClass], curve: Curve, numerics: Numerics) -> Iterator[Message]:
@@ -145,32 +118,12 @@ def _said_of_classes(classes: Sequence[InvariantClass], curve: Curve, numerics: 
         yield Message(Code.INVARIANT_CLASSES, phase=classes[0].phase, along=along, across=across)
 
 
-def _content_of_classes(case: Case, result: CurveResult) -> Mapping[str, Any]:
-    if not result.classes:
-        return {}
-    found = [
-        {
-            "name": each.name,
-            **pair(LYAPUNOV_EXPONENT.name, each.lyapunov_exponent),
-            "moments": [
-                {"p": p, "moment": value, "moment_error": error}
-                for p, value, error in zip(
-                    each.p.tolist(), each.value.tolist(), each.error_estimate.tolist(), strict=True
-                )
-            ],
-        }
-        for each in result.classes
-    ]
-    return {"classes": found}
-
-
-CLASSES: Part = Part(
+CLASSES: Question = Question(
     "classes",
     _settings,
     _solve_classes,
     tuple[InvariantClass, ...],
     said=_said_of_classes,
-    content=_content_of_classes,
-    lacks=lambda found, settings: any({*each.p.tolist()} != {*settings["p"]} for each in found),
+    lacks=lambda found, settings: [UNFINISHED for each in found if {*each.p.tolist()} != {*settings["p"]}],
 )
 """λ and Λ(p) of blocks of variables, or on a ray that the phase never leaves and across it."""

@@ -8,7 +8,7 @@ from typing import Any
 from fpsolve.case.case import Case
 from fpsolve.data import Quantity
 from fpsolve.model.quantity import MOMENT, RATE_FUNCTION
-from fpsolve.parts.part import Part
+from fpsolve.parts.question import Question
 from fpsolve.results.curve import CurveResult
 
 
@@ -17,4 +17,4 @@ def _numbers(case: Case, result: CurveResult | None) -> Mapping[Quantity, Any]:
     return {RATE_FUNCTION: result and result.moments.rate_function} if is_asked else {}
 
 
-PART: Part = Part(RATE_FUNCTION.name, numbers=_numbers)
+QUESTION: Question = Question(RATE_FUNCTION.name, numbers=_numbers)

@@ -146,7 +146,7 @@ class CurveResult(Result):
         notes: where the theories compared with are not valid.
         failures: why some p are missing, or with all p some indices.
         classes: λ and Λ(p) of blocks of variables, or on a ray that the phase never leaves and across it.
-        parts: what else was found, by the names of `Part`s; without what is not wanted, or did not converge.
+        parts: what else was found, by the names of `Question`s; without what is not wanted, or did not converge.
         seconds: how long the processor took.
     """
 

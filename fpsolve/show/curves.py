@@ -22,13 +22,11 @@ from fpsolve.exponent.quantities import LYAPUNOV_EXPONENT, MOMENT, STABILITY_IND
 from fpsolve.model.quantity import MEAN_SQUARE, STATUS, moment_at
 from fpsolve.page.limits import EACH, EXTREMES, FAILURES, MOMENTS, ROWS
 from fpsolve.page.page import Block, Column, Grid, Sentence
-from fpsolve.parts.excursions import bounds_text
-from fpsolve.parts.indices import index_text, told_indices
 from fpsolve.parts.intervals import spreads_of
-from fpsolve.parts.moments import STAR
 from fpsolve.results.curve import CurveResult, Status
 from fpsolve.results.table import Table
 from fpsolve.results.text import DIGITS, interval, short, units_in_words
+from fpsolve.show.numbers import STAR, bounds_text, index_text, told_indices
 
 MAIN = LYAPUNOV_EXPONENT, STABILITY_INDEX
 """The indices that come first, and that have a column over a parameter."""

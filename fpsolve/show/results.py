@@ -7,14 +7,15 @@ from pathlib import Path
 
 from fpsolve.case.case import Case
 from fpsolve.output.figures import main_figure, rate_figure
+from fpsolve.output.pictures import FIGURES
 from fpsolve.page.limits import EACH, PICTURES, ROWS_OVER_P
 from fpsolve.page.page import Block, Drawing, Sentence
-from fpsolve.parts.every import PARTS
-from fpsolve.parts.moments import moment_grid
+from fpsolve.parts.every import BY_NAME
 from fpsolve.results.curve import CurveResult, SimulatedCurve
 from fpsolve.results.table import Table
 from fpsolve.results.text import duration, plural
 from fpsolve.show import curves
+from fpsolve.show.numbers import OF_CURVE, moment_grid
 from fpsolve.show.verdict import meaning, verdicts
 from fpsolve.study.columns import table_of
 
@@ -60,7 +61,7 @@ def show(
 
 def told_of(case: Case, result: CurveResult) -> Iterator[Block]:
     """What is told of one curve, but for its verdict and Λ(p)."""
-    yield from (block for part in PARTS for block in part.show(case, result))
+    yield from (block for tell in OF_CURVE for block in tell(case, result))
     yield from meaning(result)
 
 
@@ -68,9 +69,8 @@ def figures_of(
     case: Case, result: CurveResult, folder: Path, simulated: Mapping[int, SimulatedCurve]
 ) -> Iterator[Drawing]:
     """The figures of a curve, beside the simulations by the numbers of their curves."""
-    for part in PARTS:
-        if part.figures:
-            yield from part.figures(case, result, folder, simulated.get(result.curve.number))
+    for draw in FIGURES.values():
+        yield from draw(case, result, folder, simulated.get(result.curve.number))
 
 
 def write_figures(
@@ -80,9 +80,7 @@ def write_figures(
     main_figure(case, results, simulated, table).write(folder)
     rate_figure(case, results).write(folder)
     samples = {each.curve.number: each for each in simulated}
-    of_first, of_others = (
-        any(part.figures and part.settings(case, number) is not None for part in PARTS) for number in (1, 2)
-    )
+    of_first, of_others = (any(BY_NAME[name].asked(case, number) is not None for name in FIGURES) for number in (1, 2))
     for result in results if of_others else results[:1] if of_first else ():
         for figure in figures_of(case, result, folder, samples):
             figure.write(folder)

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 from fpsolve.case.case import Case
 from fpsolve.model.quantity import MOMENT, SECONDS, STATUS, Quantity
-from fpsolve.parts.every import PARTS
+from fpsolve.parts.every import QUESTIONS
 from fpsolve.results.curve import CurveResult
 from fpsolve.results.table import NO_P, Row, Table
 
@@ -18,8 +18,8 @@ COUNTS = (
 
 
 def columns_of(case: Case) -> tuple[Quantity, ...]:
-    """The columns of all parts, those over p first; those of perturbation theory have no error."""
-    found = [each for part in PARTS for each in part.numbers(case, None)]
+    """The columns of all questions, those over p first; those of perturbation theory have no error."""
+    found = [each for question in QUESTIONS for each in question.numbers(case, None)]
     return *sorted(found, key=lambda each: not each.dims), *COUNTS, STATUS, SECONDS
 
 
@@ -30,7 +30,7 @@ def row_of(case: Case, result: CurveResult) -> Row:
         case: which tells what is asked for.
         result: of the curve.
     """
-    row = {about.name: each for part in PARTS for about, each in part.numbers(case, result).items()}
+    row = {about.name: each for question in QUESTIONS for about, each in question.numbers(case, result).items()}
     count, solved = case.p.size if MOMENT.name in case.asked else 0, result.moments.p.size
     counts = {"p_solved": solved, "p_failed": count - solved}
     return {**row, "p": result.moments.p, **counts, STATUS.name: result.status, SECONDS.name: round(result.seconds, 6)}

@@ -6,10 +6,9 @@ noise.)
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 from time import process_time
-from typing import TypeVar
 
 import numpy as np
 
@@ -21,60 +20,55 @@ from fpsolve.exponent.kinds import choose
 from fpsolve.exponent.quantities import INDICES
 from fpsolve.messages import Code, Message, Severity, message_of
 from fpsolve.model.quantity import LYAPUNOV_EXPONENT
-from fpsolve.parts.every import BY_NAME, PARTS
+from fpsolve.parts.every import BY_NAME, QUESTIONS
 from fpsolve.parts.moments import CLASSES, Moments
-from fpsolve.parts.moments import PART as MOMENTS
-from fpsolve.parts.part import Asked, Entry, Job, Limit, Part, Reason, attempt, idle
+from fpsolve.parts.moments import QUESTION as MOMENTS
+from fpsolve.parts.question import UNFINISHED, Asked, Entry, Job, Limit, Question, Reason, attempt
 from fpsolve.results.curve import NO_MOMENTS, CurveResult
 
-Told = TypeVar("Told")
 ANEW: Limit = (0.0, 0.0)
 """The limit of what failed for a reason that may be gone the next time."""
 
 
 def everything(case: Case, number: int = 1) -> Asked:
     """What a case asks for, of the curve with a number."""
-    asked = {part.name: part.settings(case, number) for part in PARTS if part.solve}
+    asked = {each.name: each.asked(case, number) for each in QUESTIONS if each.solve}
     return {name: settings for name, settings in asked.items() if settings is not None}
 
 
 def solve_curve(job: Job) -> Job:
-    """Solve what is not known of a parameter set, part after part; what is missing is an entry with its reason."""
-    planned = [part for part in PARTS if part.symbol and part.name in job.asked]
+    """Solve what is not known of a parameter set, one after the other; what is missing is an entry with its reason."""
+    planned = [each for each in QUESTIONS if each.symbol and each.name in job.asked]
     p = job.asked[MOMENTS.name]["p"]
     job.meter.planned = len(p) + len(planned)
-    try:
-        with job.meter.running():
-            if MOMENTS.name not in job.entries:  # moments of even order take little
-                attempt(lambda: [job.solver.method.even(each) for each in p], MOMENTS.symbol)
-            first = [BY_NAME[LYAPUNOV_EXPONENT.name]] if choose(job.curve.problem).is_dear(0.0) else []
-            for part in dict.fromkeys((*first, *PARTS)):
-                is_known = part.name in job.entries
-                if part.solve is None or part.name not in job.asked or (is_known and part.draw is None):
-                    continue
-                if part is not MOMENTS:
-                    begin(part.symbol)
-                started = process_time()
-                found = attempt(partial(part.solve, job, job.asked[part.name]), part.symbol)
-                if is_known:  # it was drawn again, and its numbers stay as they are
-                    continue
-                job.add(part.name, _entry(job, part, found, process_time() - started))
-                if part is MOMENTS and isinstance(found, Reason):  # nor will there be anything else
-                    break
-    except KeyboardInterrupt:
-        job.keep(job)
-        raise
+    with job.meter.running():
+        if MOMENTS.name not in job.entries:  # moments of even order take little
+            attempt(lambda: [job.solver.method.even(each) for each in p], MOMENTS.symbol)
+        first = [BY_NAME[LYAPUNOV_EXPONENT.name]] if choose(job.curve.problem).is_dear(0.0) else []
+        for each in dict.fromkeys((*first, *QUESTIONS)):
+            is_known = each.name in job.entries
+            if each.solve is None or each.name not in job.asked or (is_known and not each.is_picture):
+                continue
+            if each is not MOMENTS:
+                begin(each.symbol)
+            started = process_time()
+            found = attempt(partial(each.solve, job, job.asked[each.name]), each.symbol)
+            if is_known:  # it was drawn again, and its numbers stay as they are
+                continue
+            job.add(each.name, _entry(job, each, found, process_time() - started))
+            if each is MOMENTS and isinstance(found, Reason):  # nor will there be anything else
+                break
     return job
 
 
-def _entry(job: Job, part: Part, found: object, seconds: float) -> Entry:
-    """What became of a part."""
+def _entry(job: Job, question: Question, found: object, seconds: float) -> Entry:
+    """What became of a question."""
     if isinstance(found, Reason):
         return Entry(None, found, seconds, ANEW if _may_pass(found.message) else job.numerics.limit)
-    said = [*part.said(found, job.curve, job.numerics), *part.reasons(found)]
-    is_limited = part.lacks(found, job.asked[part.name]) or any(each.severity is not Severity.NOTE for each in said)
-    limit = job.numerics.limit if is_limited else None
-    return Entry(found, None, seconds, ANEW if any(map(_may_pass, said)) else limit)
+    said, lacking = question.said(found, job.curve, job.numerics), [*question.lacks(found, job.asked[question.name])]
+    lacking += [each for each in said if each.severity is not Severity.NOTE]
+    limit = job.numerics.limit if lacking else None
+    return Entry(found, None, seconds, ANEW if any(map(_may_pass, lacking)) else limit)
 
 
 def _may_pass(message: Message) -> bool:
@@ -82,21 +76,8 @@ def _may_pass(message: Message) -> bool:
     return message.tells_of(Code.NO_MEMORY) or message.tells_of(Code.FAULT)
 
 
-def solve_set(
-    job: Job,
-    tell: Callable[[Job], Told],
-    progress: Callable[[], None] = idle,
-    keep: Callable[[Job], None] = idle,
-) -> Told:
-    """The task: solves a set; one which contradicts itself, or overflows, fails.
-
-    Args:
-        job: the set, with what is known of it.
-        tell: makes of it what is returned, which pickles.
-        progress: called after each moment; only where the task stays in this process.
-        keep: takes the job as it grows, every `SOON` seconds at most, and when the work is interrupted.
-    """
-    job.progress, job.keep = progress, keep
+def solve_set(job: Job) -> Job:
+    """Solve what is not known of a set; one which contradicts itself, or overflows, fails."""
     p = np.array(job.asked[MOMENTS.name]["p"])
     if text := obstacle(job.curve.base, job.curve.varied, p, with_moments=False):
         found: Job | Reason = Reason("failed", message_of(f"{job.line}{text}"), job.curve.label)
@@ -104,7 +85,7 @@ def solve_set(
         found = attempt(partial(solve_curve, job), job.curve.label)
     if isinstance(found, Reason):
         job.add(MOMENTS.name, Entry(None, found, limit=ANEW))
-    return tell(job)
+    return job
 
 
 def result_of(job: Job) -> CurveResult:
@@ -116,17 +97,17 @@ def result_of(job: Job) -> CurveResult:
     known = {name: entry.found for name, entry in entries.items() if name in asked and entry.found is not None}
     moments: Moments = known.get(MOMENTS.name, Moments())
     said: dict[Severity, list[Message]] = {each: [] for each in Severity}
-    reasons = list[tuple[Part, Reason]]()
-    for part in PARTS:
-        if part.name in known:
-            for message in part.said(known[part.name], curve, job.numerics):
+    reasons = list[tuple[Question, Reason]]()
+    for each in QUESTIONS:
+        if each.name in known:
+            for message in each.said(known[each.name], curve, job.numerics):
                 said[message.severity].append(message)
-        elif (entry := entries.get(part.name)) and entry.reason and part.name in asked and part.symbol:
-            reasons.append((part, entry.reason))
+        elif (entry := entries.get(each.name)) and entry.reason and each.name in asked and each.symbol:
+            reasons.append((each, entry.reason))
     for message in missing(reasons, moments.failures):
         if job.numerics.is_stated or not message.tells_of(Code.NOT_ONE_RAY):
             said[message.severity].append(message)
-    is_whole = all(name in entries or BY_NAME[name].draw for name in asked)
+    is_whole = all(name in entries or BY_NAME[name].is_picture for name in asked)
     failures = moments.failures or tuple(Failure(None, message) for message in said[Severity.FAILURE])
     return CurveResult(
         curve=curve,
@@ -135,7 +116,7 @@ def result_of(job: Job) -> CurveResult:
         discretisation=known.get("discretisation") or None,
         warnings=tuple(said[Severity.WARNING]),
         notes=tuple(said[Severity.NOTE]),
-        failures=failures if is_whole else (*failures, Failure(None, Message(Code.UNFINISHED))),
+        failures=failures if is_whole else (*failures, Failure(None, UNFINISHED)),
         classes=known.get(CLASSES.name, ()),
         parts={name: found for name, found in known.items() if name not in _OWN},
         seconds=sum(entry.seconds for name, entry in entries.items() if name in asked),
@@ -143,28 +124,28 @@ def result_of(job: Job) -> CurveResult:
 
 
 _OWN = {MOMENTS.name, *INDICES, CLASSES.name, "discretisation"}
-"""Names of parts that have attributes of their own in a result."""
+"""Names of questions that have attributes of their own in a result."""
 
 
-def missing(reasons: Sequence[tuple[Part, Reason]], failures: Sequence[Failure]) -> Iterator[Message]:
+def missing(reasons: Sequence[tuple[Question, Reason]], failures: Sequence[Failure]) -> Iterator[Message]:
     """What is said of numbers that are missing, of indices with one reason together.
 
     Args:
-        reasons: by the parts.
+        reasons: by the questions.
         failures: the p at which Λ(p) failed, which others may follow from.
     """
     unsolved = {each.reason: Message(Code.NO_MOMENT, p=each.p) for each in failures if each.p is not None}
     codes = {"absent": Code.INDEX_ABSENT, "impossible": Code.INDEX_MISSING}
     failing = Code.INDEX_MISSING if failures else Code.INDEX_FAILED
     groups = dict[tuple[Code, Message, str], list[str]]()
-    for part, reason in reasons:
+    for question, reason in reasons:
         message, code = reason.message, codes.get(reason.kind, failing)
-        if part.name in _OWN:
+        if question.name in _OWN:
             message = unsolved.get(message, message) if reason.kind == "failed" else message
         elif message.severity is not Severity.FAILURE:
             yield message
             continue
-        group = "" if part.name in _OWN else part.name
+        group = "" if question.name in _OWN else question.name
         groups.setdefault((code, message, group), []).append(reason.symbol)
     for (code, message, _), symbols in groups.items():
         yield Message(code, symbols=symbols, reason=message)

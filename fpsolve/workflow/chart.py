@@ -18,7 +18,7 @@ import numpy as np
 from fpsolve.analysis.axis import Axis
 from fpsolve.analysis.regions import P_BIFURCATIONS, Region, Regions, regions
 from fpsolve.analysis.scan import Row, Sample, Scan, scan_row
-from fpsolve.analysis.stability import Boundary, begun, crossed, is_of_line
+from fpsolve.analysis.stability import Boundary, crossed, is_of_line, untraced
 from fpsolve.analysis.target import Target
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case
@@ -144,7 +144,7 @@ def begun_lines(case: Case) -> list[Boundary]:
     """The lines of a chart, of which nothing is traced."""
     frame, problem = charted(case), case.curve({}).problem
     own: dict[str, Any] = {"step": frame.step, "nodes": frame.nodes, "budget": case.budget}
-    return [begun(target, frame.x.axis, frame.y.axis, problem, **own) for target in frame.lines]
+    return [untraced(target, frame.x.axis, frame.y.axis, problem, **own) for target in frame.lines]
 
 
 def solve_chart(

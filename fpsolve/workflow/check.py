@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
@@ -20,8 +19,8 @@ from fpsolve.exponent.quantities import INDICES
 from fpsolve.messages import Message
 from fpsolve.page.limits import EACH, ROWS
 from fpsolve.page.page import Block, Column, Grid, Sentence
-from fpsolve.parts.moments import PART as MOMENTS
-from fpsolve.parts.part import Asked, Job, Numerics, Settings
+from fpsolve.parts.moments import QUESTION as MOMENTS
+from fpsolve.parts.question import Asked, Job, Numerics, Settings
 from fpsolve.pool import Pool, serial
 from fpsolve.results.curve import CurveResult
 from fpsolve.study.solve import result_of, solve_set
@@ -127,6 +126,11 @@ def compare_with_hierarchy(case: Case, results: Sequence[CurveResult]) -> list[C
     return found
 
 
+def compared(job: Job) -> CurveResult:
+    """The task: solves a set, of which the result is small enough to send."""
+    return result_of(solve_set(job))
+
+
 def check_case(case: Case, *, by_hierarchy: bool = False, pool: Pool | None = None, watch: Watch = SILENT) -> Checked:
     """Solve what a case expects, and compare; nothing is written.
 
@@ -145,7 +149,7 @@ def check_case(case: Case, *, by_hierarchy: bool = False, pool: Pool | None = No
         watch.bar(Phase(case.name, "solving", case.planned, SETS)) as progress,
         pool or serial() as workers,
     ):
-        for _, result in workers.run(partial(solve_set, tell=result_of), map(job, case.curves())):
+        for _, result in workers.run(compared, map(job, case.curves())):
             found.append(result)
             progress(failed=result.status.fails)
     found.sort(key=lambda result: result.curve.number)

@@ -42,12 +42,11 @@ from fpsolve.model.problem import Problem, checked_problem
 from fpsolve.page.html import page_of, part_of_page
 from fpsolve.page.local import LocalPage
 from fpsolve.page.page import Sentence
-from fpsolve.parts.indices import THEORY
-from fpsolve.parts.moments import moment_grid
-from fpsolve.parts.part import Job, Numerics, fault
+from fpsolve.parts.question import Job, Numerics, fault
 from fpsolve.results.curve import CurveResult
 from fpsolve.show import results
 from fpsolve.show.notes import notes
+from fpsolve.show.numbers import indices, moment_grid
 from fpsolve.show.problem import show as show_problem
 from fpsolve.show.verdict import meaning, verdict
 from fpsolve.study.solve import everything, result_of, solve_curve
@@ -258,7 +257,7 @@ class Explorer:
             "exponent": exponent.value if exponent else None,
             "equations": equations if len(equations) <= MOST_EQUATIONS else [],
             "verdict": part_of_page([Sentence(verdict(case, result)), *meaning(result)]),
-            "numbers": part_of_page([*THEORY.show(case, result), *notes(case, [result], "")]),
+            "numbers": part_of_page([*indices(case, result), *notes(case, [result], "")]),
             "table": "",  # which nobody reads while a slider moves
         }
 

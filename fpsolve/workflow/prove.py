@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from decimal import ROUND_CEILING, ROUND_FLOOR, Decimal
-from functools import cache, partial
+from functools import partial
 from pathlib import Path
 from time import monotonic
 from typing import Any, TypeAlias, cast
@@ -21,7 +21,7 @@ from fpsolve.errors import FpsolveError, NoSuchExponent
 from fpsolve.exponent.quantities import LYAPUNOV_EXPONENT, STABILITY_INDEX
 from fpsolve.files import writable, write_text
 from fpsolve.messages import Code, Message
-from fpsolve.output.records import Records, key_of
+from fpsolve.output.records import Entries, Records, answered, key_of
 from fpsolve.page.limits import EACH, PROOFS, ROWS
 from fpsolve.page.page import Block, Column, Grid, Sentence
 from fpsolve.pool import Pool, serial
@@ -287,36 +287,19 @@ def bounds_text(found: Enclosure | IndexEnclosure) -> tuple[str, str]:
     return low, high
 
 
-class Kept:
-    """Bounds on Λ(p) and λ that an earlier run has proven, each verified anew from its certificate.
+def record_of(found: Answer) -> Entries:
+    """The record of bounds on Λ(p) or λ; none of those on δ_p, which follow from these."""
+    return {"enclosure": ENCLOSURES.dump_python(found)} if isinstance(found, Enclosure) else {}
 
-    Args:
-        records: of them.
-    """
 
-    def __init__(self, records: Records) -> None:
-        self.records = records
-        self._verified = cache(self._read)
-
-    def find(self, question: Question) -> Enclosure | None:
-        """What was proven, if it was, and follows."""
-        return self._verified(_key(question))
-
-    def add(self, question: Question, found: Answer) -> None:
-        """Keep what was proven."""
-        if isinstance(found, Enclosure):
-            self.records.put(_key(question), {"enclosure": ENCLOSURES.dump_python(found)})
-
-    def _read(self, key: str) -> Enclosure | None:
-        try:
-            found = ENCLOSURES.validate_python(self.records.get(key).get("enclosure"))
-        except ValueError:
-            return None
-        if found.certificate is None:
-            return found if found == replace(NOTHING, wanted=found.wanted) else None
-        whole = enclosure_of(found.certificate)
-        is_same = (whole.lower, whole.upper) == (found.lower, found.upper)
-        return found if is_same and not objection(found.certificate) else None
+def verified(record: Entries, _: Question) -> Enclosure | None:
+    """The bounds that an earlier run has proven, if they follow from their certificate. Raises `ValueError`."""
+    found = ENCLOSURES.validate_python(record.get("enclosure"))
+    if found.certificate is None:
+        return found if found == replace(NOTHING, wanted=found.wanted) else None
+    whole = enclosure_of(found.certificate)
+    is_same = (whole.lower, whole.upper) == (found.lower, found.upper)
+    return found if is_same and not objection(found.certificate) else None
 
 
 def _key(question: Question) -> str:
@@ -383,13 +366,8 @@ def prove_case(
         written = monotonic()
         with shown_at_the_end(report):
             try:
-                kept_bounds = Kept(Records(folder / PROVEN_RECORDS))
-                fresh = workers.map(answer, (each for each in plan.questions() if kept_bounds.find(each) is None))
-                for question in plan.questions():
-                    found: Answer | None = kept_bounds.find(question)
-                    is_known = found is not None
-                    if found is None:
-                        kept_bounds.add(question, found := next(fresh))
+                records, kept_as = Records(folder / PROVEN_RECORDS), dict[str, Any](read=verified, entries=record_of)
+                for _, found, is_known in answered(records, workers, answer, plan.questions(), key=_key, **kept_as):
                     answers.append(found)
                     progress(failed=not found.is_proven, known=is_known)
                     if monotonic() - written > EVERY and len(answers) % plan.each == 0:

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
-from functools import partial
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from time import monotonic
 from typing import Any
 
 import numpy as np
 
 from fpsolve.case.case import Case
+from fpsolve.errors import WorkersDied
+from fpsolve.files import atomic
 from fpsolve.model.quantity import MOMENT, SECONDS, STATUS
 from fpsolve.output.datasets import write_dataset
 from fpsolve.output.known import Results, record_of
@@ -18,8 +22,8 @@ from fpsolve.output.records import Entries, Records
 from fpsolve.output.tables import facts_of, write_results
 from fpsolve.page.page import Note
 from fpsolve.parts.eigenfunctions import write_curves
-from fpsolve.parts.every import BY_NAME, PARTS
-from fpsolve.parts.part import Job
+from fpsolve.parts.every import BY_NAME
+from fpsolve.parts.question import Job
 from fpsolve.pool import Pool, serial
 from fpsolve.results.curve import Status
 from fpsolve.show.notes import notes
@@ -35,12 +39,41 @@ REST = 50
 """Tables are rewritten when so many times as long has gone by as the last time took, so that all of it costs little."""
 
 
-def drawn(folder: Path, job: Job) -> Entries:
-    """Write the pictures of a set into the folder of its case; its record."""
-    for name, found in job.pictures.items():
-        if draw := BY_NAME[name].draw:
-            draw(found, job.curve, folder)
-    return record_of(job) if job.new else {}
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """What becomes of a set, as any process can send it to that which writes.
+
+    Attributes:
+        record: what was solved now.
+        files: the contents of its pictures, by their names in the folder of the case.
+        interrupted: whether the work was.
+    """
+
+    record: Entries
+    files: Mapping[str, bytes]
+    interrupted: bool = False
+
+
+def solved(job: Job) -> Solved:
+    """The task: solves a set and draws its pictures; where it is interrupted, what is done by then."""
+    try:
+        solve_set(job)
+        return Solved(record_of(job), contents_of(job))
+    except KeyboardInterrupt:
+        return Solved(record_of(job), {}, interrupted=True)
+
+
+def contents_of(job: Job) -> dict[str, bytes]:
+    """The pictures of a set by their names, drawn in a folder of their own: a cluster may not have that of the case."""
+    if not job.pictures:
+        return {}
+    with TemporaryDirectory() as place:
+        folder = Path(place)
+        for name, found in job.pictures.items():
+            if draw := BY_NAME[name].files:
+                draw(found, job.curve, folder)
+        files = (path for path in sorted(folder.rglob("*")) if path.is_file())
+        return {path.relative_to(folder).as_posix(): path.read_bytes() for path in files}
 
 
 class Sweep:
@@ -92,21 +125,36 @@ class Sweep:
         """Solve what is not known yet, and draw; tables are written first, if anything is missing, and as they grow."""
         if self.done < self.case.planned:
             self.write_tables()
-        draws = [any(BY_NAME[name].draw for name in self.results.asked(number)) for number in (1, 2)]
+        draws = [any(BY_NAME[name].is_picture for name in self.results.asked(number)) for number in (1, 2)]
         numbers = range(1, self.case.planned + 1)
         left = [number for number in numbers if draws[number > 1] or number not in self.results.whole]
         if len(left) < self.case.planned:
             progress((self.case.planned - len(left)) * self._steps_each, known=True)
         is_alone = self.case.planned == 1 and not pool.is_elsewhere
-        task = partial(solve_set, tell=partial(drawn, self.folder))
+        jobs: Iterable[Job] = map(self.results.job, left)
         if is_alone:
-            task = partial(task, keep=self._grow, progress=progress)
+            jobs = (replace(job, keep=self._grow, progress=progress) for job in jobs)
         with serial() if is_alone else pool as workers:
-            for job, record in workers.run(task, map(self.results.job, left)):
-                is_failed = bool(record) and self.results.put(job.curve.number, record).status.fails
-                progress(0 if is_alone and record else self._steps_each, failed=int(is_failed))
-                if record:
-                    self._write_if_due()
+            try:
+                for job, each in workers.run(solved, jobs):
+                    is_failed = self._take(job, each)
+                    if each.interrupted:
+                        raise KeyboardInterrupt
+                    progress(0 if is_alone and each.record else self._steps_each, failed=int(is_failed))
+                    if each.record:
+                        self._write_if_due()
+            except (KeyboardInterrupt, WorkersDied):
+                for job, each in workers.rest():
+                    self._take(job, each)
+                raise
+
+    def _take(self, job: Job, each: Solved) -> bool:
+        """Keep what became of a set, and its pictures; whether it has failed."""
+        is_failed = bool(each.record) and self.results.put(job.curve.number, each.record).status.fails
+        for name, content in each.files.items():
+            with atomic(self.folder / name) as draft:
+                draft.write_bytes(content)
+        return is_failed
 
     def _write_if_due(self) -> None:
         if monotonic() >= self._due:
@@ -120,13 +168,14 @@ class Sweep:
         self._due = monotonic() + REST * (monotonic() - started)
 
     def write_all(self) -> None:
-        """Write the tables, results.nc, the series over the curves, and the files of parts."""
+        """Write the tables, results.nc, the series over the curves, and the files of what records hold."""
         self.write_tables()
         write_curves(self.case, self.folder)
-        writers = [part.files for part in PARTS if part.files and part.name in self.results.asked(1)]
+        recorded = [BY_NAME[name] for name in self.results.asked(1) if not BY_NAME[name].is_picture]
+        writers = {each.name: each.files for each in recorded if each.files}
         for result in self.results if writers else ():
-            for write in writers:
-                write(result, self.folder)
+            for name in writers.keys() & result.parts.keys():
+                writers[name](result.parts[name], result.curve, self.folder)
         table = self.results.table
         write_dataset(self.case, table, self.folder, self.facts)
         numbers = [each.values for each in table.values() if each.quantity not in (*COUNTS, STATUS, SECONDS)]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import nullcontext, suppress
 from dataclasses import asdict, replace
 from datetime import UTC, datetime
 from functools import partial
@@ -22,11 +21,11 @@ from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, MOMENT
 from fpsolve.files import writable, write_csv, write_json
 from fpsolve.messages import Code, Message
 from fpsolve.model.quantity import OF_STOPS
-from fpsolve.output.records import Records, key_of, made, plain
+from fpsolve.output.records import Records, answered, key_of, made, plain
 from fpsolve.output.tables import head, in_case_words, parameters_of
 from fpsolve.page.limits import EACH, PICTURES
 from fpsolve.page.page import Block, Column, Drawing, Grid, Sentence, filled
-from fpsolve.pool import Pool, processors
+from fpsolve.pool import Pool, processors, serial
 from fpsolve.results.curve import CurveResult, SimulatedCurve
 from fpsolve.results.text import fate, sampled, sign_of, units_in_words
 from fpsolve.show.curves import Shown, grid_of
@@ -133,8 +132,8 @@ def simulated_of(record: Mapping[str, Any], curve: Curve) -> SimulatedCurve:
 
 
 def record_of(found: SimulatedCurve) -> dict[str, Any]:
-    """The record of a simulation that is finished."""
-    return {"simulation": plain((found.result, found.response, found.warnings))}
+    """The record of a simulation; nothing of one that is not finished."""
+    return {} if found.interrupted else {"simulation": plain((found.result, found.response, found.warnings))}
 
 
 def simulation_key(curve: Curve, orders: Sequence[float], setting: MonteCarloSection) -> str:
@@ -158,15 +157,7 @@ class Simulations:
 
     def __init__(self, case: Case, folder: Path, *, is_fresh: bool) -> None:
         self.case, self.folder, self.records = case, folder, Records(folder / RECORDS, is_fresh=is_fresh)
-        self.simulated, self.interruption = list[SimulatedCurve](), ""
-        self._orders = case.simulated.tolist()
-        self._key = partial(simulation_key, orders=self._orders, setting=case.monte_carlo)
-        curves = case.curves() if self.records else ()
-        self._known = {curve.number for curve in curves if self._found(curve)}
-
-    @property
-    def known(self) -> int:
-        return len(self._known)
+        self.simulated, self.interruption, self.known = list[SimulatedCurve](), "", 0
 
     def run(self, watch: Watch, pool: Pool | None = None, results: Sequence[CurveResult] = ()) -> str:
         """Simulate the curves, write what is found of each, and show it; the `interruption`.
@@ -191,35 +182,26 @@ class Simulations:
 
     def _curves(self, progress: Advance, pool: Pool | None) -> Iterator[SimulatedCurve]:
         """The simulations in the order of the curves; an interrupt (Ctrl-C) ends them with what is done."""
-        others = [curve for curve in self.case.curves() if curve.number not in self._known]
-        if self._known:
-            progress(simulation_work(self.case) - sum(map(simulation_steps, others)), known=True)
-        task = partial(simulate_curve, orders=self._orders, setting=self.case.monte_carlo)
-        with pool or nullcontext():
-            elsewhere = iter(pool.map(task, others)) if pool else None
-            for curve in self.case.curves():
-                found = self._found(curve) if curve.number in self._known else None
-                try:
-                    if found is None and elsewhere:
-                        found = next(elsewhere)
-                        progress(simulation_steps(curve))
-                    elif found is None:
-                        found = simulate_curve(curve, self._orders, self.case.monte_carlo, progress)
-                except KeyboardInterrupt:
-                    if curve.number == 1:
-                        raise
-                    return
-                if not found.interrupted and curve.number not in self._known:
-                    self.records.put(self._key(curve), record_of(found))
-                yield found
-                if found.interrupted:
-                    return
-
-    def _found(self, curve: Curve) -> SimulatedCurve | None:
-        """Its simulation, if that is known; a record of another form does not count."""
-        with suppress(ValueError):
-            return simulated_of(self.records.get(self._key(curve)), curve)
-        return None
+        asked: dict[str, Any] = {"orders": self.case.simulated.tolist(), "setting": self.case.monte_carlo}
+        task = partial(simulate_curve, **asked)
+        if pool is None:
+            task = partial(task, progress=progress)
+        with pool or serial() as workers:
+            kept: dict[str, Any] = {"read": simulated_of, "entries": record_of}
+            found = answered(
+                self.records, workers, task, self.case.curves(), key=partial(simulation_key, **asked), **kept
+            )
+            try:
+                for curve, each, is_known in found:
+                    self.known += is_known
+                    if pool or is_known:
+                        progress(simulation_steps(curve), known=is_known)
+                    yield each
+                    if each.interrupted:
+                        return
+            except KeyboardInterrupt:
+                if not self.simulated:
+                    raise
 
 
 def write_simulation(case: Case, simulated: SimulatedCurve, folder: Path) -> None:

@@ -22,7 +22,7 @@ from fpsolve.exponent.method import DIRECTIONS, PHASE_AND_NOISE
 from fpsolve.page.html import part_of_page
 from fpsolve.page.page import Column, Drawing, Grid, Sentence
 from fpsolve.parts.nodes import Nodes
-from fpsolve.parts.part import Numerics
+from fpsolve.parts.question import Numerics
 from fpsolve.results.text import sampled
 from fpsolve.workflow.chart import Chart, show, solve_chart
 

@@ -1,13 +1,16 @@
 """Internals of the pool: whoever runs tasks, the results are the same; what dies costs its task only."""
 
+import math
 import os
 import signal
 import time
 from concurrent.futures import Executor, Future
+from contextlib import suppress
 
 import pytest
 
 from fpsolve import pool
+from fpsolve.budget import Meter, charge
 from fpsolve.errors import WorkersDied
 from fpsolve.pool import PROCESSORS, Pool, limit_processors, parallel, processors, serial
 
@@ -90,6 +93,32 @@ def test_workers_are_as_many_as_tasks_with_one_processor_each_after_own_work(mon
         numbers = [number for number, _ in workers.map(whereabouts, range(30))]
     assert numbers[0] == os.getpid()
     assert len(set(numbers)) == 3
+
+
+def counting(number):
+    """Counts until it is asked to end, but for the first two."""
+    count = 0
+    with suppress(KeyboardInterrupt), Meter(math.inf).running():
+        while number > 1 or count < 3:
+            charge(1)
+            time.sleep(0.01)
+            count += 1
+    return count
+
+
+@pytest.mark.slow
+def test_interrupt_loses_neither_what_is_done_nor_what_tasks_under_way_have():
+    found = {}
+    with parallel(2) as workers:
+        for item, count in workers.run(counting, range(40)):
+            found[item] = count
+            break
+        time.sleep(1)
+        rest = dict(workers.rest())
+    assert {0, 1} <= {*found, *rest}
+    assert [rest.get(item, 3) for item in (0, 1)] == [3, 3]
+    assert len([item for item, count in rest.items() if item > 1 and count > 3]) == 2
+    assert len(rest) < 40
 
 
 def test_least_limit_of_processors_counts(monkeypatch):

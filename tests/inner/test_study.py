@@ -11,7 +11,7 @@ from fpsolve import ExponentSolver, load_case
 from fpsolve.errors import NotConverged
 from fpsolve.exponent import INDICES
 from fpsolve.messages import Code, Message, message_of
-from fpsolve.parts import PARTS, indices
+from fpsolve.parts import QUESTIONS, indices
 from fpsolve.results.curve import SimulatedCurve, Status
 from fpsolve.simulation.estimators import MomentEstimate, MonteCarlo
 from fpsolve.simulation.response import Response
@@ -25,15 +25,15 @@ MINIMAL = CASES / "minimal.toml"
 
 
 @pytest.mark.slow
-def test_quantity_and_part_of_the_page_on_contributing_are_solved_and_tabulated(monkeypatch):
+def test_quantity_and_question_of_the_page_on_contributing_are_solved_and_tabulated(monkeypatch):
     """The chance that Gaussian noise is above a level, as the complementary error function has it."""
     names, _ = typed(ROOT / "docs/contributing.md")
-    index, chance = names["index"], names["part"]
-    part = indices.part_of(index)
+    index, chance = names["index"], names["question"]
+    question = indices.question_of(index)
     monkeypatch.setitem(INDICES, index.name, index)
     for module in (solve, columns):
-        monkeypatch.setattr(module, "PARTS", (*PARTS, part, chance))
-    for each in (part, chance):
+        monkeypatch.setattr(module, "QUESTIONS", (*QUESTIONS, question, chance))
+    for each in (question, chance):
         monkeypatch.setitem(solve.BY_NAME, each.name, each)
     case = load_case(MINIMAL)
     output = case.output.model_copy(update={"quantities": (index.name, chance.name)})
@@ -126,10 +126,10 @@ def test_a_response_that_fails_costs_no_other_number(tmp_path, monkeypatch, rais
 def test_a_simulation_that_fails_keeps_the_curves_before_it(tmp_path, monkeypatch):
     original = simulate.simulate_curve
 
-    def failing(curve, *others):
+    def failing(curve, **asked):
         if curve.number == 2:
             raise NotConverged("the simulation overflowed")
-        return original(curve, *others)
+        return original(curve, **asked)
 
     monkeypatch.setattr(simulate, "simulate_curve", failing)
     text = "[moments]\np = [1.0]\n[output]\nquantities = ['moment']\n[monte_carlo]\npaths = 32\ntime = 40.0\n"

@@ -1,6 +1,8 @@
 """What a run does where something fails or is interrupted between its steps."""
 
 import errno
+import pickle
+from concurrent.futures import Executor, Future
 from contextlib import nullcontext
 
 import pytest
@@ -10,7 +12,9 @@ from fpsolve.case.sections import MonteCarloSection
 from fpsolve.exponent.method import Budget
 from fpsolve.files import alone, atomic
 from fpsolve.output.known import ROW, names_of, set_key
-from fpsolve.parts.part import Numerics
+from fpsolve.parts.question import Numerics
+from fpsolve.pool import Pool
+from fpsolve.workflow import run_case
 from fpsolve.workflow.simulate import simulation_key
 from tests.kit import COSTLY, LEAN, TEXT, case_in, read_json, run
 
@@ -25,7 +29,7 @@ ASKED = {
 @pytest.mark.parametrize(
     ("change", "parts"),
     [
-        ({"rtol": 1e-9}, {*ASKED} - {"response"}),
+        ({"rtol": 1e-9}, {*ASKED}),
         ({"budget": Budget(unknowns=500)}, set()),
         ({"is_stated": False}, set()),
     ],
@@ -91,6 +95,47 @@ def test_an_interrupt_says_what_is_kept_in_every_phase(tmp_path, monkeypatch, pl
     monkeypatch.setattr(place, raising(KeyboardInterrupt))
     done = run(tmp_path, command, "case.toml", "--jobs", "1", "--set", LEAN, case=TEXT)
     assert (done.code, done.err.splitlines()[-1]) == (130, message)
+
+
+def test_an_interrupt_keeps_what_is_found_of_a_set_under_way(tmp_path, monkeypatch):
+    monkeypatch.setattr("fpsolve.exponent.solver.ExponentSolver.variance_rate", raising(KeyboardInterrupt))
+    asked = "--jobs", "1", "--set", "output={ quantities=['moment', 'variance_rate', 'lyapunov_exponent'] }"
+    done = run(tmp_path, "run", "case.toml", *asked, case=TEXT)
+    assert (done.code, done.err.splitlines()[-1]) == (
+        130,
+        "interrupted after 0 of 2 curves; what was done is kept in results/case; run it again to go on",
+    )
+    [curve] = read_json(tmp_path / "results/case/summary.json")["curves"]
+    assert (len(curve["moments"]), curve["lyapunov_exponent"] is None, curve["variance_rate"]) == (3, False, None)
+
+
+class Elsewhere(Executor):
+    """A machine that has no folder of results: all that goes there and back is pickled."""
+
+    def __init__(self, folder):
+        self.folder = folder
+
+    def submit(self, task, /, item):
+        sent = pickle.dumps((task, item))
+        assert str(self.folder).encode() not in sent
+        task, item = pickle.loads(sent)
+        future = Future()
+        future.set_result(pickle.loads(pickle.dumps(task(item))))
+        return future
+
+
+def test_pictures_come_back_from_machines_that_share_no_folder(tmp_path):
+    case = case_in(tmp_path, TEXT)
+    for out, pool in (("here", None), ("there", Pool(lambda: Elsewhere(tmp_path), is_elsewhere=True))):
+        run_case(case, tmp_path / out, pool=pool)
+    here, there = (
+        {path.relative_to(tmp_path / out): path for path in (tmp_path / out).rglob("*") if path.is_file()}
+        for out in ("here", "there")
+    )
+    assert here.keys() == there.keys()
+    drawn = [path for path in here if path.suffix in (".vtu", ".pvd")]
+    assert len(drawn) == 6
+    assert all(here[path].read_bytes() == there[path].read_bytes() for path in drawn)
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""A part: one thing that a case may ask for of each curve; and what becomes of it."""
+"""A question: one thing that a case may ask for of each curve; and what becomes of it."""
 
 from __future__ import annotations
 
@@ -24,18 +24,21 @@ from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.problem import Problem
 from fpsolve.model.quantity import MOMENT, STABILITY_INDEX
-from fpsolve.page.page import Block, Drawing
-from fpsolve.results.curve import CurveResult, MomentColumns, SimulatedCurve
+from fpsolve.results.curve import CurveResult, MomentColumns
 from fpsolve.signals import is_interrupt
 
 Settings = Mapping[str, Any]
-"""What is asked of a part, as JSON can hold it: with the curve and the `Numerics` it decides its numbers."""
+"""What is asked by a question, as JSON can hold it: with the curve and the `Numerics` it decides its numbers."""
 Asked = Mapping[str, Settings]
-"""What is asked of the parts of a curve, by their names."""
+"""What is asked of a curve, by the names of questions."""
 Limit = tuple[float, float]
 """Unknowns and seconds of a budget."""
+Largest = tuple[float, dict[str, Any]]
+"""A p, and the facts of what it was solved on."""
 SOON = 1.0
 """Seconds after which what is known of a curve is kept."""
+UNFINISHED = Message(Code.UNFINISHED)
+"""What is said where some is not known yet."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +90,7 @@ class Reason:
 
 @dataclass(frozen=True, eq=False)
 class Entry:
-    """What became of a part of a curve.
+    """What became of a question.
 
     Attributes:
         found: what was found; None where nothing was.
@@ -136,13 +139,14 @@ class Job:
 
     Attributes:
         curve: the parameter set.
-        asked: what is asked of the parts, by their names.
+        asked: what is asked of it, by the names of questions.
         numerics: how it is solved.
         line: where it stands in a file of sets, for the message of one that cannot be solved.
-        entries: what became of parts, by their names; those that are there are not solved again.
+        entries: what became of them, by their names; those that are there are not solved again.
         rows: Λ(p) by p, see `MomentColumns`; those that are there are not solved again.
         new: the entries that were solved now.
-        pictures: what is drawn and not recorded, by the names of parts.
+        largest: the p of the largest size that an earlier run has solved by elements.
+        pictures: what is drawn and not recorded, by the names of questions.
         progress: called after each moment.
         keep: takes the job now and then, see `SOON`.
     """
@@ -154,6 +158,7 @@ class Job:
     entries: dict[str, Entry] = field(default_factory=dict)
     rows: dict[float, Sequence[float]] = field(default_factory=dict)
     new: dict[str, Entry] = field(default_factory=dict)
+    largest: Largest | None = None
     pictures: dict[str, Any] = field(default_factory=dict)
     progress: Callable[[], None] = idle
     keep: Callable[[Job], None] = idle
@@ -166,7 +171,7 @@ class Job:
 
     @cached_property
     def solver(self) -> ExponentSolver:
-        """The solver of Λ(p), which all parts share."""
+        """The solver of Λ(p), which all questions share."""
         return self.numerics.solver(self.curve.problem)
 
     @property
@@ -182,7 +187,7 @@ class Job:
         return self.asked.keys() <= self.entries.keys() or (moments is not None and moments.reason is not None)
 
     def found(self, name: str) -> Any:
-        """What a part found; None where that is nothing."""
+        """What was found; None where that is nothing."""
         return entry.found if (entry := self.entries.get(name)) else None
 
     @property
@@ -191,7 +196,7 @@ class Job:
         return None if (index := self.found(STABILITY_INDEX.name)) is None else float(index.value)
 
     def add(self, name: str, entry: Entry) -> None:
-        """Take what became of a part."""
+        """Take what became of a question."""
         self.entries[name] = self.new[name] = entry
         self.grow()
 
@@ -216,45 +221,35 @@ def _nothing(*_: Any) -> tuple[()]:
     return ()
 
 
-def _no_content(*_: Any) -> dict[Any, Any]:
+def _no_numbers(*_: Any) -> dict[Any, Any]:
     return {}
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class Question:
     """One thing that a case may ask for of each curve.
 
     Attributes:
         name: in a record and among the `parts` of a result.
-        settings: what a case asks of it for the curve with a number; None where it asks for nothing.
-        solve: finds it, or gives the `Reason` why there is none; None where it follows from other parts. Raises
+        asked: what a case asks of it for the curve with a number; None where it asks for nothing.
+        solve: finds it, or gives the `Reason` why there is none; None where it follows from others. Raises
             `FpsolveError`.
         kind: the type of what is found, which a record holds.
         symbol: what messages call it; empty where nobody is told why there is none.
         said: the messages about what was found.
+        lacks: why some of what is asked for is not there.
         numbers: those of a curve that a case asks for, by their quantities; of none, the quantities without numbers.
-        content: what summary.json has of it beyond the tables; None where it is not asked for.
-        files: writes into a folder the files that a curve has beyond the tables.
-        draw: writes into a folder what a curve has beyond a record, so that a further run solves it again.
-        show: what a terminal and a report say of each of a few curves.
-        figures: of a curve in a folder, beside its simulation if there is one.
-        reasons: why some of it is missing.
-        lacks: whether it lacks something that is asked for, as another part lacks it.
-        uses_solver: whether rtol and the mesh of Λ(p) decide its numbers.
+        files: writes into a folder what a curve has beyond the tables.
+        is_picture: whether its files show more than a record holds, so that it is solved again for them.
     """
 
     name: str
-    settings: Callable[[Case, int], Settings | None] = lambda *_: None
+    asked: Callable[[Case, int], Settings | None] = lambda *_: None
     solve: Callable[[Job, Settings], Any] | None = None
     kind: Any = None
     symbol: str = ""
     said: Callable[[Any, Curve, Numerics], Iterable[Message]] = _nothing
-    numbers: Callable[[Case, CurveResult | None], Mapping[Quantity, Any]] = _no_content
-    content: Callable[[Case, CurveResult], Mapping[str, Any]] = _no_content
-    files: Callable[[CurveResult, Path], None] | None = None
-    draw: Callable[[Any, Curve, Path], None] | None = None
-    show: Callable[[Case, CurveResult], Iterable[Block]] = _nothing
-    figures: Callable[[Case, CurveResult, Path, SimulatedCurve | None], Iterable[Drawing]] | None = None
-    reasons: Callable[[Any], Iterable[Message]] = _nothing
-    lacks: Callable[[Any, Settings], bool] = lambda *_: False
-    uses_solver: bool = True
+    lacks: Callable[[Any, Settings], Iterable[Message]] = _nothing
+    numbers: Callable[[Case, CurveResult | None], Mapping[Quantity, Any]] = _no_numbers
+    files: Callable[[Any, Curve, Path], None] | None = None
+    is_picture: bool = False

@@ -1,0 +1,135 @@
+"""What summary.json has of a curve beyond the tables, as tables in the table of the curve."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fpsolve.analysis.excursions import Excursion
+from fpsolve.analysis.sensitivity import RECORDS, Slopes
+from fpsolve.analysis.spreads import LEVEL, UNCERTAIN, Spread
+from fpsolve.case.case import Case
+from fpsolve.case.sections import EXCURSIONS, RESPONSE, SENSITIVITIES
+from fpsolve.exponent.error import MEANINGLESS, Estimate
+from fpsolve.model.quantity import LYAPUNOV_EXPONENT
+from fpsolve.parts.intervals import ENDS, spreads_of
+from fpsolve.results.curve import CurveResult
+from fpsolve.results.table import pair
+
+if TYPE_CHECKING:
+    pass
+
+
+def _classes(case: Case, result: CurveResult) -> Mapping[str, Any]:
+    if not result.classes:
+        return {}
+    found = [
+        {
+            "name": each.name,
+            **pair(LYAPUNOV_EXPONENT.name, each.lyapunov_exponent),
+            "moments": [
+                {"p": p, "moment": value, "moment_error": error}
+                for p, value, error in zip(
+                    each.p.tolist(), each.value.tolist(), each.error_estimate.tolist(), strict=True
+                )
+            ],
+        }
+        for each in result.classes
+    ]
+    return {"classes": found}
+
+
+def _sensitivities(case: Case, result: CurveResult) -> Mapping[str, Any]:
+    """∂/∂θ by the key of θ, null where its error leaves it no meaning, and the estimates of these errors alike."""
+    if SENSITIVITIES not in case.asked:
+        return {}
+    if (found := result.sensitivities) is None:
+        return {SENSITIVITIES: None}
+    known = found
+
+    def numbers(of: Callable[[Estimate], float]) -> dict[str, Any]:
+        def row(slopes: Slopes) -> dict[str, float | None]:
+            return {key: of(each) if each.relative_error <= MEANINGLESS else None for key, each in slopes.items()}
+
+        moments = zip(known.p.tolist(), known.moments, strict=True)
+        indices = {name: row(known.indices[name]) if name in known.indices else None for name in RECORDS}
+        return {"moments": [{"p": p, **row(slopes)} for p, slopes in moments], **indices}
+
+    errors = numbers(lambda each: each.error_estimate)
+    return {SENSITIVITIES: {**numbers(lambda each: each.value), "errors": errors}}
+
+
+def _excursions(case: Case, result: CurveResult) -> Mapping[str, Any]:
+    """The start, the bounds and the asymptotic number of upcrossings at all levels, and what these follow from."""
+    found: Excursion | None = result.parts.get(EXCURSIONS)
+    if EXCURSIONS not in case.asked or found is None:
+        return {EXCURSIONS: None} if EXCURSIONS in case.asked else {}
+    levels = np.array(case.excursions.levels)
+    rows = zip(levels.tolist(), *(each.tolist() for each in found.bounds(levels)), strict=True)
+    many = [None if math.isnan(each) else each for each in found.expected_upcrossings(levels).tolist()]
+    content = {
+        "start": {"phi": found.phi, "xi": found.xi},
+        "is_certain": found.is_certain,
+        **pair("stability_index", found.stability_index),
+        **pair("lower", found.lower),
+        **pair("upper", found.upper),
+        **pair("upcrossings", found.upcrossings),
+        "levels": [
+            {"level": level, "least_probable": low, "most_probable": high, "upcrossings": count}
+            for (level, low, high), count in zip(rows, many, strict=True)
+        ],
+    }
+    return {EXCURSIONS: content}
+
+
+def _response(case: Case, result: CurveResult) -> Mapping[str, Any]:
+    """The means and impacts with their errors, what the density does near rest, and how far these are to be trusted."""
+    if not case.has_response or (found := result.response) is None:
+        return {RESPONSE: None} if case.has_response else {}
+    means: dict[str, Any] = {}
+    for name, number in found.means.items():
+        means |= pair(name, number)
+    content = {
+        "means": means,
+        **({} if found.impact_rate is None else pair("impact_rate", found.impact_rate)),
+    }
+    if found.balance is not None:
+        content |= {
+            "has_hump": found.has_hump,
+            "has_crater": found.has_crater,
+            **pair("balance", found.balance),
+            "least_over_largest_density": found.least,
+            "unknowns": found.unknowns,
+        }
+    return {RESPONSE: content}
+
+
+def _intervals(case: Case, result: CurveResult) -> Mapping[str, Any]:
+    """What is uncertain of a curve, and how that of the parameters is."""
+    if not (case.uncertain and result.curve.is_possible):
+        return {}
+    found, laws = spreads_of(case, result), case.uncertain.laws(result.curve.problem)
+    content = {
+        "level": LEVEL,
+        "laws": {
+            key: {name: getattr(each, name) for name in ("value", "sd", "mean", "deviation")}
+            for key, each in laws.items()
+        },
+        **{name: _plain(found.indices[name]) if name in found.indices else None for name in UNCERTAIN},
+        "moments": [{"p": p, **_plain(each)} for p, each in found.moments.items()],
+    }
+    return {"uncertainty": content}
+
+
+def _plain(spread: Spread) -> dict[str, float]:
+    """A spread to first order as files have it."""
+    return {name: getattr(spread, name) for name in ("mean", "deviation", *ENDS)} | {
+        "probability_below_0": spread.below
+    }
+
+
+BEYOND = _classes, _excursions, _response, _sensitivities, _intervals
+"""Each gives what it has by its name; nothing where that is not asked for."""
