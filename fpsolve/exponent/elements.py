@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Iterator, Sequence
+from contextlib import nullcontext
 from dataclasses import replace
 from functools import cached_property, partial
 from typing import Any
@@ -16,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from fpsolve.arrays import FloatArray
-from fpsolve.budget import OverBudget, unless_over_budget
+from fpsolve.budget import unless_over_budget
 from fpsolve.errors import NotConverged
 from fpsolve.exponent.eigen import (
     PairDerivatives,
@@ -211,7 +212,8 @@ class Elements(Method):
         """
         if self.preferred_even(p):
             return super().row(p)
-        try:
+        even = self.even(p)
+        with unless_over_budget() if even else nullcontext():
             solution = self.solution(p)
             value, error = solution.value, solution.error
             if p == 0:  # but for rounding, in every space
@@ -221,11 +223,8 @@ class Elements(Method):
                 value, error = p * ratio, abs(p) * error
             if abs(p) >= TINIEST_P:  # else Λ has no scale
                 self.check(p, value, error)
-        except NotConverged as failure:
-            if isinstance(failure, OverBudget) or not (even := self.even(p)):
-                raise
-            return Moment.of(even)
-        return Moment(value, solution.derivative, math.nan, error, solution.pair.residual)
+            return Moment(value, solution.derivative, math.nan, error, solution.pair.residual)
+        return Moment.of(even)
 
     def ratio_alone(self, p: float, tolerance: Tolerance | None = None) -> tuple[float, float]:
         """Λ(p)/p and its error.

@@ -39,7 +39,6 @@ from fpsolve.exponent.solver import ExponentSolver, solver_of
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import Code, Message
 from fpsolve.model import quantity
-from fpsolve.model.coordinates import framed
 from fpsolve.model.problem import ParameterDerivative, Problem
 from fpsolve.model.quantity import MOMENT as MOMENT
 from fpsolve.model.quantity import Quantity as Quantity
@@ -72,8 +71,6 @@ def impact_rate(solver: ExponentSolver, jump: int | None = None) -> Estimate | A
     number = 0 if jump is None else jump
     if not is_whole(number, 0, count - 1):
         raise ValueError(f"got jump = {shown(jump)}; must be a whole number from 0 to {count - 1}, or None")
-    if framed(solver.problem).invariant_rays:  # the phase never passes one, and so no jump twice
-        return Estimate(0.0, 0.0, 0.0, quantity=quantity.IMPACT_RATE)
     value, better = (_flux(each.pair, number) for each in (solver.method.around_zero, solver.method.finer_around_zero))
     generator = solver.method.finer_around_zero.pair.generator
     usual = generator.framed.unit_rate / math.pi
@@ -132,6 +129,8 @@ def critical_restitution(solver: ExponentSolver, jump: int | None = None) -> Est
 def _flux(pair: PrincipalPair, number: int) -> float:
     """⟨T*, ∂L′(0)/∂ ln R 1⟩ of a pair at p = 0, R that of one of the jumps."""
     jumps = pair.generator.problem.system.jumps
+    if not jumps:  # of a part beside a ray that the phase never passes, and so no jump twice
+        return 0.0
     changes = tuple(float(i == number) for i in range(len(jumps)))
     load = pair.generator.changed(ParameterDerivative(jumps[number].log_factor, jumps=changes), 0.0, 0.0, derivative=1)
     return float(pair.left @ (load @ pair.right) / (pair.left @ pair.space.weighed(pair.right)))

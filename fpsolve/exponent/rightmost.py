@@ -14,7 +14,7 @@ import numpy as np
 from scipy.sparse.linalg import ArpackError, LinearOperator, eigs
 
 from fpsolve.arrays import FloatArray
-from fpsolve.budget import charge
+from fpsolve.budget import timed
 from fpsolve.errors import NoHierarchy, SingularMatrix
 
 ROUNDING = 10 * sys.float_info.epsilon
@@ -84,12 +84,12 @@ class Rates(Protocol):
 
     def inverse(self, sigma: float, size: int, tolerance: float = EXACTLY) -> Solve:
         """(σ − H)⁻¹ of so many numbers, within the budget. Raises as `solver`, and `OverBudget`."""
-        charge(size)
-        solve = self.solver(sigma, tolerance)
+        with timed(size):
+            solve = self.solver(sigma, tolerance)
 
         def asked(x: FloatArray, trans: int = 0) -> FloatArray:
-            charge(size)
-            return np.asarray(solve(x, trans))
+            with timed(size):
+                return np.asarray(solve(x, trans))
 
         return asked
 
