@@ -28,6 +28,8 @@ from fpsolve.theory.frozen import frozen_noise, steady_places, swing
 
 REACH = 12.0
 """Standard deviations on both sides, up to which the first cells of noise with algebraic tails are."""
+FREE_STAGES = 4
+"""From this number of stages on, no cell is made coarser."""
 SHARE = 0.05
 """Share of the tolerance that a new discretisation is made for in each direction, so that it serves other p too."""
 ALONE = 0.5
@@ -80,19 +82,20 @@ class Start:
         found = self.space.doubled(mode_effects(pair) if is_pair else ())
         return replace(self, space=found) if found.size > self.space.size else None
 
-    def refined(self, solution: Solution, goal: float, most: int) -> Start:
+    def refined(self, solution: Solution, goal: float, stages: int, most: int) -> Start:
         """A place on which each cell should lack no more than its share of an error.
 
         Args:
             solution: that on the space.
             goal: the error.
+            stages: how many spaces were solved on.
             most: unknowns; where more are needed, a space is made that does for this p alone.
         """
-        chosen = self.space
+        chosen, may_coarsen = self.space, stages < FREE_STAGES
         if chosen.xi.lines.size:
             goal = max(goal, MOST_GAIN * solution.error)
         for share in (SHARE * goal, ALONE * goal):
-            found = chosen.refined(solution.effects, share)
+            found = chosen.refined(solution.effects, share, may_coarsen)
             if chosen.xi.lines.size:
                 lower, upper = solution.truncation
                 found = found.with_axis(1, found.xi.reaching(lower > share, upper > share))

@@ -192,9 +192,10 @@ class CountedAxis(NoiseAxis):
     def raised(self) -> Self:
         return replace(self, count=min(self.count + 2, MAX_COUNT))
 
-    def refined(self, effects: ModeEffects, share: float) -> Self:
+    def refined(self, effects: ModeEffects, share: float, may_coarsen: bool) -> Self:
         needed = math.ceil(float(effects.needed(share)[0]) + 1.3)
-        return replace(self, count=max(self.count, min(needed, 3 * self.count // 2 + 3, MAX_COUNT)))
+        least = max(self.count // 2, 3) if may_coarsen else self.count
+        return replace(self, count=max(least, min(needed, 3 * self.count // 2 + 3, MAX_COUNT)))
 
 
 class LineAxis(NoiseAxis):
