@@ -195,7 +195,9 @@ def excursion(
 
 def solve_excursion(solver: ExponentSolver, *, phi: Start, xi: StartOfNoise, root: float | None = None) -> Excursion:
     """The excursions of a solver's problem; `root` is near δ_p, if that is known."""
-    problem, solver = solver.problem, solver.adapting()  # a mesh need not reach the ends of the noise
+    problem = solver.problem
+    if solver.mesh:  # which need not reach the ends of the noise
+        solver = replace(solver, mesh=None)
     check_start(problem, phi, xi)
     exponent = solver.lyapunov_exponent()
     found = Excursion(exponent, phi=phi, xi=xi, parameters=problem.values)

@@ -14,7 +14,6 @@ from .method import Budget as Budget
 from .method import Method as Method
 from .moments import EvenMoment as EvenMoment
 from .moments import even_moment as even_moment
-from .moments import hierarchy_exponent as hierarchy_exponent
 from .quantities import INDICES as INDICES
 from .quantities import QUANTITIES as QUANTITIES
 from .quantities import Index as Index

@@ -112,16 +112,6 @@ def functions_of(noise: Noise, count: int) -> Functions:
     )
 
 
-def hierarchy_exponent(problem: Problem, p: float) -> tuple[float, float]:
-    """Λ(p) of an even p by the equations of the moments, and its error.
-
-    Raises:
-        NoHierarchy: the equations do not close for this problem and this p, or are too many.
-    """
-    found = even_moment(problem, p)
-    return found.value, found.error
-
-
 def even_moment(
     problem: Problem,
     p: float,

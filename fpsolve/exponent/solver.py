@@ -184,10 +184,6 @@ class ExponentSolver:
     budget: Budget = field(default_factory=Budget)
     slope_errors: dict[float, float] = field(init=False, default_factory=dict, repr=False)
 
-    def adapting(self) -> ExponentSolver:
-        """The same with a discretisation that is chosen for each p."""
-        return self if self.mesh is None else replace(self, mesh=None)
-
     def __post_init__(self) -> None:
         checked_problem(self.problem)
         for name, kind, words in _KINDS:

@@ -178,8 +178,22 @@ class Core(Basis):
         return (matrix_product(part, table[: part.shape[1]]) for part in derived[:order]), raised(left, 2 * degrees)
 
 
+class Cosines(Basis):
+    """Functions of z = cos θ by sums of cos mθ, up to signs."""
+
+    def times_z(self, u: Balls, noise: Cylinder) -> Balls:
+        """z u."""
+        return times_cosine(u)
+
+    def taylor(
+        self, parts: Balls, middle: Balls, half: FloatArray, rest: float = 0.0
+    ) -> tuple[Iterator[Balls], FloatArray]:
+        """The same of sums of cos mθ, up to signs."""
+        return cosine_taylor(parts, middle, half, rest)
+
+
 @dataclass(frozen=True)
-class Whole(Basis):
+class Whole(Cosines):
     """B_0 = 1 and ∫(1 − z²) T_{m−1} dz on the whole support [−1, 1] of bounded noise.
 
     Both ends have u_z = 0, and b u_z is a polynomial, −b B_m′ = −a z T_{m−1}. Nothing needs to be cleared, D = 1.
@@ -217,24 +231,14 @@ class Whole(Basis):
             second[:, n + 1] -= inner[:, n] * (n + 2) / 2
         return added(second * (noise.nu / 2), self.times_z(inner, noise) * (-noise.nu * noise.slope))
 
-    def times_z(self, u: Balls, noise: Cylinder) -> Balls:
-        """z u."""
-        return times_cosine(u)
-
     def places(self, low: FloatArray, high: FloatArray) -> tuple[Balls, Balls]:
         """The ends of cells in θ, T_m(cos θ) = cos mθ."""
         right, left = (each(lambda z: z.acos(), balls(end)) for end in (low, high))
         return left, right
 
-    def taylor(
-        self, parts: Balls, middle: Balls, half: FloatArray, rest: float = 0.0
-    ) -> tuple[Iterator[Balls], FloatArray]:
-        """The same of sums of cos mθ, up to signs."""
-        return cosine_taylor(parts, middle, half, rest)
-
 
 @dataclass(frozen=True)
-class Circle(Basis):
+class Circle(Cosines):
     """cos mθ of z = cos θ."""
 
     kind: ClassVar[BasisKind] = "circle"
@@ -255,20 +259,10 @@ class Circle(Basis):
         """½ ν ∂θθ u."""
         return u * (each(ball, np.arange(u.shape[1])) ** 2 * (-noise.nu / 2))
 
-    def times_z(self, u: Balls, noise: Cylinder) -> Balls:
-        """u cos θ."""
-        return times_cosine(u)
-
     def places(self, low: FloatArray, high: FloatArray) -> tuple[Balls, Balls]:
         """θ at the ends of cells."""
         left, right = (balls(end) * ball(0).pi() for end in (low, high))
         return left, right
-
-    def taylor(
-        self, parts: Balls, middle: Balls, half: FloatArray, rest: float = 0.0
-    ) -> tuple[Iterator[Balls], FloatArray]:
-        """As `Whole.taylor`."""
-        return cosine_taylor(parts, middle, half, rest)
 
 
 @dataclass(frozen=True)

@@ -42,14 +42,19 @@ def store(y, i, state):
 
 
 @compiled
+def image_of(matrix, state, image):
+    """Put a matrix times a state into `image`."""
+    for r in range(state.size):
+        image[r] = 0.0
+        for c in range(state.size):
+            image[r] += matrix[r, c] * state[c]
+
+
+@compiled
 def multiplied(matrix, state, other):
     """Multiply a state by a matrix, in place; `other` is room for one more."""
-    n = state.size
-    for r in range(n):
-        other[r] = 0.0
-        for c in range(n):
-            other[r] += matrix[r, c] * state[c]
-    for r in range(n):
+    image_of(matrix, state, other)
+    for r in range(state.size):
         state[r] = other[r]
 
 
@@ -115,10 +120,7 @@ def flow(rays, matrix, t, size, state, tally, other, begun):
         for r in range(n):
             begun[r] = state[r]
         for k in range(terms, 0, -1):
-            for r in range(n):
-                other[r] = 0.0
-                for c in range(n):
-                    other[r] += matrix[r, c] * state[c]
+            image_of(matrix, state, other)
             for r in range(n):
                 state[r] = begun[r] + s / k * other[r]
         log += crossed(rays, begun, state, tally) + tamed(state)

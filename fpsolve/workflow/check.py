@@ -14,7 +14,7 @@ from fpsolve.case.sections import RESPONSE, Expectation, Varied
 from fpsolve.data import short_names, written
 from fpsolve.errors import FpsolveError, NoHierarchy
 from fpsolve.exponent.error import digits
-from fpsolve.exponent.moments import hierarchy_exponent, refuse_open_hierarchy
+from fpsolve.exponent.moments import even_moment, refuse_open_hierarchy
 from fpsolve.exponent.quantities import INDICES
 from fpsolve.messages import Message
 from fpsolve.page.limits import EACH, ROWS
@@ -119,9 +119,9 @@ def compare_with_hierarchy(case: Case, results: Sequence[CurveResult]) -> list[C
     for result in results:
         errors = dict(zip(result.moments.p.tolist(), result.moments.error_estimate.tolist(), strict=True))
         for p in even_moments(case).tolist():
-            value, rounding = hierarchy_exponent(result.curve.problem, p)
-            error = errors.get(p, 0.0) + rounding
-            wanted = Expectation(quantity="moment", p=p, value=value, atol=error, source=SOURCE)
+            known = even_moment(result.curve.problem, p)
+            error = errors.get(p, 0.0) + known.error
+            wanted = Expectation(quantity="moment", p=p, value=known.value, atol=error, source=SOURCE)
             found.append(Comparison.of(wanted, result))
     return found
 

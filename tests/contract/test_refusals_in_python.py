@@ -21,7 +21,7 @@ from fpsolve import (
     moment_lyapunov,
     simulate,
 )
-from fpsolve.exponent import Budget, even_moment, hierarchy_exponent, impact_rate, stationary_moments
+from fpsolve.exponent import Budget, even_moment, impact_rate, stationary_moments
 from fpsolve.model import (
     Bounded,
     CoefficientMatrix,
@@ -306,7 +306,7 @@ BAD = [
     ),
     # Moments that do not close
     *(
-        (lambda system=system, noise=noise, p=p: hierarchy_exponent(Problem(system, noise), p), told)
+        (lambda system=system, noise=noise, p=p: even_moment(Problem(system, noise), p), told)
         for system, noise, p, told in (
             (ParametricOscillator(1.0, 0.1), White(0.5), 3.0, "even p > 0 only"),
             (ParametricOscillator(1.0, 0.1), White(0.5), 0.0, "even p > 0 only"),
@@ -337,7 +337,7 @@ def test_call_is_refused_in_words(call, words):
 @pytest.mark.slow
 def test_noise_so_strong_or_slow_that_moments_have_too_many_functions_is_refused():
     with pytest.raises(FpsolveError, match="noise so strong or slow"):
-        hierarchy_exponent(Problem(ParametricOscillator(1.0, 0.1), OrnsteinUhlenbeck(1e-3, 1.0)), 4.0)
+        even_moment(Problem(ParametricOscillator(1.0, 0.1), OrnsteinUhlenbeck(1e-3, 1.0)), 4.0)
 
 
 CALLS = [

@@ -1,5 +1,7 @@
 """Notes on weak noise, forms of moments, and the command that compares with them, where it must differ."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -72,7 +74,7 @@ def test_command_compares_with_the_moments_and_tells_what_differs(tmp_path, monk
         refused = run(tmp_path, "check", "--hierarchy", "case.toml", "--set", override)
         assert refused.code == 2
         assert words in " ".join(refused.err.split())
-    monkeypatch.setattr("fpsolve.workflow.check.hierarchy_exponent", lambda problem, p: (0.1, 1e-12))
+    monkeypatch.setattr("fpsolve.workflow.check.even_moment", lambda *_: SimpleNamespace(value=0.1, error=1e-12))
     failed = run(tmp_path, "check", "--hierarchy", "case.toml", "--jobs", "1", "--quiet")
     assert (failed.code != 0, failed.out) == (True, "case: 0 of 4 ok\n")
 

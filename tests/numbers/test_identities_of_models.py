@@ -102,7 +102,9 @@ def test_impact_laws_of_the_papers_oscillator_are_their_formulas_and_differ_by_e
     phi, ((one,), h1, q1) = np.linspace(0, 6, 9), (oscillator.jumps, oscillator.terms[1].h, oscillator.terms[1].q)
     assert_allclose(h1(phi), 0.5 * np.sin(2 * phi), atol=1e-15)  # Eqs. (17)-(18)
     assert_allclose(q1(phi), 0.5 * (1 - np.cos(2 * phi)), atol=1e-15)
-    assert_allclose([oscillator.h2(phi), oscillator.q2(phi)], [-0.4 * h1(phi), -0.4 * q1(phi)], atol=1e-15)
+    assert_allclose(
+        [oscillator.terms[2].h(phi), oscillator.terms[2].q(phi)], [-0.4 * h1(phi), -0.4 * q1(phi)], atol=1e-15
+    )
     assert (one.phase, one.log_factor) == (math.pi / 2, oscillator.log_impact_factor)
 
 

@@ -9,10 +9,9 @@ from functools import cached_property
 from typing import Annotated, ClassVar, Self
 
 import numpy as np
-from numpy.typing import ArrayLike
 from pydantic import model_validator
 
-from fpsolve.arrays import FloatArray, identity
+from fpsolve.arrays import identity
 from fpsolve.messages import Code, Message
 from fpsolve.model.faults import strict_dataclass
 from fpsolve.model.parameters import ANY_SIGN, SIZE, parameter
@@ -160,11 +159,3 @@ class VibroImpactOscillator(System):
         with np.errstate(over="ignore"):
             loss, slope = (-log_factor, 1.0) if is_delta else (-float(np.expm1(log_factor)), float(np.exp(log_factor)))
         return "r", 1 - loss / square, slope / square
-
-    def h2(self, phi: ArrayLike) -> FloatArray:
-        """h₂(φ) = c₁ h₁(φ); the impact adds nothing, as sin 2φ vanishes where it acts."""
-        return self.terms[2].h(phi)
-
-    def q2(self, phi: ArrayLike) -> FloatArray:
-        """q₂(φ) = c₁ q₁(φ) between impacts; the impact itself is `log_impact_factor`."""
-        return self.terms[2].q(phi)
