@@ -7,7 +7,6 @@ import pytest
 
 from fpsolve import ExponentSolver, load_case
 from fpsolve.workflow import Watch, chart_case
-from tests.contract.test_cases import CASES
 from tests.kit import case_in, case_text, read_csv, read_json, run
 
 TEXT = """[moments]
@@ -177,13 +176,3 @@ def test_a_map_and_a_chart_of_the_same_keys_share_a_folder(tmp_path):
     assert {"summary.json", "figure.png", "chart.csv", "chart.png"} <= {each.name for each in folder.iterdir()}
     assert not {"oscillator.omega", "noise.D0"} & read_json(folder / "chart.json")["parameters"].keys()
     assert {row["line"] for row in read_csv(folder / "chart.csv")} == {"moment(2) = 0"}
-
-
-@pytest.mark.slow
-def test_the_mean_square_under_white_noise_is_neutral_on_s_squared_4b(tmp_path):
-    text = (CASES / "systems/white_noise_chart.toml").read_text(encoding="utf-8")
-    done = run(tmp_path, "chart", "case.toml", "--set=chart.lines=['moment(2) = 0']", "--set=chart.nodes=5", case=text)
-    assert done.code == 0, done.err
-    rows = read_csv(tmp_path / "results/case/chart.csv")
-    assert len(rows) > 9
-    np.testing.assert_allclose([float(row["x"]) ** 2 / float(row["y"]) for row in rows], 4.0, rtol=1e-6)

@@ -161,33 +161,6 @@ def test_three_variables_are_reported_and_proven_under_white_noise_alone(tmp_pat
     assert (done.code, "3 variables under other noise than white, or with a delay" in done.err) == (2, True)
 
 
-OSCILLATOR = """title = "paper"
-moments.p = [2.0]
-[oscillator]
-omega = 1.0
-restitution = 0.8
-c1 = 0.1
-epsilon = 0.1
-"""
-WRITTEN = """title = "paper"
-moments.p = [2.0]
-[system]
-variables = ["x", "v"]
-drift = ["omega*v", "-omega*x + epsilon**2*c1*v + epsilon*xi*v"]
-parameters = { omega = 1.0, r = 0.8, c1 = 0.1, epsilon = 0.1 }
-walls = [{ at = "x = 0", restitution = "LAW" }]
-"""
-
-
-@pytest.mark.parametrize(
-    ("impact", "law"), [("delta", "exp(-epsilon**2*(1 - r))"), ("restitution", "1 - epsilon**2*(1 - r)")]
-)
-def test_the_oscillator_of_the_paper_written_as_equations_has_its_second_moment(tmp_path, impact, law):
-    texts = f'{OSCILLATOR}impact = "{impact}"\n', WRITTEN.replace("LAW", law)
-    one, other = (moment_lyapunov(case_in(tmp_path, text + GAUSSIAN).problem, 2.0).value[0] for text in texts)
-    assert one == pytest.approx(other, rel=1e-12)
-
-
 def test_modes_that_are_not_coupled_have_the_second_moment_of_one_whatever_their_units(tmp_path):
     text = 'title = "T"\nmoments.p = [2.0]\n[system]\nkind = "modes"\nmass = [[1e13, 0.0], [0.0, 1.0]]\n'
     text += "stiffness = [[4e13, 0.0], [0.0, 1.0]]\ndamping = [[9e12, 0.0], [0.0, 0.2]]\n"

@@ -12,12 +12,12 @@ from scipy.sparse import csr_matrix
 
 from fpsolve.arrays import identity, one
 from fpsolve.fem.axis import KroneckerSum
-from fpsolve.fem.directions import HalfSphereAxis, SphereAxis
+from fpsolve.fem.directions import HalfSphereAxis
 from fpsolve.fem.factors import ArrayFactors, LevelFactors, SparseFactors
 from fpsolve.fem.noise_axes import StateAxis
 from fpsolve.fem.phase import PhaseAxis
 from fpsolve.fem.space import Space, first_axis
-from fpsolve.model import Bounded, CoefficientMatrix, NonGaussianNoise, OrnsteinUhlenbeck, Telegraph
+from fpsolve.model import Bounded, NonGaussianNoise, OrnsteinUhlenbeck, Telegraph
 
 TWO_THREADS = """
 from threading import Event, Thread
@@ -110,7 +110,6 @@ def test_axis_has_the_band_of_its_matrices_by_which_memory_is_foreseen(noise):
 
 
 HALF = HalfSphereAxis(np.eye(4), np.array([0, np.pi / 2]), 10, 2, np.array([-0.5, 0.5]) * np.pi, 12)
-WHOLE = SphereAxis(np.eye(4), np.array([0.0, 0.5, np.pi / 2]), 8, 2)
 
 
 def fitted(axis, *forms):
@@ -120,23 +119,6 @@ def fitted(axis, *forms):
     points /= np.linalg.norm(points, axis=0)
     table = axis.at(points)
     return np.linalg.lstsq(table, np.stack([np.einsum("ix,ij,jx->x", points, form, points) for form in forms], 1))[0]
-
-
-@pytest.mark.parametrize("axis", [HALF, WHOLE], ids=["half", "whole"])
-def test_quadratic_forms_on_a_sphere_move_as_they_do(axis):
-    """L xᵀQx = xᵀ(AᵀQ + QA)x of ẋ = Ax, and twice that of white noise, beside another form."""
-    q, a, b, test = np.random.default_rng(3).standard_normal((4, 4, 4))
-    a[0], b[0] = (0, 1.3, 0, 0), 0
-
-    def moved(by, form):
-        return by.T @ form + form @ by
-
-    u, driven, diffused, v = fitted(axis, q, moved(a, q), moved(b, moved(b, q)), test).T
-    b = CoefficientMatrix(0, b)
-    (free, growth), parts = axis.driven(CoefficientMatrix(0, a)), axis.diffusion(b, b)
-    assert v @ (free + 2 * growth) @ u == pytest.approx(v @ axis.mass() @ driven, rel=1e-5)
-    twice = sum(2**k * each for k, each in enumerate(parts))
-    assert v @ twice @ u == pytest.approx(v @ axis.mass() @ diffused, rel=1e-5)
 
 
 def test_impact_on_the_half_sphere_keeps_the_other_mode():

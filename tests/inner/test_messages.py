@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 from fpsolve.case.remedies import CASE_WORDS
-from fpsolve.errors import MeshError, NoSuchExponent, NotConverged
 from fpsolve.messages import Code, Message, Remedy, Severity, escaped, message_of
 
 TEXTS = ("text", "place", "symbol", "symbols", "key", "name", "line", "side", "kind", "file", "last", "value_text")
@@ -71,20 +70,6 @@ def test_remedy_is_said_in_the_words_of_its_audience(remedy):
     assert not re.search(r"`(fpsolve\.|write_mesh)|a (larger|smaller) budget|given mesh", words[1])
     assert words[0].endswith(remedy.value)
     assert words[1].endswith(CASE_WORDS.get(remedy, remedy.value))
-
-
-@pytest.mark.parametrize(
-    "failure",
-    [
-        NotConverged(Message(Code.NO_ARNOLDI, p=2.0), {"a": 1}, Remedy.DEGREES),
-        NoSuchExponent(Message(Code.TAILS, what="Λ(9)", remedy=Remedy.REDUCTION)),
-        MeshError("no", Remedy.MESH_FILE),
-    ],
-)
-def test_error_carries_its_message_into_a_pickle(failure):
-    again = pickle.loads(pickle.dumps(failure))
-    assert (type(again), vars(again), str(again)) == (type(failure), vars(failure), failure.message)
-    assert again.message.data == failure.message.data
 
 
 def test_numbers_of_any_kind_survive_a_record():

@@ -5,13 +5,11 @@ from typing import Annotated
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
 from pydantic.dataclasses import dataclass
 from scipy.linalg import expm
 
-from fpsolve import OrnsteinUhlenbeck, PlaneSystem, Problem, sensitivities
+from fpsolve import OrnsteinUhlenbeck, PlaneSystem, sensitivities
 from fpsolve.model import Bounded, CoefficientMatrix, Filter, SineWiener
-from fpsolve.model.coordinates import framed
 from fpsolve.model.noise import NoiseDerivative
 from fpsolve.model.noises.markov_chain import Chain
 from fpsolve.model.parameters import parameter
@@ -109,16 +107,3 @@ def test_polar_form_and_frequency_of_a_system_are_those_of_its_motion(rng):
         assert angular_frequency(PlaneSystem([CoefficientMatrix(order, matrix)], epsilon=0.5)) == pytest.approx(
             expected
         )
-
-
-def test_phases_of_a_frame_there_and_back(rng):
-    problem = Problem(PlaneSystem([CoefficientMatrix(0, ((0.3, -2.0), (1.0, -0.4)))]), OrnsteinUhlenbeck(1.0, 0.7))
-    phi, h = np.sort(rng.uniform(-7, 7, 500)), 1e-6
-    frame, motion = framed(problem).frame, framed(problem).motion
-    psi = frame.phase(phi)
-    assert_allclose(frame.own_phase(psi), phi, atol=1e-13)
-    slope = (frame.phase(phi + h) - frame.phase(phi - h)) / (2 * h)
-    assert_allclose(frame.density(phi), slope, rtol=1e-7)
-    (rotation,) = motion.terms
-    assert rotation.h.amplitude == rotation.q.amplitude == 0
-    assert rotation.h.mean == pytest.approx(-math.sqrt(2.0 - 0.35**2))

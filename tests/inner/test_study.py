@@ -10,16 +10,16 @@ import pytest
 from fpsolve import ExponentSolver, load_case
 from fpsolve.errors import NotConverged
 from fpsolve.exponent import INDICES
-from fpsolve.messages import Code, Message, message_of
+from fpsolve.messages import message_of
 from fpsolve.parts import QUESTIONS, indices
-from fpsolve.results.curve import SimulatedCurve, Status
+from fpsolve.results.curve import SimulatedCurve
 from fpsolve.simulation.estimators import MomentEstimate, MonteCarlo
 from fpsolve.simulation.response import Response
 from fpsolve.study import columns, solve
 from fpsolve.workflow import run_case, simulate
 from tests.contract.test_cases import CASES, ROOT
 from tests.contract.test_docs import typed
-from tests.kit import case_in, case_text, from_record, solve_case, solve_sets
+from tests.kit import case_in, case_text, from_record, solve_sets
 
 MINIMAL = CASES / "minimal.toml"
 
@@ -100,27 +100,6 @@ def test_a_simulation_comes_back_from_its_record_to_the_last_bit(rng):
     for each in wrong:
         with pytest.raises(ValueError, match="this is no record of "):
             simulate.simulated_of({"simulation": each}, curve)
-
-
-@pytest.mark.parametrize(
-    ("raised", "code"),
-    [
-        (NotConverged(Message(Code.RESPONSE_OPEN, size=0.1)), Code.RESPONSE_OPEN),
-        (MemoryError(), Code.NO_MEMORY),
-        (ZeroDivisionError("a fault"), Code.FAULT),
-    ],
-)
-def test_a_response_that_fails_costs_no_other_number(tmp_path, monkeypatch, raised, code):
-    def failing(*arguments):
-        raise raised
-
-    monkeypatch.setattr("fpsolve.parts.response.solve_response", failing)
-    text = case_text("[moments]\np = [1.0]\n[output]\nquantities = ['moment', 'response']", c2=0.5)
-    [found] = solve_case(case_in(tmp_path, text))
-    [failure] = found.failures
-    assert failure.reason.tells_of(code)
-    assert str(failure.reason).startswith("no response: ")
-    assert (found.status, found.moments.p.tolist()) == (Status.PARTLY, [1.0])
 
 
 def test_a_simulation_that_fails_keeps_the_curves_before_it(tmp_path, monkeypatch):

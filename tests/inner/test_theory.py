@@ -5,10 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from fpsolve import ExponentSolver, OrnsteinUhlenbeck, Problem, VibroImpactOscillator, moment_lyapunov
+from fpsolve import OrnsteinUhlenbeck, Problem, VibroImpactOscillator, moment_lyapunov
 from fpsolve.errors import NoHierarchy
 from fpsolve.exponent import even_moment
-from fpsolve.exponent.density import plane_fields
 from fpsolve.messages import Code
 from fpsolve.model import Bounded, White
 from fpsolve.theory.perturbation import perturbed_moments, weak_noise_note
@@ -18,7 +17,6 @@ from tests.numbers.rows.even import NOISES, WAVY, drawn
 from tests.numbers.second import LOAD, even, spring
 from tests.oracles import perturbation
 
-OU = OrnsteinUhlenbeck(alpha=1.7, sigma=0.9)
 CASE = """
 title = "hierarchy"
 [system]
@@ -103,17 +101,3 @@ def test_no_theory_stands_beside_a_harmonic_load():
     assert note.code is Code.LOAD_LEFT_OUT
     assert "noise.xi1 with sigma = 0 is" in str(note)
     assert weak_noise_note(noisy, p, value).code is Code.STRONG_NOISE
-
-
-@pytest.mark.parametrize("p", [-1.0, 2.0])
-def test_eigenfunction_tends_to_1_plus_epsilon_T1(p):
-    """On [π/2, 3π/2], where the impact adds a sawtooth of order ε² only."""
-    errors = []
-    phi, xi = np.linspace(np.pi / 2, 3 * np.pi / 2, 41)[1:-1], OU.standard_deviation * np.linspace(-3, 3, 31)
-    for epsilon in (0.04, 0.02, 0.01):
-        oscillator = VibroImpactOscillator(omega=1.3, restitution=0.8, c1=0.1, epsilon=epsilon)
-        space = (pair := ExponentSolver(Problem(oscillator, OU)).pair(p)).space
-        t1 = perturbation.first_order_eigenfunction(oscillator, OU, p, phi[:, None], xi)
-        values = plane_fields(pair, phi, phi, space.xi.at(xi / OU.standard_deviation)).T
-        errors.append(np.max(np.abs(values - 1 - epsilon * t1)))
-    assert np.log2(np.array(errors[:-1]) / errors[1:]) == pytest.approx([2, 2], abs=0.15)

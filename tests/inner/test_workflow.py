@@ -154,13 +154,22 @@ def test_a_failure_to_write_is_one_sentence(tmp_path, monkeypatch, failure, said
     assert (done.code, done.err.count("\n"), done.err.startswith(said)) == (2, 1, True)
 
 
-@pytest.mark.parametrize("failure", [ZeroDivisionError("x"), MemoryError(), FpsolveError("no")])
-def test_a_quantity_that_fails_takes_no_other_with_it(tmp_path, monkeypatch, failure):
+@pytest.mark.parametrize(
+    ("failure", "said"),
+    [
+        (ZeroDivisionError("x"), "ZeroDivisionError: x (a fault of fpsolve"),
+        (MemoryError(), "not enough memory"),
+        (FpsolveError("no"), "no"),
+    ],
+)
+def test_a_quantity_that_fails_takes_no_other_with_it(tmp_path, monkeypatch, failure, said):
     for place in (*COSTLY, "fpsolve.exponent.solver.ExponentSolver.variance_rate"):
         monkeypatch.setattr(place, raising(failure))
-    done = run(tmp_path, "run", "case.toml", "--all", "--set", "vary={}", "--set", "moments.p=[2.0]", case=TEXT)
+    sets = "vary={}", "moments.p=[2.0]", "oscillator.c2=0.5"
+    done = run(tmp_path, "run", "case.toml", "--all", *(f"--set={each}" for each in sets), case=TEXT)
     [curve] = read_json(tmp_path / "results/case/summary.json")["curves"]
     assert (done.code, curve["status"], curve["variance_rate"]) == (3, "partly", None)
+    assert any(each.startswith(f"no response: {said}") for each in curve["warnings"])
     assert all(curve[name] for name in ("lyapunov_exponent", "stability_index", "moments"))
 
 

@@ -244,12 +244,6 @@ def test_slope_and_curvature_are_those_of_differences():
         assert second_derivative(pair) == pytest.approx((right.derivative - left.derivative) / (2 * h), rel=1e-5)
 
 
-def test_moments_are_convex_in_p():
-    found = moment_lyapunov(Problem(paper(), WEAK), np.linspace(-4, 8, 49))
-    assert np.all(np.diff(found.value, 2) > 0)
-    assert np.all(np.diff(found.derivative) > 0)
-
-
 def test_moments_have_the_order_asked_for_on_which_they_do_not_depend():
     problem, p = Problem(paper(), WEAK), [3.0, -1.0, 0.0, 3.0]
     found = moment_lyapunov(problem, p)
@@ -292,12 +286,6 @@ def test_density_of_the_states_of_a_chain_is_their_stationary_law():
     density = stationary_density(ExponentSolver(rates(STIFF, chain)).pair(0.0))
     np.testing.assert_allclose(density.xi_marginal(), [1 / 3, 2 / 3], rtol=1e-10)
     assert density.mean(lambda phi, xi: xi) == pytest.approx(0.0, abs=1e-12)
-
-
-def test_spectrum_of_impulses_is_their_rate_times_their_mean_square():
-    noise = Poisson(rate=2.0, sizes=(1.0, -2.0), weights=(3.0, 1.0))
-    np.testing.assert_allclose(noise.shares, [0.75, 0.25])
-    assert noise.spectral_density(0.0) == noise.spectral_density(7.0) == pytest.approx(3.5, rel=1e-15)
 
 
 def orders(of, steps, limit=0.0):

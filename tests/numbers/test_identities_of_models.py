@@ -415,7 +415,6 @@ FAST = {  # a noise of a rate with S(0) = 0.25, and the power of the rate by whi
     "filter": (lambda w: Filter(w, 0.3, 0.5 * w**2, 1.0, 0.0), (64.0, 128.0, 256.0), 1),
     "sine-Wiener": (lambda s: SineWiener(amplitude=s / math.sqrt(8), sigma=s), (32.0, 64.0, 128.0), 2),
     "bounded": (lambda s: Bounded(s / math.sqrt(8), 2.0, s), (64.0, 128.0, 256.0), 2),
-    "ground": (lambda w: Filter(w, 0.3, 0.5, w**2, 0.6 * w), (64.0, 128.0, 256.0), 1),
 }
 
 

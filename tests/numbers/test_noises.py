@@ -21,8 +21,6 @@ from fpsolve.model import (
     SineWiener,
     Telegraph,
     White,
-    noise_kind,
-    system_kind,
 )
 
 DEPARTURES = -5.0, -1.0, 0.5, 0.9, 1 - 1e-4, 1.0, 1 + 1e-4, 1.1, 1.3, 1.5
@@ -45,7 +43,6 @@ LAWS = [  # a noise, its variance and its spectral density
     (ReducedNoise(D0=0.7, tau0=1.3, r0=0.9), 1.1 * 2 * 0.7 / (1.3 * 2.3), relaxing(1.54 / 2.99, 2.3 / 2.2 / 1.3)),
     *((NonGaussianNoise(D0=0.7, tau0=1.3, r0=r0), 2 * 0.7 / (1.3 * (5 - 3 * r0)), None) for r0 in DEPARTURES),
     (SineWiener(amplitude=0.4, sigma=0.6), 0.08, relaxing(0.08, 0.18)),
-    (Bounded(mu=0.4, nu=0.0, sigma=0.6), 0.08, relaxing(0.08, 0.18)),
     (
         Bounded(mu=0.4, nu=2.0, sigma=0.5),
         0.08,
@@ -194,11 +191,3 @@ def test_chain_has_probabilities_by_its_times_and_rates_without_their_diagonal()
     assert RING.mean == pytest.approx(2.0)
     assert MarkovChain((1, 2), ((-3, 3), (4, -4))) == MarkovChain((1, 2), ((0, 3), (4, 0)))
     assert Filter(2.0, 5.0, 1.0, 1.0, 0.0).correlation_time == pytest.approx(1 / (10 - math.sqrt(96)), rel=1e-14)
-
-
-def test_kinds_of_noises_and_systems_are_found_by_their_names():
-    kinds = (
-        "non-gaussian ou-reduction ornstein-uhlenbeck sine-wiener white poisson telegraph markov-chain bounded filter"
-    )
-    assert [noise_kind(name).kind for name in kinds.split()] == kinds.split()
-    assert [system_kind(name).kind for name in ("parametric", "modes")] == ["parametric", "modes"]

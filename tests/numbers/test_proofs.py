@@ -175,7 +175,6 @@ PROOFS = {
         paper(bounded(0.4, 0.6, 0.7), 0.75, -0.1, 0.5, 1.3, impact="restitution"), None, elements, 1e-5, slow=True
     ),
     "bounded, ends that are reached": Proof(paper(bounded(r0=-1.0)), 2.0, series, 1e-8, slow=True),
-    "bounded, without loss": Proof(paper(bounded(), 1.0), 2.0, series, slow=True),
     "bounded, strong, without loss": Proof(paper(bounded(), 1.0, epsilon=1.0), 2.0, series, 1e-5, slow=True),
     "bounded, gain at a wall": Proof(spring(bounded(0.02, 0.6, 0.7), 0.1, 2.0, 1.1), 1.0, elements, 1e-6, slow=True),
     "bounded, reversed": Proof(spring(bounded(0.05, 0.6, 0.8)), -2.0, known(0.2), slow=True),
@@ -189,7 +188,6 @@ PROOFS = {
     "Gaussian, strong": Proof(
         paper(reduced(0.3), epsilon=1.0), 1.0, functools.partial(series, harmonics=20, functions=60), 2e-5, slow=True
     ),
-    "Gaussian, without loss": Proof(paper(reduced(), 1.0), 2.0, series, slow=True),
     "Gaussian, without loss, closed form": Proof(
         paper(reduced(0.2), 1.0, epsilon=0.2),
         -2.0,
@@ -289,11 +287,6 @@ PROOFS = {
         spring(Lopsided(0.5, 1.0)),
         2.0,
         lambda *_: moment_hierarchy.moment_lyapunov(at(oscillating(), (0.0, 1.5)), FLIP, 2),
-    ),
-    "chain": Proof(
-        spring(MarkovChain.telegraph(0.5, 1.0), 0.05),
-        2.0,
-        lambda *_: moment_hierarchy.moment_lyapunov(STATES_OF_SPRING, FLIP, 2),
     ),
     **{
         f"chain, a wall, {p}": Proof(
