@@ -19,7 +19,7 @@ from fpsolve.fem.pairs import PairAxis
 from fpsolve.fem.phase import PhaseAxis
 from fpsolve.model.noise import Noise
 
-MOST_BYTES = 0.85e9
+MOST_BYTES = 1e9
 """Of the factors of a generator: with what else is held, and libraries, a process takes about 1.5 GB."""
 LITTLE = 1e-2
 """Share of the largest effect of an axis below which others are left as they are, while nothing is resolved."""
