@@ -72,7 +72,7 @@ def flows(problem):
     """φ̇ and the growth of ln a of the oscillator between impacts."""
     epsilon, system = problem.system.epsilon, problem.system
     turn = lambda phi, xi: system.omega + epsilon * system.terms[1].h(phi) * xi + epsilon**2 * system.terms[2].h(phi)  # noqa: E731
-    grow = lambda phi, xi: epsilon * system.terms[1].q(phi) * xi + epsilon**2 * system.q2(phi)  # noqa: E731
+    grow = lambda phi, xi: epsilon * system.terms[1].q(phi) * xi + epsilon**2 * system.terms[2].q(phi)  # noqa: E731
     return turn, grow
 
 
