@@ -42,6 +42,7 @@ from fpsolve.exponent.stopped import looked_at
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.noise_axes import Samples
 from fpsolve.fem.space import Space
+from fpsolve.model.coordinates import mean_matrix
 from fpsolve.model.plane import is_driven
 from fpsolve.model.problem import Problem
 from fpsolve.model.quantity import PHASE, density_unit
@@ -377,9 +378,9 @@ def direction_grid(problem: Problem, count: int) -> DirectionGrid:
 def oscillators(problem: Problem) -> dict[int, float]:
     """√(k/c) of each oscillator q̇ = cv, v̇ = −kq + …, by the place of q among the variables; pairs begin at 0 and 2."""
     system, (at, _) = problem.system, looked_at(problem)
-    sizes = [(term, system.epsilon**term.order * at.inside(term.matrix)) for term in system.terms]
-    free = np.sum([problem.named_noise(term.noise).mean_of(term.g) * size for term, size in sizes], axis=0)
-    driven = np.sum([is_driven(term.g) * abs(size) for term, size in sizes], axis=0)
+    free = at.inside(mean_matrix(problem, system))
+    sizes = [system.epsilon**term.order * abs(at.inside(term.matrix)) for term in system.terms if is_driven(term.g)]
+    driven = sum(sizes, np.zeros_like(free))
     found = {}
     for q in range(0, problem.dimension - 1, 2):
         is_rate = not np.any(np.delete(free[q], q + 1)) and not np.any(driven[q])

@@ -27,7 +27,7 @@ from fpsolve.exponent.eigen import PrincipalPair, principal_pair
 from fpsolve.exponent.elements import Elements
 from fpsolve.exponent.error import Solution, mode_effects
 from fpsolve.exponent.method import RTOL_BEYOND_PLANE, SMALL_P, Stage, Tolerance
-from fpsolve.exponent.moments import EvenMoment, even_moment, mean_matrix
+from fpsolve.exponent.moments import EvenMoment, even_moment
 from fpsolve.exponent.powers import moment_form
 from fpsolve.exponent.starts import SHARE, Start
 from fpsolve.fem.directions import DirectionAxis, SphereAxis, group_dimensions
@@ -35,7 +35,7 @@ from fpsolve.fem.factors import factorised
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.space import Space, first_axis
 from fpsolve.messages import Remedy
-from fpsolve.model.coordinates import framed
+from fpsolve.model.coordinates import framed, mean_matrix
 from fpsolve.model.problem import Problem
 
 FIRST_WAVES = 2

@@ -40,9 +40,8 @@ from fpsolve.exponent.powers import Moving, PowerRates, exponents, moment_form, 
 from fpsolve.exponent.rightmost import REMEDY, ROUNDING
 from fpsolve.fem.space import BASES
 from fpsolve.messages import Remedy
-from fpsolve.model.coordinates import framed
+from fpsolve.model.coordinates import framed, mean_matrix
 from fpsolve.model.noise import Noise
-from fpsolve.model.plane import System
 from fpsolve.model.problem import Problem
 from fpsolve.theory.perturbation import Scale
 
@@ -154,12 +153,6 @@ def even_moment(
         f"got p = {p:g}; {most} equations, or {MOST_DEGREES} functions of each noise, are too few for moments "
         f"under noise so strong or slow; use a smaller p, or {REMEDY}"
     )
-
-
-def mean_matrix(problem: Problem, motion: System) -> FloatArray:
-    """Σ ε^n ⟨g⟩ A of the terms of a motion, in the mean over the noise."""
-    means = [motion.epsilon**term.order * problem.named_noise(term.noise).mean_of(term.g) for term in motion.terms]
-    return np.tensordot(means, [term.matrix for term in motion.terms], axes=1)
 
 
 def constant_scale(problem: Problem) -> Scale:

@@ -28,9 +28,9 @@ from fpsolve.arrays import FloatArray
 from fpsolve.exponent.eigen import PrincipalPair, slope_rounding
 from fpsolve.exponent.error import Solution
 from fpsolve.exponent.modes import Directions, DirectionStart, inside_frame, second_moments
-from fpsolve.exponent.moments import mean_matrix
 from fpsolve.exponent.starts import SHARE
 from fpsolve.fem.directions import HalfSphereAxis
+from fpsolve.model.coordinates import mean_matrix
 from fpsolve.model.plane import LinearMotion, Stop, rotating_coordinates
 from fpsolve.model.problem import Problem
 

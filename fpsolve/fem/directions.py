@@ -48,7 +48,7 @@ from fpsolve.fem.element import EXTRA_POINTS, gauss_legendre
 from fpsolve.fem.line import LineSpace
 from fpsolve.fem.mesh import halved, middles
 from fpsolve.fem.terms import OfMoment, Term, Terms
-from fpsolve.model.coordinates import Framed
+from fpsolve.model.coordinates import Framed, mean_matrix
 from fpsolve.model.plane import CoefficientMatrix
 from fpsolve.model.problem import ParameterDerivative
 
@@ -562,11 +562,8 @@ class DirectionTerms(Terms):
     @cached_property
     def _mean(self) -> FloatArray:
         """The matrix of the motion of y in the mean over the noise."""
-        total, noise = 0.0 * self.phi.coordinates, self._framed.problem.named_noise
-        for term in self.system.terms:
-            size = self.system.epsilon**term.order * noise(term.noise).mean_of(term.g)
-            total += size * self.phi.inside(term)
-        return total
+        mean = mean_matrix(self._framed.problem, self.system)
+        return self.phi.inside(CoefficientMatrix(0, mean.tolist()))
 
     def _loads(self) -> Iterator[Term]:
         """The penalty, as slopes jump by the error of the elements alone."""

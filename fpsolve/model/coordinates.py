@@ -195,6 +195,12 @@ def infinite(problem: Problem, p: float, symbol: str = "") -> Message | None:
     return None
 
 
+def mean_matrix(problem: Problem, motion: System) -> FloatArray:
+    """Σ ε^n ⟨g⟩ A of the terms of a motion, in the mean over the noise."""
+    means = [motion.epsilon**term.order * problem.named_noise(term.noise).mean_of(term.g) for term in motion.terms]
+    return np.tensordot(means, [term.matrix for term in motion.terms], axes=1)
+
+
 def is_free(term: CoefficientMatrix) -> bool:
     """Whether a term is of order 0, and no noise drives it."""
     return term.order == 0 and not is_driven(term.g)

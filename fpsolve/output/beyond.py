@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -18,9 +18,6 @@ from fpsolve.model.quantity import LYAPUNOV_EXPONENT
 from fpsolve.parts.intervals import ENDS, spreads_of
 from fpsolve.results.curve import CurveResult
 from fpsolve.results.table import pair
-
-if TYPE_CHECKING:
-    pass
 
 
 def _classes(case: Case, result: CurveResult) -> Mapping[str, Any]:
