@@ -159,8 +159,8 @@ class Framed:
 
     def wall_speeds(self, motion: System) -> list[float]:
         """dφ/dt of a motion at the ray of each jump, which no noise changes."""
-        speed = phase_speed(motion, self.problem.valued.extremes)
-        return [float(np.ravel(speed(jump.phase))[0]) for jump in self.motion.jumps]
+        extremes = self.problem.valued.extremes
+        return [float(np.ravel(phase_speed(motion, extremes)(jump.phase))[0]) for jump in self.motion.jumps]
 
     @cached_property
     def resting_phases(self) -> tuple[float, ...]:

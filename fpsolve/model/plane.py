@@ -81,18 +81,16 @@ class Harmonics:
         return not np.any([self.mean, self.cosine, self.sine])
 
 
-def turning(a: FloatArray) -> Harmonics:
-    """e′ᵀA e, dφ/dt, for matrices of shape (…, 2, 2)."""
-    return Harmonics(
-        (a[..., 0, 1] - a[..., 1, 0]) / 2, -(a[..., 0, 1] + a[..., 1, 0]) / 2, (a[..., 1, 1] - a[..., 0, 0]) / 2
-    )
-
-
 def stretching(a: FloatArray) -> Harmonics:
     """eᵀA e, d ln a/dt, for matrices of shape (…, 2, 2)."""
     return Harmonics(
         (a[..., 0, 0] + a[..., 1, 1]) / 2, (a[..., 0, 0] - a[..., 1, 1]) / 2, -(a[..., 0, 1] + a[..., 1, 0]) / 2
     )
+
+
+def turning(a: FloatArray) -> Harmonics:
+    """e′ᵀA e, dφ/dt, for matrices of shape (…, 2, 2): eᵀQA e, as e′ = Qᵀe."""
+    return stretching(np.array([[0.0, -1.0], [1.0, 0.0]]) @ a)
 
 
 PROBES = np.concatenate([-(side := np.geomspace(1e-6, 1e6, 97) * (1 + 0.01 * np.sin(np.arange(97)))), [0.0], side])

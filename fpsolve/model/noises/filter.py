@@ -110,9 +110,8 @@ class Filter(Gaussian):
 
     def spectral_density(self, omega: float) -> float:
         """S(ω) = s²(c₀² + c₁²ω²)/((ω_f² − ω²)² + 4ζ²ω_f²ω²), where ω_f is the frequency of the filter."""
-        of_output = self.s * math.hypot(self.c0, self.c1 * omega)
-        own, other = (self.omega - omega) * (self.omega + omega), 2 * self.zeta * self.omega * omega
-        return (of_output / math.hypot(own, other)) ** 2
+        y = 1 / complex((self.omega - omega) * (self.omega + omega), 2 * self.zeta * self.omega * omega)
+        return abs(self.s * complex(self.c0, self.c1 * omega) * y) ** 2
 
     @property
     def drift_matrix(self) -> FloatArray:
@@ -126,14 +125,14 @@ class Filter(Gaussian):
 
     def derivative(self, name: str) -> NoiseDerivative:
         """The derivative of M and of ln std(ξ) at fixed u; ω, c₀ and c₁ also change n."""
-        c, omega, zeta = self._mixed, self.omega, self.zeta
-        by_c = np.array({"omega": (self.c1, 0.0), "c0": (0.0, 1.0), "c1": (omega, 0.0)}.get(name, (0.0, 0.0)))
+        size, omega, zeta = np.hypot(*self._mixed), self.omega, self.zeta
+        by_c = np.array({"omega": (self.c1, 0.0), "c0": (0.0, 1.0), "c1": (omega, 0.0)}.get(name, (0.0, 0.0))) / size
         unit = {"s": 1 / self.s, "zeta": -0.5 / zeta, "omega": -1.5 / omega}.get(name, 0.0)
-        square, stretch = c @ c, c @ by_c / (c @ c)
-        normal = np.outer(c, c) / square
-        turned = (np.outer(c, by_c) + np.outer(by_c, c)) / square - 2 * stretch * normal
+        n = self._mixed / size
+        stretch, normal = n @ by_c, np.outer(n, n)
+        turned = np.outer(n, by_c) - stretch * normal
         direct = {"omega": self.drift_matrix / omega, "zeta": 2 * omega * normal}
-        drift = 2 * zeta * omega * turned + direct.get(name, 0.0)
+        drift = 2 * zeta * omega * (turned + turned.T) + direct.get(name, 0.0)
         return NoiseDerivative(log_scale=float(unit + stretch), drift=tuple(map(tuple, drift.tolist())))
 
     def start(self, size: int, rng: np.random.Generator) -> FloatArray:

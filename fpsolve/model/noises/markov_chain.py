@@ -91,9 +91,8 @@ class Chain(Noise):
 
     def step(self, h: float, bias: float = 0.0) -> ChainStep:
         """The jumps in any time, without a bias."""
-        jumps = np.array(self.rates) * (1 - np.eye(len(self.states)))
-        leaving = jumps.sum(axis=1)
-        reached = np.cumsum(jumps / leaving[:, None], axis=1)
+        leaving = -np.diagonal(self.rates)
+        reached = np.cumsum(np.maximum(self.rates, 0.0) / leaving[:, None], axis=1)
         reached = np.where(reached >= reached[:, -1:], 1.0, reached)
         return ChainStep(leaving, reached, np.array(self.states, dtype=float), np.zeros(leaving.size))
 
@@ -142,8 +141,8 @@ class MarkovChain(Chain):
         if np.ptp(states) == 0:
             told = f"got the states {shown(self.states)} and rates {shown(self.rates)}"
             raise ValueError(f"{told}; must be finite numbers that differ, with finite rates")
-        sizes = {"states": np.abs(states).max(), "rates": np.abs(rates).max()}
-        for name, size in sizes.items():
+        for name, each in (("states", states), ("rates", rates)):
+            size = np.abs(each).max()
             if not SIZE["ge"] <= size <= SIZE["le"]:
                 raise ValueError(f"got {name} of sizes up to {size:g}; must be from {SIZE['ge']:g} to {SIZE['le']:g}")
         jumps = rates - np.diag(np.diagonal(rates))

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import Field
 from pydantic.fields import FieldInfo
-from scipy.special import betaln, xlog1py
+from scipy.special import betaln, hyp2f1, xlog1py
 
 from fpsolve.arrays import FloatArray
 from fpsolve.model.faults import TableError, strict_dataclass
@@ -227,7 +227,10 @@ class NonGaussianNoise(TreatedNoise):
         return ("r0",) if self.r0 == 1 else ()
 
     def derivative(self, name: str) -> NoiseDerivative:
-        """∂/∂θ of Eq. (9), ln P_s = −ln(1 + q)/(r₀ − 1) with q = (r₀ − 1)u and u = τ₀ξ²/(2D₀)."""
+        """∂/∂θ of Eq. (9), ln P_s = −ln(1 + q)/(r₀ − 1) with q = (r₀ − 1)u and u = τ₀ξ²/(2D₀).
+
+        By r₀ it is u² (ln(1 + q) − q/(1 + q))/q², a hypergeometric function, as a difference would cancel near q = 0.
+        """
 
         def u(xi: FloatArray) -> FloatArray:
             return np.asarray(0.5 * self.tau0 / self.D0 * xi**2)
@@ -241,12 +244,4 @@ class NonGaussianNoise(TreatedNoise):
             case "tau0":
                 return NoiseDerivative(-1 / self.tau0, lambda xi: by_log_tau0(xi) / self.tau0)
         end_exponent = 1 / (1 - self.r0) ** 2 if math.isfinite(self.half_width) else 0.0
-        return NoiseDerivative(0.0, lambda xi: u(xi) ** 2 * _curvature_of_log((self.r0 - 1) * u(xi)), end_exponent)
-
-
-def _curvature_of_log(q: FloatArray) -> FloatArray:
-    """(ln(1 + q) − q/(1 + q))/q², which is ½ − ⅔q + ¾q² − … near 0, where a difference of logarithms cancels."""
-    n, is_small = np.arange(2, 18), np.abs(q) < 0.05
-    series = np.polynomial.polynomial.polyval(np.where(is_small, q, 0.0), (-1.0) ** n * (1 - 1 / n))
-    far = np.where(is_small, 1.0, q)
-    return np.where(is_small, series, (np.log1p(far) - far / (1 + far)) / far**2)
+        return NoiseDerivative(0.0, lambda xi: 0.5 * u(xi) ** 2 * hyp2f1(2, 2, 3, (1 - self.r0) * u(xi)), end_exponent)
