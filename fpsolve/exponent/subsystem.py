@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from fpsolve.arrays import ROUNDED, FloatArray
 from fpsolve.model.coordinates import framed
 from fpsolve.model.expressions import TIME
-from fpsolve.model.plane import BELOW, CoefficientMatrix, Jump, System, as_plane, by_noise
+from fpsolve.model.plane import BELOW, CoefficientMatrix, Jump, ParameterDerivative, System, as_plane, by_noise
 from fpsolve.model.problem import Problem
 from fpsolve.model.quantity import Quantity
 
@@ -59,9 +59,6 @@ class Subsystem(System):
     @property
     def clock(self) -> Any:
         return self.whole.clock if TIME in self.driven_by else None
-
-    def clock_slope(self, name: str) -> float:
-        return self.whole.clock_slope(name)
 
     @cached_property
     def _sides(self) -> tuple[FloatArray, FloatArray]:
@@ -115,10 +112,11 @@ class Subsystem(System):
         """The same block of the whole with other values, which leave it one."""
         return replace(self, whole=self.whole.at(values))
 
-    def derivative(self, name: str) -> tuple[tuple[CoefficientMatrix, ...], tuple[float, ...]]:
+    def derivative(self, name: str) -> ParameterDerivative:
         """The derivative of the whole system, in the coordinates of this block."""
-        terms, jumps = self.whole.derivative(name)
-        return as_plane(self.part(terms)), jumps if self.jumps else ()
+        whole = self.whole.derivative(name)
+        jumps, clock = whole.jumps if self.jumps else (), whole.noise if self.clock else None
+        return replace(whole, terms=as_plane(self.part(whole.terms)), jumps=jumps, noise=clock)
 
 
 @lru_cache(maxsize=64)
@@ -180,7 +178,7 @@ def couples(blocks: Sequence[Subsystem], name: str) -> bool:
     is, as −V_k in place of V_k gives the opposite derivative of the couplings: Λ(p) is even in them.
     """
     whole = blocks[0].whole
-    changes = by_noise(whole, whole.derivative(name)[0]).values()
+    changes = by_noise(whole, whole.derivative(name).terms).values()
     if len(blocks) == 1:  # all rays are invariant
         return any(map(_turns, changes))
     drives = reached(couplings(blocks, by_noise(whole, whole.terms).values()))

@@ -9,43 +9,18 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fpsolve.arrays import Coefficient, FloatArray, nothing
+from fpsolve.arrays import Coefficient, FloatArray
 from fpsolve.model.parameters import Parametrised
-from fpsolve.model.plane import CoefficientMatrix, Motion, MotionDerivative, System, Xi
+from fpsolve.model.plane import Motion, ParameterDerivative, System, Xi
+from fpsolve.model.plane import NoiseDerivative as NoiseDerivative
 
 STAY = 'write xi = "stationary"'
 """What to do where a value of ξ is no start."""
-
-
-@dataclass(frozen=True)
-class NoiseDerivative:
-    """∂/∂θ of a diffusion, or of a chain.
-
-    Attributes:
-        log_diffusion: ∂ ln σ/∂θ, the same for all ξ/c.
-        log_density: ∂ ln P_s(ξ)/∂θ at fixed ξ/c, but for a constant.
-        end_exponent: ∂a/∂θ of P_s ~ (1 − ξ²/ξ_s²)^a at the ends of a bounded support.
-        log_scale: ∂ ln c/∂θ of the length c that ξ is measured by; 0 where ξ itself is held.
-        states: ∂ξ_i/∂θ of a chain; empty where none moves.
-        rates: ∂Q/∂θ of a chain; empty where none changes.
-        turning: ∂ν/∂θ of a noise that is a function of an angle, with the speed ν.
-        drift: ∂M/∂θ of a noise that is a function of two linear ones; empty where it does not change.
-    """
-
-    log_diffusion: float = 0.0
-    log_density: Coefficient = nothing
-    end_exponent: float = 0.0
-    log_scale: float = 0.0
-    states: tuple[float, ...] = ()
-    rates: tuple[tuple[float, ...], ...] = ()
-    turning: float = 0.0
-    drift: tuple[tuple[float, ...], ...] = ()
 
 
 class Noise(Parametrised):
@@ -298,17 +273,17 @@ class Noise(Parametrised):
         return self
 
     def changed_motion(
-        self, system: System, terms: Sequence[CoefficientMatrix], by: str = "", name: str | None = None
-    ) -> MotionDerivative:
+        self, system: System, changed: ParameterDerivative, by: str = "", name: str | None = None
+    ) -> ParameterDerivative:
         """The derivative ∂/∂θ of the `motion`.
 
         Args:
             system: the system.
-            terms: ∂/∂θ of its terms; empty if θ is a parameter of the noise.
+            changed: that of its terms and jumps; nothing if θ is a parameter of the noise.
             by: the name of θ if it is a parameter of the noise, else empty.
             name: what the terms call the noise.
         """
-        return MotionDerivative(terms)
+        return changed
 
     @property
     def one_sided(self) -> Sequence[str]:

@@ -30,6 +30,7 @@ from fpsolve.arrays import (
     Linear,
     identity,
     is_whole,
+    nothing,
     one,
     real_array,
     real_number,
@@ -485,6 +486,54 @@ class Stop:
             )
 
 
+@dataclass(frozen=True)
+class NoiseDerivative:
+    """∂/∂θ of a diffusion, or of a chain.
+
+    Attributes:
+        log_diffusion: ∂ ln σ/∂θ, the same for all ξ/c.
+        log_density: ∂ ln P_s(ξ)/∂θ at fixed ξ/c, but for a constant.
+        end_exponent: ∂a/∂θ of P_s ~ (1 − ξ²/ξ_s²)^a at the ends of a bounded support.
+        log_scale: ∂ ln c/∂θ of the length c that ξ is measured by; 0 where ξ itself is held.
+        states: ∂ξ_i/∂θ of a chain; empty where none moves.
+        rates: ∂Q/∂θ of a chain; empty where none changes.
+        turning: ∂ν/∂θ of a noise that is a function of an angle, with the speed ν.
+        drift: ∂M/∂θ of a noise that is a function of two linear ones; empty where it does not change.
+    """
+
+    log_diffusion: float = 0.0
+    log_density: Coefficient = nothing
+    end_exponent: float = 0.0
+    log_scale: float = 0.0
+    states: tuple[float, ...] = ()
+    rates: tuple[tuple[float, ...], ...] = ()
+    turning: float = 0.0
+    drift: tuple[tuple[float, ...], ...] = ()
+
+
+@dataclass(frozen=True)
+class ParameterDerivative:
+    """∂/∂θ of a problem, all at fixed x and ξ; of a system alone its terms, its jumps, and its clock as the noise.
+
+    Attributes:
+        theta: the value of θ.
+        terms: Σ ε^n g(ξ) A x of these is ∂/∂θ of the motion.
+        diffusions: that of each of its diffusions; empty where none changes.
+        impulses: that of each of its impulses, of its rate and of its exponent; empty where none changes.
+        jumps: ∂ ln R/∂θ of each of the jumps of the motion; empty where none changes.
+        noise: that of the noise; None where it does not change.
+        part: which of the `valued` noises changes.
+    """
+
+    theta: float = 0.0
+    terms: tuple[CoefficientMatrix, ...] = ()
+    diffusions: tuple[CoefficientMatrix, ...] = ()
+    impulses: tuple[Impulse, ...] = ()
+    jumps: tuple[float, ...] = ()
+    noise: NoiseDerivative | None = None
+    part: int = 0
+
+
 class System(Parametrised):
     """What solvers ask of a linear system in the plane.
 
@@ -567,12 +616,8 @@ class System(Parametrised):
         """The names that its terms give the noises that drive it."""
         return frozenset(term.noise for term in self.terms if is_driven(term.g))
 
-    def clock_slope(self, name: str) -> float:
-        """∂ν/∂θ of its clock."""
-        return 0.0
-
-    def derivative(self, name: str) -> tuple[tuple[CoefficientMatrix, ...], tuple[float, ...]]:
-        """∂/∂θ of the sum of the terms, as terms, and ∂ ln R/∂θ of every jump, nothing where none changes."""
+    def derivative(self, name: str) -> ParameterDerivative:
+        """∂/∂θ of the sum of the terms, of ln R of every jump, and of ν of the clock."""
         raise NotImplementedError(f"{type(self).__name__} states no derivative by {name}")
 
     @property
@@ -640,14 +685,6 @@ class Motion(NamedTuple):
     def rises_smoothly(self) -> bool:
         """Whether ‖x‖ is differentiable but where a wall makes it smaller."""
         return self.overshoot == 1.0 and not self.impulses and all(each.q.vanishes for each in self.diffusions)
-
-
-class MotionDerivative(NamedTuple):
-    """∂/∂θ of a `Motion`: of the sum of the terms of its drift, of each diffusion, and of each rate and exponent."""
-
-    terms: Sequence[CoefficientMatrix]
-    diffusions: Sequence[CoefficientMatrix] = ()
-    impulses: Sequence[Impulse] = ()
 
 
 def split_by_noise(

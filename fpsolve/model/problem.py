@@ -13,37 +13,15 @@ import numpy as np
 from fpsolve.arrays import shown
 from fpsolve.messages import Message
 from fpsolve.model.expressions import TIME
-from fpsolve.model.noise import Noise, NoiseDerivative
+from fpsolve.model.noise import Noise
 from fpsolve.model.noises.several import noises_of
 from fpsolve.model.parameters import DERIVED, Parameter, Parametrised
-from fpsolve.model.plane import CoefficientMatrix, Impulse, System, is_driven
+from fpsolve.model.plane import ParameterDerivative as ParameterDerivative
+from fpsolve.model.plane import System, is_driven
 from fpsolve.model.quantity import NOISE, Quantity
 
 RATE = "1/time"
 """Unit of ξ for which the units of parameters of noises are stated."""
-
-
-@dataclass(frozen=True)
-class ParameterDerivative:
-    """∂/∂θ of a problem, all at fixed x and ξ.
-
-    Attributes:
-        theta: the value of θ.
-        terms: Σ ε^n g(ξ) A x of these is ∂/∂θ of the motion.
-        diffusions: that of each of its diffusions; empty where none changes.
-        impulses: that of each of its impulses, of its rate and of its exponent; empty where none changes.
-        jumps: ∂ ln R/∂θ of each of the jumps of the motion; empty where none changes.
-        noise: that of the noise; None where it does not change.
-        part: which of the `valued` noises changes.
-    """
-
-    theta: float
-    terms: tuple[CoefficientMatrix, ...] = ()
-    diffusions: tuple[CoefficientMatrix, ...] = ()
-    impulses: tuple[Impulse, ...] = ()
-    jumps: tuple[float, ...] = ()
-    noise: NoiseDerivative | None = None
-    part: int = 0
 
 
 @dataclass(frozen=True)
@@ -190,26 +168,16 @@ class Problem:
             raise ValueError(f"got {key}; the parameters to differentiate by are {', '.join(self.differentiable)}")
         section, _, name = key.rpartition(".")
         part = dict(zip(self.sections, ["", *self.noise.parts], strict=True))[section]
-        terms, jumps, changed = tuple[CoefficientMatrix, ...](), tuple[float, ...](), ""
-        noise: NoiseDerivative | None = None
+        changed, by = ParameterDerivative(), ""
         if section == self.system.section:
-            terms, jumps = self.system.derivative(name)
-            if slope := self.system.clock_slope(name):
-                noise, part = NoiseDerivative(turning=slope), TIME
+            changed = self.system.derivative(name)
+            part = TIME if changed.noise else part
         else:
-            changed = ".".join(filter(None, (part, name)))
+            by = ".".join(filter(None, (part, name)))
             if not (own := self.named_noise(part)).is_white:
-                noise = own.derivative(name)
-        moved, axes = self.noise.changed_motion(self.system, terms, changed), [*self.valued.parts]
-        return ParameterDerivative(
-            float(self.values[key]),
-            tuple(moved.terms),
-            tuple(moved.diffusions),
-            tuple(moved.impulses),
-            tuple(jumps),
-            noise,
-            axes.index(part) if part in axes else 0,
-        )
+                changed = replace(changed, noise=own.derivative(name))
+        moved, axes = self.noise.changed_motion(self.system, changed, by), [*self.valued.parts]
+        return replace(moved, theta=float(self.values[key]), part=axes.index(part) if part in axes else 0)
 
     def derivatives(self) -> Mapping[str, ParameterDerivative]:
         """∂/∂θ by all of the `differentiable` parameters, by their keys."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from dataclasses import replace
 from typing import Annotated, ClassVar
 
 import numpy as np
@@ -15,11 +15,10 @@ from fpsolve.model.noise import Memoryless
 from fpsolve.model.noises.steps import ChainStep
 from fpsolve.model.parameters import SIZE, parameter
 from fpsolve.model.plane import (
-    CoefficientMatrix,
     Impulse,
     LinearMotion,
     Motion,
-    MotionDerivative,
+    ParameterDerivative,
     System,
     split_by_noise,
 )
@@ -128,15 +127,15 @@ class Poisson(Memoryless):
         return Motion(drift, (), impulses)
 
     def changed_motion(
-        self, system: System, terms: Sequence[CoefficientMatrix], by: str = "", name: str | None = None
-    ) -> MotionDerivative:
-        drift, changed = split_by_noise(system, terms, name)
+        self, system: System, changed: ParameterDerivative, by: str = "", name: str | None = None
+    ) -> ParameterDerivative:
+        drift, change = split_by_noise(system, changed.terms, name)
         by_rate, known = 1.0 / self.rate if by == "rate" else 0.0, self.motion(system, name).impulses
         impulses = [  # none of what is not driven
-            Impulse(by_rate * each.rate, (size * changed).tolist())
+            Impulse(by_rate * each.rate, (size * change).tolist())
             for each, size in zip(known, self.sizes, strict=False)
         ]
-        return MotionDerivative(drift, (), impulses)
+        return replace(changed, terms=tuple(drift), impulses=(*changed.impulses, *impulses))
 
 
 LARGEST = 100.0

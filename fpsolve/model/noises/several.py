@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from fpsolve.arrays import FloatArray, shown
 from fpsolve.model.noise import STAY, Noise
-from fpsolve.model.plane import CoefficientMatrix, Impulse, Motion, MotionDerivative, System, Xi
+from fpsolve.model.plane import CoefficientMatrix, Impulse, Motion, ParameterDerivative, System, Xi
 
 MOST_WITH_AXES = 2
 """Noises that have values at most: each of them is a dimension more."""
@@ -162,14 +162,12 @@ class Noises(Noise):
         return noises_of(known or {first: self.parts[first]})
 
     def changed_motion(
-        self, system: System, terms: Sequence[CoefficientMatrix], by: str = "", name: str | None = None
-    ) -> MotionDerivative:
-        (part, _, parameter), diffusions, jolts = by.rpartition("."), list[CoefficientMatrix](), list[Impulse]()
+        self, system: System, changed: ParameterDerivative, by: str = "", name: str | None = None
+    ) -> ParameterDerivative:
+        part, _, parameter = by.rpartition(".")
         for own, noise in self._white:
-            terms, diffused, struck = noise.changed_motion(system, terms, parameter if part == own else "", own)
-            diffusions += diffused
-            jolts += struck
-        return MotionDerivative(terms, diffusions, jolts)
+            changed = noise.changed_motion(system, changed, parameter if part == own else "", own)
+        return changed
 
     @property
     def _white(self) -> list[tuple[str, Noise]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from enum import StrEnum
 from typing import Annotated, ClassVar
 
@@ -16,7 +17,7 @@ from fpsolve.model.plane import (
     CoefficientMatrix,
     LinearMotion,
     Motion,
-    MotionDerivative,
+    ParameterDerivative,
     System,
     is_driven,
     split_by_noise,
@@ -89,15 +90,16 @@ class White(Memoryless):
         return Motion(LinearMotion(tuple(drift), system.jumps, system.epsilon), diffusions)
 
     def changed_motion(
-        self, system: System, terms: Sequence[CoefficientMatrix], by: str = "", name: str | None = None
-    ) -> MotionDerivative:
+        self, system: System, changed: ParameterDerivative, by: str = "", name: str | None = None
+    ) -> ParameterDerivative:
         _, driven = split_by_noise(system, system.terms, name)
-        drift, changed = split_by_noise(system, terms, name)
+        drift, change = split_by_noise(system, changed.terms, name)
         by_s = 1.0 if by == "s" else 0.0
         if self.interpretation == Interpretation.ITO:
-            square = changed @ driven + driven @ changed
+            square = change @ driven + driven @ change
             drift.append(_term(system, -0.5 * self.s**2 * square - by_s * self.s * driven @ driven, 0))
-        return MotionDerivative(drift, [_term(system, by_s * driven + self.s * changed, 0)] if driven.any() else [])
+        moved = (_term(system, by_s * driven + self.s * change, 0),) if driven.any() else ()
+        return replace(changed, terms=tuple(drift), diffusions=changed.diffusions + moved)
 
 
 def _term(system: System, matrix: FloatArray, order: int) -> CoefficientMatrix:

@@ -46,6 +46,8 @@ from fpsolve.model.plane import (
     Function,
     Jump,
     LinearMotion,
+    NoiseDerivative,
+    ParameterDerivative,
     Stop,
     System,
     as_plane,
@@ -454,10 +456,6 @@ class EquationSystem(System):
         except ValueError as failure:
             raise TableError(str(failure), "drift" if self.drift else "stiffness") from None
 
-    def clock_slope(self, name: str) -> float:
-        speed, slope = next(iter(self._read_by(name).speeds.values()), (1.0, 0.0))
-        return slope / speed * self.clock.nu if self.clock else 0.0
-
     @cached_property
     def pasts(self) -> tuple[tuple[int, float], ...]:
         found = tuple((variable, delay) for variable, (delay, _) in self._read.delays.values())
@@ -604,16 +602,17 @@ class EquationSystem(System):
         return logs  # noqa: RET504
 
     @cached_property
-    def _derivatives(self) -> Mapping[str, tuple[tuple[CoefficientMatrix, ...], tuple[float, ...]]]:
-        """∂/∂θ of the terms and of ln R by the parameters, without those for which one is infinite."""
-        found = dict[str, tuple[tuple[CoefficientMatrix, ...], tuple[float, ...]]]()
+    def _derivatives(self) -> Mapping[str, ParameterDerivative]:
+        """∂/∂θ by the parameters, without those for which it is infinite."""
+        found = dict[str, ParameterDerivative]()
         for name, _ in self.named:
-            try:
-                terms = by_epsilon(self) if name == EPSILON else self._terms_of(self._read_by(name).rates, 1)
-                slope = self._log_factor(name)[1] if self.walls else 0.0
-            except TableError:
-                continue
-            found[name] = terms, (slope,) if slope else ()
+            with suppress(TableError):
+                read = self._read_by(name)
+                terms = by_epsilon(self) if name == EPSILON else self._terms_of(read.rates, 1)
+                jumps = (self._log_factor(name)[1],) if self.walls else ()
+                speed, slope = next(iter(read.speeds.values()), (1.0, 0.0))
+                clock = NoiseDerivative(turning=slope / speed * self.clock.nu) if slope and self.clock else None
+                found[name] = ParameterDerivative(terms=terms, jumps=jumps if any(jumps) else (), noise=clock)
         return found
 
     @cached_property
@@ -632,15 +631,17 @@ class EquationSystem(System):
         recurring = [delay for _, delay in read.delays.values()], [*read.speeds.values()]
         rates = [[slope / value for value, slope in each] for each in recurring if each]
         alike = all(np.ptp(each) <= ROUNDED * max(map(abs, each)) for each in rates)
-        is_moved = self.stop and (self._moves_wall(name) or (self.stop.restitution == 1 and self._derivatives[name][1]))
+        is_moved = self.stop and (
+            self._moves_wall(name) or (self.stop.restitution == 1 and self._derivatives[name].jumps)
+        )
         return alike and not is_moved
 
     def _moves_wall(self, name: str) -> bool:
         """Whether the coordinates of a wall depend on a parameter."""
         return name in names_in(self.drift[self._place()[0]])
 
-    def derivative(self, name: str) -> tuple[tuple[CoefficientMatrix, ...], tuple[float, ...]]:
-        """∂/∂θ of the terms and of ln R, exact but for rounding. Raises `ValueError` where it is infinite."""
+    def derivative(self, name: str) -> ParameterDerivative:
+        """∂/∂θ, exact but for rounding. Raises `ValueError` where it is infinite."""
         if name not in self._derivatives:
             raise ValueError(f"the derivative of the system by {name} is not finite; choose another value of {name}")
         return self._derivatives[name]

@@ -9,7 +9,7 @@ from typing import Annotated, ClassVar
 from fpsolve.arrays import identity
 from fpsolve.model.faults import strict_dataclass
 from fpsolve.model.parameters import ANY_SIGN, parameter
-from fpsolve.model.plane import CoefficientMatrix, Jump, System
+from fpsolve.model.plane import CoefficientMatrix, Jump, ParameterDerivative, System
 
 
 @strict_dataclass
@@ -59,10 +59,10 @@ class ParametricOscillator(System):
         """The wall, which the phase passes at speed 1."""
         return (Jump(math.pi / 2, math.log(self.restitution)),)
 
-    def derivative(self, name: str) -> tuple[tuple[CoefficientMatrix, ...], tuple[float, ...]]:
+    def derivative(self, name: str) -> ParameterDerivative:
         match name:
             case "stiffness":
-                return (CoefficientMatrix(0, ((0.0, 0.0), (-1.0, 0.0))),), ()
+                return ParameterDerivative(terms=(CoefficientMatrix(0, ((0.0, 0.0), (-1.0, 0.0))),))
             case "damping":
-                return (CoefficientMatrix(0, ((0.0, 0.0), (0.0, -2.0))),), ()
-        return (), (1 / self.restitution,)
+                return ParameterDerivative(terms=(CoefficientMatrix(0, ((0.0, 0.0), (0.0, -2.0))),))
+        return ParameterDerivative(jumps=(1 / self.restitution,))

@@ -17,6 +17,7 @@ from fpsolve.model.plane import (
     CoefficientMatrix,
     Jump,
     LinearMotion,
+    ParameterDerivative,
     Stop,
     as_plane,
     by_epsilon,
@@ -128,8 +129,8 @@ class PlaneSystem(LinearMotion):
                 raise ValueError(f"got {name}; the parameter is epsilon")
         return replace(self, epsilon=cast("float", values.get("epsilon", self.epsilon)))
 
-    def derivative(self, name: str) -> tuple[tuple[CoefficientMatrix, ...], tuple[float, ...]]:
-        return by_epsilon(self), ()
+    def derivative(self, name: str) -> ParameterDerivative:
+        return ParameterDerivative(terms=by_epsilon(self))
 
 
 @dataclass(frozen=True)

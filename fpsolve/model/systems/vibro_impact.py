@@ -15,7 +15,7 @@ from fpsolve.arrays import identity
 from fpsolve.messages import Code, Message
 from fpsolve.model.faults import strict_dataclass
 from fpsolve.model.parameters import ANY_SIGN, SIZE, parameter
-from fpsolve.model.plane import CoefficientMatrix, CubicTerms, Jump, System, by_epsilon
+from fpsolve.model.plane import CoefficientMatrix, CubicTerms, Jump, ParameterDerivative, System, by_epsilon
 from fpsolve.model.quantity import OSCILLATOR_RESPONSE, ResponseQuantities
 
 
@@ -140,18 +140,18 @@ class VibroImpactOscillator(System):
         """ω: the terms are those of (x, ẋ/ω)."""
         return self.omega
 
-    def derivative(self, name: str) -> tuple[tuple[CoefficientMatrix, ...], tuple[float, ...]]:
+    def derivative(self, name: str) -> ParameterDerivative:
         """∂/∂θ of the terms and of ln R, θ = ω, r, c₁ or ε."""
         bounce = 1.0 if self.impact == ImpactLaw.DELTA else 1 / (1 - self._loss)
         match name:
             case "omega":
-                return (CoefficientMatrix(0, ((0.0, 1.0), (-1.0, 0.0))),), ()
+                return ParameterDerivative(terms=(CoefficientMatrix(0, ((0.0, 1.0), (-1.0, 0.0))),))
             case "c1":
-                return (CoefficientMatrix(2, DAMPING),), ()
+                return ParameterDerivative(terms=(CoefficientMatrix(2, DAMPING),))
             case "restitution":
-                return (), (self.epsilon**2 * bounce,)
-            case _:
-                return by_epsilon(self), (-2 * self.epsilon * (1 - self.restitution) * bounce,)
+                return ParameterDerivative(jumps=(self.epsilon**2 * bounce,))
+        slope = -2 * self.epsilon * (1 - self.restitution) * bounce
+        return ParameterDerivative(terms=by_epsilon(self), jumps=(slope,))
 
     def restitution_at(self, log_factor: float) -> tuple[str, float, float]:
         """r, the value for which this law, with this ε, has a given ln R, and dr/d ln R; it may be out of its range."""
