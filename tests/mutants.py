@@ -193,8 +193,8 @@ DEFECTS: tuple[Defect, ...] = (
     Defect(
         "N6 the size of ξ is not in its derivative by the amplitude",
         "model/noises/bounded.py",
-        "return NoiseDerivative(a, log_scale=a)",
-        "return NoiseDerivative(a)",
+        "return NoiseDerivative(1 / self.amplitude, log_scale=1 / self.amplitude)",
+        "return NoiseDerivative(1 / self.amplitude)",
         "sensitivit",
     ),
     Defect(
@@ -365,15 +365,15 @@ DEFECTS: tuple[Defect, ...] = (
     Defect(
         "R15 the correlation time of a filter goes with ω",
         "model/noises/filter.py",
-        "return (self._overdamped if self.zeta > 1 else 1 / self.zeta) / self.omega",
-        "return (self._overdamped if self.zeta > 1 else 1 / self.zeta) * self.omega",
+        "return max(self._overdamped, 1 / self.zeta) / self.omega",
+        "return max(self._overdamped, 1 / self.zeta) * self.omega",
         "filter",
     ),
     Defect(
         "R16 the slope by the intensity of white noise divides",
         "model/noises/white.py",
-        "by_s * driven + self.s * changed",
-        "by_s / driven + self.s * changed",
+        "by_s * driven + self.s * change,",
+        "by_s / driven + self.s * change,",
         "white",
     ),
     Defect(
