@@ -608,13 +608,14 @@ class System(Parametrised):
 
     @property
     def columns(self) -> Sequence[str]:
-        """What the columns of its terms multiply: its variables, and 1 with no name where it is forced."""
-        return (*self.states, "") if self.forced else self.states
+        """What the columns of its terms multiply: its variables, 1 with no name where it is forced, what is past."""
+        past = [f"{self.states[k]}(t − {delay:.10g})" for k, delay in self.pasts]
+        return *self.states, *[""] * bool(self.forced), *past
 
     @property
     def driven_by(self) -> frozenset[str]:
         """The names that its terms give the noises that drive it."""
-        return frozenset(term.noise for term in self.terms if is_driven(term.g))
+        return frozenset(term.noise for term in (self.forced or self).terms if is_driven(term.g))
 
     def derivative(self, name: str) -> ParameterDerivative:
         """∂/∂θ of the sum of the terms, of ln R of every jump, and of ν of the clock."""

@@ -13,7 +13,7 @@ from operator import itemgetter
 from typing import Annotated, ClassVar, Self, cast
 
 import numpy as np
-from pydantic import AfterValidator, BaseModel, BeforeValidator, Field
+from pydantic import AfterValidator, BeforeValidator, Field
 from pydantic.fields import FieldInfo
 
 from fpsolve.arrays import ROUNDED, Constant, FloatArray, Linear, identity, one, real_number, shown
@@ -38,7 +38,7 @@ from fpsolve.model.expressions import (
 )
 from fpsolve.model.faults import TableError, table_of
 from fpsolve.model.noises.clock import Clock, Wave
-from fpsolve.model.parameters import STRICT, Table, parameter, stated_field, unknown_parameter, without_unit
+from fpsolve.model.parameters import Section, Table, parameter, stated_field, unknown_parameter, without_unit
 from fpsolve.model.plane import (
     MOST_VARIABLES,
     CoefficientMatrix,
@@ -82,10 +82,8 @@ Place = tuple[str | int, ...]
 Line = Annotated[str, Field(min_length=1, max_length=80), AfterValidator(_printed)]
 
 
-class StatedParameter(BaseModel):
+class StatedParameter(Section):
     """A parameter in a case file: a number, or a table with one."""
-
-    model_config = STRICT
 
     value: Annotated[float, parameter("the value of a parameter", "omega = 1.0")]
     symbol: Annotated[
@@ -95,10 +93,8 @@ class StatedParameter(BaseModel):
     words: Annotated[Line, parameter("what it is, on an axis", 'words = "damping ratio"')] = ""
 
 
-class StatedWall(BaseModel):
+class StatedWall(Section):
     """A wall in a case file."""
-
-    model_config = STRICT
 
     at: Annotated[str, parameter("where the wall is", 'at = "x = 0"')]
     restitution: Annotated[object, parameter("R of v+ = -R v-, a number or an expression", "restitution = 0.8")]
@@ -140,26 +136,13 @@ class Read:
     linear: set[str] = field(default_factory=set)
 
 
-@dataclass(frozen=True)
-class Wall:
-    """v⁺ = −R v⁻ where a variable is 0, v the other one.
-
-    Args:
-        at: "x = 0".
-        restitution: R > 0, a number, or an expression in the parameters.
-    """
-
-    at: str
-    restitution: float | str
-
-
-def walls_of(walls: object) -> tuple[Wall, ...]:
-    """Walls from mappings with their keys. Raises `TableError`."""
-    found = list[Wall]()
+def walls_of(walls: object) -> tuple[StatedWall, ...]:
+    """Walls v⁺ = −R v⁻ from mappings with their keys, where they are and R. Raises `TableError`."""
+    found = list[StatedWall]()
     for number, wall in enumerate(walls if isinstance(walls, list | tuple) else (walls,)):
         if not isinstance(wall, Mapping) or set(wall) != {"at", "restitution"}:
             raise TableError(f"got {shown(wall)}; must have the keys at and restitution alone", "walls", number)
-        found.append(Wall(**wall))
+        found.append(StatedWall.model_construct(**wall))
     return tuple(found)
 
 
@@ -187,7 +170,7 @@ class EquationSystem(System):
     drift: Sequence[str]
     named: tuple[tuple[str, float], ...] = ()
     noises: tuple[tuple[str, str], ...] = (("xi", "noise"),)
-    walls: tuple[Wall, ...] = ()
+    walls: tuple[StatedWall, ...] = ()
     quantities: tuple[tuple[str, Quantity], ...] = field(default=(), repr=False, compare=False)
 
     kind: ClassVar[str] = "equations"
@@ -339,7 +322,7 @@ class EquationSystem(System):
             drift=table["drift"],
             named=named,
             noises=tuple(table.get("noises", {"xi": "noise"}).items()),
-            walls=tuple(Wall(each.at, each.restitution) for each in table.get("walls", ())),
+            walls=table.get("walls", ()),
             quantities=quantities,
         )
 
@@ -363,10 +346,6 @@ class EquationSystem(System):
     def states(self) -> Sequence[str]:
         is_plane = len(self.variables) == 1 and not self.pasts
         return (*self.variables, f"{self.variables[0]}*") if is_plane else self.variables  # as `as_plane` has it
-
-    @property
-    def columns(self) -> Sequence[str]:
-        return (*super().columns, *(f"{self.variables[k]}(t − {delay:.10g})" for k, delay in self.pasts))
 
     @property
     def values(self) -> Mapping[str, float | str]:
@@ -520,10 +499,6 @@ class EquationSystem(System):
         if not any(not states for form in self._rates for states, _, _ in form.parts):
             return None
         return LinearMotion(self._terms_of(self._rates, 0, [""]), (), self.epsilon, pasts=self.pasts)
-
-    @property
-    def driven_by(self) -> frozenset[str]:
-        return super().driven_by | (self.forced.driven_by if self.forced else frozenset())
 
     @cached_property
     def cubic(self) -> CubicTerms | None:
