@@ -19,6 +19,7 @@ from .noises.white import White as White
 from .plane import CoefficientMatrix as CoefficientMatrix
 from .plane import CubicTerms as CubicTerms
 from .plane import Jump as Jump
+from .plane import ParameterDerivative as ParameterDerivative
 from .plane import System as System
 from .problem import Problem as Problem
 from .systems.equations import EquationSystem as EquationSystem

@@ -61,7 +61,7 @@ def mean_terms(problem: Problem) -> tuple[FloatArray, FloatArray]:
     """The linear terms with the noise at its mean and the cubic terms, shapes (2, 2) and (2, 4), where ‖y‖ is a."""
     system, frame = problem.system, amplitude_frame(problem.system)
     assert system.cubic is not None
-    linear = frame.term(CoefficientMatrix(0, matrix_at(system, problem.valued.mean).tolist()))
+    linear = frame.term(CoefficientMatrix(0, matrix_at(system, problem.valued.mean)))
     return np.array(linear.matrix), np.array(frame.cubic(system.cubic).matrix)
 
 

@@ -35,6 +35,7 @@ from fpsolve.model.plane import (
     kept_phases,
     phase_speed,
     rotating_coordinates,
+    rows_of,
 )
 from fpsolve.model.problem import ParameterDerivative, Problem
 from fpsolve.model.quantity import moment_at
@@ -81,17 +82,17 @@ class Frame:
 
     def term(self, term: CoefficientMatrix) -> CoefficientMatrix:
         """A term for y, with the matrix S⁻¹AS."""
-        return replace(term, matrix=(self._inverse @ np.array(term.matrix) @ self.array).tolist())
+        return replace(term, matrix=self._inverse @ np.array(term.matrix) @ self.array)
 
     def cubic(self, terms: CubicTerms) -> CubicTerms:
         """Cubic terms for y: S⁻¹ C of the products of Sy."""
         first, second = self.array
         products = [reduce(np.convolve, [first] * (3 - k) + [second] * k) for k in range(4)]
-        return CubicTerms((self._inverse @ np.array(terms.matrix) @ np.array(products)).tolist())
+        return CubicTerms(self._inverse @ np.array(terms.matrix) @ np.array(products))
 
     def exponent(self, of: Impulse) -> Impulse:
         """An impulse, or its derivative, for y."""
-        return replace(of, exponent=(self._inverse @ np.array(of.exponent) @ self.array).tolist())
+        return replace(of, exponent=self._inverse @ np.array(of.exponent) @ self.array)
 
     def motion(self, system: System) -> System:
         """A system for y, the terms of order 0 that no noise drives as one; a rotation is one exactly."""
@@ -102,7 +103,7 @@ class Frame:
         a = self._inverse @ free @ self.array
         turned = 0.5 * (np.trace(a) * np.eye(len(a)) + a - a.T)
         is_turn = np.all(abs(a - turned) <= OF_PRODUCTS * (abs(self._inverse) @ abs(free) @ abs(self.array)))
-        steady = CoefficientMatrix(0, (turned if is_turn and len(a) == 2 else a).tolist())
+        steady = CoefficientMatrix(0, turned if is_turn and len(a) == 2 else a)
         jumps = [replace(jump, phase=float(self.phase(np.array(jump.phase)))) for jump in system.jumps]
         return LinearMotion((steady, *others), tuple(jumps), system.epsilon)
 
@@ -198,7 +199,7 @@ def infinite(problem: Problem, p: float, symbol: str = "") -> Message | None:
 def mean_matrix(problem: Problem, motion: System) -> FloatArray:
     """Σ ε^n ⟨g⟩ A of the terms of a motion, in the mean over the noise."""
     means = [motion.epsilon**term.order * problem.named_noise(term.noise).mean_of(term.g) for term in motion.terms]
-    return np.tensordot(means, [term.matrix for term in motion.terms], axes=1)
+    return np.tensordot(np.array(means), np.array([term.matrix for term in motion.terms]), 1)
 
 
 def is_free(term: CoefficientMatrix) -> bool:
@@ -258,7 +259,7 @@ def own_frame(problem: Problem, moved: Motion) -> tuple[Frame, float]:
         (first, _), (lower, last) = rotating
         choice.insert(0, np.array([[1.0, 0.0], [lower / first, last / abs(first)]]))
     chosen = next((each for each in choice if size(each) <= HARDLY * least), own)
-    return Frame(tuple(map(tuple, chosen.tolist()))), least
+    return Frame(rows_of(chosen)), least
 
 
 def _unit(phi: FloatArray) -> FloatArray:

@@ -130,6 +130,11 @@ def constant(*series: float) -> Form:
     return Form({NUMBER: series})
 
 
+def product(*states: str, noise: str = "", power: int = 0) -> Form:
+    """A product of variables, a noise and a power of ε, whatever a parameter is."""
+    return Form({(states, noise, power): (1.0, 0.0)})
+
+
 def _product(a: Series, b: Series) -> Series:
     return tuple(sum(a[i] * b[k - i] for i in range(k + 1)) for k in range(len(a)))
 

@@ -39,7 +39,7 @@ from fpsolve.arrays import (
 from fpsolve.model.parameters import Parametrised
 from fpsolve.model.quantity import ResponseQuantities, response_quantities
 
-Matrix = Sequence[Sequence[float]]
+Matrix = Sequence[Sequence[float]] | FloatArray
 Xi = ArrayLike | Mapping[str, ArrayLike]
 """ξ, or with several noises that of each by its name."""
 MOST_VARIABLES = 200
@@ -54,6 +54,11 @@ COLLAPSE = math.exp(-math.pi / math.sqrt(3))
 """Restitution below which a mass under white noise comes to rest at a wall (E. Jacob, arXiv:1004.1953)."""
 BELOW = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 """Digits below a line."""
+
+
+def rows_of(matrix: ArrayLike) -> tuple[tuple[float, ...], ...]:
+    """The rows of a matrix, which can be compared and hashed."""
+    return tuple(map(tuple, np.asarray(matrix, dtype=float).tolist()))
 
 
 @dataclass(frozen=True)
@@ -223,7 +228,7 @@ class CoefficientMatrix:
                 f"{MOST_VARIABLES}"
             )
         object.__setattr__(self, "order", int(self.order))
-        object.__setattr__(self, "matrix", tuple(map(tuple, entries.tolist())))
+        object.__setattr__(self, "matrix", rows_of(entries))
         object.__setattr__(self, "g", coefficient(self.g))
 
     @property
@@ -270,7 +275,7 @@ class CubicTerms:
         entries = real_array(self.matrix, "matrix")
         if entries.shape != (2, 4):
             raise ValueError(f"got matrix = {shown(self.matrix)}; must be two rows of four finite numbers")
-        object.__setattr__(self, "matrix", tuple(map(tuple, entries.tolist())))
+        object.__setattr__(self, "matrix", rows_of(entries))
 
     def h(self, phi: ArrayLike) -> FloatArray:
         """e′ᵀ C m(e), m the products of degree 3."""
@@ -301,7 +306,7 @@ class Impulse:
     exponent: Matrix
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "exponent", tuple(map(tuple, self.exponent)))
+        object.__setattr__(self, "exponent", rows_of(self.exponent))
 
     @cached_property
     def matrix(self) -> FloatArray:
@@ -343,8 +348,7 @@ class Jump:
 
     def __post_init__(self) -> None:
         try:
-            for value in (self.phase, self.log_factor, 0.0 if self.leading is None else self.leading):
-                real_number(value, "")
+            real_array([self.phase, self.log_factor, 0.0 if self.leading is None else self.leading], "")
         except ValueError:
             numbers = f"phase = {shown(self.phase)}, log_factor = {shown(self.log_factor)}"
             more = f"and leading, here {shown(self.leading)}, one too where it is not None"
@@ -426,7 +430,7 @@ class Stop:
             raise ValueError(f"got coordinates = {shown(self.coordinates)}; must be a matrix of n ≥ 3 with an inverse")
         if not 0 < real_number(self.restitution, "restitution") <= 1:
             raise ValueError(f"got restitution = {self.restitution:g}; must be > 0 and <= 1; a wall gives no energy")
-        object.__setattr__(self, "coordinates", tuple(map(tuple, rows.tolist())))
+        object.__setattr__(self, "coordinates", rows_of(rows))
 
     @cached_property
     def _sides(self) -> tuple[FloatArray, FloatArray]:
@@ -607,12 +611,6 @@ class System(Parametrised):
         return tuple(f"x{str(k + 1).translate(BELOW)}" for k in range(self.dimension))
 
     @property
-    def columns(self) -> Sequence[str]:
-        """What the columns of its terms multiply: its variables, 1 with no name where it is forced, what is past."""
-        past = [f"{self.states[k]}(t − {delay:.10g})" for k, delay in self.pasts]
-        return *self.states, *[""] * bool(self.forced), *past
-
-    @property
     def driven_by(self) -> frozenset[str]:
         """The names that its terms give the noises that drive it."""
         return frozenset(term.noise for term in (self.forced or self).terms if is_driven(term.g))
@@ -714,7 +712,7 @@ def split_by_noise(
             )
         offset, slope = line
         if offset:
-            steady.append(CoefficientMatrix(term.order, (offset * np.array(term.matrix)).tolist()))
+            steady.append(CoefficientMatrix(term.order, offset * np.array(term.matrix)))
         driven += slope * system.epsilon**term.order * np.array(term.matrix)
     return steady, driven
 
@@ -758,7 +756,7 @@ def as_plane(terms: Sequence[CoefficientMatrix], size: float = 0.0) -> tuple[Coe
         return tuple(terms)
     speed = 4.0 ** math.floor(math.log(size, 4)) if size else 0.0
     turn = (CoefficientMatrix(0, ((0.0, speed), (-speed, 0.0))),) if speed else ()
-    return *turn, *(replace(term, matrix=(term.matrix[0][0] * np.eye(2)).tolist()) for term in terms)
+    return *turn, *(replace(term, matrix=term.matrix[0][0] * np.eye(2)) for term in terms)
 
 
 def common_unit(values: Sequence[float], name: str) -> tuple[float, int]:
@@ -776,7 +774,7 @@ def common_unit(values: Sequence[float], name: str) -> tuple[float, int]:
 def by_epsilon(system: System) -> tuple[CoefficientMatrix, ...]:
     """∂/∂ε of Σ ε^n g(ξ) A x, as terms."""
     return tuple(
-        CoefficientMatrix(term.order - 1, (term.order * np.array(term.matrix)).tolist(), term.g, term.noise)
+        CoefficientMatrix(term.order - 1, term.order * np.array(term.matrix), term.g, term.noise)
         for term in system.terms
         if term.order
     )

@@ -15,6 +15,7 @@ from fpsolve.model.faults import strict_dataclass
 from fpsolve.model.noise import Gaussian, NoiseDerivative
 from fpsolve.model.noises.steps import FilterStep, transition
 from fpsolve.model.parameters import ANY_SIGN, SIZE, Table, parameter, stated_field
+from fpsolve.model.plane import rows_of
 
 Pair = Annotated[tuple[float, float], Field(strict=False)]
 
@@ -133,7 +134,7 @@ class Filter(Gaussian):
         turned = np.outer(n, by_c) - stretch * normal
         direct = {"omega": self.drift_matrix / omega, "zeta": 2 * omega * normal}
         drift = 2 * zeta * omega * (turned + turned.T) + direct.get(name, 0.0)
-        return NoiseDerivative(log_scale=float(unit + stretch), drift=tuple(map(tuple, drift.tolist())))
+        return NoiseDerivative(log_scale=float(unit + stretch), drift=rows_of(drift))
 
     def start(self, size: int, rng: np.random.Generator) -> FloatArray:
         """ξ, y/std(y) and y′/std(y′), shape (3, size)."""

@@ -18,6 +18,7 @@ from fpsolve.arrays import ROUNDED, FloatArray, real_array, real_number, shown
 from fpsolve.model.noise import Noise
 from fpsolve.model.noises.steps import ChainStep
 from fpsolve.model.parameters import SIZE, stated_field
+from fpsolve.model.plane import rows_of
 
 Row = Annotated[tuple[float, ...], Field(strict=False)]
 
@@ -155,7 +156,7 @@ class MarkovChain(Chain):
         if connected_components(jumps > 0, connection="strong")[0] > 1:
             raise ValueError("every state must be reachable from every other one; leave out those that are not")
         object.__setattr__(self, "states", tuple(states.tolist()))
-        object.__setattr__(self, "rates", tuple(map(tuple, (jumps - np.diag(leaving)).tolist())))
+        object.__setattr__(self, "rates", rows_of(jumps - np.diag(leaving)))
 
     @classmethod
     def telegraph(cls, amplitude: float, rate: float) -> MarkovChain:

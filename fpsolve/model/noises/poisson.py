@@ -86,11 +86,6 @@ class Poisson(Memoryless):
         return np.asarray(weights / weights.sum())
 
     @property
-    def mean(self) -> float:
-        """rate ⟨w⟩; each impulse is taken as it is, so that nothing more is added to the drift."""
-        return 0.0
-
-    @property
     def relaxation_time(self) -> float:
         """The mean time between impulses: some of them have to pass until the motion has forgotten its start."""
         return 1 / self.rate
@@ -121,7 +116,7 @@ class Poisson(Memoryless):
         if float(np.max(np.abs(np.linalg.eigvals(driven)))) * max(map(abs, self.sizes)) > LARGEST:
             raise ValueError(f"an impulse multiplies the state by up to e^{LARGEST:g} or more; use smaller sizes")
         impulses = [
-            Impulse(self.rate * float(share), (size * driven).tolist())
+            Impulse(self.rate * float(share), size * driven)
             for size, share in zip(self.sizes, self.shares, strict=True)
         ]
         return Motion(drift, (), impulses)
@@ -132,8 +127,7 @@ class Poisson(Memoryless):
         drift, change = split_by_noise(system, changed.terms, name)
         by_rate, known = 1.0 / self.rate if by == "rate" else 0.0, self.motion(system, name).impulses
         impulses = [  # none of what is not driven
-            Impulse(by_rate * each.rate, (size * change).tolist())
-            for each, size in zip(known, self.sizes, strict=False)
+            Impulse(by_rate * each.rate, size * change) for each, size in zip(known, self.sizes, strict=False)
         ]
         return replace(changed, terms=tuple(drift), impulses=(*changed.impulses, *impulses))
 

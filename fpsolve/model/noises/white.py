@@ -103,4 +103,4 @@ class White(Memoryless):
 
 
 def _term(system: System, matrix: FloatArray, order: int) -> CoefficientMatrix:
-    return CoefficientMatrix(order, (matrix / system.epsilon**order).tolist())
+    return CoefficientMatrix(order, matrix / system.epsilon**order)

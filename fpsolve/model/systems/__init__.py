@@ -1,5 +1,1 @@
 """The kinds of systems, one file for each: parameters, coefficient matrices, impacts, and how they change."""
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -33,6 +33,7 @@ from fpsolve.model.expressions import (
     log_of,
     name_fault,
     names_in,
+    product,
     shortened,
     summands,
 )
@@ -207,6 +208,7 @@ class EquationSystem(System):
 
     def _refuse_faults(self) -> None:
         """Refuse names, values, noises and walls that are not what they must be. Raises `TableError`."""
+        known = set[object]()
         for name, path in self._given_names():
             fault = name_fault(name) if isinstance(name, str) else "must be a text"
             if not fault and (name in self.stated or name == "kind"):
@@ -215,8 +217,6 @@ class EquationSystem(System):
                 fault = "is the name of the small parameter; rename it"
             if fault:
                 raise TableError(f"got the name {shown(name)}; it {fault}", *path)
-        known = set[object]()
-        for name, path in self._given_names():
             if name in known:
                 raise TableError(f"got the name {name} twice; all names must differ; rename one of them", *path)
             known.add(name)
@@ -373,8 +373,8 @@ class EquationSystem(System):
         """The rates, with their derivatives by a parameter. Raises `TableError`."""
         read = Read()
         names = {
-            **{name: Form({((name,), "", 0): (1.0, 0.0)}) for name in self.variables},
-            **{name: Form({((), name, 0): (1.0, 0.0)}) for name, _ in self.noises},
+            **{name: product(name) for name in self.variables},
+            **{name: product(noise=name) for name, _ in self.noises},
             **self._names(by),
         }
         terms, of_time = list[tuple[int, float, str, Form]](), partial(self._of_time, read, by)
@@ -391,18 +391,21 @@ class EquationSystem(System):
             read.rates[i] = read.rates[i].plus(form, sign)
         return read
 
+    def _values(self, by: str = "") -> dict[str, Form]:
+        """The numbers that parameters are, with their derivatives by one of them."""
+        return {name: constant(value, float(name == by)) for name, value in self.named}
+
     def _names(self, by: str) -> dict[str, Form]:
-        """What parameters are, with their derivatives by one of them."""
-        names = {name: constant(value, float(name == by)) for name, value in self.named}
-        return names | ({EPSILON: Form({((), "", 1): (1.0, 0.0)})} if EPSILON in names else {})
+        """What parameters are in rates, where ε stands for itself."""
+        names = self._values(by)
+        return names | ({EPSILON: product(power=1)} if EPSILON in names else {})
 
     def _of_time(self, read: Read, by: str, name: str, time: str, written: str) -> Form | None:
         """What x(t - tau) is, and cos(nu*t + phi) by waves of the frequency nu; both are noted; else None."""
         if name not in WAVES and not self.drift:
             return None
-        names = {name: constant(value, float(name == by)) for name, value in self.named}
-        names |= {name: Form({((name,), "", 0): (1.0, 0.0)}) for name in (*self.variables, TIME)}
-        names |= {name: Form({((), name, 0): (1.0, 0.0)}) for name, _ in self.noises}
+        names = self._values(by) | {name: product(name) for name in (*self.variables, TIME)}
+        names |= {name: product(noise=name) for name, _ in self.noises}
         parts = dict(evaluate(time, names, f"the time of {written}").parts)
         (first, slope), speed = parts.pop(NUMBER, (0.0, 0.0)), parts.pop(((TIME,), "", 0), (0.0, 0.0))
         if name in WAVES:
@@ -425,7 +428,7 @@ class EquationSystem(System):
         if fault:
             raise ExpressionError(f"got {written}; {fault}")
         read.delays[written] = self.variables.index(name), (-first, -slope)
-        return Form({((written,), "", 0): (1.0, 0.0)})
+        return product(written)
 
     @cached_property
     def clock(self) -> Clock | None:
@@ -477,7 +480,7 @@ class EquationSystem(System):
                     order = power if has_orders else int(bool(noise))
                     matrices[order, noise][i, columns.index((*states, *last)[0])] += series[at]
         terms = [
-            CoefficientMatrix(order, matrix.tolist(), *self._coefficient(noise, names))
+            CoefficientMatrix(order, matrix, *self._coefficient(noise, names))
             for (order, noise), matrix in sorted(matrices.items(), key=itemgetter(0))
             if at == 0 or matrix.any()
         ]
@@ -508,7 +511,7 @@ class EquationSystem(System):
             for (states, _, power), series in form.parts.items():
                 if len(states) == HIGHEST_DEGREE:
                     matrix[i, states.count(self.variables[1])] += self.epsilon**power * series[0]
-        return CubicTerms(matrix.tolist()) if matrix.any() else None
+        return CubicTerms(matrix) if matrix.any() else None
 
     @cached_property
     def jumps(self) -> tuple[Jump, ...]:
@@ -519,7 +522,7 @@ class EquationSystem(System):
         log_factor, leading = self._log_factor()[0], None
         if EPSILON in names_in(str(self.walls[0].restitution)):
             with suppress(TableError):  # no power series
-                zeroth, first, second = self._log_factor(EPSILON, 0.0, order=2)
+                zeroth, first, second = self._log_factor(EPSILON, 0.0)
                 leading = zeroth + first * self.epsilon + second * self.epsilon**2
         return (Jump(math.pi / 2 if place == 0 else 0.0, log_factor, leading),)
 
@@ -532,7 +535,7 @@ class EquationSystem(System):
         if restitution > 1:
             text = f"got {restitution:g}; must be <= 1 at a wall of more than two variables; reduce it"
             raise TableError(text, "walls", 0, "restitution")
-        return Stop(coordinates.tolist(), restitution)
+        return Stop(coordinates, restitution)
 
     def _wall_coordinates(self) -> FloatArray:
         """q, q̇ and all others as rows: an impact changes the velocity alone."""
@@ -563,16 +566,15 @@ class EquationSystem(System):
             raise TableError(f'got "{variable} = 0"; {must}, {told}; {remedy}', "walls", 0, "at")
         return i, names.index(other), speed
 
-    def _log_factor(self, by: str = "", value: float | None = None, order: int = 1) -> tuple[float, ...]:
-        """Taylor coefficients of ln R of the wall by a parameter, at a value of it. Raises `TableError`."""
+    def _log_factor(self, by: str = "", value: float | None = None) -> tuple[float, ...]:
+        """Three Taylor coefficients of ln R of the wall by a parameter, at a value of it. Raises `TableError`."""
         restitution = self.walls[0].restitution
         named = dict(self.named) | ({} if value is None else {by: value})
-        zeros = (0.0,) * (order - 1)
         with placed("walls", 0, "restitution"):
             if isinstance(restitution, bool) or not isinstance(restitution, str | float | int):
                 must = "must be a number > 0, or an expression in the parameters"
                 raise ExpressionError(f"got {shown(restitution)}; {must}; write, for example, restitution = 0.8")
-            names = {name: constant(each, float(name == by), *zeros) for name, each in named.items()}
+            names = {name: constant(each, float(name == by), 0.0) for name, each in named.items()}
             logs = log_of(str(restitution), names, "the restitution")
         return logs  # noqa: RET504
 
@@ -621,35 +623,26 @@ class EquationSystem(System):
             raise ValueError(f"the derivative of the system by {name} is not finite; choose another value of {name}")
         return self._derivatives[name]
 
-    @cached_property
-    def _law(self) -> str:
-        """The parameter that is the coefficient of restitution, in ln R alone: R = 1 for 1, and more for more."""
-        own = names_in(str(self.walls[0].restitution)) - {EPSILON} if self.walls else frozenset()
-        if len(own) != 1 or own & self._used:
-            return ""
-        (name,) = own
-        with suppress(TableError):
-            at_one, slope = self._log_factor(name, 1.0)
-            return name if abs(at_one) <= ROUNDED and slope > 0 else ""
-        return ""
-
     def restitution_at(self, log_factor: float) -> tuple[str, float, float]:
-        """By Newton's method; NaN if it is not found."""
-        if not (name := self._law):
+        """R; or the only parameter in it, if it is in nothing else, R is 1 where it is 1, and R grows with it.
+
+        Such a parameter is found by Newton's method; it is NaN where it is not found.
+        """
+        name, value, step = "".join(names_in(str(self.walls[0].restitution)) - {EPSILON}), 1.0, 0.0
+        known, slope = math.inf, 0.0
+        with suppress(TableError):
+            known, slope, _ = self._log_factor(name, value)
+        if name in self._used or abs(known) > ROUNDED or not slope > 0:
             return super().restitution_at(log_factor)
-        value, step, slope = 1.0, math.inf, 0.0
         for _ in range(_NEWTON):
             try:
-                known, slope = self._log_factor(name, value)
-            except TableError:  # R is not positive there
+                known, slope, _ = self._log_factor(name, value)
+                step = (log_factor - known) / slope
+                value += step
+            except (TableError, ZeroDivisionError):  # R is not positive there, or does not change
                 step /= 2
                 value -= step
-                continue
-            if not slope or abs(step) <= 4e-16 * max(1.0, abs(value)):
-                break
-            step = (log_factor - known) / slope
-            value += step
-        is_found = slope and abs(step) <= ROUNDED * max(1.0, abs(value))
+        is_found = abs(known - log_factor) <= ROUNDED * max(1.0, abs(log_factor))
         return (name, value, 1 / slope) if is_found else (name, math.nan, math.nan)
 
 

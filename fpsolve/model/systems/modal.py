@@ -13,7 +13,7 @@ from pydantic import BeforeValidator, Field
 from pydantic.fields import FieldInfo
 
 from fpsolve.arrays import ROUNDED, FloatArray, real_number, shown
-from fpsolve.model.expressions import Form, Monomial, OfTime, Series, constant, evaluate, names_in
+from fpsolve.model.expressions import Form, Monomial, OfTime, Series, evaluate, names_in, product
 from fpsolve.model.faults import TableError
 from fpsolve.model.parameters import Table, stated_field
 from fpsolve.model.plane import MOST_VARIABLES
@@ -183,14 +183,15 @@ class ModalSystem(EquationSystem):
             for parts, *pairs in zip(found, rates.tolist(), slopes.tolist(), strict=True):
                 for name, *pair in zip(self.variables, *pairs, strict=True):
                     parts[(name,), noise, power] = tuple(pair)
-        speeds = [Form({((name,), "", 0): (1.0, 0.0)}) for name in self.variables[1::2]]
+        speeds = map(product, self.variables[1::2])
         read.rates.extend(each for pair in zip(speeds, map(Form, found), strict=True) for each in pair)
         return read
 
     def _mobility(self, by: str = "") -> FloatArray:
         """M⁻¹, by which modes share an impact, and its derivative by a parameter. Raises `TableError`."""
         place, _, rows = self.matrices[0]
-        names = {name: constant(value, float(name == by)) for name, value in self.named if name != EPSILON}
+        names = self._values(by)
+        names.pop(EPSILON, None)
         mass, slope = _series(place, rows, names)["", 0]
         scaled = mass / np.maximum(np.max(np.abs(mass), axis=1, keepdims=True), SMALLEST)
         scaled = scaled / np.maximum(np.max(np.abs(scaled), axis=0), SMALLEST)  # whatever the units of the modes
@@ -230,10 +231,8 @@ class ModalSystem(EquationSystem):
         """The displacement of the wall, a row of those of the modes. Raises `TableError`."""
         modes, at = self.variables[::2], str(self.walls[0].at)
         text, _, zero = at.partition("=")
-        names = {name: constant(value) for name, value in self.named}
-        names |= {name: Form({((name,), "", 0): (1.0,)}) for name in modes}
         with placed("walls", 0, "at"):
-            parts = evaluate(text, names, "at").parts
+            parts = evaluate(text, self._values() | {name: product(name) for name in modes}, "at").parts
         found = {states: series[0] for (states, _, _), series in parts.items()}
         row = np.array([found.pop((name,), 0.0) for name in modes])
         if found or not row.any() or zero.strip().rstrip("0") not in ("", "0.") or "=" not in at:
@@ -289,8 +288,8 @@ def _count(mass: object) -> int:
 
 def _rows(matrix: object, count: int, place: Place) -> Rows:
     """The rows of a matrix, numbers and texts. Raises `TableError`."""
-    stated = matrix if isinstance(matrix, list | tuple) else ()
-    if [len(row) if isinstance(row, list | tuple) else 0 for row in stated] != [count] * count:
+    stated = np.array(matrix, dtype=object)
+    if stated.shape != (count, count):
         size = f"{count} row{'s' * (count > 1)} of {count}, as mass is"
         raise TableError(f"got {shown(matrix)}; must be {size}", *place)
     return tuple(tuple(_entry(each, (*place, i, j)) for j, each in enumerate(row)) for i, row in enumerate(stated))
