@@ -127,11 +127,13 @@ class NoiseRecord(Record):
         """
         if type(noise) is NonGaussianNoise:
             if noise.r0 > 1:
-                key = f"{noise.section}.r0"
-                raise NoSuchExponent(Message(Code.NO_BOUND, key=key, value=noise.r0, remedy=Remedy.REDUCTION))
+                raise NoSuchExponent(
+                    Message(Code.NO_BOUND, key=f"{noise.section}.r0", value=noise.r0, remedy=Remedy.REDUCTION)
+                )
             if noise.r0 < 1:
-                slope = noise.end_exponent
-                return cls(kind="bounded", unit=noise.half_width, nu=(1 - noise.r0) / noise.tau0, slope=slope)
+                return cls(
+                    kind="bounded", unit=noise.half_width, nu=(1 - noise.r0) / noise.tau0, slope=noise.end_exponent
+                )
             noise = noise.ou_reduction()
         if isinstance(noise, GaussianNoise):
             return cls(kind="gaussian", unit=noise.standard_deviation, nu=2 * noise.alpha, slope=0.5)
@@ -139,7 +141,7 @@ class NoiseRecord(Record):
             return cls(kind="circle", unit=noise.amplitude, nu=noise.sigma**2)
         if type(noise) is White:
             return cls(kind="white", unit=noise.s, states=[0.0], rates=[[0.0]])
-        if not isinstance(noise, Chain):
+        if noise.is_white or not isinstance(noise, Chain):
             raise TypeError(f"got {type(noise).__name__}; proofs are for {KNOWN}")
         if len(noise.states) > MOST_STATES:
             raise TypeError(f"got a chain of {len(noise.states)} states; proofs are for {MOST_STATES} at most")

@@ -90,7 +90,7 @@ class Chain(Noise):
     def start(self, size: int, rng: np.random.Generator) -> FloatArray:
         return rng.choice(len(self.states), size, p=self.probabilities).astype(float)
 
-    def step(self, h: float, bias: float = 0.0) -> ChainStep:
+    def step(self, h: float, bias: float = 0.0) -> tuple[object, ...]:
         """The jumps in any time, without a bias."""
         leaving = -np.diagonal(self.rates)
         reached = np.cumsum(np.maximum(self.rates, 0.0) / leaving[:, None], axis=1)

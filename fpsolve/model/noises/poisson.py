@@ -11,8 +11,8 @@ from pydantic import AfterValidator
 
 from fpsolve.arrays import FloatArray
 from fpsolve.model.faults import strict_dataclass
-from fpsolve.model.noise import Memoryless
 from fpsolve.model.noises.steps import ChainStep
+from fpsolve.model.noises.white import Memoryless
 from fpsolve.model.parameters import SIZE, parameter
 from fpsolve.model.plane import (
     Impulse,

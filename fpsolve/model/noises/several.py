@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from fpsolve.arrays import FloatArray, shown
 from fpsolve.model.noise import STAY, Noise
-from fpsolve.model.plane import CoefficientMatrix, Impulse, Motion, ParameterDerivative, System, Xi
+from fpsolve.model.plane import Motion, ParameterDerivative, System, Xi
 
 MOST_WITH_AXES = 2
 """Noises that have values at most: each of them is a dimension more."""
@@ -149,12 +149,11 @@ class Noises(Noise):
 
     def motion(self, system: System, name: str | None = None) -> Motion:
         """The motion besides the white noises, and what all white noises add, each in its own `sense`."""
-        drift, diffusions, jolts = system, list[CoefficientMatrix](), list[Impulse]()
+        whole = Motion(system)
         for own, noise in self._white:
-            drift, diffused, struck = noise.motion(drift, own)
-            diffusions += diffused
-            jolts += struck
-        return Motion(drift, diffusions, jolts)
+            drift, diffusions, impulses = noise.motion(whole.drift, own)
+            whole = Motion(drift, [*whole.diffusions, *diffusions], [*whole.impulses, *impulses])
+        return whole
 
     def driving(self, system: System) -> Noise:
         first = system.noise_sections[0].removeprefix("noise.")

@@ -8,9 +8,12 @@ from dataclasses import replace
 from enum import StrEnum
 from typing import Annotated, ClassVar
 
+import numpy as np
+
 from fpsolve.arrays import FloatArray
 from fpsolve.model.faults import strict_dataclass
-from fpsolve.model.noise import Memoryless
+from fpsolve.model.noise import STAY
+from fpsolve.model.noises.markov_chain import Chain
 from fpsolve.model.noises.steps import WhiteStep
 from fpsolve.model.parameters import SIZE, parameter
 from fpsolve.model.plane import (
@@ -33,6 +36,31 @@ class Interpretation(StrEnum):
 
     STRATONOVICH = "stratonovich"
     ITO = "ito"
+
+
+class Memoryless(Chain):
+    """Noise that has no value, see `is_white`: to solvers a chain that rests in its only state, ξ = 0."""
+
+    is_white: ClassVar[bool] = True
+    states: ClassVar[Sequence[float]] = (0.0,)
+    rates: ClassVar[Sequence[Sequence[float]]] = ((0.0,),)
+
+    @property
+    def standard_deviation(self) -> float:
+        return math.inf
+
+    @property
+    def correlation_time(self) -> float:
+        return 0.0
+
+    relaxation_time = correlation_time
+
+    def misfit(self, xi: float) -> str:
+        return f", but white noise has no value at a time; {STAY}"
+
+    def start(self, size: int, rng: np.random.Generator) -> FloatArray:
+        """0: it has no value."""
+        return np.zeros(size)
 
 
 @strict_dataclass

@@ -265,7 +265,7 @@ class EquationSystem(System):
         """What is wrong where a noise drives nothing."""
         if name in self._used:
             return ""
-        others = sorted(self._used.difference(self.variables, dict(self.named), dict(self.noises)))
+        others = sorted(self._used.difference(self.variables, self.values, dict(self.noises)))
         if not others:
             _ = self._read  # its fault may be why the noise is in none
         named = f', or name the noise, noises = {{ {others[0]} = "{section}" }}' if others else ", or remove it"
@@ -470,7 +470,7 @@ class EquationSystem(System):
         """The terms of rates, of their values for `at` = 0, of their derivatives for 1; those of degree 0 with a last
         variable if it has a name.
         """
-        has_orders = EPSILON in dict(self.named)
+        has_orders = EPSILON in self.values
         names = {name: section[6:] for name, section in self.noises} if len(self.noises) > 1 else {}
         columns, size = [*self.variables, *last, *self._read.delays], len(self.variables) + len(last) + len(self.pasts)
         matrices = defaultdict[tuple[int, str], FloatArray](lambda: np.zeros(2 * (size,)))

@@ -143,9 +143,9 @@ class ModalSystem(EquationSystem):
     @classmethod
     def from_table(cls, table: Table) -> ModalSystem:
         named, quantities = cls.named_of(table, cls.stated)
-        given = {key: each for key, each in table.items() if key in cls.stated}
-        walls = [each.model_dump() for each in table.get("walls", ())]
-        return replace(cls.of(**{**given, "parameters": dict(named), "walls": walls}), quantities=quantities)
+        given = {key: each for key, each in table.items() if key in cls.stated and key != "walls"}
+        system = cls.of(**{**given, "parameters": dict(named)})
+        return replace(system, walls=table.get("walls", ()), quantities=quantities)
 
     def __post_init__(self) -> None:
         self._refuse_faults()
