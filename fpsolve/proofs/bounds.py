@@ -196,7 +196,7 @@ class Trial:
         return added(self.basis.diffused(self._u, self.noise), self.basis.cleared(self._turned[0], self.noise))
 
     @cached_property
-    def held(self) -> tuple[Balls, Balls]:
+    def frozen(self) -> tuple[Balls, Balls]:
         """(F₀ + z F₁ + ½ νβ² − μ) u and F₁ u, of which n u and n_z u of `verify` are made; or the same of λ."""
         beta, (rest, driven) = ball(self.basis.gauge), self._turned
         return added(rest, self.noise.nu * beta * beta / 2 * self.values), driven
@@ -225,8 +225,8 @@ class Bounds:
 
 
 @dataclass(frozen=True)
-class HeldBounds:
-    """Where u may be held, each below and above, on the right or mirrored onto it.
+class FrozenBounds:
+    """Where T may be frozen beyond, each below and above, on the right or mirrored onto it.
 
     Attributes:
         steep: around u_z/u; for λ around f_z.
@@ -279,13 +279,13 @@ class Bounder:
         inward = np.array(drift) - bend[::-1]
         return Bounds(mismatch, (inward[0] - slack[0], inward[1] + slack[1]))
 
-    def held(self, z: FloatArray, sign: int) -> list[HeldBounds]:
-        """Where u may be held, on the right or, with sign −1, on the left."""
+    def frozen(self, z: FloatArray, sign: int) -> list[FrozenBounds]:
+        """Where T may be frozen beyond, on the right or, with sign −1, on the left."""
         trial, cells, at = self.trial, Cells(self.trial.basis, z, z, self._rest), balls(z)
         divisor = self._divisor(cells)
         drifts = (trial.noise.drift(at), trial.noise.drift_slope(at))
         ranges = [self._range(cells.modes(trial.slope), divisor)]
-        for part, drift in zip(trial.held, drifts, strict=True):
+        for part, drift in zip(trial.frozen, drifts, strict=True):
             modes = cells.modes(part)
             if trial.p is not None:
                 values = cells.modes(padded(trial.values, waves=1))
@@ -295,7 +295,7 @@ class Bounder:
         if sign < 0:
             steep, growth = ([(-high, -low) for low, high in pairs] for pairs in (steep, growth))
         least = ([below(number) for number in numbers] for numbers in (sign * drifts[0], drifts[1]))
-        return [HeldBounds(*bounds) for bounds in zip(steep, mismatch, growth, *least, strict=True)]
+        return [FrozenBounds(*bounds) for bounds in zip(steep, mismatch, growth, *least, strict=True)]
 
     def _divisor(self, cells: Cells) -> Range:
         """Around u on every cell of φ and z; 1 for λ, where nothing is divided by f."""

@@ -21,7 +21,7 @@ from scipy.special import roots_jacobi
 from fpsolve.arrays import FloatArray
 from fpsolve.proofs.balls import above, ball, balls, below, precision
 from fpsolve.proofs.basis import OTHERS, Basis, Core, Whole, hermite_table
-from fpsolve.proofs.bounds import LOWER, UPPER, Bounder, Bounds, HeldBounds, Trial
+from fpsolve.proofs.bounds import LOWER, UPPER, Bounder, Bounds, FrozenBounds, Trial
 from fpsolve.proofs.certificate import NOTHING, BasisRecord, Certificate, Enclosure, SideRecord, enclosure_of
 from fpsolve.proofs.statement import Cylinder, Statement, cylinder
 from fpsolve.proofs.verify import objection
@@ -31,9 +31,9 @@ SMALLEST, GROWTH, MOST, MOST_UNKNOWNS = (5, 9), 1.35, 399, 25_000
 """Modes on either side and polynomials of the first trial, by what one of both grows, how far each and both."""
 ABSENT = 1e9
 """What a missing bound counts for."""
-PATIENCE, PROGRESS, FAR = {False: 2, True: 6}, 0.7, 1e-2
-"""Enlargements that do not bring the bounds closer by this factor, after which no more are tried; more of them where
-the bounds are farther apart than this share of the number."""
+PATIENCE, PATIENCE_FAR, PROGRESS, FAR = 2, 6, 0.7, 1e-2
+"""Enlargements that do not bring the bounds closer by a factor, after which no more are tried, of bounds near to each
+other and far apart; that factor; and the share of the number from which on they are far apart."""
 ROUGH, EARLY = 30.0, 0.1
 """Sizes of a trial's highest functions, in widths, above which it is too small, and the share of the time up to which
 such trials are passed over."""
@@ -252,7 +252,9 @@ def _enlarged(
     delta, idle, value, (waves, degrees) = math.inf, 0, math.inf, size
     cost, unknowns, edge = 0.0, (2 * waves + 1) * degrees, math.inf
     passed: tuple[Basis, Pair, int, int] | None = None
-    while idle < PATIENCE[delta > FAR * abs(value)] and (2 * waves + 1) * degrees <= MOST_UNKNOWNS:
+    while (
+        idle < (PATIENCE_FAR if delta > FAR * abs(value) else PATIENCE) and (2 * waves + 1) * degrees <= MOST_UNKNOWNS
+    ):
         begun = timer.elapsed
         cost, unknowns = cost * ((2 * waves + 1) * degrees / unknowns) ** 1.5, (2 * waves + 1) * degrees
         if begun + cost > timer.seconds:
@@ -363,7 +365,7 @@ class Half:
         mismatch: above e on each cell.
         inward: below B on each cell.
         beta: β.
-        held: what is known at the nodes where u may be held; None where u serves to the end of the support.
+        frozen: what is known at the nodes where T may be frozen beyond; None where u serves to the end of the support.
         nu: floats below and above ν.
         sense: q.
         square: q in front of W²; 0 for the drift of ln‖x‖.
@@ -373,7 +375,7 @@ class Half:
     mismatch: FloatArray
     inward: FloatArray
     beta: float
-    held: Mapping[int, HeldBounds] | None
+    frozen: Mapping[int, FrozenBounds] | None
     nu: tuple[float, float]
     sense: int
     square: int
@@ -395,17 +397,17 @@ class Half:
             if value is None:
                 return None
             values.append(value)
-            held = None if self.held is None else self.held.get(j + 1)
-            kappa = None if held is None else self._tail(delta, j + 1, value, held)
+            frozen = None if self.frozen is None else self.frozen.get(j + 1)
+            kappa = None if frozen is None else self._tail(delta, j + 1, value, frozen)
             if kappa is not None:
                 return np.array(values), kappa
-        return (np.array(values), 0.0) if self.held is None else None
+        return (np.array(values), 0.0) if self.frozen is None else None
 
-    def _tail(self, delta: float, j: int, value: float, held: HeldBounds) -> float | None:
+    def _tail(self, delta: float, j: int, value: float, frozen: FrozenBounds) -> float | None:
         """κ beyond a node, if there is one."""
-        drop, mismatch, growth = held.above(self.sense)
-        pull, most = held.drift - self.beta, (value - drop) * (1 - 1e-12)
-        least = max(-self.sense * self.beta, max(growth, 0.0) / (self.nu[0] * held.slope)) * (1 + 1e-12)
+        drop, mismatch, growth = frozen.above(self.sense)
+        pull, most = frozen.drift - self.beta, (value - drop) * (1 - 1e-12)
+        least = max(-self.sense * self.beta, max(growth, 0.0) / (self.nu[0] * frozen.slope)) * (1 + 1e-12)
         kappa = min(most, max(pull, least)) if self.square > 0 else most
         if kappa < least or pull <= 0 or self.nodes[j] < 0:
             return None
@@ -457,7 +459,7 @@ def _sides(trial: Trial, phases: int) -> tuple[SideRecord | None, SideRecord | N
         return None, None
     inward = np.maximum(np.abs(bounds.inward[0]), np.abs(bounds.inward[1]))
     middle = int(np.argmin(np.where(bounds.is_positive, inward, np.inf)))
-    held = _held(bounder, nodes, bounds, middle) if trial.basis.is_core else (None, None)
+    frozen = _frozen(bounder, nodes, bounds, middle) if trial.basis.is_core else (None, None)
     nu, caution = (below(trial.noise.nu), above(trial.noise.nu)), SLACK * 1e-3
     low, high = (end - sign * caution * (1 + np.abs(end)) for sign, end in zip((1, -1), bounds.inward, strict=True))
     found = []
@@ -466,8 +468,8 @@ def _sides(trial: Trial, phases: int) -> tuple[SideRecord | None, SideRecord | N
         excess = bounds.above(q)
         least = max(float(np.min(excess)), 1e-18)
         excess = excess + SLACK * np.abs(excess)
-        left = Half(-nodes[middle::-1], excess[:middle][::-1], -high[:middle][::-1], -beta, held[0], nu, q, square)
-        right = Half(nodes[middle:], excess[middle:], low[middle:], beta, held[1], nu, q, square)
+        left = Half(-nodes[middle::-1], excess[:middle][::-1], -high[:middle][::-1], -beta, frozen[0], nu, q, square)
+        right = Half(nodes[middle:], excess[middle:], low[middle:], beta, frozen[1], nu, q, square)
         found.append(_least(left, right, least))
     return found[0], found[1]
 
@@ -485,20 +487,20 @@ def _nodes(trial: Trial) -> FloatArray:
     return np.linspace(low, high, CELLS + 1)
 
 
-def _held(
+def _frozen(
     bounder: Bounder, nodes: FloatArray, bounds: Bounds, middle: int
-) -> tuple[Mapping[int, HeldBounds], Mapping[int, HeldBounds]]:
+) -> tuple[Mapping[int, FrozenBounds], Mapping[int, FrozenBounds]]:
     """Some nodes on either side, by their distance from the middle, far enough out and with u > 0 up to there."""
     basis, bad = bounder.trial.basis, np.flatnonzero(~bounds.is_positive)
     first = bad[bad < middle].max(initial=-1) + 1
     last = bad[bad >= middle].min(initial=len(nodes) - 1)
     far = np.abs(nodes - basis.centre) > HELD_FROM * basis.scale
     inside = np.flatnonzero(far & (np.arange(len(nodes)) >= first) & (np.arange(len(nodes)) <= last))
-    found: list[dict[int, HeldBounds]] = []
+    found: list[dict[int, FrozenBounds]] = []
     for sign, chosen in ((-1, inside[inside < middle]), (1, inside[inside > middle])):
         picked = np.unique(chosen[np.linspace(0, len(chosen) - 1, CANDIDATES).astype(int)]) if len(chosen) else chosen
-        held = bounder.held(nodes[picked], sign) if len(picked) else []
-        found.append(dict(zip((sign * (picked - middle)).tolist(), held, strict=True)))
+        frozen = bounder.frozen(nodes[picked], sign) if len(picked) else []
+        found.append(dict(zip((sign * (picked - middle)).tolist(), frozen, strict=True)))
     return found[0], found[1]
 
 
@@ -528,5 +530,5 @@ def _least(left: Half, right: Half, least: float) -> SideRecord | None:
         delta=high * (1 + 1e-9),
         nodes=np.concatenate([-left.nodes[: len(before)][:0:-1], right.nodes[: len(after)]]).tolist(),
         values=np.concatenate([-before[:0:-1], after]).tolist(),
-        tails=None if right.held is None else [-left_tail, right_tail],
+        tails=None if right.frozen is None else [-left_tail, right_tail],
     )

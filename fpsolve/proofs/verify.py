@@ -44,7 +44,7 @@ Outward from W = 0 where the noise mostly is, W may grow like e^{z²/2}, so that
 the law of the noise in the moment, and is far below its maximum. Where W jumps downward, ψ has a concave kink and −ψ a
 convex one, which only helps: the local time at the kink enters with the sign of the inequality (Itô-Tanaka).
 
-Where u serves only between two ends, it is held there: T = e^{βz ± ψ} u(φ, end) beyond. At the right end the slope of
+Where u serves only between two ends, T is frozen there: T = e^{βz ± ψ} u(φ, end) beyond. At the right end the slope of
 ln T loses r = u_z/u, so that its kink is concave for q = 1 if W drops by max(−r) at least, and convex for q = −1 if W
 drops by max r at least. Beyond, W is a constant κ ≥ max(0, −qβ), which keeps T from 0 for q = 1 and bounded for
 q = −1, with
@@ -168,11 +168,11 @@ def _objection_within(
 
 
 def _objection_beyond(bounder: Bounder, q: int, side: SideRecord) -> str:
-    """Why u may not be held at an end of the core, the left one mirrored onto the right one."""
+    """Why T may not be frozen at an end of the core, the left one mirrored onto the right one."""
     noise, square = bounder.trial.noise, q if bounder.trial.p is not None else 0
     for sign, j, tail in zip((-1, 1), (0, -1), side.tails or (), strict=False):
-        (held,) = bounder.held(np.array([side.nodes[j]]), sign)
-        drop, mismatch, growth, drift, slope = map(ball, (*held.above(q), held.drift, held.slope))
+        (frozen,) = bounder.frozen(np.array([side.nodes[j]]), sign)
+        drop, mismatch, growth, drift, slope = map(ball, (*frozen.above(q), frozen.drift, frozen.slope))
         beta, value, kappa = (ball(sign * each) for each in (bounder.trial.basis.gauge, side.values[j], tail))
         if not (
             kappa <= value - drop

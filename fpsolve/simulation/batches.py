@@ -38,7 +38,7 @@ class Plan:
         paths: in one batch.
         slice_steps: steps in one slice, the unit in which batches are advanced: one transient, of populations beyond
             the plane without the time in which modes share the motion.
-        settling: slices before the estimate begins.
+        burn_in: slices before the estimate begins.
         wanted: slices for the estimate.
         levels: the direct estimator has windows of 2⁰ … 2^(levels − 1) slices.
     """
@@ -50,7 +50,7 @@ class Plan:
     estimator: Estimator
     paths: int
     slice_steps: int
-    settling: int
+    burn_in: int
     wanted: int
     levels: int
 
@@ -81,7 +81,7 @@ class Plan:
 
 
 class _Paths:
-    """Paths of a batch; in its first slices, numbered from −`settling`, they reach the law that they shall have.
+    """Paths of a batch; in its first slices, numbered from −`burn_in`, they reach the law that they shall have.
 
     Attributes:
         slices: how many are done after those.
@@ -93,7 +93,7 @@ class _Paths:
         self.y, self.xi = starting_state(plan.known.noise, plan.paths, self.rng, plan.known.size(plan.step))
         self.log_norm, self.tally = np.zeros(plan.paths), np.zeros(2)
         self.state = self.y, self.xi, self.log_norm, np.zeros(plan.paths), self.tally
-        self.slices = -plan.settling
+        self.slices = -plan.burn_in
 
     def advance(self, slices: int, stop: Event) -> None:
         """Go on by so many slices, or fewer if told to stop; one that was begun then does not count."""
@@ -148,15 +148,15 @@ class Population(_Paths):
 
     So that they seldom do, the noise is pushed to where the moment is carried: with T₀(ξ) = exp(b ξ) the paths obey
     dξ = (f(ξ) + σ² b) dt + σ dW, and the weights are ‖x‖^p exp(∫(L_ξ T₀)/T₀ dt), L_ξ T₀/T₀ = b f(ξ) + ½σ² b², which
-    gives the same Λ(p) for every b (Girsanov). b is sought while settling: it is the one that belongs to the mean of ξ.
+    gives the same Λ(p) for every b (Girsanov). b is sought in the burn-in: it is the one that belongs to the mean of ξ.
 
     Slow noise may carry a moment in two places, between which a population does not pass in any time: so some start
     with the b that T has where the oscillator does not turn, ln ‖x‖ growing by ε ξ, b = p ε/α₀.
 
     Attributes:
         bias: b, which stays 0 where exp(b ξ) has no mean.
-        found: the growth of ln Z in each slice after settling, and how many paths of its beginning carry it, shape (2,
-            slices).
+        found: the growth of ln Z in each slice after the burn-in, and how many paths of its beginning carry it, shape
+            (2, slices).
     """
 
     def __init__(self, plan: Plan, seed: SeedSequence, p: float, *, is_far: bool) -> None:
@@ -183,7 +183,7 @@ class Population(_Paths):
         found = close_slice(self._log_weights, self._ancestors, self._log_z)
         if self.slices >= 0:
             self.found[:, self.slices] = found
-        if self._is_biased and 2 - self.plan.settling <= self.slices < -2:
+        if self._is_biased and 2 - self.plan.burn_in <= self.slices < -2:
             # α₀⟨ξ⟩/σ², under which Ornstein-Uhlenbeck noise has this mean
             weights = np.exp(self._log_weights - self._log_weights.max())
             self.bias = float(np.average(self.xi[0], weights=weights)) / (

@@ -129,7 +129,7 @@ class Coefficients:
         steady: A₀, shape (n, n), with a column for each past value.
         wall: the lines of the jumps, or the wall of one of several variables.
         half_turn: π/ω, ω the largest; without rotation π times the time in which the direction of x is forgotten.
-        settling: the time in which it is forgotten how modes shared the motion; 0 where all turn alike.
+        mixing_time: the time in which it is forgotten how modes shared the motion; 0 where all turn alike.
         pasts: which variable is the one of each past value, and how long ago.
     """
 
@@ -138,7 +138,7 @@ class Coefficients:
     steady: FloatArray
     wall: Rays | Floor
     half_turn: float
-    settling: float
+    mixing_time: float
     pasts: Sequence[tuple[int, float]]
 
     @property
@@ -237,7 +237,7 @@ class Coefficients:
         motion.
         """
         relaxation = max((each.noise.relaxation_time for each in self.loads if not each.noise.period), default=0.0)
-        needed = max(2 * self.half_turn, 8 * relaxation, is_mixed * self.settling)
+        needed = max(2 * self.half_turn, 8 * relaxation, is_mixed * self.mixing_time)
         return self.repeated * math.ceil(needed / self.repeated)
 
 
@@ -296,8 +296,8 @@ def coefficients(system: System, noise: Noise) -> Coefficients:
         if (square := -free[0, 1] * free[1, 0]) > 0:  # an impact in each half-turn is like damping
             half_turn = math.pi / math.sqrt(square)
             free[1, 1] += 2 * math.log(stop.restitution) / half_turn
-    settling = _DELAYS * max((delay for _, delay in system.pasts), default=0.0) or _settling(free, loads, half_turn)
-    return Coefficients(noise, loads, steady, wall, half_turn, settling, system.pasts)
+    mixing = _DELAYS * max((delay for _, delay in system.pasts), default=0.0) or _mixing_time(free, loads, half_turn)
+    return Coefficients(noise, loads, steady, wall, half_turn, mixing, system.pasts)
 
 
 def _without_noise(system: System, terms: Sequence[CoefficientMatrix]) -> FloatArray:
@@ -368,7 +368,7 @@ def _exchanged(free: FloatArray, noise: Noise) -> float:
     return min(float(np.mean(densities)) / max(noise.spectral_density(0.0), 1e-300), 1.0)
 
 
-def _settling(free: FloatArray, loads: Sequence[Load], half_turn: float) -> float:
+def _mixing_time(free: FloatArray, loads: Sequence[Load], half_turn: float) -> float:
     """Six times that in which E‖x‖² forgets how the modes shared it; 0 in the plane without harmonic loads.
 
     It is that under white noises, Σ ½ I (B ⊗ 1 + 1 ⊗ B)² for pairs (I, B), on symmetric matrices: where the noise has a

@@ -68,7 +68,7 @@ _TINY = 1e-9
 _KEPT = 0.3
 """The share of effective paths that a long window of the direct estimator must leave."""
 _LEVELS = 12
-_SETTLING, _LONGER = 9, 2
+_BURN_IN, _LONGER = 9, 2
 """Slices in which a population finds its law, and times that modes have beyond the plane to share the motion."""
 
 
@@ -239,10 +239,10 @@ def _simulated(
     for name, sentence in obstacles(oscillator, noise, time=time, step=step).items():
         raise ValueError(f"{name}: {sentence}")
     known = coefficients(oscillator, noise)
-    h, settling = known.default_step if step is None else step, known.transient()
-    is_plane, is_direct = known.settling == 0, estimator == "direct"
-    length = settling if is_direct else known.transient(is_mixed=False)
-    time = (TRANSIENTS if is_plane else FEWER) * settling if time is None else time
+    h, transient = known.default_step if step is None else step, known.transient()
+    is_plane, is_direct = known.mixing_time == 0, estimator == "direct"
+    length = transient if is_direct else known.transient(is_mixed=False)
+    time = (TRANSIENTS if is_plane else FEWER) * transient if time is None else time
     wanted = max(2, round(time / length))
     plan = Plan(
         known=known,
@@ -252,7 +252,7 @@ def _simulated(
         estimator=estimator,
         paths=math.ceil(paths / BATCHES),
         slice_steps=known.together * round(length / (known.together * h)),
-        settling=max(1 if is_direct else _SETTLING, math.ceil(_LONGER * known.settling / length)),
+        burn_in=max(1 if is_direct else _BURN_IN, math.ceil(_LONGER * known.mixing_time / length)),
         wanted=wanted,
         levels=min(_LEVELS, wanted.bit_length()) if is_direct else 0,
     )
@@ -274,7 +274,7 @@ def _simulated(
     ]
     batches = [*plain, *chain.from_iterable(populations)]
     advances = [batch.advance for batch in batches]
-    interrupted = advance_all(advances, plan.settling + plan.wanted, plan.slice_seconds, progress, calls)
+    interrupted = advance_all(advances, plan.burn_in + plan.wanted, plan.slice_seconds, progress, calls)
     slices = np.array([batch.slices for batch in batches])
     if slices.min() < 2:
         raise KeyboardInterrupt

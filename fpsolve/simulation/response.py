@@ -188,14 +188,14 @@ def simulated_response(
     steps = max(1, round(math.pi / (rate * step * _LOOKS)))
     between = steps * step
     memory = max(1 / exponent, 2 * variance_rate / exponent**2)
-    settling, looks = math.ceil(5 * memory / between), math.ceil(max(time, 20 * memory) / between)
+    burn_in, looks = math.ceil(5 * memory / between), math.ceil(max(time, 20 * memory) / between)
     size = math.ceil(paths / BATCHES)
     amplitude = math.sqrt(exponent / _damping(system))
     rngs = [np.random.default_rng(each) for each in np.random.SeedSequence(seed, spawn_key=(1,)).spawn(BATCHES)]
     batches = [_Batch(motion, step, steps, starting_state(noise, size, rng, 2, amplitude), rng) for rng in rngs]
     seconds = STEP_SECONDS * size * steps
     advances = [batch.advance for batch in batches]
-    if advance_all(advances, settling, seconds, progress):
+    if advance_all(advances, burn_in, seconds, progress):
         raise KeyboardInterrupt
     reach = _MARGIN * max(float(np.max(np.hypot(*batch.y))) for batch in batches)
     for batch in batches:
