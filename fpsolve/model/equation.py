@@ -27,8 +27,7 @@ def equations_of(system: System) -> list[str]:
         letter, wave = f"ξ_{noise}" if named and noise else "ξ", g.f if isinstance(g, Function) else None
         name = letter if wave is None else wave.at(system.clock.nu) if isinstance(wave, Wave) else f"g({letter})"
         driven[name] = driven.get(name, 0.0) + matrix
-    cubic, past = np.array(system.cubic.matrix) if system.cubic else np.zeros((n, 4)), system.pasts
-    names = *system.states, *[""] * bool(system.forced), *(f"{system.states[k]}(t − {each:.10g})" for k, each in past)
+    cubic, names = np.array(system.cubic.matrix) if system.cubic else np.zeros((n, 4)), system.columns
 
     def rate(i: int, names: Sequence[str], speed: float = 1.0) -> str:
         """That of a variable, what is constant first: "−x + 0.001 ẋ − 0.2 x² ẋ + 0.1 ξ ẋ"; of x₂ over a speed."""

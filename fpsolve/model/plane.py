@@ -611,6 +611,11 @@ class System(Parametrised):
         return tuple(f"x{str(k + 1).translate(BELOW)}" for k in range(self.dimension))
 
     @property
+    def columns(self) -> Sequence[str]:
+        """What the columns of its terms multiply: its variables, 1 with no name where it is forced, what is past."""
+        return self.states
+
+    @property
     def driven_by(self) -> frozenset[str]:
         """The names that its terms give the noises that drive it."""
         return frozenset(term.noise for term in (self.forced or self).terms if is_driven(term.g))

@@ -34,6 +34,7 @@ from fpsolve.exponent import (
 )
 from fpsolve.fem import Generator
 from fpsolve.model import (
+    Bounded,
     CoefficientMatrix,
     Jump,
     MarkovChain,
@@ -344,10 +345,10 @@ def test_second_order_leaves_a_fourth_order_in_the_weakest_noise(p):
     np.testing.assert_allclose(found, found[1], rtol=0.01)
 
 
-def chained(**changed):
+def chained():
     """A filter y drives an oscillator, which drives z; kappa would let z drive y."""
     text = "y' = -a*y - 0.3*xi*y + kappa*z; x' = v; v' = -x - 2*zeta*v - xi*x + c*y; z' = -b*z + x"
-    return rates(text, White(s=0.6), **{"a": 0.5, "zeta": 0.1, "b": 1.0, "kappa": 0.0, "c": 0.5, **changed})
+    return rates(text, White(0.6), a=0.5, zeta=0.1, b=1.0, kappa=0.0, c=0.5)
 
 
 def turned_modes():
@@ -357,11 +358,13 @@ def turned_modes():
     return Problem(system, White(s=0.6))
 
 
+UNCLOCKED = "x' = v; v' = -x - 1.5*v - 0.3*cos(nu*t)*x - 0.1*xi*x; y' = w; w' = -y - 0.1*w - 0.3*xi*y"
 IMPULSES = Poisson(rate=0.8, sizes=(1.0, -0.6))
 SENSITIVE = {
     "impulses": (lambda: rates("x' = v; v' = -k*x - 0.4*v - c*xi*x", IMPULSES, k=1.3, c=0.8), 2.0),
     "modes that turn": (turned_modes, 1.0),
     "blocks": (chained, 1.0),
+    "a block without the clock": (lambda: rates(UNCLOCKED, Bounded(0.4, 2.0, 0.5), nu=1.3), 2.0),
     "two noises": (lambda: rates(BEAM.replace("0.1*v", "b*v"), [GAUSSIAN, Telegraph(a=0.2, k=0.7)], b=0.1), 2.0),
 }
 

@@ -284,6 +284,11 @@ class EquationSystem(System):
                 found |= names_in(text)
         return found
 
+    @property
+    def _in_walls(self) -> frozenset[str]:
+        """The names in restitutions."""
+        return frozenset[str]().union(*(names_in(str(wall.restitution)) for wall in self.walls))
+
     @classmethod
     def takes(cls, key: str, table: Table) -> bool:
         """Besides what is `stated`, keys of parameters, whose values these replace, as `--set` writes them."""
@@ -334,7 +339,7 @@ class EquationSystem(System):
     @property
     def remarks(self) -> Sequence[Message]:
         """Which parameters are in no rate and in no restitution."""
-        used = self._used.union(*(names_in(str(wall.restitution)) for wall in self.walls))
+        used = self._used | self._in_walls
         unused = tuple(f"{self.section}.{name}" for name, _ in self.named if name not in used)
         return [Message(Code.UNUSED, keys=unused)] if unused else []
 
@@ -346,6 +351,11 @@ class EquationSystem(System):
     def states(self) -> Sequence[str]:
         is_plane = len(self.variables) == 1 and not self.pasts
         return (*self.variables, f"{self.variables[0]}*") if is_plane else self.variables  # as `as_plane` has it
+
+    @property
+    def columns(self) -> Sequence[str]:
+        past = (f"{self.states[k]}(t − {delay:.10g})" for k, delay in self.pasts)
+        return *self.states, *[""] * bool(self.forced), *past
 
     @property
     def values(self) -> Mapping[str, float | str]:
@@ -364,10 +374,6 @@ class EquationSystem(System):
     @cached_property
     def _read(self) -> Read:
         return self._read_by("")
-
-    @property
-    def _rates(self) -> Sequence[Form]:
-        return self._read.rates
 
     def _read_by(self, by: str) -> Read:
         """The rates, with their derivatives by a parameter. Raises `TableError`."""
@@ -397,8 +403,7 @@ class EquationSystem(System):
 
     def _names(self, by: str) -> dict[str, Form]:
         """What parameters are in rates, where ε stands for itself."""
-        names = self._values(by)
-        return names | ({EPSILON: product(power=1)} if EPSILON in names else {})
+        return self._values(by) | {name: product(power=1) for name in self.values if name == EPSILON}
 
     def _of_time(self, read: Read, by: str, name: str, time: str, written: str) -> Form | None:
         """What x(t - tau) is, and cos(nu*t + phi) by waves of the frequency nu; both are noted; else None."""
@@ -495,19 +500,19 @@ class EquationSystem(System):
 
     @cached_property
     def terms(self) -> tuple[CoefficientMatrix, ...]:
-        return self._terms_of(self._rates, 0)
+        return self._terms_of(self._read.rates, 0)
 
     @cached_property
     def forced(self) -> System | None:
-        if not any(not states for form in self._rates for states, _, _ in form.parts):
+        if not any(not states for form in self._read.rates for states, _, _ in form.parts):
             return None
-        return LinearMotion(self._terms_of(self._rates, 0, [""]), (), self.epsilon, pasts=self.pasts)
+        return LinearMotion(self._terms_of(self._read.rates, 0, [""]), (), self.epsilon, pasts=self.pasts)
 
     @cached_property
     def cubic(self) -> CubicTerms | None:
         """The terms of degree 3; None where there are none, or all are 0."""
         matrix = np.zeros((2, HIGHEST_DEGREE + 1))
-        for i, form in enumerate(self._rates):
+        for i, form in enumerate(self._read.rates):
             for (states, _, power), series in form.parts.items():
                 if len(states) == HIGHEST_DEGREE:
                     matrix[i, states.count(self.variables[1])] += self.epsilon**power * series[0]
@@ -520,7 +525,7 @@ class EquationSystem(System):
             return ()
         place, _, _ = self._place()
         log_factor, leading = self._log_factor()[0], None
-        if EPSILON in names_in(str(self.walls[0].restitution)):
+        if EPSILON in self._in_walls:
             with suppress(TableError):  # no power series
                 zeroth, first, second = self._log_factor(EPSILON, 0.0)
                 leading = zeroth + first * self.epsilon + second * self.epsilon**2
@@ -554,7 +559,7 @@ class EquationSystem(System):
             must = must if len(names) == 2 else f'must be one variable, such as "{names[0]} = 0"; {_COMBINED}'
             raise TableError(f'got {shown(at)}; {must}; write, for example, at = "{names[0]} = 0"', "walls", 0, "at")
         i = names.index(variable := match[1])
-        parts = self._rates[i].parts
+        parts = self._read.rates[i].parts
         speed = sum(series[0] * self.epsilon**power for (_, _, power), series in parts.items())
         kinds = {(states, noise) for states, noise, _ in parts}
         other = next((name for name in names if name != variable and kinds == {((name,), "")}), "")
@@ -595,8 +600,7 @@ class EquationSystem(System):
     @cached_property
     def inert(self) -> Sequence[str]:
         """The parameters that are in no term of degree 1, but in others."""
-        in_walls = frozenset[str]().union(*(names_in(str(wall.restitution)) for wall in self.walls))
-        return tuple(name for name, _ in self.named if name in self._used - in_walls - self._read.linear)
+        return tuple(name for name, _ in self.named if name in self._used - self._in_walls - self._read.linear)
 
     @property
     def differentiable(self) -> Sequence[str]:
@@ -628,8 +632,8 @@ class EquationSystem(System):
 
         Such a parameter is found by Newton's method; it is NaN where it is not found.
         """
-        name, value, step = "".join(names_in(str(self.walls[0].restitution)) - {EPSILON}), 1.0, 0.0
-        known, slope = math.inf, 0.0
+        name = "".join(self._in_walls - {EPSILON})
+        value, known, step, slope = 1.0, math.inf, 0.0, 0.0
         with suppress(TableError):
             known, slope, _ = self._log_factor(name, value)
         if name in self._used or abs(known) > ROUNDED or not slope > 0:
