@@ -255,6 +255,11 @@ class Noise(Parametrised):
         """Whether this kind states a `step`."""
         return type(self).step is not Noise.step
 
+    @property
+    def takes_bias(self) -> bool:
+        """Whether a simulation may add σ²b to the drift and weigh paths: σ is constant, and exp(b ξ) has a mean."""
+        return self.may_tilt and type(self).squared_diffusion is Noise.squared_diffusion
+
     def motion(self, system: System, name: str | None = None) -> Motion:
         """How this noise moves a system whose terms call it so, with None whatever; by default along a path of ξ.
 

@@ -154,7 +154,7 @@ class Population(_Paths):
     with the b that T has where the oscillator does not turn, ln ‖x‖ growing by ε ξ, b = p ε/α₀.
 
     Attributes:
-        bias: b, which stays 0 where exp(b ξ) has no mean.
+        bias: b, which stays 0 where exp(b ξ) has no mean, or σ depends on ξ.
         found: the growth of ln Z in each slice after the burn-in, and how many paths of its beginning carry it, shape
             (2, slices).
     """
@@ -162,7 +162,7 @@ class Population(_Paths):
     def __init__(self, plan: Plan, seed: SeedSequence, p: float, *, is_far: bool) -> None:
         super().__init__(plan, seed)
         self.p, self.bias, self.found = p, 0.0, np.empty((2, plan.wanted))
-        self._is_biased = p != 0 and plan.known.noise.may_tilt
+        self._is_biased = p != 0 and plan.known.noise.takes_bias
         if is_far and self._is_biased:
             self.bias = p * plan.known.strength * plan.known.noise.relaxation_time
         self._motion = plan.known.motion(plan.step, self.bias)

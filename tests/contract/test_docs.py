@@ -113,6 +113,13 @@ def test_slope_by_the_size_of_a_noise_of_the_page_is_that_by_its_factor_in_the_e
     assert 0.8 * slopes["noise.a"].value == pytest.approx(slopes["system.k"].value, rel=1e-9)
 
 
+def test_population_of_the_noise_of_the_page_has_the_number_of_the_elements():
+    """Its σ depends on ξ, so that no bias of its drift is weighed."""
+    problem = typed(ROOT / "docs/guide/noises.md")[0]["problem"]
+    found = simulate(problem, [4.0], estimator="population", paths=4096, time=30.0, seed=1).estimates[0]
+    assert abs(found.value - moment_lyapunov(problem, 4.0).value) <= 3 * found.standard_error < 0.01
+
+
 def test_noise_and_system_of_the_page_on_contributing_are_what_those_that_ship_are():
     names, _ = typed(ROOT / "docs/contributing.md")
     own = Problem(names["Pendulum"](length=1.0, damping=0.1), names["Wind"](size=0.5**0.5, duration=1.0))
