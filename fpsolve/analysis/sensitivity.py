@@ -27,7 +27,7 @@ from fpsolve.arrays import FloatArray
 from fpsolve.data import Result, dataset
 from fpsolve.drawing import add_legend, draw_bars
 from fpsolve.errors import NoSuchExponent, NotConverged
-from fpsolve.exponent.changed import Changed
+from fpsolve.exponent.changed import Changed, scaled
 from fpsolve.exponent.eigen import PairDerivatives
 from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.method import NEAR_ZERO, Budget, checked_moments
@@ -197,10 +197,10 @@ def solve_sensitivities(
 
     def of_root() -> Slopes:
         index = nonzero_root(solver, guess=root)
-        return found.root(index.value) if index else {}
+        return found.root(index) if index else {}
 
     moments = tuple(tried(moment_at(each), partial(found.moment, each), each) for each in p.tolist())
-    solves = dict(zip(RECORDS, (found.lyapunov_exponent, of_root, found.variance_rate), strict=True))
+    solves: Any = dict(zip(RECORDS, (partial(found.ratio, 0.0), of_root, found.variance_rate), strict=True))
     slopes = {name: tried(RECORDS[name], solves[name]) for name in indices}
     values = problem.values
     noises: list[Any] = [*problem.sections.items()][1:]
@@ -228,58 +228,40 @@ class Gradient:
 
     def __init__(self, solver: ExponentSolver, along: Mapping[str, ParameterDerivative]) -> None:
         self._method, self._along = solver.method, along
-        self._known = dict[float, list[tuple[PairDerivatives, dict[str, Changed]]]]()
 
     def moment(self, p: float) -> Slopes:
         """∂Λ(p)/∂θ. Raises `NotConverged`, `NoSuchExponent`."""
         if p == 0:
             return dict.fromkeys(self._along, Estimate(0.0, 0.0, 0.0))
-        if known := self._method.preferred_even(p):
-            along = self._along
-            slopes = {key: known.slope(key) for key in along}
-            sizes = {key: known.scale / abs(by.theta) if by.theta else abs(slopes[key][0]) for key, by in along.items()}
-            return {key: Estimate(slopes[key][0], slopes[key][1], sizes[key]) for key in along}
-        coarse, fine = (around.pair.value for around, _ in self._around(p))
-        method, _ = self._method.held(p, self._along)
-        return self._compared(p, abs(fine - coarse) / method.scale(p), lambda _, changed: changed.value)
+        return {key: scaled(p, each) for key, each in self.ratio(p).items()}
 
-    def lyapunov_exponent(self) -> Slopes:
-        """∂λ/∂θ. Raises `NotConverged`, `NoSuchExponent`."""
-        method, _ = self._method.held(0.0, self._along)
-        share = method.ratio_alone(0.0)[1] / method.scales.linear
-        return self._compared(0.0, share, lambda _, changed: changed.slope)
+    def ratio(self, p: float) -> Slopes:
+        """∂/∂θ of Λ(p)/p, at p = 0 of λ. Raises `NotConverged`, `NoSuchExponent`."""
+        if known := self._method.preferred_even(p):
+            found = dict[str, Estimate]()
+            for key, by in self._along.items():
+                value, error = known.slope(key)
+                size = known.scale / abs(by.theta) if by.theta else abs(value)
+                found[key] = scaled(1 / p, Estimate(value, error, size))
+            return found
+        method, _ = self._method.held(p, self._along)
+        share = method.ratio_alone(p)[1] / (method.scales.linear + method.scales.quadratic * abs(p))
+        return self._compared(p, share, lambda _, changed: changed.ratio(p))
 
     def variance_rate(self) -> Slopes:
         """∂Λ″(0)/∂θ. Raises `NotConverged`, `NoSuchExponent`."""
         share = self._method.variance_rate().relative_error
         return self._compared(0.0, share, lambda _, changed: changed.curvature)
 
-    def root(self, p: float) -> Slopes:
-        """∂δ_p/∂θ, p being δ_p: that of Λ(p)/p, for small p from its derivatives at p = 0, over that by p.
+    def root(self, index: Estimate) -> Slopes:
+        """∂δ_p/∂θ: that of Λ(p)/p over that by p at δ_p, with twice the relative error of δ_p."""
+        p = index.value
 
-        With its own error each has twice the relative one of δ_p.
-        """
-        _, slope, error = self._method.ratio(p)
-        if abs(p) >= NEAR_ZERO:
-            found = self._compared(p, 0.0, lambda at, changed: _times(-1 / at.pair.derivative, changed.value))
-        else:
-            found = self._compared(0.0, 0.0, lambda at, changed: _times(-2 / at.second_derivative, _ratio(changed, p)))
-        share = 2 * error / (max(abs(p), NEAR_ZERO) * abs(slope))
-        return {
-            key: replace(each, error_estimate=each.error_estimate + share * abs(each.value))
-            for key, each in found.items()
-        }
+        def of(at: PairDerivatives, changed: Changed) -> Estimate:
+            rise = at.pair.derivative / p if at.pair.p else 0.5 * at.second_derivative
+            return scaled(-1 / rise, changed.ratio(p))
 
-    def _around(self, p: float) -> list[tuple[PairDerivatives, dict[str, Changed]]]:
-        """The pair at p, and one of a finer discretisation, with what changes along the directions."""
-        if p not in self._known:
-            method, along = self._method.held(p, self._along)
-            if p:
-                both = PairDerivatives(pair := method.pair(p)), PairDerivatives(method.finer_pair(pair))
-            else:
-                both = method.around_zero, method.finer_around_zero
-            self._known[p] = [(each, {key: Changed(each, by) for key, by in along.items()}) for each in both]
-        return self._known[p]
+        return self._compared(p, 2 * index.error_estimate / max(abs(p), NEAR_ZERO), of)
 
     def _compared(self, p: float, share: float, of: Callable[[PairDerivatives, Changed], Estimate]) -> Slopes:
         """Numbers of the finer one, their errors from how far both are apart.
@@ -287,20 +269,11 @@ class Gradient:
         That of one parameter may be small by chance, or fall slowly: twice as much counts, and of the scale of each the
         share that the error of what is derived has of its own scale, as both are of one pair.
         """
-        found = dict[str, Estimate]()
-        for key in self._along:
-            coarse, fine = (of(around, changed[key]) for around, changed in self._around(p))
+        method, along = self._method.held(p if abs(p) >= NEAR_ZERO else 0.0, self._along)
+        around, found = method.around(p), dict[str, Estimate]()
+        finer = PairDerivatives(method.finer_pair(around.pair)) if around.pair.p else method.finer_around_zero
+        for key, by in along.items():
+            coarse, fine = (of(each, Changed(each, by)) for each in (around, finer))
             apart = 2 * abs(fine.value - coarse.value) + share * fine.scale
             found[key] = replace(fine, error_estimate=fine.error_estimate + apart)
         return found
-
-
-def _ratio(changed: Changed, p: float) -> Estimate:
-    """∂/∂θ of Λ(p)/p for small p."""
-    slope, more = changed.slope, _times(0.5 * p, changed.curvature)
-    errors = slope.error_estimate + more.error_estimate
-    return Estimate(slope.value + more.value, errors, max(slope.scale, more.scale))
-
-
-def _times(factor: float, estimate: Estimate) -> Estimate:
-    return Estimate(factor * estimate.value, abs(factor) * estimate.error_estimate, abs(factor) * estimate.scale)

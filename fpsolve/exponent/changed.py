@@ -63,6 +63,14 @@ class Changed:
         )
         return _summed(parts, around.norm)
 
+    def ratio(self, p: float) -> Estimate:
+        """∂/∂θ of Λ(p)/p by the pair at p; for a small p, and of λ, by that at p = 0, without terms in p²."""
+        if self._pair.p or not p:
+            return scaled(1 / p, self.value) if p else self.slope
+        slope, more = self.slope, scaled(0.5 * p, self.curvature)
+        errors = slope.error_estimate + more.error_estimate + abs(p) * more.scale
+        return Estimate(slope.value + more.value, errors, max(slope.scale, more.scale))
+
     def image(self, v: FloatArray, k: int, change: float = 0.0) -> FloatArray:
         """(∂L⁽ᵏ⁾ − Λ⁽ᵏ⁾∂M − change M)v."""
         found = self._operator(k) @ v
@@ -81,3 +89,8 @@ def _summed(parts: Sequence[Any], norm: float) -> Estimate:
     """The sum of some parts over a norm, with about what rounding may change in it."""
     size = float(np.sum(np.abs(parts))) / norm
     return Estimate(float(np.sum(parts)) / norm, 1e3 * _EPS * size, size)
+
+
+def scaled(factor: float, estimate: Estimate) -> Estimate:
+    """A multiple of a number."""
+    return Estimate(factor * estimate.value, abs(factor) * estimate.error_estimate, abs(factor) * estimate.scale)

@@ -340,6 +340,10 @@ class Method:
         """That of a finer discretisation, for algebraic tails of a wider one. Raises as `around_zero`."""
         return PairDerivatives(self.finer_pair(self.around_zero.pair))
 
+    def around(self, p: float) -> PairDerivatives:
+        """The pair at p and its derivatives; for a small p those at p = 0. Raises as `around_zero`."""
+        return PairDerivatives(self.pair(p)) if abs(p) >= NEAR_ZERO else self.around_zero
+
     def variance_rate(self) -> Estimate:
         """Λ″(0), the asymptotic growth rate of the variance of ln ‖x‖.
 
@@ -360,12 +364,8 @@ class Method:
         """∂/∂θ of Λ(p)/p, at p = 0 of λ, by parameters. Raises `NotConverged`, `NoSuchExponent`."""
         if known := self.preferred_even(p):
             return np.asarray(known.gradient(keys) / p)
-        along = [self.problem.derivative(key) for key in keys]
-        if abs(p) >= NEAR_ZERO:
-            around = PairDerivatives(self.pair(p))
-            return np.array([Changed(around, by).value.value / p for by in along])
-        changed = [Changed(self.around_zero, by) for by in along]
-        return np.array([each.slope.value + (0.5 * p * each.curvature.value if p else 0.0) for each in changed])
+        around = self.around(p)
+        return np.array([Changed(around, self.problem.derivative(key)).ratio(p).value for key in keys])
 
     def held(self, p: float, along: Along) -> tuple[Method, Along]:
         """The part whose Λ(p), at p = 0 whose λ, is that of the problem, and directions for it.
