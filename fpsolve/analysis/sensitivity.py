@@ -55,6 +55,8 @@ RECORDS = {each.name: each for each in (LYAPUNOV_EXPONENT, STABILITY_INDEX, VARI
 """The quantities besides Λ(p) that have sensitivities, by their names: those that are no function of p."""
 MOST_BARS = 4
 """Largest number of p whose sensitivities are drawn."""
+NOTHING = Estimate(0.0, 0.0, 0.0)
+"""∂/∂θ where nothing changes."""
 Slopes = Mapping[str, Estimate]
 """∂/∂θ by the key of θ."""
 
@@ -232,19 +234,19 @@ class Gradient:
     def moment(self, p: float) -> Slopes:
         """∂Λ(p)/∂θ. Raises `NotConverged`, `NoSuchExponent`."""
         if p == 0:
-            return dict.fromkeys(self._along, Estimate(0.0, 0.0, 0.0))
+            return dict.fromkeys(self._along, NOTHING)
         return {key: scaled(p, each) for key, each in self.ratio(p).items()}
 
     def ratio(self, p: float) -> Slopes:
         """∂/∂θ of Λ(p)/p, at p = 0 of λ. Raises `NotConverged`, `NoSuchExponent`."""
-        if known := self._method.preferred_even(p):
-            found = dict[str, Estimate]()
-            for key, by in self._along.items():
+        method, along = self._method.held(p, self._along)
+        if known := method.preferred_even(p):
+            found = dict.fromkeys(self._along, NOTHING)
+            for key, by in along.items():
                 value, error = known.slope(key)
                 size = known.scale / abs(by.theta) if by.theta else abs(value)
                 found[key] = scaled(1 / p, Estimate(value, error, size))
             return found
-        method, _ = self._method.held(p, self._along)
         share = method.ratio_alone(p)[1] / (method.scales.linear + method.scales.quadratic * abs(p))
         return self._compared(p, share, lambda _, changed: changed.ratio(p))
 
@@ -270,7 +272,7 @@ class Gradient:
         share that the error of what is derived has of its own scale, as both are of one pair.
         """
         method, along = self._method.held(p if abs(p) >= NEAR_ZERO else 0.0, self._along)
-        around, found = method.around(p), dict[str, Estimate]()
+        around, found = method.around(p), dict.fromkeys(self._along, NOTHING)
         finer = PairDerivatives(method.finer_pair(around.pair)) if around.pair.p else method.finer_around_zero
         for key, by in along.items():
             coarse, fine = (of(each, Changed(each, by)) for each in (around, finer))

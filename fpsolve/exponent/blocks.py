@@ -10,7 +10,7 @@ E‖x‖^p of one of them grows as Λ_i(p). For p < 0 it depends on how the x_i 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import cached_property
 from typing import Any
 
@@ -33,7 +33,7 @@ from fpsolve.exponent.method import (
 from fpsolve.exponent.subsystem import blocks_of, couples
 from fpsolve.messages import Code, Message
 from fpsolve.model.coordinates import framed
-from fpsolve.model.problem import ParameterDerivative, Problem
+from fpsolve.model.problem import Problem
 
 
 class Blocks(Method):
@@ -154,22 +154,11 @@ class Blocks(Method):
         if not is_alone:
             raise NoSuchExponent(Message(Code.KINK, p=p or None))
         own = part.problem
-        known = {
-            key: own.derivative(key) if key in own.differentiable else ParameterDerivative(by.theta)
-            for key, by in along.items()
-        }
-        return part.held(p, known)
+        return part.held(p, {key: own.derivative(key) for key in along if key in own.differentiable})
 
     def closes(self, key: str) -> bool:
         section, _, name = key.rpartition(".")
         return section == self.problem.system.section and couples(blocks_of(self.problem), name)
-
-    def gradient(self, p: float, keys: Sequence[str]) -> FloatArray:
-        """That of the part, which other parameters do not change."""
-        part, _ = self.held(p, {key: self.problem.derivative(key) for key in keys})
-        own = [key for key in keys if key in part.problem.differentiable]
-        slopes = dict(zip(own, part.gradient(p, own).tolist(), strict=True))
-        return np.array([slopes.get(key, 0.0) for key in keys])
 
     def variance_rate(self) -> Estimate:
         part, is_alone = self.leading(0.0)

@@ -362,13 +362,17 @@ class Method:
 
     def gradient(self, p: float, keys: Sequence[str]) -> FloatArray:
         """∂/∂θ of Λ(p)/p, at p = 0 of λ, by parameters. Raises `NotConverged`, `NoSuchExponent`."""
-        if known := self.preferred_even(p):
-            return np.asarray(known.gradient(keys) / p)
-        around = self.around(p)
-        return np.array([Changed(around, self.problem.derivative(key)).ratio(p).value for key in keys])
+        part, along = self.held(p, {key: self.problem.derivative(key) for key in keys})
+        slopes = dict.fromkeys(keys, 0.0)
+        if known := part.preferred_even(p):
+            slopes |= {key: known.slope(key)[0] / p for key in along}
+        else:
+            around = part.around(p)
+            slopes |= {key: Changed(around, by).ratio(p).value for key, by in along.items()}
+        return np.array([*slopes.values()])
 
     def held(self, p: float, along: Along) -> tuple[Method, Along]:
-        """The part whose Λ(p), at p = 0 whose λ, is that of the problem, and directions for it.
+        """The part whose Λ(p), at p = 0 whose λ, is that of the problem, and those of some directions that change it.
 
         Raises:
             NoSuchExponent: Λ(p) is that of two parts, so that it has no derivatives by parameters.

@@ -270,10 +270,6 @@ class EvenMoment:
                 return slope / step, (abs(slope - coarse) + self.rounding + self.change + lacking) / step
         raise NoSuchExponent(f"got {key}; Λ(p) has no slope by it")
 
-    def gradient(self, keys: Sequence[str]) -> FloatArray:
-        """∂Λ(p)/∂θ of some parameters. Raises as `slope`."""
-        return np.array([self.slope(key)[0] for key in keys])
-
     def _with(self, problem: Problem) -> float:
         """⟨y, Hx⟩ of a problem next to it."""
         refuse_open_hierarchy(problem, self.equations.p)
