@@ -20,8 +20,6 @@ from fpsolve.roots import Missing, NoRoot, Value, increasing_root
 SEARCH_INTERVAL: tuple[float, float] = (-20.0, 20.0)
 OUTWARD = 4.0
 """The first p at most; others are at most twice as far out as the one before, as Λ(p) costs more there."""
-ROUGH = 0.1
-"""Error, over |Λ(p)|, at an end of the interval, where the sign alone counts."""
 PRECISE = 0.5
 """Of what rtol allows δ_p, for the error of the last Λ(p)/p."""
 
@@ -50,27 +48,24 @@ def nonzero_root(
     of_parts = method.index_of_parts(lambda part: nonzero_root(solver.of(part), interval), nowhere)
     if of_parts is not None:
         return of_parts
-    solved, outward = dict[float, tuple[float, float, float]](), {*ends}  # where the sign is wanted
+    solved = dict[float, tuple[float, float, float]]()
     cause: Any
 
     def at(p: float, tolerance: Tolerance | None = None) -> Value:
-        is_rough = p in outward and method.adapts and tolerance is None
-        with unless_over_budget(Missing(p)):
-            solved[p] = _rough_ratio(solver, p) if is_rough else _precise_ratio(solver, p, tolerance)
+        with unless_over_budget(None if p in solved else Missing(p)):  # what is known is enough
+            solved[p] = method.ratio(p, tolerance)
         ratio, slope, error = solved[p]
         if not slope > 0:
             raise NotConverged(Message(Code.NOT_INCREASING, p=p), remedy=method.refinement)
-        outward.update((-max(OUTWARD, 2 * abs(p)), max(OUTWARD, 2 * abs(p))))
         return Value(ratio, slope, 0.1 * error)
 
     signed: tuple[float, ...] = ()
     if guess is None:
-        ratio, slope, error = solver.method.ratio(0.0)
+        ratio, slope, error = method.ratio(0.0)
         if slope <= error and _is_linear(solver, low, high):
             return Absent(Message(Code.LINEAR, value=ratio if abs(ratio) > error else 0.0))
         guess = -ratio / slope if slope > 0 else math.copysign(1.0, -ratio)
         guess = min(max(guess, -OUTWARD), OUTWARD)
-        outward |= {-OUTWARD, OUTWARD}
         if abs(ratio) > 2 * error and low < 0 < high:
             (low, high), signed = (0.0, high) if ratio < 0 else (low, 0.0), (0.0,)
     try:
@@ -105,18 +100,3 @@ def _is_linear(solver: ExponentSolver, low: float, high: float) -> bool:
 def _index(p: float, ratio: float, slope: float, error: float) -> Estimate:
     """δ_p by Λ(p)/p next to it, its slope and error."""
     return Estimate(p, error / slope + abs(ratio / slope), scale=1.0, quantity=STABILITY_INDEX)
-
-
-def _rough_ratio(solver: ExponentSolver, p: float) -> tuple[float, float, float]:
-    """Λ(p)/p, its slope and error, which tell the sign; as `_precise_ratio` does where that is not enough."""
-    ratio, slope, error = solver.method.ratio(
-        p, lambda p, value: max(ROUGH * abs(value), solver.method.tolerance(p, value))
-    )
-    return (ratio, slope, error) if abs(ratio) > 2 * error and slope > 0 else _precise_ratio(solver, p, None)
-
-
-def _precise_ratio(solver: ExponentSolver, p: float, tolerance: Tolerance | None) -> tuple[float, float, float]:
-    """Λ(p)/p, its slope and error within a tolerance; within that of rtol where that of δ_p is out of reach."""
-    with unless_over_budget():
-        return solver.method.ratio(p, tolerance)
-    return solver.method.ratio(p)
