@@ -72,9 +72,6 @@ class Start:
         """The pair with its error by its highest modes."""
         return Solution(pair)
 
-    def is_enough(self, found: Solution) -> bool:
-        return True
-
     def doubled(self, failure: Exception | None) -> Start | None:
         """More functions along the axes that lack most, by the pair that a failed search has reached, if any."""
         pair: Any = getattr(failure, "partial", None)
