@@ -42,11 +42,9 @@ class Changed:
 
     @cached_property
     def slope(self) -> Estimate:
-        """∂Λ′/∂θ."""
+        """∂Λ′/∂θ at p = 0, where BT = 0."""
         around, x, y = self._around, self._pair.right, self._pair.left
         parts = [y @ self.image(x, 1), y @ self.image(around.by_p, 0, self.value.value)]
-        if self._pair.p:  # for p = 0 BT = 0
-            parts.append(around.adjoint_by_p @ self.image(x, 0, self.value.value))
         return _summed(parts, around.norm)
 
     @cached_property
