@@ -74,10 +74,9 @@ def with_points(trace: Trace, new: Sequence[Placed]) -> Trace:
     for place, point in new:
         k = int(np.argmin([np.linalg.norm(each.at - point.at) for _, each in placed]))
         if np.linalg.norm(placed[k][1].at - point.at) < EQUAL:
-            labels = [*placed[k][1].label.split("; "), *point.label.split("; ")]
-            label = "; ".join(dict.fromkeys(each for each in labels if each))
-            known = placed[k][1]
-            placed[k] = placed[k][0], (known if known.label else point)._replace(label=label)
+            at, known = placed[k]
+            labels = dict.fromkeys(filter(None, (*known.label.split("; "), point.label)))
+            placed[k] = at, (known if known.label else point)._replace(label="; ".join(labels))
         else:
             placed.append((place, point))
     return replace(trace, points=tuple(point for _, point in sorted(placed, key=lambda each: each[0])))

@@ -11,7 +11,7 @@ and the interval that holds Q with 95 % is that of a normal law.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
 from itertools import repeat
@@ -26,7 +26,7 @@ from fpsolve.analysis.sensitivity import RECORDS, Sensitivities, solve_sensitivi
 from fpsolve.arrays import FloatArray, is_whole, shown
 from fpsolve.data import Result, dataset
 from fpsolve.errors import NotConverged
-from fpsolve.exponent.error import Absent, Estimate
+from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.method import Budget, checked_moments
 from fpsolve.exponent.root import nonzero_root
 from fpsolve.exponent.solver import solver_of
@@ -238,15 +238,10 @@ def uncertainty(
     laws = laws_of(problem, uncertain)
     solver = solver_of(problem, rtol=rtol, budget=budget)
     points = checked_moments(p, solver.method, may_be_empty=True)
-    values: dict[str, Callable[[], Estimate | Absent]] = {
-        LYAPUNOV_EXPONENT.name: solver.lyapunov_exponent,
-        STABILITY_INDEX.name: partial(nonzero_root, solver),
-    }
-    values = values if solver.method.has_pairs else {}
-    found = {name: each for name, solve in values.items() if (each := solve())}
-    root = found.get(STABILITY_INDEX.name)
+    solves = {LYAPUNOV_EXPONENT.name: solver.lyapunov_exponent, STABILITY_INDEX.name: partial(nonzero_root, solver)}
+    found = {name: each for name, solve in solves.items() if solver.method.has_pairs and (each := solve())}
     along = {key: problem.derivative(key) for key in laws}
-    slopes = solve_sensitivities(solver, points, along, indices=[*found], root=None if root is None else root.value)
+    slopes = solve_sensitivities(solver, points, along, indices=[*found])
     solved = solver.moments(points)
     if solved.failures:
         raise NotConverged(solved.failures[0].reason)

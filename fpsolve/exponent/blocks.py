@@ -139,6 +139,9 @@ class Blocks(Method):
     def ratio_alone(self, p: float, tolerance: Tolerance | None = None) -> tuple[float, float]:
         return self.leading(p, tolerance)[0].ratio_alone(p, tolerance)
 
+    def ratio(self, p: float, tolerance: Tolerance | None = None) -> tuple[float, float, float]:
+        return self.leading(p, tolerance)[0].ratio(p, tolerance)
+
     def slope_error(self, p: float) -> float:
         part, is_alone = self.leading(p)
         return float(np.max([each.slope_error(p) for each in ([part] if is_alone else self.parts)]))

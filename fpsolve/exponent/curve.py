@@ -77,9 +77,11 @@ def values(curves: Sequence[Curve], p: FloatArray) -> Values:
     return Values(*found)
 
 
-def polynomials(solve: Solve, low: float, high: float, allowed: Callable[[float], float], most: int) -> list[Curve]:
-    """Λ by one polynomial, or by some on halves of the interval and of these; none where more are needed than most."""
-    rest, found = [(low, high)], list[Curve]()
+def polynomials(
+    solve: Solve, intervals: Sequence[tuple[float, float]], allowed: Callable[[float], float], most: int
+) -> list[Curve]:
+    """Λ by one polynomial on each interval, or by some on halves of these; none where more are needed than most."""
+    rest, found = [*reversed(intervals)], list[Curve]()
     while rest and len(found) + len(rest) <= most:
         start, end = rest.pop()
         if curve := polynomial(solve, start, end, allowed):

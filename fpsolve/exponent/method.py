@@ -314,9 +314,7 @@ class Method:
         """Λ(p)/p, its derivative in p, and the error of the first."""
         refuse(self.reason(0.0, "λ, or another number that follows from eigenfunctions,"))
         value, error = self.ratio_alone(p, tolerance)
-        if not p:
-            return value, 0.5 * self.around_zero.second_derivative, error
-        return value, (self.solution(p, tolerance).derivative - value) / p, error
+        return value, (self.solution(p, tolerance).derivative - value) / p if p else math.nan, error
 
     def slope_error(self, p: float) -> float:
         """Estimate of |error of Λ′(p)|; NaN where none is known. Raises `NotConverged`."""

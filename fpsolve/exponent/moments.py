@@ -206,6 +206,7 @@ class EvenMoment:
         change: by the last step, from `effects` where only the last functions move with the next ones, and from fewer
             functions, where that is beyond the errors of both: then `effects` are no errors.
         finer: how many times polynomials of the time were made finer, where there are delays.
+        derivative: Λ′(p), which leads to other degrees and is not known.
     """
 
     equations: Equations
@@ -219,6 +220,7 @@ class EvenMoment:
     polynomial: FloatArray
     change: float = 0.0
     finer: int = 0
+    derivative: float = math.nan
 
     def __repr__(self) -> str:
         return brief(self, f"Λ({self.equations.p}) = {self.value:.10g} ± {self.error:.0e}, {self.x.size} equations")
@@ -227,11 +229,6 @@ class EvenMoment:
     def value(self) -> float:
         """Λ(p), per unit time."""
         return self.eigenvalue + sum(self.effects)
-
-    @property
-    def derivative(self) -> float:
-        """Λ′(p) leads to other degrees and is not known."""
-        return math.nan
 
     @property
     def rounding(self) -> float:

@@ -7,7 +7,6 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import KW_ONLY, dataclass, field, replace
 from functools import cached_property, partial
-from itertools import pairwise
 from numbers import Real
 from typing import TYPE_CHECKING, Any
 
@@ -240,20 +239,18 @@ class ExponentSolver:
 
         Args:
             low, high: the interval; it falls in two where a saddle has a corner.
-            most: number of polynomials for each of these.
+            most: number of polynomials, and one more where it falls in two.
 
         Raises:
             NotConverged: there are none.
         """
-        ends, found = [low, high], list[Curve]()
+        intervals = [(low, high)]
         if low < -1 < high and not eigenvalues_at(self.problem, 0.0)[2]:
-            ends.insert(1, -1.0)
-        for start, end in pairwise(ends):
-            parts = polynomials(self._node, start, end, self._allowed, most) if self.method.is_function else []
-            if not parts:
-                raise NotConverged(Message(Code.NO_FUNCTION, low=low, high=high))
-            found += parts
-        return tuple(found)
+            intervals, most = [(low, -1.0), (-1.0, high)], most + 1
+        parts = polynomials(self._node, intervals, self._allowed, most) if self.method.is_function else []
+        if not parts:
+            raise NotConverged(Message(Code.NO_FUNCTION, low=low, high=high))
+        return tuple(parts)
 
     def _allowed(self, p: float) -> float:
         """The largest error of Λ(p)/p, and of λ."""
