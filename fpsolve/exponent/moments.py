@@ -408,7 +408,7 @@ class Equations:
         more = [count + NEXT for count in counts]
         axes, is_old = self._axes(more), self.are_old(counts)
         generator, masses = self.over_noise(more)
-        h, old, mean = self.rates(generator, masses), _outer(is_old), self.means(counts)
+        h, old, mean = self.rates(generator, masses), reduce(np.kron, is_old), self.means(counts)
         start = np.kron(mean, of_signs(self.dimension, self.p))
         bound, _ = self.moving.bounds(self.p, _sizes(masses))
         value, x, y, change, scale, finer = h.on(old).rightmost(start, bound)
@@ -418,10 +418,12 @@ class Equations:
         images = [each.reshape(old.size, -1) for each in (h @ whole[0].ravel(), h.T @ whole[1].ravel())]
         effects = []
         for k, (axis, count) in enumerate(zip(axes, counts, strict=True)):
-            new = _outer([~each if k == j else each for j, each in enumerate(is_old)])
+            new = reduce(np.kron, [~each if k == j else each for j, each in enumerate(is_old)])
             told = [0.0, 0.0]
             for last in (1, 2) if new.any() else ():
-                moved = _outer([axis.degrees >= count - last if k == j else each for j, each in enumerate(is_old)])
+                moved = reduce(
+                    np.kron, [axis.degrees >= count - last if k == j else each for j, each in enumerate(is_old)]
+                )
                 right, left = ((each * new[:, None])[moved].ravel() for each in images)
                 told[last - 1] = float(left @ h.on(moved).inverse(value, right.size)(right))
             effects.append(told[1])
@@ -447,7 +449,7 @@ class Equations:
 
     def means(self, counts: Sequence[int]) -> FloatArray:
         """The coefficients of 1 in functions of degrees below these, which are the means of these, too."""
-        return _outer([axis.unit for axis in self._axes(counts)])
+        return reduce(np.kron, [axis.unit for axis in self._axes(counts)])
 
     def over_noise(self, counts: Sequence[int]) -> tuple[Any, list[Any]]:
         """Gᵀ, and Ξᵀ of each load, with functions of degrees below these."""
@@ -459,18 +461,10 @@ class Equations:
             factors = [sparse.csr_array(of_noise.T) if k == at else each for k, each in enumerate(ones)]
             return sparse.csr_array(reduce(sparse.kron, factors))
 
-        generator = sum((over(axis.generator, k) for k, axis in enumerate(axes[1:], 1)), over(axes[0].generator, 0))
+        generator = sum(over(axis.generator, k) for k, axis in enumerate(axes))
         return generator, [over(axes[at].mass(g), at) for g, at in self._loads]
 
 
 def _sizes(masses: Sequence[Any]) -> list[float]:
     """What no Ξ exceeds."""
     return [math.sqrt(norm(xi, 1) * norm(xi, np.inf)) for xi in masses]
-
-
-def _outer(factors: Sequence[Any]) -> Any:
-    """The product of all combinations, in one row."""
-    found = np.ones(1, dtype=factors[0].dtype)
-    for each in factors:
-        found = np.multiply.outer(found, each).ravel()
-    return found
