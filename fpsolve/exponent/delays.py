@@ -129,7 +129,7 @@ class DelayRates:
         if self.is_still:
             size = self._even.shape[1]
             own = np.eye(size // len(self.generator))
-            return (sigma - 2 * self._slowest.real) * np.eye(size) - _kron(self.generator, own)
+            return (sigma - 2 * self._slowest.real) * np.eye(size) - np.kron(self.generator, own)
         return -self._even.T @ sum(self._terms(sigma)) @ self._even
 
     def sizes(self, sigma: float) -> FloatArray:
@@ -152,7 +152,7 @@ class DelayRates:
         """Symmetric matrices S(0), row by row, of their upper halves, for each function."""
         n = len(self.drift[0])
         one = np.eye(n * (n + 1) // 2)
-        return _kron(np.eye(len(self.generator)), moment_form(one, n, 2).reshape(len(one), -1).T)
+        return np.kron(np.eye(len(self.generator)), moment_form(one, n, 2).reshape(len(one), -1).T)
 
     @cached_property
     def _turned(self) -> IntArray:
@@ -163,13 +163,13 @@ class DelayRates:
     def _acting(self, one: FloatArray) -> Any:
         """What multiplies x(t − kτ), with functions of the noise and for all columns of a matrix, by k."""
         terms = [(np.eye(len(self.generator)), self.drift), *zip(self.masses, self.loads, strict=True)]
-        return np.array([sum(_kron(xi, _kron(by[k], one)) for xi, by in terms) for k in range(self._count + 1)])
+        return np.array([sum(np.kron(xi, np.kron(by[k], one)) for xi, by in terms) for k in range(self._count + 1)])
 
     def _terms(self, sigma: Any) -> list[Any]:
         """What −Z(σ) is the sum of, on all matrices S(0) for each function."""
         one = np.eye(len(self.drift[0]))
         fall = _exp(-0.5 * sigma * self.unit * np.arange(self._count + 1))[:, None, None]
-        moving, own = self._acting(one) * fall, _kron(self.generator, _kron(one, one))
+        moving, own = self._acting(one) * fall, np.kron(self.generator, np.kron(one, one))
         shift = sigma * np.eye(len(own))
         moving[0] -= 0.5 * shift
         later = self._later(moving, own)
@@ -179,7 +179,7 @@ class DelayRates:
             parts = square * fall
             reached = [k for k, each in enumerate(square) if each.any()]
             for k, j in combinations_with_replacement(reached, 2):
-                relaxed = _kron(expm(self.generator * self.unit * k), _kron(parts[k], parts[j]))
+                relaxed = np.kron(expm(self.generator * self.unit * k), np.kron(parts[k], parts[j]))
                 terms.append((1 if k == j else 2) * relaxed @ later[j - k])
         return terms
 
@@ -221,7 +221,7 @@ class DelayRates:
 
     def _relaxed(self, time: Any) -> Any:
         """What functions of the noise become, for all matrices, after a time, or several."""
-        return _kron(expm(np.multiply.outer(time, self.generator)), np.eye(self.drift[0].size))
+        return np.kron(expm(np.multiply.outer(time, self.generator)), np.eye(self.drift[0].size))
 
     @cached_property
     def _slowest(self) -> complex:
@@ -233,14 +233,14 @@ class DelayRates:
         moving, found = self._acting(np.eye(1)), 0j
         size, one, last = len(moving[0]), np.eye(len(self.drift[0])), self._last
         degree = FEWEST + last * float(np.linalg.norm(sum(map(np.abs, moving)), 2))
-        moving = moving @ _kron(expm(np.multiply.outer(self.unit * np.arange(len(moving)), self.generator)), one)
-        moving[0] += _kron(self.generator, one)
+        moving = moving @ np.kron(expm(np.multiply.outer(self.unit * np.arange(len(moving)), self.generator)), one)
+        moving[0] += np.kron(self.generator, one)
         while size * degree <= MOST_ROOTS:
             _, slopes, through = _polynomials(math.ceil(degree))
-            whole = _kron((2 / last) * slopes, np.eye(size))
+            whole = np.kron((2 / last) * slopes, np.eye(size))
             fall = _exp(-found.real * self.unit * np.arange(len(moving)))[:, None, None]
             at = chebval(1 - 2 * np.arange(len(moving)) / self._count, through).T
-            now = [_kron(row[None], each) for row, each in zip(at, fall * moving, strict=True)]
+            now = [np.kron(row[None], each) for row, each in zip(at, fall * moving, strict=True)]
             whole[-size:] = sum(now) - found.real * np.eye(size, whole.shape[1], k=len(whole) - size)
             roots = np.linalg.eigvals(whole) + found.real
             before, found = found, max(roots[abs(roots.imag) * last <= degree], key=lambda root: root.real)
@@ -313,12 +313,6 @@ class DelayRates:
             if change <= ROUNDED * size or not change < 0.5 * last:
                 return Eigenpair(sigma, x, y, max(change, ROUNDED * size), size, at.finer)
             at, last = finer, change
-
-
-def _kron(a: Any, b: Any) -> Any:
-    """a ⊗ b, also of several a."""
-    found = a[..., :, None, :, None] * b[:, None, :]
-    return np.reshape(found, (*a.shape[:-2], a.shape[-2] * len(b), -1))
 
 
 def _exp(of: Any) -> Any:

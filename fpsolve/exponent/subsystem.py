@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import cdf2rdf
 
 from fpsolve.arrays import ROUNDED, FloatArray
 from fpsolve.model.coordinates import framed
@@ -221,12 +222,7 @@ def hidden_blocks(matrices: Sequence[FloatArray]) -> tuple[FloatArray, list[tupl
     words = [*scaled, *(a @ b for a in scaled for b in scaled)]
     mixed = np.tensordot(np.random.default_rng(0).standard_normal(len(words)), words, 1)
     values, vectors = np.linalg.eig(mixed)
-    upper = values.imag >= 0
-    parts = [
-        [each.real, each.imag] if value.imag else [each.real]
-        for value, each in zip(values[upper], vectors.T[upper], strict=True)
-    ]
-    basis, sizes = np.column_stack([column for each in parts for column in each]), [len(each) for each in parts]
+    (_, basis), sizes = cdf2rdf(values, vectors), [1 + bool(each.imag) for each in values if each.imag >= 0]
     if not (condition := float(np.linalg.cond(basis))) < WORST_CONDITION:
         return np.eye(len(basis)), [(*range(len(basis)),)], 0.0
     least = ROUNDED * condition
