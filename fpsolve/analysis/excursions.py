@@ -337,12 +337,12 @@ def _extremes(pair: PrincipalPair, is_smooth: bool) -> FloatArray:
         rate = np.ones(shape)
     axes = [1, *(2 + k for k, axis in enumerate(space.noises) if axis.dimension)]  # along which T is continuous
     bent, wider = _between(values, axes), rate + _between(rate, axes)
-    own = _where_positive(values, rate, axes)
-    lowest, highest = (
-        _where_positive(values - bent, wider, axes).min(),
-        _where_positive(values + bent, wider, axes).max(),
-    )
-    return np.array([[own.min(), max(own.min() - lowest, 0.0)], [own.max(), max(highest - own.max(), 0.0)]])
+    found = []
+    for sign in (1, -1):
+        least = _where_positive(sign * values, rate, axes).min()
+        lowest = _where_positive(sign * values - bent, wider, axes).min()
+        found.append([sign * least, max(least - lowest, 0.0)])
+    return np.array(found)
 
 
 def _between(values: FloatArray, axes: Sequence[int]) -> FloatArray:

@@ -379,8 +379,9 @@ def oscillators(problem: Problem) -> dict[int, float]:
     """√(k/c) of each oscillator q̇ = cv, v̇ = −kq + …, by the place of q among the variables; pairs begin at 0 and 2."""
     system, (at, _) = problem.system, looked_at(problem)
     free = at.inside(mean_matrix(problem, system))
-    sizes = [system.epsilon**term.order * abs(at.inside(term.matrix)) for term in system.terms if is_driven(term.g)]
-    driven = sum(sizes, np.zeros_like(free))
+    driven = 0.0 * free
+    for term in system.terms:
+        driven += is_driven(term.g) * system.epsilon**term.order * abs(at.inside(term.matrix))
     found = {}
     for q in range(0, problem.dimension - 1, 2):
         is_rate = not np.any(np.delete(free[q], q + 1)) and not np.any(driven[q])

@@ -11,7 +11,6 @@ from fpsolve.arrays import FloatArray, real_array, real_numbers
 from fpsolve.data import Result, dataset
 from fpsolve.exponent.curve import Values, values
 from fpsolve.exponent.error import Absent, Estimate
-from fpsolve.exponent.kinds import choose
 from fpsolve.exponent.method import Budget, checked_moments
 from fpsolve.exponent.root import SEARCH_INTERVAL, nonzero_root
 from fpsolve.exponent.solver import (
@@ -75,11 +74,11 @@ class MomentLyapunovFunction(Result):
         budget: Budget | None = None,
         solver: ExponentSolver | None = None,
     ) -> None:
-        low, high = (float(end) for end in checked_moments(list(interval), choose(problem)))
+        self.solver = solver or solver_of(problem, mesh, rtol, budget)
+        low, high = (float(end) for end in checked_moments(list(interval), self.solver.method))
         if not low < high:
             raise ValueError(f"the interval of p is {interval}; its ends must increase")
         self.interval = low, high
-        self.solver = solver or solver_of(problem, mesh, rtol, budget)
         self._curves = self.solver.curves(low, high, MOST_PARTS)
         self.nodes = np.unique([p for curve in self._curves for p in curve.nodes])
         interpolated(self.solver, self._curves, self.nodes)  # refuses nodes that contradict each other

@@ -61,8 +61,8 @@ class MatrixRates(Rates):
 
     def _driven(self, given: Any) -> Any:
         """By noise."""
-        total = sum((_over(xi, _both(load @ given)) for load, xi in self.loads), 0.0 * given)
-        return total + sum((gain @ given @ gain.T for gain in self.gains), 0.0 * given)
+        of_loads = sum(_over(xi, _both(load @ given)) for load, xi in self.loads)
+        return 0.0 * given + of_loads + sum(gain @ given @ gain.T for gain in self.gains)
 
     @cached_property
     def T(self) -> MatrixRates:

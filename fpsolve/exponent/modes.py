@@ -27,7 +27,7 @@ from fpsolve.exponent.eigen import PrincipalPair, principal_pair
 from fpsolve.exponent.elements import Elements
 from fpsolve.exponent.error import Solution, mode_effects
 from fpsolve.exponent.method import RTOL_BEYOND_PLANE, SMALL_P, Stage, Tolerance
-from fpsolve.exponent.moments import EvenMoment, even_moment
+from fpsolve.exponent.moments import even_moment
 from fpsolve.exponent.powers import moment_form
 from fpsolve.exponent.starts import SHARE, Start
 from fpsolve.fem.directions import DirectionAxis, SphereAxis, group_dimensions
@@ -272,6 +272,7 @@ class Directions(Elements):
     by_moments = True
     usual_rtol = RTOL_BEYOND_PLANE
     remedy = Remedy.MANY
+    preferred_even = Elements.even
 
     def places(self, p: float, tolerance: Tolerance, found: Sequence[Solution]) -> Iterator[tuple[Stage, Any]]:
         """One: that of the nearest p; where it is p itself, a finer one than before."""
@@ -289,6 +290,3 @@ class Directions(Elements):
 
     def is_dear(self, p: float) -> bool:
         return p <= 0 or p % 2 != 0
-
-    def preferred_even(self, p: float) -> EvenMoment | None:
-        return self.even(p)

@@ -153,7 +153,7 @@ class Moving(NamedTuple):
         loads = [*zip(sizes, self.loads, strict=True)]
         most = 0.5 * p * float(np.linalg.eigvalsh(self.steady + self.steady.T)[-1])
         most += sum(each * size(load) for each, load in loads)
-        largest = p * float(np.max(sum((each * abs(load) for each, load in loads), abs(self.steady))))
+        largest = p * float(np.max(abs(self.steady) + sum(each * abs(load) for each, load in loads)))
         return most + driven, largest + driven
 
 
@@ -184,9 +184,8 @@ class PowerRates(Rates):
         """H from what `moves` gives, Gᵀ and the Ξᵀ of each load."""
         unit = moves[0].shape[0]
         factors = (sparse.eye_array(generator.shape[0]), *masses)
-        h = sparse.kron(generator, sparse.eye_array(unit))
-        h = h + sum(sparse.kron(xi, k) for xi, k in zip(factors, moves, strict=True))
-        return cls(h.tocsc(), unit)
+        driven = sum(sparse.kron(xi, k) for xi, k in zip(factors, moves, strict=True))
+        return cls((sparse.kron(generator, sparse.eye_array(unit)) + driven).tocsc(), unit)
 
     def __matmul__(self, x: FloatArray) -> FloatArray:
         return np.asarray(self.matrix @ x)
