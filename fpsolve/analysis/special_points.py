@@ -127,15 +127,11 @@ def _roots(
 
 
 def _meetings(one: FloatArray, other: FloatArray) -> Iterator[tuple[float, float]]:
-    """The places on both where pieces of two polylines cross, or hardly miss each other."""
-    start, way = one[:-1, None], np.diff(one, axis=0)[:, None]
-    gap, ways = other[:-1] - start, np.diff(other, axis=0)[None]
+    """The places on both where pieces of two polylines cross, or hardly miss each other; (u, v) as u + iv."""
+    (start, way), (begin, ways) = ((z[:-1], np.diff(z)) for z in (one @ (1, 1j), other @ (1, 1j)))
+    gap, way = begin - start[:, None], way[:, None]
     with np.errstate(divide="ignore", invalid="ignore"):
-        first, second = (_cross(gap, each) / _cross(way, ways) for each in (ways, way))
-    is_near = np.all([(share >= -BY_A_HAIR) & (share <= 1 + BY_A_HAIR) for share in (first, second)], axis=0)
-    for i, j in np.argwhere(is_near):
-        yield tuple((k + np.clip(share[i, j], 0, 1)) / PIECES for k, share in ((i, first), (j, second)))
-
-
-def _cross(one: FloatArray, other: FloatArray) -> FloatArray:
-    return np.asarray(one[..., 0] * other[..., 1] - one[..., 1] * other[..., 0])
+        shares = np.stack([np.imag(gap.conj() * each) / np.imag(way.conj() * ways) for each in (ways, way)])
+    for at in np.argwhere(np.all(np.abs(shares - 0.5) <= 0.5 + BY_A_HAIR, axis=0)):
+        first, second = (at + np.clip(shares[:, *at], 0, 1)) / PIECES
+        yield first, second

@@ -74,7 +74,7 @@ class EvenMoments(Method):
             return ()
         at, low = int(np.argmin(p)), float(p[value < -error].max(initial=0.0))
         high = float(p[value > error].min(initial=np.inf))
-        root = f"> {low:g}" * (low > 0) + " and " * (low > 0 and high < np.inf) + f"< {high:g}" * (high < np.inf)
+        root = " and ".join([f"> {low:g}"] * (low > 0) + [f"< {high:g}"] * (high < np.inf))
         bound = float(value[at] + error[at]) / float(p[at])
         return (Message(Code.CONVEX_BOUNDS, p=p[at], bound=bound, root=root or None),)
 
