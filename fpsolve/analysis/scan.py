@@ -95,7 +95,7 @@ class Scan:
             return BPoly.from_derivatives(self.nodes, np.stack([values, slopes], axis=1))(points)
 
         by_u, by_v = np.moveaxis(self.gradients, 2, 0)
-        order = min(2, self.nodes.size - 1)
+        order: Any = min(2, self.nodes.size - 1)
         twists = (np.gradient(each, self.nodes, axis=k, edge_order=order) for k, each in enumerate((by_v, by_u)))
         mixed = np.nan_to_num(0.5 * sum(twists))
         return np.asarray(along(along(self.values, by_u).T, along(by_v, mixed).T).T)

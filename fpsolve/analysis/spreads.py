@@ -238,7 +238,10 @@ def uncertainty(
     laws = laws_of(problem, uncertain)
     solver = solver_of(problem, rtol=rtol, budget=budget)
     points = checked_moments(p, solver.method, may_be_empty=True)
-    solves = {LYAPUNOV_EXPONENT.name: solver.lyapunov_exponent, STABILITY_INDEX.name: partial(nonzero_root, solver)}
+    solves: Any = {
+        LYAPUNOV_EXPONENT.name: solver.lyapunov_exponent,
+        STABILITY_INDEX.name: partial(nonzero_root, solver),
+    }
     found = {name: each for name, solve in solves.items() if solver.method.has_pairs and (each := solve())}
     along = {key: problem.derivative(key) for key in laws}
     slopes = solve_sensitivities(solver, points, along, indices=[*found])

@@ -94,7 +94,7 @@ class DelayMoments(EvenMoments):
         return p == 2
 
 
-class Simulated(EvenMoments):
+class NotComputed(EvenMoments):
     """No Λ(p) is computed: a wall for one of several variables, of which there are no elements."""
 
     code = Code.WALL_SIMULATED

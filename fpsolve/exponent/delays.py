@@ -148,7 +148,7 @@ class DelayRates:
         return self.unit * self._count
 
     @cached_property
-    def _even(self) -> FloatArray:
+    def _even(self) -> Any:
         """Symmetric matrices S(0), row by row, of their upper halves, for each function."""
         n = len(self.drift[0])
         one = np.eye(n * (n + 1) // 2)

@@ -38,7 +38,7 @@ from fpsolve.errors import MeshError, OutputError, SingularMatrix
 from fpsolve.exponent.eigen import PrincipalPair, principal_pair
 from fpsolve.exponent.kinds import choose
 from fpsolve.exponent.modes import inside_frame
-from fpsolve.exponent.stopped import looked_at
+from fpsolve.exponent.stopped import reading_coordinates
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.noise_axes import Samples
 from fpsolve.fem.space import Space
@@ -343,7 +343,7 @@ def _longitude_and_latitude(problem: Problem, count: int) -> DirectionGrid:
 
 def _share_and_phase(problem: Problem, count: int) -> DirectionGrid:
     """η and θ₁ − θ₂, at a stop θ₁, of four variables in two pairs."""
-    (read, is_half), own = looked_at(problem), oscillators(problem)
+    (read, is_half), own = reading_coordinates(problem), oscillators(problem)
     states = read.names(problem.system.states)
     one, two = (states[k] if k in own else f"({states[k]}, {states[k + 1]})" for k in (0, 2))
     words = f"angle whose squared sine is the share of {two}"
@@ -377,7 +377,7 @@ def direction_grid(problem: Problem, count: int) -> DirectionGrid:
 
 def oscillators(problem: Problem) -> dict[int, float]:
     """√(k/c) of each oscillator q̇ = cv, v̇ = −kq + …, by the place of q among the variables; pairs begin at 0 and 2."""
-    system, (at, _) = problem.system, looked_at(problem)
+    system, (at, _) = problem.system, reading_coordinates(problem)
     free = at.inside(mean_matrix(problem, system))
     driven = 0.0 * free
     for term in system.terms:
@@ -396,7 +396,7 @@ def direction_map(pair: PrincipalPair) -> FloatArray:
     scales = np.ones(problem.dimension)
     for q, size in oscillators(problem).items():
         scales[q + 1] = size
-    at, _ = looked_at(problem)
+    at, _ = reading_coordinates(problem)
     inside = inside_frame(problem, np.linalg.inv(np.array(at.coordinates)))
     return np.linalg.solve(pair.space.phi.coordinates, inside) * scales
 

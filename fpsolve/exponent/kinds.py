@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from fpsolve.exponent.blocks import Blocks
-from fpsolve.exponent.closed import DelayMoments, EvenMoments, Simulated, StruckMoments
+from fpsolve.exponent.closed import DelayMoments, EvenMoments, NotComputed, StruckMoments
 from fpsolve.exponent.elements import GivenMesh, PlaneElements
 from fpsolve.exponent.method import Method, Settings
 from fpsolve.exponent.modes import Directions
@@ -35,7 +35,7 @@ def kind_of(problem: Problem) -> type[Method]:
     is_in_plane, stop = problem.dimension <= 2, problem.system.stop
     impulses = problem.noise.motion(problem.system).impulses
     if stop and (problem.dimension != MOST_BY_DIRECTIONS or impulses):
-        return Simulated
+        return NotComputed
     if problem.system.pasts:
         return DelayMoments
     if problem.dimension > MOST_BY_DIRECTIONS:

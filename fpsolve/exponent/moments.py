@@ -36,7 +36,7 @@ from fpsolve.errors import NoHierarchy, NoSuchExponent
 from fpsolve.exponent.delays import DelayRates
 from fpsolve.exponent.matrices import MatrixRates
 from fpsolve.exponent.method import BUDGET, Budget, Search
-from fpsolve.exponent.powers import Moving, PowerRates, exponents, moment_form, moves, multinomials, of_signs
+from fpsolve.exponent.powers import Moving, PowerRates, moment_form, moves, multi_indices, multinomials, of_signs
 from fpsolve.exponent.rightmost import REMEDY, ROUNDING
 from fpsolve.fem.space import BASES
 from fpsolve.messages import Remedy
@@ -90,7 +90,7 @@ class Functions(NamedTuple):
     degrees: Any
     generator: FloatArray
     mass: Callable[[Coefficient], FloatArray]
-    unit: FloatArray
+    unit: Any
 
 
 @lru_cache(64)  # derivatives by parameters of the system have the same
@@ -290,7 +290,7 @@ class EvenMoment:
             return np.asarray(np.linalg.eigvalsh(moment_form(self.polynomial, n, 2)))
         x = np.random.default_rng(0).standard_normal((200, n))
         x /= np.linalg.norm(x, axis=1)[:, None]
-        alphas = exponents(n, p)
+        alphas = multi_indices(n, p)
         return np.prod(x[:, None] ** alphas, axis=2) @ (self.polynomial * np.sqrt(multinomials(alphas)))
 
 

@@ -24,7 +24,7 @@ from fpsolve.superlu import sparse_lu
 
 
 @lru_cache(maxsize=32)
-def exponents(n: int, p: int) -> IntArray:
+def multi_indices(n: int, p: int) -> IntArray:
     """All α, shape (N, n)."""
     return np.array([np.bincount(each, minlength=n) for each in combinations_with_replacement(range(n), p)])
 
@@ -32,15 +32,15 @@ def exponents(n: int, p: int) -> IntArray:
 @lru_cache(maxsize=32)
 def _lowering(n: int, p: int) -> Any:
     """∂/∂x_i of all functions for one x_i after the other, over √p in functions of order p − 1, sparse."""
-    alphas = exponents(n, p)
-    places = {tuple(each): k for k, each in enumerate(exponents(n, p - 1).tolist())}
+    alphas = multi_indices(n, p)
+    places = {tuple(each): k for k, each in enumerate(multi_indices(n, p - 1).tolist())}
     columns, i = np.nonzero(alphas)
     lower = [places[tuple(each)] for each in (alphas[columns] - np.eye(n, dtype=int)[i]).tolist()]
     rows = i * len(places) + lower
     return sparse.csc_array((np.sqrt(alphas[columns, i]), (rows, columns)), shape=(n * len(places), len(alphas)))
 
 
-def moved(matrix: FloatArray, p: int) -> Any:
+def symmetric_power(matrix: FloatArray, p: int) -> Any:
     """K(A), sparse: Σ A_ij times the transpose of ∂/∂x_i times ∂/∂x_j."""
     lower = _lowering(len(matrix), p)
     whole = lower.T @ sparse.kron(matrix, sparse.eye_array(lower.shape[0] // len(matrix))) @ lower
@@ -56,7 +56,7 @@ def multinomials(alphas: IntArray) -> FloatArray:
 
 def of_signs(n: int, p: int) -> FloatArray:
     """The moments of n independent signs, which are the coefficients of a positive polynomial, too."""
-    alphas = exponents(n, p)
+    alphas = multi_indices(n, p)
     is_even = np.all(alphas % 2 == 0, axis=1)
     found = np.zeros(len(alphas))
     found[is_even] = np.sqrt(multinomials(alphas[is_even]))
@@ -83,7 +83,7 @@ def moment_form(moments: FloatArray, n: int, p: int) -> FloatArray:
         form = np.zeros((*moments.shape[:-1], n, n))
         form[..., i, j] = form[..., j, i] = moments / sizes
         return form
-    alphas, halves = exponents(n, p), exponents(n, p // 2)
+    alphas, halves = multi_indices(n, p), multi_indices(n, p // 2)
     places = {tuple(each): k for k, each in enumerate(alphas.tolist())}
     at = np.array([[places[tuple(each)] for each in (half + halves).tolist()] for half in halves])
     sizes = np.sqrt(multinomials(halves))
@@ -159,12 +159,12 @@ class Moving(NamedTuple):
 
 def moves(moving: Moving, p: int) -> list[Any]:
     """K(A) with ½K(B)² and ν(exp K(C) − 1), and K(D) of each load."""
-    steady = moved(moving.steady, p)
-    for k in (moved(each, p) for each in moving.squares):
+    steady = symmetric_power(moving.steady, p)
+    for k in (symmetric_power(each, p) for each in moving.squares):
         steady = steady + 0.5 * k @ k
     for rate, exponent in moving.impulses:  # the dense exponential of SciPy lost four digits of some
-        steady = steady + rate * (expm(moved(exponent, p)) - sparse.eye_array(steady.shape[0]))
-    return [steady, *(moved(each, p) for each in moving.loads)]
+        steady = steady + rate * (expm(symmetric_power(exponent, p)) - sparse.eye_array(steady.shape[0]))
+    return [steady, *(symmetric_power(each, p) for each in moving.loads)]
 
 
 @dataclass(frozen=True, eq=False)

@@ -59,7 +59,7 @@ WORTH = 0.2
 """Share of the largest change from which on functions in another direction are made finer, too."""
 
 
-def looked_at(problem: Problem) -> tuple[Stop, bool]:
+def reading_coordinates(problem: Problem) -> tuple[Stop, bool]:
     """The coordinates in which variables are looked at, those of the stop, and whether the first one is never negative.
 
     Without a stop they are x itself.
@@ -92,7 +92,7 @@ class StopStart(DirectionStart):
 
     @staticmethod
     def directions(problem: Problem) -> HalfSphereAxis:
-        (at, _), system = looked_at(problem), problem.system
+        (at, _), system = reading_coordinates(problem), problem.system
         free, smooth = at.inside(mean_matrix(problem, system)), LinearMotion(system.terms, epsilon=system.epsilon)
         own = scipy.linalg.block_diag(_rotating(free[:2, :2]), _rotating(free[2:, 2:]))
         own = np.linalg.solve(np.array(at.coordinates), own)
