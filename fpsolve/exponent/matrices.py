@@ -10,7 +10,7 @@ of Lyapunov, one after the other, in the Schur forms of A and of Gᵀ. By this i
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -64,20 +64,21 @@ class MatrixRates(Rates):
         of_loads = sum(_over(xi, _both(load @ given)) for load, xi in self.loads)
         return 0.0 * given + of_loads + sum(gain @ given @ gain.T for gain in self.gains)
 
+    def _mapped(self, of_state: Callable[[Any], Any], of_noise: Callable[[Any], Any]) -> MatrixRates:
+        """That with a function of each matrix of the state, and one of each of the noise."""
+        loads = [(of_state(load), of_noise(xi)) for load, xi in self.loads]
+        return MatrixRates(of_state(self.steady), loads, [*map(of_state, self.gains)], of_noise(self.of_noise))
+
     @cached_property
     def T(self) -> MatrixRates:
-        loads = [(load.T, xi.T.tocsr()) for load, xi in self.loads]
-        return MatrixRates(self.steady.T, loads, [each.T for each in self.gains], self.of_noise.T.tocsr())
+        return self._mapped(np.transpose, lambda xi: xi.T.tocsr())
 
     def on(self, functions: Any) -> MatrixRates:
         at = np.flatnonzero(functions)
-        loads = [(load, xi[at][:, at]) for load, xi in self.loads]
-        return MatrixRates(self.steady, loads, self.gains, self.of_noise[at][:, at])
+        return self._mapped(np.asarray, lambda xi: xi[at][:, at])
 
     def sizes(self, x: FloatArray, y: FloatArray) -> float:
-        loads = [(abs(load), abs(xi)) for load, xi in self.loads]
-        absolute = MatrixRates(abs(self.steady), loads, [abs(each) for each in self.gains], abs(self.of_noise))
-        return float(np.abs(y) @ (absolute @ np.abs(x)))
+        return float(np.abs(y) @ (self._mapped(abs, abs) @ np.abs(x)))
 
     @cached_property
     def _schur(self) -> tuple[Any, Any, Any, Any]:
