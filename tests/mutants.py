@@ -95,8 +95,8 @@ DEFECTS: tuple[Defect, ...] = (
     Defect(
         "T6 noise does not relax between two delays",
         "exponent/delays.py",
-        "relaxed = _kron(expm(self.generator * self.unit * k), _kron",
-        "relaxed = _kron(np.eye(len(self.generator)), _kron",
+        "relaxed = np.kron(expm(self.generator * self.unit * k), np.kron",
+        "relaxed = np.kron(np.eye(len(self.generator)), np.kron",
         "delay",
     ),
     Defect(
