@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from enum import Enum, StrEnum, unique
 from functools import partial
 from string import Formatter
@@ -449,7 +448,7 @@ class Message(str):
     @property
     def kind(self) -> tuple[Any, ...]:
         """What it has in common with messages that differ in numbers only."""
-        return self.code, *((key, _changed(value, _WITHOUT_NUMBERS)) for key, value in self.data.items())
+        return self.code, *((key, _without_numbers(value)) for key, value in self.data.items())
 
     @property
     def size(self) -> float | None:
@@ -474,14 +473,26 @@ class Message(str):
         others = {key: value for key, value in self.data.items() if key != "remedy"}
         return Message(self.code, **others, **({"remedy": remedy} if remedy else {}))
 
+    @classmethod
+    def __get_pydantic_core_schema__(cls, *_: Any) -> Any:
+        """What pydantic writes of a message, and makes it of again."""
+        from pydantic_core import core_schema
+
+        return core_schema.no_info_plain_validator_function(
+            Message.from_data, serialization=core_schema.plain_serializer_function_ser_schema(Message.to_data)
+        )
+
     def to_data(self) -> dict[str, Any]:
-        """What strict JSON can hold, from which `from_data` makes it again."""
-        return {"code": self.code.name, "data": {key: _changed(value, _PLAIN) for key, value in self.data.items()}}
+        """What JSON can hold, from which `from_data` makes it again."""
+        return {"code": self.code.name, "data": {key: _plain(value) for key, value in self.data.items()}}
 
     @classmethod
     def from_data(cls, data: Mapping[str, Any]) -> Message:
-        """The inverse of `to_data`. Raises `KeyError` or `TypeError` where it is none."""
-        return cls(Code[data["code"]], **{key: _changed(value, _FROM_PLAIN) for key, value in data["data"].items()})
+        """The inverse of `to_data`. Raises `ValueError` where it is none."""
+        try:
+            return cls(Code[data["code"]], **{key: _made(value) for key, value in data["data"].items()})
+        except (KeyError, TypeError) as failure:
+            raise ValueError(f"this is no message: {failure!r}") from failure
 
 
 def message_of(text: str) -> Message:
@@ -541,28 +552,29 @@ def _python(value: Any) -> Any:
     return tuple(map(_python, value)) if isinstance(value, list | tuple) else value
 
 
-def _special(stated: Mapping[str, str]) -> Remedy | float:
-    return float(stated["number"]) if "number" in stated else Remedy[stated["remedy"]]
+def _without_numbers(value: Any) -> Any:
+    """A datum of which numbers do not count, nor how many like ones there are."""
+    if type(value) is Message:
+        return value.kind
+    if type(value) is tuple:
+        return tuple(dict.fromkeys(map(_without_numbers, value)))
+    return "#" if type(value) in (int, float) else value
 
 
-def _changed(value: Any, by_type: Mapping[type, Callable[[Any], Any]]) -> Any:
-    """What a table by types makes of a datum; others stay."""
-    return by_type[type(value)](value) if type(value) in by_type else value
+def _plain(value: Any) -> Any:
+    """A datum as JSON can hold it."""
+    if type(value) is Message:
+        return value.to_data()
+    return [*map(_plain, value)] if type(value) is tuple else value
 
 
-_WITHOUT_NUMBERS: Mapping[type, Callable[[Any], Any]] = {
-    Message: lambda message: message.kind,
-    tuple: lambda values: tuple(dict.fromkeys(_changed(each, _WITHOUT_NUMBERS) for each in values)),
-    int: lambda _: "#",
-    float: lambda _: "#",
-}
-_PLAIN: Mapping[type, Callable[[Any], Any]] = {
-    Message: Message.to_data,
-    Remedy: lambda remedy: {"remedy": remedy.name},
-    tuple: lambda values: [_changed(each, _PLAIN) for each in values],
-    float: lambda number: number if math.isfinite(number) else {"number": str(number)},
-}
-_FROM_PLAIN: Mapping[type, Callable[[Any], Any]] = {
-    list: lambda values: tuple(_changed(each, _FROM_PLAIN) for each in values),
-    dict: lambda stated: Message.from_data(stated) if "code" in stated else _special(stated),
-}
+def _made(value: Any) -> Any:
+    """The datum of what `_plain` gave; the text of a remedy is one."""
+    if type(value) is dict:
+        return Message.from_data(value)
+    if type(value) is list:
+        return tuple(map(_made, value))
+    return Remedy(value) if value in _REMEDIES else value
+
+
+_REMEDIES = {*Remedy}

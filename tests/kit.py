@@ -18,6 +18,7 @@ from fpsolve.case import Case
 from fpsolve.cli import main
 from fpsolve.model import CoefficientMatrix, LinearSystem, Noise, System
 from fpsolve.output.known import names_of, read_into, record_of
+from fpsolve.output.records import packed, unpacked
 from fpsolve.parts.question import Job, Numerics
 from fpsolve.results import CurveResult, SimulatedCurve
 from fpsolve.study.solve import everything, result_of, solve_curve
@@ -164,7 +165,8 @@ def simulate_curves(case: Case) -> list[SimulatedCurve]:
 def from_record(case: Case, solved: Any) -> CurveResult:
     """A solved set as it comes back from its record."""
     asked, numerics = everything(case), Numerics.of(case)
-    record, job = json.loads(json.dumps(solved.record)), Job(solved.result.curve, asked, numerics)
+    record = json.loads(json.dumps(solved.record, default=packed), object_hook=unpacked)
+    job = Job(solved.result.curve, asked, numerics)
     return result_of(read_into(job, record, names_of(asked, numerics), is_all=True))
 
 

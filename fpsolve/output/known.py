@@ -27,12 +27,21 @@ ROW, LARGEST = "row", "largest"
 """What the entries of Λ(p) are called, before their p; or before this of what the largest p was solved on."""
 
 
+_ROW = tuple[tuple[float, ...], Limit | None]
+"""The form of Λ(p) in a record, see `Job.rows`, and of the budget in which it was found."""
+
+
+def _entry(name: str) -> Any:
+    """The form of an `Entry` in a record."""
+    return tuple[BY_NAME[name].kind | None, Reason | None, float, Limit | None]
+
+
 def names_of(asked: Asked, numerics: Numerics) -> dict[str, str]:
     """What the entries of a set are called in its records: by a digest of all that their numbers follow from.
 
     A budget is none of this: a number is the same under any.
     """
-    solver = numerics.rtol, plain(numerics.mesh)
+    solver = numerics.rtol, numerics.mesh and vars(numerics.mesh)
     of_row = {name: each for name, each in asked[MOMENTS.name].items() if name != "p"}
     names = {name: key_of(each, *solver) for name, each in asked.items()}
     return {name: f"{name}-{key[:16]}" for name, key in (names | {ROW: key_of(of_row, *solver)}).items()}
@@ -41,30 +50,28 @@ def names_of(asked: Asked, numerics: Numerics) -> dict[str, str]:
 def record_of(job: Job) -> Entries:
     """The entries of what was solved now of a set, and of each p."""
     names = names_of(job.asked, job.numerics)
-    record = {names[name]: plain((each.found, each.reason, each.seconds, each.limit)) for name, each in job.new.items()}
+    record = {names[name]: plain(_entry(name), tuple(vars(each).values())) for name, each in job.new.items()}
     if MOMENTS.name in job.new or MOMENTS.name not in job.entries:
         limit = job.new[MOMENTS.name].limit if MOMENTS.name in job.new else job.numerics.limit
         known = ((p, job.rows[p]) for p in job.asked[MOMENTS.name]["p"] if p in job.rows)
-        record |= {f"{names[ROW]} {p!r}": plain((row, limit)) for p, row in known}
+        record |= {f"{names[ROW]} {p!r}": plain(_ROW, (row, limit)) for p, row in known}
     if record and "solver" in vars(job) and DISCRETISATION.name not in job.entries and (largest := largest_of(job)):
-        record[f"{names[ROW]} {LARGEST}"] = plain(largest)
+        record[f"{names[ROW]} {LARGEST}"] = plain(Largest, largest)
     return record
 
 
 def read_into(job: Job, record: Entries, names: Mapping[str, str], *, is_all: bool = False) -> Job:
     """Give a job what its record has of what is asked: what is settled, or all; what cannot be read is not there."""
     for name in job.asked:
-        with suppress(ValueError, KeyError, TypeError):
-            found, reason, seconds, limit = record[names[name]]
-            own = made(BY_NAME[name].kind | None, found), made(Reason | None, reason), float(seconds)
-            entry = Entry(*own, made(Limit | None, limit))
+        with suppress(ValueError, KeyError):
+            entry = Entry(*made(_entry(name), record[names[name]]))
             if is_all or job.numerics.settles(entry.limit):
                 job.entries[name] = entry
     with suppress(ValueError, KeyError):
         job.largest = made(Largest, record[f"{names[ROW]} {LARGEST}"])
     for p in job.asked[MOMENTS.name]["p"]:
         with suppress(ValueError, KeyError):
-            row, limit = made(tuple[tuple[float, ...], Limit | None], record[f"{names[ROW]} {p!r}"])
+            row, limit = made(_ROW, record[f"{names[ROW]} {p!r}"])
             if is_all or job.numerics.settles(limit):
                 job.rows[p] = row
     return job

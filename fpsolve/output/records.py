@@ -3,37 +3,32 @@
 A record is a line of JSON with a key and some entries, and it is with the system before work goes on; a line that is
 torn, or damaged, is none. The records of a key add up, and of each name the last entry counts.
 
-How a value becomes plain data, and comes back to the last bit, follows from the annotation of its attribute: a
-dataclass is a list of its attributes, an array a compressed text; nan and inf, which JSON has not, are texts.
+How a value becomes plain data, and comes back to the last bit, follows from its annotation, by pydantic. An array is a
+compressed text; nan and inf, which JSON has not, are words as Python writes them.
 """
 
 from __future__ import annotations
 
 import json
-import math
 import os
 import zlib
 from base64 import b64decode, b64encode
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
-from dataclasses import fields, is_dataclass
 from errno import ENOSPC
 from functools import cache
 from hashlib import sha256
 from itertools import tee
 from pathlib import Path
-from types import NoneType, UnionType
-from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
+from typing import Any, TypeVar
 
 import numpy as np
+from pydantic import ConfigDict, TypeAdapter
 
 from fpsolve import __version__
 from fpsolve.arrays import FloatArray
-from fpsolve.messages import Message
 from fpsolve.pool import Pool
 
-_OF_ANOTHER_FORM = LookupError, TypeError, AttributeError, ValueError, ArithmeticError, RecursionError, zlib.error
-"""What is raised where data have another form than what is made of them."""
 Entries = dict[str, Any]
 Item = TypeVar("Item")
 Found = TypeVar("Found")
@@ -73,7 +68,7 @@ class Records:
                 for start in self._starts[key]:
                     file.seek(start)
                     if found := _parsed(file.readline()):
-                        entries |= json.loads(found[1])
+                        entries |= json.loads(found[1], object_hook=unpacked)
         return entries
 
     def put(self, key: str, entries: Mapping[str, Any]) -> None:
@@ -82,7 +77,7 @@ class Records:
         Raises:
             OSError: they cannot be written; nothing is left of them.
         """
-        content = json.dumps(entries, ensure_ascii=False).encode()
+        content = json.dumps(entries, ensure_ascii=False, default=packed).encode()
         line = b'{"key": "%s", "crc32": %d, "record": %s}\n' % (key.encode(), zlib.crc32(content), content)
         self.path.parent.mkdir(parents=True, exist_ok=True)
         with self.path.open("ab", buffering=0) as file:
@@ -151,73 +146,36 @@ def answered(
 
 def key_of(*content: Any) -> str:
     """The key of what follows from some content, which JSON can hold, as this version of fpsolve finds it."""
-    return sha256(json.dumps([__version__, *content], sort_keys=True).encode()).hexdigest()[:32]
+    return sha256(json.dumps([__version__, *content], sort_keys=True, default=packed).encode()).hexdigest()[:32]
 
 
-def plain(value: Any) -> Any:
-    """What JSON can hold of a value."""
-    if isinstance(value, Message):
-        return value.to_data()
-    if names := _names(value.__class__):
-        return [plain(getattr(value, name)) for name in names]
-    if isinstance(value, np.ndarray):
-        return _packed(value)
-    if isinstance(value, Mapping):
-        return {key: plain(each) for key, each in value.items()}
-    if isinstance(value, tuple | list):
-        return [plain(each) for each in value]
-    value = value.item() if isinstance(value, np.generic) else value
-    return str(value) if isinstance(value, float) and not math.isfinite(value) else value
+def plain(kind: Any, value: Any) -> Any:
+    """A value with an annotation as data that a record can hold."""
+    return _form(kind).dump_python(value, warnings=False)
 
 
 def made(kind: Any, data: Any) -> Any:
     """The value with an annotation of what `plain` gave. Raises `ValueError` where that has another form."""
-    try:
-        return maker(kind)(data)
-    except _OF_ANOTHER_FORM as failure:
-        raise ValueError(f"this is no record of {kind}: {failure!r}") from failure
+    return _form(kind).validate_python(data)
 
 
 @cache
-def maker(kind: Any) -> Callable[[Any], Any]:
-    """Makes the values that have an annotation of what `plain` gave; raises one of `_OF_ANOTHER_FORM` elsewhere."""
-    origin, parts = get_origin(kind), get_args(kind)
-    if kind is Message:
-        return Message.from_data
-    if names := _names(kind):
-        hints = get_type_hints(kind)
-        each = [maker(hints[name]) for name in names]
-        return lambda data: kind(*(make(part) for make, part in zip(each, data, strict=True)))
-    if origin is get_origin(FloatArray):  # np.ndarray, or NDArray itself since NumPy 2.5
-        return _unpacked
-    if origin is Literal:
-        return lambda data: parts[parts.index(data)]
-    if origin is UnionType and NoneType in parts:
-        [own] = [maker(part) for part in parts if part is not NoneType]
-        return lambda data: None if data is None else own(data)
-    if origin is tuple and parts[1:] == (...,):
-        one = maker(parts[0])
-        return lambda data: tuple(map(one, data))
-    if origin is tuple:
-        each = [*map(maker, parts)]
-        return lambda data: tuple(make(part) for make, part in zip(each, data, strict=True))
-    if origin in (dict, Mapping):
-        entry = maker(parts[1])
-        return lambda data: {key: entry(value) for key, value in data.items()}
-    return kind if kind in (str, bool, int, float) else lambda data: data
+def _form(kind: Any) -> TypeAdapter[Any]:
+    """What writes and reads the values with an annotation that is no class by itself, such as `Estimate | None`."""
+    return TypeAdapter(kind, config=ConfigDict(arbitrary_types_allowed=True, extra="forbid"))
 
 
-@cache
-def _names(kind: Any) -> Sequence[str]:
-    """The attributes of a dataclass, or of a named tuple; none of what is neither."""
-    return [each.name for each in fields(kind)] if is_dataclass(kind) else getattr(kind, "_fields", ())
+def packed(array: FloatArray) -> Entries | float:
+    """An array as JSON can hold it, to the last bit; a number of numpy as one of Python."""
+    if not array.shape:
+        return array.item()
+    data = np.ascontiguousarray(array, dtype="<f8").tobytes()
+    return {"shape": list(array.shape), "data": b64encode(zlib.compress(data)).decode("ascii")}
 
 
-def _packed(value: FloatArray) -> Entries:
-    data = np.ascontiguousarray(value, dtype="<f8").tobytes()
-    return {"shape": list(value.shape), "data": b64encode(zlib.compress(data)).decode("ascii")}
-
-
-def _unpacked(packed: Any) -> FloatArray:
-    data = zlib.decompress(b64decode(packed["data"]))
-    return np.frombuffer(data, dtype="<f8").reshape(packed["shape"]).astype(float)
+def unpacked(found: Entries) -> Entries | FloatArray:
+    """An array of what `packed` gave; another table as it is."""
+    if found.keys() != {"shape", "data"}:
+        return found
+    data = zlib.decompress(b64decode(found["data"]))
+    return np.frombuffer(data, dtype="<f8").reshape(found["shape"]).astype(float)

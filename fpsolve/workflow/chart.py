@@ -247,9 +247,9 @@ class Points:
     def keep(self, rtol: float, at: FloatArray, found: Sample | Message) -> None:
         """Record it, but for what may not fail again."""
         if isinstance(found, Sample):
-            self.put({_point(rtol, at): plain((found, None))})
+            self.put({_point(rtol, at): plain(POINT, (found, None))})
         elif not found.tells_of(Code.NO_MEMORY) and found.code is not Code.LINE_SPENT and not is_of_line(found):
-            self.put({_point(rtol, at): plain((None, found))})
+            self.put({_point(rtol, at): plain(POINT, (None, found))})
 
     def put(self, entries: Mapping[str, Any]) -> None:
         """Record what was solved."""

@@ -125,15 +125,19 @@ def simulate_curve(
 
 def simulated_of(record: Mapping[str, Any], curve: Curve) -> SimulatedCurve:
     """The simulation of a curve from its record. Raises `ValueError` where that has another form."""
-    from fpsolve.simulation import MonteCarlo, Response
-
-    kind = tuple[MonteCarlo, Response | None, tuple[Message, ...]]
-    return SimulatedCurve(curve, *made(kind, record.get("simulation")))
+    return SimulatedCurve(curve, *made(_form(), record.get("simulation")))
 
 
 def record_of(found: SimulatedCurve) -> dict[str, Any]:
     """The record of a simulation; nothing of one that is not finished."""
-    return {} if found.interrupted else {"simulation": plain((found.result, found.response, found.warnings))}
+    return {} if found.interrupted else {"simulation": plain(_form(), (found.result, found.response, found.warnings))}
+
+
+def _form() -> Any:
+    """The form of a simulation in its record."""
+    from fpsolve.simulation import MonteCarlo, Response
+
+    return tuple[MonteCarlo, Response | None, tuple[Message, ...]]
 
 
 def simulation_key(curve: Curve, orders: Sequence[float], setting: MonteCarloSection) -> str:
