@@ -7,7 +7,8 @@ value of a key.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -19,6 +20,7 @@ from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case, Curve
 from fpsolve.case.sections import MOST_NAMED, Value, Varied, same
 from fpsolve.case.vary import legend, map_key
+from fpsolve.data import Quantity
 from fpsolve.drawing import (
     COLOURS,
     FORMATS,
@@ -50,8 +52,6 @@ from fpsolve.theory.perturbation import perturbed_moments
 
 MOST_VECTORS = 1000
 """Curves up to which a PDF holds each as a line, not all as a picture."""
-MOST_TALL = 50
-"""Curves up to which the ticks of stability indices are tall; more of them would cover what is near zero."""
 _MARKERS = "osD^v<"  # one fewer than colours, so that both repeat together after 42 curves only
 _TANGENT = 0.2
 """Length of a tangent, as a share of the width of the axes."""
@@ -98,42 +98,38 @@ class Encoding:
     Attributes:
         key: the one whose value a colour tells; None where it tells the number of the curve.
         colours: that value, or the number, of each curve.
-        styles: for each curve what its line style tells; the same everywhere where it tells nothing.
-        unencoded: the other keys, each with how many values it has.
+        kinds: for each curve what its line style tells; the same everywhere where it tells nothing.
+        untold: the other keys, each with how many values it has.
     """
 
     key: str | None
     colours: FloatArray
-    styles: tuple[tuple[tuple[str, Value], ...], ...]
-    unencoded: tuple[tuple[str, int], ...]
+    kinds: Sequence[Varied]
+    untold: Mapping[str, int]
 
     @classmethod
     def of(cls, varied: Sequence[Varied]) -> Encoding:
         """Of the parameters of some curves: a colour for the key with the most values, line styles for a few sets."""
-        numbers, texts = _several(varied)
-
-        def of_keys(*keys: str) -> tuple[tuple[tuple[str, Value], ...], ...]:
-            return tuple(tuple((key, each[key]) for key in keys) for each in varied)
-
-        sets = len(set(of_keys(*numbers)))
-        key = max(numbers, key=lambda name: numbers[name], default=None)
-        if key is None or (numbers[key] < sets and np.prod([*numbers.values()]) != sets):
-            # none varies, or values side by side, none of which tells the curve
-            return cls(None, np.arange(1.0, len(varied) + 1), of_keys(*texts), ())
-        colours = np.array([each[key] for each in varied], dtype=float)
-        others = [name for name in numbers if name != key] if numbers[key] < sets else []
-        styles = of_keys(*others, *texts)
-        if len(set(styles)) <= len(STYLES):
-            return cls(key, colours, styles, ())
-        return cls(key, colours, of_keys(*texts), tuple((name, numbers[name]) for name in others))
-
-
-def _several(varied: Sequence[Varied]) -> tuple[dict[str, int], list[str]]:
-    """The keys of numbers that have several values, and how many; the keys of texts that have several."""
-    counts = {key: len({each[key] for each in varied}) for key in (varied[0] if varied else ())}
-    several = [key for key, count in counts.items() if count > 1]
-    texts = [key for key in several if isinstance(varied[0][key], str)]
-    return {key: counts[key] for key in several if key not in texts}, texts
+        counts = {name: len({each[name] for each in varied}) for name in varied[0]}
+        texts = [name for name in counts if isinstance(varied[0][name], str)]
+        others = [name for name in counts if name not in texts]
+        key = max(others, key=lambda name: counts[name], default=None)
+        sets = len({tuple(each[name] for name in others) for each in varied})
+        if key and counts[key] == sets > 1:  # it tells the curve
+            others = []
+        elif key and math.prod(counts[name] for name in others) == sets > 1:
+            others.remove(key)
+        else:  # none varies, or values side by side, none of which tells the curve
+            key, others = None, []
+        names = [name for name in (*others, *texts) if counts[name] > 1]
+        kinds = [{name: each[name] for name in names} for each in varied]
+        is_told = len({tuple(each.values()) for each in kinds}) <= len(STYLES)
+        return cls(
+            key,
+            np.array([each[key] for each in varied], dtype=float) if key else np.arange(1.0, len(varied) + 1),
+            kinds if is_told else [{}] * len(varied),
+            {} if is_told else {name: counts[name] for name in names},
+        )
 
 
 def main_figure(
@@ -166,9 +162,7 @@ def _draw(
     setting = case.figure
     if not case.output.figure or setting.needed not in case.asked or not results:
         return
-    held = results[0].curve.held(case.units.time, case.vary.keys)
-    with figure_for(paths, heading, held, FORMATS[setting.width]) as figure:
-        axes = figure.add_subplot()
+    with _axes(case, results, paths, heading) as axes:
         if other := map_key(setting, case.vary):
             _draw_map(axes, case, table, (setting.x, other))
             return
@@ -179,7 +173,22 @@ def _draw(
             series = [_moment_series(case, *pair, with_theory=i in shown) for i, pair in enumerate(pairs)]
         else:
             series = _over_parameter(case, pairs, _numbers(case, table))
-        draw_series(axes, case, series, setting.quantity.closed_form + ", reduced noise" * case.theory_reduces_noise)
+        over = P if setting.x == "p" else case.about(setting.x)
+        colours = draw_series(axes, case, series, over, setting.quantity)
+        places = np.concatenate([item.x for item in series])
+        is_short = setting.x == "p" and places.size and places.max() < 10 * places.min()
+        scale_axis(axes.xaxis, "linear" if is_short else scale_of(places), setting.xlim)
+        scale_axis(axes.yaxis, "linear", setting.ylim)
+        axes.ticklabel_format(axis="y", style="sci", scilimits=(-2, 3), useMathText=True)
+        _mark(axes, series, colours)
+
+
+@contextmanager
+def _axes(case: Case, results: Sequence[CurveResult], paths: Sequence[Path], heading: str) -> Iterator[Any]:
+    """Those of a figure of all curves."""
+    held = results[0].curve.held(case.units.time, case.vary.keys)
+    with figure_for(paths, heading, held, FORMATS[case.figure.width]) as figure:
+        yield figure.add_subplot()
 
 
 def rate_figure(case: Case, results: Sequence[CurveResult]) -> Drawing:
@@ -192,18 +201,10 @@ def _draw_rates(case: Case, results: Sequence[CurveResult], paths: Sequence[Path
     """I(s) at s = Λ′(p) of every p, 0 at s = λ."""
     if RATE_FUNCTION.name not in case.asked or not case.output.figure or not results:
         return
-    held, is_few = results[0].curve.held(case.units.time, case.vary.keys), len(results) <= MOST_NAMED
     shown = _some(len(results))
     series = [_rates(result, with_theory=i in shown) for i, result in enumerate(results)]
-    form = FORMATS[case.figure.width]
-    with figure_for(paths, heading, held, form) as figure:
-        axes = figure.add_subplot()
-        label_axes(axes, *(each.timed(case.units.time).attributes for each in (GROWTH, RATE_FUNCTION)))
-        mark_zero(axes)
-        (_draw_few if is_few else _draw_many)(
-            axes, case, series, MOMENT.closed_form + ", reduced noise" * case.theory_reduces_noise
-        )
-        axes.margins(x=0.03)
+    with _axes(case, results, paths, heading) as axes:
+        draw_series(axes, case, series, GROWTH, RATE_FUNCTION)
         axes.ticklabel_format(style="sci", scilimits=(-2, 3), useMathText=True)
 
 
@@ -310,12 +311,12 @@ def _columns(dots: Sequence[tuple[float | None, ...]]) -> FloatArray | None:
     return np.array(dots, dtype=float).T if dots else None
 
 
-def draw_series(axes: Any, case: Case, series: Sequence[Series], equation: str) -> None:
-    """Draw what [figure] says over its x for several curves; the lines are of perturbation theory, by an equation."""
-    setting, is_few = case.figure, len(series) <= MOST_NAMED
-    over = P if setting.x == "p" else case.about(setting.x)
-    label_axes(axes, over.attributes, setting.quantity.timed(case.units.time).attributes)
+def draw_series(axes: Any, case: Case, series: Sequence[Series], over: Quantity, about: Quantity) -> Sequence[Any]:
+    """Draw a quantity over another one for several curves; the colours of these."""
+    is_few = len(series) <= MOST_NAMED
+    label_axes(axes, *(each.timed(case.units.time).attributes for each in (over, about)))
     mark_zero(axes)
+    equation = (about.closed_form or MOMENT.closed_form) + ", reduced noise" * case.theory_reduces_noise
     colours = (_draw_few if is_few else _draw_many)(axes, case, series, equation)
     if simulated := [item.simulated for item in series if item.simulated is not None]:
         size, line, cap = (5, 1.1, 4) if is_few else (3, 0.8, 0)
@@ -323,30 +324,17 @@ def draw_series(axes: Any, case: Case, series: Sequence[Series], equation: str) 
         style |= {"markersize": points(size), "elinewidth": points(line), "capsize": points(cap)}
         draw_dots(axes, *np.concatenate(simulated, axis=1), label="Monte Carlo ± 2 standard errors", **style)
     axes.margins(x=0.03)
-    places = np.concatenate([item.x for item in series])
-    is_short = setting.x == "p" and places.size and places.max() < 10 * places.min()
-    scale_axis(axes.xaxis, "linear" if is_short else scale_of(places), setting.xlim)
-    scale_axis(axes.yaxis, "linear", setting.ylim)
-    axes.ticklabel_format(axis="y", style="sci", scilimits=(-2, 3), useMathText=True)
-    _mark(axes, series, colours)
+    return colours
 
 
 def _draw_few(axes: Any, case: Case, series: Sequence[Series], equation: str) -> Sequence[Any]:
     """A colour and a marker for each curve, named in the legend; the colours."""
-    varied = [item.varied for item in series]
-    numbers, texts = _several(varied)
-    kinds = [tuple(each[key] for key in texts) for each in varied]
-    rest = [tuple(value for key, value in each.items() if key not in texts) for each in varied]
-    is_mixed = bool(texts and numbers)  # colours tell numbers, markers and lines texts
-    of_rest, of_kind = ({value: i for i, value in enumerate(dict.fromkeys(values))} for values in (rest, kinds))
-    colours = [COLOURS[(of_rest[each] if is_mixed else i) % len(COLOURS)] for i, each in enumerate(rest)]
+    colours = [COLOURS[i % len(COLOURS)] for i in range(len(series))]
     for i, (item, colour) in enumerate(zip(series, colours, strict=True)):
-        marker = _MARKERS[(of_kind[kinds[i]] if is_mixed else i) % len(_MARKERS)]
-        line: Any = STYLES[of_kind[kinds[i]] % len(STYLES)]
-        hollow: dict[str, Any] = {"marker": marker, "color": colour, "markerfacecolor": "none"}
-        axes.plot(item.line_x, item.line_y, color=colour, linestyle=line)
-        axes.plot(item.x, item.y, linestyle="none", markevery=item.every, **hollow)
-        axes.plot([], [], linestyle=line, label=legend(item.varied, case.about), **hollow)
+        look = {"marker": _MARKERS[i % len(_MARKERS)], "color": colour, "markerfacecolor": "none"}
+        axes.plot(item.line_x, item.line_y, color=colour)
+        axes.plot(item.x, item.y, linestyle="none", markevery=item.every, **look)
+        axes.plot([], [], label=legend(item.varied, case.about), **look)
     words = case.method.name + " (not all marked)" * any(item.every > 1 for item in series)
     axes.plot([], [], "o", markerfacecolor="none", label=words, **_GREY)
     if any(np.any(np.isfinite(item.line_y)) for item in series):
@@ -360,87 +348,65 @@ def _draw_many(axes: Any, case: Case, series: Sequence[Series], equation: str) -
     from matplotlib.cm import ScalarMappable
     from matplotlib.collections import LineCollection
     from matplotlib.colors import ListedColormap, LogNorm, Normalize
-    from matplotlib.ticker import MaxNLocator
 
     encoding = Encoding.of([item.varied for item in series])
     values, is_log = encoding.colours, scale_of(encoding.colours) == "log"
     dark = ListedColormap(colormaps["viridis"](np.linspace(0, 0.93, 256)))
     scale = ScalarMappable((LogNorm if is_log else Normalize)(float(values.min()), float(values.max())), dark)
-    colours, is_picture = scale.to_rgba(values), len(series) > MOST_VECTORS
-    look = {
-        "rasterized": is_picture,
-        "alpha": 1.0 if len(series) <= 100 else 0.7,
-        "linewidths": points(1.2 if len(series) <= 50 else 0.5 if is_picture else 0.8),
-    }
-    order = [np.argsort(item.x, kind="stable") for item in series]
-    paths = [np.stack([item.x[by], item.y[by]], axis=1) for item, by in zip(series, order, strict=True)]
-    others = "".join(f", each for {count} values of {case.about(key).shown}" for key, count in encoding.unencoded)
-    kinds = dict.fromkeys(encoding.styles)
+    colours, look = scale.to_rgba(values), {"rasterized": len(series) > MOST_VECTORS, "linewidths": points(1)}
+    paths = [np.stack([item.x, item.y], axis=1)[np.argsort(item.x, kind="stable")] for item in series]
+    untold = "".join(f", each for {count} values of {case.about(key).shown}" for key, count in encoding.untold.items())
+    kinds = list({tuple(each.values()): each for each in encoding.kinds}.values())
     for kind, line in zip(kinds, STYLES, strict=False):
-        chosen = [i for i, each in enumerate(encoding.styles) if each == kind]
+        chosen = [i for i, each in enumerate(encoding.kinds) if each == kind]
         lines = LineCollection([paths[i] for i in chosen], colors=colours[chosen], linestyles=[line], **look)
         axes.add_collection(lines, autolim=True)
-        name = f", {legend(dict(kind), case.about)}" if len(kinds) > 1 else ""
-        axes.plot([], [], linestyle=line, label=f"finite elements{name}{others}", **_GREY)
+        name = f", {legend(kind, case.about)}" if kind else ""
+        axes.plot([], [], linestyle=line, label=f"finite elements{name}{untold}", **_GREY)
 
     # dots: curves that have but one point
-    known = [np.isfinite(item.y) for item in series]
-    dots = [(i, at) for i, at in enumerate(known) if at.sum() == 1]
+    dots = [(*path[np.isfinite(path[:, 1])][0], colour)
+            for path, colour in zip(paths, colours, strict=True) if np.isfinite(path[:, 1]).sum() == 1]  # fmt: skip
     if dots:
-        x, y = (np.concatenate([getattr(series[i], side)[at] for i, at in dots]) for side in "xy")
-        colour = np.repeat(colours[[i for i, _ in dots]], [at.sum() for _, at in dots], axis=0)
-        axes.scatter(x, y, s=points(4) ** 2, color=colour, rasterized=is_picture)
+        x, y, shades = zip(*dots, strict=True)
+        axes.scatter(x, y, s=points(4) ** 2, color=shades)
 
     # the perturbation theory of the first, the middle and the last of those that have one
     theories = [series[i] for i in np.argsort(values, kind="stable") if series[i].line_x.size]
-    style = {"linestyle": (0, (2, 2)), "color": "black", "linewidth": points(1.2), "zorder": 3}
-    outermost = dict.fromkeys([0, len(theories) // 2, len(theories) - 1]) if theories else ()
-    for place in outermost:
-        axes.plot(theories[place].line_x, theories[place].line_y, **style)
-    if outermost:
-        axes.plot([], [], label=f"perturbation, Eq. {equation}, of {len(outermost)} curves", **style)
+    chosen = sorted({0, len(theories) // 2, len(theories) - 1}) if theories else []
+    label = f"perturbation, Eq. {equation}, of {len(chosen)} curves"
+    for place in chosen:
+        style = {"linestyle": (0, (2, 2)), "color": "black", "linewidth": points(1.2), "zorder": 3}
+        axes.plot(theories[place].line_x, theories[place].line_y, label="" if place else label, **style)
 
     axes.autoscale_view()
-    bar = axes.figure.colorbar(scale, ax=axes, pad=0.02)
-    if encoding.key is None:
-        bar.set_label("number of the curve")
-        bar.ax.yaxis.set_major_locator(MaxNLocator(6, integer=True))
-    else:
-        bar.set_label(label_of(case.about(encoding.key).attributes, 36))
-        if is_log:
-            plain_numbers(bar.ax.yaxis)
+    words = "number of the curve" if encoding.key is None else label_of(case.about(encoding.key).attributes, 36)
+    bar = axes.figure.colorbar(scale, ax=axes, pad=0.02, label=words)
+    if is_log:
+        plain_numbers(bar.ax.yaxis)
     return colours
 
 
 def _mark(axes: Any, series: Sequence[Series], colours: Any) -> None:
-    """Stability indices as ticks on the zero line, λ as tangents at 0, all of one length, in the present ends."""
+    """Stability indices as ticks on the zero line, λ as tangents at 0, in the present ends."""
     from matplotlib.collections import LineCollection
 
     is_few, rasterized = len(series) <= MOST_NAMED, len(series) > MOST_VECTORS
     roots = [i for i, item in enumerate(series) if item.root is not None]
     if roots:
-        high, wide = (16, 2.2) if is_few else (12, 1.2) if len(series) <= MOST_TALL else (6, 1.2)
-        style = {"marker": "|", "zorder": 4, "rasterized": rasterized, "linewidths": points(wide)}
         where, shown = [series[i].root for i in roots], [colours[i] for i in roots]
-        sizes = points(high) * (np.linspace(2.0, 1.0, len(roots)) if is_few else 1.0)  # to see those behind
-        axes.scatter(where, np.zeros(len(roots)), s=sizes**2, color=shown, **style)
+        style = {"marker": "|", "linewidths": points(2.2 if is_few else 1.2), "zorder": 4, "rasterized": rasterized}
         words = f"{STABILITY_INDEX.words} {STABILITY_INDEX.latex}"
-        tick = {"linestyle": "none", "markersize": points(16), "markeredgewidth": points(2.2)}
-        axes.plot([], [], marker="|", label=words, **tick, **_GREY)
+        axes.scatter(where, np.zeros(len(roots)), s=points(16 if is_few else 8) ** 2, color=shown, label=words, **style)
     chosen = [i for i, item in enumerate(series) if item.slope is not None]
     if chosen:
         left, right = axes.get_xlim()
-        low, high = axes.get_ylim()
-        axes.set(xlim=(left, right), ylim=(low, high))
-        slopes = np.array([series[i].slope for i in chosen])
-        rises = slopes * (right - left) / (high - low) * axes.bbox.height / axes.bbox.width  # on paper
-        half = 0.5 * _TANGENT * (right - left) / np.hypot(1, rises)
-        ends, width = np.stack([half, half * slopes], axis=1), points(2.6 if is_few else 1.0)
-        for colour, wide in (("black", 1.5 * width), ([colours[i] for i in chosen], width)):  # with black rims
-            look: dict[str, Any] = {"colors": colour, "linewidths": wide, "capstyle": "butt", "zorder": 3.5}
-            axes.add_collection(LineCollection(list(np.stack([-ends, ends], axis=1)), **look), autolim=False)
-        line = {"linewidth": points(3), "solid_capstyle": "butt", **_GREY}
-        axes.plot([], [], label=f"slope {LYAPUNOV_EXPONENT.latex} at $p = 0$", **line)
+        axes.set(xlim=(left, right), ylim=axes.get_ylim())
+        ends = 0.5 * _TANGENT * (right - left) * np.array([-1.0, 1.0])
+        lines = [np.stack([ends, series[i].slope * ends], axis=1) for i in chosen]
+        look: dict[str, Any] = {"linewidths": points(3 if is_few else 1), "capstyle": "butt", "zorder": 3.5}
+        look |= {"colors": [colours[i] for i in chosen], "label": f"slope {LYAPUNOV_EXPONENT.latex} at $p = 0$"}
+        axes.add_collection(LineCollection(lines, rasterized=rasterized, **look), autolim=False)
 
 
 def _draw_map(axes: Any, case: Case, table: Table, keys: tuple[str, str]) -> None:
@@ -452,14 +418,11 @@ def _draw_map(axes: Any, case: Case, table: Table, keys: tuple[str, str]) -> Non
     from matplotlib.patches import Rectangle
 
     setting = case.figure
-    x, y = (np.array(case.vary.values(key), dtype=float) for key in keys)
-    is_x_first = case.vary.keys.index(keys[0]) < case.vary.keys.index(keys[1])
-    shape, order = ((x.size, y.size) if is_x_first else (y.size, x.size)), np.ix_(np.argsort(y), np.argsort(x))
-    values, status = (
-        (each.reshape(shape).T if is_x_first else each.reshape(shape))[order]
-        for each in (_numbers(case, table), table[STATUS.name].values)
+    (x, column), (y, row) = (
+        np.unique(np.array([each[key] for each in case.vary.sets], dtype=float), return_inverse=True) for key in keys
     )
-    x, y = np.sort(x), np.sort(y)
+    values, status = np.full((2, y.size, x.size), math.nan)
+    values[row, column], status[row, column] = _numbers(case, table), table[STATUS.name].values
     failed = np.isnan(values) & ~np.isin(status, [each for each in Status if not each.fails])
     edges = _edges(x), _edges(y)
     label_axes(axes, *(case.about(key).attributes for key in keys))
@@ -469,10 +432,9 @@ def _draw_map(axes: Any, case: Case, table: Table, keys: tuple[str, str]) -> Non
         scale_axis(axis, scale_of(each), limit or (float(ends[0]), float(ends[-1])))
     sought = "" if setting.moment is not None else " from {:g} to {:g}".format(*INDICES[setting.needed].interval)
     unsolved: dict[str, Any] = {"facecolor": "white", "edgecolor": "0.45", "hatch": "/////"}
-    absent: dict[str, Any] = {"facecolor": "0.8", "edgecolor": "none"}
     for where, style, label in (
         (failed, unsolved, "failed or not solved"),
-        (np.isnan(values) & ~failed, absent, f"no {setting.quantity.words}{sought}"),
+        (np.isnan(values) & ~failed, {"facecolor": "0.8"}, f"no {setting.quantity.words}{sought}"),
     ):
         (left, low), (width, height) = edges, map(np.diff, edges)
         cells = [Rectangle((left[j], low[i]), width[j], height[i]) for i, j in np.argwhere(where)]
@@ -480,39 +442,31 @@ def _draw_map(axes: Any, case: Case, table: Table, keys: tuple[str, str]) -> Non
             axes.add_collection(PatchCollection(cells, linewidth=0, label=label, **style))
     finite = values[np.isfinite(values)]
     if finite.size and finite.min() < 0 < finite.max():
-        wide = points(1.5)
-        look: dict[str, Any] = {"colors": _BETWEEN, "linestyles": "--", "linewidths": wide, "zorder": 3}
-        axes.contour(x, y, np.ma.masked_invalid(values), levels=[0.0], **look)
-        axes.plot([], [], "--", color=_BETWEEN, linewidth=wide, label="zero, interpolated between the values")
+        look: dict[str, Any] = {"linestyles": "--", "linewidths": points(1.5), "zorder": 3}
+        axes.contour(x, y, np.ma.masked_invalid(values), levels=[0.0], colors=_BETWEEN, **look)
+        axes.plot([], [], "--", color=_BETWEEN, label="zero, interpolated between the values")
 
 
 def _draw_values(axes: Any, values: FloatArray, edges: tuple[FloatArray, FloatArray], about: Mapping[str, Any]) -> None:
     """Blue where it is negative, red where it is positive, told apart by all eyes; colours are alike on both sides.
 
-    There are more of them near zero where most values are much smaller than the largest; then numbers beside the
-    colour bar are powers of ten, with room between them.
+    There are more of them near zero where most values are much smaller than the largest.
     """
     from matplotlib.colors import AsinhNorm, Normalize
-    from matplotlib.ticker import FixedLocator, StrMethodFormatter
+    from matplotlib.ticker import AsinhLocator
 
     sizes = np.abs(values[np.isfinite(values) & (values != 0)])
     limit = float(np.max(sizes, initial=0.0)) or 1.0
     middle = float(np.median(sizes)) if sizes.size else limit
     is_even = limit < 4 * middle
-    norm = Normalize(-limit, limit) if is_even else AsinhNorm(middle, -limit, limit)
-    shown = np.ma.masked_invalid(values)
-    bar = draw_colours(axes, *edges, shown, about, cmap="RdBu_r", norm=norm, shading="flat")
+    look = {"cmap": "RdBu_r", "norm": Normalize(-limit, limit) if is_even else AsinhNorm(middle, -limit, limit)}
+    bar = draw_colours(axes, *edges, np.ma.masked_invalid(values), about, shading="flat", **look)
     if is_even:
         bar.formatter.set_powerlimits((-2, 3))
         bar.formatter.set_useMathText(True)
-        return
-    chosen = [0.0]
-    for decade in range(math.ceil(math.log10(limit)) - 8, math.floor(math.log10(limit)) + 1):
-        if norm(10.0**decade) - norm(chosen[-1]) >= (0.06 if points(1) > 0.8 else 0.08):
-            chosen.append(10.0**decade)
-    chosen = chosen if len(chosen) > 1 else [0.0, float(f"{0.8 * limit:.0e}")]
-    bar.ax.yaxis.set_major_locator(FixedLocator([*(-value for value in chosen[:0:-1]), *chosen]))
-    bar.ax.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+    else:
+        bar.ax.yaxis.set_major_locator(AsinhLocator(middle, numticks=5))
+        bar.ax.yaxis.set_major_formatter("{x:g}")
 
 
 def _edges(values: FloatArray) -> FloatArray:

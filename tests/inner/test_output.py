@@ -109,16 +109,16 @@ VARIED = [{"a": a, "b": b, "c": c} for a in (1.0, 2.0) for b in (1.0, 2.0, 3.0) 
 
 
 @pytest.mark.parametrize(
-    ("varied", "key", "styles", "unencoded"),
+    ("varied", "key", "kinds", "untold"),
     [
-        (VARIED, "b", 4, ()),
-        ([each | {"a": each["a"] + i} for i in range(0, 8, 2) for each in VARIED], "a", 2, (("b", 3),)),
-        ([{"a": 1.0, "b": 1.0}, {"a": 2.0, "b": 1.0}, {"a": 2.0, "b": 2.0}], None, 1, ()),
-        ([{"a": 1.0, "b": 3.0}, {"a": 2.0, "b": 1.0}, {"a": 3.0, "b": 1.0}], "a", 1, ()),
-        ([{"c": "x"}, {"c": "y"}], None, 2, ()),
+        (VARIED, "b", 4, {}),
+        ([each | {"a": each["a"] + i} for i in range(0, 8, 2) for each in VARIED], "a", 1, {"b": 3, "c": 2}),
+        ([{"a": 1.0, "b": 1.0}, {"a": 2.0, "b": 1.0}, {"a": 2.0, "b": 2.0}], None, 1, {}),
+        ([{"a": 1.0, "b": 3.0}, {"a": 2.0, "b": 1.0}, {"a": 3.0, "b": 1.0}], "a", 1, {}),
+        ([{"c": "x"}, {"c": "y"}], None, 2, {}),
     ],
 )
-def test_colours_and_styles_tell_curves_from_each_other(varied, key, styles, unencoded):
+def test_colours_and_styles_tell_curves_from_each_other(varied, key, kinds, untold):
     told = Encoding.of(varied)
-    assert (told.key, len(set(told.styles)), told.unencoded) == (key, styles, unencoded)
+    assert (told.key, len({tuple(each.values()) for each in told.kinds}), told.untold) == (key, kinds, untold)
     assert told.colours.tolist() == ([each[key] for each in varied] if key else [*range(1, len(varied) + 1)])
