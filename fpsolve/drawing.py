@@ -6,11 +6,11 @@ import logging
 import math
 import re
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from textwrap import fill, wrap
+from textwrap import fill
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -107,14 +107,12 @@ def figure_for(
         FigureCanvasAgg(figure)
         body: Any = figure.subfigures()
         yield body
-        room = 0.96 * figure.get_figwidth()
         large, small = (_font_size(f"{which}.titlesize") for which in ("figure", "axes"))
-        words = [[part for word in line.split(" ") for part in wrap(word, 40)] for line in title.splitlines()]
         if title:
-            lines = "\n".join(in_lines(figure, line, " ", large, room, has_math=False) for line in words)
-            figure.suptitle(lines, parse_math=False)
+            lines = [fill(line, letters_in(form.width, large)) for line in title.splitlines()]
+            figure.suptitle("\n".join(lines), parse_math=False)
         if parameters:
-            body.suptitle(in_lines(figure, parameters, ", ", small, room), fontsize=small, color="0.3")
+            body.suptitle(in_lines(parameters, letters_in(form.width, small)), fontsize=small, color="0.3")
         _add_legend(figure)
         figure.set_figheight(4 * form.height)  # has room for everything, so that the layout tells what is left
         layout.execute(figure)
@@ -132,45 +130,25 @@ def _add_legend(figure: Any) -> None:
     handles, labels = ([item for each in found for item in each[k]] for k in (0, 1))
     if not labels:
         return
-    room, letters = 0.98 * figure.get_figwidth(), _font_size("legend.fontsize")
-    labels = [in_lines(figure, label.split(", "), ", ", letters, room - letters / 18) for label in labels]
-    for columns, share in [(columns, share) for columns in (4, 3, 2) for share in (1.0, 0.9)] + [(1, 1.0)]:
-        if columns <= len(labels):
-            style = {"ncols": columns, "columnspacing": 1.2, "handlelength": 1.8, "fontsize": share * letters}
-            legend = figure.legend(handles, labels, loc="outside lower center", **style)
-            if columns == 1 or legend.get_window_extent(figure.canvas.get_renderer()).width <= room * figure.dpi:
-                return
-            legend.remove()
+    room, size = 0.98 * figure.get_figwidth(), _font_size("legend.fontsize")
+    labels = [in_lines(label.split(", "), letters_in(0.9 * room, size)) for label in labels]
+    for columns in (4, 3, 2, 1):
+        style = {"ncols": columns, "columnspacing": 1.2, "handlelength": 1.8}
+        legend = figure.legend(handles, labels, loc="outside lower center", **style)
+        if columns == 1 or legend.get_window_extent(figure.canvas.get_renderer()).width <= room * figure.dpi:
+            return
+        legend.remove()
 
 
-def in_lines(figure: Any, pieces: Sequence[str], mark: str, size: float, room: float, *, has_math: bool = True) -> str:
-    """Pieces with a mark between them in as few lines as fit, these of like lengths, none of the pieces broken.
+def letters_in(room: float, size: float) -> int:
+    """About how many letters of a size in points have room in a line, whose length is in inches."""
+    return int(room * 72 / (0.6 * size))
 
-    Args:
-        figure: in which they are drawn.
-        pieces, mark: words and " ", or parts of a list and ", ".
-        size: of the letters, in points.
-        room: for a line, in inches.
-        has_math: whether what stands between two "$" is a formula.
-    """
-    from matplotlib.font_manager import FontProperties
 
-    measure = figure.canvas.get_renderer().get_text_width_height_descent
-    font, gap = FontProperties(size=size), 0.3 * len(mark) * size / 72
-    widths = [measure(piece, font, has_math and "$" in piece)[0] / figure.dpi + gap for piece in pieces]
-
-    def lines(room: float) -> list[str]:
-        found, used = list[list[str]](), math.inf
-        for piece, width in zip(pieces, widths, strict=True):
-            if used + width > room:
-                found, used = [*found, []], 0.0
-            found[-1].append(piece)
-            used += width
-        return [mark.join(each) for each in found]
-
-    fewest = lines(room)
-    like = next(each for share in (0.6, 0.7, 0.8, 0.9, 1.0) if len(each := lines(share * room)) == len(fewest))
-    return f"{mark.rstrip()}\n".join(like)
+def in_lines(pieces: Iterable[str], letters: int) -> str:
+    """A list in lines of about so many letters, none of its pieces broken."""
+    text = ", ".join(piece.replace(" ", "\xa0") for piece in pieces)
+    return fill(text, letters, break_long_words=False, break_on_hyphens=False).replace("\xa0", " ")
 
 
 def is_math(text: str) -> bool:
@@ -220,14 +198,14 @@ def scale_axis(axis: Any, scale: str, limits: tuple[float, float] | None) -> Non
 
 
 def plain_numbers(axis: Any) -> None:
-    """Numbers such as 0.5, 1, 2 on a logarithmic axis of a few decades; fewer of them in a small figure."""
+    """Numbers such as 0.5, 1, 2 on a logarithmic axis of a few decades."""
     from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter, NullLocator, StrMethodFormatter
 
     start, stop = axis.get_view_interval()
-    decades, is_large = math.log10(stop / start), points(1) > 0.7
+    decades = math.log10(stop / start)
     if decades < 4:
-        subs = (1, 1.5, 2, 3, 4, 5, 7) if decades < 0.7 else (1, 2, 5) if decades < (2.5 if is_large else 1.8) else (1,)
-        axis.set_major_locator(MaxNLocator(5 if is_large else 4) if decades < 0.4 else LogLocator(subs=subs))
+        subs = (1, 1.5, 2, 3, 4, 5, 7) if decades < 0.7 else (1, 2, 5) if decades < 2.2 else (1,)
+        axis.set_major_locator(MaxNLocator(4) if decades < 0.4 else LogLocator(subs=subs))
         if decades < 0.7:
             axis.set_minor_locator(NullLocator())
         axis.set_major_formatter(StrMethodFormatter("{x:g}"))

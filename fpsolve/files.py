@@ -122,9 +122,9 @@ def parsed_json(text: str | bytes) -> Any:
         raise ValueError("lists are nested too deeply") from None
 
 
-def write_json(path: Path, data: Any) -> None:
+def write_json(path: Path, data: Any, indent: int | None = 1) -> None:
     """Data without NaN or infinities as JSON."""
-    write_text(path, json.dumps(data, indent=1, allow_nan=False, ensure_ascii=False) + "\n")
+    write_text(path, json.dumps(data, indent=indent, allow_nan=False, ensure_ascii=False) + "\n")
 
 
 @contextmanager

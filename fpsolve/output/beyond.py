@@ -9,43 +9,45 @@ from typing import Any
 import numpy as np
 
 from fpsolve.analysis.excursions import Excursion
-from fpsolve.analysis.sensitivity import RECORDS, Slopes
+from fpsolve.analysis.sensitivity import RECORDS, Sensitivities, Slopes
 from fpsolve.analysis.spreads import LEVEL, UNCERTAIN, Spread
 from fpsolve.case.case import Case
 from fpsolve.case.sections import EXCURSIONS, RESPONSE, SENSITIVITIES
-from fpsolve.exponent.error import MEANINGLESS, Estimate
+from fpsolve.exponent.error import MEANINGLESS, Estimate, InvariantClass
 from fpsolve.model.quantity import LYAPUNOV_EXPONENT
 from fpsolve.parts.intervals import ENDS, spreads_of
-from fpsolve.results.curve import CurveResult
+from fpsolve.results.curve import CurveResponse, CurveResult
 from fpsolve.results.table import pair
 
 
-def _classes(case: Case, result: CurveResult) -> Mapping[str, Any]:
-    if not result.classes:
-        return {}
-    found = [
-        {
-            "name": each.name,
-            **pair(LYAPUNOV_EXPONENT.name, each.lyapunov_exponent),
-            "moments": [
-                {"p": p, "moment": value, "moment_error": error}
-                for p, value, error in zip(
-                    each.p.tolist(), each.value.tolist(), each.error_estimate.tolist(), strict=True
-                )
-            ],
-        }
-        for each in result.classes
-    ]
-    return {"classes": found}
+def beyond_tables(case: Case, result: CurveResult) -> dict[str, Any]:
+    """What neither results.nc nor a CSV file has, by its name; None where it is asked for and not there."""
+    found = dict[str, Any]()
+    if result.classes:
+        found["classes"] = [_class(each) for each in result.classes]
+    if EXCURSIONS in case.asked:
+        found[EXCURSIONS] = result.excursion and _excursion(case, result.excursion)
+    if case.has_response:
+        found[RESPONSE] = result.response and _response(result.response)
+    if SENSITIVITIES in case.asked:
+        found[SENSITIVITIES] = result.sensitivities and _sensitivities(result.sensitivities)
+    if case.uncertain and result.curve.is_possible:
+        found["uncertainty"] = _intervals(case, result)
+    return found
 
 
-def _sensitivities(case: Case, result: CurveResult) -> Mapping[str, Any]:
+def _class(found: InvariantClass) -> dict[str, Any]:
+    """λ and Λ(p) of a block or a ray."""
+    columns = found.p.tolist(), found.value.tolist(), found.error_estimate.tolist()
+    return {
+        "name": found.name,
+        **pair(LYAPUNOV_EXPONENT.name, found.lyapunov_exponent),
+        "moments": [dict(zip(("p", "moment", "moment_error"), row, strict=True)) for row in zip(*columns, strict=True)],
+    }
+
+
+def _sensitivities(known: Sensitivities) -> Mapping[str, Any]:
     """∂/∂θ by the key of θ, null where its error leaves it no meaning, and the estimates of these errors alike."""
-    if SENSITIVITIES not in case.asked:
-        return {}
-    if (found := result.sensitivities) is None:
-        return {SENSITIVITIES: None}
-    known = found
 
     def numbers(of: Callable[[Estimate], float]) -> dict[str, Any]:
         def row(slopes: Slopes) -> dict[str, float | None]:
@@ -56,18 +58,15 @@ def _sensitivities(case: Case, result: CurveResult) -> Mapping[str, Any]:
         return {"moments": [{"p": p, **row(slopes)} for p, slopes in moments], **indices}
 
     errors = numbers(lambda each: each.error_estimate)
-    return {SENSITIVITIES: {**numbers(lambda each: each.value), "errors": errors}}
+    return {**numbers(lambda each: each.value), "errors": errors}
 
 
-def _excursions(case: Case, result: CurveResult) -> Mapping[str, Any]:
+def _excursion(case: Case, found: Excursion) -> Mapping[str, Any]:
     """The start, the bounds and the asymptotic number of upcrossings at all levels, and what these follow from."""
-    found: Excursion | None = result.parts.get(EXCURSIONS)
-    if EXCURSIONS not in case.asked or found is None:
-        return {EXCURSIONS: None} if EXCURSIONS in case.asked else {}
     levels = np.array(case.excursions.levels)
     rows = zip(levels.tolist(), *(each.tolist() for each in found.bounds(levels)), strict=True)
     many = [None if math.isnan(each) else each for each in found.expected_upcrossings(levels).tolist()]
-    content = {
+    return {
         "start": {"phi": found.phi, "xi": found.xi},
         "is_certain": found.is_certain,
         **pair("stability_index", found.stability_index),
@@ -79,13 +78,10 @@ def _excursions(case: Case, result: CurveResult) -> Mapping[str, Any]:
             for (level, low, high), count in zip(rows, many, strict=True)
         ],
     }
-    return {EXCURSIONS: content}
 
 
-def _response(case: Case, result: CurveResult) -> Mapping[str, Any]:
+def _response(found: CurveResponse) -> Mapping[str, Any]:
     """The means and impacts with their errors, what the density does near rest, and how far these are to be trusted."""
-    if not case.has_response or (found := result.response) is None:
-        return {RESPONSE: None} if case.has_response else {}
     means: dict[str, Any] = {}
     for name, number in found.means.items():
         means |= pair(name, number)
@@ -101,15 +97,13 @@ def _response(case: Case, result: CurveResult) -> Mapping[str, Any]:
             "least_over_largest_density": found.least,
             "unknowns": found.unknowns,
         }
-    return {RESPONSE: content}
+    return content
 
 
 def _intervals(case: Case, result: CurveResult) -> Mapping[str, Any]:
     """What is uncertain of a curve, and how that of the parameters is."""
-    if not (case.uncertain and result.curve.is_possible):
-        return {}
     found, laws = spreads_of(case, result), case.uncertain.laws(result.curve.problem)
-    content = {
+    return {
         "level": LEVEL,
         "laws": {
             key: {name: getattr(each, name) for name in ("value", "sd", "mean", "deviation")}
@@ -118,7 +112,6 @@ def _intervals(case: Case, result: CurveResult) -> Mapping[str, Any]:
         **{name: _plain(found.indices[name]) if name in found.indices else None for name in UNCERTAIN},
         "moments": [{"p": p, **_plain(each)} for p, each in found.moments.items()],
     }
-    return {"uncertainty": content}
 
 
 def _plain(spread: Spread) -> dict[str, float]:
@@ -126,7 +119,3 @@ def _plain(spread: Spread) -> dict[str, float]:
     return {name: getattr(spread, name) for name in ("mean", "deviation", *ENDS)} | {
         "probability_below_0": spread.below
     }
-
-
-BEYOND = _classes, _excursions, _response, _sensitivities, _intervals
-"""Each gives what it has by its name; nothing where that is not asked for."""

@@ -164,7 +164,7 @@ class Sweep:
         """Write summary.json, moments.csv and curves.csv."""
         started, self.facts = monotonic(), facts_of(self.case, self.started, monotonic() - self._clock)
         results = self.results
-        write_results(self.case, results, self.folder, self.facts, self.done, results.table, results.says)
+        write_results(self.case, results, self.folder, self.facts, self.done, results.table, results.telling)
         self._due = monotonic() + REST * (monotonic() - started)
 
     def write_all(self) -> None:
