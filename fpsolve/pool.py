@@ -20,7 +20,7 @@ from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from functools import partial
-from itertools import chain, islice
+from itertools import islice
 from multiprocessing import resource_tracker
 from types import ModuleType
 from typing import Any, TypeVar
@@ -92,9 +92,9 @@ class Pool:
     stop: Callable[[Executor], None] = lambda executor: executor.shutdown(cancel_futures=True)
     size: int = 1
     own_seconds: float = 0.0
-    has_workers: Callable[[], bool] = lambda: True
+    has_workers: Callable[[Executor], bool] = lambda executor: True
     is_elsewhere: bool = False
-    _executor: Executor | None = field(default=None, init=False, repr=False)
+    _executor: Any = field(default=None, init=False, repr=False)
     _waiting: dict[Future[Any], Any] = field(default_factory=dict, init=False, repr=False)
 
     def __enter__(self) -> Pool:
@@ -116,11 +116,10 @@ class Pool:
             WorkersDied: a worker has died, or none is left.
         """
         source, until = iter(items), time.monotonic() + self.own_seconds
-        for item in source:
-            if self._executor is not None or time.monotonic() >= until:
-                source = chain([item], source)
-                break
+        for item in source if self.own_seconds and self._executor is None else ():
             yield item, task(item)
+            if time.monotonic() >= until:
+                break
         waiting: dict[Future[Result], Item] = {}
         self._waiting = waiting
         try:
@@ -161,7 +160,7 @@ class Pool:
         """Those that are done first."""
         until = math.inf
         while not (found := futures.wait(waiting, LOOK_SECONDS, futures.FIRST_COMPLETED).done):
-            until = math.inf if self.has_workers() else min(until, time.monotonic() + CONNECT_SECONDS)
+            until = math.inf if self.has_workers(self._executor) else min(until, time.monotonic() + CONNECT_SECONDS)
             if time.monotonic() >= until:
                 raise WorkersDied(f"no worker is left at the scheduler; {ANEW}")
         return found
@@ -207,22 +206,20 @@ def cluster(address: str) -> Pool:
     Raises:
         FpsolveError: Dask is not installed, nothing answers, or the workers cannot run fpsolve.
     """
-    clients = [_client(address)]
-    size = len(clients[0].nthreads())
-    clients.pop().close()
+    client = _client(address)
+    size = len(client.nthreads())
+    client.close()
 
-    def start() -> Executor:
-        clients.append(_client(address))
-        executor: Executor = clients[-1].get_executor(pure=False)
-        return executor
+    def start() -> Any:
+        return _client(address).get_executor(pure=False)
 
-    def stop(executor: Executor) -> None:
+    def stop(executor: Any) -> None:
         executor.shutdown(wait=False)  # cancels what is not done
-        clients.pop().close()
+        executor._client.close()
 
-    def has_workers() -> bool:
+    def has_workers(executor: Any) -> bool:
         try:
-            return bool(clients[-1].nthreads())
+            return bool(executor._client.nthreads())
         except OSError:  # it stopped while it was asked
             raise WorkersDied(STOPPED) from None
 

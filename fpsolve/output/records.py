@@ -18,7 +18,6 @@ from contextlib import suppress
 from errno import ENOSPC
 from functools import cache
 from hashlib import sha256
-from itertools import tee
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -118,30 +117,23 @@ def answered(
         records: of the items.
         pool: does the tasks of those that are not known.
         task: finds something of an item; can be pickled.
-        items: are taken twice.
         key: what the record of an item is found by.
         read: gives what its record has; None, or raises `ValueError`, where that is nothing.
         entries: the record of what was found; empty of what is not kept.
     """
-    earlier, new = dict[str, Found | None](), dict[str, Found]()
-
-    def known(item: Item) -> Found | None:
-        if (name := key(item)) not in earlier:
-            earlier[name] = None
-            with suppress(ValueError):
-                earlier[name] = read(records.get(name), item)
-        return earlier[name]
-
-    ahead, items = tee(items)
-    fresh = pool.run(task, (each for each in ahead if known(each) is None))
-    for item in items:
-        found = known(item)
-        while found is None and key(item) not in new:
+    by_key, earlier, new = [(key(each), each) for each in items], dict[str, Found](), dict[str, Found]()
+    for name, item in dict(by_key).items():
+        with suppress(ValueError):
+            if found := read(records.get(name), item):
+                earlier[name] = found
+    fresh = pool.run(task, [item for name, item in dict(by_key).items() if name not in earlier])
+    for name, item in by_key:
+        while name not in earlier and name not in new:
             each, one = next(fresh)
             new[key(each)] = one
             if record := entries(one):
                 records.put(key(each), record)
-        yield item, found or new[key(item)], found is not None
+        yield item, earlier.get(name) or new[name], name in earlier
 
 
 def key_of(*content: Any) -> str:

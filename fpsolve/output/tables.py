@@ -70,9 +70,7 @@ def write_results(
     """
     known, sets = np.flatnonzero(~np.isnan(table[STATUS.name].values)).tolist(), case.vary.sets
     over_p = [name for name, each in table.items() if each.quantity.dims]
-    of_curve = [
-        name for name in table if name not in over_p and not name.endswith("_perturbation")
-    ]  # others have these
+    of_curve = [name for name in table if name not in over_p and not name.endswith("_perturbation")]
     by_moment = ([*sets[each].values(), *row.values()] for each in known for row in _over_p(case, table, each))
     by_curve = ([*sets[each].values(), *map(_numbers(table, each).__getitem__, of_curve)] for each in known)
     write_csv(folder / "moments.csv", [*case.vary.keys, "p", *over_p], by_moment)
