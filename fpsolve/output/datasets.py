@@ -63,7 +63,7 @@ def write_dataset(case: Case, table: Table, folder: Path, facts: Mapping[str, An
     import h5netcdf
     import h5py
 
-    variables, coordinates = _variables(case, table), _coordinates(case)
+    variables, coordinates = _arrays(case, table)
     beside = " ".join(name for name, each in coordinates.items() if each.dims != (name,))
     content = io.BytesIO()  # HDF5 does not survive a full disk
     with h5netcdf.File(content, "w") as file:
@@ -84,42 +84,30 @@ def write_dataset(case: Case, table: Table, folder: Path, facts: Mapping[str, An
         draft.write_bytes(content.getvalue())
 
 
-def _variables(case: Case, table: Table) -> dict[str, Variable]:
-    """The numbers of all sets."""
+def _arrays(case: Case, table: Table) -> tuple[dict[str, Variable], dict[str, Variable]]:
+    """The numbers of all sets; the varied values and p."""
     vary = case.vary
     is_list = bool(vary) and vary.mode != "product"
-    over: tuple[str, ...] = (SET,) if is_list else vary.keys
-    shape = (case.planned,) if is_list else tuple(len(vary.values(key)) for key in over)
-    found = {name: (each.quantity, each.values) for name, each in table.items()}
-    status = np.where(np.isnan(table[STATUS.name].values), Status.MISSING, table[STATUS.name].values)
-    found[STATUS.name] = STATUS, status.astype(np.int8)
-    flags = {
-        "flag_values": np.array([int(each) for each in Status], dtype=np.int8),
-        "flag_meanings": " ".join(each.name.lower() for each in Status),
-    }
-    return {
-        name: Variable(
-            (*over, *about.dims),
-            values.reshape(shape + values.shape[1:]),
-            about.timed(case.units.time).attributes | (flags if about is STATUS else {}),
-        )
-        for name, (about, values) in found.items()
-    }
-
-
-def _coordinates(case: Case) -> dict[str, Variable]:
-    """The varied values and p."""
-    vary, found = case.vary, dict[str, Variable]()
-    is_list = bool(vary) and vary.mode != "product"
+    over, shape = (
+        ((SET,), (case.planned,)) if is_list else (vary.keys, tuple(len(vary.values(key)) for key in vary.keys))
+    )
+    coordinates, variables = dict[str, Variable](), dict[str, Variable]()
     for key in vary.keys:
-        values = np.array(
-            vary.columns[key] if is_list else vary.values(key), dtype=object if vary.is_text(key) else float
-        )
-        about = {} if vary.is_text(key) else case.about(key).attributes
-        found[key] = Variable((SET if is_list else key,), values, about)
+        values, is_text = vary.columns[key] if is_list else vary.values(key), vary.is_text(key)
+        array = np.array(values, dtype=object if is_text else float)
+        coordinates[key] = Variable((SET if is_list else key,), array, {} if is_text else case.about(key).attributes)
     if MOMENT.name in case.asked:
-        found["p"] = Variable(("p",), case.p, P.attributes)
-    return found
+        coordinates["p"] = Variable(("p",), case.p, P.attributes)
+    for name, column in table.items():
+        numbers: NDArray[Any] = column.values
+        attributes: dict[str, Any] = dict(column.quantity.timed(case.units.time).attributes)
+        if column.quantity is STATUS:
+            numbers = np.where(np.isnan(numbers), Status.MISSING, numbers).astype(np.int8)
+            attributes["flag_values"] = np.array([*Status], dtype=np.int8)
+            attributes["flag_meanings"] = " ".join(each.name.lower() for each in Status)
+        whole = numbers.reshape(shape + numbers.shape[1:])
+        variables[name] = Variable((*over, *column.quantity.dims), whole, attributes)
+    return variables, coordinates
 
 
 def _origin(case: Case, facts: Mapping[str, Any]) -> dict[str, str | float | int]:

@@ -35,7 +35,6 @@ from fpsolve.drawing import (
     scale_axis,
     scale_of,
 )
-from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, STABILITY_INDEX
 from fpsolve.model.quantity import (
     GROWTH,
@@ -209,9 +208,8 @@ def _draw_rates(case: Case, results: Sequence[CurveResult], paths: Sequence[Path
 
 
 def _some(count: int) -> set[int]:
-    """Places of curves with perturbation theory: all that a legend can name, or of more some, evenly spread."""
-    places = np.linspace(0, count - 1, count if count <= MOST_NAMED else 3 * MOST_NAMED)
-    return set(places.round().astype(int).tolist())
+    """Places of curves with perturbation theory: all of few, or of many three."""
+    return set(range(count)) if count <= MOST_NAMED else {0, count // 2, count - 1}
 
 
 def _moment_series(case: Case, result: CurveResult, sample: SimulatedCurve | None, *, with_theory: bool) -> Series:
@@ -220,7 +218,7 @@ def _moment_series(case: Case, result: CurveResult, sample: SimulatedCurve | Non
     line = np.linspace(first, last, 200) if with_theory and p.size else _NOTHING
     estimates = sample.result.estimates if sample else ()
     root, slope = (
-        _value(result.estimates[each.name]) if each.name in case.figure.mark else None
+        found.value if each.name in case.figure.mark and (found := result.estimates[each.name]) else None
         for each in (STABILITY_INDEX, LYAPUNOV_EXPONENT)
     )
     return Series(
@@ -272,10 +270,6 @@ def _over_parameter(case: Case, pairs: Sequence[Pair], numbers: FloatArray) -> l
             )
         )
     return found
-
-
-def _value(estimate: Estimate | None) -> float | None:
-    return None if estimate is None else estimate.value
 
 
 def _numbers(case: Case, table: Table) -> FloatArray:
@@ -371,13 +365,11 @@ def _draw_many(axes: Any, case: Case, series: Sequence[Series], equation: str) -
         x, y, shades = zip(*dots, strict=True)
         axes.scatter(x, y, s=points(4) ** 2, color=shades)
 
-    # the perturbation theory of the first, the middle and the last of those that have one
-    theories = [series[i] for i in np.argsort(values, kind="stable") if series[i].line_x.size]
-    chosen = sorted({0, len(theories) // 2, len(theories) - 1}) if theories else []
-    label = f"perturbation, Eq. {equation}, of {len(chosen)} curves"
-    for place in chosen:
+    theories = [item for item in series if item.line_x.size]
+    label = f"perturbation, Eq. {equation}, of {len(theories)} curves"
+    for place, item in enumerate(theories):
         style = {"linestyle": (0, (2, 2)), "color": "black", "linewidth": points(1.2), "zorder": 3}
-        axes.plot(theories[place].line_x, theories[place].line_y, label="" if place else label, **style)
+        axes.plot(item.line_x, item.line_y, label="" if place else label, **style)
 
     axes.autoscale_view()
     words = "number of the curve" if encoding.key is None else label_of(case.about(encoding.key).attributes, 36)

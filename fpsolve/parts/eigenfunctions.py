@@ -113,7 +113,6 @@ def question_of_pictures(
         symbol,
         said=lambda found, *_: found,
         files=files,
-        is_picture=True,
     )
 
 

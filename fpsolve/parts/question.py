@@ -239,8 +239,7 @@ class Question:
         said: the messages about what was found.
         lacks: why some of what is asked for is not there.
         numbers: those of a curve that a case asks for, by their quantities; of none, the quantities without numbers.
-        files: writes into a folder what a curve has beyond the tables.
-        is_picture: whether its files show more than a record holds, so that it is solved again for them.
+        files: writes into a folder pictures of a curve, which no record holds, so that it is solved again for them.
     """
 
     name: str
@@ -252,4 +251,3 @@ class Question:
     lacks: Callable[[Any, Settings], Iterable[Message]] = _nothing
     numbers: Callable[[Case, CurveResult | None], Mapping[Quantity, Any]] = _no_numbers
     files: Callable[[Any, Curve, Path], None] | None = None
-    is_picture: bool = False

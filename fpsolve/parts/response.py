@@ -96,7 +96,7 @@ def _numbers(case: Case, result: CurveResult | None) -> Mapping[Quantity, Any]:
     return {key: value for name, each in about.items() for key, value in estimated(each, found.get(name)).items()}
 
 
-def _files(found: CurveResponse, curve: Curve, folder: Path) -> None:
+def write_response(found: CurveResponse, curve: Curve, folder: Path) -> None:
     """Write the stationary density of a curve, if it has one, as response.csv, response.vtu and response_3d.vtu.
 
     The table has that of the amplitude. response.vtu shows both variables as x and y, with the `density` of these, and
@@ -126,4 +126,4 @@ def _files(found: CurveResponse, curve: Curve, folder: Path) -> None:
     write_between(folder / f"response_3d{curve.suffix}.vtu", places, whole, facts)
 
 
-QUESTION: Question = Question(RESPONSE, _settings, _solve, CurveResponse, RESPONSE, numbers=_numbers, files=_files)
+QUESTION: Question = Question(RESPONSE, _settings, _solve, CurveResponse, RESPONSE, numbers=_numbers)

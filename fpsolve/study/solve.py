@@ -47,7 +47,7 @@ def solve_curve(job: Job) -> Job:
         first = [BY_NAME[LYAPUNOV_EXPONENT.name]] if choose(job.curve.problem).is_dear(0.0) else []
         for each in dict.fromkeys((*first, *QUESTIONS)):
             is_known = each.name in job.entries
-            if each.solve is None or each.name not in job.asked or (is_known and not each.is_picture):
+            if each.solve is None or each.name not in job.asked or (is_known and not each.files):
                 continue
             if each is not MOMENTS:
                 begin(each.symbol)
@@ -107,7 +107,7 @@ def result_of(job: Job) -> CurveResult:
     for message in missing(reasons, moments.failures):
         if job.numerics.is_stated or not message.tells_of(Code.NOT_ONE_RAY):
             said[message.severity].append(message)
-    is_whole = all(name in entries or BY_NAME[name].is_picture for name in asked)
+    is_whole = all(name in entries or BY_NAME[name].files for name in asked)
     failures = moments.failures or tuple(Failure(None, message) for message in said[Severity.FAILURE])
     return CurveResult(
         curve=curve,

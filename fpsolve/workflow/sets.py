@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from fpsolve.case.case import Case
+from fpsolve.case.sections import RESPONSE
 from fpsolve.errors import WorkersDied
 from fpsolve.files import atomic
 from fpsolve.model.quantity import MOMENT, SECONDS, STATUS
@@ -24,6 +25,7 @@ from fpsolve.page.page import Note
 from fpsolve.parts.eigenfunctions import write_curves
 from fpsolve.parts.every import BY_NAME
 from fpsolve.parts.question import Job
+from fpsolve.parts.response import write_response
 from fpsolve.pool import Pool, serial
 from fpsolve.results.curve import Status
 from fpsolve.show.notes import notes
@@ -125,7 +127,7 @@ class Sweep:
         """Solve what is not known yet, and draw; tables are written first, if anything is missing, and as they grow."""
         if self.done < self.case.planned:
             self.write_tables()
-        draws = [any(BY_NAME[name].is_picture for name in self.results.asked(number)) for number in (1, 2)]
+        draws = [any(BY_NAME[name].files for name in self.results.asked(number)) for number in (1, 2)]
         numbers = range(1, self.case.planned + 1)
         left = [number for number in numbers if draws[number > 1] or number not in self.results.whole]
         if len(left) < self.case.planned:
@@ -171,11 +173,9 @@ class Sweep:
         """Write the tables, results.nc, the series over the curves, and the files of what records hold."""
         self.write_tables()
         write_curves(self.case, self.folder)
-        recorded = [BY_NAME[name] for name in self.results.asked(1) if not BY_NAME[name].is_picture]
-        writers = {each.name: each.files for each in recorded if each.files}
-        for result in self.results if writers else ():
-            for name in writers.keys() & result.parts.keys():
-                writers[name](result.parts[name], result.curve, self.folder)
+        for result in self.results if RESPONSE in self.results.asked(1) else ():
+            if result.response:
+                write_response(result.response, result.curve, self.folder)
         table = self.results.table
         write_dataset(self.case, table, self.folder, self.facts)
         numbers = [each.values for each in table.values() if each.quantity not in (*COUNTS, STATUS, SECONDS)]
