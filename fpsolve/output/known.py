@@ -77,11 +77,6 @@ def read_into(job: Job, record: Entries, names: Mapping[str, str], *, is_all: bo
     return job
 
 
-def set_key(curve: Curve) -> str:
-    """What the records of a parameter set are found by."""
-    return key_of(curve.digest)
-
-
 class Results(Sequence[CurveResult]):
     """What is known of the curves of a case, in their order; each is made of its records when it is looked at.
 
@@ -111,7 +106,7 @@ class Results(Sequence[CurveResult]):
         vary, place = self._case.vary, number > 1
         curve = Curve(self._case.problem, vary.sets[number - 1], number)
         job = Job(curve, self._asked[place], self._numerics, vary.line_of(number))
-        return read_into(job, self._records.get(set_key(curve)), self._names[place], is_all=is_all)
+        return read_into(job, self._records.get(curve.digest), self._names[place], is_all=is_all)
 
     def add(self, job: Job) -> CurveResult:
         """Take what is known of a curve into the table."""
@@ -124,11 +119,10 @@ class Results(Sequence[CurveResult]):
         self.says[number - 1] = says_more(self._case, result)
         return result
 
-    def put(self, number: int, record: Entries) -> CurveResult:
-        """Keep what was solved of the curve with a number."""
-        [curve] = self._case.curves(number - 1, number)
-        self._records.put(set_key(curve), record)
-        return self.add(self.job(number, is_all=True))
+    def put(self, curve: Curve, record: Entries) -> CurveResult:
+        """Keep what was solved of a curve."""
+        self._records.put(curve.digest, record)
+        return self.add(self.job(curve.number, is_all=True))
 
     def add_rest(self) -> None:
         """Take in what is known of the sets that are not finished."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import tempfile
 from base64 import b64encode
 from collections.abc import Iterable, Iterator, Mapping
@@ -14,15 +13,6 @@ from typing import Any
 from fpsolve.errors import FpsolveError
 from fpsolve.messages import Code, Message
 from fpsolve.page.page import TONES, WORDS, Block, Drawing
-
-_FURTHER = re.compile(r"<(metadata|style)\b.*?</\1>", re.DOTALL)
-"""Elements of SVG that would be of the whole page, or that no page needs."""
-_COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
-"""A comment of XML."""
-_ID = re.compile(r'\bid="')
-"""The beginning of an id."""
-_REFERENCE = re.compile(r'(href="#|url\(#)')
-"""The beginning of a reference to an id."""
 
 
 def page_of(blocks: Iterable[Block], **head: Any) -> str:
@@ -59,32 +49,22 @@ def _templates() -> Any:
 
 def _pieces(blocks: Iterable[Block]) -> Iterator[tuple[str, Any]]:
     """What the template prints: blocks by the names of their classes, of drawings what was drawn."""
-    for number, block in enumerate(blocks):
+    for block in blocks:
         if not isinstance(block, Drawing):
             yield type(block).__name__, block
-        elif picture := _picture(block, f"d{number}"):
+        elif picture := _picture(block):
             yield "picture", {"title": block.title, **picture}
 
 
-def _picture(drawing: Drawing, name: str) -> Mapping[str, str]:
-    """SVG, or the content of a PNG file in base64, or why there is none; empty where there is nothing to draw."""
-    nothing = {"svg": "", "png": "", "missing": ""}
+def _picture(drawing: Drawing) -> Mapping[str, str]:
+    """The address that is a picture itself, or why there is none; empty where there is nothing to draw."""
     try:
         with tempfile.TemporaryDirectory() as place:
-            drawing.draw([path := Path(place, f"{name}.{drawing.kind}")], "")
+            drawing.draw([path := Path(place, f"picture.{drawing.kind}")], "")
             if not path.exists():
                 return {}
-            if drawing.kind == "png":
-                return nothing | {"png": b64encode(path.read_bytes()).decode()}
-            return nothing | {"svg": _inlined(path.read_text(encoding="utf-8"), name)}
+            kind = "svg+xml" if drawing.kind == "svg" else drawing.kind
+            return {"source": f"data:image/{kind};base64,{b64encode(path.read_bytes()).decode()}"}
     except Exception as failure:  # the numbers shall not be lost for a picture
         reason = str(failure) if isinstance(failure, FpsolveError) else f"{type(failure).__name__}: {failure}"
-        return nothing | {"missing": str(Message(Code.NO_PICTURE, reason=reason))}
-
-
-def _inlined(svg: str, name: str) -> str:
-    """SVG that stands in a page beside others: without its prologue, size and comments, its ids with a name."""
-    head, rest = _COMMENT.sub("", svg[svg.index("<svg") :]).split(">", 1)
-    head = re.sub(r' (width|height)="[^"]*"', "", head)
-    rest = _REFERENCE.sub(rf"\1{name}-", _ID.sub(f'id="{name}-', _FURTHER.sub("", rest)))
-    return f'{head} aria-hidden="true">{rest}'
+        return {"source": "", "missing": str(Message(Code.NO_PICTURE, reason=reason))}

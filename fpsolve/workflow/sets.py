@@ -120,7 +120,7 @@ class Sweep:
     def _grow(self, job: Job) -> None:
         """Keep what is known of the only set, and show it in the tables; once it is solved, only pictures are drawn."""
         if job.curve.number not in self.results.whole:
-            self.results.put(job.curve.number, record_of(job))
+            self.results.put(job.curve, record_of(job))
             self._write_if_due()
 
     def solve(self, pool: Pool, progress: Advance) -> None:
@@ -152,7 +152,7 @@ class Sweep:
 
     def _take(self, job: Job, each: Solved) -> bool:
         """Keep what became of a set, and its pictures; whether it has failed."""
-        is_failed = bool(each.record) and self.results.put(job.curve.number, each.record).status.fails
+        is_failed = bool(each.record) and self.results.put(job.curve, each.record).status.fails
         for name, content in each.files.items():
             with atomic(self.folder / name) as draft:
                 draft.write_bytes(content)
