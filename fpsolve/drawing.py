@@ -26,6 +26,8 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#0
 STYLE: dict[Any, Any] = {"font.size": 13, "mathtext.fontset": "cm", "axes.titlesize": 12}
 SIZE = (7.2, 5.0)
 """Width and height of a figure of `plot`, in inches."""
+DOTS: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 5, "elinewidth": 1.3, "capsize": 4}
+"""Of dots with bars, if nothing else is said."""
 MARKED = 40
 """Largest number of points of a line that each have a marker."""
 MOST_LINES = 10
@@ -255,16 +257,14 @@ def draw_line(axes: Axes, main: xarray.DataArray, error: xarray.DataArray | None
 
 def draw_dots(axes: Axes, x: FloatArray, y: FloatArray, error: FloatArray, **kwargs: Any) -> None:
     """Dots with bars of ± two standard errors."""
-    style = {"linestyle": "none", "marker": "o", "markersize": 5, "elinewidth": 1.3, "capsize": 4}
-    axes.errorbar(x, y, 2 * error, **{**style, **coloured(axes, kwargs)})
+    axes.errorbar(x, y, 2 * error, **{**DOTS, **coloured(axes, kwargs)})
 
 
 def draw_point(axes: Axes, main: xarray.DataArray, error: xarray.DataArray | None, **kwargs: Any) -> None:
     """One number with a bar of ± its error, above its symbol; several stand side by side."""
     name = str(main.attrs.get("symbol", main.name))
     size = None if error is None else [error.item()]
-    style = {"linestyle": "none", "marker": "o", "markersize": 6, "elinewidth": 1.3, "capsize": 5}
-    axes.errorbar([name], [main.item()], size, **{**style, **coloured(axes, kwargs)})
+    axes.errorbar([name], [main.item()], size, **{**DOTS, **coloured(axes, kwargs)})
     axes.set_ylabel(label_of(main.attrs))
     mark_zero(axes)
     axes.margins(x=0.3)

@@ -255,9 +255,7 @@ def _over_parameter(case: Case, pairs: Sequence[Pair], numbers: FloatArray) -> l
     shown, found = _some(len(groups)), []
     for i, (others, group) in enumerate(groups.items()):
         x = np.array([float(result.curve.varied[key]) for result, _ in group])
-        line = np.linspace(x.min(), x.max(), 100) if i in shown else _NOTHING
-        if line.size and x.min() > 0:
-            line = np.unique(np.concatenate([line, np.geomspace(x.min(), x.max(), 100)]))
+        line = (np.geomspace if x.min() > 0 else np.linspace)(x.min(), x.max(), 200) if i in shown else _NOTHING
         dots = [(at, _simulated(case, sample)) for at, (_, sample) in zip(x, group, strict=True) if sample]
         found.append(
             Series(
@@ -451,7 +449,10 @@ def _draw_values(axes: Any, values: FloatArray, edges: tuple[FloatArray, FloatAr
     limit = float(np.max(sizes, initial=0.0)) or 1.0
     middle = float(np.median(sizes)) if sizes.size else limit
     is_even = limit < 4 * middle
-    look = {"cmap": "RdBu_r", "norm": Normalize(-limit, limit) if is_even else AsinhNorm(middle, -limit, limit)}
+    look: dict[str, Any] = {
+        "cmap": "RdBu_r",
+        "norm": Normalize(-limit, limit) if is_even else AsinhNorm(middle, -limit, limit),
+    }
     bar = draw_colours(axes, *edges, np.ma.masked_invalid(values), about, shading="flat", **look)
     if is_even:
         bar.formatter.set_powerlimits((-2, 3))

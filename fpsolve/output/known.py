@@ -31,9 +31,8 @@ _ROW = tuple[tuple[float, ...], Limit | None]
 """The form of Λ(p) in a record, see `Job.rows`, and of the budget in which it was found."""
 
 
-def _entry(name: str) -> Any:
-    """The form of an `Entry` in a record."""
-    return tuple[BY_NAME[name].kind | None, Reason | None, float, Limit | None]
+_BESIDE = tuple[Reason | None, float, Limit | None]
+"""The form of an `Entry` in a record, beside what was found."""
 
 
 def names_of(asked: Asked, numerics: Numerics) -> dict[str, str]:
@@ -50,7 +49,10 @@ def names_of(asked: Asked, numerics: Numerics) -> dict[str, str]:
 def record_of(job: Job) -> Entries:
     """The entries of what was solved now of a set, and of each p."""
     names = names_of(job.asked, job.numerics)
-    record = {names[name]: plain(_entry(name), tuple(vars(each).values())) for name, each in job.new.items()}
+    record = dict[str, Any]()
+    for name, each in job.new.items():
+        beside = plain(_BESIDE, (each.reason, each.seconds, each.limit))
+        record[names[name]] = [plain(BY_NAME[name].kind | None, each.found), *beside]
     if MOMENTS.name in job.new or MOMENTS.name not in job.entries:
         limit = job.new[MOMENTS.name].limit if MOMENTS.name in job.new else job.numerics.limit
         known = ((p, job.rows[p]) for p in job.asked[MOMENTS.name]["p"] if p in job.rows)
@@ -64,7 +66,8 @@ def read_into(job: Job, record: Entries, names: Mapping[str, str], *, is_all: bo
     """Give a job what its record has of what is asked: what is settled, or all; what cannot be read is not there."""
     for name in job.asked:
         with suppress(ValueError, KeyError):
-            entry = Entry(*made(_entry(name), record[names[name]]))
+            found, *beside = record[names[name]]
+            entry = Entry(made(BY_NAME[name].kind | None, found), *made(_BESIDE, beside))
             if is_all or job.numerics.settles(entry.limit):
                 job.entries[name] = entry
     with suppress(ValueError, KeyError):

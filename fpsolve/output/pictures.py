@@ -150,14 +150,8 @@ def _draw_panels(case: Case, curve: Curve, found: xarray.Dataset, paths: Sequenc
     form = Format(width=7.2 if columns == 1 else 11.5, height=3.6 if rows == 1 else 2.6, scale=1.1)
     with figure_for(paths, heading, curve.held(case.units.time), form) as figure:
         axes = np.ravel(figure.subplots(rows, columns))
-        for place, (axis, (words, values)) in enumerate(zip(axes, panels, strict=False)):
-            is_right = place % columns == columns - 1 or place == len(panels) - 1
-            about = {"long_name": "density", "units": grid.unit} if is_right else {"long_name": "", "units": "1"}
-            grid.draw(axis, values.values, about, vmin=0.0)
-            if place % columns:
-                axis.set_ylabel("")
-            if place + columns < len(panels):
-                axis.set_xlabel("")
+        for axis, (words, values) in zip(axes, panels, strict=False):
+            grid.draw(axis, values.values, {"long_name": "density", "units": grid.unit}, vmin=0.0)
             means = (f": mean {each.symbol} {mean:.1%}" for each, mean in grid.means(values.values).items())
             axis.set_title("".join([words, *means]), parse_math=False)
         for axis in axes[len(panels) :]:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING
+from typing import Any
 
 from fpsolve.analysis.excursions import Excursion
+from fpsolve.analysis.spreads import Spread
 from fpsolve.case.case import Case
-from fpsolve.exponent.error import digits
+from fpsolve.exponent.error import Estimate, digits
 from fpsolve.exponent.quantities import (
     CRITICAL_RESTITUTION,
     INDICES,
@@ -25,9 +26,6 @@ from fpsolve.page.page import Block, Column, Grid, Sentence, filled
 from fpsolve.parts.intervals import INTERVAL, spreads_of
 from fpsolve.results.curve import CurveResponse, CurveResult
 from fpsolve.results.text import NUMBER_COLUMNS, interval, percent, row_of, units_in_words
-
-if TYPE_CHECKING:
-    pass
 
 
 def told_indices(case: Case) -> list[Index]:
@@ -55,17 +53,19 @@ def indices(case: Case, result: CurveResult) -> Iterator[Block]:
     if case.figure.x != "p":
         return
     found_spreads, problem = spreads_of(case, result), result.curve.problem
-    spreads, of_p, rows = found_spreads.indices, found_spreads.moments, list[list[str]]()
-    for index in told_indices(case):
-        found, spread = result.estimates[index.name], spreads.get(index.name)
-        row, theory = row_of(index, found, case.units.time), index.theory(problem) if found else math.nan
-        row[2] = index_text(index, result)
-        row.append(f"{theory:.6g}, Eq. {index.closed_form}" if math.isfinite(theory) else "")
-        rows.append([*row, interval(spread.low, spread.high) if spread else ""])
+    told: list[tuple[Any, Estimate | None, float, Spread | None]] = [
+        (index, found, index.theory(problem) if found else math.nan, found_spreads.indices.get(index.name))
+        for index in told_indices(case)
+        for found in [result.estimates[index.name]]
+    ]
     if square := result.moment(2.0):
         [closed] = result.moments.perturbation[result.moments.p == 2]
-        told, spread = f"{closed:.6g}, Eq. {MOMENT.closed_form}" * math.isfinite(closed), of_p.get(2.0)
-        row = [*row_of(MEAN_SQUARE, square, case.units.time), told]
+        told.append((MEAN_SQUARE, square, closed, found_spreads.moments.get(2.0)))
+    rows = list[list[str]]()
+    for about, found, theory, spread in told:
+        row = row_of(about, found, case.units.time)
+        row[2] = row[2] or index_text(about, result)
+        row.append(f"{theory:.6g}, Eq. {about.closed_form}" if math.isfinite(theory) else "")
         rows.append([*row, interval(spread.low, spread.high) if spread else ""])
     if any(result.estimates.values()):
         yield filled("", [*NUMBER_COLUMNS, Column("perturbation theory", 3), Column(INTERVAL, 1)], rows)
