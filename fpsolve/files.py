@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from secrets import token_hex
-from typing import Any, NoReturn, TextIO
+from typing import Any, NoReturn
 
 from fpsolve.errors import OutputError
 from fpsolve.messages import Code, Message, Remedy
@@ -127,15 +127,8 @@ def write_json(path: Path, data: Any, indent: int | None = 1) -> None:
     write_text(path, json.dumps(data, indent=indent, allow_nan=False, ensure_ascii=False) + "\n")
 
 
-@contextmanager
-def draft(path: Path) -> Iterator[TextIO]:
-    """A file that is open for writing text as UTF-8, line ends as they are, and takes its place when it is whole."""
-    with atomic(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
-        yield file
-
-
 def write_csv(path: Path, columns: Sequence[str], rows: Iterable[Iterable[Any]]) -> None:
-    with draft(path) as file:
+    with atomic(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
         table = csv.writer(file)
         table.writerow(columns)
         table.writerows(rows)

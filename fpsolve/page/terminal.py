@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from shutil import get_terminal_size
 from textwrap import TextWrapper
 
 from rich.cells import cell_len
@@ -34,7 +35,7 @@ _TIED = "\0"
 
 def print_blocks(blocks: Iterable[Block], severities: Collection[Severity] = tuple(Severity)) -> None:
     """Print tables and sentences on the standard output, and notes of some severities on the standard error."""
-    output, errors = Screen.of(), Screen.of(errors=True)
+    output, errors = Screen(), Screen(errors=True)
     has_begun = has_grid = False
     for block in blocks:
         if isinstance(block, Note):
@@ -53,29 +54,17 @@ def print_blocks(blocks: Iterable[Block], severities: Collection[Severity] = tup
         output.say("")
 
 
-@dataclass(frozen=True)
 class Screen:
-    """The standard output, or errors.
+    """The standard output, or errors; what is no terminal takes lines of any length."""
 
-    Attributes:
-        console: which prints.
-        width: of the terminal, or `ENDLESS`.
-    """
-
-    console: Console
-    width: int
-
-    @classmethod
-    def of(cls, *, errors: bool = False) -> Screen:
-        console = Console(stderr=errors)
-        if not console.file.isatty():
-            console = Console(stderr=errors, width=ENDLESS)
-        elif console.is_dumb_terminal:
-            from shutil import get_terminal_size  # with its compression it takes longer than the rest
-
-            size = get_terminal_size()  # rich takes 80 columns
-            console = Console(stderr=errors, width=size.columns, height=size.lines)
-        return cls(console, console.width)
+    def __init__(self, *, errors: bool = False) -> None:
+        self.console = Console(stderr=errors)
+        if not self.console.file.isatty():
+            self.console = Console(stderr=errors, width=ENDLESS)
+        elif self.console.is_dumb_terminal:  # of which rich takes 80 columns
+            width, height = get_terminal_size()
+            self.console = Console(stderr=errors, width=width, height=height)
+        self.width = self.console.width
 
     def say(self, text: str, style: str = "") -> None:
         """Print a text in lines that fit, indented from the second one on; its own line ends remain."""

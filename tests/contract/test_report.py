@@ -231,9 +231,8 @@ class Page(HTMLParser):
         for name, value in attrs:
             if name == "id":
                 self.ids.append(value)
-            if name in ("href", "xlink:href", "src", "action", "data") and not value.startswith("data:"):
+            if name in ("href", "src", "action", "data") and not value.startswith("data:"):
                 (self.inside if value.startswith("#") else self.outside).append(value.removeprefix("#"))
-            self.inside += re.findall(r"url\(#([^)]*)\)", value or "")
 
     def handle_data(self, data):
         self.text += f" {data}"
