@@ -55,11 +55,9 @@ class Format:
     @property
     def style(self) -> dict[Any, Any]:
         sizes = {
-            **{"font.size": 13, "axes.titlesize": 11, "figure.titlesize": 12.5, "legend.fontsize": 11},
-            **{"lines.linewidth": 1.6, "lines.markersize": 7, "lines.markeredgewidth": 1.6, "axes.linewidth": 0.9},
-            **{f"{side}tick.major.{what}": size for side in "xy" for what, size in (("size", 4), ("width", 0.9))},
-            **{f"{side}tick.minor.{what}": size for side in "xy" for what, size in (("size", 2.2), ("width", 0.7))},
-        }
+            "font.size": 13, "axes.titlesize": 11, "figure.titlesize": 12.5, "legend.fontsize": 11,
+            "lines.linewidth": 1.6, "lines.markersize": 7, "lines.markeredgewidth": 1.6, "axes.linewidth": 0.9,
+        }  # fmt: skip
         scaled = {name: self.scale * value for name, value in sizes.items()}
         return {**STYLE, **scaled, "legend.frameon": False, "pdf.fonttype": 42}
 

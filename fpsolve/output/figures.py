@@ -311,9 +311,8 @@ def draw_series(axes: Any, case: Case, series: Sequence[Series], over: Quantity,
     equation = (about.closed_form or MOMENT.closed_form) + ", reduced noise" * case.theory_reduces_noise
     colours = (_draw_few if is_few else _draw_many)(axes, case, series, equation)
     if simulated := [item.simulated for item in series if item.simulated is not None]:
-        size, line, cap = (5, 1.1, 4) if is_few else (3, 0.8, 0)
         style: dict[str, Any] = {"marker": ".", "color": "black", "markeredgewidth": points(1), "zorder": 5}
-        style |= {"markersize": points(size), "elinewidth": points(line), "capsize": points(cap)}
+        style |= {"markersize": points(5 if is_few else 3), "elinewidth": points(1), "capsize": points(3 * is_few)}
         draw_dots(axes, *np.concatenate(simulated, axis=1), label="Monte Carlo ± 2 standard errors", **style)
     axes.margins(x=0.03)
     return colours

@@ -49,7 +49,7 @@ def names_of(asked: Asked, numerics: Numerics) -> dict[str, str]:
 def record_of(job: Job) -> Entries:
     """The entries of what was solved now of a set, and of each p."""
     names = names_of(job.asked, job.numerics)
-    record = dict[str, Any]()
+    record = Entries()
     for name, each in job.new.items():
         beside = plain(_BESIDE, (each.reason, each.seconds, each.limit))
         record[names[name]] = [plain(BY_NAME[name].kind | None, each.found), *beside]

@@ -34,9 +34,8 @@ if TYPE_CHECKING:
 def _of_response(case: Case, result: CurveResult, folder: Path, simulated: SimulatedCurve | None) -> Iterator[Drawing]:
     """response.png and .pdf, where there are densities."""
     if case.output.figure and result.response and result.response.density:
-        title, name = f"Stationary response{result.curve.of}", f"response{result.curve.suffix}"
-        sample = simulated.response if simulated else None
-        yield Drawing(title, partial(_draw_response, case, result, sample), name, case.headline)
+        draw = partial(_draw_response, case, result, simulated and simulated.response)
+        yield Drawing(f"Stationary response{result.curve.of}", draw, f"response{result.curve.suffix}", case.headline)
 
 
 def _draw_response(
@@ -97,10 +96,8 @@ def _of_sensitivities(
 ) -> Iterator[Drawing]:
     """sensitivities.png and .pdf, if the case asks for them."""
     if case.output.sensitivities and result.sensitivities:
-        title, name = f"Effect of the parameters{result.curve.of}", f"sensitivities{result.curve.suffix}"
-        yield Drawing(
-            title, partial(_draw_sensitivities, case, result.curve, result.sensitivities), name, case.headline
-        )
+        curve, draw = result.curve, partial(_draw_sensitivities, case, result.curve, result.sensitivities)
+        yield Drawing(f"Effect of the parameters{curve.of}", draw, f"sensitivities{curve.suffix}", case.headline)
 
 
 def _draw_sensitivities(case: Case, curve: Curve, found: Sensitivities, paths: Sequence[Path], heading: str) -> None:

@@ -62,12 +62,11 @@ class Records:
     def get(self, key: str) -> Entries:
         """All entries of a key; none where nothing is known, or can be read."""
         entries = Entries()
-        if key in self._starts:
-            with suppress(OSError, ValueError), self.path.open("rb") as file:
-                for start in self._starts[key]:
-                    file.seek(start)
-                    if found := _parsed(file.readline()):
-                        entries |= json.loads(found[1], object_hook=unpacked)
+        with suppress(OSError, ValueError), self.path.open("rb") as file:
+            for start in self._starts.get(key, ()):
+                file.seek(start)
+                if found := _parsed(file.readline()):
+                    entries |= json.loads(found[1], object_hook=unpacked)
         return entries
 
     def put(self, key: str, entries: Mapping[str, Any]) -> None:

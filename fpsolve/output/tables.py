@@ -129,8 +129,8 @@ def in_case_words(messages: Sequence[str]) -> list[str]:
 
 def head(case: Case) -> dict[str, Any]:
     """What every table begins with."""
-    units = {"units": {"time": case.units.time}}
-    return {"case": case.name, "title": case.title, "fpsolve_version": __version__, **units}
+    units = {"time": case.units.time}
+    return {"case": case.name, "title": case.title, "fpsolve_version": __version__, "units": units}
 
 
 def parameters_of(curve: Curve) -> dict[str, dict[str, Any]]:

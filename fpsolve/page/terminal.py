@@ -5,7 +5,6 @@ Nothing is cut, and no word and no number is broken.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import replace
 from shutil import get_terminal_size
@@ -27,10 +26,6 @@ COLOURS = {Severity.FAILURE: "bold red", Severity.WARNING: "yellow", Severity.NO
 """The styles of notes."""
 SEVERAL_WORDS = 18
 """Letters of a line of a text in a table, at least where it has as many."""
-_TIE = re.compile(r"(?<=\S) (=|±|<=|<|>) (?=\S)")
-"""What holds a name and a number together in one line: "D0 = 0.1", "0.1 ± 1e-3"."""
-_TIED = "\0"
-"""The letter in place of a space at which no line ends."""
 
 
 def print_blocks(blocks: Iterable[Block], severities: Collection[Severity] = tuple(Severity)) -> None:
@@ -129,8 +124,4 @@ def wrapped(text: str, width: int) -> list[str]:
     """A text in lines of at most this width, but for longer words; those from the second on are indented."""
     start = text[: len(text) - len(text.lstrip())]
     wrapper = TextWrapper(max(width, 20), start, start + "  ", break_long_words=False, break_on_hyphens=False)
-    tied = _TIE.sub(lambda match: match[0].replace(" ", _TIED), text.strip())
-    lines = wrapper.wrap(tied) or [""]
-    if max(map(len, lines)) > width:
-        lines = wrapper.wrap(text.strip()) or [""]
-    return [line.replace(_TIED, " ") for line in lines]
+    return wrapper.wrap(text.strip()) or [""]

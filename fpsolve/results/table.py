@@ -6,7 +6,7 @@ A row is what one curve adds: a number for each column by its name, or several, 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -33,7 +33,7 @@ class Column:
     values: FloatArray
 
 
-class Table(Mapping[str, Column]):
+class Table(dict[str, Column]):
     """Columns by the names of their quantities.
 
     Args:
@@ -44,23 +44,13 @@ class Table(Mapping[str, Column]):
 
     def __init__(self, quantities: Sequence[Quantity], count: int, p: FloatArray) -> None:
         self._places = {each: place for place, each in enumerate(p.tolist())}
-        self._columns = {
-            each.name: Column(each, np.full((count, p.size) if each.dims else count, math.nan)) for each in quantities
-        }
-
-    def __getitem__(self, name: str) -> Column:
-        return self._columns[name]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._columns)
-
-    def __len__(self) -> int:
-        return len(self._columns)
+        for each in quantities:
+            self[each.name] = Column(each, np.full((count, p.size) if each.dims else count, math.nan))
 
     def put(self, curve: int, row: Row) -> None:
         """Fill in what a curve adds, counted from 0."""
         places = [self._places[p] for p in row["p"].tolist()] if self._places else []
-        for name, column in self._columns.items():
+        for name, column in self.items():
             if (found := row.get(name)) is not None:
                 column.values[(curve, places) if column.quantity.dims else curve] = found
 
