@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 def _of_response(case: Case, result: CurveResult, folder: Path, simulated: SimulatedCurve | None) -> Iterator[Drawing]:
     """response.png and .pdf, where there are densities."""
     if case.output.figure and result.response and result.response.density:
-        draw = partial(_draw_response, case, result, simulated and simulated.response)
+        draw = partial(_draw_response, case, result, simulated.response if simulated else None)
         yield Drawing(f"Stationary response{result.curve.of}", draw, f"response{result.curve.suffix}", case.headline)
 
 
