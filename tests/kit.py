@@ -165,9 +165,13 @@ def simulate_curves(case: Case) -> list[SimulatedCurve]:
 def from_record(case: Case, solved: Any) -> CurveResult:
     """A solved set as it comes back from its record."""
     asked, numerics = everything(case), Numerics.of(case)
-    record = json.loads(json.dumps(solved.record, default=packed), object_hook=unpacked)
-    job = Job(solved.result.curve, asked, numerics)
+    record, job = read_again(solved.record), Job(solved.result.curve, asked, numerics)
     return result_of(read_into(job, record, names_of(asked, numerics), is_all=True))
+
+
+def read_again(record: Any) -> Any:
+    """A record after it was written and read."""
+    return json.loads(json.dumps(record, default=packed), object_hook=unpacked)
 
 
 def read_json(path: Path) -> Any:

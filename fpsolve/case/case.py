@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
-from functools import cached_property, lru_cache, partial
+from functools import cached_property, partial
 from hashlib import sha256
 from pathlib import Path
 from typing import Annotated, Any, Self
@@ -87,7 +87,6 @@ MOST_FAULTS = 1000
 USUAL_P = 2.0
 
 
-@lru_cache(maxsize=1)  # of the curves of a case it is the same
 def _form(problem: Problem) -> str:
     """All that it is but for the values of its parameters, as text.
 

@@ -1,6 +1,5 @@
 """Parts of results: those of one's own, records of simulations to the last bit, and parts that fail."""
 
-import json
 import math
 from dataclasses import replace
 
@@ -11,7 +10,6 @@ from fpsolve import ExponentSolver, load_case
 from fpsolve.errors import NotConverged
 from fpsolve.exponent import INDICES
 from fpsolve.messages import message_of
-from fpsolve.output.records import packed, unpacked
 from fpsolve.parts import QUESTIONS, indices
 from fpsolve.results.curve import SimulatedCurve
 from fpsolve.simulation.estimators import MomentEstimate, MonteCarlo
@@ -20,7 +18,7 @@ from fpsolve.study import columns, solve
 from fpsolve.workflow import run_case, simulate
 from tests.contract.test_cases import CASES, ROOT
 from tests.contract.test_docs import typed
-from tests.kit import case_in, case_text, from_record, solve_sets
+from tests.kit import case_in, case_text, from_record, read_again, solve_sets
 
 MINIMAL = CASES / "minimal.toml"
 
@@ -78,11 +76,6 @@ def bits(thing):
     return bits([*vars(thing).items()]) if hasattr(thing, "__dataclass_fields__") else repr(thing)
 
 
-def recorded(simulated):
-    """The record of a simulation as it is read again."""
-    return json.loads(json.dumps(simulate.record_of(simulated), default=packed), object_hook=unpacked)
-
-
 def test_a_simulation_comes_back_from_its_record_to_the_last_bit(rng):
     curve = next(load_case(MINIMAL).curves())
     density = rng.normal(size=(3, 6)) * 10.0 ** rng.integers(-300, 300, size=(3, 6))
@@ -92,11 +85,11 @@ def test_a_simulation_comes_back_from_its_record_to_the_last_bit(rng):
     response = Response({"x": (1.0, math.nan), "energy": (0.1, 0.2)}, *edges, **more)
     for found in (response, None):
         simulated = SimulatedCurve(curve, RESULT, found, RESULT.warnings)
-        again = simulate.simulated_of(recorded(simulated), curve)
+        again = simulate.simulated_of(read_again(simulate.record_of(simulated)), curve)
         for name in ("result", "response", "warnings", "interrupted"):
             assert bits(getattr(again, name)) == bits(getattr(simulated, name)), name
     numpy = replace(RESULT, time=np.float64(0.3), paths=np.int64(64))
-    record = recorded(SimulatedCurve(curve, numpy, None, ()))
+    record = read_again(simulate.record_of(SimulatedCurve(curve, numpy, None, ())))
     assert bits(simulate.simulated_of(record, curve).result) == bits(replace(RESULT, time=0.3))
     row, *rest = record["simulation"]
     wrong = [[each, *rest] for each in ({}, [row], {**row, "more": 0}, {**row, "paths": [{}]})]
