@@ -18,7 +18,6 @@ from fpsolve.case import Case
 from fpsolve.cli import main
 from fpsolve.model import CoefficientMatrix, LinearSystem, Noise, System
 from fpsolve.output.known import names_of, read_into, record_of
-from fpsolve.output.records import packed, unpacked
 from fpsolve.parts.question import Job, Numerics
 from fpsolve.results import CurveResult, SimulatedCurve
 from fpsolve.study.solve import everything, result_of, solve_curve
@@ -162,16 +161,10 @@ def simulate_curves(case: Case) -> list[SimulatedCurve]:
     return [simulate_curve(curve, orders, case.monte_carlo) for curve in case.curves()]
 
 
-def from_record(case: Case, solved: Any) -> CurveResult:
+def from_record(case: Case, curve: Any, record: Any) -> CurveResult:
     """A solved set as it comes back from its record."""
     asked, numerics = everything(case), Numerics.of(case)
-    record, job = read_again(solved.record), Job(solved.result.curve, asked, numerics)
-    return result_of(read_into(job, record, names_of(asked, numerics), is_all=True))
-
-
-def read_again(record: Any) -> Any:
-    """A record after it was written and read."""
-    return json.loads(json.dumps(record, default=packed), object_hook=unpacked)
+    return result_of(read_into(Job(curve, asked, numerics), record, names_of(asked, numerics), is_all=True))
 
 
 def read_json(path: Path) -> Any:

@@ -1,5 +1,6 @@
 """Parts of results: those of one's own, records of simulations to the last bit, and parts that fail."""
 
+import json
 import math
 from dataclasses import replace
 
@@ -10,6 +11,7 @@ from fpsolve import ExponentSolver, load_case
 from fpsolve.errors import NotConverged
 from fpsolve.exponent import INDICES
 from fpsolve.messages import message_of
+from fpsolve.output.records import packed, unpacked
 from fpsolve.parts import QUESTIONS, indices
 from fpsolve.results.curve import SimulatedCurve
 from fpsolve.simulation.estimators import MomentEstimate, MonteCarlo
@@ -18,7 +20,7 @@ from fpsolve.study import columns, solve
 from fpsolve.workflow import run_case, simulate
 from tests.contract.test_cases import CASES, ROOT
 from tests.contract.test_docs import typed
-from tests.kit import case_in, case_text, from_record, read_again, solve_sets
+from tests.kit import case_in, case_text, from_record, solve_sets
 
 MINIMAL = CASES / "minimal.toml"
 
@@ -39,7 +41,7 @@ def test_quantity_and_question_of_the_page_on_contributing_are_solved_and_tabula
     case = case.model_copy(update={"output": output})
     [solved] = solve_sets(case)
     expected = 0.5 * math.erfc(1.0 / (math.sqrt(2) * case.problem.noise.standard_deviation))
-    for result in (solved.result, from_record(case, solved)):
+    for result in (solved.result, from_record(case, solved.result.curve, read_again(solved.record))):
         assert result.parts[chance.name].value == pytest.approx(expected, rel=1e-8)
         row, solver = columns.row_of(case, result), ExponentSolver(case.problem)
         assert {each.name for each in columns.columns_of(case)} >= {index.name, f"{index.name}_error", chance.name}
@@ -76,6 +78,11 @@ def bits(thing):
     return bits([*vars(thing).items()]) if hasattr(thing, "__dataclass_fields__") else repr(thing)
 
 
+def read_again(record):
+    """A record after it was written and read."""
+    return json.loads(json.dumps(record, default=packed), object_hook=unpacked)
+
+
 def test_a_simulation_comes_back_from_its_record_to_the_last_bit(rng):
     curve = next(load_case(MINIMAL).curves())
     density = rng.normal(size=(3, 6)) * 10.0 ** rng.integers(-300, 300, size=(3, 6))
@@ -92,8 +99,8 @@ def test_a_simulation_comes_back_from_its_record_to_the_last_bit(rng):
     record = read_again(simulate.record_of(SimulatedCurve(curve, numpy, None, ())))
     assert bits(simulate.simulated_of(record, curve).result) == bits(replace(RESULT, time=0.3))
     row, *rest = record["simulation"]
-    wrong = [[each, *rest] for each in ({}, [row], {**row, "more": 0}, {**row, "paths": [{}]})]
-    wrong += [None, [], *([row, None, each] for each in ("a text", [1], [{"code": "NONE", "data": {}}]))]
+    wrong = [[each, *rest] for each in ({}, {**row, "more": 0}, {**row, "paths": [{}]})]
+    wrong += [None, [], *([row, None, each] for each in ("a text", [1]))]
     for each in wrong:
         with pytest.raises(ValueError, match=r"validation errors? for "):
             simulate.simulated_of({"simulation": each}, curve)
