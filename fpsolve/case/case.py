@@ -48,6 +48,7 @@ from fpsolve.case.sections import (
     UnitsSection,
     Value,
     Varied,
+    as_kind,
 )
 from fpsolve.case.toml import Place, dotted, read_document
 from fpsolve.case.uncertain import EXAMPLE as UNCERTAIN
@@ -207,7 +208,7 @@ class Case(Section):
     moments: Annotated[Moments, parameter("the orders p of the moments", "[moments] with p = [2.0]")]
     budget: Annotated[
         Budget,
-        BeforeValidator(lambda value: Budget(**value) if isinstance(value, dict) else value),
+        as_kind(Budget),
         parameter("the limits of the cost of a parameter set", "[budget]"),
     ] = Budget()
     vary: Annotated[

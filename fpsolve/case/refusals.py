@@ -17,7 +17,7 @@ import numpy as np
 from pydantic import ValidationError
 from pydantic.fields import FieldInfo
 
-from fpsolve.analysis.axis import axis_faults
+from fpsolve.analysis.axis import Axis
 from fpsolve.analysis.excursions import STATIONARY, check_start
 from fpsolve.analysis.target import said
 from fpsolve.arrays import FloatArray, is_log_spaced
@@ -27,7 +27,6 @@ from fpsolve.case.remedies import CASE_WORDS
 from fpsolve.case.sections import (
     EXCURSIONS,
     RESPONSE,
-    ChartAxis,
     ChartSection,
     ExcursionSection,
     Expectation,
@@ -315,8 +314,8 @@ def _of_chart(chart: ChartSection | None, valid: Known, context: Known) -> Itera
             return
 
 
-def _of_axis(axis: ChartAxis, problem: Problem, ranges: Mapping[str, FieldInfo]) -> Iterator[Refusal]:
-    """A key that is none to differentiate by, or ends that are out of its range, or not in order."""
+def _of_axis(axis: Axis, problem: Problem, ranges: Mapping[str, FieldInfo]) -> Iterator[Refusal]:
+    """A key that is none to differentiate by, or ends that are out of its range."""
     known = problem.differentiable
     if axis.key not in known:
         inert = [name for half in problem.sections.values() for name in half.inert]
@@ -333,7 +332,6 @@ def _of_axis(axis: ChartAxis, problem: Problem, ranges: Mapping[str, FieldInfo])
                 must = detail["msg"].replace("Input should be", "must be")
                 yield (name,), value, f"got {value}; {axis.key} {must}; choose another value"
             return
-    yield from axis_faults(axis.start, axis.stop, axis.scale, axis.at)
 
 
 def _without(key: str) -> str:
