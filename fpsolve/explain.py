@@ -14,7 +14,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails, InitErrorDetails, PydanticCustomError
 
 from fpsolve.messages import is_control
-from fpsolve.model.faults import TableError, accepted, choices, entry_of, fields_of, written_path
+from fpsolve.model.faults import accepted, choices, entry_of, fields_of, written_path
 from fpsolve.model.parameters import Section, example_of, meaning_of, parameter, without_unit
 
 _OWN, _RANGE = "own sentence", "range"
@@ -156,7 +156,17 @@ def explain(
         fields: of that model.
         varied: the ranges of the values of keys that are varied.
     """
-    faults = [(tuple(part for part in _place(each) if part not in TAGS), each) for each in faults_in(error)]
+    faults = [
+        (
+            tuple(
+                part
+                for part in (*each["loc"], *getattr(each.get("ctx", {}).get("error"), "path", ()))
+                if part not in TAGS
+            ),
+            each,
+        )
+        for each in faults_in(error)
+    ]
     misspelt = set[Path]()
     for path, detail in faults:
         if detail["type"] in _UNKNOWN and (guess := _guess(str(path[-1]), _known_keys(path, fields))):
@@ -164,12 +174,6 @@ def explain(
     for path, detail in faults:
         if (detail["type"] != "missing" or path not in misspelt) and detail["msg"] != DEPENDENT:
             yield path, written_path(path), _sentence(path, dict(detail), fields, varied)
-
-
-def _place(detail: ErrorDetails) -> Path:
-    """Where a fault is, also inside of the table of a `TableError`."""
-    told = detail.get("ctx", {}).get("error")
-    return (*detail["loc"], *(told.path if isinstance(told, TableError) else ()))
 
 
 def _known_keys(path: Path, fields: Mapping[str, FieldInfo]) -> list[str]:
@@ -183,8 +187,8 @@ def _sentence(
 ) -> str:
     kind, value = detail["type"], detail["input"]
     if kind in (_OWN, "value_error"):
-        told = detail["msg"] if kind == _OWN else detail["ctx"]["error"]
-        return told.text if isinstance(told, TableError) else str(told)
+        error = detail.get("ctx", {}).get("error")
+        return getattr(error, "text", str(error or detail["msg"]))
     if kind == "too_long":
         return too_long(detail)
     if kind in _UNKNOWN:
