@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pydantic import ValidationError
 from pydantic.fields import FieldInfo
 
 from fpsolve.analysis.axis import Axis
@@ -22,7 +21,7 @@ from fpsolve.analysis.excursions import STATIONARY, check_start
 from fpsolve.analysis.target import said
 from fpsolve.arrays import FloatArray, is_log_spaced
 from fpsolve.case.kinds import parameters_of, problem_of
-from fpsolve.case.read_vary import values_of
+from fpsolve.case.read_vary import column_of
 from fpsolve.case.remedies import CASE_WORDS
 from fpsolve.case.sections import (
     EXCURSIONS,
@@ -41,11 +40,12 @@ from fpsolve.case.sections import (
 )
 from fpsolve.case.vary import Vary, assignments, map_key
 from fpsolve.errors import FpsolveError, MeshError
-from fpsolve.explain import Refusal, faults_in, nearest, quoted, shown
+from fpsolve.explain import Refusal, nearest, quoted, shown
 from fpsolve.exponent.kinds import choose
 from fpsolve.exponent.quantities import INDICES
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.fem.space import Space
+from fpsolve.model.faults import accepted
 from fpsolve.model.parameters import Section
 from fpsolve.model.problem import Problem
 from fpsolve.simulation.setup import obstacles, simulated_parts
@@ -324,14 +324,10 @@ def _of_axis(axis: Axis, problem: Problem, ranges: Mapping[str, FieldInfo]) -> I
         text = f'got "{axis.key}";{nearest(axis.key, known)} must be one of {", ".join(known)}{told}'
         yield ("key",), axis.key, f"{text}; choose one of them"
         return
-    for name, value in (("start", axis.start), ("stop", axis.stop)):
-        try:
-            values_of(ranges[axis.key]).validate_python([value])
-        except ValidationError as error:
-            for detail in faults_in(error):
-                must = detail["msg"].replace("Input should be", "must be")
-                yield (name,), value, f"got {value}; {axis.key} {must}; choose another value"
-            return
+    field = ranges[axis.key]
+    for (_, i), value, _ in column_of(axis.key, [axis.start, axis.stop], field)[1]:
+        text = f"got {value}; {axis.key} must be {accepted(field)}; choose another value"
+        yield (("start", "stop")[int(i)],), value, text
 
 
 def _without(key: str) -> str:
