@@ -9,7 +9,6 @@ from datetime import UTC, datetime
 from decimal import ROUND_CEILING, ROUND_FLOOR, Decimal
 from functools import partial
 from pathlib import Path
-from time import monotonic
 from typing import Any, TypeAlias, cast
 
 from pydantic import TypeAdapter
@@ -58,8 +57,6 @@ PROVEN_RECORDS = "records/proven.jsonl"
 """The file of the records of bounds."""
 ENCLOSURES = TypeAdapter(Enclosure)
 """The form of bounds in a record."""
-EVERY = 30.0
-"""Seconds after which the curves that are done are written, so that a run that is killed keeps them."""
 _WORDS = Words("the proof", "a proof", "proof.json", "JSON", "make one with `fpsolve prove`")
 """The words of messages on a proof.json."""
 
@@ -345,36 +342,25 @@ def prove_case(
     answers, proofs = list[Answer](), list[CurveProof]()
     started = datetime.now(UTC)
 
-    def report() -> None:
-        if proofs:
-            facts, is_whole = facts_since(case, started), len(answers) == plan.total
-            write_report(case, folder, watch, show(case, proofs), facts=facts, files=[PROOF], complete=is_whole)
-
-    def write() -> list[CurveProof]:
-        proofs = plan.gathered(answers)
+    def finish() -> None:
+        proofs[:], is_whole = plan.gathered(answers), len(answers) == plan.total
         if proofs:
             with writable(folder):
-                write_proof(plan.case, proofs, folder, is_whole=len(answers) == plan.total)
-        return proofs
+                write_proof(case, proofs, folder, is_whole=is_whole)
+            facts = facts_since(case, started)
+            write_report(case, folder, watch, show(case, proofs), facts=facts, files=[PROOF], complete=is_whole)
 
     with (
         own_folder(case, out, (PROVEN,)) as folder,
         saying_if_interrupted(lambda: kept(len(answers), f"of {plan.total} bounds", folder)),
         watch.bar(Phase(case.name, "proving", plan.total, BOUNDS)) as progress,
         pool or serial() as workers,
+        shown_at_the_end(finish),
     ):
-        written = monotonic()
-        with shown_at_the_end(report):
-            try:
-                records, kept_as = Records(folder / PROVEN_RECORDS), dict[str, Any](read=verified, entries=record_of)
-                for _, found, is_known in answered(records, workers, answer, plan.questions(), key=_key, **kept_as):
-                    answers.append(found)
-                    progress(failed=not found.is_proven, known=is_known)
-                    if monotonic() - written > EVERY and len(answers) % plan.each == 0:
-                        write()
-                        written = monotonic()
-            finally:
-                proofs = write()
+        records, kept_as = Records(folder / PROVEN_RECORDS), dict[str, Any](read=verified, entries=record_of)
+        for _, found, is_known in answered(records, workers, answer, plan.questions(), key=_key, **kept_as):
+            answers.append(found)
+            progress(failed=not found.is_proven, known=is_known)
     return proofs
 
 
