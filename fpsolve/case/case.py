@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property, partial
 from hashlib import sha256
@@ -396,16 +396,6 @@ class Case(Section):
         """One curve for each set of the varied values, from one place to another; each is made when it is asked for."""
         sets = enumerate(self.vary.sets[start:stop], start + 1)
         return (Curve(self.problem, varied, number) for number, varied in sets)
-
-    def membership(self) -> Callable[[Varied], bool]:
-        """Tells whether parameters by their keys are those of a curve."""
-        known, keys, constants = {tuple(each.values()) for each in self.vary.sets}, self.vary.keys, self.constants
-
-        def is_curve(values: Varied) -> bool:
-            varied = tuple(map(values.get, keys))
-            return varied in known and values == {**constants, **dict(zip(keys, varied, strict=True))}
-
-        return is_curve
 
     def curve(self, varied: Varied) -> Curve:
         """The case's parameter set with some parameters replaced, by their dotted keys."""
