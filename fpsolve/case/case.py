@@ -481,8 +481,8 @@ def load_case(path: str | Path, overrides: Sequence[str] = (), options: Mapping[
             raise CaseError(
                 str(path), [Fault("", None, f"has {count} faults; start from a copy of a case, see `fpsolve new`")]
             ) from None
-        fields, parameters = sections_of(Case.model_fields, data), parameters_of({}, context)
-        faults += (document.fault(*fault) for fault in explain(error, fields, parameters or {}))
+        fields = sections_of(Case.model_fields, data)
+        faults += (document.fault(*fault) for fault in explain(error, fields, parameters_of({}, context) or {}))
     except RecursionError:
         faults.append(Fault("", None, "tables are nested too deeply; name each key with its section only"))
     faults += _faults_of_name(Path(path).stem)
