@@ -29,6 +29,7 @@ from fpsolve.case.refusals import REFUSALS
 from fpsolve.case.removed import take_removed
 from fpsolve.case.sections import (
     EIGENFUNCTIONS,
+    EVERYTHING,
     EXCURSIONS,
     MOST_NAMED,
     QUANTITY_NAMES,
@@ -296,7 +297,7 @@ class Case(Section):
         named |= {RESPONSE if each.of_response else each.quantity for each in self.expect}
         named |= self.model_fields_set & {EXCURSIONS, RESPONSE}
         usual = {
-            RESPONSE: RESPONSE not in named and self.responds,
+            RESPONSE: self.responds and self.planned <= MOST_DRAWN,
             SENSITIVITIES: self.output.sensitivities,
             EIGENFUNCTIONS: self.output.asks_for_eigenfunctions
             or (self.output.eigenfunctions is None and self.method.pictures.is_seen),
@@ -308,8 +309,8 @@ class Case(Section):
         """What else there is of this case, where it leaves open what is computed."""
         if self.output.names is not None:
             return ()
-        is_there = {RESPONSE: self.responds, EIGENFUNCTIONS: not self.method.no_picture}
-        is_there |= dict.fromkeys(OF_IMPACTS, bool(self.problem.system.jumps)) | {DERIVATIVE.name: False}
+        is_there = {RESPONSE: False, DERIVATIVE.name: False, EIGENFUNCTIONS: not self.method.no_picture}
+        is_there |= dict.fromkeys(OF_IMPACTS, bool(self.problem.system.jumps))
         if not self.method.has_pairs:
             is_there |= dict.fromkeys({*QUANTITY_NAMES} - {MOMENT.name, SENSITIVITIES}, False)
         known = {*self.asked} - ({EIGENFUNCTIONS} if not self.output.asks_for_eigenfunctions else set())
@@ -337,17 +338,13 @@ class Case(Section):
     @property
     def has_response(self) -> bool:
         """Whether the stationary response is computed: it is named, or some of at most ten curves are nonlinear."""
-        if RESPONSE not in self.asked or self.response.off:
-            return False
-        is_named = self.output.lists_quantities or any(each.of_response for each in self.expect)
-        if is_named or (self.output.names is None and RESPONSE in self.model_fields_set):
-            return True
-        return self.responds and (self.planned <= MOST_DRAWN or self.output.names is not None)
+        is_named = self.output.quantities != EVERYTHING
+        return RESPONSE in self.asked and not self.response.off and (is_named or self.responds)
 
     @property
     def leaves_out_response(self) -> bool:
         """Whether it is not, as there are too many curves and nobody names it."""
-        return RESPONSE in self.asked and not (self.response.off or self.has_response) and self.responds
+        return self.output.names is None and RESPONSE not in self.asked and self.responds
 
     @cached_property
     def responds(self) -> bool:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
 from functools import partial
-from typing import Protocol
+from typing import Any
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
@@ -42,14 +42,11 @@ class Phase:
     unit: str = ""
 
 
-class Advance(Protocol):
-    """What a phase calls as it goes on."""
-
-    def __call__(self, count: int = 1, *, failed: int = 0, known: bool = False) -> None:
-        """So many steps are done, of which some failed; `known` are those that an earlier run has done."""
+Advance = Callable[..., None]
+"""What a phase calls as it goes on: with how many steps are done, `failed` of them, `known` if by an earlier run."""
 
 
-def ignore(count: int = 1, *, failed: int = 0, known: bool = False) -> None:
+def ignore(*_: Any, **__: Any) -> None:
     """Progress that is not shown."""
 
 

@@ -8,8 +8,9 @@ from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from decimal import ROUND_CEILING, ROUND_FLOOR, Decimal
 from functools import partial
+from itertools import zip_longest
 from pathlib import Path
-from typing import Any, TypeAlias, cast
+from typing import Any, TypeAlias
 
 from pydantic import TypeAdapter
 
@@ -88,52 +89,35 @@ class CurveProof:
         return verdicts(signs, 0 if self.exponent is None else self.exponent.sign)
 
 
-@dataclass(frozen=True)
-class Plan:
-    """What is to be proven of a case, the same of every curve: Λ at all p; λ and δ_p if [output] names them.
+def asked_of(case: Case) -> list[float | str]:
+    """What is to be proven of every curve of a case: Λ at all p; λ and δ_p if [output] names them."""
+    return [*case.p.tolist(), *(name for name in (LYAPUNOV_EXPONENT.name, STABILITY_INDEX.name) if name in case.asked)]
 
-    Attributes:
-        case: whose curves.
+
+def questions(case: Case, width: float | None) -> Iterator[Question]:
+    """For each curve those of what is asked, in its order.
+
+    Args:
         width: wanted upper − lower; a share of the scale if None.
     """
+    for curve in case.curves():
+        problem, stated = curve.problem, statement_of(curve.problem)
+        for each in asked_of(case):
+            if each == STABILITY_INDEX.name:
+                yield partial(prove_index, problem, stated, budget=case.budget)
+            else:
+                p = None if each == LYAPUNOV_EXPONENT.name else each
+                yield partial(prove_bounds, problem, stated, p, width, budget=case.budget)
 
-    case: Case
-    width: float | None
 
-    @property
-    def indices(self) -> list[str]:
-        """Those of λ and δ_p that are asked for."""
-        return [name for name in (LYAPUNOV_EXPONENT.name, STABILITY_INDEX.name) if name in self.case.asked]
-
-    @property
-    def each(self) -> int:
-        return len(self.case.p) + len(self.indices)
-
-    @property
-    def total(self) -> int:
-        return self.each * self.case.planned
-
-    def questions(self) -> Iterator[Question]:
-        for curve in self.case.curves():
-            problem, budget = curve.problem, self.case.budget
-            stated = statement_of(problem)
-            yield from (
-                partial(prove_bounds, problem, stated, p, self.width, budget=budget) for p in self.case.p.tolist()
-            )
-            if LYAPUNOV_EXPONENT.name in self.indices:
-                yield partial(prove_bounds, problem, stated, None, self.width, budget=budget)
-            if STABILITY_INDEX.name in self.indices:
-                yield partial(prove_index, problem, stated, budget=budget)
-
-    def gathered(self, answers: Sequence[Answer]) -> list[CurveProof]:
-        """What is proven of each curve, from the first answers, in the order of the questions."""
-        found, rest = [], iter(answers)
-        for curve in self.case.curves(stop=-(-len(answers) // self.each)):
-            moments = tuple((p, cast("Enclosure | None", next(rest, None))) for p in self.case.p.tolist())
-            indices: dict[str, Any] = {name: next(rest, None) for name in self.indices}
-            names = (LYAPUNOV_EXPONENT.name, STABILITY_INDEX.name)
-            found.append(CurveProof(curve, moments, *map(indices.get, names)))
-        return found
+def gathered(case: Case, answers: Sequence[Answer]) -> list[CurveProof]:
+    """What is proven of each curve, from the first answers, in the order of the questions."""
+    asked, found = asked_of(case), list[CurveProof]()
+    for curve in case.curves(stop=-(-len(answers) // len(asked))):
+        known: dict[Any, Any] = dict(zip_longest(asked, answers[len(found) * len(asked) :][: len(asked)]))
+        moments = tuple((p, known[p]) for p in case.p.tolist())
+        found.append(CurveProof(curve, moments, *map(known.get, (LYAPUNOV_EXPONENT.name, STABILITY_INDEX.name))))
+    return found
 
 
 def refuse_unprovable_case(case: Case, width: float | None) -> None:
@@ -146,7 +130,7 @@ def refuse_unprovable_case(case: Case, width: float | None) -> None:
         check_width(width)
     except ValueError as failure:
         raise FpsolveError(f"--width: {failure}") from None
-    if not Plan(case, width).each:
+    if not asked_of(case):
         raise FpsolveError(
             f"{case.path}: moments: missing; proofs are of Λ(p), λ and δ_p; add [moments] with p = [2.0]"
         )
@@ -338,12 +322,11 @@ def prove_case(
         KeyboardInterrupt: its text says what is kept.
     """
     refuse_unprovable_case(case, width)
-    plan = Plan(case, width)
-    answers, proofs = list[Answer](), list[CurveProof]()
+    answers, proofs, total = list[Answer](), list[CurveProof](), len(asked_of(case)) * case.planned
     started = datetime.now(UTC)
 
     def finish() -> None:
-        proofs[:], is_whole = plan.gathered(answers), len(answers) == plan.total
+        proofs[:], is_whole = gathered(case, answers), len(answers) == total
         if proofs:
             with writable(folder):
                 write_proof(case, proofs, folder, is_whole=is_whole)
@@ -352,13 +335,13 @@ def prove_case(
 
     with (
         own_folder(case, out, (PROVEN,)) as folder,
-        saying_if_interrupted(lambda: kept(len(answers), f"of {plan.total} bounds", folder)),
-        watch.bar(Phase(case.name, "proving", plan.total, BOUNDS)) as progress,
+        saying_if_interrupted(lambda: kept(len(answers), f"of {total} bounds", folder)),
+        watch.bar(Phase(case.name, "proving", total, BOUNDS)) as progress,
         pool or serial() as workers,
         shown_at_the_end(finish),
     ):
         records, kept_as = Records(folder / PROVEN_RECORDS), dict[str, Any](read=verified, entries=record_of)
-        for _, found, is_known in answered(records, workers, answer, plan.questions(), key=_key, **kept_as):
+        for _, found, is_known in answered(records, workers, answer, questions(case, width), key=_key, **kept_as):
             answers.append(found)
             progress(failed=not found.is_proven, known=is_known)
     return proofs
