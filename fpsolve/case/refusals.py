@@ -157,24 +157,23 @@ def _misfit(mesh: CylinderMesh, valid: Known) -> str:
 
 def _of_monte_carlo(section: MonteCarloSection, valid: Known, context: Known) -> Iterator[Refusal]:
     """The time, the step or a p of the simulation that is not right for the first parameter set."""
-    base = problem_of(valid)
-    if base is None or "vary" not in valid:
+    base, vary = problem_of(valid), valid.get("vary")
+    if base is None or vary is None:
         return
-    p = np.array(section.p or (0.0,))
-    vary: Vary = valid["vary"]
-    varied, place = vary.sets[0], vary.line_of(1) + _with(vary.sets[0])
-    is_known = section.p is None and "moments" in valid  # then there are such curves, and λ is finite
-    reason, faults = "" if is_known else obstacle(base, varied, p, with_moments=choose(base).has_pairs), {}
-    with suppress(ValueError):  # that is the reason
-        try:
-            faults = obstacles(*simulated_parts(base.at(varied)), time=section.time, step=section.step)
-        except FpsolveError as error:
-            yield (), None, place + error.message.words(CASE_WORDS)
-            return
+    varied, faults = vary.sets[0], dict[str, str]()
+    place = vary.line_of(1) + _with(varied)
+    try:
+        faults = obstacles(*simulated_parts(base.at(varied)), time=section.time, step=section.step)
+    except FpsolveError as error:
+        yield (), None, place + error.message.words(CASE_WORDS)
+        return
+    except ValueError:  # which [vary] tells of
+        pass
     for name, text in faults.items():
         if getattr(section, name) is not None:
             yield (name,), getattr(section, name), place + text
-    if reason:
+    p = np.array(section.p or ())
+    if section.p and (reason := obstacle(base, varied, p, with_moments=choose(base).has_pairs)):
         yield ("p",), section.p, place + reason
 
 

@@ -55,6 +55,8 @@ UNKNOWN = "#C4C8CE"
 """Of the rest of a frame."""
 NAMED = 0.01
 """Share of the frame from which on a region has room for a letter; smaller ones are in chart.json only."""
+LETTER = 0.0125, 0.055
+"""Width and height of a letter of a name, with what is free around it, in sides of the frame."""
 CLOSED_FORM: dict[str, Any] = {"linestyle": (0, (2, 3)), "linewidth": 1.4, "zorder": 3}
 """The look of a closed form."""
 FORM = Format(height=4.0)
@@ -351,32 +353,18 @@ def _shade(axes: Any, regions: Regions, frame: tuple[Axis, Axis]) -> dict[str, s
         box = {"facecolor": tint, "edgecolor": "none", "pad": 1.5, "alpha": 0.85}  # closed forms may cross the words
         middle: dict[str, Any] = {"ha": "center", "va": "center", "color": "0.15", "zorder": 4, "bbox": box}
         name = each.name.replace("δ_p", r"$\delta_p$")
-        parts = name.split(", ")
+        parts, size = name.split(", "), np.array(regions.index.shape)
         for lines in (parts, [line for part in parts for line in ([part] if "$" in part else wrap(part, 14))]):
-            words = axes.text(0, 0, "\n".join(lines), fontsize=9.5, **middle)
-            if place := _room(words, regions.index == number):
-                words.set_position((x.value(place[0]), y.value(place[1])))
+            half = 0.5 * np.array([max(map(len, lines)) * LETTER[0], len(lines) * LETTER[1]])
+            (left, low), (right, high) = (((each.at + end * half) * size).astype(int) for end in (-1, 1))
+            if min(left, low) >= 0 and (regions.index[left : right + 1, low : high + 1] == number).all():
+                words, height = "\n".join(lines), 9.5
                 break
-            words.remove()
         else:
-            if each.share > NAMED:
-                small[name] = rf"$\mathbf{{{next(letters, 'z')}}}$"
-                axes.text(x.value(each.at[0]), y.value(each.at[1]), small[name], fontsize=12, **middle)
+            words, height = rf"$\mathbf{{{next(letters, 'z')}}}$" if each.share > NAMED else "", 12.0
+            small |= {name: words} if words else {}
+        axes.text(x.value(each.at[0]), y.value(each.at[1]), words, fontsize=height, **middle)
     return small
-
-
-def _room(words: Any, inside: FloatArray) -> tuple[float, float] | None:
-    """Where the middle of words is deepest in a region with all of them inside, in shares of the sides; or None."""
-    from scipy.ndimage import distance_transform_edt, minimum_filter
-
-    box, n, inches = words.get_window_extent(), inside.shape[0], words.figure.dpi
-    shares = 1.05 * box.width / (0.85 * FORM.width * inches), 1.05 * box.height / (FORM.height * inches)
-    fits = minimum_filter(inside, [max(1, round(n * share)) for share in shares], mode="constant")
-    if not fits.any():
-        return None
-    depth = np.where(fits, distance_transform_edt(np.pad(inside, 1))[1:-1, 1:-1], 0)
-    u, v = np.unravel_index(int(np.argmax(depth)), depth.shape)
-    return (float(u) + 0.5) / n, (float(v) + 0.5) / n
 
 
 def _appears(target: Target) -> str | None:
