@@ -128,30 +128,24 @@ def _of_mesh(mesh: MeshSection, valid: Known, context: Known) -> Iterator[Refusa
 
 
 def _misfit(mesh: CylinderMesh, valid: Known) -> str:
-    """Why the mesh does not serve some noise, or nothing; those of one law in noise units are judged once."""
-    judged, base, section = set[tuple[object, ...]](), valid["noise"], valid["system"].noise_sections[0]
+    """Why the mesh does not serve the noise of the first parameter set, or nothing."""
+    base, section, varied = valid["noise"], valid["system"].noise_sections[0], valid["vary"].sets[0]
     if len(base.parts) > 1:
         return "a mesh is for one noise, but there are several; leave it out, and one is chosen for each p"
-    for varied in valid["vary"].among([f"{section}.{name}" for name in base.values]):
-        noise = base.at({key.rpartition(".")[2]: value for key, value in varied.items()})
-        shaping = {f"{section}.{name}": noise.values[name] for name in (*noise.shaped_by, *noise.words)}
-        if (shape := tuple(shaping.items())) in judged:
-            continue
-        judged.add(shape)
-        told = _with({key: value for key, value in varied.items() if key in shaping})
-        chosen = Space.on(mesh, noise)
-        size, most = chosen.size, valid["budget"].most(chosen)
-        if size > most:
-            return (
-                f"{told}makes {size} unknowns; must be at most budget.unknowns = {most}; use fewer cells or "
-                "lower degrees, or a larger [budget]"
-            )
-        try:
-            for each in (chosen, chosen.enriched().enriched()):  # the finer one tells the error
-                _ = each.xi.constant
-        except MeshError as failure:
-            lines = chosen.xi.lines
-            return f"{told}from xi = {lines[0]:g} to {lines[-1]:g} {failure}"
+    of_noise = {key.rpartition(".")[2]: value for key, value in varied.items() if key.startswith(f"{section}.")}
+    chosen = Space.on(mesh, base.at(of_noise))
+    size, most = chosen.size, valid["budget"].most(chosen)
+    if size > most:
+        return (
+            f"makes {size} unknowns; must be at most budget.unknowns = {most}; use fewer cells or "
+            "lower degrees, or a larger [budget]"
+        )
+    try:
+        for each in (chosen, chosen.enriched().enriched()):  # the finer one tells the error
+            _ = each.xi.constant
+    except MeshError as failure:
+        lines = chosen.xi.lines
+        return f"from xi = {lines[0]:g} to {lines[-1]:g} {failure}"
     return ""
 
 

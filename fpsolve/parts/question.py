@@ -213,14 +213,6 @@ def estimated(quantity: Quantity, estimate: Any) -> dict[Quantity, float | None]
     return {quantity: estimate and estimate.value, quantity.error(): estimate and estimate.error_estimate}
 
 
-def _nothing(*_: Any) -> tuple[()]:
-    return ()
-
-
-def _no_numbers(*_: Any) -> dict[Any, Any]:
-    return {}
-
-
 @dataclass(frozen=True, eq=False)
 class Question:
     """One thing that a case may ask for of each curve.
@@ -244,8 +236,8 @@ class Question:
     solve: Callable[[Job, Settings], Any] | None = None
     kind: Any = None
     symbol: str = ""
-    said: Callable[[Any, Curve, Numerics], Iterable[Message]] = _nothing
-    lacks: Callable[[Any, Settings], Iterable[Message]] = _nothing
-    numbers: Callable[[Case, CurveResult | None], Mapping[Quantity, Any]] = _no_numbers
+    said: Callable[[Any, Curve, Numerics], Iterable[Message]] = lambda *_: ()
+    lacks: Callable[[Any, Settings], Iterable[Message]] = lambda *_: ()
+    numbers: Callable[[Case, CurveResult | None], Mapping[Quantity, Any]] = lambda *_: {}
     files: Callable[[Any, Curve, Path], None] | None = None
     is_picture: bool = False
