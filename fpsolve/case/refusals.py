@@ -113,7 +113,7 @@ def obstacle(base: Problem, varied: Varied, p: FloatArray, *, with_moments: bool
 
 
 def _of_mesh(mesh: MeshSection, valid: Known, context: Known) -> Iterator[Refusal]:
-    """A mesh that cannot be read or made, is larger than the budget, or too wide for the noise of some curve."""
+    """A mesh that cannot be read or made, is larger than the budget, or too wide for the noise of the first set."""
     try:
         with np.errstate(all="ignore"):
             made = mesh.mesh(context.get("folder", Path()))
