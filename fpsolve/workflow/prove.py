@@ -89,7 +89,7 @@ class CurveProof:
         return verdicts(signs, 0 if self.exponent is None else self.exponent.sign)
 
 
-def asked_of(case: Case) -> list[float | str]:
+def asked_of(case: Case) -> list[Any]:
     """What is to be proven of every curve of a case: Λ at all p; λ and δ_p if [output] names them."""
     return [*case.p.tolist(), *(name for name in (LYAPUNOV_EXPONENT.name, STABILITY_INDEX.name) if name in case.asked)]
 

@@ -78,15 +78,15 @@ def map_of(case: Case, axes: object, tell: Callable[[Answer], None]) -> Answer:
         }
 
     def scans() -> Iterator[Scan]:
-        for row in chain.from_iterable(line.rows() for line in lines):
+        for row in chain.from_iterable(line.rows() for line in begun):
             grid[:] = grid if row.number else [[None] * row.count] * row.count
             found = scan_row(row)
             grid[row.number] = listed(np.sign(found.values))
             tell(answer(chart))
             yield found
 
-    chart, lines = Chart((), ()), begun_lines(case)
-    for chart in solve_chart(case, lines, scans(), has_closed_forms=False):
+    chart, begun = Chart((), ()), begun_lines(case)
+    for chart in solve_chart(case, begun, scans(), has_closed_forms=False):
         tell(answer(chart))
     grid.clear()
     return answer(chart)
