@@ -131,7 +131,7 @@ import fpsolve
 from fpsolve.drawing import label_axes, scale_axis
 
 case = fpsolve.load_case("{file}")
-x, y = case.chart.x.axis, case.chart.y.axis
+x, y = case.chart.x, case.chart.y
 figure, axes = plt.subplots(layout="constrained")
 table = pandas.read_csv("../../charts/{name}/chart.csv")
 for number, target in enumerate(case.chart.lines):

@@ -156,7 +156,17 @@ def explain(
         fields: of that model.
         varied: the ranges of the values of keys that are varied.
     """
-    faults = [(tuple(part for part in each["loc"] if part not in TAGS), each) for each in faults_in(error)]
+    faults = [
+        (
+            tuple(
+                part
+                for part in (*each["loc"], *getattr(each.get("ctx", {}).get("error"), "path", ()))
+                if part not in TAGS
+            ),
+            each,
+        )
+        for each in faults_in(error)
+    ]
     misspelt = set[Path]()
     for path, detail in faults:
         if detail["type"] in _UNKNOWN and (guess := _guess(str(path[-1]), _known_keys(path, fields))):
@@ -177,7 +187,8 @@ def _sentence(
 ) -> str:
     kind, value = detail["type"], detail["input"]
     if kind in (_OWN, "value_error"):
-        return str(detail["msg"] if kind == _OWN else detail["ctx"]["error"])
+        error = detail.get("ctx", {}).get("error")
+        return getattr(error, "text", str(error or detail["msg"]))
     if kind == "too_long":
         return too_long(detail)
     if kind in _UNKNOWN:

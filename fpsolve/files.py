@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from secrets import token_hex
-from typing import Any, NoReturn
+from typing import Any
 
 from fpsolve.errors import OutputError
 from fpsolve.messages import Code, Message, Remedy
@@ -108,18 +108,6 @@ def plain_text(path: Path) -> str:
     if not stat.S_ISREG(about.st_mode) or about.st_size > LARGEST:
         raise ValueError(f"{path} is no plain file, or larger than {LARGEST} bytes")
     return path.read_text(encoding="utf-8")
-
-
-def parsed_json(text: str | bytes) -> Any:
-    """The data of JSON without NaN and infinities. Raises ValueError, also where lists are nested too deeply."""
-
-    def refuse(constant: str) -> NoReturn:
-        raise ValueError(f"{constant} is no JSON")
-
-    try:
-        return json.loads(text, parse_constant=refuse)
-    except RecursionError:
-        raise ValueError("lists are nested too deeply") from None
 
 
 def write_json(path: Path, data: Any, indent: int | None = 1) -> None:

@@ -3,32 +3,36 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import ValidationError
 
 from fpsolve.analysis.target import said
 from fpsolve.arrays import shown
-from fpsolve.model.faults import strict_dataclass
+from fpsolve.model.faults import TableError, strict_dataclass
+from fpsolve.model.parameters import parameter
 from fpsolve.model.problem import Problem, checked_problem
 
+Scale = Literal["linear", "log"]
 
-def axis_faults(
-    start: float, stop: float, scale: str, at: Sequence[float]
-) -> Iterator[tuple[tuple[str | int, ...], float | None, str]]:
-    """What is wrong with the numbers of an axis: where, which value, and a sentence."""
-    if not start < stop:
-        yield (), None, f"got start = {start}, stop = {stop}; must be start < stop; exchange the two"
-        return
+
+def check_range(start: float, stop: float, scale: Scale, more: str = "") -> None:
+    """Refuse a range that does not increase, or cannot be logarithmic.
+
+    Args:
+        start, stop, scale: of the range.
+        more: what else may be done about ends that do not increase.
+
+    Raises:
+        TableError: of `start` alone where it is not positive.
+    """
+    if not 0 < stop - start < math.inf:
+        must = f"must be start < stop, with a finite difference; exchange the two{more}"
+        raise TableError(f"got start = {start}, stop = {stop}; {must}")
     if scale == "log" and start <= 0:
         remedy = 'must be > 0 where scale = "log"; use a positive start, or scale = "linear"'
-        yield ("start",), start, f"got {start}; {remedy}"
-    for i, value in enumerate(at):
-        if not start <= value <= stop:
-            known = f"must be from start = {start} to stop = {stop}; remove it, or widen the frame"
-            yield ("at", i), value, f"got {value}; {known}"
+        raise TableError(f"got {start}; {remedy}", "start")
 
 
 @strict_dataclass
@@ -45,15 +49,21 @@ class Axis:
         pydantic.ValidationError: start ≥ stop, or not positive on a log scale, or an `at` is not between them.
     """
 
-    key: str
-    start: float
-    stop: float
-    scale: Literal["linear", "log"] = "linear"
-    at: tuple[float, ...] = ()
+    key: Annotated[str, parameter("the parameter", 'key = "oscillator.omega"')]
+    start: Annotated[float, parameter("its smallest value", "start = 0.3")]
+    stop: Annotated[float, parameter("its largest value", "stop = 5.0")]
+    scale: Annotated[Scale, parameter("whether it is linear or logarithmic", 'scale = "log"')] = "linear"
+    at: Annotated[
+        tuple[float, ...],
+        parameter("values at which lines have a point exactly", "at = [1.0, 2.0]", strict=False, max_length=1000),
+    ] = ()
 
     def __post_init__(self) -> None:
-        for place, _, text in axis_faults(self.start, self.stop, self.scale, self.at):
-            raise ValueError(f"{place[0]}: {text}" if place else text)
+        check_range(self.start, self.stop, self.scale)
+        for i, value in enumerate(self.at):
+            if not self.start <= value <= self.stop:
+                known = f"must be from start = {self.start} to stop = {self.stop}; remove it, or widen the frame"
+                raise TableError(f"got {value}; {known}", "at", i)
 
     def value(self, share: Any) -> Any:
         """The parameter at a share of the way from start to stop."""

@@ -11,7 +11,7 @@ from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations, product
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -51,14 +51,13 @@ LARGEST = 0.1
 """Step that may be asked for, in sides of the frame."""
 
 
-class Known(Protocol):
-    """The points of a line that were solved, also by an earlier run."""
+Solve = Callable[[FloatArray], Sample | Message]
+"""F at (u, v), or why there is none."""
 
-    def find(self, rtol: float, at: FloatArray) -> Sample | Message | None:
-        """F at (u, v), or why there is none."""
 
-    def keep(self, rtol: float, at: FloatArray, found: Sample | Message) -> None:
-        """Keep it."""
+def solved_anew(at: FloatArray, solve: Solve) -> Sample | Message:
+    """F at a point of which nothing is known."""
+    return solve(at)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -106,7 +105,7 @@ class Boundary(Result):
         seconds: of the processor, that the scan and the branches took.
         obstacles: why branches that the scan shows may be missing.
         complete: whether all branches that the scan shows are there.
-        known: points that need not be solved again.
+        recall: gives F at a point that was solved earlier, or else solves it.
     """
 
     target: Target
@@ -120,7 +119,7 @@ class Boundary(Result):
     seconds: float = 0.0
     obstacles: tuple[Message, ...] = ()
     complete: bool = False
-    known: Known | None = None
+    recall: Callable[[FloatArray, Solve], Sample | Message] = solved_anew
 
     @property
     def branches(self) -> tuple[Branch, ...]:
@@ -281,12 +280,7 @@ class ZeroField:
         Raises:
             FpsolveError: there is none, or the time does not suffice.
         """
-        known = self._line.known
-        found = known.find(self._rtol, at) if known else None
-        if found is None:
-            found = self._solved(at)
-            if known:
-                known.keep(self._rtol, at, found)
+        found = self._line.recall(at, self._solved)
         if isinstance(found, Message):
             raise NotConverged(found)
         return found
@@ -370,8 +364,8 @@ def untraced(
 
 
 def is_of_line(reason: Message) -> bool:
-    """Whether the time for a line ended a row of its scan."""
-    return reason.code is Code.ROW_SPENT and reason.data["key"] == LINE_KEY
+    """Whether the time for a line ended it, or a row of its scan."""
+    return reason.code is Code.LINE_SPENT or (reason.code is Code.ROW_SPENT and reason.data["key"] == LINE_KEY)
 
 
 def crossed(lines: Sequence[Boundary]) -> list[Boundary]:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property, partial
 from hashlib import sha256
 from pathlib import Path
@@ -29,6 +29,7 @@ from fpsolve.case.refusals import REFUSALS
 from fpsolve.case.removed import take_removed
 from fpsolve.case.sections import (
     EIGENFUNCTIONS,
+    EVERYTHING,
     EXCURSIONS,
     MOST_NAMED,
     QUANTITY_NAMES,
@@ -48,6 +49,7 @@ from fpsolve.case.sections import (
     UnitsSection,
     Value,
     Varied,
+    as_kind,
 )
 from fpsolve.case.toml import Place, dotted, read_document
 from fpsolve.case.uncertain import EXAMPLE as UNCERTAIN
@@ -85,20 +87,6 @@ MOST_DRAWN = 10
 MOST_FAULTS = 1000
 """Of so many faults of a case at most each is told."""
 USUAL_P = 2.0
-
-
-def _form(problem: Problem) -> str:
-    """All that it is but for the values of its parameters, as text.
-
-    The class of a kind that has words follows from these, which are among the values.
-    """
-    found, sections = list[tuple[str, str, dict[str, str]]](), dict[str, Any](problem.sections)
-    for section, half in sections.items():
-        values, name = repr(tuple(half.values.items())), "" if half.words else type(half).__qualname__
-        others = {each.name: repr(vars(half)[each.name]) for each in fields(half) if each.repr}
-        kept = {name: text for name, text in others.items() if name not in half.values and text != values}
-        found.append((section, name, kept))
-    return repr(found)
 
 
 @dataclass(frozen=True)
@@ -146,8 +134,7 @@ class Curve:
     @property
     def digest(self) -> str:
         """What tells it from all parameter sets of all cases, in 64 letters; its problem is not made for that."""
-        stated = [_form(self.base), sorted(self.parameters.items())]
-        return sha256(json.dumps(stated).encode()).hexdigest()
+        return sha256(f"{self.base!r} with {sorted(self.parameters.items())}".encode()).hexdigest()
 
     @property
     def key(self) -> tuple[tuple[str, Value], ...]:
@@ -207,7 +194,7 @@ class Case(Section):
     moments: Annotated[Moments, parameter("the orders p of the moments", "[moments] with p = [2.0]")]
     budget: Annotated[
         Budget,
-        BeforeValidator(lambda value: Budget(**value) if isinstance(value, dict) else value),
+        as_kind(Budget),
         parameter("the limits of the cost of a parameter set", "[budget]"),
     ] = Budget()
     vary: Annotated[
@@ -310,7 +297,7 @@ class Case(Section):
         named |= {RESPONSE if each.of_response else each.quantity for each in self.expect}
         named |= self.model_fields_set & {EXCURSIONS, RESPONSE}
         usual = {
-            RESPONSE: RESPONSE not in named and self.responds,
+            RESPONSE: self.responds and self.planned <= MOST_DRAWN,
             SENSITIVITIES: self.output.sensitivities,
             EIGENFUNCTIONS: self.output.asks_for_eigenfunctions
             or (self.output.eigenfunctions is None and self.method.pictures.is_seen),
@@ -322,8 +309,8 @@ class Case(Section):
         """What else there is of this case, where it leaves open what is computed."""
         if self.output.names is not None:
             return ()
-        is_there = {RESPONSE: self.responds, EIGENFUNCTIONS: not self.method.no_picture}
-        is_there |= dict.fromkeys(OF_IMPACTS, bool(self.problem.system.jumps)) | {DERIVATIVE.name: False}
+        is_there = {RESPONSE: False, DERIVATIVE.name: False, EIGENFUNCTIONS: not self.method.no_picture}
+        is_there |= dict.fromkeys(OF_IMPACTS, bool(self.problem.system.jumps))
         if not self.method.has_pairs:
             is_there |= dict.fromkeys({*QUANTITY_NAMES} - {MOMENT.name, SENSITIVITIES}, False)
         known = {*self.asked} - ({EIGENFUNCTIONS} if not self.output.asks_for_eigenfunctions else set())
@@ -351,17 +338,13 @@ class Case(Section):
     @property
     def has_response(self) -> bool:
         """Whether the stationary response is computed: it is named, or some of at most ten curves are nonlinear."""
-        if RESPONSE not in self.asked or self.response.off:
-            return False
-        is_named = self.output.lists_quantities or any(each.of_response for each in self.expect)
-        if is_named or (self.output.names is None and RESPONSE in self.model_fields_set):
-            return True
-        return self.responds and (self.planned <= MOST_DRAWN or self.output.names is not None)
+        is_named = self.output.quantities != EVERYTHING
+        return RESPONSE in self.asked and not self.response.off and (is_named or self.responds)
 
     @property
     def leaves_out_response(self) -> bool:
         """Whether it is not, as there are too many curves and nobody names it."""
-        return RESPONSE in self.asked and not (self.response.off or self.has_response) and self.responds
+        return self.output.names is None and RESPONSE not in self.asked and self.responds
 
     @cached_property
     def responds(self) -> bool:
@@ -395,16 +378,6 @@ class Case(Section):
         """One curve for each set of the varied values, from one place to another; each is made when it is asked for."""
         sets = enumerate(self.vary.sets[start:stop], start + 1)
         return (Curve(self.problem, varied, number) for number, varied in sets)
-
-    def membership(self) -> Callable[[Varied], bool]:
-        """Tells whether parameters by their keys are those of a curve."""
-        known, keys, constants = {tuple(each.values()) for each in self.vary.sets}, self.vary.keys, self.constants
-
-        def is_curve(values: Varied) -> bool:
-            varied = tuple(map(values.get, keys))
-            return varied in known and values == {**constants, **dict(zip(keys, varied, strict=True))}
-
-        return is_curve
 
     def curve(self, varied: Varied) -> Curve:
         """The case's parameter set with some parameters replaced, by their dotted keys."""
@@ -505,8 +478,8 @@ def load_case(path: str | Path, overrides: Sequence[str] = (), options: Mapping[
             raise CaseError(
                 str(path), [Fault("", None, f"has {count} faults; start from a copy of a case, see `fpsolve new`")]
             ) from None
-        fields, parameters = sections_of(Case.model_fields, data), parameters_of({}, context)
-        faults += (document.fault(*fault) for fault in explain(error, fields, parameters or {}))
+        fields = sections_of(Case.model_fields, data)
+        faults += (document.fault(*fault) for fault in explain(error, fields, parameters_of({}, context) or {}))
     except RecursionError:
         faults.append(Fault("", None, "tables are nested too deeply; name each key with its section only"))
     faults += _faults_of_name(Path(path).stem)

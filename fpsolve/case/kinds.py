@@ -106,12 +106,9 @@ def _made(half: Half, table: Mapping[str, Any]) -> Parametrised:
             made = kind.from_table(known)
         except ValidationError as error:
             faults += details_of(error)
-        except TableError as error:
-            if not faults:
-                refuse([(error.path, None, error.text)])
         except (ValueError, TypeError) as error:
             if not faults:
-                raise ValueError(str(error)) from None
+                raise (error if isinstance(error, TableError) else ValueError(str(error))) from None
     refuse([], faults)
     return made
 
@@ -182,22 +179,18 @@ def parameters_of(valid: Mapping[str, Any], context: Mapping[str, Any]) -> dict[
         valid: the sections that are.
         context: with the kinds that the tables name.
     """
-    found = dict[str, FieldInfo]()
+    if problem := problem_of(valid):
+        known = problem.parameters.items()
+        return {key: fields_of(each.kind).get(key.rpartition(".")[2], UNBOUNDED) for key, each in known}
     kinds: Mapping[str, type[Parametrised]] = context.get("kinds", {})
-    for half in USUAL:
-        stated = {section: kind for section, kind in kinds.items() if section.partition(".")[0] == half}
-        sections = valid["system"].noise_sections if half == "noise" and "system" in valid else [*stated]
-        made = [] if half not in valid else [valid[half]] if half == "system" else [*valid[half].parts.values()]
-        if not sections or len(sections) not in (len(made), len(stated)):
-            return None
-        for k, section in enumerate(sections):
-            kind = type(made[k]) if made else [*stated.values()][k]
-            if not made and not kind.fields():
-                return None
-            names = made[k].values if made else {**kind.fields(), **kind.words}
-            section = kind.section if half == "system" else section
-            found |= {f"{section}.{name}": fields_of(kind).get(name, UNBOUNDED) for name in names}
-    return found
+    halves = {section.partition(".")[0] for section in kinds}
+    if halves != USUAL.keys() or not all(kind.fields() for kind in kinds.values()):
+        return None
+    return {
+        f"{kind.section if section == 'system' else section}.{name}": fields_of(kind)[name]
+        for section, kind in kinds.items()
+        for name in (*kind.fields(), *kind.words)
+    }
 
 
 def problem_of(valid: Mapping[str, Any]) -> Problem | None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import io
-import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from operator import itemgetter
@@ -43,22 +42,22 @@ Known = Mapping[str, FieldInfo]
 """The parameters of a case by their keys, each with its range."""
 
 
-def values_of(known: FieldInfo, most: int | None = None) -> TypeAdapter[Values]:
-    """What a list of values of a parameter must be, with at most so many entries."""
+def values_of(known: FieldInfo) -> TypeAdapter[Values]:
+    """What a list of values of a parameter must be."""
     number = Annotated[float, Field(), *known.metadata]
-    return TypeAdapter(Annotated[tuple[number, ...], Field(strict=False, min_length=1, max_length=most)], config=STRICT)
+    entries = Field(strict=False, min_length=1, max_length=MAX_MOMENTS)
+    return TypeAdapter(Annotated[tuple[number, ...], entries], config=STRICT)
 
 
 def vary_of(value: Any, info: ValidationInfo) -> Vary:
     """What [vary] means; a `Vary` is left. Raises ValidationError with all that is wrong with it."""
     context = info.context or {}
-    parameters = parameters_of(info.data, context)
     if isinstance(value, Vary):
         return value
     if not isinstance(value, dict):
         text = f"got {shown_with_kind(value)}; must be a table of lists and ranges; write, for example, {EXAMPLE}"
         raise ValueError(text)
-    if parameters is None:
+    if (parameters := parameters_of(info.data, context)) is None:
         refuse([((), value, DEPENDENT)])
         return Vary()
     table = flat(value, parameters)
@@ -70,7 +69,8 @@ def vary_of(value: Any, info: ValidationInfo) -> Vary:
         refusals.append((("mode",), mode, f'{text} write mode = "zip", or remove it'))
     for key, item in table.items():
         if key in parameters:
-            refusals += _column(key, item, parameters[key], columns)
+            columns[key], wrong = column_of(key, item, parameters[key])
+            refusals += wrong
         else:
             known = (*parameters, "mode", "file")
             text = f"cannot be varied;{nearest(key, known)} known keys: {', '.join(known)}; rename or remove it"
@@ -100,53 +100,42 @@ def _of_file(table: Mapping[str, Any], parameters: Known, folder: Path) -> Vary:
         raise
 
 
-def _column(key: str, values: Any, field: FieldInfo, columns: Columns) -> Iterator[Refusal]:
-    """What is wrong with the values of a key; without faults these join the columns."""
+def column_of(key: str, values: Any, field: FieldInfo) -> tuple[Column, list[Refusal]]:
+    """The values of a key that a list or a range states, and what is wrong with them."""
     texts = choices(field.annotation)
     if texts and not (is_list(values) and values):
         known = quoted(texts)
         text = f"got {shown_with_kind(values)}; must be a non-empty list of {known}; write, for example, "
-        yield (key,), values, f"{text}{key} = [{known}]"
-    elif texts:
+        return (), [((key,), values, f"{text}{key} = [{known}]")]
+    if texts:
+        wrong = list[Refusal]()
         for i, value in enumerate(values):
             if value not in texts:
                 text = f"got {shown_with_kind(value)}; must be one of {quoted(texts)};{nearest(value, texts)}"
-                yield (key, i), value, f"{text} write one of them"
-        columns[key] = tuple(map(str, values))
-    elif table_of(values):
-        yield from _range(key, values, field, columns)
-    else:
-        try:
-            columns[key] = values_of(field, MAX_MOMENTS).validate_python(values)
-        except ValidationError as error:
-            yield from (((key, *detail["loc"]), detail["input"], too_long(detail)) for detail in faults_in(error))
+                wrong.append(((key, i), value, f"{text} write one of them"))
+        return tuple(map(str, values)), wrong
+    if table_of(values):
+        return _range(key, values, field)
+    try:
+        return values_of(field).validate_python(values), []
+    except ValidationError as error:
+        return (), [((key, *each["loc"]), each["input"], too_long(each)) for each in faults_in(error)]
 
 
-def _range(key: str, table: Mapping[str, Any], field: FieldInfo, columns: Columns) -> Iterator[Refusal]:
-    """A range; where its ends are in the range of the key, so are the values between them."""
+def _range(key: str, table: Mapping[str, Any], field: FieldInfo) -> tuple[Column, list[Refusal]]:
+    """Those of a range; where its ends are in the range of the key, so are the values between them."""
     try:
         sweep = Sweep(**table)
     except ValidationError as error:
         faults = explain(error, Sweep.__pydantic_fields__)
-        yield from (((key, *path), table, sentence) for path, _, sentence in faults)
-        return
-    ends = ("start", sweep.start), ("stop", sweep.stop)
-    wrong = [ends[i] for i in _out_of_range(field, [end for _, end in ends])]
-    yield from (((key, name), end, "") for name, end in wrong)
-    values = tuple(sweep.values.tolist())
+        return (), [((key, *path), table, sentence) for path, _, sentence in faults]
+    values, ends = tuple(sweep.values.tolist()), ("start", "stop")
+    wrong: list[Refusal]
+    wrong = [((key, ends[int(i)]), end, "") for (_, i), end, _ in column_of(key, [sweep.start, sweep.stop], field)[1]]
     if repeats((each,) for each in values):
         text = f"got num = {sweep.num}, which makes values equal to 12 digits; use a smaller num, or ends further apart"
-        yield (key, "num"), sweep.num, text
-    elif not wrong:
-        columns[key] = values
-
-
-def _out_of_range(field: FieldInfo, values: Sequence[float]) -> list[int]:
-    try:
-        values_of(field).validate_python(values)
-    except ValidationError as error:
-        return [int(detail["loc"][0]) for detail in faults_in(error)]
-    return []
+        wrong.append(((key, "num"), sweep.num, text))
+    return values, wrong
 
 
 def _repeated(columns: Columns) -> Iterator[Refusal]:
@@ -201,7 +190,7 @@ def read_sets(file: str, folder: Path, parameters: Known) -> Vary:
     lines, columns, wrong = tuple(rows), Columns(), set[int]()
     for key, column in zip(header, zip(*rows.values(), strict=True), strict=False):
         if key in parameters:
-            columns[key], reasons = _cells(column, parameters[key])
+            columns[key], reasons = _cells(key, column, parameters[key])
             faults += ((lines[i], f"{key}: {reason}") for i, reason in reasons.items())
             wrong |= reasons.keys()
     for place, first in repeats(zip(*columns.values(), strict=True)) if len(columns) == len(header) else ():
@@ -234,28 +223,28 @@ def _wrong_length(cells: Sequence[str], header: Sequence[str]) -> str:
     return f"has {len(cells)} cell{'s' * (len(cells) > 1)}; must have {len(header)}, one for each key; {remedy}"
 
 
-def _cells(cells: Sequence[str], field: FieldInfo) -> tuple[Column, dict[int, str]]:
-    """The values in cells, 0 without a sign, and what is wrong with some, by their places."""
-    wrong = dict[int, str]()
-    if texts := choices(field.annotation):
-        for i, cell in enumerate(cells):
-            if cell not in texts:
-                wrong[i] = f"must be one of {', '.join(texts)};{nearest(cell, texts)} write one of them"
-        values: Column = tuple(cells)
-    else:
-        must, numbers = f"must be {accepted(field)} ({meaning_of(field)})", list[float]()
-        for i, cell in enumerate(cells):
-            try:
-                numbers.append(float(cell) + 0.0)
-            except ValueError:
-                numbers.append(math.nan)
+def _cells(key: str, cells: Sequence[str], field: FieldInfo) -> tuple[Column, dict[int, str]]:
+    """The values in cells, and what is wrong with some, by their places."""
+    texts, wrong = choices(field.annotation), dict[int, str]()
+    column, refusals = column_of(key, cells if texts else [_number(cell) for cell in cells], field)
+    must = f"must be {accepted(field)} ({meaning_of(field)})"
+    for (_, *place), value, _ in refusals:
+        for i in map(int, place):  # none of too many cells
+            cell, remedy = cells[i], "change it, or remove the row"
+            if texts:
+                must, remedy = f"must be one of {', '.join(texts)}", f"{nearest(cell, texts)} write one of them".strip()
+            elif _DECIMAL_COMMA.fullmatch(cell):
+                remedy = f"write the decimal point as {cell.replace(',', '.')}"
+            elif type(value) is str:
                 is_split = ";" in cell
                 remedy = "write commas between cells, and decimal points in numbers" if is_split else "write a number"
-                if _DECIMAL_COMMA.fullmatch(cell):
-                    remedy = f"write the decimal point as {cell.replace(',', '.')}"
-                wrong[i] = f"{must}; {remedy}"
-        for i in _out_of_range(field, numbers) if numbers else ():
-            wrong.setdefault(i, f"{must}; change it, or remove the row")
-        values = tuple(numbers)
-    got = (f"got {shortened(cell)}" if cell else "is empty" for cell in cells)
-    return values, {i: f"{each}; {wrong[i]}" for i, each in enumerate(got) if i in wrong}
+            wrong[i] = f"{f'got {shortened(cell)}' if cell else 'is empty'}; {must}; {remedy}"
+    return column or tuple(cells), wrong
+
+
+def _number(cell: str) -> float | str:
+    """The number in a cell, 0 without a sign; the cell where there is none."""
+    try:
+        return float(cell) + 0.0
+    except ValueError:
+        return cell

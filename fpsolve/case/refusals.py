@@ -14,20 +14,18 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pydantic import ValidationError
 from pydantic.fields import FieldInfo
 
-from fpsolve.analysis.axis import axis_faults
+from fpsolve.analysis.axis import Axis
 from fpsolve.analysis.excursions import STATIONARY, check_start
 from fpsolve.analysis.target import said
 from fpsolve.arrays import FloatArray, is_log_spaced
 from fpsolve.case.kinds import parameters_of, problem_of
-from fpsolve.case.read_vary import values_of
+from fpsolve.case.read_vary import column_of
 from fpsolve.case.remedies import CASE_WORDS
 from fpsolve.case.sections import (
     EXCURSIONS,
     RESPONSE,
-    ChartAxis,
     ChartSection,
     ExcursionSection,
     Expectation,
@@ -42,11 +40,12 @@ from fpsolve.case.sections import (
 )
 from fpsolve.case.vary import Vary, assignments, map_key
 from fpsolve.errors import FpsolveError, MeshError
-from fpsolve.explain import Refusal, faults_in, nearest, quoted, shown
+from fpsolve.explain import Refusal, nearest, quoted, shown
 from fpsolve.exponent.kinds import choose
 from fpsolve.exponent.quantities import INDICES
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.fem.space import Space
+from fpsolve.model.faults import accepted
 from fpsolve.model.parameters import Section
 from fpsolve.model.problem import Problem
 from fpsolve.simulation.setup import obstacles, simulated_parts
@@ -114,7 +113,7 @@ def obstacle(base: Problem, varied: Varied, p: FloatArray, *, with_moments: bool
 
 
 def _of_mesh(mesh: MeshSection, valid: Known, context: Known) -> Iterator[Refusal]:
-    """A mesh that cannot be read or made, is larger than the budget, or too wide for the noise of some curve."""
+    """A mesh that cannot be read or made, is larger than the budget, or too wide for the noise of the first set."""
     try:
         with np.errstate(all="ignore"):
             made = mesh.mesh(context.get("folder", Path()))
@@ -129,53 +128,46 @@ def _of_mesh(mesh: MeshSection, valid: Known, context: Known) -> Iterator[Refusa
 
 
 def _misfit(mesh: CylinderMesh, valid: Known) -> str:
-    """Why the mesh does not serve some noise, or nothing; those of one law in noise units are judged once."""
-    judged, base, section = set[tuple[object, ...]](), valid["noise"], valid["system"].noise_sections[0]
+    """Why the mesh does not serve the noise of the first parameter set, or nothing."""
+    base, section, varied = valid["noise"], valid["system"].noise_sections[0], valid["vary"].sets[0]
     if len(base.parts) > 1:
         return "a mesh is for one noise, but there are several; leave it out, and one is chosen for each p"
-    for varied in valid["vary"].among([f"{section}.{name}" for name in base.values]):
-        noise = base.at({key.rpartition(".")[2]: value for key, value in varied.items()})
-        shaping = {f"{section}.{name}": noise.values[name] for name in (*noise.shaped_by, *noise.words)}
-        if (shape := tuple(shaping.items())) in judged:
-            continue
-        judged.add(shape)
-        told = _with({key: value for key, value in varied.items() if key in shaping})
-        chosen = Space.on(mesh, noise)
-        size, most = chosen.size, valid["budget"].most(chosen)
-        if size > most:
-            return (
-                f"{told}makes {size} unknowns; must be at most budget.unknowns = {most}; use fewer cells or "
-                "lower degrees, or a larger [budget]"
-            )
-        try:
-            for each in (chosen, chosen.enriched().enriched()):  # the finer one tells the error
-                _ = each.xi.constant
-        except MeshError as failure:
-            lines = chosen.xi.lines
-            return f"{told}from xi = {lines[0]:g} to {lines[-1]:g} {failure}"
+    of_noise = {key.rpartition(".")[2]: value for key, value in varied.items() if key.startswith(f"{section}.")}
+    chosen = Space.on(mesh, base.at(of_noise))
+    size, most = chosen.size, valid["budget"].most(chosen)
+    if size > most:
+        return (
+            f"makes {size} unknowns; must be at most budget.unknowns = {most}; use fewer cells or "
+            "lower degrees, or a larger [budget]"
+        )
+    try:
+        for each in (chosen, chosen.enriched().enriched()):  # the finer one tells the error
+            _ = each.xi.constant
+    except MeshError as failure:
+        lines = chosen.xi.lines
+        return f"from xi = {lines[0]:g} to {lines[-1]:g} {failure}"
     return ""
 
 
 def _of_monte_carlo(section: MonteCarloSection, valid: Known, context: Known) -> Iterator[Refusal]:
     """The time, the step or a p of the simulation that is not right for the first parameter set."""
-    base = problem_of(valid)
-    if base is None or "vary" not in valid:
+    base, vary = problem_of(valid), valid.get("vary")
+    if base is None or vary is None:
         return
-    p = np.array(section.p or (0.0,))
-    vary: Vary = valid["vary"]
-    varied, place = vary.sets[0], vary.line_of(1) + _with(vary.sets[0])
-    is_known = section.p is None and "moments" in valid  # then there are such curves, and λ is finite
-    reason, faults = "" if is_known else obstacle(base, varied, p, with_moments=choose(base).has_pairs), {}
-    with suppress(ValueError):  # that is the reason
-        try:
-            faults = obstacles(*simulated_parts(base.at(varied)), time=section.time, step=section.step)
-        except FpsolveError as error:
-            yield (), None, place + error.message.words(CASE_WORDS)
-            return
+    varied, faults = vary.sets[0], dict[str, str]()
+    place = vary.line_of(1) + _with(varied)
+    try:
+        faults = obstacles(*simulated_parts(base.at(varied)), time=section.time, step=section.step)
+    except FpsolveError as error:
+        yield (), None, place + error.message.words(CASE_WORDS)
+        return
+    except ValueError:  # which [vary] tells of
+        pass
     for name, text in faults.items():
         if getattr(section, name) is not None:
             yield (name,), getattr(section, name), place + text
-    if reason:
+    p = np.array(section.p or ())
+    if section.p and (reason := obstacle(base, varied, p, with_moments=choose(base).has_pairs)):
         yield ("p",), section.p, place + reason
 
 
@@ -315,8 +307,8 @@ def _of_chart(chart: ChartSection | None, valid: Known, context: Known) -> Itera
             return
 
 
-def _of_axis(axis: ChartAxis, problem: Problem, ranges: Mapping[str, FieldInfo]) -> Iterator[Refusal]:
-    """A key that is none to differentiate by, or ends that are out of its range, or not in order."""
+def _of_axis(axis: Axis, problem: Problem, ranges: Mapping[str, FieldInfo]) -> Iterator[Refusal]:
+    """A key that is none to differentiate by, or ends that are out of its range."""
     known = problem.differentiable
     if axis.key not in known:
         inert = [name for half in problem.sections.values() for name in half.inert]
@@ -325,15 +317,10 @@ def _of_axis(axis: ChartAxis, problem: Problem, ranges: Mapping[str, FieldInfo])
         text = f'got "{axis.key}";{nearest(axis.key, known)} must be one of {", ".join(known)}{told}'
         yield ("key",), axis.key, f"{text}; choose one of them"
         return
-    for name, value in (("start", axis.start), ("stop", axis.stop)):
-        try:
-            values_of(ranges[axis.key]).validate_python([value])
-        except ValidationError as error:
-            for detail in faults_in(error):
-                must = detail["msg"].replace("Input should be", "must be")
-                yield (name,), value, f"got {value}; {axis.key} {must}; choose another value"
-            return
-    yield from axis_faults(axis.start, axis.stop, axis.scale, axis.at)
+    field = ranges[axis.key]
+    for (_, i), value, _ in column_of(axis.key, [axis.start, axis.stop], field)[1]:
+        text = f"got {value}; {axis.key} must be {accepted(field)}; choose another value"
+        yield (("start", "stop")[int(i)],), value, text
 
 
 def _without(key: str) -> str:

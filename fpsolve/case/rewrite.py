@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import os
 from collections.abc import Collection, Mapping, Sequence
-from itertools import takewhile
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
 import tomlkit
-from tomlkit.items import Comment, Table
 
 from fpsolve.case.case import Case
 from fpsolve.case.keys import get, put
@@ -79,21 +77,10 @@ def _with_data(text: str, data: Mapping[str, Any]) -> str:
 def _update(table: Any, data: Mapping[str, Any], before: Mapping[str, Any]) -> None:
     """Give a table the entries of data, as deep as both are tables; others stay as they are written."""
     for key in [key for key in before if key not in data]:
-        _remove(table, key)
+        del table[key]
     for key, value in data.items():
         old = before.get(key)
         if isinstance(value, dict) and isinstance(old, dict):
             _update(table[key], value, old)
         elif old != value or type(old) is not type(value):
             table[key] = value
-
-
-def _remove(table: Any, key: str) -> None:
-    """Remove an entry; comments after the last value of a section stay, as they speak of the next one."""
-    names, item = list(table), table[key]
-    before = table[names[names.index(key) - 1]]
-    if isinstance(item, Table) and isinstance(before, Table) and before is not item:
-        after = list(takewhile(lambda entry: entry[0] is None, reversed(item.value.body)))
-        for _, each in reversed(after) if any(isinstance(each, Comment) for _, each in after) else ():
-            before.value.append(None, each)
-    del table[key]

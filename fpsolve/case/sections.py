@@ -24,7 +24,7 @@ from pydantic import (
     model_validator,
 )
 
-from fpsolve.analysis.axis import Axis
+from fpsolve.analysis.axis import Axis, Scale, check_range
 from fpsolve.analysis.excursions import STATIONARY
 from fpsolve.analysis.target import EXAMPLES, Target, target_of
 from fpsolve.arrays import FloatArray
@@ -90,7 +90,6 @@ Varied = Mapping[str, Value]
 NonEmpty = Annotated[Values, Field(strict=False, min_length=1, max_length=MAX_MOMENTS)]
 Cells = Annotated[int | None, Field(ge=1, le=MAX_CELLS)]
 Degree = Annotated[int | None, Field(ge=1, le=MAX_DEGREE)]
-Scale = Literal["linear", "log"]
 KnownName = Literal[
     QuantityName,
     "response.amplitude",
@@ -134,6 +133,11 @@ def _printed(text: str) -> str:
 Text = Annotated[str, Field(min_length=1), AfterValidator(_printed)]
 
 
+def as_kind(kind: type) -> BeforeValidator:
+    """Makes a dataclass of a table."""
+    return BeforeValidator(lambda value: kind(**value) if isinstance(value, dict) else value)
+
+
 def same(value: Value, other: Value) -> bool:
     """Whether two values of a varied key are one."""
     if str in (type(value), type(other)):
@@ -166,14 +170,7 @@ class Sweep(Section):
 
     @model_validator(mode="after")
     def _increases(self) -> Self:
-        if not 0 < self.stop - self.start < math.inf:
-            raise ValueError(
-                f"got start = {self.start}, stop = {self.stop}; must be start < stop, with a finite "
-                "difference; exchange the two, or list a single value as in [2.0]"
-            )
-        if self.scale == "log" and self.start <= 0:
-            text = f'got {self.start}; must be > 0 where scale = "log"; use a positive start, or scale = "linear"'
-            refuse([(("start",), self.start, text)])
+        check_range(self.start, self.stop, self.scale, ", or list a single value as in [2.0]")
         return self
 
     @property
@@ -443,24 +440,6 @@ class OutputSection(Section):
         return self
 
 
-class ChartAxis(Section):
-    """{ key, start, stop, scale, at }: one side of the frame."""
-
-    key: Annotated[Text, parameter("the parameter", 'key = "oscillator.omega"')]
-    start: Annotated[float, parameter("its smallest value", "start = 0.3")]
-    stop: Annotated[float, parameter("its largest value", "stop = 5.0")]
-    scale: Annotated[Scale, parameter("whether it is linear or logarithmic", 'scale = "log"')] = "linear"
-    at: Annotated[
-        Values,
-        parameter("values at which lines have a point exactly", "at = [1.0, 2.0]", strict=False, max_length=1000),
-    ] = ()
-
-    @property
-    def axis(self) -> Axis:
-        """What the solver takes."""
-        return Axis(self.key, self.start, self.stop, self.scale, self.at)
-
-
 def _targets(value: Any) -> Any:
     """The entries of `lines` as `Target`s; those already made are left."""
     if not is_list(value) or not value:
@@ -483,8 +462,10 @@ def _targets(value: Any) -> Any:
 class ChartSection(Section):
     """[chart]: a frame of two parameters, and the lines in it."""
 
-    x: Annotated[ChartAxis, parameter("the abscissa", 'x = { key = "oscillator.omega", start = 0.3, stop = 5.0 }')]
-    y: Annotated[ChartAxis, parameter("the ordinate", 'y = { key = "noise.D0", start = 0.01, stop = 2.0 }')]
+    x: Annotated[
+        Axis, as_kind(Axis), parameter("the abscissa", 'x = { key = "oscillator.omega", start = 0.3, stop = 5.0 }')
+    ]
+    y: Annotated[Axis, as_kind(Axis), parameter("the ordinate", 'y = { key = "noise.D0", start = 0.01, stop = 2.0 }')]
     lines: Annotated[
         tuple[Target, ...],
         BeforeValidator(_targets, json_schema_input_type=Annotated[tuple[str, ...], Field(min_length=1)]),

@@ -157,11 +157,6 @@ class Noise(Parametrised):
         return 0.0
 
     @property
-    def shaped_by(self) -> Sequence[str]:
-        """The names of the parameters, besides the `words`, on which the law of z = ξ/std depends."""
-        return tuple(name for name in self.values if name not in self.words)
-
-    @property
     def half_width(self) -> float:
         """Half the width of the support of ξ, which is (−half_width, half_width); ∞ for the whole line."""
         return math.inf

@@ -12,19 +12,17 @@ from fpsolve.case.case import Case, Curve
 from fpsolve.model.quantity import STATUS
 from fpsolve.output.records import Entries, Records, key_of, made, plain
 from fpsolve.output.tables import says_more
-from fpsolve.parts.discretisation import QUESTION as DISCRETISATION
-from fpsolve.parts.discretisation import largest_of
 from fpsolve.parts.every import BY_NAME
 from fpsolve.parts.moments import QUESTION as MOMENTS
-from fpsolve.parts.question import Asked, Entry, Job, Largest, Limit, Numerics, Reason
+from fpsolve.parts.question import Asked, Entry, Job, Limit, Numerics, Reason
 from fpsolve.results.curve import CurveResult
 from fpsolve.study.columns import row_of, table_of
 from fpsolve.study.solve import everything, result_of
 
 KEPT = 100
 """So many results stay in memory, as of few curves all are asked for again."""
-ROW, LARGEST = "row", "largest"
-"""What the entries of Λ(p) are called, before their p; or before this of what the largest p was solved on."""
+ROW = "row"
+"""What the entries of Λ(p) are called, before their p."""
 
 
 _ROW = tuple[tuple[float, ...], Limit | None]
@@ -57,8 +55,6 @@ def record_of(job: Job) -> Entries:
         limit = job.new[MOMENTS.name].limit if MOMENTS.name in job.new else job.numerics.limit
         known = ((p, job.rows[p]) for p in job.asked[MOMENTS.name]["p"] if p in job.rows)
         record |= {f"{names[ROW]} {p!r}": plain(_ROW, (row, limit)) for p, row in known}
-    if record and "solver" in vars(job) and DISCRETISATION.name not in job.entries and (largest := largest_of(job)):
-        record[f"{names[ROW]} {LARGEST}"] = plain(Largest, largest)
     return record
 
 
@@ -70,8 +66,6 @@ def read_into(job: Job, record: Entries, names: Mapping[str, str], *, is_all: bo
             entry = Entry(made(BY_NAME[name].kind | None, found), *made(_BESIDE, beside))
             if is_all or job.numerics.settles(entry.limit):
                 job.entries[name] = entry
-    with suppress(ValueError, KeyError):
-        job.largest = made(Largest, record[f"{names[ROW]} {LARGEST}"])
     for p in job.asked[MOMENTS.name]["p"]:
         with suppress(ValueError, KeyError):
             row, limit = made(_ROW, record[f"{names[ROW]} {p!r}"])

@@ -33,8 +33,6 @@ Asked = Mapping[str, Settings]
 """What is asked of a curve, by the names of questions."""
 Limit = tuple[float, float]
 """Unknowns and seconds of a budget."""
-Largest = tuple[float, dict[str, Any]]
-"""A p, and the facts of what it was solved on."""
 SOON = 1.0
 """Seconds after which what is known of a curve is kept."""
 UNFINISHED = Message(Code.UNFINISHED)
@@ -145,7 +143,6 @@ class Job:
         entries: what became of them, by their names; those that are there are not solved again.
         rows: Λ(p) by p, see `MomentColumns`; those that are there are not solved again.
         new: the entries that were solved now.
-        largest: the p of the largest size that an earlier run has solved by elements.
         pictures: what is drawn and not recorded, by the names of questions.
         progress: called after each moment.
         keep: takes the job now and then, see `SOON`.
@@ -158,7 +155,6 @@ class Job:
     entries: dict[str, Entry] = field(default_factory=dict)
     rows: dict[float, Sequence[float]] = field(default_factory=dict)
     new: dict[str, Entry] = field(default_factory=dict)
-    largest: Largest | None = None
     pictures: dict[str, Any] = field(default_factory=dict)
     progress: Callable[[], None] = idle
     keep: Callable[[Job], None] = idle
@@ -217,14 +213,6 @@ def estimated(quantity: Quantity, estimate: Any) -> dict[Quantity, float | None]
     return {quantity: estimate and estimate.value, quantity.error(): estimate and estimate.error_estimate}
 
 
-def _nothing(*_: Any) -> tuple[()]:
-    return ()
-
-
-def _no_numbers(*_: Any) -> dict[Any, Any]:
-    return {}
-
-
 @dataclass(frozen=True, eq=False)
 class Question:
     """One thing that a case may ask for of each curve.
@@ -247,7 +235,7 @@ class Question:
     solve: Callable[[Job, Settings], Any] | None = None
     kind: Any = None
     symbol: str = ""
-    said: Callable[[Any, Curve, Numerics], Iterable[Message]] = _nothing
-    lacks: Callable[[Any, Settings], Iterable[Message]] = _nothing
-    numbers: Callable[[Case, CurveResult | None], Mapping[Quantity, Any]] = _no_numbers
+    said: Callable[[Any, Curve, Numerics], Iterable[Message]] = lambda *_: ()
+    lacks: Callable[[Any, Settings], Iterable[Message]] = lambda *_: ()
+    numbers: Callable[[Case, CurveResult | None], Mapping[Quantity, Any]] = lambda *_: {}
     files: Callable[[Any, Curve, Path], None] | None = None

@@ -7,7 +7,6 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
 from functools import partial
-from itertools import chain, product
 from pathlib import Path
 from string import ascii_lowercase
 from textwrap import wrap
@@ -18,7 +17,7 @@ import numpy as np
 from fpsolve.analysis.axis import Axis
 from fpsolve.analysis.regions import P_BIFURCATIONS, Region, Regions, regions
 from fpsolve.analysis.scan import Row, Sample, Scan, scan_row
-from fpsolve.analysis.stability import Boundary, crossed, is_of_line, untraced
+from fpsolve.analysis.stability import Boundary, Solve, crossed, is_of_line, untraced
 from fpsolve.analysis.target import Target
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case
@@ -30,7 +29,7 @@ from fpsolve.exponent.kinds import choose
 from fpsolve.files import writable, write_csv, write_json
 from fpsolve.messages import Code, Message, message_of
 from fpsolve.model.problem import Problem
-from fpsolve.output.records import Records, key_of, made, plain
+from fpsolve.output.records import Entries, Records, answered, key_of, made, plain
 from fpsolve.output.tables import head, in_case_words
 from fpsolve.page.page import Block, Column, Drawing, Grid, Sentence
 from fpsolve.pool import Pool, serial
@@ -48,8 +47,6 @@ POINT = tuple[Sample | None, Message | None]
 """What is recorded of a point: F, or why there is none."""
 FILES = "chart.csv", "chart.json"
 """The files with all numbers of a chart."""
-Map = Callable[[Callable[[Any], Any], Iterable[Any]], Iterable[Any]]
-"""The builtin `map`, or that of an executor: results in the order of the tasks."""
 CLOSED_FORM_NODES = 41
 """Of the grid, each way, on which the closed forms are evaluated."""
 TINTS = ("#FFFFFF", "#F3EFE6", "#E9DFCB", "#DBCBAA", "#C9B388")
@@ -58,6 +55,8 @@ UNKNOWN = "#C4C8CE"
 """Of the rest of a frame."""
 NAMED = 0.01
 """Share of the frame from which on a region has room for a letter; smaller ones are in chart.json only."""
+LETTER = 0.0125, 0.055
+"""Width and height of a letter of a name, with what is free around it, in sides of the frame."""
 CLOSED_FORM: dict[str, Any] = {"linestyle": (0, (2, 3)), "linewidth": 1.4, "zorder": 3}
 """The look of a closed form."""
 FORM = Format(height=4.0)
@@ -126,11 +125,6 @@ def refuse_no_chart(case: Case) -> None:
         )
 
 
-def chart_work(case: Case) -> int:
-    """How often `solve_chart` reports progress: once for each node of each scan."""
-    return sum(line.nodes**2 for line in begun_lines(case))
-
-
 def dear_lines(case: Case) -> Message | None:
     """What the lines of a chart cost whose points take seconds; None where there are none."""
     if not (dear := [line for line in begun_lines(case) if choose(line.problem).is_dear(line.target.order)]):
@@ -144,42 +138,30 @@ def begun_lines(case: Case) -> list[Boundary]:
     """The lines of a chart, of which nothing is traced."""
     frame, problem = charted(case), case.curve({}).problem
     own: dict[str, Any] = {"step": frame.step, "nodes": frame.nodes, "budget": case.budget}
-    return [untraced(target, frame.x.axis, frame.y.axis, problem, **own) for target in frame.lines]
+    return [untraced(target, frame.x, frame.y, problem, **own) for target in frame.lines]
 
 
 def solve_chart(
     case: Case,
+    lines: Sequence[Boundary],
+    rows: Iterator[Scan],
     *,
     progress: Callable[[], None] = lambda: None,
     stepped: Callable[[], None] = lambda: None,
-    map: Map,
-    known: Callable[[Boundary], Points | None] = lambda _: None,
     has_closed_forms: bool = True,
 ) -> Iterator[Chart]:
     """What there is so far, after each scan, branch and line, and in the end the whole chart.
 
     Args:
         case: with a chart, see `refuse_no_chart`.
-        progress: called once for each node of each scan, see `chart_work`.
+        lines: see `begun_lines`.
+        rows: what `scan_row` gives for the `rows` of all lines, in order.
+        progress: called once for each node of each scan.
         stepped: called once for each point that is traced.
-        map: computes the rows of all scans, as the builtin does or in other processes, while branches are traced here.
-        known: gives what is recorded of the points of a line.
         has_closed_forms: whether they are found, too, which takes seconds.
     """
-    lines = begun_lines(case)
-    found = [known(line) for line in lines]
-    lines = [replace(line, known=points) for line, points in zip(lines, found, strict=True)]
-    x, y = lines[0].x, lines[0].y
-    chart = Chart((), _closed_forms(lines[0].problem, charted(case).lines, (x, y)) if has_closed_forms else ())
-    tasks = [(points, row) for line, points in zip(lines, found, strict=True) for row in line.rows()]
-
-    def scans() -> Iterator[Scan]:
-        for (points, _), (scan, new) in zip(tasks, map(scan_points, tasks), strict=True):
-            if points and new:
-                points.put(new)
-            yield scan
-
-    rows = scans()
+    axes = lines[0].x, lines[0].y
+    chart = Chart((), _closed_forms(lines[0].problem, charted(case).lines, axes) if has_closed_forms else ())
     for each in lines:
         done = chart.lines
         for line in each.solve(rows, progress, stepped):
@@ -215,58 +197,51 @@ def _closed_forms(
     return tuple(found)
 
 
-class Points:
-    """The points of a line, recorded one by one as they are solved.
-
-    Args:
-        records: of the case.
-        case: the case.
-        line: of which nothing is traced.
-
-    Attributes:
-        new: in another process, which does not record, the points that were solved.
-    """
-
-    def __init__(self, records: Records, case: Case, line: Boundary) -> None:
-        axes = (replace(axis, at=()) for axis in (line.x, line.y))
-        self._key = key_of(case.curve({}).digest, [repr(each) for each in (line.target, *axes, line.budget)])
-        self._records: Records | None = records
-        self._found, self.new = dict[str, Sample | Message | None](), dict[str, Any]()
-        for name, each in records.get(self._key).items():
-            with suppress(ValueError):  # which counts as none
-                sample, reason = made(POINT, each)
-                self._found[name] = sample or reason
-
-    def __getstate__(self) -> dict[str, Any]:
-        return {**vars(self), "_records": None}
-
-    def find(self, rtol: float, at: FloatArray) -> Sample | Message | None:
-        """F at a point, or why there is none; None where it is not known."""
-        return self._found.get(_point(rtol, at))
-
-    def keep(self, rtol: float, at: FloatArray, found: Sample | Message) -> None:
-        """Record it, but for what may not fail again."""
-        if isinstance(found, Sample):
-            self.put({_point(rtol, at): plain(POINT, (found, None))})
-        elif not found.tells_of(Code.NO_MEMORY) and found.code is not Code.LINE_SPENT and not is_of_line(found):
-            self.put({_point(rtol, at): plain(POINT, (None, found))})
-
-    def put(self, entries: Mapping[str, Any]) -> None:
-        """Record what was solved."""
-        if self._records is None:
-            self.new |= entries
-        else:
-            self._records.put(self._key, entries)
+def key_of_line(case: Case, line: Boundary) -> str:
+    """What the records of the points of a line are found by."""
+    axes = (replace(axis, at=()) for axis in (line.x, line.y))
+    return key_of(case.curve({}).digest, [repr(each) for each in (line.target, *axes, line.budget, line.rtol)])
 
 
-def _point(rtol: float, at: FloatArray) -> str:
-    return f"{rtol!r} {at.tolist()}"
+def recalled(records: Records, key: str, line: Boundary) -> Boundary:
+    """The line, of which each point is solved once for all runs."""
+    known = dict[str, Sample | Message]()
+    for name, each in records.get(key).items():
+        with suppress(ValueError):  # which counts as none
+            sample, reason = made(POINT, each)
+            known[name] = sample or reason
+
+    def recall(at: FloatArray, solve: Solve) -> Sample | Message:
+        name = str(at.tolist())
+        if name not in known:
+            known[name] = found = solve(at)
+            if not (isinstance(found, Message) and may_pass(found)):
+                records.put(key, {name: plain(POINT, (None, found) if isinstance(found, Message) else (found, None))})
+        return known[name]
+
+    return replace(line, recall=recall)
 
 
-def scan_points(task: tuple[Points | None, Row]) -> tuple[Scan, Mapping[str, Any]]:
-    """The task: a row, and what another process has solved on it."""
-    points, row = task
-    return scan_row(row), points.new if points else {}
+def may_pass(reason: Message) -> bool:
+    """Whether a reason may be gone the next time, so that it is not recorded."""
+    return reason.tells_of(Code.NO_MEMORY) or is_of_line(reason)
+
+
+def scans_of(keys: Mapping[str, Boundary], records: Records, pool: Pool) -> Iterator[Scan]:
+    """The rows of the scans of all lines, by the keys of these, in their order."""
+    rows = {
+        row: key_of(key, line.scan_rtol, row.count, row.number) for key, line in keys.items() for row in line.rows()
+    }
+
+    def read(record: Entries, _: Row) -> Scan:
+        found: Scan = made(Scan, record.get("scan"))
+        return found
+
+    def entries(scan: Scan) -> Entries:
+        return {} if any(map(may_pass, scan.reasons)) else {"scan": plain(Scan, replace(scan, seconds=0.0))}
+
+    found = answered(records, pool, scan_row, rows, key=rows.__getitem__, read=read, entries=entries)
+    return (scan for _, scan, _ in found)
 
 
 def write_chart(case: Case, chart: Chart, folder: Path) -> None:
@@ -278,7 +253,7 @@ def write_chart(case: Case, chart: Chart, folder: Path) -> None:
         for *point, label in zip(branch.x, branch.y, branch.width, branch.labels, strict=True)
     )
     write_csv(folder / "chart.csv", ["line", "branch", "x", "y", "width", "label"], rows)
-    targets, frame = charted(case).lines, {"x": charted(case).x.axis, "y": charted(case).y.axis}
+    targets, frame = charted(case).lines, {"x": charted(case).x, "y": charted(case).y}
     keys = [axis.key for axis in frame.values()]
     summary = {
         **head(case),
@@ -328,7 +303,7 @@ def chart_figure(case: Case, chart: Chart) -> Drawing:
 
 def _draw(case: Case, chart: Chart, paths: Sequence[Path], heading: str) -> None:
     """The lines, their closed forms dashed, and the regions with names."""
-    frame = charted(case).x.axis, charted(case).y.axis
+    frame = charted(case).x, charted(case).y
     keys = frame[0].key, frame[1].key
     held = case.curve({}).held(case.units.time, keys)
     with figure_for(paths, heading, held, FORM) as figure:
@@ -336,7 +311,7 @@ def _draw(case: Case, chart: Chart, paths: Sequence[Path], heading: str) -> None
         label_axes(axes, *(case.about(key).attributes for key in keys))
         for axis, side in zip((axes.xaxis, axes.yaxis), frame, strict=True):
             scale_axis(axis, side.scale, (side.start, side.stop))
-        small = {} if chart.regions is None else _shade(axes, chart.regions, frame, list(chain(*chart.closed_forms)))
+        small = {} if chart.regions is None else _shade(axes, chart.regions, frame)
         for i, line in enumerate(chart.lines):
             colour, appears = COLOURS[i % len(COLOURS)], _appears(line.target)
             for branch in line.branches:
@@ -361,65 +336,35 @@ def _draw(case: Case, chart: Chart, paths: Sequence[Path], heading: str) -> None
             axes.plot([], [], " ", label=f"{letter}: {name}")
 
 
-def _shade(axes: Any, regions: Regions, frame: tuple[Axis, Axis], forms: Sequence[FloatArray]) -> dict[str, str]:
-    """Draw a tint for each region, and its name, off the lines, or where that has no room a letter; these by the names.
-
-    Args:
-        forms: the closed forms, which cross regions, each of shape (n, 2).
-    """
-    from matplotlib.colors import ListedColormap
+def _shade(axes: Any, regions: Regions, frame: tuple[Axis, Axis]) -> dict[str, str]:
+    """Draw a tint for each region, and its name, or where that has no room a letter; these by the names."""
+    from matplotlib.colors import to_rgb
 
     x, y = frame
-    edges = np.linspace(0, 1, regions.index.shape[0] + 1)
-    unstable = [sum(sign > 0 for sign in each.signs.values()) for each in regions.each]
-    tints = np.array([*unstable, np.nan])[regions.index]
-    style: dict[str, Any] = {
-        "cmap": ListedColormap(TINTS).with_extremes(bad=UNKNOWN),
-        "vmin": -0.5,
-        "vmax": len(TINTS) - 0.5,
-    }
-    axes.pcolormesh(x.value(edges), y.value(edges), tints.T, rasterized=True, **style)
-    if np.isnan(tints).any():
+    edges, small = np.linspace(0, 1, regions.index.shape[0] + 1), dict[str, str]()
+    unstable = (sum(sign > 0 for sign in each.signs.values()) for each in regions.each)
+    tints = [TINTS[min(count, len(TINTS) - 1)] for count in unstable]
+    colours = np.array([*map(to_rgb, (*tints, UNKNOWN))])[regions.index]  # -1 is the last one
+    axes.pcolormesh(x.value(edges), y.value(edges), np.swapaxes(colours, 0, 1), rasterized=True)
+    if (regions.index < 0).any():
         axes.fill([], [], color=UNKNOWN, label="not solved, or not defined")
-    letters, small, crossed = iter(ascii_lowercase), dict[str, str](), np.zeros(regions.index.shape, dtype=bool)
-    for line in forms:
-        at = [np.interp(np.linspace(0, 1, 2000), np.linspace(0, 1, len(line)), axis) for axis in line.T]
-        u, v = (np.searchsorted(side.value(edges), each) - 1 for side, each in zip(frame, at, strict=True))
-        crossed[u.clip(0, len(edges) - 2), v.clip(0, len(edges) - 2)] = True
-    middle: dict[str, Any] = {"ha": "center", "va": "center", "color": "0.15", "zorder": 4}
-    for number, each in enumerate(regions.each):
-        tint = TINTS[min(unstable[number], len(TINTS) - 1)]
-        if forms:  # which may cross the words
-            middle["bbox"] = {"facecolor": tint, "edgecolor": "none", "pad": 1.5, "alpha": 0.85}
+    letters = iter(ascii_lowercase)
+    for number, (each, tint) in enumerate(zip(regions.each, tints, strict=True)):
+        box = {"facecolor": tint, "edgecolor": "none", "pad": 1.5, "alpha": 0.85}  # closed forms may cross the words
+        middle: dict[str, Any] = {"ha": "center", "va": "center", "color": "0.15", "zorder": 4, "bbox": box}
         name = each.name.replace("δ_p", r"$\delta_p$")
-        parts = name.split(", ")
-        narrow = [line for part in parts for line in ([part] if "$" in part else wrap(part, 14))]
-        inside = regions.index == number
-        for free, lines in product((inside & ~crossed, inside), (parts, narrow)):
-            words = axes.text(0, 0, "\n".join(lines), fontsize=9.5, **middle)
-            if place := _room(words, free):
-                words.set_position((x.value(place[0]), y.value(place[1])))
+        parts, size = name.split(", "), np.array(regions.index.shape)
+        for lines in (parts, [line for part in parts for line in ([part] if "$" in part else wrap(part, 14))]):
+            half = 0.5 * np.array([max(map(len, lines)) * LETTER[0], len(lines) * LETTER[1]])
+            (left, low), (right, high) = (((each.at + end * half) * size).astype(int) for end in (-1, 1))
+            if min(left, low) >= 0 and (regions.index[left : right + 1, low : high + 1] == number).all():
+                words, height = "\n".join(lines), 9.5
                 break
-            words.remove()
         else:
-            if each.share > NAMED:
-                small[name] = rf"$\mathbf{{{next(letters, 'z')}}}$"
-                axes.text(x.value(each.at[0]), y.value(each.at[1]), small[name], fontsize=12, **middle)
+            words, height = rf"$\mathbf{{{next(letters, 'z')}}}$" if each.share > NAMED else "", 12.0
+            small |= {name: words} if words else {}
+        axes.text(x.value(each.at[0]), y.value(each.at[1]), words, fontsize=height, **middle)
     return small
-
-
-def _room(words: Any, inside: FloatArray) -> tuple[float, float] | None:
-    """Where the middle of words is deepest in a region with all of them inside, in shares of the sides; or None."""
-    from scipy.ndimage import distance_transform_edt, minimum_filter
-
-    box, n, inches = words.get_window_extent(), inside.shape[0], words.figure.dpi
-    shares = 1.05 * box.width / (0.85 * FORM.width * inches), 1.05 * box.height / (FORM.height * inches)
-    fits = minimum_filter(inside, [max(1, round(n * share)) for share in shares], mode="constant")
-    if not fits.any():
-        return None
-    depth = np.where(fits, distance_transform_edt(np.pad(inside, 1))[1:-1, 1:-1], 0)
-    u, v = np.unravel_index(int(np.argmax(depth)), depth.shape)
-    return (float(u) + 0.5) / n, (float(v) + 0.5) / n
 
 
 def _appears(target: Target) -> str | None:
@@ -501,7 +446,7 @@ def chart_case(
         KeyboardInterrupt: its text says what is kept; the figure shows that.
     """
     refuse_no_chart(case)
-    chart, started = Chart((), ()), datetime.now(UTC)
+    chart, lines, started = Chart((), ()), begun_lines(case), datetime.now(UTC)
 
     def done() -> str:
         count = sum(len(line.traces) for line in chart.lines)
@@ -517,13 +462,15 @@ def chart_case(
     with (
         own_folder(case, out, (CHART,)) as folder,
         saying_if_interrupted(done),
-        watch.bar(Phase(case.name, "scan", chart_work(case), SCANNED)) as progress,
+        watch.bar(Phase(case.name, "scan", sum(line.nodes**2 for line in lines), SCANNED)) as progress,
         watch.bar(Phase(case.name, "lines", unit=POINTS)) as stepped,
         writable(folder),
         pool or serial() as workers,
     ):
-        known = partial(Points, Records(folder / LINE_RECORDS), case)
+        records = Records(folder / LINE_RECORDS)
+        keys = {key_of_line(case, line): line for line in lines}
+        lines = [recalled(records, *each) for each in keys.items()]
         with shown_at_the_end(draw):
-            for chart in solve_chart(case, progress=progress, stepped=stepped, map=workers.map, known=known):
+            for chart in solve_chart(case, lines, scans_of(keys, records, workers), progress=progress, stepped=stepped):
                 write_chart(case, chart, folder)
     return chart

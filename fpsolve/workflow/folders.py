@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from fpsolve.case.case import Case
 from fpsolve.errors import FpsolveError, OutputError, Remedy
-from fpsolve.files import TEMPORARY, alone, parsed_json, plain_text, writable
+from fpsolve.files import TEMPORARY, alone, plain_text, writable, write_text
+from fpsolve.output.records import key_of
 from fpsolve.signals import is_interrupt
 
 AGAIN, ANEW = "run it again to go on", "run it again to start over"
@@ -26,14 +27,13 @@ CHART, PROVEN, DESIGNED = r"chart\.(csv|json|png|pdf)", r"proof\.json", r"design
 """Patterns of the names of the files that a run writes, a simulation, a chart, proofs, and a design."""
 _UNFINISHED = rf"(eigenfunctions(-\d+)?/)?{TEMPORARY}"
 _FOLDERS = r"records|eigenfunctions(-\d+)?"
-_TABLES = {SOLVED: r"summary\.json", SIMULATED: r"monte_carlo(-\d+)?\.json", CHART: r"chart\.json"}
-_TABLES |= {PROVEN: PROVEN, DESIGNED: r"design\.json"}
-"""Of each kind of files those that state the parameters."""
+_PARAMETERS = "records/parameters"
+"""The file that tells of which parameter sets all others are."""
 
 
 @contextmanager
 def own_folder(case: Case, out: str | Path, replaced: Sequence[str]) -> Iterator[Path]:
-    """The folder of a case for one run alone. Files that match `replaced`, or are of other parameters, are removed.
+    """The folder of a case for one run alone. Files that match `replaced` are removed, of other parameters all.
 
     Raises:
         OutputError: the folder cannot be made or written to, another run writes into it, or something in it has the
@@ -49,12 +49,17 @@ def own_folder(case: Case, out: str | Path, replaced: Sequence[str]) -> Iterator
                     raise OutputError(f"{path} cannot be written to: it is no folder, or a link to one", Remedy.FOLDER)
                 if re.fullmatch("|".join([*replaced, REPORT]), name) and is_folder:
                     raise OutputError(f"{path} cannot be written: Is a directory", Remedy.FOLDER)
-            names = "|".join([*replaced, REPORT, *_stale(case, there), _UNFINISHED])
+            parameters, stated = key_of(case.curve({}).digest, case.vary.mode, case.vary.columns), ""
+            with suppress(OSError, ValueError):
+                stated = plain_text(folder / _PARAMETERS)
+            kinds = replaced if stated == parameters else (SOLVED, SIMULATED, CHART, PROVEN, DESIGNED)
+            names = "|".join([*kinds, REPORT, _UNFINISHED])
             for name, path in there.items():
                 if re.fullmatch(names, name) and (path.is_symlink() or not path.is_dir()):
                     path.unlink()
                     if path.parent != folder and not any(path.parent.iterdir()):
                         path.parent.rmdir()
+            write_text(folder / _PARAMETERS, parameters)
         yield folder
 
 
@@ -86,33 +91,3 @@ def _entries(folder: Path) -> Iterator[Path]:
         if path.is_dir() and not path.is_symlink():
             with suppress(PermissionError):  # somebody else's
                 yield from sorted(path.iterdir())
-
-
-def _stale(case: Case, there: Mapping[str, Path]) -> list[str]:
-    """Which kinds of files in a folder are not of the parameters of a case.
-
-    A kind whose tables state complete parameters that the case has is. One without a table is as the others are, but a
-    chart says nothing without its table.
-    """
-    states = {
-        kind: [path for name, path in there.items() if re.fullmatch(table, name)] for kind, table in _TABLES.items()
-    }
-    is_of_case = case.membership() if any(states.values()) else bool
-
-    def agrees(path: Path) -> bool:
-        try:
-            content = parsed_json(plain_text(path))
-            if path.name == "chart.json":
-                stated, axes = content["parameters"], {content["x"]["key"], content["y"]["key"]}
-                is_whole = {*stated, *axes} == case.problem.values.keys() and axes.isdisjoint(stated)
-                return is_whole and any(stated.items() <= curve.parameters.items() for curve in case.curves())
-            held = content.get("parameters", {})  # by many curves, which then state the others alone
-            stated = [each.get("parameters") or {**held, **each["varied"]} for each in content.get("curves", [content])]
-            is_empty = path.name == "proof.json" and not stated
-            return not is_empty and all(map(is_of_case, stated))
-        except (OSError, ValueError, LookupError, TypeError, AttributeError):  # it is not a table of fpsolve
-            return False
-
-    agreeing = {kind: all(map(agrees, tables)) for kind, tables in states.items()}
-    are_all = all(agreeing.values())
-    return [kind for kind in _TABLES if not (agreeing[kind] if states[kind] else are_all and kind != CHART)]

@@ -6,13 +6,11 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
-from datetime import timedelta
 from functools import partial
-from typing import Protocol
+from typing import Any
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
-from rich.table import Column
 
 from fpsolve.budget import Meter, watched
 from fpsolve.page.page import Block
@@ -44,14 +42,11 @@ class Phase:
     unit: str = ""
 
 
-class Advance(Protocol):
-    """What a phase calls as it goes on."""
-
-    def __call__(self, count: int = 1, *, failed: int = 0, known: bool = False) -> None:
-        """So many steps are done, of which some failed; `known` are those that an earlier run has done."""
+Advance = Callable[..., None]
+"""What a phase calls as it goes on: with how many steps are done, `failed` of them, `known` if by an earlier run."""
 
 
-def ignore(count: int = 1, *, failed: int = 0, known: bool = False) -> None:
+def ignore(*_: Any, **__: Any) -> None:
     """Progress that is not shown."""
 
 
@@ -90,7 +85,7 @@ class Bars:
     def __init__(self, console: Console | None = None, clock: Callable[[], float] = time.monotonic) -> None:
         self.console, self.clock = console or Console(stderr=True), clock
         self.is_live = self.console.is_terminal and not self.console.is_dumb_terminal
-        text = partial(TextColumn, markup=False, table_column=Column(no_wrap=True))
+        text = partial(TextColumn, markup=False)
         self._display = Progress(
             text("{task.fields[case]}{task.description}" if self.console.width >= ROOMY else "{task.description}"),
             text("{task.fields[waits]}", style="dim"),
@@ -100,19 +95,15 @@ class Bars:
             console=self.console,
             transient=True,
             redirect_stdout=False,
-            refresh_per_second=4,
             speed_estimate_period=SPEED_SECONDS,
             get_time=clock,
-            disable=not self.is_live,
         )
-        self._open = 0
 
     @contextmanager
     def bar(self, phase: Phase) -> Iterator[Advance]:
         """Shows a phase as long as the body lasts, and those before it."""
-        display, done, fails, earlier = self._display, 0, 0, 0
+        display, done, fails, printed, printed_at = self._display, 0, 0, 0, self.clock()
         number = display.add_task(phase.name, total=phase.total, case=f"{phase.case}, ", waits="", counted="")
-        printed, printed_at = 0, self.clock()
 
         def tell(text: str) -> None:
             nonlocal printed, printed_at
@@ -121,32 +112,23 @@ class Bars:
                 printed, printed_at = done, self.clock()
 
         def advance(count: int = 1, *, failed: int = 0, known: bool = False) -> None:
-            nonlocal done, fails, earlier, printed
-            done, fails, earlier = done + count, fails + failed, earlier + count * known
+            nonlocal done, fails, printed
+            done, fails, printed = done + count, fails + failed, printed + count * known
             text = counted(phase, done, fails)
-            left = None if phase.total is None else phase.total - earlier  # of which the time to go is estimated
-            display.update(number, total=left, completed=done - earlier, counted=text)
-            printed += count * known
-            if phase.total and phase.unit and LINE_SHARE * phase.total <= done - printed and done < phase.total:
-                [seconds] = (task.time_remaining for task in display.tasks if task.id == number)
-                tell(text if seconds is None else f"{text}, {timedelta(seconds=round(seconds))} left")
+            display.update(number, completed=done, counted=text)
+            if phase.total and LINE_SHARE * phase.total <= done - printed and done < phase.total:
+                tell(text)
 
         def wait(meter: Meter) -> None:
             if meter.number:
                 display.update(number, waits=waiting(meter))
                 tell(waiting(meter))
 
-        if self.is_live and not self._open:
-            display.start()
-        self._open += 1
-        try:
-            with watched(wait):
+        with display if self.is_live else nullcontext(), watched(wait):
+            try:
                 yield advance
-        finally:
-            display.update(number, waits="", total=1, completed=1)
-            self._open -= 1
-            if self.is_live and not self._open:
-                display.stop()
+            finally:
+                display.update(number, waits="", total=1, completed=1)
 
 
 def waiting(meter: Meter) -> str:

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from decimal import ROUND_CEILING, ROUND_FLOOR, Decimal
 from functools import partial
+from itertools import zip_longest
 from pathlib import Path
-from time import monotonic
-from typing import Any, TypeAlias, cast
+from typing import Any, TypeAlias
 
 from pydantic import TypeAdapter
 
@@ -58,8 +58,6 @@ PROVEN_RECORDS = "records/proven.jsonl"
 """The file of the records of bounds."""
 ENCLOSURES = TypeAdapter(Enclosure)
 """The form of bounds in a record."""
-EVERY = 30.0
-"""Seconds after which the curves that are done are written, so that a run that is killed keeps them."""
 _WORDS = Words("the proof", "a proof", "proof.json", "JSON", "make one with `fpsolve prove`")
 """The words of messages on a proof.json."""
 
@@ -91,52 +89,35 @@ class CurveProof:
         return verdicts(signs, 0 if self.exponent is None else self.exponent.sign)
 
 
-@dataclass(frozen=True)
-class Plan:
-    """What is to be proven of a case, the same of every curve: Λ at all p; λ and δ_p if [output] names them.
+def asked_of(case: Case) -> list[Any]:
+    """What is to be proven of every curve of a case: Λ at all p; λ and δ_p if [output] names them."""
+    return [*case.p.tolist(), *(name for name in (LYAPUNOV_EXPONENT.name, STABILITY_INDEX.name) if name in case.asked)]
 
-    Attributes:
-        case: whose curves.
+
+def questions(case: Case, width: float | None) -> Iterator[Question]:
+    """For each curve those of what is asked, in its order.
+
+    Args:
         width: wanted upper − lower; a share of the scale if None.
     """
+    for curve in case.curves():
+        problem, stated = curve.problem, statement_of(curve.problem)
+        for each in asked_of(case):
+            if each == STABILITY_INDEX.name:
+                yield partial(prove_index, problem, stated, budget=case.budget)
+            else:
+                p = None if each == LYAPUNOV_EXPONENT.name else each
+                yield partial(prove_bounds, problem, stated, p, width, budget=case.budget)
 
-    case: Case
-    width: float | None
 
-    @property
-    def indices(self) -> list[str]:
-        """Those of λ and δ_p that are asked for."""
-        return [name for name in (LYAPUNOV_EXPONENT.name, STABILITY_INDEX.name) if name in self.case.asked]
-
-    @property
-    def each(self) -> int:
-        return len(self.case.p) + len(self.indices)
-
-    @property
-    def total(self) -> int:
-        return self.each * self.case.planned
-
-    def questions(self) -> Iterator[Question]:
-        for curve in self.case.curves():
-            problem, budget = curve.problem, self.case.budget
-            stated = statement_of(problem)
-            yield from (
-                partial(prove_bounds, problem, stated, p, self.width, budget=budget) for p in self.case.p.tolist()
-            )
-            if LYAPUNOV_EXPONENT.name in self.indices:
-                yield partial(prove_bounds, problem, stated, None, self.width, budget=budget)
-            if STABILITY_INDEX.name in self.indices:
-                yield partial(prove_index, problem, stated, budget=budget)
-
-    def gathered(self, answers: Sequence[Answer]) -> list[CurveProof]:
-        """What is proven of each curve, from the first answers, in the order of the questions."""
-        found, rest = [], iter(answers)
-        for curve in self.case.curves(stop=-(-len(answers) // self.each)):
-            moments = tuple((p, cast("Enclosure | None", next(rest, None))) for p in self.case.p.tolist())
-            indices: dict[str, Any] = {name: next(rest, None) for name in self.indices}
-            names = (LYAPUNOV_EXPONENT.name, STABILITY_INDEX.name)
-            found.append(CurveProof(curve, moments, *map(indices.get, names)))
-        return found
+def gathered(case: Case, answers: Sequence[Answer]) -> list[CurveProof]:
+    """What is proven of each curve, from the first answers, in the order of the questions."""
+    asked, found = asked_of(case), list[CurveProof]()
+    for curve in case.curves(stop=-(-len(answers) // len(asked))):
+        known: dict[Any, Any] = dict(zip_longest(asked, answers[len(found) * len(asked) :][: len(asked)]))
+        moments = tuple((p, known[p]) for p in case.p.tolist())
+        found.append(CurveProof(curve, moments, *map(known.get, (LYAPUNOV_EXPONENT.name, STABILITY_INDEX.name))))
+    return found
 
 
 def refuse_unprovable_case(case: Case, width: float | None) -> None:
@@ -149,7 +130,7 @@ def refuse_unprovable_case(case: Case, width: float | None) -> None:
         check_width(width)
     except ValueError as failure:
         raise FpsolveError(f"--width: {failure}") from None
-    if not Plan(case, width).each:
+    if not asked_of(case):
         raise FpsolveError(
             f"{case.path}: moments: missing; proofs are of Λ(p), λ and δ_p; add [moments] with p = [2.0]"
         )
@@ -341,40 +322,28 @@ def prove_case(
         KeyboardInterrupt: its text says what is kept.
     """
     refuse_unprovable_case(case, width)
-    plan = Plan(case, width)
-    answers, proofs = list[Answer](), list[CurveProof]()
+    answers, proofs, total = list[Answer](), list[CurveProof](), len(asked_of(case)) * case.planned
     started = datetime.now(UTC)
 
-    def report() -> None:
-        if proofs:
-            facts, is_whole = facts_since(case, started), len(answers) == plan.total
-            write_report(case, folder, watch, show(case, proofs), facts=facts, files=[PROOF], complete=is_whole)
-
-    def write() -> list[CurveProof]:
-        proofs = plan.gathered(answers)
+    def finish() -> None:
+        proofs[:], is_whole = gathered(case, answers), len(answers) == total
         if proofs:
             with writable(folder):
-                write_proof(plan.case, proofs, folder, is_whole=len(answers) == plan.total)
-        return proofs
+                write_proof(case, proofs, folder, is_whole=is_whole)
+            facts = facts_since(case, started)
+            write_report(case, folder, watch, show(case, proofs), facts=facts, files=[PROOF], complete=is_whole)
 
     with (
         own_folder(case, out, (PROVEN,)) as folder,
-        saying_if_interrupted(lambda: kept(len(answers), f"of {plan.total} bounds", folder)),
-        watch.bar(Phase(case.name, "proving", plan.total, BOUNDS)) as progress,
+        saying_if_interrupted(lambda: kept(len(answers), f"of {total} bounds", folder)),
+        watch.bar(Phase(case.name, "proving", total, BOUNDS)) as progress,
         pool or serial() as workers,
+        shown_at_the_end(finish),
     ):
-        written = monotonic()
-        with shown_at_the_end(report):
-            try:
-                records, kept_as = Records(folder / PROVEN_RECORDS), dict[str, Any](read=verified, entries=record_of)
-                for _, found, is_known in answered(records, workers, answer, plan.questions(), key=_key, **kept_as):
-                    answers.append(found)
-                    progress(failed=not found.is_proven, known=is_known)
-                    if monotonic() - written > EVERY and len(answers) % plan.each == 0:
-                        write()
-                        written = monotonic()
-            finally:
-                proofs = write()
+        records, kept_as = Records(folder / PROVEN_RECORDS), dict[str, Any](read=verified, entries=record_of)
+        for _, found, is_known in answered(records, workers, answer, questions(case, width), key=_key, **kept_as):
+            answers.append(found)
+            progress(failed=not found.is_proven, known=is_known)
     return proofs
 
 

@@ -25,6 +25,7 @@ from fpsolve.output.records import Records, answered, key_of, made, plain
 from fpsolve.output.tables import head, in_case_words, parameters_of
 from fpsolve.page.limits import EACH, PICTURES
 from fpsolve.page.page import Block, Column, Drawing, Grid, Sentence, filled
+from fpsolve.parts.question import idle
 from fpsolve.pool import Pool, processors, serial
 from fpsolve.results.curve import CurveResult, SimulatedCurve
 from fpsolve.results.text import fate, sampled, sign_of, units_in_words
@@ -33,7 +34,7 @@ from fpsolve.show.notes import MONTE_CARLO, notes
 from fpsolve.simulation.setup import PROGRESS_STEPS, obstacles, simulated_parts
 from fpsolve.vtk import field_data, pyvista_module, write_vtk
 from fpsolve.workflow.folders import AGAIN, SIMULATED, kept, of_curves, own_folder, saying_if_interrupted
-from fpsolve.workflow.progress import PERCENT, SILENT, Advance, Phase, Watch
+from fpsolve.workflow.progress import PERCENT, SILENT, Phase, Watch
 from fpsolve.workflow.reports import facts_since, write_report
 
 RECORDS = "records/simulated.jsonl"
@@ -97,30 +98,30 @@ def simulate_curve(
         curve.problem, orders, estimator=setting.estimator,
         paths=setting.paths, time=setting.time, step=setting.step, seed=setting.seed, progress=progress,
     )  # fmt: skip
+    found = SimulatedCurve(curve, result, None, result.warnings, result.interrupted)
     if not curve.problem.system.cubic or result.interrupted:
-        return SimulatedCurve(curve, result, None, result.warnings, result.interrupted)
-    value, error, noted = result.lyapunov_exponent, result.lyapunov_exponent_error, result.warnings
-    try:
-        if value <= SIGNIFICANT * error:
-            for _ in range(2 * PROGRESS_STEPS):
-                progress()
-            at_rest = Message(Code.AT_REST, value=value, error=error, most=SIGNIFICANT if value > 0 else None)
-            return SimulatedCurve(curve, result, None, (*noted, at_rest))
-        from fpsolve.simulation.response import no_simulation, simulated_response
+        return found
+    from fpsolve.simulation.response import no_simulation, simulated_response
 
-        if reason := no_simulation(curve.problem):
-            for _ in range(2 * PROGRESS_STEPS):
-                progress()
-            return SimulatedCurve(curve, result, None, (*noted, reason))
+    def telling(message: Message, **more: Any) -> SimulatedCurve:
+        return replace(found, warnings=(*result.warnings, message), **more)
+
+    value, error = result.lyapunov_exponent, result.lyapunov_exponent_error
+    at_rest = Message(Code.AT_REST, value=value, error=error, most=SIGNIFICANT if value > 0 else None)
+    if reason := at_rest if value <= SIGNIFICANT * error else no_simulation(curve.problem):
+        for _ in range(2 * PROGRESS_STEPS):
+            progress()
+        return telling(reason)
+    try:
         response = simulated_response(
             curve.problem, value, result.variance_rate, paths=max(result.paths // 8, 32),
             time=result.time, step=result.step, seed=result.seed, progress=progress,
         )  # fmt: skip
     except KeyboardInterrupt:
-        return SimulatedCurve(curve, result, None, (*noted, Message(Code.RESPONSE_NOT_REACHED)), interrupted=True)
+        return telling(Message(Code.RESPONSE_NOT_REACHED), interrupted=True)
     if response.interrupted:
-        noted = (*noted, Message(Code.RESPONSE_STOPPED, time=response.time))
-    return SimulatedCurve(curve, result, response, noted, response.interrupted)
+        return telling(Message(Code.RESPONSE_STOPPED, time=response.time), response=response, interrupted=True)
+    return replace(found, response=response)
 
 
 def simulated_of(record: Mapping[str, Any], curve: Curve) -> SimulatedCurve:
@@ -171,11 +172,23 @@ class Simulations:
             results: what is solved of the same curves.
         """
         case = self.case
+        asked: dict[str, Any] = {"orders": case.simulated.tolist(), "setting": case.monte_carlo}
+        kept: dict[str, Any] = {"key": partial(simulation_key, **asked), "read": simulated_of, "entries": record_of}
         work = Phase(case.name, "simulation", simulation_work(case), PERCENT)
-        with watch.bar(work) as progress, writable(self.folder):
-            for each in self._curves(progress, pool):
-                self.simulated.append(each)
-                write_simulation(case, each, self.folder)
+        with watch.bar(work) as progress, writable(self.folder), pool or serial() as workers:
+            task = partial(simulate_curve, **asked, progress=idle if pool else progress)
+            try:
+                for curve, each, is_known in answered(self.records, workers, task, case.curves(), **kept):
+                    if pool or is_known:
+                        progress(simulation_steps(curve), known=is_known)
+                    self.known += is_known
+                    self.simulated.append(each)
+                    write_simulation(case, each, self.folder)
+                    if each.interrupted:
+                        break
+            except KeyboardInterrupt:
+                if not self.simulated:
+                    raise
         whole = len(self.simulated) - self.simulated[-1].interrupted
         if whole < case.planned:
             place = f"in the simulation of curve {whole + 1} of {case.planned}"
@@ -183,29 +196,6 @@ class Simulations:
         watch.shown(show(case, self.simulated, results))
         watch.noted(notes(case, self.simulated, MONTE_CARLO))
         return self.interruption
-
-    def _curves(self, progress: Advance, pool: Pool | None) -> Iterator[SimulatedCurve]:
-        """The simulations in the order of the curves; an interrupt (Ctrl-C) ends them with what is done."""
-        asked: dict[str, Any] = {"orders": self.case.simulated.tolist(), "setting": self.case.monte_carlo}
-        task = partial(simulate_curve, **asked)
-        if pool is None:
-            task = partial(task, progress=progress)
-        with pool or serial() as workers:
-            kept: dict[str, Any] = {"read": simulated_of, "entries": record_of}
-            found = answered(
-                self.records, workers, task, self.case.curves(), key=partial(simulation_key, **asked), **kept
-            )
-            try:
-                for curve, each, is_known in found:
-                    self.known += is_known
-                    if pool or is_known:
-                        progress(simulation_steps(curve), known=is_known)
-                    yield each
-                    if each.interrupted:
-                        return
-            except KeyboardInterrupt:
-                if not self.simulated:
-                    raise
 
 
 def write_simulation(case: Case, simulated: SimulatedCurve, folder: Path) -> None:
@@ -317,15 +307,12 @@ def moment_grid(case: Case, simulated: SimulatedCurve, result: CurveResult | Non
 
 def number_grid(case: Case, simulated: SimulatedCurve, result: CurveResult | None) -> Grid:
     """λ, Λ″(0) and the means of a response with their standard errors, beside the finite elements."""
-    rows, known = [], {**INDICES, **OF_STOPS}
-    for name, number in simulated.estimates.items():
-        found = result.estimates.get(name) if result else None
-        rows.append([known[name].words, known[name].symbol, *_cells(*number, found.value if found else None)])
+    known, estimates = {**INDICES, **OF_STOPS}, dict(result.estimates if result else {})
+    numbers = [(known[name], each, estimates.get(name)) for name, each in simulated.estimates.items()]
     if response := simulated.response:
         means = result.response.means if result and result.response else {}
-        for name, number in response.means.items():
-            about, found = response.about.means[name], means.get(name)
-            rows.append([about.words, about.symbol, *_cells(*number, found.value if found else None)])
+        numbers += [(response.about.means[name], each, means.get(name)) for name, each in response.means.items()]
+    rows = [[about.words, about.symbol, *_cells(*each, found and found.value)] for about, each, found in numbers]
     columns = [Column("quantity", 3, is_text=True), Column("symbol"), Column("value"), Column("± s.e."), *COMPARED]
     units = units_in_words(case.units.time, [known[name] for name in simulated.estimates])
     return filled("", columns, rows, units)

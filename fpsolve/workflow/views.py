@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from pydantic import ValidationError
 
 from fpsolve.analysis.axis import check_axes
 from fpsolve.analysis.density import stationary_density, tilted_density
+from fpsolve.analysis.scan import Scan, scan_row
 from fpsolve.analysis.target import said
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case
@@ -24,7 +26,7 @@ from fpsolve.page.page import Column, Drawing, Grid, Sentence
 from fpsolve.parts.nodes import Nodes
 from fpsolve.parts.question import Numerics
 from fpsolve.results.text import sampled
-from fpsolve.workflow.chart import Chart, show, solve_chart
+from fpsolve.workflow.chart import Chart, begun_lines, show, solve_chart
 
 PIXELS = 144, 72
 """Of a picture, each way."""
@@ -50,7 +52,7 @@ def map_of(case: Case, axes: object, tell: Callable[[Answer], None]) -> Answer:
     x, y = axes if isinstance(axes, list) and len(axes) == 2 else (None, None)
     try:
         frame = ChartSection.model_validate({"x": x, "y": y, "lines": lines})
-        sides = frame.x.axis, frame.y.axis
+        sides = frame.x, frame.y
         check_axes(case.problem, *sides)
     except ValidationError as failure:
         told = [f"{key}: {text}" for _, key, text in explain(failure, ChartSection.model_fields)]
@@ -75,17 +77,16 @@ def map_of(case: Case, axes: object, tell: Callable[[Answer], None]) -> Answer:
             "told": part_of_page(each for each in show(case, chart) if not isinstance(each, Drawing)),
         }
 
-    def rows(scan: Callable[[Any], Any], tasks: Iterable[Any]) -> Iterator[Any]:
-        for task in tasks:
-            _, row = task
+    def scans() -> Iterator[Scan]:
+        for row in chain.from_iterable(line.rows() for line in begun):
             grid[:] = grid if row.number else [[None] * row.count] * row.count
-            found = scan(task)
-            grid[row.number] = listed(np.sign(found[0].values))
+            found = scan_row(row)
+            grid[row.number] = listed(np.sign(found.values))
             tell(answer(chart))
             yield found
 
-    chart = Chart((), ())
-    for chart in solve_chart(case, map=rows, has_closed_forms=False):
+    chart, begun = Chart((), ()), begun_lines(case)
+    for chart in solve_chart(case, begun, scans(), has_closed_forms=False):
         tell(answer(chart))
     grid.clear()
     return answer(chart)

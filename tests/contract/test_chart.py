@@ -146,7 +146,6 @@ def test_an_interrupted_chart_goes_on_to_the_same_lines_and_a_whole_one_solves_n
     assert counts == {"scan": 2 * 25, "lines": sum(branch.x.size for line in whole.lines for branch in line.branches)}
     total = sum(counts.values())
     kept = {path: path.read_bytes() for path in (tmp_path / "whole/test/records").rglob("*.jsonl")}
-    assert sum(each.count(b"\n") for each in kept.values()) >= total
     chart_case(case, tmp_path / "whole", watch=watch)
     assert {path: path.read_bytes() for path in kept} == kept
     for share, done in ((0.3, 0), (0.6, 1)):

@@ -285,7 +285,7 @@ def flipped(line, at):
 )
 def test_a_damaged_record_is_solved_again(kept, tmp_path, damage):
     shutil.copytree(kept, tmp_path, dirs_exist_ok=True)
-    [path] = (tmp_path / "results/case/records").glob("*")
+    [path] = (tmp_path / "results/case/records").glob("*.jsonl")
     before = read_csv(tmp_path / "results/case/moments.csv")
     first, second = path.read_bytes().splitlines(keepends=True)
     path.write_bytes(first + damage(second))

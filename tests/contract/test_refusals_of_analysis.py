@@ -40,13 +40,16 @@ def uniform(a=-0.3):
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"start": 2.0, "stop": 1.0}, "start = 2.0, stop = 1.0; must be start < stop; exchange the two"),
+        ({"start": 2.0, "stop": 1.0}, "start = 2.0, stop = 1.0; must be start < stop, with .*; exchange the two"),
         ({"start": 1.0, "stop": 1.0}, "must be start < stop"),
         (
             {"start": 0.0, "stop": 1.0, "scale": "log"},
             'start: got 0.0; must be > 0 where scale = "log"; use a positive start, or scale = "linear"',
         ),
-        ({"start": 0.0, "stop": 1.0, "at": (2.0,)}, "at: got 2.0; must be from start = 0.0 to stop = 1.0; remove it"),
+        (
+            {"start": 0.0, "stop": 1.0, "at": (2.0,)},
+            "at.0.: got 2.0; must be from start = 0.0 to stop = 1.0; remove it",
+        ),
         ({"start": 0.0, "stop": math.inf}, "finite"),
         ({"start": math.nan, "stop": 1.0}, "finite"),
         ({"start": "0", "stop": 1.0}, "finite number"),

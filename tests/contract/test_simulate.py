@@ -100,7 +100,7 @@ def test_a_simulation_that_ends_before_it_has_anything_leaves_nothing_of_an_earl
         (place / name).write_text("{}")
     with pytest.raises(KeyboardInterrupt, match="interrupted after 0 of 1 curve; run it again to go on"):
         simulate_case(case_in(tmp_path, CASE), tmp_path / "results", watch=interrupted(0))
-    assert {path.name for path in place.iterdir()} == {"notes.txt"}
+    assert {path.name for path in place.iterdir()} == {"notes.txt", "records"}
 
 
 @pytest.mark.parametrize(

@@ -1,24 +1,18 @@
 """What lies in the folder of a case: files of other parameters go, and what is none of fpsolve's harms nothing."""
 
-import json
 import os
 import shutil
 
 import pytest
 
-from tests.kit import case_text, files, read_json, run
+from tests.kit import case_text, files, run
 
 SECTIONS = "[moments]\np = [2.0]\n[output]\nfigure = false\nquantities = ['lyapunov_exponent']\n"
 CASE = case_text(SECTIONS + "[monte_carlo]\npaths = 6400\ntime = 20.0\n")
 OF_RUN = {"summary.json", "moments.csv", "curves.csv", "results.nc"}
-TABLES = {
-    # what states the parameters: what goes with it, and the command that looks at it
-    "summary.json": (OF_RUN, "simulate"),
-    "monte_carlo.json": ({"monte_carlo.json"}, "run"),
-    "chart.json": ({"chart.json", "chart.csv", "chart.png"}, "run"),
-    "proof.json": ({"proof.json"}, "run"),
-}
-AXES = {"x": {"key": "noise.D0"}, "y": {"key": "oscillator.c1"}}
+OF_COMMAND = {"run": OF_RUN, "simulate": {"monte_carlo.json"}}
+OTHERS = {"chart.json", "chart.csv", "chart.png", "proof.json", "design.json"}
+ALL = OF_RUN | OF_COMMAND["simulate"] | OTHERS
 
 
 @pytest.fixture(scope="module")
@@ -29,11 +23,7 @@ def good(tmp_path_factory):
         ended = run(place, command, "case.toml", case=CASE)
         assert ended.code == 0, ended.err
     folder = place / "results/case"
-    parameters = read_json(folder / "monte_carlo.json")["parameters"]
-    held = {key: value for key, value in parameters.items() if key not in ("noise.D0", "oscillator.c1")}
-    (folder / "chart.json").write_text(json.dumps({"parameters": held, **AXES}), encoding="utf-8")
-    (folder / "proof.json").write_text(json.dumps({"curves": [{"parameters": parameters}]}), encoding="utf-8")
-    for name in ("chart.csv", "chart.png"):
+    for name in OTHERS:
         (folder / name).write_text("", encoding="utf-8")
     return place
 
@@ -50,10 +40,7 @@ def after(place, command, *options):
     return {name for name in files(place / "results/case") if not name.startswith("records/")}
 
 
-ALL = {name for names, _ in TABLES.values() for name in names}
-
-
-@pytest.mark.parametrize("command", ["run", "simulate"])
+@pytest.mark.parametrize("command", OF_COMMAND)
 def test_files_of_the_parameters_of_a_case_stay(place, command):
     assert after(place, command) >= ALL
 
@@ -76,50 +63,25 @@ def as_huge(path):
         file.truncate(2**40)
 
 
-def as_text(text):
-    return lambda path: path.write_text(text, encoding="utf-8")
+def as_text(path):
+    path.write_text("[" * 100_000, encoding="utf-8")
 
 
-def without(key):
-    def put(path):
-        data = read_json(path)
-        del data.get("curves", [data])[0]["parameters"][key]
-        path.write_text(json.dumps(data), encoding="utf-8")
-
-    return put
+FAULTS = [as_link_to("/dev/zero"), as_link_to(""), as_pipe, as_huge, as_text, os.unlink]
 
 
-NESTED = as_text("[" * 100_000)
-FAULTS = [
-    ("summary.json", as_link_to("/dev/zero")),
-    ("monte_carlo.json", as_pipe),
-    ("monte_carlo.json", without("noise.tau0")),
-    *[("monte_carlo.json", as_text(text)) for text in ("[]", '{"parameters": NaN}', '{"curves": 1}')],
-    ("chart.json", as_huge),
-    ("chart.json", as_text("{}")),
-    ("chart.json", without("noise.r0")),
-    ("chart.json", lambda path: path.unlink()),
-    ("proof.json", as_link_to("")),
-    ("proof.json", without("noise.r0")),
-    *[("proof.json", as_text(text)) for text in ("", '{"parameters": {}}', '{"curves": []}')],
-    *[(name, NESTED) for name in TABLES],
-]
+@pytest.mark.parametrize("command", OF_COMMAND)
+@pytest.mark.parametrize("fault", FAULTS)
+def test_files_of_unknown_parameters_go_unread(place, fault, command):
+    fault(place / "results/case/records/parameters")
+    assert after(place, command) & ALL == OF_COMMAND[command]
+    assert after(place, "simulate") >= OF_COMMAND[command]  # they are known from now on
 
 
-@pytest.mark.parametrize(("name", "fault"), FAULTS)
-def test_table_that_is_not_of_the_case_goes_alone_and_unread(place, name, fault):
-    fault(place / "results/case" / name)
-    names, command = TABLES[name]
-    left = after(place, command)
-    assert not left & names
-    others = {each for other, (more, _) in TABLES.items() if other != name for each in more}
-    assert left >= others
-
-
-@pytest.mark.parametrize("command", ["run", "simulate"])
+@pytest.mark.parametrize("command", OF_COMMAND)
 def test_files_of_an_earlier_run_with_other_parameters_are_removed(place, command):
     left = after(place, command, "--set", "noise.r0=0.9")
-    assert not left & (ALL - (OF_RUN if command == "run" else {"monte_carlo.json"}))
+    assert left & ALL == OF_COMMAND[command]
 
 
 def test_run_removes_the_responses_of_an_earlier_one_and_no_file_of_another(place):

@@ -198,7 +198,7 @@ def test_torn_and_damaged_records_are_solved_again_and_what_is_no_record_is_left
     for out in ("whole", "torn"):
         run(tmp_path, out, "--jobs", "1", *FEW)
     folder = tmp_path / "torn/sweep/records"
-    [path] = folder.glob("*")
+    [path] = folder.glob("*.jsonl")
     content = path.read_bytes().splitlines(keepends=True)
     key, _, record = content[0].removesuffix(b"}\n").partition(b', "record": ')
     strange = json.dumps({name: [0] for name in json.loads(record)}).encode()

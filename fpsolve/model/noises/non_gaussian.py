@@ -113,10 +113,6 @@ class NonGaussianNoise(TreatedNoise):
         return self.tau0 * (self.r0 - 1) / (2 * self.D0)
 
     @property
-    def shaped_by(self) -> Sequence[str]:
-        return ("r0",)
-
-    @property
     def standard_deviation(self) -> float:
         return math.sqrt(self.variance)
 

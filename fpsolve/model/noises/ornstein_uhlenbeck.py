@@ -39,10 +39,6 @@ class GaussianNoise(Gaussian):
         return self.sigma
 
     @property
-    def shaped_by(self) -> Sequence[str]:
-        return ()
-
-    @property
     def standard_deviation(self) -> float:
         """σ₀/√(2α₀)."""
         return self.sigma / math.sqrt(2 * self.alpha)
