@@ -209,7 +209,7 @@ def _is_rightmost(pair: PrincipalPair) -> bool:
     """
     problem, space = pair.generator.problem, pair.space
     if problem.valued.is_bounded and not space.is_tilted:
-        values = space.on_grid(pair.right)
+        _, values = space.on_grid(pair.right)
         if np.min(values) > LEAST_OF_MOST * np.max(values):
             return True
     pencil, source = pair.generator.at(pair.p), space.weighed(space.constant)
@@ -460,7 +460,7 @@ def _sign_defects(space: Space, x: FloatArray, y: FloatArray) -> tuple[float, fl
 
     T T* looks where the tilted density lives: a strong tilt hides the sign change of another pair from P_s.
     """
-    right, left, measure = space.on_grid(x), space.on_grid(y), space.grid_measure
+    measure, right, left = space.on_grid(x, y)
     tilted = np.abs(right * left) * measure
 
     def share(values: FloatArray) -> float:

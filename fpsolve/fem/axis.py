@@ -13,14 +13,15 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property, reduce
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 import scipy.sparse
 from scipy.sparse import csc_matrix
 
 from fpsolve.arrays import Coefficient, FloatArray, IntArray, Mask, Matrix, dense, one
-from fpsolve.fem.mesh import MAX_DEGREE, halved, middles
+from fpsolve.fem.element import halved, middles
+from fpsolve.fem.mesh import MAX_DEGREE
 from fpsolve.model.noise import NoiseDerivative
 
 NO_LINES = np.zeros(0)
@@ -106,6 +107,20 @@ def split(lines: FloatArray, effects: ModeEffects, share: float, may_coarsen: bo
     return np.sort(np.concatenate([lines, middles(lines)[is_split]])), degrees
 
 
+class Rule(NamedTuple):
+    """The functions of an axis at the points of a quadrature rule, or at the states of a noise.
+
+    Attributes:
+        points: of what the functions are of, shape (n,) or (2, n).
+        measure: ∫ of the weight of the axis there, shape (n,).
+        values: without the factor of the axis, shape (n, size).
+    """
+
+    points: FloatArray
+    measure: FloatArray
+    values: Any
+
+
 class Axis:
     """What terms of a generator, error estimates and pictures ask of the functions along one direction.
 
@@ -149,6 +164,11 @@ class Axis:
     def modes(self) -> IntArray:
         """For each unknown the degree of its polynomial in a cell, shape (size,)."""
         return np.zeros(self.size, dtype=int)
+
+    @property
+    def rule(self) -> Rule:
+        """The functions at points of their own, at which signs are looked at."""
+        raise NotImplementedError
 
     @cached_property
     def constant(self) -> FloatArray:

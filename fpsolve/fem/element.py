@@ -55,6 +55,16 @@ def numbered(lines: FloatArray, degrees: IntArray) -> tuple[Mask, IntArray]:
     return own, np.where(own, (np.cumsum(kept) - 1)[numbers], 0)
 
 
+def middles(lines: FloatArray) -> FloatArray:
+    """The middle of each cell."""
+    return 0.5 * (lines[:-1] + lines[1:])
+
+
+def halved(lines: FloatArray) -> FloatArray:
+    """The lines, and the middles."""
+    return np.sort(np.concatenate([lines, middles(lines)]))
+
+
 def located(lines: FloatArray, x: FloatArray, inside: FloatArray | None = None) -> tuple[IntArray, FloatArray]:
     """For each point the cell that holds it, and its place in that cell, from 0 to 1.
 

@@ -19,9 +19,9 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 
 from fpsolve.arrays import Coefficient, FloatArray, IntArray, Matrix, dense, one
-from fpsolve.fem.axis import Axis, DividedAxis, ModeEffects
+from fpsolve.fem.axis import Axis, DividedAxis, ModeEffects, Rule
+from fpsolve.fem.element import middles
 from fpsolve.fem.line import LineSpace
-from fpsolve.fem.mesh import middles
 from fpsolve.model.noise import Noise, NoiseDerivative
 from fpsolve.polynomials import Polynomials, gegenbauer, hermite, logarithm, stieltjes
 
@@ -59,20 +59,6 @@ class Samples(NamedTuple):
     factor: FloatArray
 
 
-class Rule(NamedTuple):
-    """The functions of a noise at the points of a quadrature rule, or at the states.
-
-    Attributes:
-        points: of what the functions are of, shape (n,) or (2, n).
-        measure: ∫ of the weight of the axis there, shape (n,).
-        values: without the factor of the axis, shape (n, size).
-    """
-
-    points: FloatArray
-    measure: FloatArray
-    values: Matrix
-
-
 @dataclass(frozen=True, eq=False)
 class NoiseAxis(Axis):
     """What the generator and its users ask of the functions of ξ; matrices are arrays, or sparse where they are large.
@@ -95,11 +81,6 @@ class NoiseAxis(Axis):
     def tilt(self) -> float:
         """s of this factor."""
         return self.slope * self.p
-
-    @property
-    def rule(self) -> Rule:
-        """The functions at points of their own."""
-        raise NotImplementedError
 
     @property
     def xi(self) -> FloatArray:

@@ -17,7 +17,8 @@ import numpy as np
 import scipy.sparse
 
 from fpsolve.arrays import FloatArray, IntArray
-from fpsolve.fem.noise_axes import MORE_POINTS, CountedAxis, Rule, Samples, form
+from fpsolve.fem.axis import Rule
+from fpsolve.fem.noise_axes import MORE_POINTS, CountedAxis, Samples, form
 from fpsolve.model.noise import NoiseDerivative
 from fpsolve.polynomials import hermite
 

@@ -10,20 +10,21 @@ from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.sparse import csr_matrix, diags, issparse
+from scipy.sparse import csr_matrix, diags, identity, issparse
 
-from fpsolve.arrays import FloatArray, IntArray, Mask, Matrix, one
+from fpsolve.arrays import FloatArray, IntArray, Matrix, one
 from fpsolve.errors import MeshError
-from fpsolve.fem.axis import FEW_UNKNOWNS, DividedAxis
+from fpsolve.fem.axis import DividedAxis, Rule
 from fpsolve.fem.element import (
     EXTRA_POINTS,
     Orthonormal,
     gauss_legendre,
     legendre,
     located,
+    middles,
     orthonormal,
 )
-from fpsolve.fem.mesh import SAME_LINE, middles
+from fpsolve.fem.mesh import SAME_LINE
 from fpsolve.fem.terms import At, OfMoment, Term, Terms
 from fpsolve.messages import Code, Message
 from fpsolve.model.coordinates import Framed
@@ -97,23 +98,12 @@ class PhaseAxis(DividedAxis):
         return orthonormal(int(self.degrees.max()))
 
     @cached_property
-    def _numbers(self) -> tuple[Mask, IntArray]:
-        """Which modes each cell has, and their numbers, shapes (m, largest degree + 1)."""
-        kept = np.arange(self.degrees.max() + 1) <= self.degrees[:, None]
-        return kept, np.cumsum(kept).reshape(kept.shape) - 1
-
-    @cached_property
     def cells(self) -> IntArray:
-        return np.nonzero(self._numbers[0])[0]
+        return np.repeat(np.arange(self.degrees.size), self.degrees + 1)
 
     @cached_property
     def modes(self) -> IntArray:
-        return np.nonzero(self._numbers[0])[1]
-
-    @cached_property
-    def _pairs(self) -> Mask:
-        kept, _ = self._numbers
-        return kept[:, :, None] & kept[:, None, :]
+        return np.arange(self.size) - np.searchsorted(self.cells, self.cells)
 
     @cached_property
     def _grid(self) -> FloatArray:
@@ -141,32 +131,18 @@ class PhaseAxis(DividedAxis):
 
     @cached_property
     def turns(self) -> int:  # type: ignore[override]
-        return round(2 * math.pi / self.span)
+        return round(2 * math.pi / np.ptp(self.lines))
 
     @cached_property
-    def right_trace(self) -> Matrix:
-        """T(φⱼ⁺) at lines[:-1], shape (m, size)."""
-        return self._trace(0)
-
-    @cached_property
-    def left_trace(self) -> Matrix:
-        """T(φⱼ⁻) at lines[:-1], shape (m, size); that at the seam comes from the last cell."""
-        return self._trace(1)
-
-    @cached_property
-    def jump(self) -> Matrix:
-        """T(φⱼ⁺) − T(φⱼ⁻)."""
-        return self.right_trace - self.left_trace
-
-    def _trace(self, side: int) -> Matrix:
-        """T at lines[:-1] in the cells above these, or for side = 1 below."""
-        cell = (np.arange(self._sizes.size) - side) % self._sizes.size
-        return self.at(self.lines[cell + side], middles(self.lines)[cell])
+    def traces(self) -> tuple[Matrix, Matrix]:
+        """T(φⱼ⁻) and T(φⱼ⁺) at lines[:-1], shapes (m, size); below the seam is the last cell."""
+        inside = middles(self.lines)
+        return self.at(np.roll(self.lines[1:], 1), np.roll(inside, 1)), self.at(self.lines[:-1], inside)
 
     def mass(self, f: Any = one) -> Matrix:
         """∫ f u v of `Harmonics` f, or of 1."""
         if f == one:
-            return self._assembled(np.broadcast_to(np.eye(self._pairs.shape[1]), self._pairs.shape))
+            return self.stored(identity(self.size, format="csr"))
         wave = self._cellwise(f(self._grid) - f.mean, self._table.values, self._table.values, 0)
         return f.mean * self.matrix(one) + self._assembled(wave)  # exact without a wave
 
@@ -202,7 +178,8 @@ class PhaseAxis(DividedAxis):
         ha, qa, hb, qb, slope = a.h(at), a.q(at), b.h(at), b.q(at), a.h.slope(at)
         sharpness = (self.degrees + 1) ** 2 / self._sizes
         penalty = PENALTY * np.maximum(sharpness, np.roll(sharpness, 1))
-        jump, mean = self.jump, 0.5 * (self.left_trace + self.right_trace)
+        left, right = self.traces
+        jump, mean = right - left, 0.5 * (left + right)
         mean_slope = mean @ self._derivative
         loads = (
             -(jump.T @ by_rows(ha * hb, mean_slope) + mean_slope.T @ by_rows(ha * hb, jump))
@@ -256,9 +233,7 @@ class PhaseAxis(DividedAxis):
         cell above.
         """
         cell, local = located(self.lines, phi, inside)
-        values = legendre(int(self.degrees.max()), local) / np.sqrt(self._sizes[cell])[:, None]
-        kept, numbers = self._numbers[0][cell], self._numbers[1][cell]
-        return self._matrix(values[kept], np.nonzero(kept)[0], numbers[kept], (phi.size, self.size))
+        return self._of_cells(cell, legendre(int(self.degrees.max()), local) / np.sqrt(self._sizes[cell])[:, None])
 
     def finer_rule(self, parts: int) -> tuple[FloatArray, FloatArray]:
         """Points and weights of the rule where every cell is cut into so many parts, shapes (parts n,)."""
@@ -273,14 +248,10 @@ class PhaseAxis(DividedAxis):
         return self.at(self.points)
 
     @cached_property
-    def inner_values(self) -> Matrix:
-        """The basis functions at five points inside each cell, shape (5 m, size)."""
-        return self.at((self.lines[:-1, None] + self._sizes[:, None] * np.linspace(0.1, 0.9, 5)).ravel())
-
-    @property
-    def inner_measure(self) -> FloatArray:
-        """What each of these points stands for in ∫ dφ, shape (5 m,)."""
-        return np.repeat(self._sizes / 5, 5)
+    def rule(self) -> Rule:
+        """At five points inside each cell."""
+        points = (self.lines[:-1, None] + self._sizes[:, None] * np.linspace(0.1, 0.9, 5)).ravel()
+        return Rule(points, np.repeat(self._sizes / 5, 5), self.at(points))
 
     def projection(self, other: PhaseAxis) -> Matrix:
         """The matrix that takes a function of another space to its projection on this one, shape (size, other.size)."""
@@ -292,20 +263,13 @@ class PhaseAxis(DividedAxis):
 
     def _assembled(self, blocks: FloatArray) -> Matrix:
         """The matrix with a block for each cell; its rows are those of the test functions."""
-        return self._matrix(blocks[self._pairs], *self._places, (self.size, self.size))
+        return self._of_cells(self.cells, blocks[self.cells, self.modes])
 
-    @cached_property
-    def _places(self) -> tuple[IntArray, IntArray]:
-        _, numbers = self._numbers
-        rows, columns = np.broadcast_arrays(numbers[:, :, None], numbers[:, None, :])
-        return rows[self._pairs], columns[self._pairs]
-
-    def _matrix(self, entries: FloatArray, rows: IntArray, columns: IntArray, shape: tuple[int, int]) -> Matrix:
-        if self.size > FEW_UNKNOWNS:
-            return csr_matrix((entries, (rows, columns)), shape=shape)
-        matrix = np.zeros(shape)
-        matrix[rows, columns] = entries
-        return matrix
+    def _of_cells(self, cells: IntArray, table: FloatArray) -> Matrix:
+        """The matrix of which each row is that of a table, by degree, at the functions of one cell, and else 0."""
+        rows, columns = np.nonzero(np.equal.outer(cells, self.cells))
+        entries = table[rows, self.modes[columns]]
+        return self.stored(csr_matrix((entries, (rows, columns)), shape=(cells.size, self.size)))
 
 
 class Wall(NamedTuple):
@@ -338,14 +302,15 @@ class PlaneTerms(Terms):
 
     def __init__(self, framed: Framed, phi: PhaseAxis, noises: Sequence[Any]) -> None:
         super().__init__(framed, phi, noises)
-        system, self._jump, self._vertices = self.system, phi.jump, phi.lines[:-1]
+        system, self._vertices, (left, right) = self.system, phi.lines[:-1], phi.traces
+        self._jump = right - left
         steady, driven = np.zeros(self._vertices.size), np.zeros(self._vertices.size)
         for term in system.terms:
             speed, xi = system.epsilon**term.order * term.h(self._vertices), noises[self._at(term.noise)]
             if not is_driven(term.g):
                 steady += float(term.g(0.0)) * speed
             else:
-                square = xi.constant @ (xi.mass(lambda xi, g=term.g: g(xi) ** 2) @ xi.constant)
+                square = xi.constant @ (xi.product(term.g(xi.xi) ** 2) @ xi.constant)
                 driven += abs(speed) * math.sqrt(square / (xi.constant @ (xi.matrix(one) @ xi.constant)))
         self._upwinding = abs(steady) + driven  # for the typical ξ
         after_walls = 0.0 * self._jump  # |v| T₊ is in the term of the wall
@@ -359,14 +324,14 @@ class PlaneTerms(Terms):
         for jump, v in zip(system.jumps, framed.wall_speeds(system), strict=True):
             at = vertices_at(phi.lines, jump.phase)
             is_pointwise[at], direction[at] = True, math.copysign(1.0, v)
-            left, right = phi.left_trace[at], phi.right_trace[at]
-            self._walls.append(Wall(jump, v, left.T @ right if v > 0 else right.T @ left))
-            at_wall = np.isin(np.arange(self._vertices.size), at).astype(float)
-            after_walls = after_walls + by_rows(at_wall, phi.right_trace if v > 0 else -phi.left_trace)
+            before, after = (left, right) if v > 0 else (right, left)
+            self._walls.append(Wall(jump, v, before[at].T @ after[at]))
+            at_wall = np.isin(np.arange(self._vertices.size), at) * math.copysign(1.0, v)
+            after_walls = after_walls + by_rows(at_wall, after)
         self._free_jump, self._two_way = self._jump - after_walls, np.flatnonzero(is_pointwise & (direction == 0))
         self._upwinding[is_pointwise] = 0.0
         # nothing is left of the other side: where ξ is large that would count
-        self._leaving = 0.5 * (phi.right_trace + phi.left_trace) - by_rows(0.5 * direction, self._jump)
+        self._leaving = 0.5 * (left + right) - by_rows(0.5 * direction, self._jump)
 
     @property
     def keeps_constants(self) -> bool:  # type: ignore[override]

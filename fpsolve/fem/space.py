@@ -142,12 +142,8 @@ class Space:
         tables = [along(matrices, old.table(each)) for each in np.atleast_2d(coefficients)]
         return np.reshape(tables, (*coefficients.shape[:-1], self.size))
 
-    def on_grid(self, coefficients: FloatArray) -> FloatArray:
-        """A function without its factor at all points of a grid, φ first."""
-        return along([self.phi.inner_values, *(axis.rule.values for axis in self.noises)], self.table(coefficients))
-
-    @property
-    def grid_measure(self) -> FloatArray:
-        """What the points of that grid stand for in an integral with the weights of all axes, but for a factor."""
-        measures = [self.phi.inner_measure, *(axis.rule.measure for axis in self.noises)]
-        return np.asarray(reduce(np.multiply.outer, measures))
+    def on_grid(self, *functions: FloatArray) -> list[FloatArray]:
+        """What the points of a grid stand for in an integral with the weights of all axes, but for a factor, and
+        functions without their factors there."""
+        _, measures, values = zip(*[axis.rule[:3] for axis in self.axes], strict=True)
+        return [reduce(np.multiply.outer, measures), *(along(values, self.table(each)) for each in functions)]
