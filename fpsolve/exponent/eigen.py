@@ -172,7 +172,7 @@ def _is_principal(pair: PrincipalPair, pairs: Sequence[PrincipalPair], goes_on: 
         return abs(pair.value) <= BESIDE_IT[0] * generator.framed.unit_rate
     if not goes_on and math.isinf(tangent) and _has_other_positive(generator, pair.p):
         return False
-    return not generator.may_hold or _is_rightmost(pair)
+    return not generator.left_in_phase or _is_rightmost(pair)
 
 
 def _rightmost_pair(pencil: Pencil, generator: Generator, reached: PrincipalPair | None) -> PrincipalPair:
@@ -189,7 +189,7 @@ def _rightmost_pair(pencil: Pencil, generator: Generator, reached: PrincipalPair
     if not _has_other_positive(generator, p):
         return pair
     others = [reached.value] if reached and reached.residual <= BACKWARD_ERROR_LIMIT else []
-    if generator.may_hold and generator.size <= FEW_UNKNOWNS:  # of a chain
+    if generator.left_in_phase and generator.size <= FEW_UNKNOWNS:  # of a chain
         others.append(float(spectrum(generator, p, 1)[0].real))
     rightmost = max(others, default=-math.inf)
     if rightmost - pair.value > 1e-6 * max(abs(rightmost), unit):
@@ -250,7 +250,7 @@ def _has_other_positive(generator: Generator, p: float) -> bool:
     problem = generator.problem
     if generator.chosen.phi.is_followed:  # each search begins at a neighbouring p
         return False
-    if generator.may_hold:
+    if generator.left_in_phase:
         return True
     if (frozen := frozen_noise(problem)) is None:
         values = [each.reached for each in problem.valued.parts.values()]

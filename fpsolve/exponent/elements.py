@@ -398,7 +398,7 @@ class GivenMesh(PlaneElements):
         """That of the mesh, and one of four degrees more, whose error hardly counts beside it. Raises `MeshError`."""
         assert self.settings.mesh is not None
         generator = Generator(self.problem, self.settings.mesh)
-        return generator, generator.enriched().enriched()
+        return generator, Generator(self.problem, generator.chosen.enriched().enriched())
 
     def solution(self, p: float, tolerance: Tolerance | None = None) -> Solution:
         _ = self.generators  # refuses a mesh that cannot be used

@@ -244,7 +244,7 @@ def mode_effects(pair: PrincipalPair) -> tuple[ModeEffects | None, ...]:
         shares = np.abs(parts).sum(axis=tuple(1 + j for j in range(count) if j != k)) * np.cumsum(masks, axis=0)
         effects = [np.bincount(axis.cells[inside], each[inside], degrees.size) / norm for each in shares]
         highest = np.maximum.accumulate(effects)  # in those of more modes, parts of these may cancel
-        found.append(ModeEffects(degrees, highest, pair.generator.slowest[k]))
+        found.append(ModeEffects(degrees, highest, axis.slowest if k else pair.generator.left_in_phase))
     return tuple(found)
 
 

@@ -357,7 +357,7 @@ class DirectionAxis(Axis):
         """S⁻¹AS."""
         return np.asarray(np.linalg.solve(self.coordinates, np.array(term.matrix) @ self.coordinates))
 
-    def driven(self, term: CoefficientMatrix) -> tuple[Matrix, Matrix]:
+    def motion(self, term: CoefficientMatrix) -> tuple[Matrix, Matrix]:
         """∫ v h·∇u and ∫ v q u."""
         moved, growth = self._moved(self.inside(term))
         return self._form((self._itself, moved)), self._form((self._itself, growth))
@@ -548,8 +548,11 @@ class HalfSphereAxis(DirectionAxis):
 class DirectionTerms(Terms):
     """L(p) of three and four variables. Args as those of `Terms`."""
 
-    def _written(self, term: CoefficientMatrix) -> tuple[str, str, str]:
-        return "h·∇", "q", "(h·∇ + p q)² of white noise"
+    words = "{0}h·∇", "{0}q", "½ (h·∇ + p q)² of white noise"
+
+    def _matrices(self, term: CoefficientMatrix) -> tuple[Matrix, Matrix]:
+        found: tuple[Matrix, Matrix] = self.phi.motion(term)
+        return found
 
     @cached_property
     def _mean(self) -> FloatArray:

@@ -300,6 +300,8 @@ class PlaneTerms(Terms):
     they take φ, see `PhaseAxis.impulses`.
     """
 
+    words = "{0}{h} ∂φ", "{0}{q}", "½ (h ∂φ + p q)² of white noise, h = {h}, q = {q}"
+
     def __init__(self, framed: Framed, phi: PhaseAxis, noises: Sequence[Any]) -> None:
         super().__init__(framed, phi, noises)
         system, self._vertices, (left, right) = self.system, phi.lines[:-1], phi.traces
@@ -369,10 +371,6 @@ class PlaneTerms(Terms):
         loads = self._leaving.T @ by_rows(term.h(self._vertices), self._free_jump)
         return self.phi.convection(term.h) + loads, self.phi.mass(term.q)
 
-    def _written(self, term: CoefficientMatrix) -> tuple[str, str, str]:
-        h, q = _written(term.h), _written(term.q)
-        return f"{h} ∂φ", q, f"(h ∂φ + p q)² of white noise, h = {h}, q = {q}"
-
     def _struck(self, of: Impulse, by: Impulse | None = None) -> Term:
         """An impulse, or ∂/∂θ of it."""
         struck = self.phi.struck(of)
@@ -401,16 +399,6 @@ class PlaneTerms(Terms):
                     return np.abs(phase_speed(self.system, {**held, first: xi} if held else xi)(phi))
 
                 yield Term(0, OfMoment(0), phase, (of_first, *map(At, values)), text)
-
-
-def _written(of: Harmonics) -> str:
-    """(0.5 − 0.5 cos 2φ), or one number."""
-    text = ""
-    for value, name in ((of.mean, ""), (of.cosine, " cos 2φ"), (of.sine, " sin 2φ")):
-        if value:
-            text += f" {'−' if value < 0 else '+'} {abs(value):g}{name}"
-    text = text.removeprefix(" + ").removeprefix(" ")
-    return text if of.mean and not of.amplitude else f"({text})"
 
 
 def by_rows(factors: FloatArray, matrix: Matrix) -> Matrix:
