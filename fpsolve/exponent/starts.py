@@ -28,14 +28,8 @@ from fpsolve.theory.frozen import frozen_noise, steady_places, swing
 
 REACH = 12.0
 """Standard deviations on both sides, up to which the first cells of noise with algebraic tails are."""
-FREE_STAGES = 4
-"""From this number of stages on, no cell is made coarser."""
 SHARE = 0.05
 """Share of the tolerance that a new discretisation is made for in each direction, so that it serves other p too."""
-ALONE = 0.5
-"""Share of the tolerance in each direction of a discretisation that serves one p only."""
-MOST_GAIN = 1e-3
-"""Least factor by which one stage with cells of the noise aims to reduce the error: a larger fall is foreseen badly."""
 ROUND = 360
 """Number of φ at which it is asked which way the phase turns."""
 COMPARABLE = 0.6
@@ -82,27 +76,14 @@ class Start:
         found = self.space.doubled(mode_effects(pair) if is_pair else ())
         return replace(self, space=found) if found.size > self.space.size else None
 
-    def refined(self, solution: Solution, goal: float, stages: int, most: int) -> Start:
-        """A place on which each cell should lack no more than its share of an error.
-
-        Args:
-            solution: that on the space.
-            goal: the error.
-            stages: how many spaces were solved on.
-            most: unknowns; where more are needed, a space is made that does for this p alone.
-        """
-        chosen, may_coarsen = self.space, stages < FREE_STAGES
-        if chosen.xi.lines.size:
-            goal = max(goal, MOST_GAIN * solution.error)
-        for share in (SHARE * goal, ALONE * goal):
-            found = chosen.refined(solution.effects, share, may_coarsen)
-            if chosen.xi.lines.size:
-                lower, upper = solution.truncation
-                found = found.with_axis(1, found.xi.reaching(lower > share, upper > share))
-            found = found if found.size > chosen.size else found.raised()
-            if found.size <= most:
-                break
-        return replace(self, space=found)
+    def refined(self, solution: Solution, goal: float) -> Start:
+        """More functions where those of a solution lack more than their share of an error, fewer where they lack less."""
+        share = SHARE * goal
+        found = self.space.refined(solution.effects, share)
+        if found.xi.lines.size:
+            lower, upper = solution.truncation
+            found = found.with_axis(1, found.xi.reaching(lower > share, upper > share))
+        return replace(self, space=found if found.size > self.space.size else found.raised())
 
 
 def first(problem: Problem, p: float, rtol: float, center: float | None = None) -> Space:

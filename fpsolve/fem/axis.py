@@ -89,15 +89,13 @@ class ModeEffects:
         return self.degrees + np.log(np.maximum(self.of_cells, 1e-300) / tolerance) / self.fall
 
 
-def split(lines: FloatArray, effects: ModeEffects, share: float, may_coarsen: bool) -> tuple[FloatArray, IntArray]:
+def split(lines: FloatArray, effects: ModeEffects, share: float) -> tuple[FloatArray, IntArray]:
     """Lines, and a degree for each cell, with which all n cells together should lack no more than a share.
 
     What cells lack has both signs, so that it is taken to add up like √n: each cell may lack a share of 1/√n. A cell is
     halved where its halves take fewer unknowns, as effects fall faster in them.
     """
     rate, needed = effects.fall, effects.needed(max(share, 1e-290) / math.sqrt(effects.degrees.size))
-    if not may_coarsen:  # by more than one degree
-        needed = np.maximum(needed, np.minimum(effects.degrees, needed + 1))
     in_half = needed * rate / (rate + HALVING)
     is_split = (2 * in_half + 2 < needed + 1) & (effects.degrees >= SPLIT_DEGREE) & (needed > effects.degrees)
     is_split |= needed > MOST_DEGREE
@@ -223,7 +221,7 @@ class Axis:
         """One function more in each cell, where what a cell lacks harms others."""
         return self
 
-    def refined(self, effects: ModeEffects, share: float, may_coarsen: bool) -> Self:
+    def refined(self, effects: ModeEffects, share: float) -> Self:
         """One that all together should lack no more than a share."""
         return self
 
@@ -258,8 +256,8 @@ class DividedAxis(Axis):
     def raised(self) -> Self:
         return self.on(self.lines, np.minimum(self.degrees + 1, MAX_DEGREE))
 
-    def refined(self, effects: ModeEffects, share: float, may_coarsen: bool) -> Self:
-        return self.on(*split(self.lines, effects, share, may_coarsen))
+    def refined(self, effects: ModeEffects, share: float) -> Self:
+        return self.on(*split(self.lines, effects, share))
 
 
 def along(factors: Sequence[Matrix | None], tables: FloatArray) -> FloatArray:

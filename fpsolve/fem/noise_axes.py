@@ -173,10 +173,9 @@ class CountedAxis(NoiseAxis):
     def raised(self) -> Self:
         return replace(self, count=min(self.count + 2, MAX_COUNT))
 
-    def refined(self, effects: ModeEffects, share: float, may_coarsen: bool) -> Self:
+    def refined(self, effects: ModeEffects, share: float) -> Self:
         needed = math.ceil(float(effects.needed(share)[0]) + 1.3)
-        least = max(self.count // 2, 3) if may_coarsen else self.count
-        return replace(self, count=max(least, min(needed, 3 * self.count // 2 + 3, MAX_COUNT)))
+        return replace(self, count=max(self.count // 2, 3, min(needed, 3 * self.count // 2 + 3, MAX_COUNT)))
 
 
 class LineAxis(NoiseAxis):

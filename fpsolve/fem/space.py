@@ -108,10 +108,10 @@ class Space:
         """One more function each way, where what a cell lacks harms others."""
         return Space(tuple(axis.raised() for axis in self.axes))
 
-    def refined(self, effects: Sequence[ModeEffects | None], share: float, may_coarsen: bool) -> Space:
+    def refined(self, effects: Sequence[ModeEffects | None], share: float) -> Space:
         """One on which every cell should lack no more than its share; the effects are those of every axis."""
         pairs = zip(self.axes, effects, strict=True)
-        return Space(tuple(axis.refined(each, share, may_coarsen) if each else axis for axis, each in pairs))
+        return Space(tuple(axis.refined(each, share) if each else axis for axis, each in pairs))
 
     @cached_property
     def constant(self) -> FloatArray:
