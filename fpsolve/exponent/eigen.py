@@ -441,12 +441,12 @@ def _reached(generator: Generator, pencil: Pencil, x: FloatArray, y: FloatArray)
 
 
 def _of_noises(space: Space) -> FloatArray:
-    """⟨L_ξ T, 1⟩ for every function T, L_ξ the generator of all noises, shape (size,)."""
-    noises, total = space.noises, np.zeros(space.size)
-    for k, own in enumerate(noises):
-        others = [axis.generator_of_one() if axis is own else axis.matrix(one) @ axis.constant for axis in noises]
-        if np.any(others[k]) or len(noises) == 1:
-            total = total + space.product([space.phi.constant, *others])
+    """⟨L_ξ T, 1⟩ for every function T, L_ξ the generator of all noises, shape (size,): 0 but for factors."""
+    total = np.zeros(space.size)
+    for own in space.axes:
+        if own.slope:  # the first of its functions is 1
+            loads = [axis.matrix(None)[0] if axis is own else axis.matrix(one) @ axis.constant for axis in space.axes]
+            total += space.product(loads)
     return total
 
 

@@ -28,8 +28,6 @@ from fpsolve.model.quantity import UNNAMED
 if TYPE_CHECKING:
     import xarray
 
-DEPTH = 4
-"""Of the highest modes of a cell whose effects are looked at."""
 MEANINGLESS = 1e-2
 """An estimated error above this share of the scale of Λ(p) is no result."""
 
@@ -236,8 +234,8 @@ def mode_effects(pair: PrincipalPair) -> tuple[ModeEffects | None, ...]:
             continue
         degrees = np.zeros(int(axis.cells.max()) + 1, dtype=int)
         np.maximum.at(degrees, axis.cells[inside], axis.modes[inside])
-        masks = inside & (degrees[axis.cells] - axis.modes == np.arange(DEPTH)[:, None])  # from the highest mode on
-        kept = masks.reshape(DEPTH, *(axis.size if j == k else 1 for j in range(count)))
+        masks = inside & (degrees[axis.cells] - axis.modes == np.arange(4)[:, None])  # from the highest mode on
+        kept = masks.reshape(4, *(axis.size if j == k else 1 for j in range(count)))
         nested = [axis.nested if j == k else None for j in range(count)]
         first, last = (along(nested, space.table(each)) for each in (smooth, rough))
         parts = last * np.cumsum(operator.images(first * kept), axis=0)

@@ -18,7 +18,7 @@ from fpsolve.exponent.eigen import BACKWARD_ERROR_LIMIT, PrincipalPair, principa
 from fpsolve.exponent.error import Solution, mode_effects
 from fpsolve.fem.axis import MOST_DEGREE, KroneckerSum
 from fpsolve.fem.generator import Generator
-from fpsolve.fem.noise_axes import CellAxis, NoiseAxis, PolynomialAxis
+from fpsolve.fem.noise_axes import CellAxis, NoiseAxis
 from fpsolve.fem.phase import PhaseAxis
 from fpsolve.fem.space import Space, first_axis
 from fpsolve.model.coordinates import framed
@@ -77,7 +77,7 @@ class Start:
         return replace(self, space=found) if found.size > self.space.size else None
 
     def refined(self, solution: Solution, goal: float) -> Start:
-        """More functions where those of a solution lack more than their share of an error, fewer where they lack less."""
+        """More functions where those of a solution lack more than their share of an error, fewer where less."""
         share = SHARE * goal
         found = self.space.refined(solution.effects, share)
         if found.xi.lines.size:
@@ -122,8 +122,8 @@ def _of_diffusion(problem: Problem, p: float, digits: float, center: float | Non
     unit, end = noise.standard_deviation, noise.half_width / noise.standard_deviation
     center = frozen.center(p) if center is None else center
     slope = frozen.tilt(center) / p if noise.may_tilt else 0.0
-    axis = PolynomialAxis(noise, round(digits / 2) + (3 if math.isinf(end) else 5), slope)
-    return axis, unit * np.clip(center + np.array([-2.0, 2.0]), -end, end)
+    axis: Any = first_axis(noise, digits)
+    return replace(axis, slope=slope), unit * np.clip(center + np.array([-2.0, 2.0]), -end, end)
 
 
 AXES = {"cells": _of_tails, "pairs": _of_filter, "polynomials": _of_diffusion}

@@ -119,10 +119,6 @@ class NoiseAxis(Axis):
     def facts(self) -> dict[str, Any]:
         return {"xi": self.word, "xi_size": self.size, "tilt": self.tilt}
 
-    def generator_of_one(self) -> FloatArray:
-        """`generator` with v the function 1, times the factor; shape (size,)."""
-        return np.zeros(self.size)
-
     def samples(self) -> Samples:
         """At the points of the rule, or at the states."""
         raise NotImplementedError
@@ -365,10 +361,6 @@ class PolynomialAxis(CountedAxis, LineAxis):
             x = self.rule.points / self.rule.scale
             logs = logs + change.end_exponent * (_end_logarithm(x.size, self._ends[0], a) - np.log1p(-(x**2)))
         return logs
-
-    def generator_of_one(self) -> FloatArray:
-        flux = self.rule.measure * self.rate(self.rule.points)
-        return np.asarray(-self.tilt * (flux @ self.rule.slopes))
 
     def values_at(self, z: FloatArray) -> FloatArray:
         return self.rule.polynomials.at((z - self.rule.shift) / self.rule.scale)[0]

@@ -88,9 +88,6 @@ class PairAxis(CountedAxis):
     def generator(self) -> FloatArray:
         return self._drifting(self.noise.drift_matrix)
 
-    def generator_of_one(self) -> FloatArray:
-        return np.asarray(self.matrix(None)[0])
-
     def _changed_generator(self, change: NoiseDerivative) -> FloatArray:
         return self._drifting(np.array(change.drift or np.zeros((2, 2))))
 

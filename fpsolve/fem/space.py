@@ -30,13 +30,11 @@ BASES: dict[str, Callable[[Noise, int], NoiseAxis]] = {
     "states": lambda noise, _: StateAxis(noise),
 }
 """The functions of a noise by its `basis` and a number of them; those of "cells" follow from their interval."""
-FIRST = {"waves": 4}
-"""Number of functions of a first axis beyond half the digits, by the `basis`, where that is not 3."""
 
 
 def first_axis(noise: Noise, digits: float) -> NoiseAxis:
-    """Few functions of a noise, for so many digits, where no value of the noise is held."""
-    return BASES[noise.basis](noise, round(digits / 2) + FIRST.get(noise.basis, 3))
+    """Few functions of a noise, for so many digits; there are more where it has ends."""
+    return BASES[noise.basis](noise, round(digits / 2) + (3 if math.isinf(noise.half_width) else 5))
 
 
 class Space:
