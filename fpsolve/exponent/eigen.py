@@ -19,13 +19,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.linalg
-from scipy.sparse.linalg import ArpackError, ArpackNoConvergence, LinearOperator, eigs, gmres
+from scipy.sparse.linalg import ArpackError, ArpackNoConvergence, LinearOperator, eigs
 
 from fpsolve.arrays import FloatArray, finite, one
 from fpsolve.data import brief
 from fpsolve.errors import NotConverged, NumericalFailure, SingularMatrix
 from fpsolve.exponent.rightmost import NEAR_ENOUGH, NEARER
-from fpsolve.fem.axis import FEW_UNKNOWNS, KroneckerSum
+from fpsolve.fem.axis import KroneckerSum
 from fpsolve.fem.factors import Factors, one_thread
 from fpsolve.fem.generator import Generator, Pencil
 from fpsolve.fem.space import Space
@@ -46,8 +46,6 @@ SURELY_POSITIVE = 1e-4
 """The same for a pair with which the search ends at once."""
 BESIDE_IT = 1e-6, 1e-2
 """Distances from an eigenvalue, over a rate of the system, at which it is looked whether others are to its right."""
-RESOLVED, STEPS = 1e-5, 20
-"""Residual of GMRES, as signs count from `SURELY_POSITIVE` on, and its number of steps at most."""
 LEAST_OF_MOST = 1e-2
 """Least value of T, over its largest, from which on it is positive beyond what it may be off."""
 MOSTLY = 0.5
@@ -186,14 +184,9 @@ def _rightmost_pair(pencil: Pencil, generator: Generator, reached: PrincipalPair
         limits = {"limit": BACKWARD_ERROR_LIMIT, "most": POSITIVE}
         told = Message(Code.NO_EIGENVALUE, p=p, residual=pair.residual, size=defect, **limits)
         raise NotConverged(told, pair, Remedy.BOTH_AXES)
-    if not _has_other_positive(generator, p):
-        return pair
-    others = [reached.value] if reached and reached.residual <= BACKWARD_ERROR_LIMIT else []
-    if generator.left_in_phase and generator.size <= FEW_UNKNOWNS:  # of a chain
-        others.append(float(spectrum(generator, p, 1)[0].real))
-    rightmost = max(others, default=-math.inf)
-    if rightmost - pair.value > 1e-6 * max(abs(rightmost), unit):
-        told = Message(Code.LARGER_EIGENVALUE, p=p, rightmost=rightmost, value=pair.value)
+    is_other = reached and reached.residual <= BACKWARD_ERROR_LIMIT and _has_other_positive(generator, p)
+    if is_other and reached.value - pair.value > 1e-6 * max(abs(reached.value), unit):
+        told = Message(Code.LARGER_EIGENVALUE, p=p, rightmost=reached.value, value=pair.value)
         raise NotConverged(told, pair, Remedy.PHASE)
     return pair
 
@@ -214,31 +207,15 @@ def _is_rightmost(pair: PrincipalPair) -> bool:
             return True
     pencil, source = pair.generator.at(pair.p), space.weighed(space.constant)
     seen = [side for side in (0, 1) if not space.phi.is_followed or pair.sign_defects[side] <= POSITIVE]
-    near, far = (pair.eigenvalue + shift * pair.generator.framed.unit_rate for shift in BESIDE_IT)
-    factor: Any = pencil.factorised(near)
-
-    def solutions(side: int) -> list[FloatArray]:
-        operator, is_left = pencil.shifted(far), bool(side)
-        operator = operator.T if is_left else operator
-        inverse = LinearOperator(2 * source.shape, lambda v: factor.solve(v, transposed=is_left), dtype=float)
-        moved = LinearOperator(2 * source.shape, lambda v: operator @ v, dtype=float)
-        solution, failed = gmres(moved, source, M=inverse, rtol=RESOLVED, restart=STEPS, maxiter=1)
-        return [inverse @ source, *([] if failed else [solution])]
-
-    def is_positive(side: int, solution: FloatArray) -> bool:
-        both = [pair.right, pair.left]
-        both[side] = -solution
-        return _sign_defects(space, *both)[side] <= SURELY_POSITIVE
-
-    found = {side: solutions(side) for side in seen}
-    failed = [side for side in seen if len(found[side]) == 1 and is_positive(side, found[side][0])]
-    if failed:
-        factor = None  # there is room for the next ones
-        factor = pencil.factorised(far)
-        for side in failed:
-            found[side].append(factor.solve(source, transposed=bool(side)))
-    positive = (all(is_positive(side, each) for each in found[side]) for side in seen)
-    return not seen or (all if space.phi.has_adjoint else any)(positive)
+    positive = dict.fromkeys(seen, True)
+    for distance in BESIDE_IT:
+        factor: Any = None  # there is room for the next ones
+        factor = pencil.factorised(pair.eigenvalue + distance * pair.generator.framed.unit_rate)
+        for side in seen:
+            both = [pair.right, pair.left]
+            both[side] = -factor.solve(source, transposed=bool(side))
+            positive[side] &= _sign_defects(space, *both)[side] <= SURELY_POSITIVE
+    return not seen or (all if space.phi.has_adjoint else any)(positive.values())
 
 
 def _has_other_positive(generator: Generator, p: float) -> bool:
