@@ -275,7 +275,9 @@ def along(factors: Sequence[Matrix | None], tables: FloatArray) -> FloatArray:
 
 
 class KroneckerSum:
-    """Σ Φ_k ⊗ Ξ_k ⊗ …, the factors kept apart; vectors are those of functions on φ × ξ × …, the first axis slowest.
+    """Σ Φ_k ⊗ Ξ_k ⊗ …, the factors kept apart.
+
+    It multiplies vectors of functions on φ × ξ × …, the first axis slowest, or such tables, or a stack of either.
 
     Attributes:
         terms: for each term a square matrix for each axis, arrays or sparse.
@@ -288,12 +290,9 @@ class KroneckerSum:
         self.shape = tuple(factor.shape[0] for factor in terms[0])
         self.size = math.prod(self.shape)
 
-    def __matmul__(self, vector: FloatArray) -> FloatArray:
-        return np.ravel(self.images(vector.reshape(self.shape)))
-
-    def images(self, tables: FloatArray) -> FloatArray:
-        """The images of vectors as tables, shape (…, *shape)."""
-        return np.asarray(sum(along(term, tables) for term in self.terms))
+    def __matmul__(self, vectors: FloatArray) -> FloatArray:
+        tables = vectors.reshape(self.shape if vectors.size == self.size else (-1, *self.shape))
+        return np.reshape(sum(along(term, tables) for term in self.terms), vectors.shape)
 
     def each(self, function: Callable[[Matrix], Matrix]) -> KroneckerSum:
         """The sum with a function of every factor in place of it."""

@@ -337,10 +337,10 @@ class PlaneTerms(Terms):
 
     @property
     def keeps_constants(self) -> bool:  # type: ignore[override]
-        for term in self.system.terms:
+        for term in (*self.system.terms, *self._framed.diffusions):
             if term.order == 0 and (term.h.amplitude or not term.q.vanishes):
                 return False
-        return all(each.order for each in self._framed.diffusions)
+        return True
 
     def _loads(self) -> Iterator[Term]:
         for struck in self._framed.impulses:
