@@ -14,15 +14,14 @@ from scipy.sparse import csr_matrix, diags, identity, issparse
 
 from fpsolve.arrays import FloatArray, IntArray, Matrix, one
 from fpsolve.errors import MeshError
-from fpsolve.fem.axis import DividedAxis, Rule
+from fpsolve.fem.axis import FEW_UNKNOWNS, DividedAxis, Rule
 from fpsolve.fem.element import (
     EXTRA_POINTS,
-    Orthonormal,
+    differentiation,
     gauss_legendre,
     legendre,
     located,
     middles,
-    orthonormal,
 )
 from fpsolve.fem.mesh import SAME_LINE
 from fpsolve.fem.terms import At, OfMoment, Term, Terms
@@ -94,10 +93,6 @@ class PhaseAxis(DividedAxis):
         return np.diff(self.lines)
 
     @cached_property
-    def _table(self) -> Orthonormal:
-        return orthonormal(int(self.degrees.max()))
-
-    @cached_property
     def cells(self) -> IntArray:
         return np.repeat(np.arange(self.degrees.size), self.degrees + 1)
 
@@ -106,19 +101,26 @@ class PhaseAxis(DividedAxis):
         return np.arange(self.size) - np.searchsorted(self.cells, self.cells)
 
     @cached_property
-    def _grid(self) -> FloatArray:
-        """The points of a rule in each cell, shape (m, n)."""
-        return self.lines[:-1, None] + self._sizes[:, None] * self._table.points
-
-    @property
     def points(self) -> FloatArray:
-        """The points of all cells, shape (m n,)."""
+        """The points of a rule, so many in each cell, shape (n,)."""
         return self.finer_rule(1)[0]
 
-    @property
+    @cached_property
     def weights(self) -> FloatArray:
-        """Weights of the points, shape (m n,)."""
+        """Weights of the points, shape (n,)."""
         return self.finer_rule(1)[1]
+
+    @property
+    def values(self) -> Matrix:
+        """The functions at the points, shape (n, size)."""
+        return self.at(self.points)
+
+    @cached_property
+    def _local(self) -> tuple[FloatArray, FloatArray]:
+        """The polynomials of each cell and their derivatives at its points, shapes (m, n/m, largest degree + 1)."""
+        degree, size = int(self.degrees.max()), self._sizes[:, None, None]
+        values = legendre(degree, gauss_legendre(degree + EXTRA_POINTS)[0]) / np.sqrt(size)
+        return values, values @ differentiation(degree) / size
 
     @cached_property
     def constant(self) -> FloatArray:
@@ -143,17 +145,18 @@ class PhaseAxis(DividedAxis):
         """∫ f u v of `Harmonics` f, or of 1."""
         if f == one:
             return self.stored(identity(self.size, format="csr"))
-        wave = self._cellwise(f(self._grid) - f.mean, self._table.values, self._table.values, 0)
-        return f.mean * self.matrix(one) + self._assembled(wave)  # exact without a wave
+        wave = self._integral(f(self.points) - f.mean, *2 * self._local[:1])
+        return f.mean * self.matrix(one) + wave  # exact without a wave
 
     def convection(self, f: Harmonics) -> Matrix:
         """∫ f u′ v, cell by cell."""
-        return self._assembled(self._cellwise(f(self._grid), self._table.values, self._table.slopes, 1))
+        return self._integral(f(self.points), *self._local)
 
-    def _cellwise(self, f: FloatArray, of_test: FloatArray, of_trial: FloatArray, order: int) -> FloatArray:
-        """∫ f v u in each cell, from f at the points of its rule; v and u have so many derivatives together."""
-        weights = f * self._table.weights / self._sizes[:, None] ** order
-        return np.asarray(of_test.T @ (weights[:, :, None] * of_trial))
+    def _integral(self, f: Any, test: FloatArray, trial: FloatArray) -> Matrix:
+        """∫ f v u, cell by cell, from f at the points, and test and trial functions of each cell there."""
+        weights = np.reshape(self.weights * f, trial.shape[:2])
+        blocks = np.swapaxes(test, 1, 2) @ by_rows(weights, trial)
+        return self._of_cells(self.cells, blocks[self.cells, self.modes])
 
     def diffusion(self, a: CoefficientMatrix, b: CoefficientMatrix) -> tuple[Matrix, Matrix, Matrix]:
         """∫ w D_a D_b T, D = h ∂φ + p q of two matrices: the coefficients of p⁰, p¹ and p².
@@ -165,30 +168,22 @@ class PhaseAxis(DividedAxis):
         the interior penalty method, in which η grows like degree²/size of the smaller cell. What h and q do not change
         at a vertex, as h = 0 at the ray of a jump, is not there.
         """
-        grid, at, cellwise = self._grid, self.lines[:-1], self._cellwise
-        values, slopes = self._table.values, self._table.slopes
-        ha, qa, hb, qb, slope = a.h(grid), a.q(grid), b.h(grid), b.q(grid), a.h.slope(grid)
-        cells = (
-            -cellwise(ha * hb, slopes, slopes, 2) - cellwise(slope * hb, values, slopes, 1),
-            cellwise(qa * hb, values, slopes, 1)
-            - cellwise(ha * qb, slopes, values, 1)
-            - cellwise(slope * qb, values, values, 0),
-            cellwise(qa * qb, values, values, 0),
-        )
-        ha, qa, hb, qb, slope = a.h(at), a.q(at), b.h(at), b.q(at), a.h.slope(at)
+        left, right = self.traces
+        jump, mean, vertices = right - left, 0.5 * (left + right), self.lines[:-1]
         sharpness = (self.degrees + 1) ** 2 / self._sizes
         penalty = PENALTY * np.maximum(sharpness, np.roll(sharpness, 1))
-        left, right = self.traces
-        jump, mean = right - left, 0.5 * (left + right)
-        mean_slope = mean @ self._derivative
-        loads = (
-            -(jump.T @ by_rows(ha * hb, mean_slope) + mean_slope.T @ by_rows(ha * hb, jump))
-            - mean.T @ by_rows(hb * slope, jump)
-            - jump.T @ by_rows(penalty * ha * hb, jump),
-            mean.T @ by_rows(hb * qa, jump) - jump.T @ by_rows(ha * qb, mean),
-        )
-        first, second, last = (self._assembled(blocks) for blocks in cells)
-        return first + loads[0], second + loads[1], last
+
+        def both(phi: FloatArray, values: Any, slopes: Any) -> Any:
+            """D_a* w and D_b T by p⁰ and p¹, from values and slopes at φ."""
+            steady = by_rows(a.h(phi), slopes) + by_rows(a.h.slope(phi), values)
+            return (-steady, by_rows(a.q(phi), values)), (by_rows(b.h(phi), slopes), by_rows(b.q(phi), values))
+
+        adjoint, image = both(self.points.reshape(self._sizes.size, -1), *self._local)
+        first, second, third, last = (self._integral(1.0, w, u) for w in adjoint for u in image)
+        adjoint, image = both(vertices, mean, mean @ self._derivative)
+        of_a, of_b = by_rows(a.h(vertices), jump), by_rows(b.h(vertices), jump)
+        loads = [w.T @ of_b - of_a.T @ u for w, u in zip(adjoint, image, strict=True)]
+        return first + loads[0] - of_a.T @ by_rows(penalty, of_b), second + third + loads[1], last
 
     def impulses(self, struck: Struck, p: float, derivative: int = 0) -> Matrix:
         """∂ᵏ/∂pᵏ of ∫ w |exp(B)e|^p T(ψ(φ)), ψ being where an impulse takes φ."""
@@ -224,7 +219,8 @@ class PhaseAxis(DividedAxis):
     @cached_property
     def _derivative(self) -> Matrix:
         """The matrix to the coefficients of T′ in each cell."""
-        return self._assembled(self._table.derivative / self._sizes[:, None, None])
+        blocks = differentiation(int(self.degrees.max()))[self.modes] / self._sizes[self.cells, None]
+        return self._of_cells(self.cells, blocks)
 
     def at(self, phi: FloatArray, inside: FloatArray | None = None) -> Matrix:
         """Values at points of the domain, as rows of E with u(φ) = E @ coefficients, shape (len(φ), size).
@@ -239,13 +235,8 @@ class PhaseAxis(DividedAxis):
         """Points and weights of the rule where every cell is cut into so many parts, shapes (parts n,)."""
         sizes = np.repeat(self._sizes / parts, parts)
         starts = (self.lines[:-1, None] + self._sizes[:, None] * np.arange(parts) / parts).ravel()
-        points = starts[:, None] + sizes[:, None] * self._table.points
-        return points.ravel(), (sizes[:, None] * self._table.weights).ravel()
-
-    @cached_property
-    def values(self) -> Matrix:
-        """The basis functions at the points of the rule, shape (n, size)."""
-        return self.at(self.points)
+        local, weights = gauss_legendre(int(self.degrees.max()) + EXTRA_POINTS)
+        return (starts[:, None] + sizes[:, None] * local).ravel(), (sizes[:, None] * weights).ravel()
 
     @cached_property
     def rule(self) -> Rule:
@@ -261,15 +252,15 @@ class PhaseAxis(DividedAxis):
         """L(p) on these functions times those of each noise."""
         return PlaneTerms(framed, self, noises)
 
-    def _assembled(self, blocks: FloatArray) -> Matrix:
-        """The matrix with a block for each cell; its rows are those of the test functions."""
-        return self._of_cells(self.cells, blocks[self.cells, self.modes])
-
     def _of_cells(self, cells: IntArray, table: FloatArray) -> Matrix:
         """The matrix of which each row is that of a table, by degree, at the functions of one cell, and else 0."""
         rows, columns = np.nonzero(np.equal.outer(cells, self.cells))
-        entries = table[rows, self.modes[columns]]
-        return self.stored(csr_matrix((entries, (rows, columns)), shape=(cells.size, self.size)))
+        entries, shape = table[rows, self.modes[columns]], (cells.size, self.size)
+        if self.size > FEW_UNKNOWNS:
+            return csr_matrix((entries, (rows, columns)), shape=shape)
+        matrix = np.zeros(shape)
+        matrix[rows, columns] = entries
+        return matrix
 
 
 class Wall(NamedTuple):
@@ -402,5 +393,5 @@ class PlaneTerms(Terms):
 
 
 def by_rows(factors: FloatArray, matrix: Matrix) -> Matrix:
-    """A matrix with its rows multiplied."""
-    return diags(factors) @ matrix if issparse(matrix) else factors[:, None] * matrix
+    """A matrix, or several, with its rows multiplied."""
+    return diags(factors) @ matrix if issparse(matrix) else factors[..., None] * matrix
