@@ -279,13 +279,12 @@ def spectrum(generator: Generator, p: float, k: int = 10) -> Any:
 def _from_the_right(pencil: Pencil, generator: Generator) -> tuple[FloatArray, FloatArray, float, float]:
     """Vectors T and T*, and the value, of the rightmost real eigenvalue, seen from the right; and half its distance.
 
-    For a real shift σ > Λ no eigenvalue of L is nearer to σ than Λ. The first shift is the largest eigenvalue of the
-    symmetric part of L, about, and a margin, to the right of the eigenvalues of the discrete L; each further one keeps
-    `NEARER` of the distance. Complex pairs that come of the truncation may be nearer; they are passed over.
+    For a real shift σ > Λ no eigenvalue of L is nearer to σ than Λ. The first shift is beyond a bound on Λ; each next
+    one keeps `NEARER` of the distance. Complex pairs that come of the truncation may be nearer; they are passed over.
     """
     space, value = pencil.space, math.inf
     right = left = space.constant
-    shift = pencil.numerical_abscissa + 0.1 * generator.framed.unit_rate
+    shift = generator.growth_bound(pencil.p) + 0.1 * generator.framed.unit_rate
     for step in range(MAX_SHIFTS):
         if step:
             shift = value + NEARER * (shift - value)

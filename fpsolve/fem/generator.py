@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
-import scipy.linalg
-from scipy.sparse import csc_matrix
-from scipy.sparse.linalg import LinearOperator
 
-from fpsolve.arrays import Matrix, dense, one
-from fpsolve.fem.axis import KroneckerSum, along
+from fpsolve.arrays import Matrix, one
+from fpsolve.fem.axis import KroneckerSum
 from fpsolve.fem.factors import Factors, factorised
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.fem.noise_axes import NoiseAxis
@@ -21,12 +17,9 @@ from fpsolve.fem.space import Space
 from fpsolve.fem.terms import Noises, Term, Terms
 from fpsolve.model.coordinates import framed
 from fpsolve.model.problem import ParameterDerivative, Problem
-from fpsolve.superlu import sparse_lu
 
 KEPT_SPACES = 40
 """Number of spaces, of the last p, whose matrices are kept."""
-LANCZOS_STEPS = 16
-"""Number of steps of Lanczos after which the end of a spectrum is known to a bound."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,26 +35,6 @@ class Pencil:
     p: float
     space: Space
     matrix: KroneckerSum
-
-    @cached_property
-    def numerical_abscissa(self) -> float:
-        """About the largest ω of ½(L + Lᵀ)v = ωMv, by some steps of Lanczos, and their residual: no bound."""
-        space, rows, betas = self.space, [0.0], [0.0]
-        unit = csc_matrix(space.phi.matrix(one))
-        solve = sparse_lu(unit).solve
-        inverses: list[Any] = [LinearOperator(unit.shape, matvec=solve, matmat=solve, dtype=float)]
-        inverses += [np.linalg.inv(dense(axis.matrix(one))) for axis in space.noises]
-        rest, old = np.random.default_rng(0).standard_normal(space.size), np.zeros(space.size)
-        for _ in range(LANCZOS_STEPS):
-            weighed = space.weighed(rest)
-            betas.append(math.sqrt(rest @ weighed))
-            new = rest / betas[-1]
-            image = 0.5 * (self.matrix @ new + self.matrix.T @ new)
-            rows.append(float(new @ image))
-            rest = np.ravel(along(inverses, space.table(image))) - rows[-1] * new - betas[-1] * old
-            old = new
-        ritz, ends = scipy.linalg.eigh_tridiagonal(rows[1:], betas[2:])
-        return float(ritz[-1] + abs(ends[-1, -1]) * math.sqrt(rest @ space.weighed(rest)))
 
     def shifted(self, shift: float) -> KroneckerSum:
         """L(p) − σM."""
@@ -122,6 +95,20 @@ class Generator:
         if self._last is None or self._last.p != p:
             self._last = Pencil(p, self.space(p), self.matrix(p))
         return self._last
+
+    def growth_bound(self, p: float) -> float:
+        """About a bound on Λ(p): (|p| + n) ‖A‖ max |g| for each term of the motion of n variables, and so on."""
+        framed, power, total = self.framed, abs(p) + self.problem.dimension, 0.0
+        for term in framed.motion.terms:
+            g = term.g(self.space(p).noises[self._maker.place(term.noise)].xi)
+            total += power * framed.motion.epsilon**term.order * np.linalg.norm(term.matrix, 2) * np.max(np.abs(g))
+        for each in framed.diffusions:
+            total += 0.5 * (power * framed.motion.epsilon**each.order * np.linalg.norm(each.matrix, 2)) ** 2
+        for each in framed.impulses:
+            total += each.rate * np.exp(power * np.linalg.norm(each.exponent, 2))
+        for each in framed.motion.jumps:
+            total += abs(p * each.log_factor) * framed.unit_rate
+        return float(total)
 
     @cached_property
     def left_in_phase(self) -> float:

@@ -299,7 +299,7 @@ class PlaneTerms(Terms):
         self._jump = right - left
         steady, driven = np.zeros(self._vertices.size), np.zeros(self._vertices.size)
         for term in system.terms:
-            speed, xi = system.epsilon**term.order * term.h(self._vertices), noises[self._at(term.noise)]
+            speed, xi = system.epsilon**term.order * term.h(self._vertices), noises[self.place(term.noise)]
             if not is_driven(term.g):
                 steady += float(term.g(0.0)) * speed
             else:

@@ -189,10 +189,10 @@ class Terms:
     ) -> Term:
         """One with a function of the noise of a name, or of the first."""
         noises: list[Coefficient | None] = [one] * len(self._names)
-        noises[self._at(name)] = g
+        noises[self.place(name)] = g
         return Term(order, of_p, phase, tuple(noises), text, of, is_wall)
 
-    def _at(self, name: str) -> int:
+    def place(self, name: str) -> int:
         """The place of a noise among those that have values; the first one for others."""
         return self._names.index(name) if name in self._names else 0
 
