@@ -13,10 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from fpsolve.arrays import Coefficient, one
 from fpsolve.exponent.eigen import BACKWARD_ERROR_LIMIT, PrincipalPair, principal_pair
 from fpsolve.exponent.error import Solution, mode_effects
-from fpsolve.fem.axis import MOST_DEGREE, KroneckerSum
+from fpsolve.fem.axis import MOST_DEGREE
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.noise_axes import CellAxis, NoiseAxis
 from fpsolve.fem.phase import PhaseAxis
@@ -171,27 +170,21 @@ def _of_filters(pair: PrincipalPair, least: float) -> list[float]:
 
 
 def _of_diffusions(pair: PrincipalPair, least: float) -> list[float]:
-    unit = pair.generator.problem.valued.standard_deviation
     frozen = frozen_noise(pair.generator.problem)
     assert frozen is not None
     z, rate = frozen.peaks(pair.p)
     if z.size < 2:
         return []
-    mean = tilted_mean(pair, lambda xi: xi / unit)
-    width = math.sqrt(tilted_mean(pair, lambda xi: (xi / unit - mean) ** 2))
+    measure, right, left = pair.space.on_grid(pair.right, pair.left)
+    points, weights = pair.space.xi.rule.points, (measure * right * left).sum(axis=0)
+    mean = np.average(points, weights=weights)
+    width = math.sqrt(abs(np.average((points - mean) ** 2, weights=weights)))
     far = (np.abs(z - mean) > 3 * width + 2) & (rate > least)
     return [float(z[far][np.argmax(rate[far])])] if np.any(far) else []
 
 
 OTHERS = {"pairs": _of_filters, "polynomials": _of_diffusions}
 """`other_centers` of one noise by its `basis`, that grow at a least rate; of others there are none."""
-
-
-def tilted_mean(pair: PrincipalPair, g: Coefficient) -> float:
-    """The mean of a function of ξ in the tilted density."""
-    space = pair.space
-    weighed = KroneckerSum([[space.phi.matrix(one), space.xi.mass(g)]]) @ pair.right
-    return float(pair.left @ weighed / (pair.left @ space.weighed(pair.right)))
 
 
 def has_cones(problem: Problem) -> bool:

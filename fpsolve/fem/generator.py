@@ -105,7 +105,7 @@ class Generator:
         for each in framed.diffusions:
             total += 0.5 * (power * framed.motion.epsilon**each.order * np.linalg.norm(each.matrix, 2)) ** 2
         for each in framed.impulses:
-            total += each.rate * np.exp(power * np.linalg.norm(each.exponent, 2))
+            total += each.rate * np.exp(abs(p) * np.linalg.norm(each.exponent, 2))
         for each in framed.motion.jumps:
             total += abs(p * each.log_factor) * framed.unit_rate
         return float(total)

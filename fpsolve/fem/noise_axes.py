@@ -231,7 +231,7 @@ class LineAxis(NoiseAxis):
             z, measure = end * np.sin(0.5 * np.pi * x), end * np.cos(0.5 * np.pi * x) * np.pi / count
         else:
             z, measure = self.center + GAUSSIAN_REACH * x, np.full(count, 2 * GAUSSIAN_REACH / count)
-        return self._sampled(z, self.unit * measure, self.values_at(z))
+        return self.at(z, self.unit * measure)
 
     def _factor(self, z: FloatArray) -> FloatArray:
         return np.exp(np.clip(self.tilt * (z - self.center), -600, 600))
@@ -241,9 +241,11 @@ class LineAxis(NoiseAxis):
         logs = self.noise.log_density(self.unit * z) + 2 * self.tilt * z - self._log_mass
         return np.asarray(self.unit * np.exp(logs))
 
-    def at(self, z: FloatArray) -> Samples:
-        """At any z; the measure is 0."""
-        return self._sampled(z, np.zeros_like(z), self.values_at(z))
+    def at(self, z: FloatArray, measure: Any = 0.0) -> Samples:
+        """At any z, with what each stands for, in ξ."""
+        return Samples(
+            self.unit * z, self.weight(z) / self.unit, measure + np.zeros_like(z), self.values_at(z), self._factor(z)
+        )
 
     def started(self, xi: float) -> FloatArray:
         """The functions with their factor at one ξ, shape (size,)."""
@@ -251,11 +253,8 @@ class LineAxis(NoiseAxis):
         return np.asarray(dense(at.values)[0] * at.factor[0])
 
     def samples(self) -> Samples:
-        z, measure, values = self.rule[:3]
-        return self._sampled(z, self.unit * measure / self.weight(z), values)
-
-    def _sampled(self, z: FloatArray, measure: FloatArray, values: Matrix) -> Samples:
-        return Samples(self.unit * z, self.weight(z) / self.unit, measure, values, self._factor(z))
+        z, measure, _ = self.rule[:3]
+        return self.at(z, self.unit * measure / self.weight(z))
 
     def projection(self, other: LineAxis) -> FloatArray:
         z, measure, values = self.rule[:3]

@@ -310,7 +310,7 @@ class PlaneTerms(Terms):
         # where θ = |v| for every ξ, and the sign of v where that is the same for all ξ, otherwise 0
         is_pointwise, direction = np.full(self._vertices.size, False), np.zeros(self._vertices.size)
         if all(axis.is_local for axis in noises):
-            rates = matrix_at(system, framed.problem.valued.combined([axis.samples().xi for axis in noises]))
+            rates = matrix_at(system, framed.problem.valued.combined([axis.xi for axis in noises]))
             speed = turning(rates.reshape(-1, 1, 2, 2))(self._vertices)
             is_pointwise, direction = ~is_pointwise, 1.0 * np.all(speed > 0, axis=0) - np.all(speed < 0, axis=0)
         self._walls = list[Wall]()
