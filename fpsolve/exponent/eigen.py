@@ -151,24 +151,24 @@ def principal_pair(
             if nearest.generator is not generator:  # whose functions move with p
                 x, y = pencil.space.carry(np.array([x, y]), nearest.space)
         pair = _reached(generator, pencil, x, y)
-        if _is_principal(pair, pairs, goes_on=bool(pairs) and _share(pencil.space, pair, x, y) > MOSTLY):
+        if _is_principal(pair, pairs, continues=bool(pairs) and _share(pencil.space, pair, x, y) > MOSTLY):
             return pair
     return _rightmost_pair(pencil, generator, pair)
 
 
-def _is_principal(pair: PrincipalPair, pairs: Sequence[PrincipalPair], goes_on: bool) -> bool:
+def _is_principal(pair: PrincipalPair, pairs: Sequence[PrincipalPair], continues: bool) -> bool:
     """Whether a pair that was reached from others, or from T = 1, is the principal one.
 
     Where other pairs may seem positive, too, it must go on from the others, or reach the tangent of Λ at their p. At
     p = 0 it has Λ = 0 and T = 1.
     """
     generator, tangent = pair.generator, _tangents(pair.generator.problem, pair.p, pairs)
-    most = POSITIVE if goes_on else SURELY_POSITIVE
+    most = POSITIVE if continues else SURELY_POSITIVE
     if pair.residual > BACKWARD_ERROR_LIMIT or pair.value < tangent or min(pair.sign_defects) > most:
         return False
     if pair.p == 0:
         return abs(pair.value) <= BESIDE_IT[0] * generator.framed.unit_rate
-    if not goes_on and math.isinf(tangent) and _has_other_positive(generator, pair.p):
+    if not continues and math.isinf(tangent) and _has_other_positive(generator, pair.p):
         return False
     return not generator.left_in_phase or _is_rightmost(pair)
 

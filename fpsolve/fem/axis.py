@@ -119,7 +119,7 @@ class Rule(NamedTuple):
     values: Any
 
 
-class Axis:
+class FunctionAxis:
     """What terms of a generator, error estimates and pictures ask of the functions along one direction.
 
     An axis is a frozen choice of functions. Its tables are made when they are first asked for, and are not pickled.
@@ -227,7 +227,7 @@ class Axis:
 
 
 @dataclass(frozen=True, eq=False)
-class DividedAxis(Axis):
+class DividedAxis(FunctionAxis):
     """Elements of a degree of their own in each cell.
 
     Attributes:

@@ -43,7 +43,7 @@ from scipy.sparse import csc_matrix, csr_matrix, diags, identity, kron
 from scipy.sparse.linalg import LinearOperator
 
 from fpsolve.arrays import Coefficient, FloatArray, IntArray, Mask, Matrix, one
-from fpsolve.fem.axis import Axis, KroneckerSum, Rule, along
+from fpsolve.fem.axis import FunctionAxis, KroneckerSum, Rule, along
 from fpsolve.fem.element import EXTRA_POINTS, gauss_legendre, halved, middles
 from fpsolve.fem.line import LineSpace
 from fpsolve.fem.terms import OfMoment, Term, Terms
@@ -172,7 +172,7 @@ def _jumps(line: LineSpace, speeds: FloatArray) -> FloatArray:
 
 
 @dataclass(frozen=True, eq=False)
-class DirectionAxis(Axis):
+class DirectionAxis(FunctionAxis):
     """Elements in η times functions of e₁ and of e₂, see the module.
 
     Attributes:

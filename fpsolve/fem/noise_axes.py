@@ -19,7 +19,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 
 from fpsolve.arrays import Coefficient, FloatArray, IntArray, Matrix, dense, one
-from fpsolve.fem.axis import Axis, DividedAxis, ModeEffects, Rule
+from fpsolve.fem.axis import DividedAxis, FunctionAxis, ModeEffects, Rule
 from fpsolve.fem.element import middles
 from fpsolve.fem.line import LineSpace
 from fpsolve.model.noise import Noise, NoiseDerivative
@@ -60,7 +60,7 @@ class Samples(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class NoiseAxis(Axis):
+class NoiseAxis(FunctionAxis):
     """What the generator and its users ask of the functions of ξ; matrices are arrays, or sparse where they are large.
 
     Attributes:

@@ -11,7 +11,7 @@ import numpy as np
 
 from fpsolve.arrays import FloatArray, one
 from fpsolve.errors import MeshError
-from fpsolve.fem.axis import Axis, KroneckerSum, ModeEffects, along
+from fpsolve.fem.axis import FunctionAxis, KroneckerSum, ModeEffects, along
 from fpsolve.fem.circle import CircleAxis
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.fem.noise_axes import CellAxis, NoiseAxis, PolynomialAxis, StateAxis
@@ -86,7 +86,7 @@ class Space:
             return cls((phi, CellAxis(noise, mesh.z_lines, np.full(mesh.z_lines.size - 1, mesh.xi_degree))))
         return cls((phi, BASES[noise.basis](noise, mesh.xi_degree)))
 
-    def with_axis(self, k: int, axis: Axis) -> Space:
+    def with_axis(self, k: int, axis: FunctionAxis) -> Space:
         """The space with another axis in one place."""
         return Space((*self.axes[:k], axis, *self.axes[k + 1 :]))
 
