@@ -184,8 +184,9 @@ def _rightmost_pair(pencil: Pencil, generator: Generator, reached: PrincipalPair
         limits = {"limit": BACKWARD_ERROR_LIMIT, "most": POSITIVE}
         told = Message(Code.NO_EIGENVALUE, p=p, residual=pair.residual, size=defect, **limits)
         raise NotConverged(told, pair, Remedy.BOTH_AXES)
-    is_other = reached and reached.residual <= BACKWARD_ERROR_LIMIT and _has_other_positive(generator, p)
-    if is_other and reached.value - pair.value > 1e-6 * max(abs(reached.value), unit):
+    if not reached or reached.residual > BACKWARD_ERROR_LIMIT or not _has_other_positive(generator, p):
+        return pair
+    if reached.value - pair.value > 1e-6 * max(abs(reached.value), unit):
         told = Message(Code.LARGER_EIGENVALUE, p=p, rightmost=reached.value, value=pair.value)
         raise NotConverged(told, pair, Remedy.PHASE)
     return pair

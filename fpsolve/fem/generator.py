@@ -6,8 +6,6 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-import numpy as np
-
 from fpsolve.arrays import Matrix, one
 from fpsolve.fem.axis import KroneckerSum
 from fpsolve.fem.factors import Factors, factorised
@@ -97,18 +95,8 @@ class Generator:
         return self._last
 
     def growth_bound(self, p: float) -> float:
-        """About a bound on Λ(p): (|p| + n) ‖A‖ max |g| for each term of the motion of n variables, and so on."""
-        framed, power, total = self.framed, abs(p) + self.problem.dimension, 0.0
-        for term in framed.motion.terms:
-            g = term.g(self.space(p).noises[self._maker.place(term.noise)].xi)
-            total += power * framed.motion.epsilon**term.order * np.linalg.norm(term.matrix, 2) * np.max(np.abs(g))
-        for each in framed.diffusions:
-            total += 0.5 * (power * framed.motion.epsilon**each.order * np.linalg.norm(each.matrix, 2)) ** 2
-        for each in framed.impulses:
-            total += each.rate * np.exp(abs(p) * np.linalg.norm(each.exponent, 2))
-        for each in framed.motion.jumps:
-            total += abs(p * each.log_factor) * framed.unit_rate
-        return float(total)
+        """About a bound on Λ(p)."""
+        return self._maker.growth_bound(p, self.space(p).noises)
 
     @cached_property
     def left_in_phase(self) -> float:

@@ -319,7 +319,7 @@ class PlaneTerms(Terms):
             is_pointwise[at], direction[at] = True, math.copysign(1.0, v)
             before, after = (left, right) if v > 0 else (right, left)
             self._walls.append(Wall(jump, v, before[at].T @ after[at]))
-            at_wall = np.isin(np.arange(self._vertices.size), at) * math.copysign(1.0, v)
+            at_wall = np.where(np.isin(np.arange(self._vertices.size), at), math.copysign(1.0, v), 0.0)
             after_walls = after_walls + by_rows(at_wall, after)
         self._free_jump, self._two_way = self._jump - after_walls, np.flatnonzero(is_pointwise & (direction == 0))
         self._upwinding[is_pointwise] = 0.0
@@ -332,6 +332,14 @@ class PlaneTerms(Terms):
             if term.order == 0 and (term.h.amplitude or not term.q.vanishes):
                 return False
         return True
+
+    def growth_bound(self, p: float, noises: Sequence[Any]) -> float:
+        total = super().growth_bound(p, noises)
+        for each in self._framed.impulses:
+            total += each.rate * math.exp(abs(p) * float(np.linalg.norm(each.exponent, 2)))
+        for ray, v, _ in self._walls:
+            total += abs(p * ray.log_factor * v)
+        return total
 
     def _loads(self) -> Iterator[Term]:
         for struck in self._framed.impulses:

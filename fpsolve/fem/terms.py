@@ -139,6 +139,16 @@ class Terms:
             found += self._diffused([(0.5, each, each)])
         return [*found, *self._loads()]
 
+    def growth_bound(self, p: float, noises: Sequence[Any]) -> float:
+        """About a bound on Λ(p): (|p| + n) ‖A‖ max |g| for each term of the motion of n variables, and so on."""
+        total, power = 0.0, abs(p) + self._framed.problem.dimension
+        for term in self.system.terms:
+            size = power * self.system.epsilon**term.order * float(np.linalg.norm(term.matrix, 2))
+            total += size * float(np.max(np.abs(term.g(noises[self.place(term.noise)].xi))))
+        for each in self._framed.diffusions:
+            total += 0.5 * (power * self.system.epsilon**each.order * float(np.linalg.norm(each.matrix, 2))) ** 2
+        return total
+
     def changed(self, by: ParameterDerivative) -> Iterator[Term]:
         """∂L(p)/∂θ of the same terms; what makes functions smooth is held."""
         by = self._framed.changed(by)
