@@ -203,7 +203,7 @@ def furstenberg_khasminskii(pair: PrincipalPair) -> float:
         rate = rate + struck.rate * np.log(struck.stretched(phi)[0])
     growth = float(axis.weights @ (rate * evaluated(pair, axis.values, at).T_adjoint) @ at.measure)
     for jump, speed in zip(system.jumps, framed.wall_speeds(system), strict=True):
-        met = (axis.left_trace if speed > 0 else axis.right_trace)[vertices_at(axis.lines, jump.phase)]
+        met = axis.traces[0 if speed > 0 else 1][vertices_at(axis.lines, jump.phase)]
         growth += abs(speed) * jump.log_factor * float(np.sum(evaluated(pair, met, at).T_adjoint @ at.measure))
     return pair.space.turns * growth
 

@@ -43,7 +43,7 @@ from fpsolve.exponent.method import Budget, refuse
 from fpsolve.exponent.root import nonzero_root
 from fpsolve.exponent.solver import ExponentSolver, solver_of
 from fpsolve.fem.axis import along
-from fpsolve.fem.mesh import middles
+from fpsolve.fem.element import middles
 from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.plane import Harmonics, growth_rate
 from fpsolve.model.problem import Problem

@@ -19,13 +19,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.linalg
-from scipy.sparse.linalg import ArpackError, ArpackNoConvergence, LinearOperator, eigs, gmres
+from scipy.sparse.linalg import ArpackError, ArpackNoConvergence, LinearOperator, eigs
 
 from fpsolve.arrays import FloatArray, finite, one
 from fpsolve.data import brief
 from fpsolve.errors import NotConverged, NumericalFailure, SingularMatrix
 from fpsolve.exponent.rightmost import NEAR_ENOUGH, NEARER
-from fpsolve.fem.axis import FEW_UNKNOWNS, KroneckerSum
+from fpsolve.fem.axis import KroneckerSum
 from fpsolve.fem.factors import Factors, one_thread
 from fpsolve.fem.generator import Generator, Pencil
 from fpsolve.fem.space import Space
@@ -46,8 +46,6 @@ SURELY_POSITIVE = 1e-4
 """The same for a pair with which the search ends at once."""
 BESIDE_IT = 1e-6, 1e-2
 """Distances from an eigenvalue, over a rate of the system, at which it is looked whether others are to its right."""
-RESOLVED, STEPS = 1e-5, 20
-"""Residual of GMRES, as signs count from `SURELY_POSITIVE` on, and its number of steps at most."""
 LEAST_OF_MOST = 1e-2
 """Least value of T, over its largest, from which on it is positive beyond what it may be off."""
 MOSTLY = 0.5
@@ -153,26 +151,26 @@ def principal_pair(
             if nearest.generator is not generator:  # whose functions move with p
                 x, y = pencil.space.carry(np.array([x, y]), nearest.space)
         pair = _reached(generator, pencil, x, y)
-        if _is_principal(pair, pairs, goes_on=bool(pairs) and _share(pencil.space, pair, x, y) > MOSTLY):
+        if _is_principal(pair, pairs, continues=bool(pairs) and _share(pencil.space, pair, x, y) > MOSTLY):
             return pair
     return _rightmost_pair(pencil, generator, pair)
 
 
-def _is_principal(pair: PrincipalPair, pairs: Sequence[PrincipalPair], goes_on: bool) -> bool:
+def _is_principal(pair: PrincipalPair, pairs: Sequence[PrincipalPair], continues: bool) -> bool:
     """Whether a pair that was reached from others, or from T = 1, is the principal one.
 
     Where other pairs may seem positive, too, it must go on from the others, or reach the tangent of Λ at their p. At
     p = 0 it has Λ = 0 and T = 1.
     """
     generator, tangent = pair.generator, _tangents(pair.generator.problem, pair.p, pairs)
-    most = POSITIVE if goes_on else SURELY_POSITIVE
+    most = POSITIVE if continues else SURELY_POSITIVE
     if pair.residual > BACKWARD_ERROR_LIMIT or pair.value < tangent or min(pair.sign_defects) > most:
         return False
     if pair.p == 0:
         return abs(pair.value) <= BESIDE_IT[0] * generator.framed.unit_rate
-    if not goes_on and math.isinf(tangent) and _has_other_positive(generator, pair.p):
+    if not continues and math.isinf(tangent) and _has_other_positive(generator, pair.p):
         return False
-    return not generator.may_hold or _is_rightmost(pair)
+    return not generator.left_in_phase or _is_rightmost(pair)
 
 
 def _rightmost_pair(pencil: Pencil, generator: Generator, reached: PrincipalPair | None) -> PrincipalPair:
@@ -186,14 +184,10 @@ def _rightmost_pair(pencil: Pencil, generator: Generator, reached: PrincipalPair
         limits = {"limit": BACKWARD_ERROR_LIMIT, "most": POSITIVE}
         told = Message(Code.NO_EIGENVALUE, p=p, residual=pair.residual, size=defect, **limits)
         raise NotConverged(told, pair, Remedy.BOTH_AXES)
-    if not _has_other_positive(generator, p):
+    if not reached or reached.residual > BACKWARD_ERROR_LIMIT or not _has_other_positive(generator, p):
         return pair
-    others = [reached.value] if reached and reached.residual <= BACKWARD_ERROR_LIMIT else []
-    if generator.may_hold and generator.size <= FEW_UNKNOWNS:  # of a chain
-        others.append(float(spectrum(generator, p, 1)[0].real))
-    rightmost = max(others, default=-math.inf)
-    if rightmost - pair.value > 1e-6 * max(abs(rightmost), unit):
-        told = Message(Code.LARGER_EIGENVALUE, p=p, rightmost=rightmost, value=pair.value)
+    if reached.value - pair.value > 1e-6 * max(abs(reached.value), unit):
+        told = Message(Code.LARGER_EIGENVALUE, p=p, rightmost=reached.value, value=pair.value)
         raise NotConverged(told, pair, Remedy.PHASE)
     return pair
 
@@ -209,36 +203,20 @@ def _is_rightmost(pair: PrincipalPair) -> bool:
     """
     problem, space = pair.generator.problem, pair.space
     if problem.valued.is_bounded and not space.is_tilted:
-        values = space.on_grid(pair.right)
+        _, values = space.on_grid(pair.right)
         if np.min(values) > LEAST_OF_MOST * np.max(values):
             return True
     pencil, source = pair.generator.at(pair.p), space.weighed(space.constant)
     seen = [side for side in (0, 1) if not space.phi.is_followed or pair.sign_defects[side] <= POSITIVE]
-    near, far = (pair.eigenvalue + shift * pair.generator.framed.unit_rate for shift in BESIDE_IT)
-    factor: Any = pencil.factorised(near)
-
-    def solutions(side: int) -> list[FloatArray]:
-        operator, is_left = pencil.shifted(far), bool(side)
-        operator = operator.T if is_left else operator
-        inverse = LinearOperator(2 * source.shape, lambda v: factor.solve(v, transposed=is_left), dtype=float)
-        moved = LinearOperator(2 * source.shape, lambda v: operator @ v, dtype=float)
-        solution, failed = gmres(moved, source, M=inverse, rtol=RESOLVED, restart=STEPS, maxiter=1)
-        return [inverse @ source, *([] if failed else [solution])]
-
-    def is_positive(side: int, solution: FloatArray) -> bool:
-        both = [pair.right, pair.left]
-        both[side] = -solution
-        return _sign_defects(space, *both)[side] <= SURELY_POSITIVE
-
-    found = {side: solutions(side) for side in seen}
-    failed = [side for side in seen if len(found[side]) == 1 and is_positive(side, found[side][0])]
-    if failed:
-        factor = None  # there is room for the next ones
-        factor = pencil.factorised(far)
-        for side in failed:
-            found[side].append(factor.solve(source, transposed=bool(side)))
-    positive = (all(is_positive(side, each) for each in found[side]) for side in seen)
-    return not seen or (all if space.phi.has_adjoint else any)(positive)
+    positive = dict.fromkeys(seen, True)
+    for distance in BESIDE_IT:
+        factor: Any = None  # there is room for the next ones
+        factor = pencil.factorised(pair.eigenvalue + distance * pair.generator.framed.unit_rate)
+        for side in seen:
+            both = [pair.right, pair.left]
+            both[side] = -factor.solve(source, transposed=bool(side))
+            positive[side] &= _sign_defects(space, *both)[side] <= SURELY_POSITIVE
+    return not seen or (all if space.phi.has_adjoint else any)(positive.values())
 
 
 def _has_other_positive(generator: Generator, p: float) -> bool:
@@ -250,7 +228,7 @@ def _has_other_positive(generator: Generator, p: float) -> bool:
     problem = generator.problem
     if generator.chosen.phi.is_followed:  # each search begins at a neighbouring p
         return False
-    if generator.may_hold:
+    if generator.left_in_phase:
         return True
     if (frozen := frozen_noise(problem)) is None:
         values = [each.reached for each in problem.valued.parts.values()]
@@ -302,13 +280,12 @@ def spectrum(generator: Generator, p: float, k: int = 10) -> Any:
 def _from_the_right(pencil: Pencil, generator: Generator) -> tuple[FloatArray, FloatArray, float, float]:
     """Vectors T and T*, and the value, of the rightmost real eigenvalue, seen from the right; and half its distance.
 
-    For a real shift σ > Λ no eigenvalue of L is nearer to σ than Λ. The first shift is the largest eigenvalue of the
-    symmetric part of L, about, and a margin, to the right of the eigenvalues of the discrete L; each further one keeps
-    `NEARER` of the distance. Complex pairs that come of the truncation may be nearer; they are passed over.
+    For a real shift σ > Λ no eigenvalue of L is nearer to σ than Λ. The first shift is beyond a bound on Λ; each next
+    one keeps `NEARER` of the distance. Complex pairs that come of the truncation may be nearer; they are passed over.
     """
     space, value = pencil.space, math.inf
     right = left = space.constant
-    shift = pencil.numerical_abscissa + 0.1 * generator.framed.unit_rate
+    shift = generator.growth_bound(pencil.p) + 0.1 * generator.framed.unit_rate
     for step in range(MAX_SHIFTS):
         if step:
             shift = value + NEARER * (shift - value)
@@ -441,12 +418,12 @@ def _reached(generator: Generator, pencil: Pencil, x: FloatArray, y: FloatArray)
 
 
 def _of_noises(space: Space) -> FloatArray:
-    """⟨L_ξ T, 1⟩ for every function T, L_ξ the generator of all noises, shape (size,)."""
-    noises, total = space.noises, np.zeros(space.size)
-    for k, own in enumerate(noises):
-        others = [axis.generator_of_one() if axis is own else axis.matrix(one) @ axis.constant for axis in noises]
-        if np.any(others[k]) or len(noises) == 1:
-            total = total + space.product([space.phi.constant, *others])
+    """⟨L_ξ T, 1⟩ for every function T, L_ξ the generator of all noises, shape (size,): 0 but for factors."""
+    total = np.zeros(space.size)
+    for own in space.axes:
+        if own.slope:  # the first of its functions is 1
+            loads = [axis.matrix(None)[0] if axis is own else axis.matrix(one) @ axis.constant for axis in space.axes]
+            total += space.product(loads)
     return total
 
 
@@ -460,7 +437,7 @@ def _sign_defects(space: Space, x: FloatArray, y: FloatArray) -> tuple[float, fl
 
     T T* looks where the tilted density lives: a strong tilt hides the sign change of another pair from P_s.
     """
-    right, left, measure = space.on_grid(x), space.on_grid(y), space.grid_measure
+    measure, right, left = space.on_grid(x, y)
     tilted = np.abs(right * left) * measure
 
     def share(values: FloatArray) -> float:

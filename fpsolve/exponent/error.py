@@ -28,8 +28,6 @@ from fpsolve.model.quantity import UNNAMED
 if TYPE_CHECKING:
     import xarray
 
-DEPTH = 4
-"""Of the highest modes of a cell whose effects are looked at."""
 MEANINGLESS = 1e-2
 """An estimated error above this share of the scale of Λ(p) is no result."""
 
@@ -205,8 +203,10 @@ class Solution:
 
     @cached_property
     def truncation(self) -> tuple[float, float]:
-        """What the lower and the upper end of a noise interval may change in Λ."""
-        return truncation(self.pair)
+        """What the two ends of an interval of cells change in Λ, at most about: ½σ²P_s Σ |T_z T*| over φ."""
+        if not (lines := self.pair.space.xi.lines).size:
+            return 0.0, 0.0
+        return _end_effect(self.pair, lines[[0, 1]]), _end_effect(self.pair, lines[[-1, -2]])
 
     @cached_property
     def error(self) -> float:
@@ -224,9 +224,9 @@ def mode_effects(pair: PrincipalPair) -> tuple[ModeEffects | None, ...]:
     direction of time: that of the paths for p < −1 has layers where the paths for p > −1 leave.
     """
     operator, space = pair.generator.at(pair.p).shifted(pair.eigenvalue), pair.space
-    smooth, rough = pair.right, pair.left
+    both = np.reshape([pair.right, pair.left], (2, *space.shape))  # the smooth one first
     if pair.p < -1:
-        smooth, rough, operator = rough, smooth, operator.T
+        both, operator = both[::-1], operator.T
     norm = abs(float(pair.left @ space.weighed(pair.right)))
     count, found = len(space.axes), list[ModeEffects | None]()
     for k, axis in enumerate(space.axes):
@@ -236,23 +236,17 @@ def mode_effects(pair: PrincipalPair) -> tuple[ModeEffects | None, ...]:
             continue
         degrees = np.zeros(int(axis.cells.max()) + 1, dtype=int)
         np.maximum.at(degrees, axis.cells[inside], axis.modes[inside])
-        masks = inside & (degrees[axis.cells] - axis.modes == np.arange(DEPTH)[:, None])  # from the highest mode on
-        kept = masks.reshape(DEPTH, *(axis.size if j == k else 1 for j in range(count)))
-        nested = [axis.nested if j == k else None for j in range(count)]
-        first, last = (along(nested, space.table(each)) for each in (smooth, rough))
-        parts = last * np.cumsum(operator.images(first * kept), axis=0)
-        shares = np.abs(parts).sum(axis=tuple(1 + j for j in range(count) if j != k)) * np.cumsum(masks, axis=0)
+        masks = inside & (degrees[axis.cells] - axis.modes == np.arange(4)[:, None])  # from the highest mode on
+        others = tuple({*range(1, count + 1)} - {k + 1})
+        nested: list[Any] = count * [None]
+        nested[k] = axis.nested
+        smooth, rough = along(nested, both)
+        parts = rough * np.cumsum(operator @ (smooth * np.expand_dims(masks, others)), axis=0)
+        shares = np.abs(parts).sum(axis=others) * np.cumsum(masks, axis=0)
         effects = [np.bincount(axis.cells[inside], each[inside], degrees.size) / norm for each in shares]
         highest = np.maximum.accumulate(effects)  # in those of more modes, parts of these may cancel
-        found.append(ModeEffects(degrees, highest, pair.generator.slowest[k]))
+        found.append(ModeEffects(degrees, highest, axis.slowest if k else pair.generator.left_in_phase))
     return tuple(found)
-
-
-def truncation(pair: PrincipalPair) -> tuple[float, float]:
-    """What the two ends of an interval of cells change in Λ, at most about: ½σ²P_s Σ |T_z T*| over functions of φ."""
-    if not (lines := pair.space.xi.lines).size:
-        return 0.0, 0.0
-    return _end_effect(pair, lines[[0, 1]]), _end_effect(pair, lines[[-1, -2]])
 
 
 def _end_effect(pair: PrincipalPair, lines: FloatArray) -> float:

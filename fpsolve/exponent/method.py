@@ -439,8 +439,8 @@ class Stage(Protocol):
     def doubled(self, failure: Exception | None) -> Stage | None:
         """More functions, where nothing is found among these; None where that is no use."""
 
-    def refined(self, found: Any, goal: float, stages: int, most: int) -> Stage | None:
-        """Functions that should have an error of about a goal, after so many stages, with so many unknowns at most."""
+    def refined(self, found: Any, goal: float) -> Stage | None:
+        """Functions that should have an error of about a goal, or less."""
 
 
 @dataclass
@@ -500,7 +500,7 @@ class Search:
                     self.best, self.share = found, found.error / allowed
                 if near.rounding > allowed:
                     raise NotConverged(Message(Code.ROUNDED, size=near.rounding))
-                stage = stage.refined(found, allowed, self.stages, self.budget.most(stage))
+                stage = stage.refined(found, allowed)
         except NotConverged as failure:  # no stage may follow
             return self._stop(failure)
 

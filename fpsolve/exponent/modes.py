@@ -195,7 +195,7 @@ class DirectionStart(Start):
         noises, errors = list(self.space.noises), (solution.measured or ())[1:]
         for k, (axis, effects, error) in enumerate(zip(noises, solution.effects[1:], errors, strict=True)):
             if effects is not None and error > share:
-                noises[k] = axis.enriched() if error < effects.error else axis.refined(effects, share, False)
+                noises[k] = axis.enriched() if error < effects.error else axis.refined(effects, share)
         found = Space((phi, *noises))
         return found if found.size > self.space.size else self.space.enriched()
 
@@ -255,7 +255,7 @@ class SphereStart(DirectionStart):
     def doubled(self, failure: Exception | None) -> SphereStart:
         return self.of_waves(self.space.phi.waves + 2)
 
-    def refined(self, solution: Solution, goal: float, stages: int, most: int) -> SphereStart:
+    def refined(self, solution: Solution, goal: float) -> SphereStart:
         """Waves of the next degree; or other elements and functions of the noise, with waves of the degree before."""
         of_axes = solution.measured or ()
         phi, share = self.space.phi, MINOR * goal
@@ -279,7 +279,7 @@ class Directions(Elements):
         if abs(p) < SMALL_P:
             yield from super().places(p, tolerance, found)
         elif known := self.spaces.get(p):
-            yield known.start.refined(known, tolerance(p, known.value), 0, 0), known.pair
+            yield known.start.refined(known, tolerance(p, known.value)), known.pair
         else:
             yield self.stage.at(self.problem, p, self.settings.rtol, self.spaces)
 

@@ -340,7 +340,7 @@ class Level:
     def doubled(self, failure: Exception | None) -> None:
         """Where these are not solved, more are not."""
 
-    def refined(self, found: EvenMoment, goal: float, stages: int, most: int) -> Level | None:
+    def refined(self, found: EvenMoment, goal: float) -> Level | None:
         """More functions of the noises of which the next ones change most; None where there are no others."""
         if not (worst := max(map(abs, found.effects), default=0.0)):
             return None

@@ -13,12 +13,11 @@ from typing import Any
 
 import numpy as np
 
-from fpsolve.arrays import Coefficient, one
-from fpsolve.exponent.eigen import BACKWARD_ERROR_LIMIT, PrincipalPair, principal_pair
-from fpsolve.exponent.error import Solution, mode_effects
-from fpsolve.fem.axis import MOST_DEGREE, KroneckerSum
+from fpsolve.exponent.eigen import PrincipalPair, principal_pair
+from fpsolve.exponent.error import Solution
+from fpsolve.fem.axis import MOST_DEGREE
 from fpsolve.fem.generator import Generator
-from fpsolve.fem.noise_axes import CellAxis, NoiseAxis, PolynomialAxis
+from fpsolve.fem.noise_axes import CellAxis, NoiseAxis
 from fpsolve.fem.phase import PhaseAxis
 from fpsolve.fem.space import Space, first_axis
 from fpsolve.model.coordinates import framed
@@ -28,14 +27,8 @@ from fpsolve.theory.frozen import frozen_noise, steady_places, swing
 
 REACH = 12.0
 """Standard deviations on both sides, up to which the first cells of noise with algebraic tails are."""
-FREE_STAGES = 4
-"""From this number of stages on, no cell is made coarser."""
 SHARE = 0.05
 """Share of the tolerance that a new discretisation is made for in each direction, so that it serves other p too."""
-ALONE = 0.5
-"""Share of the tolerance in each direction of a discretisation that serves one p only."""
-MOST_GAIN = 1e-3
-"""Least factor by which one stage with cells of the noise aims to reduce the error: a larger fall is foreseen badly."""
 ROUND = 360
 """Number of φ at which it is asked which way the phase turns."""
 COMPARABLE = 0.6
@@ -73,33 +66,18 @@ class Start:
         return Solution(pair)
 
     def doubled(self, failure: Exception | None) -> Start | None:
-        """More functions along the axes that lack most, by the pair that a failed search has reached, if any."""
-        pair: Any = getattr(failure, "partial", None)
-        is_pair = pair is not None and pair.residual <= BACKWARD_ERROR_LIMIT
-        found = self.space.doubled(mode_effects(pair) if is_pair else ())
+        """Twice as many functions along every axis."""
+        found = self.space.doubled()
         return replace(self, space=found) if found.size > self.space.size else None
 
-    def refined(self, solution: Solution, goal: float, stages: int, most: int) -> Start:
-        """A place on which each cell should lack no more than its share of an error.
-
-        Args:
-            solution: that on the space.
-            goal: the error.
-            stages: how many spaces were solved on.
-            most: unknowns; where more are needed, a space is made that does for this p alone.
-        """
-        chosen, may_coarsen = self.space, stages < FREE_STAGES
-        if chosen.xi.lines.size:
-            goal = max(goal, MOST_GAIN * solution.error)
-        for share in (SHARE * goal, ALONE * goal):
-            found = chosen.refined(solution.effects, share, may_coarsen)
-            if chosen.xi.lines.size:
-                lower, upper = solution.truncation
-                found = found.with_axis(1, found.xi.reaching(lower > share, upper > share))
-            found = found if found.size > chosen.size else found.raised()
-            if found.size <= most:
-                break
-        return replace(self, space=found)
+    def refined(self, solution: Solution, goal: float) -> Start:
+        """More functions where those of a solution lack more than their share of an error, fewer where less."""
+        share = SHARE * goal
+        found = self.space.refined(solution.effects, share)
+        if found.xi.lines.size:
+            lower, upper = solution.truncation
+            found = found.with_axis(1, found.xi.reaching(lower > share, upper > share))
+        return replace(self, space=found if found.size > self.space.size else found.raised())
 
 
 def first(problem: Problem, p: float, rtol: float, center: float | None = None) -> Space:
@@ -138,8 +116,8 @@ def _of_diffusion(problem: Problem, p: float, digits: float, center: float | Non
     unit, end = noise.standard_deviation, noise.half_width / noise.standard_deviation
     center = frozen.center(p) if center is None else center
     slope = frozen.tilt(center) / p if noise.may_tilt else 0.0
-    axis = PolynomialAxis(noise, round(digits / 2) + (3 if math.isinf(end) else 5), slope)
-    return axis, unit * np.clip(center + np.array([-2.0, 2.0]), -end, end)
+    axis: Any = first_axis(noise, digits)
+    return replace(axis, slope=slope), unit * np.clip(center + np.array([-2.0, 2.0]), -end, end)
 
 
 AXES = {"cells": _of_tails, "pairs": _of_filter, "polynomials": _of_diffusion}
@@ -187,27 +165,21 @@ def _of_filters(pair: PrincipalPair, least: float) -> list[float]:
 
 
 def _of_diffusions(pair: PrincipalPair, least: float) -> list[float]:
-    unit = pair.generator.problem.valued.standard_deviation
     frozen = frozen_noise(pair.generator.problem)
     assert frozen is not None
     z, rate = frozen.peaks(pair.p)
     if z.size < 2:
         return []
-    mean = tilted_mean(pair, lambda xi: xi / unit)
-    width = math.sqrt(tilted_mean(pair, lambda xi: (xi / unit - mean) ** 2))
+    measure, right, left = pair.space.on_grid(pair.right, pair.left)
+    points, weights = pair.space.xi.rule.points, (measure * right * left).sum(axis=0)
+    mean = np.average(points, weights=weights)
+    width = math.sqrt(abs(np.average((points - mean) ** 2, weights=weights)))
     far = (np.abs(z - mean) > 3 * width + 2) & (rate > least)
     return [float(z[far][np.argmax(rate[far])])] if np.any(far) else []
 
 
 OTHERS = {"pairs": _of_filters, "polynomials": _of_diffusions}
 """`other_centers` of one noise by its `basis`, that grow at a least rate; of others there are none."""
-
-
-def tilted_mean(pair: PrincipalPair, g: Coefficient) -> float:
-    """The mean of a function of ξ in the tilted density."""
-    space = pair.space
-    weighed = KroneckerSum([[space.phi.matrix(one), space.xi.mass(g)]]) @ pair.right
-    return float(pair.left @ weighed / (pair.left @ space.weighed(pair.right)))
 
 
 def has_cones(problem: Problem) -> bool:

@@ -13,14 +13,15 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property, reduce
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 import scipy.sparse
 from scipy.sparse import csc_matrix
 
 from fpsolve.arrays import Coefficient, FloatArray, IntArray, Mask, Matrix, dense, one
-from fpsolve.fem.mesh import MAX_DEGREE, halved, middles
+from fpsolve.fem.element import halved, middles
+from fpsolve.fem.mesh import MAX_DEGREE
 from fpsolve.model.noise import NoiseDerivative
 
 NO_LINES = np.zeros(0)
@@ -88,15 +89,13 @@ class ModeEffects:
         return self.degrees + np.log(np.maximum(self.of_cells, 1e-300) / tolerance) / self.fall
 
 
-def split(lines: FloatArray, effects: ModeEffects, share: float, may_coarsen: bool) -> tuple[FloatArray, IntArray]:
+def split(lines: FloatArray, effects: ModeEffects, share: float) -> tuple[FloatArray, IntArray]:
     """Lines, and a degree for each cell, with which all n cells together should lack no more than a share.
 
     What cells lack has both signs, so that it is taken to add up like √n: each cell may lack a share of 1/√n. A cell is
     halved where its halves take fewer unknowns, as effects fall faster in them.
     """
     rate, needed = effects.fall, effects.needed(max(share, 1e-290) / math.sqrt(effects.degrees.size))
-    if not may_coarsen:  # by more than one degree
-        needed = np.maximum(needed, np.minimum(effects.degrees, needed + 1))
     in_half = needed * rate / (rate + HALVING)
     is_split = (2 * in_half + 2 < needed + 1) & (effects.degrees >= SPLIT_DEGREE) & (needed > effects.degrees)
     is_split |= needed > MOST_DEGREE
@@ -106,7 +105,21 @@ def split(lines: FloatArray, effects: ModeEffects, share: float, may_coarsen: bo
     return np.sort(np.concatenate([lines, middles(lines)[is_split]])), degrees
 
 
-class Axis:
+class Rule(NamedTuple):
+    """The functions of an axis at the points of a quadrature rule, or at the states of a noise.
+
+    Attributes:
+        points: of what the functions are of, shape (n,) or (2, n).
+        measure: ∫ of the weight of the axis there, shape (n,).
+        values: without the factor of the axis, shape (n, size).
+    """
+
+    points: FloatArray
+    measure: FloatArray
+    values: Any
+
+
+class FunctionAxis:
     """What terms of a generator, error estimates and pictures ask of the functions along one direction.
 
     An axis is a frozen choice of functions. Its tables are made when they are first asked for, and are not pickled.
@@ -149,6 +162,11 @@ class Axis:
     def modes(self) -> IntArray:
         """For each unknown the degree of its polynomial in a cell, shape (size,)."""
         return np.zeros(self.size, dtype=int)
+
+    @property
+    def rule(self) -> Rule:
+        """The functions at points of their own, at which signs are looked at."""
+        raise NotImplementedError
 
     @cached_property
     def constant(self) -> FloatArray:
@@ -203,13 +221,13 @@ class Axis:
         """One function more in each cell, where what a cell lacks harms others."""
         return self
 
-    def refined(self, effects: ModeEffects, share: float, may_coarsen: bool) -> Self:
+    def refined(self, effects: ModeEffects, share: float) -> Self:
         """One that all together should lack no more than a share."""
         return self
 
 
 @dataclass(frozen=True, eq=False)
-class DividedAxis(Axis):
+class DividedAxis(FunctionAxis):
     """Elements of a degree of their own in each cell.
 
     Attributes:
@@ -238,8 +256,8 @@ class DividedAxis(Axis):
     def raised(self) -> Self:
         return self.on(self.lines, np.minimum(self.degrees + 1, MAX_DEGREE))
 
-    def refined(self, effects: ModeEffects, share: float, may_coarsen: bool) -> Self:
-        return self.on(*split(self.lines, effects, share, may_coarsen))
+    def refined(self, effects: ModeEffects, share: float) -> Self:
+        return self.on(*split(self.lines, effects, share))
 
 
 def along(factors: Sequence[Matrix | None], tables: FloatArray) -> FloatArray:
@@ -257,7 +275,9 @@ def along(factors: Sequence[Matrix | None], tables: FloatArray) -> FloatArray:
 
 
 class KroneckerSum:
-    """Σ Φ_k ⊗ Ξ_k ⊗ …, the factors kept apart; vectors are those of functions on φ × ξ × …, the first axis slowest.
+    """Σ Φ_k ⊗ Ξ_k ⊗ …, the factors kept apart.
+
+    It multiplies vectors of functions on φ × ξ × …, the first axis slowest, or such tables, or a stack of either.
 
     Attributes:
         terms: for each term a square matrix for each axis, arrays or sparse.
@@ -270,12 +290,9 @@ class KroneckerSum:
         self.shape = tuple(factor.shape[0] for factor in terms[0])
         self.size = math.prod(self.shape)
 
-    def __matmul__(self, vector: FloatArray) -> FloatArray:
-        return np.ravel(self.images(vector.reshape(self.shape)))
-
-    def images(self, tables: FloatArray) -> FloatArray:
-        """The images of vectors as tables, shape (…, *shape)."""
-        return np.asarray(sum(along(term, tables) for term in self.terms))
+    def __matmul__(self, vectors: FloatArray) -> FloatArray:
+        tables = vectors.reshape(self.shape if vectors.size == self.size else (-1, *self.shape))
+        return np.reshape(sum(along(term, tables) for term in self.terms), vectors.shape)
 
     def each(self, function: Callable[[Matrix], Matrix]) -> KroneckerSum:
         """The sum with a function of every factor in place of it."""

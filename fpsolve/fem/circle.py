@@ -8,7 +8,8 @@ from functools import cached_property
 import numpy as np
 
 from fpsolve.arrays import FloatArray, IntArray, Matrix
-from fpsolve.fem.noise_axes import CountedAxis, Rule, Samples, form
+from fpsolve.fem.axis import Rule
+from fpsolve.fem.noise_axes import CountedAxis, Samples, form
 from fpsolve.model.noise import NoiseDerivative
 
 MOST_HARMONICS = 64

@@ -43,10 +43,9 @@ from scipy.sparse import csc_matrix, csr_matrix, diags, identity, kron
 from scipy.sparse.linalg import LinearOperator
 
 from fpsolve.arrays import Coefficient, FloatArray, IntArray, Mask, Matrix, one
-from fpsolve.fem.axis import Axis, KroneckerSum, along
-from fpsolve.fem.element import EXTRA_POINTS, gauss_legendre
+from fpsolve.fem.axis import FunctionAxis, KroneckerSum, Rule, along
+from fpsolve.fem.element import EXTRA_POINTS, gauss_legendre, halved, middles
 from fpsolve.fem.line import LineSpace
-from fpsolve.fem.mesh import halved, middles
 from fpsolve.fem.terms import OfMoment, Term, Terms
 from fpsolve.model.coordinates import Framed, mean_matrix
 from fpsolve.model.plane import CoefficientMatrix
@@ -173,7 +172,7 @@ def _jumps(line: LineSpace, speeds: FloatArray) -> FloatArray:
 
 
 @dataclass(frozen=True, eq=False)
-class DirectionAxis(Axis):
+class DirectionAxis(FunctionAxis):
     """Elements in η times functions of e₁ and of e₂, see the module.
 
     Attributes:
@@ -358,7 +357,7 @@ class DirectionAxis(Axis):
         """S⁻¹AS."""
         return np.asarray(np.linalg.solve(self.coordinates, np.array(term.matrix) @ self.coordinates))
 
-    def driven(self, term: CoefficientMatrix) -> tuple[Matrix, Matrix]:
+    def motion(self, term: CoefficientMatrix) -> tuple[Matrix, Matrix]:
         """∫ v h·∇u and ∫ v q u."""
         moved, growth = self._moved(self.inside(term))
         return self._form((self._itself, moved)), self._form((self._itself, growth))
@@ -391,21 +390,14 @@ class DirectionAxis(Axis):
         return first.length * second.length
 
     @property
-    def _inner(self) -> slice:
-        """Some of the points of η."""
-        return slice(None, None, max(1, self.degree // 4))
-
-    @property
-    def inner_values(self) -> LinearOperator:
-        """Values at points of η and of both angles."""
-        of_theta = np.kron(*(each.at(each.points[:, ::2]) for each in self.angles))
-        return self._along(self._tables[0][self._inner], of_theta[:, self._own])
-
-    @property
-    def inner_measure(self) -> FloatArray:
-        """What each of these points stands for, but for a factor; those of the angles are evenly spread."""
-        of_theta = np.ones(math.prod(each.points[0, ::2].size for each in self.angles))
-        return np.asarray(np.kron(self.line.measure[self._inner], of_theta))
+    def rule(self) -> Rule:
+        """At some of the points of η, and at points of both angles, which are evenly spread."""
+        inner, of_theta = (
+            slice(None, None, max(1, self.degree // 4)),
+            np.kron(*(each.at(each.points[:, ::2]) for each in self.angles)),
+        )
+        points, measure = self.line.points[inner], np.repeat(self.line.measure[inner], len(of_theta))
+        return Rule(points, measure, self._along(self._tables[0][inner], of_theta[:, self._own]))
 
     def projection(self, other: DirectionAxis) -> LinearOperator:
         mixed = self.line.values.T @ diags(self.line.measure) @ other.line.at(self.line.points)
@@ -556,8 +548,11 @@ class HalfSphereAxis(DirectionAxis):
 class DirectionTerms(Terms):
     """L(p) of three and four variables. Args as those of `Terms`."""
 
-    def _written(self, term: CoefficientMatrix) -> tuple[str, str, str]:
-        return "h·∇", "q", "(h·∇ + p q)² of white noise"
+    words = "{0}h·∇", "{0}q", "½ (h·∇ + p q)² of white noise"
+
+    def _matrices(self, term: CoefficientMatrix) -> tuple[Matrix, Matrix]:
+        found: tuple[Matrix, Matrix] = self.phi.motion(term)
+        return found
 
     @cached_property
     def _mean(self) -> FloatArray:

@@ -7,7 +7,6 @@ vanish at both. Continuous elements are made of these, discontinuous ones of the
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import NamedTuple
 
 import numpy as np
 import skfem
@@ -55,6 +54,16 @@ def numbered(lines: FloatArray, degrees: IntArray) -> tuple[Mask, IntArray]:
     return own, np.where(own, (np.cumsum(kept) - 1)[numbers], 0)
 
 
+def middles(lines: FloatArray) -> FloatArray:
+    """The middle of each cell."""
+    return 0.5 * (lines[:-1] + lines[1:])
+
+
+def halved(lines: FloatArray) -> FloatArray:
+    """The lines, and the middles."""
+    return np.sort(np.concatenate([lines, middles(lines)]))
+
+
 def located(lines: FloatArray, x: FloatArray, inside: FloatArray | None = None) -> tuple[IntArray, FloatArray]:
     """For each point the cell that holds it, and its place in that cell, from 0 to 1.
 
@@ -73,26 +82,8 @@ def legendre(degree: int, points: FloatArray) -> FloatArray:
     return slopes[:, 1:] / np.sqrt([1.0, *[2.0] * degree])
 
 
-class Orthonormal(NamedTuple):
-    """The orthonormal polynomials up to some degree at the points of a rule.
-
-    Attributes:
-        points, weights: of the rule, shape (n,).
-        values, slopes: at its points, shape (n, degree + 1).
-        derivative: the matrix to the coefficients of the slopes, without rounding of the rule.
-    """
-
-    points: FloatArray
-    weights: FloatArray
-    values: FloatArray
-    slopes: FloatArray
-    derivative: FloatArray
-
-
 @lru_cache(maxsize=64)
-def orthonormal(degree: int) -> Orthonormal:
-    """The polynomials up to a degree; ∫ P_j P_k′ is P_j P_k at 1 less that at 0 for j < k, and 0 for others."""
-    points, weights = gauss_legendre(degree + EXTRA_POINTS)
-    values, ends = legendre(degree, points), legendre(degree, np.array([0.0, 1.0]))
-    derivative = np.triu(np.outer(ends[1], ends[1]) - np.outer(ends[0], ends[0]), 1)
-    return Orthonormal(points, weights, values, values @ derivative, derivative)
+def differentiation(degree: int) -> FloatArray:
+    """The matrix to the coefficients of their slopes: ∫ P_j P_k′ is P_j P_k at 1 less that at 0 for j < k, else 0."""
+    below, above = legendre(degree, np.array([0.0, 1.0]))
+    return np.triu(np.outer(above, above) - np.outer(below, below), 1)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from functools import lru_cache, reduce
+from functools import lru_cache, partial, reduce
 from itertools import pairwise
 from threading import RLock
 from typing import Any, Protocol
@@ -109,11 +109,11 @@ class SparseFactors:
             order = np.moveaxis(order, coupled, range(-len(coupled), 0)).reshape(nodes.size, -1)[nodes]
         self._order = order.ravel()
         matrix = operator.tocsc()[self._order][:, self._order]
+        factorise = partial(sparse_lu, permc_spec=rule, diag_pivot_thresh=0.01)
         try:
-            self._lu = sparse_lu(matrix, permc_spec=rule, diag_pivot_thresh=0.01)
+            self._lu = factorise(matrix)
         except SingularMatrix:  # the shift is the eigenvalue to the last bit
-            shifted = matrix + 1e-15 * abs(matrix).max() * identity(matrix.shape[0], format="csc")
-            self._lu = sparse_lu(shifted, permc_spec=rule, diag_pivot_thresh=0.01)
+            self._lu = factorise(matrix + 1e-15 * abs(matrix).max() * identity(matrix.shape[0], format="csc"))
 
     def solve(self, b: FloatArray, *, transposed: bool = False) -> FloatArray:
         """x of A x = b, or of Aᵀx = b."""

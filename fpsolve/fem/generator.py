@@ -2,31 +2,22 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-import numpy as np
-import scipy.linalg
-from scipy.sparse import csc_matrix
-from scipy.sparse.linalg import LinearOperator
-
-from fpsolve.arrays import Matrix, dense, one
-from fpsolve.fem.axis import KroneckerSum, along
+from fpsolve.arrays import Matrix, one
+from fpsolve.fem.axis import KroneckerSum
 from fpsolve.fem.factors import Factors, factorised
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.fem.noise_axes import NoiseAxis
 from fpsolve.fem.space import Space
-from fpsolve.fem.terms import Term, Terms, power_of_epsilon
+from fpsolve.fem.terms import Noises, Term, Terms
 from fpsolve.model.coordinates import framed
 from fpsolve.model.problem import ParameterDerivative, Problem
-from fpsolve.superlu import sparse_lu
 
 KEPT_SPACES = 40
 """Number of spaces, of the last p, whose matrices are kept."""
-LANCZOS_STEPS = 16
-"""Number of steps of Lanczos after which the end of a spectrum is known to a bound."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,26 +33,6 @@ class Pencil:
     p: float
     space: Space
     matrix: KroneckerSum
-
-    @cached_property
-    def numerical_abscissa(self) -> float:
-        """About the largest ω of ½(L + Lᵀ)v = ωMv, by some steps of Lanczos, and their residual: no bound."""
-        space, rows, betas = self.space, [0.0], [0.0]
-        unit = csc_matrix(space.phi.matrix(one))
-        solve = sparse_lu(unit).solve
-        inverses: list[Any] = [LinearOperator(unit.shape, matvec=solve, matmat=solve, dtype=float)]
-        inverses += [np.linalg.inv(dense(axis.matrix(one))) for axis in space.noises]
-        rest, old = np.random.default_rng(0).standard_normal(space.size), np.zeros(space.size)
-        for _ in range(LANCZOS_STEPS):
-            weighed = space.weighed(rest)
-            betas.append(math.sqrt(rest @ weighed))
-            new = rest / betas[-1]
-            image = 0.5 * (self.matrix @ new + self.matrix.T @ new)
-            rows.append(float(new @ image))
-            rest = np.ravel(along(inverses, space.table(image))) - rows[-1] * new - betas[-1] * old
-            old = new
-        ritz, ends = scipy.linalg.eigh_tridiagonal(rows[1:], betas[2:])
-        return float(ritz[-1] + abs(ends[-1, -1]) * math.sqrt(rest @ space.weighed(rest)))
 
     def shifted(self, shift: float) -> KroneckerSum:
         """L(p) − σM."""
@@ -80,6 +51,10 @@ class Generator:
         problem: a motion and its noise.
         chosen: on the half circle (its principal eigenvalue is that of the full circle) or the full circle.
 
+    Attributes:
+        terms: those of Eq. (19).
+        keeps_constants: see `Terms`.
+
     Raises:
         MeshError: there is no φ-line at a jump, or a cell's polynomials in the noise cannot be told apart.
     """
@@ -92,17 +67,16 @@ class Generator:
         self._spaces: dict[float, Space] = {}
         self._changes: dict[ParameterDerivative, tuple[Term, ...]] = {}
         self._last: Pencil | None = None
-        self._terms: Terms = chosen.phi.terms(self.framed, self.space(0.0).noises)
-        self.keeps_constants = self._terms.keeps_constants
+        self._maker: Terms = chosen.phi.terms(self.framed, self.space(0.0).noises)
+        self.terms, self.keeps_constants = self._maker.all(), self._maker.keeps_constants
 
     def __reduce__(self) -> tuple[Any, ...]:
         """What it is made of; the matrices are assembled again when they are needed."""
         return type(self), (self.problem, self.chosen)
 
     def __str__(self) -> str:
-        lines = [f"  {power_of_epsilon(term.order):<2}  {term.text}" for term in self._terms.all]
         where = "" if self.framed.frame.is_itself else " in coordinates of its own,"
-        return "\n".join([f"L(p), Eq. (19){where} the sum of", *lines])
+        return "\n  ".join([f"L(p), Eq. (19){where} the sum of", *map(str, self.terms)])
 
     def space(self, p: float) -> Space:
         """Trial and test functions; the tilt of those of ξ moves with p, and each axis has tables of its own."""
@@ -120,20 +94,28 @@ class Generator:
             self._last = Pencil(p, self.space(p), self.matrix(p))
         return self._last
 
+    def growth_bound(self, p: float) -> float:
+        """About a bound on Λ(p)."""
+        return self._maker.growth_bound(p, self.space(p).noises)
+
     @cached_property
-    def slowest(self) -> list[float]:
-        """For each axis the least share of the effect of its highest modes that two more may leave."""
-        of_phi = (noise.left_in_phase for noise in self.problem.noise.parts.values())
-        return [max(of_phi), *(axis.slowest for axis in self.space(0.0).noises)]
+    def left_in_phase(self) -> float:
+        """The least share of the effect of the highest modes of φ that two more may leave.
 
-    @property
-    def may_hold(self) -> bool:
-        """Whether chains or white noise move x: a state, or a direction, that is hardly ever left has its own pair."""
-        return self.slowest[0] > 0
+        It is not 0 where chains or white noise move x: a state, or a direction, that is hardly ever left then has a
+        pair of its own.
+        """
+        return max(noise.left_in_phase for noise in self.problem.noise.parts.values())
 
-    def enriched(self) -> Generator:
-        """The generator on the next finer space."""
-        return Generator(self.problem, self.chosen.enriched())
+    def _phases(self, p: float, derivative: int = 0, is_forcing: bool = False) -> dict[Noises, Matrix]:
+        """For each function of the noises the matrix of φ of dᵏL/dpᵏ, or of its forcing; the first is that of 1."""
+        phi, *noises = self.chosen.axes
+        found: dict[Noises, Matrix] = {(one,) * len(noises): 0.0 * phi.matrix(one)}
+        for term in self.terms:
+            phase = term.at(p, derivative, is_forcing)
+            if phase is not None:
+                found[term.noises] = found[term.noises] + phase if term.noises in found else phase
+        return found
 
     def matrix(self, p: float, *, derivative: int = 0, is_forcing: bool = False) -> KroneckerSum:
         """The matrix of dᵏL/dpᵏ in the space for p, the tilt held, or of L − L₀; the ξ-matrix of 1 first.
@@ -144,7 +126,7 @@ class Generator:
             is_forcing: whether L₀, of the order 0 in ε, is left out.
         """
         axes, parts = self.space(p).noises, []
-        for noises, phase in self._terms.phases(p, derivative, is_forcing).items():
+        for noises, phase in self._phases(p, derivative, is_forcing).items():
             parts.append([phase, *map(NoiseAxis.matrix, axes, noises)])
         return KroneckerSum(parts)
 
@@ -152,14 +134,14 @@ class Generator:
         """The matrix of ∂/∂θ (dᵏL/dpᵏ − rate M), the functions of φ and ξ held, M = `mass`; that of P_s is in it."""
         axes = self.space(p).noises
         if by not in self._changes:
-            self._changes[by] = tuple(self._terms.changed(by))
+            self._changes[by] = tuple(self._maker.changed(by))
         parts: list[tuple[Matrix, ...]] = [
             (phase, *map(NoiseAxis.matrix, axes, term.noises))
             for term in self._changes[by]
             if (phase := term.at(p, derivative)) is not None
         ]
         if by.noise is not None:
-            (noises, phase), *others = self._terms.phases(p, derivative).items()  # the first is that of 1
+            (noises, phase), *others = self._phases(p, derivative).items()  # the first is that of 1
             moved = [(noises, phase - rate * self.chosen.phi.matrix(one)), *others]
             changes = [by.noise if k == by.part else None for k in range(len(axes))]
             parts += [(phase, *map(NoiseAxis.matrix, axes, noises, changes)) for noises, phase in moved]
@@ -168,7 +150,7 @@ class Generator:
     @cached_property
     def rounding_growth(self) -> float:
         """By about how much LU factors amplify rounding in T − 1: the size of L, free of forcing, over a rate."""
-        size = abs(next(iter(self._terms.phases(0.0).values()))).sum(axis=0).max()
+        size = abs(self.matrix(0.0).terms[0][0]).sum(axis=0).max()
         for axis in self.space(0.0).noises:
             size += abs(axis.matrix(None)).sum(axis=0).max()
         return float(30 * size / self.framed.unit_rate)

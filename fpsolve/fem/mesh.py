@@ -90,16 +90,6 @@ class CylinderMesh:
         return replace(self, z_lines=np.concatenate([[lower], inside, [upper]]))
 
 
-def middles(lines: FloatArray) -> FloatArray:
-    """The middle of each cell."""
-    return 0.5 * (lines[:-1] + lines[1:])
-
-
-def halved(lines: FloatArray) -> FloatArray:
-    """The lines, and the middles."""
-    return np.sort(np.concatenate([lines, middles(lines)]))
-
-
 def make_mesh(
     *,
     phi_cells: int = 2,

@@ -19,9 +19,9 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 
 from fpsolve.arrays import Coefficient, FloatArray, IntArray, Matrix, dense, one
-from fpsolve.fem.axis import Axis, DividedAxis, ModeEffects
+from fpsolve.fem.axis import DividedAxis, FunctionAxis, ModeEffects, Rule
+from fpsolve.fem.element import middles
 from fpsolve.fem.line import LineSpace
-from fpsolve.fem.mesh import middles
 from fpsolve.model.noise import Noise, NoiseDerivative
 from fpsolve.polynomials import Polynomials, gegenbauer, hermite, logarithm, stieltjes
 
@@ -59,22 +59,8 @@ class Samples(NamedTuple):
     factor: FloatArray
 
 
-class Rule(NamedTuple):
-    """The functions of a noise at the points of a quadrature rule, or at the states.
-
-    Attributes:
-        points: of what the functions are of, shape (n,) or (2, n).
-        measure: ∫ of the weight of the axis there, shape (n,).
-        values: without the factor of the axis, shape (n, size).
-    """
-
-    points: FloatArray
-    measure: FloatArray
-    values: Matrix
-
-
 @dataclass(frozen=True, eq=False)
-class NoiseAxis(Axis):
+class NoiseAxis(FunctionAxis):
     """What the generator and its users ask of the functions of ξ; matrices are arrays, or sparse where they are large.
 
     Attributes:
@@ -95,11 +81,6 @@ class NoiseAxis(Axis):
     def tilt(self) -> float:
         """s of this factor."""
         return self.slope * self.p
-
-    @property
-    def rule(self) -> Rule:
-        """The functions at points of their own."""
-        raise NotImplementedError
 
     @property
     def xi(self) -> FloatArray:
@@ -137,10 +118,6 @@ class NoiseAxis(Axis):
     @property
     def facts(self) -> dict[str, Any]:
         return {"xi": self.word, "xi_size": self.size, "tilt": self.tilt}
-
-    def generator_of_one(self) -> FloatArray:
-        """`generator` with v the function 1, times the factor; shape (size,)."""
-        return np.zeros(self.size)
 
     def samples(self) -> Samples:
         """At the points of the rule, or at the states."""
@@ -192,10 +169,9 @@ class CountedAxis(NoiseAxis):
     def raised(self) -> Self:
         return replace(self, count=min(self.count + 2, MAX_COUNT))
 
-    def refined(self, effects: ModeEffects, share: float, may_coarsen: bool) -> Self:
+    def refined(self, effects: ModeEffects, share: float) -> Self:
         needed = math.ceil(float(effects.needed(share)[0]) + 1.3)
-        least = max(self.count // 2, 3) if may_coarsen else self.count
-        return replace(self, count=max(least, min(needed, 3 * self.count // 2 + 3, MAX_COUNT)))
+        return replace(self, count=max(self.count // 2, 3, min(needed, 3 * self.count // 2 + 3, MAX_COUNT)))
 
 
 class LineAxis(NoiseAxis):
@@ -255,7 +231,7 @@ class LineAxis(NoiseAxis):
             z, measure = end * np.sin(0.5 * np.pi * x), end * np.cos(0.5 * np.pi * x) * np.pi / count
         else:
             z, measure = self.center + GAUSSIAN_REACH * x, np.full(count, 2 * GAUSSIAN_REACH / count)
-        return self._sampled(z, self.unit * measure, self.values_at(z))
+        return self.at(z, self.unit * measure)
 
     def _factor(self, z: FloatArray) -> FloatArray:
         return np.exp(np.clip(self.tilt * (z - self.center), -600, 600))
@@ -265,9 +241,11 @@ class LineAxis(NoiseAxis):
         logs = self.noise.log_density(self.unit * z) + 2 * self.tilt * z - self._log_mass
         return np.asarray(self.unit * np.exp(logs))
 
-    def at(self, z: FloatArray) -> Samples:
-        """At any z; the measure is 0."""
-        return self._sampled(z, np.zeros_like(z), self.values_at(z))
+    def at(self, z: FloatArray, measure: Any = 0.0) -> Samples:
+        """At any z, with what each stands for, in ξ."""
+        return Samples(
+            self.unit * z, self.weight(z) / self.unit, measure + np.zeros_like(z), self.values_at(z), self._factor(z)
+        )
 
     def started(self, xi: float) -> FloatArray:
         """The functions with their factor at one ξ, shape (size,)."""
@@ -275,11 +253,8 @@ class LineAxis(NoiseAxis):
         return np.asarray(dense(at.values)[0] * at.factor[0])
 
     def samples(self) -> Samples:
-        z, measure, values = self.rule[:3]
-        return self._sampled(z, self.unit * measure / self.weight(z), values)
-
-    def _sampled(self, z: FloatArray, measure: FloatArray, values: Matrix) -> Samples:
-        return Samples(self.unit * z, self.weight(z) / self.unit, measure, values, self._factor(z))
+        z, measure, _ = self.rule[:3]
+        return self.at(z, self.unit * measure / self.weight(z))
 
     def projection(self, other: LineAxis) -> FloatArray:
         z, measure, values = self.rule[:3]
@@ -385,10 +360,6 @@ class PolynomialAxis(CountedAxis, LineAxis):
             x = self.rule.points / self.rule.scale
             logs = logs + change.end_exponent * (_end_logarithm(x.size, self._ends[0], a) - np.log1p(-(x**2)))
         return logs
-
-    def generator_of_one(self) -> FloatArray:
-        flux = self.rule.measure * self.rate(self.rule.points)
-        return np.asarray(-self.tilt * (flux @ self.rule.slopes))
 
     def values_at(self, z: FloatArray) -> FloatArray:
         return self.rule.polynomials.at((z - self.rule.shift) / self.rule.scale)[0]

@@ -17,7 +17,8 @@ import numpy as np
 import scipy.sparse
 
 from fpsolve.arrays import FloatArray, IntArray
-from fpsolve.fem.noise_axes import MORE_POINTS, CountedAxis, Rule, Samples, form
+from fpsolve.fem.axis import Rule
+from fpsolve.fem.noise_axes import MORE_POINTS, CountedAxis, Samples, form
 from fpsolve.model.noise import NoiseDerivative
 from fpsolve.polynomials import hermite
 
@@ -86,9 +87,6 @@ class PairAxis(CountedAxis):
 
     def generator(self) -> FloatArray:
         return self._drifting(self.noise.drift_matrix)
-
-    def generator_of_one(self) -> FloatArray:
-        return np.asarray(self.matrix(None)[0])
 
     def _changed_generator(self, change: NoiseDerivative) -> FloatArray:
         return self._drifting(np.array(change.drift or np.zeros((2, 2))))

@@ -10,20 +10,20 @@ from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.sparse import csr_matrix, diags, issparse
+from scipy.sparse import csr_matrix, diags, identity, issparse
 
-from fpsolve.arrays import FloatArray, IntArray, Mask, Matrix, one
+from fpsolve.arrays import FloatArray, IntArray, Matrix, one
 from fpsolve.errors import MeshError
-from fpsolve.fem.axis import FEW_UNKNOWNS, DividedAxis
+from fpsolve.fem.axis import FEW_UNKNOWNS, DividedAxis, Rule
 from fpsolve.fem.element import (
     EXTRA_POINTS,
-    Orthonormal,
+    differentiation,
     gauss_legendre,
     legendre,
     located,
-    orthonormal,
+    middles,
 )
-from fpsolve.fem.mesh import SAME_LINE, middles
+from fpsolve.fem.mesh import SAME_LINE
 from fpsolve.fem.terms import At, OfMoment, Term, Terms
 from fpsolve.messages import Code, Message
 from fpsolve.model.coordinates import Framed
@@ -93,42 +93,34 @@ class PhaseAxis(DividedAxis):
         return np.diff(self.lines)
 
     @cached_property
-    def _table(self) -> Orthonormal:
-        return orthonormal(int(self.degrees.max()))
-
-    @cached_property
-    def _numbers(self) -> tuple[Mask, IntArray]:
-        """Which modes each cell has, and their numbers, shapes (m, largest degree + 1)."""
-        kept = np.arange(self.degrees.max() + 1) <= self.degrees[:, None]
-        return kept, np.cumsum(kept).reshape(kept.shape) - 1
-
-    @cached_property
     def cells(self) -> IntArray:
-        return np.nonzero(self._numbers[0])[0]
+        return np.repeat(np.arange(self.degrees.size), self.degrees + 1)
 
     @cached_property
     def modes(self) -> IntArray:
-        return np.nonzero(self._numbers[0])[1]
+        return np.arange(self.size) - np.searchsorted(self.cells, self.cells)
 
     @cached_property
-    def _pairs(self) -> Mask:
-        kept, _ = self._numbers
-        return kept[:, :, None] & kept[:, None, :]
-
-    @cached_property
-    def _grid(self) -> FloatArray:
-        """The points of a rule in each cell, shape (m, n)."""
-        return self.lines[:-1, None] + self._sizes[:, None] * self._table.points
-
-    @property
     def points(self) -> FloatArray:
-        """The points of all cells, shape (m n,)."""
+        """The points of a rule, so many in each cell, shape (n,)."""
         return self.finer_rule(1)[0]
 
-    @property
+    @cached_property
     def weights(self) -> FloatArray:
-        """Weights of the points, shape (m n,)."""
+        """Weights of the points, shape (n,)."""
         return self.finer_rule(1)[1]
+
+    @property
+    def values(self) -> Matrix:
+        """The functions at the points, shape (n, size)."""
+        return self.at(self.points)
+
+    @cached_property
+    def _local(self) -> tuple[FloatArray, FloatArray]:
+        """The polynomials of each cell and their derivatives at its points, shapes (m, n/m, largest degree + 1)."""
+        degree, size = int(self.degrees.max()), self._sizes[:, None, None]
+        values = legendre(degree, gauss_legendre(degree + EXTRA_POINTS)[0]) / np.sqrt(size)
+        return values, values @ differentiation(degree) / size
 
     @cached_property
     def constant(self) -> FloatArray:
@@ -141,43 +133,30 @@ class PhaseAxis(DividedAxis):
 
     @cached_property
     def turns(self) -> int:  # type: ignore[override]
-        return round(2 * math.pi / self.span)
+        return round(2 * math.pi / np.ptp(self.lines))
 
     @cached_property
-    def right_trace(self) -> Matrix:
-        """T(φⱼ⁺) at lines[:-1], shape (m, size)."""
-        return self._trace(0)
-
-    @cached_property
-    def left_trace(self) -> Matrix:
-        """T(φⱼ⁻) at lines[:-1], shape (m, size); that at the seam comes from the last cell."""
-        return self._trace(1)
-
-    @cached_property
-    def jump(self) -> Matrix:
-        """T(φⱼ⁺) − T(φⱼ⁻)."""
-        return self.right_trace - self.left_trace
-
-    def _trace(self, side: int) -> Matrix:
-        """T at lines[:-1] in the cells above these, or for side = 1 below."""
-        cell = (np.arange(self._sizes.size) - side) % self._sizes.size
-        return self.at(self.lines[cell + side], middles(self.lines)[cell])
+    def traces(self) -> tuple[Matrix, Matrix]:
+        """T(φⱼ⁻) and T(φⱼ⁺) at lines[:-1], shapes (m, size); below the seam is the last cell."""
+        inside = middles(self.lines)
+        return self.at(np.roll(self.lines[1:], 1), np.roll(inside, 1)), self.at(self.lines[:-1], inside)
 
     def mass(self, f: Any = one) -> Matrix:
         """∫ f u v of `Harmonics` f, or of 1."""
         if f == one:
-            return self._assembled(np.broadcast_to(np.eye(self._pairs.shape[1]), self._pairs.shape))
-        wave = self._cellwise(f(self._grid) - f.mean, self._table.values, self._table.values, 0)
-        return f.mean * self.matrix(one) + self._assembled(wave)  # exact without a wave
+            return self.stored(identity(self.size, format="csr"))
+        wave = self._integral(f(self.points) - f.mean, *2 * self._local[:1])
+        return f.mean * self.matrix(one) + wave  # exact without a wave
 
     def convection(self, f: Harmonics) -> Matrix:
         """∫ f u′ v, cell by cell."""
-        return self._assembled(self._cellwise(f(self._grid), self._table.values, self._table.slopes, 1))
+        return self._integral(f(self.points), *self._local)
 
-    def _cellwise(self, f: FloatArray, of_test: FloatArray, of_trial: FloatArray, order: int) -> FloatArray:
-        """∫ f v u in each cell, from f at the points of its rule; v and u have so many derivatives together."""
-        weights = f * self._table.weights / self._sizes[:, None] ** order
-        return np.asarray(of_test.T @ (weights[:, :, None] * of_trial))
+    def _integral(self, f: Any, test: FloatArray, trial: FloatArray) -> Matrix:
+        """∫ f v u, cell by cell, from f at the points, and test and trial functions of each cell there."""
+        weights = np.reshape(self.weights * f, trial.shape[:2])
+        blocks = np.swapaxes(test, 1, 2) @ by_rows(weights, trial)
+        return self._of_cells(self.cells, blocks[self.cells, self.modes])
 
     def diffusion(self, a: CoefficientMatrix, b: CoefficientMatrix) -> tuple[Matrix, Matrix, Matrix]:
         """∫ w D_a D_b T, D = h ∂φ + p q of two matrices: the coefficients of p⁰, p¹ and p².
@@ -189,29 +168,22 @@ class PhaseAxis(DividedAxis):
         the interior penalty method, in which η grows like degree²/size of the smaller cell. What h and q do not change
         at a vertex, as h = 0 at the ray of a jump, is not there.
         """
-        grid, at, cellwise = self._grid, self.lines[:-1], self._cellwise
-        values, slopes = self._table.values, self._table.slopes
-        ha, qa, hb, qb, slope = a.h(grid), a.q(grid), b.h(grid), b.q(grid), a.h.slope(grid)
-        cells = (
-            -cellwise(ha * hb, slopes, slopes, 2) - cellwise(slope * hb, values, slopes, 1),
-            cellwise(qa * hb, values, slopes, 1)
-            - cellwise(ha * qb, slopes, values, 1)
-            - cellwise(slope * qb, values, values, 0),
-            cellwise(qa * qb, values, values, 0),
-        )
-        ha, qa, hb, qb, slope = a.h(at), a.q(at), b.h(at), b.q(at), a.h.slope(at)
+        left, right = self.traces
+        jump, mean, vertices = right - left, 0.5 * (left + right), self.lines[:-1]
         sharpness = (self.degrees + 1) ** 2 / self._sizes
         penalty = PENALTY * np.maximum(sharpness, np.roll(sharpness, 1))
-        jump, mean = self.jump, 0.5 * (self.left_trace + self.right_trace)
-        mean_slope = mean @ self._derivative
-        loads = (
-            -(jump.T @ by_rows(ha * hb, mean_slope) + mean_slope.T @ by_rows(ha * hb, jump))
-            - mean.T @ by_rows(hb * slope, jump)
-            - jump.T @ by_rows(penalty * ha * hb, jump),
-            mean.T @ by_rows(hb * qa, jump) - jump.T @ by_rows(ha * qb, mean),
-        )
-        first, second, last = (self._assembled(blocks) for blocks in cells)
-        return first + loads[0], second + loads[1], last
+
+        def both(phi: FloatArray, values: Any, slopes: Any) -> Any:
+            """D_a* w and D_b T by p⁰ and p¹, from values and slopes at φ."""
+            steady = by_rows(a.h(phi), slopes) + by_rows(a.h.slope(phi), values)
+            return (-steady, by_rows(a.q(phi), values)), (by_rows(b.h(phi), slopes), by_rows(b.q(phi), values))
+
+        adjoint, image = both(self.points.reshape(self._sizes.size, -1), *self._local)
+        first, second, third, last = (self._integral(1.0, w, u) for w in adjoint for u in image)
+        adjoint, image = both(vertices, mean, mean @ self._derivative)
+        of_a, of_b = by_rows(a.h(vertices), jump), by_rows(b.h(vertices), jump)
+        loads = [w.T @ of_b - of_a.T @ u for w, u in zip(adjoint, image, strict=True)]
+        return first + loads[0] - of_a.T @ by_rows(penalty, of_b), second + third + loads[1], last
 
     def impulses(self, struck: Struck, p: float, derivative: int = 0) -> Matrix:
         """∂ᵏ/∂pᵏ of ∫ w |exp(B)e|^p T(ψ(φ)), ψ being where an impulse takes φ."""
@@ -247,7 +219,8 @@ class PhaseAxis(DividedAxis):
     @cached_property
     def _derivative(self) -> Matrix:
         """The matrix to the coefficients of T′ in each cell."""
-        return self._assembled(self._table.derivative / self._sizes[:, None, None])
+        blocks = differentiation(int(self.degrees.max()))[self.modes] / self._sizes[self.cells, None]
+        return self._of_cells(self.cells, blocks)
 
     def at(self, phi: FloatArray, inside: FloatArray | None = None) -> Matrix:
         """Values at points of the domain, as rows of E with u(φ) = E @ coefficients, shape (len(φ), size).
@@ -256,31 +229,20 @@ class PhaseAxis(DividedAxis):
         cell above.
         """
         cell, local = located(self.lines, phi, inside)
-        values = legendre(int(self.degrees.max()), local) / np.sqrt(self._sizes[cell])[:, None]
-        kept, numbers = self._numbers[0][cell], self._numbers[1][cell]
-        return self._matrix(values[kept], np.nonzero(kept)[0], numbers[kept], (phi.size, self.size))
+        return self._of_cells(cell, legendre(int(self.degrees.max()), local) / np.sqrt(self._sizes[cell])[:, None])
 
     def finer_rule(self, parts: int) -> tuple[FloatArray, FloatArray]:
         """Points and weights of the rule where every cell is cut into so many parts, shapes (parts n,)."""
         sizes = np.repeat(self._sizes / parts, parts)
         starts = (self.lines[:-1, None] + self._sizes[:, None] * np.arange(parts) / parts).ravel()
-        points = starts[:, None] + sizes[:, None] * self._table.points
-        return points.ravel(), (sizes[:, None] * self._table.weights).ravel()
+        local, weights = gauss_legendre(int(self.degrees.max()) + EXTRA_POINTS)
+        return (starts[:, None] + sizes[:, None] * local).ravel(), (sizes[:, None] * weights).ravel()
 
     @cached_property
-    def values(self) -> Matrix:
-        """The basis functions at the points of the rule, shape (n, size)."""
-        return self.at(self.points)
-
-    @cached_property
-    def inner_values(self) -> Matrix:
-        """The basis functions at five points inside each cell, shape (5 m, size)."""
-        return self.at((self.lines[:-1, None] + self._sizes[:, None] * np.linspace(0.1, 0.9, 5)).ravel())
-
-    @property
-    def inner_measure(self) -> FloatArray:
-        """What each of these points stands for in ∫ dφ, shape (5 m,)."""
-        return np.repeat(self._sizes / 5, 5)
+    def rule(self) -> Rule:
+        """At five points inside each cell."""
+        points = (self.lines[:-1, None] + self._sizes[:, None] * np.linspace(0.1, 0.9, 5)).ravel()
+        return Rule(points, np.repeat(self._sizes / 5, 5), self.at(points))
 
     def projection(self, other: PhaseAxis) -> Matrix:
         """The matrix that takes a function of another space to its projection on this one, shape (size, other.size)."""
@@ -290,17 +252,10 @@ class PhaseAxis(DividedAxis):
         """L(p) on these functions times those of each noise."""
         return PlaneTerms(framed, self, noises)
 
-    def _assembled(self, blocks: FloatArray) -> Matrix:
-        """The matrix with a block for each cell; its rows are those of the test functions."""
-        return self._matrix(blocks[self._pairs], *self._places, (self.size, self.size))
-
-    @cached_property
-    def _places(self) -> tuple[IntArray, IntArray]:
-        _, numbers = self._numbers
-        rows, columns = np.broadcast_arrays(numbers[:, :, None], numbers[:, None, :])
-        return rows[self._pairs], columns[self._pairs]
-
-    def _matrix(self, entries: FloatArray, rows: IntArray, columns: IntArray, shape: tuple[int, int]) -> Matrix:
+    def _of_cells(self, cells: IntArray, table: FloatArray) -> Matrix:
+        """The matrix of which each row is that of a table, by degree, at the functions of one cell, and else 0."""
+        rows, columns = np.nonzero(np.equal.outer(cells, self.cells))
+        entries, shape = table[rows, self.modes[columns]], (cells.size, self.size)
         if self.size > FEW_UNKNOWNS:
             return csr_matrix((entries, (rows, columns)), shape=shape)
         matrix = np.zeros(shape)
@@ -336,44 +291,55 @@ class PlaneTerms(Terms):
     they take φ, see `PhaseAxis.impulses`.
     """
 
+    words = "{0}{h} ∂φ", "{0}{q}", "½ (h ∂φ + p q)² of white noise, h = {h}, q = {q}"
+
     def __init__(self, framed: Framed, phi: PhaseAxis, noises: Sequence[Any]) -> None:
         super().__init__(framed, phi, noises)
-        system, self._jump, self._vertices = self.system, phi.jump, phi.lines[:-1]
+        system, self._vertices, (left, right) = self.system, phi.lines[:-1], phi.traces
+        self._jump = right - left
         steady, driven = np.zeros(self._vertices.size), np.zeros(self._vertices.size)
         for term in system.terms:
-            speed, xi = system.epsilon**term.order * term.h(self._vertices), noises[self._at(term.noise)]
+            speed, xi = system.epsilon**term.order * term.h(self._vertices), noises[self.place(term.noise)]
             if not is_driven(term.g):
                 steady += float(term.g(0.0)) * speed
             else:
-                square = xi.constant @ (xi.mass(lambda xi, g=term.g: g(xi) ** 2) @ xi.constant)
+                square = xi.constant @ (xi.product(term.g(xi.xi) ** 2) @ xi.constant)
                 driven += abs(speed) * math.sqrt(square / (xi.constant @ (xi.matrix(one) @ xi.constant)))
         self._upwinding = abs(steady) + driven  # for the typical ξ
         after_walls = 0.0 * self._jump  # |v| T₊ is in the term of the wall
         # where θ = |v| for every ξ, and the sign of v where that is the same for all ξ, otherwise 0
         is_pointwise, direction = np.full(self._vertices.size, False), np.zeros(self._vertices.size)
         if all(axis.is_local for axis in noises):
-            rates = matrix_at(system, framed.problem.valued.combined([axis.samples().xi for axis in noises]))
+            rates = matrix_at(system, framed.problem.valued.combined([axis.xi for axis in noises]))
             speed = turning(rates.reshape(-1, 1, 2, 2))(self._vertices)
             is_pointwise, direction = ~is_pointwise, 1.0 * np.all(speed > 0, axis=0) - np.all(speed < 0, axis=0)
         self._walls = list[Wall]()
         for jump, v in zip(system.jumps, framed.wall_speeds(system), strict=True):
             at = vertices_at(phi.lines, jump.phase)
             is_pointwise[at], direction[at] = True, math.copysign(1.0, v)
-            left, right = phi.left_trace[at], phi.right_trace[at]
-            self._walls.append(Wall(jump, v, left.T @ right if v > 0 else right.T @ left))
-            at_wall = np.isin(np.arange(self._vertices.size), at).astype(float)
-            after_walls = after_walls + by_rows(at_wall, phi.right_trace if v > 0 else -phi.left_trace)
+            before, after = (left, right) if v > 0 else (right, left)
+            self._walls.append(Wall(jump, v, before[at].T @ after[at]))
+            at_wall = np.where(np.isin(np.arange(self._vertices.size), at), math.copysign(1.0, v), 0.0)
+            after_walls = after_walls + by_rows(at_wall, after)
         self._free_jump, self._two_way = self._jump - after_walls, np.flatnonzero(is_pointwise & (direction == 0))
         self._upwinding[is_pointwise] = 0.0
         # nothing is left of the other side: where ξ is large that would count
-        self._leaving = 0.5 * (phi.right_trace + phi.left_trace) - by_rows(0.5 * direction, self._jump)
+        self._leaving = 0.5 * (left + right) - by_rows(0.5 * direction, self._jump)
 
     @property
     def keeps_constants(self) -> bool:  # type: ignore[override]
-        for term in self.system.terms:
+        for term in (*self.system.terms, *self._framed.diffusions):
             if term.order == 0 and (term.h.amplitude or not term.q.vanishes):
                 return False
-        return all(each.order for each in self._framed.diffusions)
+        return True
+
+    def growth_bound(self, p: float, noises: Sequence[Any]) -> float:
+        total = super().growth_bound(p, noises)
+        for each in self._framed.impulses:
+            total += each.rate * math.exp(abs(p) * float(np.linalg.norm(each.exponent, 2)))
+        for ray, v, _ in self._walls:
+            total += abs(p * ray.log_factor * v)
+        return total
 
     def _loads(self) -> Iterator[Term]:
         for struck in self._framed.impulses:
@@ -403,10 +369,6 @@ class PlaneTerms(Terms):
         """h ∂φ with the loads at the φ-vertices, and q."""
         loads = self._leaving.T @ by_rows(term.h(self._vertices), self._free_jump)
         return self.phi.convection(term.h) + loads, self.phi.mass(term.q)
-
-    def _written(self, term: CoefficientMatrix) -> tuple[str, str, str]:
-        h, q = _written(term.h), _written(term.q)
-        return f"{h} ∂φ", q, f"(h ∂φ + p q)² of white noise, h = {h}, q = {q}"
 
     def _struck(self, of: Impulse, by: Impulse | None = None) -> Term:
         """An impulse, or ∂/∂θ of it."""
@@ -438,16 +400,6 @@ class PlaneTerms(Terms):
                 yield Term(0, OfMoment(0), phase, (of_first, *map(At, values)), text)
 
 
-def _written(of: Harmonics) -> str:
-    """(0.5 − 0.5 cos 2φ), or one number."""
-    text = ""
-    for value, name in ((of.mean, ""), (of.cosine, " cos 2φ"), (of.sine, " sin 2φ")):
-        if value:
-            text += f" {'−' if value < 0 else '+'} {abs(value):g}{name}"
-    text = text.removeprefix(" + ").removeprefix(" ")
-    return text if of.mean and not of.amplitude else f"({text})"
-
-
 def by_rows(factors: FloatArray, matrix: Matrix) -> Matrix:
-    """A matrix with its rows multiplied."""
-    return diags(factors) @ matrix if issparse(matrix) else factors[:, None] * matrix
+    """A matrix, or several, with its rows multiplied."""
+    return diags(factors) @ matrix if issparse(matrix) else factors[..., None] * matrix

@@ -11,7 +11,7 @@ import numpy as np
 
 from fpsolve.arrays import FloatArray, one
 from fpsolve.errors import MeshError
-from fpsolve.fem.axis import Axis, KroneckerSum, ModeEffects, along
+from fpsolve.fem.axis import FunctionAxis, KroneckerSum, ModeEffects, along
 from fpsolve.fem.circle import CircleAxis
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.fem.noise_axes import CellAxis, NoiseAxis, PolynomialAxis, StateAxis
@@ -21,8 +21,6 @@ from fpsolve.model.noise import Noise
 
 MOST_BYTES = 1e9
 """Of the factors of a generator: with what else is held, and libraries, a process takes about 1.5 GB."""
-LITTLE = 1e-2
-"""Share of the largest effect of an axis below which others are left as they are, while nothing is resolved."""
 BASES: dict[str, Callable[[Noise, int], NoiseAxis]] = {
     "polynomials": PolynomialAxis,
     "waves": CircleAxis,
@@ -30,13 +28,11 @@ BASES: dict[str, Callable[[Noise, int], NoiseAxis]] = {
     "states": lambda noise, _: StateAxis(noise),
 }
 """The functions of a noise by its `basis` and a number of them; those of "cells" follow from their interval."""
-FIRST = {"waves": 4}
-"""Number of functions of a first axis beyond half the digits, by the `basis`, where that is not 3."""
 
 
 def first_axis(noise: Noise, digits: float) -> NoiseAxis:
-    """Few functions of a noise, for so many digits, where no value of the noise is held."""
-    return BASES[noise.basis](noise, round(digits / 2) + FIRST.get(noise.basis, 3))
+    """Few functions of a noise, for so many digits; there are more where it has ends."""
+    return BASES[noise.basis](noise, round(digits / 2) + (3 if math.isinf(noise.half_width) else 5))
 
 
 class Space:
@@ -90,7 +86,7 @@ class Space:
             return cls((phi, CellAxis(noise, mesh.z_lines, np.full(mesh.z_lines.size - 1, mesh.xi_degree))))
         return cls((phi, BASES[noise.basis](noise, mesh.xi_degree)))
 
-    def with_axis(self, k: int, axis: Axis) -> Space:
+    def with_axis(self, k: int, axis: FunctionAxis) -> Space:
         """The space with another axis in one place."""
         return Space((*self.axes[:k], axis, *self.axes[k + 1 :]))
 
@@ -98,20 +94,18 @@ class Space:
         """A finer one: two degrees more each way; where there are none left, cells are halved."""
         return Space(tuple(axis.enriched() for axis in self.axes))
 
-    def doubled(self, effects: Sequence[ModeEffects | None] = ()) -> Space:
-        """Twice as many functions along the axes that lack most by their effects; along all where nothing is known."""
-        errors = [each.error if each else 0.0 for each in effects] or [1.0] * len(self.axes)
-        are_coarse = [error > LITTLE * max(errors) for error in errors]
-        return Space(tuple(axis.doubled() if each else axis for axis, each in zip(self.axes, are_coarse, strict=True)))
+    def doubled(self) -> Space:
+        """Twice as many functions along every axis, where nothing is known."""
+        return Space(tuple(axis.doubled() for axis in self.axes))
 
     def raised(self) -> Space:
         """One more function each way, where what a cell lacks harms others."""
         return Space(tuple(axis.raised() for axis in self.axes))
 
-    def refined(self, effects: Sequence[ModeEffects | None], share: float, may_coarsen: bool) -> Space:
+    def refined(self, effects: Sequence[ModeEffects | None], share: float) -> Space:
         """One on which every cell should lack no more than its share; the effects are those of every axis."""
         pairs = zip(self.axes, effects, strict=True)
-        return Space(tuple(axis.refined(each, share, may_coarsen) if each else axis for axis, each in pairs))
+        return Space(tuple(axis.refined(each, share) if each else axis for axis, each in pairs))
 
     @cached_property
     def constant(self) -> FloatArray:
@@ -142,12 +136,8 @@ class Space:
         tables = [along(matrices, old.table(each)) for each in np.atleast_2d(coefficients)]
         return np.reshape(tables, (*coefficients.shape[:-1], self.size))
 
-    def on_grid(self, coefficients: FloatArray) -> FloatArray:
-        """A function without its factor at all points of a grid, φ first."""
-        return along([self.phi.inner_values, *(axis.rule.values for axis in self.noises)], self.table(coefficients))
-
-    @property
-    def grid_measure(self) -> FloatArray:
-        """What the points of that grid stand for in an integral with the weights of all axes, but for a factor."""
-        measures = [self.phi.inner_measure, *(axis.rule.measure for axis in self.noises)]
-        return np.asarray(reduce(np.multiply.outer, measures))
+    def on_grid(self, *functions: FloatArray) -> list[FloatArray]:
+        """What the points of a grid stand for in an integral with the weights of all axes, but for a factor, and
+        functions without their factors there."""
+        _, measures, values = zip(*[axis.rule[:3] for axis in self.axes], strict=True)
+        return [reduce(np.multiply.outer, measures), *(along(values, self.table(each)) for each in functions)]

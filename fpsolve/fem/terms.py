@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property, reduce
+from functools import reduce
 from operator import add
 from typing import Any, TypeAlias
 
@@ -22,7 +22,7 @@ import numpy as np
 
 from fpsolve.arrays import Coefficient, Matrix, one
 from fpsolve.model.coordinates import Framed
-from fpsolve.model.plane import CoefficientMatrix, written_coefficient
+from fpsolve.model.plane import CoefficientMatrix, Harmonics, written_coefficient
 from fpsolve.model.problem import ParameterDerivative
 
 Noises = tuple[Coefficient | None, ...]
@@ -76,7 +76,8 @@ class Term:
         of_p: the coefficient.
         phase: the matrix of the first axis; where p is in more than the coefficient, a function of p that gives it.
         noises: its functions of the noises.
-        text: the term as a reader would write it.
+        text: what it does, as a reader would write it, with {0} for its coefficient, {h} and {q}.
+        of: that of the motion, or of white noise, that the text names.
         is_wall: whether it is R^p of a wall, which is 1 where nothing is lost: forcing is R^p − 1.
     """
 
@@ -85,7 +86,15 @@ class Term:
     phase: Phase
     noises: Noises
     text: str
+    of: CoefficientMatrix | None = None
     is_wall: bool = False
+
+    def __str__(self) -> str:
+        power, text = power_of_epsilon(self.order), self.text
+        if self.of:
+            size = f"{power} " * (self.order > 0) + written_coefficient(self.of.g)
+            text = text.format(size, h=_written(self.of.h), q=_written(self.of.q))
+        return f"{power:<2}  {('', 'p ', 'p² ')[self.of_p.n]}{text}"
 
     def at(self, p: float, derivative: int = 0, is_forcing: bool = False) -> Matrix | None:
         """The k-th derivative by p of the matrix of φ with its coefficient, or of its forcing; None where that is 0."""
@@ -106,37 +115,39 @@ class Terms:
         noises: those of each noise.
 
     Attributes:
+        words: h·∇, q and the square of their sum, of `Term.text`.
         keeps_constants: whether ⟨P_s, L₀T⟩ = 0 for every T: the order 0 only rotates uniformly, as it does in the plane
             alone.
     """
 
+    words: tuple[str, str, str]
     keeps_constants = False
 
     def __init__(self, framed: Framed, phi: Any, noises: Sequence[Any]) -> None:
         self.phi, self.noises, self._names = phi, noises, tuple(framed.problem.valued.parts)
         self._framed, self.system = framed, framed.motion
 
-    @cached_property
-    def all(self) -> Sequence[Term]:
+    def all(self) -> list[Term]:
         """L(p) of Eq. (19)."""
         found = list[Term]()
         for name in self._names:
             text = f"L_ξ, the generator of the noise{f' {name}' if name else ''}"
-            found.append(self._term(self.phi.matrix(one), None, text, of=name))
+            found.append(self._term(self.phi.matrix(one), None, text, name=name))
         for term in self.system.terms:
             found += self._driven(term)
         for each in self._framed.diffusions:
             found += self._diffused([(0.5, each, each)])
         return [*found, *self._loads()]
 
-    def phases(self, p: float, derivative: int = 0, is_forcing: bool = False) -> dict[Noises, Matrix]:
-        """For each function of the noises the matrix of φ of dᵏL/dpᵏ, or of its forcing; the first is that of 1."""
-        found: dict[Noises, Matrix] = {(one,) * len(self._names): 0.0 * self.phi.matrix(one)}
-        for term in self.all:
-            phase = term.at(p, derivative, is_forcing)
-            if phase is not None:
-                found[term.noises] = found[term.noises] + phase if term.noises in found else phase
-        return found
+    def growth_bound(self, p: float, noises: Sequence[Any]) -> float:
+        """About a bound on Λ(p): (|p| + n) ‖A‖ max |g| for each term of the motion of n variables, and so on."""
+        total, power = 0.0, abs(p) + self._framed.problem.dimension
+        for term in self.system.terms:
+            size = power * self.system.epsilon**term.order * float(np.linalg.norm(term.matrix, 2))
+            total += size * float(np.max(np.abs(term.g(noises[self.place(term.noise)].xi))))
+        for each in self._framed.diffusions:
+            total += 0.5 * (power * self.system.epsilon**each.order * float(np.linalg.norm(each.matrix, 2))) ** 2
+        return total
 
     def changed(self, by: ParameterDerivative) -> Iterator[Term]:
         """∂L(p)/∂θ of the same terms; what makes functions smooth is held."""
@@ -155,22 +166,16 @@ class Terms:
         """∂/∂θ of these."""
         raise NotImplementedError
 
-    def _written(self, term: CoefficientMatrix) -> tuple[str, str, str]:
-        """h·∇, q and the square of their sum as a reader would write them."""
-        raise NotImplementedError
-
     def _matrices(self, term: CoefficientMatrix) -> tuple[Matrix, Matrix]:
         """h·∇ and q of a term of the motion."""
-        found: tuple[Matrix, Matrix] = self.phi.driven(term)
-        return found
+        raise NotImplementedError
 
     def _driven(self, term: CoefficientMatrix) -> Iterator[Term]:
         """h·∇ + p q of a term of the motion."""
-        size, power = self.system.epsilon**term.order, f"{power_of_epsilon(term.order)} " if term.order else ""
-        for k, (matrix, text) in enumerate(zip(self._matrices(term), self._written(term), strict=False)):
+        size = self.system.epsilon**term.order
+        for k, matrix in enumerate(self._matrices(term)):
             if abs(matrix).max():
-                words = "p " * k + power + written_coefficient(term.g) + text
-                yield self._term(size * matrix, term.g, words, OfMoment(k), term.order, term.noise)
+                yield self._term(size * matrix, term.g, self.words[k], OfMoment(k), term.order, term.noise, term)
 
     def _diffused(self, pairs: Sequence[tuple[float, CoefficientMatrix, CoefficientMatrix]]) -> Iterator[Term]:
         """Σ c (h_a·∇ + p q_a)(h_b·∇ + p q_b) of matrices a and b, written by the first one."""
@@ -178,9 +183,8 @@ class Terms:
         for c, a, b in pairs:
             size = c * self.system.epsilon ** (a.order + b.order)
             parts.append([size * part for part in self.phi.diffusion(a, b)])
-        text = f"½ {self._written(pairs[0][1])[2]}"
         for power, of_pairs in enumerate(zip(*parts, strict=True)):
-            yield self._term(reduce(add, of_pairs), one, ("", "p ", "p² ")[power] + text, OfMoment(power), order)
+            yield self._term(reduce(add, of_pairs), one, self.words[2], OfMoment(power), order, of=pairs[0][1])
 
     def _term(
         self,
@@ -189,17 +193,28 @@ class Terms:
         text: str,
         of_p: OfMoment = OfMoment(0),
         order: int = 0,
-        of: str = "",
+        name: str = "",
+        of: CoefficientMatrix | None = None,
         is_wall: bool = False,
     ) -> Term:
-        """One with a function of the noise `of`, or of the first."""
+        """One with a function of the noise of a name, or of the first."""
         noises: list[Coefficient | None] = [one] * len(self._names)
-        noises[self._at(of)] = g
-        return Term(order, of_p, phase, tuple(noises), text, is_wall=is_wall)
+        noises[self.place(name)] = g
+        return Term(order, of_p, phase, tuple(noises), text, of, is_wall)
 
-    def _at(self, name: str) -> int:
+    def place(self, name: str) -> int:
         """The place of a noise among those that have values; the first one for others."""
         return self._names.index(name) if name in self._names else 0
+
+
+def _written(of: Harmonics) -> str:
+    """(0.5 − 0.5 cos 2φ), or one number."""
+    text = ""
+    for value, name in ((of.mean, ""), (of.cosine, " cos 2φ"), (of.sine, " sin 2φ")):
+        if value:
+            text += f" {'−' if value < 0 else '+'} {abs(value):g}{name}"
+    text = text.removeprefix(" + ").removeprefix(" ")
+    return text if of.mean and not of.amplitude else f"({text})"
 
 
 def power_of_epsilon(order: int) -> str:

@@ -96,7 +96,7 @@ def test_share_of_what_is_negative_is_that_of_phi_and_not_of_thin_cells():
     phi = PhaseAxis(lines, np.full(4, 2))
     space = Space([phi, StateAxis(Telegraph(1.0, 1.0))])
     below = np.where(phi.cells < 3, -phi.constant, phi.constant)
-    values, measure = space.on_grid(space.product([below, np.ones(2)])), space.grid_measure
+    measure, values = space.on_grid(space.product([below, np.ones(2)]))
     assert measure[values < 0].sum() / measure.sum() == pytest.approx(0.03 / np.pi)
 
 
