@@ -233,12 +233,12 @@ def scans_of(keys: Mapping[str, Boundary], records: Records, pool: Pool) -> Iter
         row: key_of(key, line.scan_rtol, row.count, row.number) for key, line in keys.items() for row in line.rows()
     }
 
-    def read(record: Entries, _: Row) -> Scan:
-        found: Scan = made(Scan, record.get("scan"))
+    def read(record: Entries, _: Row) -> Scan | None:
+        found: Scan | None = made(Scan | None, record.get("scan"))
         return found
 
     def entries(scan: Scan) -> Entries:
-        return {} if any(map(may_pass, scan.reasons)) else {"scan": plain(Scan, replace(scan, seconds=0.0))}
+        return {} if any(map(may_pass, scan.reasons)) else {"scan": plain(Scan | None, replace(scan, seconds=0.0))}
 
     found = answered(records, pool, scan_row, rows, key=rows.__getitem__, read=read, entries=entries)
     return (scan for _, scan, _ in found)

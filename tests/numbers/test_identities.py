@@ -395,7 +395,7 @@ def test_sensitivities_to_what_would_join_blocks_are_left_out():
 
 FLUTTER = load_case(Path(__file__).parents[2] / "cases/systems/flutter.toml")
 LINES = {
-    "flutter": (FLUTTER.problem, FLUTTER.chart.x.axis, Axis("noise.standard_deviation", 1e-4, 0.3), 5),
+    "flutter": (FLUTTER.problem, FLUTTER.chart.x, Axis("noise.standard_deviation", 1e-4, 0.3), 5),
     "blocks": (chained(), Axis("system.zeta", 0.05, 0.2), Axis("noise.s", 0.3, 0.8), 3),
 }
 
