@@ -336,7 +336,7 @@ class PlaneTerms(Terms):
     def growth_bound(self, p: float, noises: Sequence[Any]) -> float:
         total = super().growth_bound(p, noises)
         for each in self._framed.impulses:
-            total += each.rate * math.exp(abs(p) * float(np.linalg.norm(each.exponent, 2)))
+            total += each.rate * math.exp(abs(p) * each.strength)
         for ray, v, _ in self._walls:
             total += abs(p * ray.log_factor * v)
         return total

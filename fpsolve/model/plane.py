@@ -348,7 +348,8 @@ class Jump:
 
     def __post_init__(self) -> None:
         try:
-            real_array([self.phase, self.log_factor, 0.0 if self.leading is None else self.leading], "")
+            for value in (self.phase, self.log_factor, 0.0 if self.leading is None else self.leading):
+                real_number(value, "")
         except ValueError:
             numbers = f"phase = {shown(self.phase)}, log_factor = {shown(self.log_factor)}"
             more = f"and leading, here {shown(self.leading)}, one too where it is not None"
