@@ -105,10 +105,8 @@ class Pool:
             executor, self._executor = self._executor, None
             self.stop(executor)
 
-    def run(
-        self, task: Callable[[Item], Result], items: Iterable[Item], *, in_order: bool = False
-    ) -> Iterator[tuple[Item, Result]]:
-        """Each item with its result, as they come or in order; an exception of a task is raised here, and ends the run.
+    def run(self, task: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[tuple[Item, Result]]:
+        """Each item with its result, as they come; an exception of a task is raised here, and ends the run.
 
         An item is taken when it can be given to a worker, as there may be many.
 
@@ -128,7 +126,7 @@ class Pool:
                     waiting[self._submit(task, item)] = item
                 if not waiting:
                     return
-                for future in self._done([next(iter(waiting))] if in_order else waiting):
+                for future in self._done(waiting):
                     yield waiting[future], future.result()
                     del waiting[future]
         except CancelledError:
@@ -152,10 +150,6 @@ class Pool:
             if not future.cancelled() and future.exception() is None:
                 yield self._waiting[future], future.result()
 
-    def map(self, task: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
-        """The results in the order of the items, see `run`."""
-        return (result for _, result in self.run(task, items, in_order=True))
-
     def _done(self, waiting: Iterable[Future[Result]]) -> set[Future[Result]]:
         """Those that are done first."""
         until = math.inf
@@ -176,11 +170,6 @@ class Pool:
             raise FpsolveError(f"the processes cannot be started: {reason}; use fewer jobs") from failure
 
 
-def serial() -> Pool:
-    """This process alone, item by item."""
-    return Pool(partial(Processes, 1), own_seconds=math.inf)
-
-
 def parallel(count: int | None = None, tasks: int = MOST_JOBS) -> Pool:
     """Processes of this machine, but not more than there are tasks.
 
@@ -196,7 +185,7 @@ def parallel(count: int | None = None, tasks: int = MOST_JOBS) -> Pool:
         raise FpsolveError(f"jobs: got {shown(count)}; {known}")
     size = min(count or processors(), tasks)
     if size == 1:
-        return serial()
+        return SERIAL
     return Pool(partial(Processes, size), _kill, size, START_SECONDS if count is None else 0.0)
 
 
@@ -277,6 +266,10 @@ class Processes(futures.ProcessPoolExecutor):
         context = multiprocessing.get_context("spawn")
         self.end: Any = context.RawValue("b", False)
         super().__init__(count, mp_context=context, initializer=_begin_worker, initargs=(self.end,))
+
+
+SERIAL = Pool(partial(Processes, 1), own_seconds=math.inf)
+"""This process alone, item by item."""
 
 
 def _begin_worker(end: Any) -> None:

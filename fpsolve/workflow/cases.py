@@ -14,7 +14,7 @@ from fpsolve.case.remedies import CASE_WORDS
 from fpsolve.errors import FpsolveError, NotConverged, WorkersDied
 from fpsolve.files import writable
 from fpsolve.messages import Code, Message
-from fpsolve.pool import Pool, cluster, parallel, serial
+from fpsolve.pool import SERIAL, Pool, cluster, parallel
 from fpsolve.results.curve import CurveResult, SimulatedCurve
 from fpsolve.show import results
 from fpsolve.show.notes import MONTE_CARLO, notes
@@ -112,7 +112,7 @@ def run_case(
     out: str | Path = "results",
     *,
     monte_carlo: bool = False,
-    pool: Pool | None = None,
+    pool: Pool = SERIAL,
     is_fresh: bool = False,
     watch: Watch = SILENT,
 ) -> Outcome:
@@ -121,7 +121,7 @@ def run_case(
     When the simulation is interrupted or fails, the figure shows what is done.
 
     Args:
-        pool: who solves; this process if none is given.
+        pool: who solves.
         is_fresh: whether to solve all sets again.
 
     Raises:
@@ -135,10 +135,10 @@ def run_case(
         refuse_obstacles(case)
     simulated: list[SimulatedCurve] = []
     interruption = ""
-    simulators = pool if pool and pool.is_elsewhere else None
+    simulators = pool if pool.is_elsewhere else None
     replaced = (SOLVED, SIMULATED) if monte_carlo else (SOLVED,)
     with own_folder(case, out, replaced) as folder:
-        sweep = _solve(case, folder, pool or serial(), watch, is_fresh=is_fresh)
+        sweep = _solve(case, folder, pool, watch, is_fresh=is_fresh)
 
         def show() -> None:
             with watch.bar(Phase(case.name, "figures")), writable(folder):
@@ -153,7 +153,7 @@ def run_case(
                 )
                 files = TABLES + SIMULATION * bool(simulated)
                 is_whole &= sweep.done == case.planned
-                write_report(case, folder, watch, blocks, facts=sweep.facts, files=files, complete=is_whole)
+                write_report(case, folder, watch, blocks, started=sweep.started, files=files, complete=is_whole)
 
         told = saying_if_interrupted(lambda: f"; what was {'done' if simulated else 'solved'} is kept in {folder}")
         with told, shown_at_the_end(show):

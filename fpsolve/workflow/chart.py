@@ -32,14 +32,14 @@ from fpsolve.model.problem import Problem
 from fpsolve.output.records import Entries, Records, answered, key_of, made, plain
 from fpsolve.output.tables import head, in_case_words
 from fpsolve.page.page import Block, Column, Drawing, Grid, Sentence
-from fpsolve.pool import Pool, serial
+from fpsolve.pool import SERIAL, Pool
 from fpsolve.results.text import plural
 from fpsolve.show.notes import note_on
 from fpsolve.theory.perturbation import second_order
 from fpsolve.workflow.folders import CHART, kept, own_folder, saying_if_interrupted
 from fpsolve.workflow.progress import NODES as SCANNED
 from fpsolve.workflow.progress import POINTS, SILENT, Phase, Watch
-from fpsolve.workflow.reports import facts_since, shown_at_the_end, write_report
+from fpsolve.workflow.reports import shown_at_the_end, write_report
 
 LINE_RECORDS = "records/charted.jsonl"
 """The file of the records of points of lines."""
@@ -429,7 +429,7 @@ def chart_case(
     case: Case,
     out: str | Path = "results",
     *,
-    pool: Pool | None = None,
+    pool: Pool = SERIAL,
     watch: Watch = SILENT,
 ) -> Chart:
     """Trace the lines of the chart of a case, and write chart.csv, .json, .png and .pdf into `out`/<name of the case>/.
@@ -438,7 +438,7 @@ def chart_case(
     solved or simulated with other parameters; but lines that it has finished are not traced again.
 
     Args:
-        pool: who scans the plane; this process if none is given.
+        pool: who scans the plane.
 
     Raises:
         OutputError: the folder cannot be made or written to, or another run writes into it.
@@ -456,8 +456,7 @@ def chart_case(
         if chart.lines:
             with writable(folder):
                 chart_figure(case, chart).write(folder)
-            facts = facts_since(case, started)
-            write_report(case, folder, watch, show(case, chart), facts=facts, files=FILES, complete=chart.complete)
+            write_report(case, folder, watch, show(case, chart), started=started, files=FILES, complete=chart.complete)
 
     with (
         own_folder(case, out, (CHART,)) as folder,
@@ -465,12 +464,12 @@ def chart_case(
         watch.bar(Phase(case.name, "scan", sum(line.nodes**2 for line in lines), SCANNED)) as progress,
         watch.bar(Phase(case.name, "lines", unit=POINTS)) as stepped,
         writable(folder),
-        pool or serial() as workers,
+        pool,
     ):
         records = Records(folder / LINE_RECORDS)
         keys = {key_of_line(case, line): line for line in lines}
         lines = [recalled(records, *each) for each in keys.items()]
         with shown_at_the_end(draw):
-            for chart in solve_chart(case, lines, scans_of(keys, records, workers), progress=progress, stepped=stepped):
+            for chart in solve_chart(case, lines, scans_of(keys, records, pool), progress=progress, stepped=stepped):
                 write_chart(case, chart, folder)
     return chart

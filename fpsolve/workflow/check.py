@@ -21,7 +21,7 @@ from fpsolve.page.limits import EACH, ROWS
 from fpsolve.page.page import Block, Column, Grid, Sentence
 from fpsolve.parts.moments import QUESTION as MOMENTS
 from fpsolve.parts.question import Asked, Job, Numerics, Settings
-from fpsolve.pool import Pool, serial
+from fpsolve.pool import SERIAL, Pool
 from fpsolve.results.curve import CurveResult
 from fpsolve.study.solve import result_of, solve_set
 from fpsolve.workflow.folders import ANEW, kept, of_curves, saying_if_interrupted
@@ -131,7 +131,7 @@ def compared(job: Job) -> CurveResult:
     return result_of(solve_set(job))
 
 
-def check_case(case: Case, *, by_hierarchy: bool = False, pool: Pool | None = None, watch: Watch = SILENT) -> Checked:
+def check_case(case: Case, *, by_hierarchy: bool = False, pool: Pool = SERIAL, watch: Watch = SILENT) -> Checked:
     """Solve what a case expects, and compare; nothing is written.
 
     With `by_hierarchy` Λ of its even p is compared with the moment hierarchy.
@@ -147,9 +147,9 @@ def check_case(case: Case, *, by_hierarchy: bool = False, pool: Pool | None = No
     with (
         saying_if_interrupted(lambda: kept(len(found), of_curves(case)), ANEW),
         watch.bar(Phase(case.name, "solving", case.planned, SETS)) as progress,
-        pool or serial() as workers,
+        pool,
     ):
-        for _, result in workers.run(compared, map(job, case.curves())):
+        for _, result in pool.run(compared, map(job, case.curves())):
             found.append(result)
             progress(failed=result.status.fails)
     found.sort(key=lambda result: result.curve.number)

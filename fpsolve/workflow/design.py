@@ -22,13 +22,12 @@ from fpsolve.errors import FpsolveError
 from fpsolve.exponent.error import Absent, digits
 from fpsolve.files import writable, write_json, write_text
 from fpsolve.messages import Code, Message
-from fpsolve.output.tables import head
+from fpsolve.output.tables import facts_of, head
 from fpsolve.page.page import Block, Column, Grid, Sentence
 from fpsolve.results.text import plural
 from fpsolve.show.notes import note_on
 from fpsolve.workflow.folders import ANEW, DESIGNED, own_folder, saying_if_interrupted
 from fpsolve.workflow.progress import SOLVES, Phase, Watch
-from fpsolve.workflow.reports import facts_since
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,7 +176,7 @@ def design_case(case: Case, target: str, by: tuple[Axis, ...], out: Path, *, wat
     ):
         with watch.bar(Phase(case.name, "design", unit=SOLVES)) as progress:
             found = solve_design(case, target, by, progress)
-        write_design(case, found, folder, facts_since(case, started))
+        write_design(case, found, folder, facts_of(case, started))
     return found
 
 

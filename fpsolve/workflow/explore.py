@@ -39,6 +39,7 @@ from fpsolve.messages import message_of
 from fpsolve.model.equation import equations_of
 from fpsolve.model.plane import BELOW
 from fpsolve.model.problem import Problem, checked_problem
+from fpsolve.output.tables import facts_of
 from fpsolve.page.html import page_of, part_of_page
 from fpsolve.page.local import LocalPage
 from fpsolve.page.page import Sentence
@@ -51,7 +52,7 @@ from fpsolve.show.problem import show as show_problem
 from fpsolve.show.verdict import meaning, verdict
 from fpsolve.study.solve import everything, result_of, solve_curve
 from fpsolve.workflow.progress import waiting
-from fpsolve.workflow.reports import COMPLETE, facts_since
+from fpsolve.workflow.reports import COMPLETE
 from fpsolve.workflow.views import field_of, listed, map_of, paths_of
 
 MOVING_RTOL = 1e-6
@@ -303,7 +304,7 @@ class Explorer:
                 state=COMPLETE,
                 equations=equations_of(case.system),
                 about=list(show_problem(case)),
-                facts={**facts_since(case, started), "case_text": self._text(case) if self.source.text else ""},
+                facts={**facts_of(case, started), "case_text": self._text(case) if self.source.text else ""},
                 file=f"{self.source.name}-explored.toml",
                 more="`fpsolve run` of the case below writes all numbers.",
             )

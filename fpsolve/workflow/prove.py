@@ -24,7 +24,7 @@ from fpsolve.messages import Code, Message
 from fpsolve.output.records import Entries, Records, answered, key_of
 from fpsolve.page.limits import EACH, PROOFS, ROWS
 from fpsolve.page.page import Block, Column, Grid, Sentence
-from fpsolve.pool import Pool, serial
+from fpsolve.pool import SERIAL, Pool
 from fpsolve.proofs.balls import precision
 from fpsolve.proofs.certificate import NOTHING, Enclosure, MalformedProof, enclosure_of
 from fpsolve.proofs.claims import Claims, CurveClaims, IndexBound, bound_of, claims_from, moment_of, plain, verdicts
@@ -40,7 +40,7 @@ from fpsolve.reading import Unreadable, Words, read_text
 from fpsolve.show.curves import Shown, grid_of
 from fpsolve.workflow.folders import PROVEN, kept, own_folder, saying_if_interrupted
 from fpsolve.workflow.progress import BOUNDS, SILENT, Phase, Watch
-from fpsolve.workflow.reports import facts_since, shown_at_the_end, write_report
+from fpsolve.workflow.reports import shown_at_the_end, write_report
 
 PROOF = "proof.json"
 """The file of proven bounds."""
@@ -307,14 +307,14 @@ def prove_case(
     out: str | Path = "results",
     *,
     width: float | None = None,
-    pool: Pool | None = None,
+    pool: Pool = SERIAL,
     watch: Watch = SILENT,
 ) -> list[CurveProof]:
     """Prove bounds on Λ at every p of every curve, and on λ and δ_p; write proof.json into `out`/<case>/.
 
     Args:
         width: wanted upper − lower; 1e-7 of the scale of each number if None.
-        pool: who proves; this process if none is given.
+        pool: who proves.
 
     Raises:
         FpsolveError: a curve cannot be proven, or the width is none; nothing is written.
@@ -330,18 +330,17 @@ def prove_case(
         if proofs:
             with writable(folder):
                 write_proof(case, proofs, folder, is_whole=is_whole)
-            facts = facts_since(case, started)
-            write_report(case, folder, watch, show(case, proofs), facts=facts, files=[PROOF], complete=is_whole)
+            write_report(case, folder, watch, show(case, proofs), started=started, files=[PROOF], complete=is_whole)
 
     with (
         own_folder(case, out, (PROVEN,)) as folder,
         saying_if_interrupted(lambda: kept(len(answers), f"of {total} bounds", folder)),
         watch.bar(Phase(case.name, "proving", total, BOUNDS)) as progress,
-        pool or serial() as workers,
+        pool,
         shown_at_the_end(finish),
     ):
         records, kept_as = Records(folder / PROVEN_RECORDS), dict[str, Any](read=verified, entries=record_of)
-        for _, found, is_known in answered(records, workers, answer, questions(case, width), key=_key, **kept_as):
+        for _, found, is_known in answered(records, pool, answer, questions(case, width), key=_key, **kept_as):
             answers.append(found)
             progress(failed=not found.is_proven, known=is_known)
     return proofs

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from datetime import UTC, datetime
+from datetime import datetime
 from pathlib import Path
-from typing import Any
 
 from fpsolve.case.case import Case
 from fpsolve.errors import FpsolveError
@@ -36,7 +35,7 @@ def write_report(
     watch: Watch,
     blocks: Iterable[Block],
     *,
-    facts: Mapping[str, Any],
+    started: datetime,
     files: Sequence[str],
     complete: bool,
 ) -> None:
@@ -44,7 +43,7 @@ def write_report(
 
     Args:
         blocks: what was found.
-        facts: on the run, see `facts_of`.
+        started: when the command was.
         files: the names of those that hold all numbers.
         complete: whether all was done that was planned.
 
@@ -63,7 +62,7 @@ def write_report(
                 state=COMPLETE if complete else INCOMPLETE,
                 equations=equations_of(next(case.curves(0, 1)).problem.system),
                 about=list(problem.show(case)),
-                facts=facts,
+                facts=facts_of(case, started),
                 file=case.path.name,
                 more=f"All numbers are in {', '.join(files)}, in the folder of the results, {folder.name}.{also}",
             )
@@ -86,8 +85,3 @@ def shown_at_the_end(show: Callable[[], None]) -> Iterator[None]:
             show()
         raise
     show()
-
-
-def facts_since(case: Case, started: datetime) -> dict[str, Any]:
-    """On a run that began then, see `facts_of`."""
-    return facts_of(case, started, (datetime.now(UTC) - started).total_seconds())

@@ -26,7 +26,7 @@ from fpsolve.parts.eigenfunctions import write_curves
 from fpsolve.parts.every import BY_NAME
 from fpsolve.parts.question import Job
 from fpsolve.parts.response import write_response
-from fpsolve.pool import Pool, serial
+from fpsolve.pool import SERIAL, Pool
 from fpsolve.results.curve import Status
 from fpsolve.show.notes import notes
 from fpsolve.study.columns import COUNTS
@@ -100,7 +100,7 @@ class Sweep:
 
     def __init__(self, case: Case, folder: Path, *, is_fresh: bool = False) -> None:
         self.case, self.folder = case, folder.resolve()
-        self.started, self._clock = datetime.now(UTC), monotonic()
+        self.started = datetime.now(UTC)
         self.results = Results(case, Records(self.folder / SOLVED_RECORDS, is_fresh=is_fresh))
         self.facts, self._due, self.known = dict[str, Any](), 0.0, len(self.results)
         self._steps_each = max(case.p.size if MOMENT.name in case.asked else 0, 1) if case.planned == 1 else 1
@@ -136,7 +136,7 @@ class Sweep:
         jobs: Iterable[Job] = map(self.results.job, left)
         if is_alone:
             jobs = (replace(job, keep=self._grow, progress=progress) for job in jobs)
-        with serial() if is_alone else pool as workers:
+        with SERIAL if is_alone else pool as workers:
             try:
                 for job, each in workers.run(solved, jobs):
                     is_failed = self._take(job, each)
@@ -164,7 +164,7 @@ class Sweep:
 
     def write_tables(self) -> None:
         """Write summary.json, moments.csv and curves.csv."""
-        started, self.facts = monotonic(), facts_of(self.case, self.started, monotonic() - self._clock)
+        started, self.facts = monotonic(), facts_of(self.case, self.started)
         results = self.results
         write_results(self.case, results, self.folder, self.facts, self.done, results.table, results.telling)
         self._due = monotonic() + REST * (monotonic() - started)

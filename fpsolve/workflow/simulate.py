@@ -26,7 +26,7 @@ from fpsolve.output.tables import head, in_case_words, parameters_of
 from fpsolve.page.limits import EACH, PICTURES
 from fpsolve.page.page import Block, Column, Drawing, Grid, Sentence, filled
 from fpsolve.parts.question import idle
-from fpsolve.pool import Pool, processors, serial
+from fpsolve.pool import SERIAL, Pool, processors
 from fpsolve.results.curve import CurveResult, SimulatedCurve
 from fpsolve.results.text import fate, sampled, sign_of, units_in_words
 from fpsolve.show.curves import Shown, grid_of
@@ -35,7 +35,7 @@ from fpsolve.simulation.setup import PROGRESS_STEPS, obstacles, simulated_parts
 from fpsolve.vtk import field_data, pyvista_module, write_vtk
 from fpsolve.workflow.folders import AGAIN, SIMULATED, kept, of_curves, own_folder, saying_if_interrupted
 from fpsolve.workflow.progress import PERCENT, SILENT, Phase, Watch
-from fpsolve.workflow.reports import facts_since, write_report
+from fpsolve.workflow.reports import write_report
 
 RECORDS = "records/simulated.jsonl"
 """The file of the records of simulations."""
@@ -175,7 +175,7 @@ class Simulations:
         asked: dict[str, Any] = {"orders": case.simulated.tolist(), "setting": case.monte_carlo}
         kept: dict[str, Any] = {"key": partial(simulation_key, **asked), "read": simulated_of, "entries": record_of}
         work = Phase(case.name, "simulation", simulation_work(case), PERCENT)
-        with watch.bar(work) as progress, writable(self.folder), pool or serial() as workers:
+        with watch.bar(work) as progress, writable(self.folder), pool or SERIAL as workers:
             task = partial(simulate_curve, **asked, progress=idle if pool else progress)
             try:
                 for curve, each, is_known in answered(self.records, workers, task, case.curves(), **kept):
@@ -373,6 +373,5 @@ def simulate_case(
         interruption = simulations.run(watch, pool)
         simulated = simulations.simulated
         blocks = chain(show(case, simulated), notes(case, simulated, MONTE_CARLO))
-        facts = facts_since(case, started)
-        write_report(case, folder, watch, blocks, facts=facts, files=SIMULATION, complete=not interruption)
+        write_report(case, folder, watch, blocks, started=started, files=SIMULATION, complete=not interruption)
     return simulations

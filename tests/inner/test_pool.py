@@ -12,7 +12,7 @@ import pytest
 from fpsolve import pool
 from fpsolve.budget import Meter, charge
 from fpsolve.errors import WorkersDied
-from fpsolve.pool import PROCESSORS, Pool, limit_processors, parallel, processors, serial
+from fpsolve.pool import PROCESSORS, SERIAL, Pool, limit_processors, parallel, processors
 
 
 def square(number):
@@ -37,18 +37,18 @@ def whereabouts(_):
 
 
 @pytest.mark.parametrize("count", [1, pytest.param(2, marks=pytest.mark.slow)])
-def test_results_are_in_order_and_exceptions_are_raised_here(count):
+def test_each_item_has_its_result_and_exceptions_are_raised_here(count):
     with parallel(count) as workers:
-        assert list(workers.map(square, range(300))) == [number**2 for number in range(300)]
-        assert list(workers.map(square, ())) == []
+        assert dict(workers.run(square, range(300))) == {number: number**2 for number in range(300)}
+        assert list(workers.run(square, ())) == []
         with pytest.raises(OSError, match="No space"):
             list(workers.run(faulty, range(20)))
 
 
 def test_items_are_taken_and_done_when_they_are_needed():
     taken, done = iter(range(1000)), []
-    with serial() as workers:
-        next(workers.map(done.append, taken))
+    with SERIAL as workers:
+        next(workers.run(done.append, taken))
     assert (done, next(taken)) == ([0], 1)
 
 
@@ -85,12 +85,12 @@ def test_cluster_without_workers_is_given_up_after_a_while(monkeypatch):
 @pytest.mark.slow
 def test_workers_are_as_many_as_tasks_with_one_processor_each_after_own_work(monkeypatch):
     with parallel(1000, 2) as workers:
-        found = set(workers.map(whereabouts, range(20)))
+        found = set(dict(workers.run(whereabouts, range(20))).values())
     assert (len(found), {count for _, count in found}) == (2, {1})
     monkeypatch.setattr(pool, "START_SECONDS", 0.1)
     monkeypatch.setattr(pool, "processors", lambda: 2)
     with parallel() as workers:
-        numbers = [number for number, _ in workers.map(whereabouts, range(30))]
+        numbers = [number for _, (number, _) in workers.run(whereabouts, range(30))]
     assert numbers[0] == os.getpid()
     assert len(set(numbers)) == 3
 

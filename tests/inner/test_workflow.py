@@ -13,7 +13,7 @@ from fpsolve.exponent.method import Budget
 from fpsolve.files import alone, atomic
 from fpsolve.output.known import ROW, names_of
 from fpsolve.parts.question import Numerics
-from fpsolve.pool import Pool
+from fpsolve.pool import SERIAL, Pool
 from fpsolve.workflow import run_case
 from fpsolve.workflow.simulate import simulation_key
 from tests.kit import COSTLY, LEAN, TEXT, case_in, read_json, run
@@ -126,7 +126,7 @@ class Elsewhere(Executor):
 
 def test_pictures_come_back_from_machines_that_share_no_folder(tmp_path):
     case = case_in(tmp_path, TEXT)
-    for out, pool in (("here", None), ("there", Pool(lambda: Elsewhere(tmp_path), is_elsewhere=True))):
+    for out, pool in (("here", SERIAL), ("there", Pool(lambda: Elsewhere(tmp_path), is_elsewhere=True))):
         run_case(case, tmp_path / out, pool=pool)
     here, there = (
         {path.relative_to(tmp_path / out): path for path in (tmp_path / out).rglob("*") if path.is_file()}
