@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from time import monotonic
-from typing import Annotated, Any
+from typing import Annotated
 
 from cyclopts import Parameter
 
@@ -53,9 +53,8 @@ def simulate(
         refuse_obstacles(case)
     pool = options.pool()
     for case in loaded:
-        start, watch = monotonic(), options.watch()
-        how: dict[str, Any] = {"is_fresh": fresh, "watch": watch}
-        outcome = simulate_case(case, options.out, pool=pool if options.scheduler else None, **how)
+        start = monotonic()
+        outcome = simulate_case(case, options.out, pool=pool, is_fresh=fresh, watch=options.watch())
         if outcome.interruption:
             print_error(outcome.interruption)
         what = done_of(case, sum(not each.interrupted for each in outcome.simulated))

@@ -106,9 +106,9 @@ def answered(
     task: Callable[[Item], Found],
     items: Iterable[Item],
     *,
+    kind: Any,
     key: Callable[[Item], str],
-    read: Callable[[Entries, Item], Found | None],
-    entries: Callable[[Found], Entries],
+    keeps: Callable[[Found], bool],
 ) -> Iterator[tuple[Item, Found, bool]]:
     """What is found of each item, in their order, and whether an earlier run had; what is new is recorded as it comes.
 
@@ -116,22 +116,22 @@ def answered(
         records: of the items.
         pool: does the tasks of those that are not known.
         task: finds something of an item; can be pickled.
+        kind: the annotation of what is found; a record that has another form counts as none.
         key: what the record of an item is found by.
-        read: gives what its record has; None, or raises `ValueError`, where that is nothing.
-        entries: the record of what was found; empty of what is not kept.
+        keeps: whether something that was found is recorded.
     """
     by_key, earlier, new = [(key(each), each) for each in items], dict[str, Found](), dict[str, Found]()
-    for name, item in dict(by_key).items():
+    for name in dict(by_key):
         with suppress(ValueError):
-            if found := read(records.get(name), item):
+            if found := made(kind | None, records.get(name).get("found")):
                 earlier[name] = found
     fresh = pool.run(task, [item for name, item in dict(by_key).items() if name not in earlier])
     for name, item in by_key:
         while name not in earlier and name not in new:
             each, one = next(fresh)
             new[key(each)] = one
-            if record := entries(one):
-                records.put(key(each), record)
+            if keeps(one):
+                records.put(key(each), {"found": plain(kind | None, one)})
         yield item, earlier.get(name) or new[name], name in earlier
 
 

@@ -133,9 +133,8 @@ def run_case(
         raise FpsolveError(f"{case.path}: {refused.words(CASE_WORDS)}")
     if monte_carlo:
         refuse_obstacles(case)
-    simulated: list[SimulatedCurve] = []
-    interruption = ""
-    simulators = pool if pool.is_elsewhere else None
+    simulations = Simulations(case)
+    simulated = simulations.simulated
     replaced = (SOLVED, SIMULATED) if monte_carlo else (SOLVED,)
     with own_folder(case, out, replaced) as folder:
         sweep = _solve(case, folder, pool, watch, is_fresh=is_fresh)
@@ -144,7 +143,7 @@ def run_case(
             with watch.bar(Phase(case.name, "figures")), writable(folder):
                 results.write_figures(case, sweep.results, simulated, folder, sweep.results.table)
             if watch.has_report:
-                is_whole = not interruption and len(simulated) == case.planned * monte_carlo
+                is_whole = not simulations.interruption and len(simulated) == case.planned * monte_carlo
                 blocks = chain(
                     results.show(case, sweep.results, folder, simulated, sweep.results.table),
                     show_simulated(case, simulated, sweep.results) if simulated else (),
@@ -161,13 +160,11 @@ def run_case(
             watch.shown(results.show(case, sweep.results, folder, (), table, is_whole=watch.is_whole))
             watch.noted(sweep.notes)
             if monte_carlo:
-                simulations = Simulations(case, folder, is_fresh=is_fresh)
-                simulated = simulations.simulated
-                interruption = simulations.run(watch, simulators, sweep.results)
+                simulations.run(folder, pool, watch, sweep.results, is_fresh=is_fresh)
     return Outcome(
         sweep.results,
         tuple(simulated),
-        interruption,
+        simulations.interruption,
         facts=sweep.facts,
         known=sweep.known,
         failed=sweep.failed,

@@ -16,7 +16,7 @@ import numpy as np
 
 from fpsolve.analysis.axis import Axis
 from fpsolve.analysis.regions import P_BIFURCATIONS, Region, Regions, regions
-from fpsolve.analysis.scan import Row, Sample, Scan, scan_row
+from fpsolve.analysis.scan import Sample, Scan, scan_row
 from fpsolve.analysis.stability import Boundary, Solve, crossed, is_of_line, untraced
 from fpsolve.analysis.target import Target
 from fpsolve.arrays import FloatArray
@@ -29,7 +29,7 @@ from fpsolve.exponent.kinds import choose
 from fpsolve.files import writable, write_csv, write_json
 from fpsolve.messages import Code, Message, message_of
 from fpsolve.model.problem import Problem
-from fpsolve.output.records import Entries, Records, answered, key_of, made, plain
+from fpsolve.output.records import Records, answered, key_of, made, plain
 from fpsolve.output.tables import head, in_case_words
 from fpsolve.page.page import Block, Column, Drawing, Grid, Sentence
 from fpsolve.pool import SERIAL, Pool
@@ -233,15 +233,11 @@ def scans_of(keys: Mapping[str, Boundary], records: Records, pool: Pool) -> Iter
         row: key_of(key, line.scan_rtol, row.count, row.number) for key, line in keys.items() for row in line.rows()
     }
 
-    def read(record: Entries, _: Row) -> Scan | None:
-        found: Scan | None = made(Scan | None, record.get("scan"))
-        return found
+    def keeps(scan: Scan) -> bool:
+        return not any(map(may_pass, scan.reasons))
 
-    def entries(scan: Scan) -> Entries:
-        return {} if any(map(may_pass, scan.reasons)) else {"scan": plain(Scan | None, replace(scan, seconds=0.0))}
-
-    found = answered(records, pool, scan_row, rows, key=rows.__getitem__, read=read, entries=entries)
-    return (scan for _, scan, _ in found)
+    found = answered(records, pool, scan_row, rows, kind=Scan, key=rows.__getitem__, keeps=keeps)
+    return (replace(scan, seconds=0.0) if is_known else scan for _, scan, is_known in found)
 
 
 def write_chart(case: Case, chart: Chart, folder: Path) -> None:

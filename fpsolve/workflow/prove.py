@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from decimal import ROUND_CEILING, ROUND_FLOOR, Decimal
 from functools import partial
 from itertools import zip_longest
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Annotated, Any, TypeAlias
 
-from pydantic import TypeAdapter
+from pydantic import AfterValidator
 
 from fpsolve import __version__
 from fpsolve.analysis.target import said
@@ -21,7 +21,7 @@ from fpsolve.errors import FpsolveError, NoSuchExponent
 from fpsolve.exponent.quantities import LYAPUNOV_EXPONENT, STABILITY_INDEX
 from fpsolve.files import writable, write_text
 from fpsolve.messages import Code, Message
-from fpsolve.output.records import Entries, Records, answered, key_of
+from fpsolve.output.records import Records, answered, key_of
 from fpsolve.page.limits import EACH, PROOFS, ROWS
 from fpsolve.page.page import Block, Column, Grid, Sentence
 from fpsolve.pool import SERIAL, Pool
@@ -56,8 +56,6 @@ FATES = {1: "grows", -1: "decays", 0: "open"}
 """The fate of a path or a moment by the sign of its exponent."""
 PROVEN_RECORDS = "records/proven.jsonl"
 """The file of the records of bounds."""
-ENCLOSURES = TypeAdapter(Enclosure)
-"""The form of bounds in a record."""
 _WORDS = Words("the proof", "a proof", "proof.json", "JSON", "make one with `fpsolve prove`")
 """The words of messages on a proof.json."""
 
@@ -268,19 +266,23 @@ def bounds_text(found: Enclosure | IndexEnclosure) -> tuple[str, str]:
     return low, high
 
 
-def record_of(found: Answer) -> Entries:
-    """The record of bounds on Λ(p) or λ; none of those on δ_p, which follow from these."""
-    return {"enclosure": ENCLOSURES.dump_python(found)} if isinstance(found, Enclosure) else {}
+def verified(found: Enclosure) -> Enclosure:
+    """The bounds of an earlier run. Raises `ValueError` where they do not follow from their certificate."""
+    whole = NOTHING if found.certificate is None else enclosure_of(found.certificate)
+    if (whole.lower, whole.upper) != (found.lower, found.upper):
+        raise ValueError("these are other bounds")
+    if found.certificate and (text := objection(found.certificate)):
+        raise ValueError(text)
+    return found
 
 
-def verified(record: Entries, _: Question) -> Enclosure | None:
-    """The bounds that an earlier run has proven, if they follow from their certificate. Raises `ValueError`."""
-    found = ENCLOSURES.validate_python(record.get("enclosure"))
-    if found.certificate is None:
-        return found if found == replace(NOTHING, wanted=found.wanted) else None
-    whole = enclosure_of(found.certificate)
-    is_same = (whole.lower, whole.upper) == (found.lower, found.upper)
-    return found if is_same and not objection(found.certificate) else None
+PROVEN_BOUNDS = Annotated[Enclosure, AfterValidator(verified)]
+"""The form of bounds in a record."""
+
+
+def is_kept(found: Answer) -> bool:
+    """Whether bounds are recorded: those on Λ(p) and λ, from which those on δ_p follow."""
+    return isinstance(found, Enclosure)
 
 
 def _key(question: Question) -> str:
@@ -339,8 +341,8 @@ def prove_case(
         pool,
         shown_at_the_end(finish),
     ):
-        records, kept_as = Records(folder / PROVEN_RECORDS), dict[str, Any](read=verified, entries=record_of)
-        for _, found, is_known in answered(records, pool, answer, questions(case, width), key=_key, **kept_as):
+        records, how = Records(folder / PROVEN_RECORDS), dict[str, Any](kind=PROVEN_BOUNDS, key=_key, keeps=is_kept)
+        for _, found, is_known in answered(records, pool, answer, questions(case, width), **how):
             answers.append(found)
             progress(failed=not found.is_proven, known=is_known)
     return proofs

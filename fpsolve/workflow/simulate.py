@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, field, replace
 from datetime import UTC, datetime
 from functools import partial
 from itertools import chain
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, MOMENT
 from fpsolve.files import writable, write_csv, write_json
 from fpsolve.messages import Code, Message
 from fpsolve.model.quantity import OF_STOPS
-from fpsolve.output.records import Records, answered, key_of, made, plain
+from fpsolve.output.records import Records, answered, key_of
 from fpsolve.output.tables import head, in_case_words, parameters_of
 from fpsolve.page.limits import EACH, PICTURES
 from fpsolve.page.page import Block, Column, Drawing, Grid, Sentence, filled
@@ -37,6 +37,11 @@ from fpsolve.workflow.folders import AGAIN, SIMULATED, kept, of_curves, own_fold
 from fpsolve.workflow.progress import PERCENT, SILENT, Phase, Watch
 from fpsolve.workflow.reports import write_report
 
+if TYPE_CHECKING:
+    from fpsolve.simulation import MonteCarlo, Response
+
+Simulation: TypeAlias = "tuple[MonteCarlo, Response | None, tuple[Message, ...], bool]"
+"""What a simulation finds, see `SimulatedCurve`."""
 RECORDS = "records/simulated.jsonl"
 """The file of the records of simulations."""
 SIMULATION = ("monte_carlo.json",)
@@ -49,13 +54,8 @@ COMPARED = Column("finite elements", 2), Column("s.e. away", 1)
 """The columns of what finite elements have found."""
 
 
-def simulation_work(case: Case) -> int:
-    """How often the simulation of a case reports progress."""
-    return sum(map(simulation_steps, case.curves()))
-
-
 def simulation_steps(curve: Curve) -> int:
-    """How often the simulation of a curve does."""
+    """How often the simulation of a curve reports progress."""
     return PROGRESS_STEPS * (3 if curve.problem.system.cubic else 1)
 
 
@@ -78,15 +78,22 @@ def refuse_obstacles(case: Case) -> None:
 
 
 def simulate_curve(
-    curve: Curve, orders: Sequence[float], setting: MonteCarloSection, progress: Callable[[], None] = lambda: None
+    curve: Curve, orders: Sequence[float], setting: MonteCarloSection, progress: Callable[[], None] = idle
 ) -> SimulatedCurve:
+    """Simulate one curve, see `simulation_of`."""
+    return SimulatedCurve(curve, *simulation_of(curve, orders, setting, progress))
+
+
+def simulation_of(
+    curve: Curve, orders: Sequence[float], setting: MonteCarloSection, progress: Callable[[], None]
+) -> Simulation:
     """Simulate one curve, and with terms of degree 3 its stationary response; a task that pickles small.
 
     Args:
         curve: the parameters.
         orders: p of the moments.
         setting: [monte_carlo] of the case, whose p are not used.
-        progress: called as often as `simulation_work` counts; a task for another process has none.
+        progress: called as often as `simulation_steps` says; a task for another process has none.
 
     Raises:
         KeyboardInterrupt: nothing was done yet.
@@ -98,47 +105,36 @@ def simulate_curve(
         curve.problem, orders, estimator=setting.estimator,
         paths=setting.paths, time=setting.time, step=setting.step, seed=setting.seed, progress=progress,
     )  # fmt: skip
-    found = SimulatedCurve(curve, result, None, result.warnings, result.interrupted)
     if not curve.problem.system.cubic or result.interrupted:
-        return found
+        return result, None, result.warnings, result.interrupted
     from fpsolve.simulation.response import no_simulation, simulated_response
 
-    def telling(message: Message, **more: Any) -> SimulatedCurve:
-        return replace(found, warnings=(*result.warnings, message), **more)
+    def telling(message: Message, response: Response | None = None, *, interrupted: bool = True) -> Simulation:
+        return result, response, (*result.warnings, message), interrupted
 
     value, error = result.lyapunov_exponent, result.lyapunov_exponent_error
     at_rest = Message(Code.AT_REST, value=value, error=error, most=SIGNIFICANT if value > 0 else None)
     if reason := at_rest if value <= SIGNIFICANT * error else no_simulation(curve.problem):
         for _ in range(2 * PROGRESS_STEPS):
             progress()
-        return telling(reason)
+        return telling(reason, interrupted=False)
     try:
         response = simulated_response(
             curve.problem, value, result.variance_rate, paths=max(result.paths // 8, 32),
             time=result.time, step=result.step, seed=result.seed, progress=progress,
         )  # fmt: skip
     except KeyboardInterrupt:
-        return telling(Message(Code.RESPONSE_NOT_REACHED), interrupted=True)
+        return telling(Message(Code.RESPONSE_NOT_REACHED))
     if response.interrupted:
-        return telling(Message(Code.RESPONSE_STOPPED, time=response.time), response=response, interrupted=True)
-    return replace(found, response=response)
+        return telling(Message(Code.RESPONSE_STOPPED, time=response.time), response)
+    return result, response, result.warnings, False
 
 
-def simulated_of(record: Mapping[str, Any], curve: Curve) -> SimulatedCurve:
-    """The simulation of a curve from its record. Raises `ValueError` where that has another form."""
-    return SimulatedCurve(curve, *made(_form(), record.get("simulation")))
-
-
-def record_of(found: SimulatedCurve) -> dict[str, Any]:
-    """The record of a simulation; nothing of one that is not finished."""
-    return {} if found.interrupted else {"simulation": plain(_form(), (found.result, found.response, found.warnings))}
-
-
-def _form() -> Any:
-    """The form of a simulation in its record."""
+def form_of_record() -> Any:
+    """The form of a simulation in its record, see `SimulatedCurve`."""
     from fpsolve.simulation import MonteCarlo, Response
 
-    return tuple[MonteCarlo, Response | None, tuple[Message, ...]]
+    return tuple[MonteCarlo, Response | None, tuple[Message, ...], bool]
 
 
 def simulation_key(curve: Curve, orders: Sequence[float], setting: MonteCarloSection) -> str:
@@ -146,45 +142,48 @@ def simulation_key(curve: Curve, orders: Sequence[float], setting: MonteCarloSec
     return key_of(curve.digest, list(orders), setting.model_dump(mode="json"))
 
 
+@dataclass(eq=False)
 class Simulations:
     """The simulations of the curves of a case, of which an earlier run may have kept some.
 
-    Args:
-        case: whose curves these are.
-        folder: where they are written and kept.
-        is_fresh: whether to do all of them again.
-
     Attributes:
+        case: whose curves these are.
         simulated: what is done, in the order of the curves.
         interruption: where an interrupt ended the simulation, what is kept, and how to go on; empty without interrupt.
         known: how many an earlier run had finished.
     """
 
-    def __init__(self, case: Case, folder: Path, *, is_fresh: bool) -> None:
-        self.case, self.folder, self.records = case, folder, Records(folder / RECORDS, is_fresh=is_fresh)
-        self.simulated, self.interruption, self.known = list[SimulatedCurve](), "", 0
+    case: Case
+    simulated: list[SimulatedCurve] = field(default_factory=list)
+    interruption: str = ""
+    known: int = 0
 
-    def run(self, watch: Watch, pool: Pool | None = None, results: Sequence[CurveResult] = ()) -> str:
-        """Simulate the curves, write what is found of each, and show it; the `interruption`.
+    def run(
+        self, folder: Path, pool: Pool, watch: Watch, results: Sequence[CurveResult] = (), *, is_fresh: bool
+    ) -> None:
+        """Simulate the curves, write what is found of each, and show it.
 
         Args:
-            pool: who simulates; None for all processors of this machine.
+            folder: where they are written and kept.
+            pool: whose other machines simulate; all processors of this one where there are none.
             results: what is solved of the same curves.
+            is_fresh: whether to do all of them again.
         """
-        case = self.case
+        case, is_elsewhere = self.case, pool.is_elsewhere
         asked: dict[str, Any] = {"orders": case.simulated.tolist(), "setting": case.monte_carlo}
-        kept: dict[str, Any] = {"key": partial(simulation_key, **asked), "read": simulated_of, "entries": record_of}
-        work = Phase(case.name, "simulation", simulation_work(case), PERCENT)
-        with watch.bar(work) as progress, writable(self.folder), pool or SERIAL as workers:
-            task = partial(simulate_curve, **asked, progress=idle if pool else progress)
+        how: dict[str, Any] = {"kind": form_of_record(), "key": partial(simulation_key, **asked), "keeps": is_finished}
+        work = Phase(case.name, "simulation", sum(map(simulation_steps, case.curves())), PERCENT)
+        with watch.bar(work) as progress, writable(folder), pool if is_elsewhere else SERIAL as workers:
+            records = Records(folder / RECORDS, is_fresh=is_fresh)
+            task = partial(simulation_of, **asked, progress=idle if is_elsewhere else progress)
             try:
-                for curve, each, is_known in answered(self.records, workers, task, case.curves(), **kept):
-                    if pool or is_known:
+                for curve, found, is_known in answered(records, workers, task, case.curves(), **how):
+                    if is_elsewhere or is_known:
                         progress(simulation_steps(curve), known=is_known)
                     self.known += is_known
-                    self.simulated.append(each)
-                    write_simulation(case, each, self.folder)
-                    if each.interrupted:
+                    self.simulated.append(SimulatedCurve(curve, *found))
+                    write_simulation(case, self.simulated[-1], folder)
+                    if not is_finished(found):
                         break
             except KeyboardInterrupt:
                 if not self.simulated:
@@ -192,10 +191,15 @@ class Simulations:
         whole = len(self.simulated) - self.simulated[-1].interrupted
         if whole < case.planned:
             place = f"in the simulation of curve {whole + 1} of {case.planned}"
-            self.interruption = f"interrupted {place}; what was done is kept in {self.folder}; {AGAIN}"
+            self.interruption = f"interrupted {place}; what was done is kept in {folder}; {AGAIN}"
         watch.shown(show(case, self.simulated, results))
         watch.noted(notes(case, self.simulated, MONTE_CARLO))
-        return self.interruption
+
+
+def is_finished(found: Simulation) -> bool:
+    """Whether a simulation was not stopped early, so that it is recorded."""
+    *_, interrupted = found
+    return not interrupted
 
 
 def write_simulation(case: Case, simulated: SimulatedCurve, folder: Path) -> None:
@@ -343,7 +347,7 @@ def simulate_case(
     case: Case,
     out: str | Path = "results",
     *,
-    pool: Pool | None = None,
+    pool: Pool = SERIAL,
     is_fresh: bool = False,
     watch: Watch = SILENT,
 ) -> Simulations:
@@ -354,7 +358,7 @@ def simulate_case(
     and written, and curves that are finished are not simulated again the next time.
 
     Args:
-        pool: who simulates, such as a `cluster`; None for all processors of this machine.
+        pool: whose other machines simulate, such as a `cluster`; all processors of this one where there are none.
         is_fresh: whether to simulate all curves again.
 
     Raises:
@@ -363,15 +367,13 @@ def simulate_case(
         KeyboardInterrupt: nothing was done yet, which its text says.
     """
     refuse_obstacles(case)
-    simulations: Simulations | None = None
-    started = datetime.now(UTC)
+    simulations, started = Simulations(case), datetime.now(UTC)
     with (
         own_folder(case, out, (SIMULATED,)) as folder,
-        saying_if_interrupted(lambda: kept(len(simulations.simulated) if simulations else 0, of_curves(case), folder)),
+        saying_if_interrupted(lambda: kept(len(simulations.simulated), of_curves(case), folder)),
     ):
-        simulations = Simulations(case, folder, is_fresh=is_fresh)
-        interruption = simulations.run(watch, pool)
-        simulated = simulations.simulated
+        simulations.run(folder, pool, watch, is_fresh=is_fresh)
+        simulated, is_whole = simulations.simulated, not simulations.interruption
         blocks = chain(show(case, simulated), notes(case, simulated, MONTE_CARLO))
-        write_report(case, folder, watch, blocks, started=started, files=SIMULATION, complete=not interruption)
+        write_report(case, folder, watch, blocks, started=started, files=SIMULATION, complete=is_whole)
     return simulations

@@ -11,9 +11,8 @@ from fpsolve import ExponentSolver, load_case
 from fpsolve.errors import NotConverged
 from fpsolve.exponent import INDICES
 from fpsolve.messages import message_of
-from fpsolve.output.records import packed, unpacked
+from fpsolve.output.records import made, packed, plain, unpacked
 from fpsolve.parts import QUESTIONS, indices
-from fpsolve.results.curve import SimulatedCurve
 from fpsolve.simulation.estimators import MomentEstimate, MonteCarlo
 from fpsolve.simulation.response import Response
 from fpsolve.study import columns, solve
@@ -84,37 +83,34 @@ def read_again(record):
 
 
 def test_a_simulation_comes_back_from_its_record_to_the_last_bit(rng):
-    curve = next(load_case(MINIMAL).curves())
     density = rng.normal(size=(3, 6)) * 10.0 ** rng.integers(-300, 300, size=(3, 6))
     density[0, :4] = math.nan, math.inf, -math.inf, -0.0
     edges = np.arange(4.0), np.linspace(-1, 1, 7), density, np.zeros(0), rng.normal(size=3), np.full(3, 5e-324)
     more = {"outside": 1e-17, "impact_rate": math.inf, "time": 2.5, "interrupted": True}
     response = Response({"x": (1.0, math.nan), "energy": (0.1, 0.2)}, *edges, **more)
+    form = simulate.form_of_record()
     for found in (response, None):
-        simulated = SimulatedCurve(curve, RESULT, found, RESULT.warnings)
-        again = simulate.simulated_of(read_again(simulate.record_of(simulated)), curve)
-        for name in ("result", "response", "warnings", "interrupted"):
-            assert bits(getattr(again, name)) == bits(getattr(simulated, name)), name
+        simulated = RESULT, found, RESULT.warnings, False
+        assert bits(made(form, read_again(plain(form, simulated)))) == bits(simulated)
     numpy = replace(RESULT, time=np.float64(0.3), paths=np.int64(64))
-    record = read_again(simulate.record_of(SimulatedCurve(curve, numpy, None, ())))
-    assert bits(simulate.simulated_of(record, curve).result) == bits(replace(RESULT, time=0.3))
-    row, *rest = record["simulation"]
+    row, *rest = record = read_again(plain(form, (numpy, None, (), False)))
+    assert bits(made(form, record)) == bits((replace(RESULT, time=0.3), None, (), False))
     wrong = [[each, *rest] for each in ({}, {**row, "more": 0}, {**row, "paths": [{}]})]
-    wrong += [None, [], *([row, None, each] for each in ("a text", [1]))]
+    wrong += [None, [], *([row, None, each, False] for each in ("a text", [1]))]
     for each in wrong:
         with pytest.raises(ValueError, match=r"validation errors? for "):
-            simulate.simulated_of({"simulation": each}, curve)
+            made(form, each)
 
 
 def test_a_simulation_that_fails_keeps_the_curves_before_it(tmp_path, monkeypatch):
-    original = simulate.simulate_curve
+    original = simulate.simulation_of
 
     def failing(curve, **asked):
         if curve.number == 2:
             raise NotConverged("the simulation overflowed")
         return original(curve, **asked)
 
-    monkeypatch.setattr(simulate, "simulate_curve", failing)
+    monkeypatch.setattr(simulate, "simulation_of", failing)
     text = "[moments]\np = [1.0]\n[output]\nquantities = ['moment']\n[monte_carlo]\npaths = 32\ntime = 40.0\n"
     case = case_in(tmp_path, case_text(f'{text}[vary]\n"noise.D0" = [0.1, 0.2]', epsilon=0.5))
     with pytest.raises(NotConverged, match="the simulation overflowed"):
