@@ -46,9 +46,11 @@ from fpsolve.case.sections import (
     OutputSection,
     ResponseSection,
     Text,
+    UncertainSection,
     UnitsSection,
     Value,
     Varied,
+    VarySection,
     as_kind,
 )
 from fpsolve.case.toml import Place, dotted, read_document
@@ -163,11 +165,6 @@ class Curve:
         held = {key: value for key, value in self.parameters.items() if key not in left}
         return [known[key].quantity.timed(time_unit).stated(value) for key, value in held.items()]
 
-    @property
-    def theory_reduces_noise(self) -> bool:
-        """Whether perturbation theory takes the reduction in place of its noise, as for Eq. (7) as it stands."""
-        return self.noise.approximates_spectrum
-
 
 class Case(Section):
     """What one case file says; made by `load_case`.
@@ -198,7 +195,9 @@ class Case(Section):
         parameter("the limits of the cost of a parameter set", "[budget]"),
     ] = Budget()
     vary: Annotated[
-        InstanceOf[Vary], BeforeValidator(vary_of), parameter("the parameter sets, with a curve for each", EXAMPLE)
+        InstanceOf[Vary],
+        BeforeValidator(vary_of, json_schema_input_type=VarySection),
+        parameter("the parameter sets, with a curve for each", EXAMPLE),
     ] = Vary()
     mesh: Annotated[MeshSection, parameter("a mesh, instead of one that is chosen", "[mesh]")] = MeshSection()
     monte_carlo: Annotated[MonteCarloSection, parameter("how the system is simulated", "[monte_carlo]")] = (
@@ -209,7 +208,9 @@ class Case(Section):
     output: Annotated[OutputSection, parameter("what is written", "[output]")] = OutputSection()
     chart: Annotated[ChartSection | None, parameter("the lines of a chart, on which stability ends", "[chart]")] = None
     uncertain: Annotated[
-        InstanceOf[Uncertain], BeforeValidator(uncertain_of), parameter("how uncertain parameters are", UNCERTAIN)
+        InstanceOf[Uncertain],
+        BeforeValidator(uncertain_of, json_schema_input_type=UncertainSection),
+        parameter("how uncertain parameters are", UNCERTAIN),
     ] = Uncertain()
     expect: Annotated[tuple[Expectation, ...], parameter("values to check", "[[expect]]", strict=False)] = ()
     excursions: Annotated[
@@ -397,8 +398,9 @@ class Case(Section):
     def theory_reduces_noise(self) -> bool:
         """Whether perturbation theory takes the reduction in place of the noise of some curve."""
         texts = [key for key in self.vary.keys if self.vary.is_text(key)]
-        kinds = map(self.curve, self.vary.among(texts))
-        return any(each.is_possible and each.theory_reduces_noise for each in kinds)
+        words = {tuple(map(each.get, texts)) for each in self.vary.sets}
+        kinds = (self.curve(dict(zip(texts, each, strict=True))) for each in words)
+        return any(each.is_possible and each.noise.approximates_spectrum for each in kinds)
 
     def heading(self, curve: Curve) -> str:
         """The headline, with which of the curves."""

@@ -45,16 +45,16 @@ def half_of(half: Half, table: Any, info: ValidationInfo) -> Any:
         return table
     if half == "system":
         folder = (info.context or {}).get("folder", Path())
-        return _made(half, with_matrices(table, folder) if table.get("kind") == "modes" else table)
+        return made_of(half, with_matrices(table, folder) if table.get("kind") == "modes" else table)
     names, system = names_of(table), info.data.get("system")
     if system is not None:
         refuse(_misnamed(names, system.noise_sections))
     if not names:
-        return _made(half, table)
+        return made_of(half, table)
     made, faults = dict[str, Any](), list[InitErrorDetails]()
     for name in names:
         try:
-            made[name] = _made(half, table[name])
+            made[name] = made_of(half, table[name])
         except ValidationError as error:
             faults += details_of(error, name)
     refuse([], faults)
@@ -85,7 +85,8 @@ def _misnamed(names: list[str], sections: Sequence[str]) -> Iterator[Refusal]:
         yield (), None, f"lacks {' and '.join(missing)}; add a section for each, or leave it out of noises of [system]"
 
 
-def _made(half: Half, table: Mapping[str, Any]) -> Parametrised:
+def made_of(half: Half, table: Mapping[str, Any]) -> Parametrised:
+    """What a table describes. Raises `ValidationError` with all that is wrong with it."""
     known = {key: value for key, value in table.items() if key != "kind"}
     kind = _kind(half, table)
     foreign = {key for key in known if key not in fields_of(kind) and not kind.takes(key, known)}

@@ -12,13 +12,13 @@ from functools import reduce
 from operator import or_
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, create_model
+from pydantic import BaseModel, Discriminator, Field, Tag, create_model
 from pydantic.fields import FieldInfo
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 
 from fpsolve.case.case import Case
 from fpsolve.case.kinds import EQUATIONS, USUAL, Half
-from fpsolve.case.sections import NonEmpty, Sweep, Text
+from fpsolve.case.sections import OPEN
 from fpsolve.data import plain_unit
 from fpsolve.model.faults import fields_of
 from fpsolve.model.kinds import NOISES, SYSTEMS, noise_kind, system_kind
@@ -27,50 +27,13 @@ from fpsolve.model.parameters import STRICT, Parametrised
 SCHEMA = "fpsolve.schema.json"
 """What the file is called that case files name."""
 _DIALECT = "https://json-schema.org/draft/2020-12/schema"
-Column = NonEmpty | Annotated[list[str], Field(min_length=1)] | Sweep
-"""The values of a key of [vary]."""
-_OPEN = STRICT | ConfigDict(extra="allow")
 
 
 class NamedParameters(BaseModel):
     """A table with further keys for parameters, which are numbers."""
 
-    model_config = _OPEN
+    model_config = OPEN
     __pydantic_extra__: dict[str, float]
-
-
-class VarySection(BaseModel):
-    """One curve for each parameter set: the values of keys, with quotes and dots or in tables; or a file of sets."""
-
-    model_config = _OPEN
-    __pydantic_extra__: dict[str, Column | dict[str, Column | dict[str, Any]]]
-
-    mode: Annotated[
-        Literal["product", "zip"],
-        Field(description="product: all combinations, the last key fastest; zip: the n-th values of all keys together"),
-    ] = "product"
-    file: Annotated[Text, Field(description="a file of sets: a header that names the keys, and a row for each set")] = (
-        ""
-    )
-
-
-class StandardDeviation(BaseModel):
-    """{ sd }: a standard deviation in the unit of the parameter."""
-
-    model_config = STRICT
-
-    sd: Annotated[float, Field(gt=0, description="standard deviation")]
-
-
-Uncertain = Annotated[float, Field(gt=0)] | StandardDeviation
-"""How uncertain a parameter is: a share of its value, or a standard deviation."""
-
-
-class UncertainSection(BaseModel):
-    """How uncertain parameters are: by their keys, with quotes and dots or in tables."""
-
-    model_config = _OPEN
-    __pydantic_extra__: dict[str, Uncertain | dict[str, Uncertain | dict[str, Any]]]
 
 
 class _Generator(GenerateJsonSchema):
@@ -97,10 +60,6 @@ def schema() -> dict[str, Any]:
             fields["system"] = system, _described("the system, written as equations or of another kind", "[system]")
         elif name == "noise":
             fields[name] = noise | named, _described("the noise; or a table of noises by their names", "[noise]")
-        elif name == "vary":
-            fields[name] = VarySection, Field(None, description=field.description, examples=field.examples)
-        elif name == "uncertain":
-            fields[name] = UncertainSection, Field(None, description=field.description, examples=field.examples)
         else:
             fields[name] = field.annotation, field
     model: Any = create_model("Case", __config__=STRICT, **fields)

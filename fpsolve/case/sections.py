@@ -16,7 +16,9 @@ from typing import Annotated, Any, Literal, Self
 import numpy as np
 from pydantic import (
     AfterValidator,
+    BaseModel,
     BeforeValidator,
+    ConfigDict,
     Field,
     Tag,
     ValidatorFunctionWrapHandler,
@@ -47,7 +49,7 @@ from fpsolve.exponent.method import RTOL, RTOL_BEYOND_PLANE, RTOL_OF_SEVERAL, RT
 from fpsolve.exponent.quantities import INDICES, MOMENT, QUANTITIES, DrawnName, QuantityName
 from fpsolve.fem.mesh import MAX_CELLS, MAX_DEGREE, CylinderMesh, make_mesh, read_mesh
 from fpsolve.messages import is_control
-from fpsolve.model.parameters import Section, parameter
+from fpsolve.model.parameters import STRICT, Section, parameter
 from fpsolve.model.quantity import DERIVATIVE, RATE_FUNCTION, Quantity, moment_at
 from fpsolve.simulation.setup import BATCHES, MAX_PATHS, PATHS, Estimator
 
@@ -233,6 +235,45 @@ class Moments(Section):
             text = f"{close[0]} stands twice; p must differ by more than {SAME:g}; remove one of them"
             refuse([(("p",), self.p, text)])
         return self
+
+
+_Column = NonEmpty | Annotated[list[str], Field(min_length=1)] | Sweep
+"""The values of a key of [vary]."""
+OPEN = STRICT | ConfigDict(extra="allow")
+
+
+class VarySection(BaseModel):
+    """One curve for each parameter set: the values of keys, with quotes and dots or in tables; or a file of sets."""
+
+    model_config = OPEN
+    __pydantic_extra__: dict[str, _Column | dict[str, _Column | dict[str, Any]]]
+
+    mode: Annotated[
+        Literal["product", "zip"],
+        Field(description="product: all combinations, the last key fastest; zip: the n-th values of all keys together"),
+    ] = "product"
+    file: Annotated[Text, Field(description="a file of sets: a header that names the keys, and a row for each set")] = (
+        ""
+    )
+
+
+class StandardDeviation(BaseModel):
+    """{ sd }: a standard deviation in the unit of the parameter."""
+
+    model_config = STRICT
+
+    sd: Annotated[float, Field(gt=0, description="standard deviation")]
+
+
+_Deviation = Annotated[float, Field(gt=0)] | StandardDeviation
+"""How uncertain a parameter is: a share of its value, or a standard deviation."""
+
+
+class UncertainSection(BaseModel):
+    """How uncertain parameters are: by their keys, with quotes and dots or in tables."""
+
+    model_config = OPEN
+    __pydantic_extra__: dict[str, _Deviation | dict[str, _Deviation | dict[str, Any]]]
 
 
 class MeshSection(Section):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import product
@@ -59,16 +59,9 @@ class Vary:
     @cached_property
     def sets(self) -> tuple[dict[str, Value], ...]:
         """The varied values of each set."""
-        return tuple(self._sets_of(self.columns))
-
-    def among(self, keys: Collection[str]) -> list[dict[str, Value]]:
-        """The distinct sets of some of the keys."""
-        found = self._sets_of({key: values for key, values in self.columns.items() if key in keys})
-        return list({tuple(each.values()): each for each in found}.values())
-
-    def _sets_of(self, columns: Mapping[str, Column]) -> Iterator[dict[str, Value]]:
-        rows = zip(*columns.values(), strict=True) if columns and self.mode == "zip" else product(*columns.values())
-        return (dict(zip(columns, row, strict=True)) for row in rows)
+        columns = self.columns.values()
+        rows = zip(*columns, strict=True) if columns and self.mode == "zip" else product(*columns)
+        return tuple(dict(zip(self.columns, row, strict=True)) for row in rows)
 
     def line_of(self, number: int) -> str:
         """The line of its file on which the set of a curve stands, as "sets.csv:12: "; empty where there is no file."""

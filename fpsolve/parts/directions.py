@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -25,10 +25,6 @@ from fpsolve.parts.eigenfunctions import question_of_pictures, without_failed
 from fpsolve.parts.nodes import FIELDS
 from fpsolve.parts.question import Job, Question, Reason, Settings, attempt
 from fpsolve.vtk import Facts, field_data, write_between, write_series
-
-if TYPE_CHECKING:
-    pass
-
 
 ROUGH = 0.05
 """Total variation by which finer functions may move a density that a picture shows."""

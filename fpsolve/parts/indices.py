@@ -8,7 +8,7 @@ from typing import Any
 from fpsolve.case.case import Case, Curve
 from fpsolve.data import Quantity
 from fpsolve.errors import NoSuchExponent
-from fpsolve.exponent.error import Absent, Estimate
+from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.quantities import (
     INDICES,
     MOMENT,
@@ -18,15 +18,6 @@ from fpsolve.exponent.quantities import (
 from fpsolve.messages import Code, Message
 from fpsolve.parts.question import Job, Numerics, Question, Reason, Settings
 from fpsolve.results.curve import CurveResult
-
-
-def index_of(found: Estimate | Absent, name: str, symbol: str) -> Estimate | Reason:
-    """An index, or why there is none; of δ_p that is a limit, as Λ(p) may have a root far out."""
-    if found:
-        return found
-    if name == STABILITY_INDEX.name:
-        return Reason("impossible", found.reason, "stability index")
-    return Reason("absent", found.reason, symbol)
 
 
 def question_of(index: Index) -> Question:
@@ -42,7 +33,11 @@ def question_of(index: Index) -> Question:
             found = index.solve(job.solver, moments.root if moments else None)
         except NoSuchExponent as failure:
             return Reason("impossible", failure.message, index.symbol)
-        return index_of(found, index.name, index.symbol)
+        if found:
+            return found
+        if index.name == STABILITY_INDEX.name:  # Λ(p) may have a root far out
+            return Reason("impossible", found.reason, "stability index")
+        return Reason("absent", found.reason, index.symbol)
 
     def said(found: Estimate, curve: Curve, numerics: Numerics) -> Iterator[Message]:
         if found.relative_error > numerics.rtol:

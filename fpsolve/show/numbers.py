@@ -136,7 +136,8 @@ STAR = "* for the noise reduced by Eqs. (12)-(14)"
 
 def moment_grid(case: Case, result: CurveResult) -> Grid:
     """Λ(p) at each p, with its error, its interval, and perturbation theory."""
-    found, spreads, is_reduced = result.moments, spreads_of(case, result).moments, result.curve.theory_reduces_noise
+    found, spreads = result.moments, spreads_of(case, result).moments
+    is_reduced = result.curve.noise.approximates_spectrum
     has_theory = any(map(math.isfinite, found.perturbation))
     columns = [Column("p"), Column(MOMENT.symbol), Column("± error")]
     columns += [Column(INTERVAL), Column("P(Λ < 0)")] * bool(spreads)

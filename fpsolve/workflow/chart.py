@@ -43,7 +43,7 @@ from fpsolve.workflow.reports import shown_at_the_end, write_report
 
 LINE_RECORDS = "records/charted.jsonl"
 """The file of the records of points of lines."""
-POINT = tuple[Sample | None, Message | None]
+POINT = Sample | Message
 """What is recorded of a point: F, or why there is none."""
 FILES = "chart.csv", "chart.json"
 """The files with all numbers of a chart."""
@@ -208,15 +208,14 @@ def recalled(records: Records, key: str, line: Boundary) -> Boundary:
     known = dict[str, Sample | Message]()
     for name, each in records.get(key).items():
         with suppress(ValueError):  # which counts as none
-            sample, reason = made(POINT, each)
-            known[name] = sample or reason
+            known[name] = made(POINT, each)
 
     def recall(at: FloatArray, solve: Solve) -> Sample | Message:
         name = str(at.tolist())
         if name not in known:
             known[name] = found = solve(at)
             if not (isinstance(found, Message) and may_pass(found)):
-                records.put(key, {name: plain(POINT, (None, found) if isinstance(found, Message) else (found, None))})
+                records.put(key, {name: plain(POINT, found)})
         return known[name]
 
     return replace(line, recall=recall)

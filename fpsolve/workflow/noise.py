@@ -16,6 +16,7 @@ from fpsolve import __version__
 from fpsolve.analysis.spreads import LEVEL, Spread
 from fpsolve.arrays import FloatArray, one
 from fpsolve.case.case import Case
+from fpsolve.case.kinds import made_of
 from fpsolve.case.remedies import CASE_WORDS
 from fpsolve.case.rewrite import rewritten
 from fpsolve.drawing import COLOURS, figure_for, label_axes, plain_numbers
@@ -44,9 +45,8 @@ from fpsolve.measured.spectrum import SIDES, UNITS
 from fpsolve.measured.stability import STEPS
 from fpsolve.measured.weak import Where
 from fpsolve.messages import Code, Message
-from fpsolve.model import Noise, ParametricOscillator, PlaneSystem, Problem, VibroImpactOscillator
+from fpsolve.model import Noise, Problem
 from fpsolve.model.plane import System
-from fpsolve.model.systems.vibro_impact import ImpactLaw
 from fpsolve.page.page import Block, Column, Grid, Sentence
 from fpsolve.results.text import likely, sampled
 from fpsolve.show.notes import note_on
@@ -234,30 +234,36 @@ def _factor(wanted: Wanted) -> float:
 
 
 def _system(wanted: Wanted, terms: int) -> System | None:
-    """The system of the case, or an oscillator with the damping and the wall that are stated; None without either."""
+    """The system of the case, or the oscillator that is stated; None without either."""
     if wanted.case:
         return wanted.case.system
+    _, table = _oscillator(wanted, terms)
+    system: Any = made_of("system", table) if table else None
+    return system
+
+
+def _oscillator(wanted: Wanted, terms: int) -> tuple[str, dict[str, Any]]:
+    """The section and the table of an oscillator with the damping and the wall that are stated; nothing without these.
+
+    Under the sum of two noises it is an equation.
+    """
     omega, zeta, r = wanted.modes.omega[0], wanted.modes.zeta, wanted.modes.restitution
     if math.isnan(zeta) or len(wanted.modes.omega) > 1:
-        return None
+        return "", {}
     if terms > 1:
-        return PlaneSystem.of_equations(**_sum(wanted.modes, wanted.noise_in))
+        total = " + ".join(NAMES)
+        force = f"+ ({total}) * v" if wanted.noise_in == "damping" else f"- ({total}) * x"
+        return "system", {
+            "variables": ["x", "v"],
+            "drift": ["v", f"-omega**2 * x - 2*zeta*omega * v {force}"],
+            "parameters": {"omega": omega, "zeta": zeta},
+            "noises": {name: f"noise.{name}" for name in NAMES},
+            "walls": [] if r is None else [{"at": "x = 0", "restitution": r}],
+        }
+    wall = {"restitution": r or 1.0}
     if wanted.noise_in == "stiffness":
-        return ParametricOscillator(stiffness=omega**2, damping=zeta * omega, restitution=r or 1.0)
-    return VibroImpactOscillator(omega, r or 1.0, -2 * zeta * omega, 1.0, impact=ImpactLaw.RESTITUTION)
-
-
-def _sum(modes: Modes, noise_in: Where) -> dict[str, Any]:
-    """The equation of one mode under the sum of two noises."""
-    force = f"+ ({' + '.join(NAMES)}) * v" if noise_in == "damping" else f"- ({' + '.join(NAMES)}) * x"
-    wall = [] if modes.restitution is None else [{"at": "x = 0", "restitution": modes.restitution}]
-    return {
-        "variables": ["x", "v"],
-        "drift": ["v", f"-omega**2 * x - 2*zeta*omega * v {force}"],
-        "parameters": {"omega": modes.omega[0], "zeta": modes.zeta},
-        "noises": {name: f"noise.{name}" for name in NAMES},
-        "walls": wall,
-    }
+        return "system", {"kind": "parametric", "stiffness": omega**2, "damping": zeta * omega, **wall}
+    return "oscillator", {"omega": omega, "c1": -2 * zeta * omega, "impact": "restitution", "epsilon": 1.0, **wall}
 
 
 def _critical(fit: NoiseFit, wanted: Wanted) -> dict[str, Any]:
@@ -276,28 +282,17 @@ def _critical(fit: NoiseFit, wanted: Wanted) -> dict[str, Any]:
     return {"exponent": Critical(*exponent), "moment": Critical(*moment)}
 
 
-def slopes_of(fit: NoiseFit, numbers: Any) -> FloatArray:
-    """∂/∂θ of numbers of a fit, shape (k, n), by central differences.
-
-    Args:
-        fit: at whose parameters θ.
-        numbers: takes a fit and gives an array of shape (n,).
-    """
-    rows = []
-    for key, value in fit.parameters.items():
-        h = 1e-5 * value
-        up, down = (numbers(fit.at({key: value + step})) for step in (h, -h))
-        rows.append((up - down) / (2 * h))
-    return np.array(rows)
-
-
 def density_of(fit: NoiseFit, omega: Sequence[float]) -> tuple[FloatArray, FloatArray]:
-    """S(ω) of a fit at several ω, and its standard errors to first order."""
+    """S(ω) of a fit at several ω, and its standard errors to first order, by central differences."""
 
     def densities(each: NoiseFit) -> FloatArray:
         return np.array([each.spectral_density(w) for w in omega])
 
-    slopes = slopes_of(fit, densities)
+    slopes = list[FloatArray]()
+    for key, value in fit.parameters.items():
+        h = 1e-5 * value
+        up, down = (densities(fit.at({key: value + step})) for step in (h, -h))
+        slopes.append((up - down) / (2 * h))
     return densities(fit), np.sqrt(np.maximum(np.einsum("ki,kl,li->i", slopes, fit.covariance, slopes), 0.0))
 
 
@@ -395,18 +390,9 @@ def case_of(outcome: NoiseOutcome, folder: Path) -> str:
     omega, zeta = wanted.modes.omega[0], wanted.modes.zeta
     if wanted.case:
         return rewritten(wanted.case, folder, without=["noise", "expect"], more=sections)
-    count = len(outcome.fit.parts)
-    if math.isnan(zeta) or len(wanted.modes.omega) > 1:
+    section, table = _oscillator(wanted, len(outcome.fit.parts))
+    if not table:
         return ""
-    if count > 1:
-        section, table = "system", _sum(wanted.modes, wanted.noise_in)
-    elif wanted.noise_in == "stiffness":
-        section, table = "system", {"kind": "parametric", "stiffness": omega**2, "damping": zeta * omega}
-    else:
-        section = "oscillator"
-        table = {"omega": omega, "c1": -2 * zeta * omega, "impact": "restitution", "epsilon": 1.0}
-    if count == 1:
-        table["restitution"] = wanted.modes.restitution or 1.0
     hertz = f"{omega / (2 * math.pi):.4g} Hz, {zeta:.4g} of critical damping"
     data = {
         "title": f"Oscillator with noise in its {wanted.noise_in}: {hertz}",
