@@ -48,7 +48,6 @@ from fpsolve.case.sections import (
     Text,
     UncertainSection,
     UnitsSection,
-    Value,
     Varied,
     VarySection,
     as_kind,
@@ -137,11 +136,6 @@ class Curve:
     def digest(self) -> str:
         """What tells it from all parameter sets of all cases, in 64 letters; its problem is not made for that."""
         return sha256(f"{self.base!r} with {sorted(self.parameters.items())}".encode()).hexdigest()
-
-    @property
-    def key(self) -> tuple[tuple[str, Value], ...]:
-        """What tells it from the other curves of its case."""
-        return tuple(self.varied.items())
 
     @property
     def label(self) -> str:
@@ -398,7 +392,7 @@ class Case(Section):
     def theory_reduces_noise(self) -> bool:
         """Whether perturbation theory takes the reduction in place of the noise of some curve."""
         texts = [key for key in self.vary.keys if self.vary.is_text(key)]
-        words = {tuple(map(each.get, texts)) for each in self.vary.sets}
+        words = {tuple(map(each.__getitem__, texts)) for each in self.vary.sets}
         kinds = (self.curve(dict(zip(texts, each, strict=True))) for each in words)
         return any(each.is_possible and each.noise.approximates_spectrum for each in kinds)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Annotated, Any
+from typing import Annotated
 
 from cyclopts import Parameter
 
@@ -56,19 +56,19 @@ def run(
     pool = options.pool(loaded)
     for case in loaded:
         watch = replace(options.watch(is_json=json), is_whole=table)
-        how: dict[str, Any] = {"monte_carlo": monte_carlo, "is_fresh": fresh}
-        outcome = run_case(case, options.out, pool=pool, watch=watch, **how)
-        if outcome.interruption:
-            print_error(outcome.interruption)
-        if not (options.quiet or outcome.interruption):
+        outcome = run_case(case, options.out, pool=pool, watch=watch, monte_carlo=monte_carlo, is_fresh=fresh)
+        sweep, interruption = outcome.sweep, outcome.simulations.interruption
+        if interruption:
+            print_error(interruption)
+        if not (options.quiet or interruption):
             print_blocks(left_out(case, monte_carlo=monte_carlo))
         if json:
-            print(whole_summary(case, outcome.results, outcome.facts))
+            print(whole_summary(case, sweep.results, sweep.facts))
         else:
-            what = done_of(case, len(outcome.results), outcome.failed)
-            options.print_written(case, what, outcome.facts["wall_seconds"], known_of(case, outcome.known))
-        if outcome.interruption:
+            what = done_of(case, len(sweep.results), sweep.failed)
+            options.print_written(case, what, sweep.facts["wall_seconds"], known_of(case, sweep.known))
+        if interruption:
             return INTERRUPTED
-        if outcome.fails:
+        if sweep.fails:
             code = NOT_CONVERGED
     return code

@@ -165,8 +165,8 @@ def _draw(
         if other := map_key(setting, case.vary):
             _draw_map(axes, case, table, (setting.x, other))
             return
-        samples = {each.curve.key: each for each in simulated}
-        pairs = [(result, samples.get(result.curve.key)) for result in results]
+        samples = {each.curve.number: each for each in simulated}
+        pairs = [(result, samples.get(result.curve.number)) for result in results]
         if setting.x == "p":
             shown = _some(len(pairs))
             series = [_moment_series(case, *pair, with_theory=i in shown) for i, pair in enumerate(pairs)]
@@ -250,7 +250,7 @@ def _over_parameter(case: Case, pairs: Sequence[Pair], numbers: FloatArray) -> l
     key = case.figure.x
     groups: dict[tuple[tuple[str, Value], ...], list[Pair]] = {}
     for pair in pairs:
-        others = tuple((name, value) for name, value in pair[0].curve.key if name != key)
+        others = tuple((name, value) for name, value in pair[0].curve.varied.items() if name != key)
         groups.setdefault(others, []).append(pair)
     shown, found = _some(len(groups)), []
     for i, (others, group) in enumerate(groups.items()):

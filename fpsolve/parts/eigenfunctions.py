@@ -124,7 +124,7 @@ def _files(found: Eigenfunctions, curve: Curve, folder: Path) -> None:
     if curve.number == 1 and found.has_density:
         write_density(folder / "density.vtu", found.stationary, *about)
     if found.pairs:
-        copy_show_script(folder)
+        write_text(folder / "show.py", files("fpsolve.output").joinpath("show.py").read_text(encoding="utf-8"))
         write_eigenfunctions(folder, found.pairs, found.stationary, f"eigenfunctions{curve.suffix}", *about)
 
 
@@ -192,7 +192,7 @@ def write_density(
     return path
 
 
-def write_curves(case: Case, folder: Path) -> Path | None:
+def write_curves(case: Case, folder: Path) -> None:
     """Write `curves.pvd`, a time series over the curves of which there are eigenfunctions in a folder, all at one p.
 
     The time is the varied value where there is one that is a number, and else the number of the curve; the name of each
@@ -202,21 +202,13 @@ def write_curves(case: Case, folder: Path) -> Path | None:
     names = [(curve, name_at(f"eigenfunctions{curve.suffix}", p)) for curve in shown]
     there = [(curve, name) for curve, name in names if (folder / name).is_file()]
     if case.planned == 1 or not there:
-        return None
+        return
     keys = [key for key in case.vary.keys if len(case.vary.values(key)) > 1]
     if len(keys) == 1 and not case.vary.is_text(keys[0]):
         entries = [(float(curve.varied[keys[0]]), name, f"{curve.label}, p = {p:g}") for curve, name in there]
     else:
         entries = [(float(each.number), name, f"curve {each.number}: {each.label}, p = {p:g}") for each, name in there]
     write_text(folder / CURVES, collection_of(sorted(entries)))
-    return folder / CURVES
-
-
-def copy_show_script(directory: Path) -> Path:
-    """Put `show.py`, which draws a collection in ParaView, into the folder."""
-    target = directory / "show.py"
-    write_text(target, files("fpsolve.output").joinpath("show.py").read_text(encoding="utf-8"))
-    return target
 
 
 def _write_grid(path: Path, grid: Nodes, data: Mapping[str, FloatArray], facts: Facts) -> None:

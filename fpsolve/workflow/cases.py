@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from contextlib import nullcontext
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
-from typing import Any
 
 from fpsolve.case.case import Case, load_case
 from fpsolve.case.remedies import CASE_WORDS
@@ -15,7 +14,7 @@ from fpsolve.errors import FpsolveError, NotConverged, WorkersDied
 from fpsolve.files import writable
 from fpsolve.messages import Code, Message
 from fpsolve.pool import SERIAL, Pool, cluster, parallel
-from fpsolve.results.curve import CurveResult, SimulatedCurve
+from fpsolve.results.curve import CurveResult
 from fpsolve.show import results
 from fpsolve.show.notes import MONTE_CARLO, notes
 from fpsolve.signals import signals_held
@@ -39,27 +38,17 @@ class Outcome:
     """What was done with a case.
 
     Attributes:
-        results: its curves, solved; what did not converge is in their `failures`.
-        simulated: its curves, simulated.
-        interruption: where an interrupt ended the simulation, what is kept, and how to go on; empty without interrupt.
-        facts: versions, the command and the time of a run that solves, see `facts_of`.
-        known: how many of its curves an earlier run had finished.
-        failed: how many of its curves have failed in a run, also in part.
-        fails: whether some have, or no number was found.
+        sweep: its sets, solved.
+        simulations: its curves, simulated; none where that was not asked for.
     """
 
-    results: Sequence[CurveResult] = ()
-    simulated: tuple[SimulatedCurve, ...] = ()
-    interruption: str = ""
-    facts: Mapping[str, Any] = field(default_factory=dict)
-    known: int = 0
-    failed: int = 0
-    fails: bool = False
+    sweep: Sweep
+    simulations: Simulations
 
     @property
     def failures(self) -> tuple[Message, ...]:
         """Why some p or indices of some curves are missing."""
-        return tuple(failure.reason for result in self.results for failure in result.failures)
+        return tuple(failure.reason for result in self.sweep.results for failure in result.failures)
 
 
 def run(
@@ -101,7 +90,7 @@ def run(
 
     watch = Watch(bar=lambda phase: nullcontext(advance if phase.unit else ignore))
     outcome = run_case(read, out, pool=pool, is_fresh=fresh, watch=watch)
-    results = tuple(outcome.results)
+    results = tuple(outcome.sweep.results)
     if outcome.failures:
         raise NotConverged(Message(Code.SEVERAL, reasons=outcome.failures), results)
     return results
@@ -161,15 +150,7 @@ def run_case(
             watch.noted(sweep.notes)
             if monte_carlo:
                 simulations.run(folder, pool, watch, sweep.results, is_fresh=is_fresh)
-    return Outcome(
-        sweep.results,
-        tuple(simulated),
-        simulations.interruption,
-        facts=sweep.facts,
-        known=sweep.known,
-        failed=sweep.failed,
-        fails=bool(sweep.failed) or sweep.is_empty,
-    )
+    return Outcome(sweep, simulations)
 
 
 def _solve(case: Case, folder: Path, pool: Pool, watch: Watch, *, is_fresh: bool) -> Sweep:

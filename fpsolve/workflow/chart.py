@@ -136,7 +136,7 @@ def dear_lines(case: Case) -> Message | None:
 
 def begun_lines(case: Case) -> list[Boundary]:
     """The lines of a chart, of which nothing is traced."""
-    frame, problem = charted(case), case.curve({}).problem
+    frame, problem = charted(case), case.problem
     own: dict[str, Any] = {"step": frame.step, "nodes": frame.nodes, "budget": case.budget}
     return [untraced(target, frame.x, frame.y, problem, **own) for target in frame.lines]
 
@@ -255,7 +255,7 @@ def write_chart(case: Case, chart: Chart, folder: Path) -> None:
         "complete": chart.complete,
         "planned": len(targets),
         "done": sum(line.complete for line in chart.lines),
-        "parameters": {key: value for key, value in case.curve({}).parameters.items() if key not in keys},
+        "parameters": {key: value for key, value in case.problem.values.items() if key not in keys},
         **{side: asdict(axis) for side, axis in frame.items()},
         "lines": [
             {

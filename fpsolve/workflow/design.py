@@ -155,7 +155,7 @@ def summary(case: Case, outcome: DesignOutcome, facts: Mapping[str, Any]) -> dic
         "found": found and {"value": found.found.value, "error_estimate": found.found.error_estimate},
         "distance": found and found.distance,
         "solves": found and found.solves,
-        "parameters": dict(case.curve({}).parameters),
+        "parameters": dict(before),
         "message": outcome.reason and outcome.reason.words(CASE_WORDS),
         **facts,
     }

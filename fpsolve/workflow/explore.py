@@ -110,17 +110,18 @@ class Explorer:
                 few.append(each)
         self._few, self._drawing = np.unique(few).tolist(), threading.Lock()
         self._newest, self._so_far = dict[tuple[str, str], float](), dict[str, dict[str, Any]]()
-        self._answers: dict[str, tuple[str, Callable[[Mapping[str, Any]], Answer]]] = {
-            "start": ("start", self._start),
-            "move": ("curve", self._move),
-            "solve": ("curve", self._solve),
-            "map": ("map", self._map),
-            "listen": ("listen", lambda asked: self._so_far.pop(str(asked.get("page")), {})),
-            "field": ("field", lambda asked: field_of(self._at(asked), asked.get("p"))),
-            "paths": ("paths", self._paths),
-            "save": ("save", self._save),
-            "report": ("report", self._report),
-            "python": ("python", self._python),
+        self._answers: dict[str, Callable[[Mapping[str, Any]], Answer]] = {
+            "start": self._start,
+            "move": self._move,
+            "solve": self._solve,
+            "map": self._map,
+            "listen": lambda asked: self._so_far.pop(str(asked.get("page")), {}),
+            "field": lambda asked: field_of(self._at(asked), asked.get("p")),
+            "paths": self._paths,
+            "save": self._save,
+            "report": self._report,
+            "python": self._python,
+            "stop": lambda _: {},
         }
 
     def answer(self, name: str, question: Mapping[str, Any], is_gone: Callable[[], bool] = bool) -> Answer:
@@ -132,7 +133,7 @@ class Explorer:
             is_gone: whether nobody waits for the answer any more.
         """
         _is_gone.set(is_gone)
-        kind, answer = self._answers.get(name, (str(question.get("of")), lambda _: {}))
+        kind = {"move": "curve", "solve": "curve", "stop": str(question.get("of"))}.get(name, name)
         asked, number = (str(question.get("page")), kind), question.get("number")
         if not isinstance(number, int | float):
             return {"refused": f"got {number!r} as the number of a question; must be a number; load the page again"}
@@ -140,7 +141,7 @@ class Explorer:
         try:
             started = perf_counter()
             with watched(partial(self._wait, asked, number)):
-                return {**answer(question), "seconds": perf_counter() - started}
+                return {**self._answers[name](question), "seconds": perf_counter() - started}
         except KeyboardInterrupt:
             return {"stopped": True}
         except FpsolveError as failure:

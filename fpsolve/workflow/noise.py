@@ -208,7 +208,7 @@ def measure(data: Spectrum | Record, wanted: Wanted, progress: Callable[[], None
     fit = replace(fit, messages=(*(Message(Code.AS_READ, text=each) for each in data.notes), *fit.messages))
     progress()
     scaled = fit.scaled(_factor(wanted))
-    found = {"exponent": None, "moment": None, "verdict": None, "failure": None} | _critical(fit, wanted)
+    found = _critical(fit, wanted)
     system = _system(wanted, len(fit.parts))
     if system is not None:
         try:
@@ -343,7 +343,7 @@ def noise_sections(outcome: NoiseOutcome) -> str:
     told = {"1/time²": "ω² times the relative stiffness, in 1/s²", "1/time": "the damping, in 1/s"}
     about = told.get(unit, f"the {SIGNAL_WORDS[wanted.noise_in]}")
     found = ""
-    for name, section, noise in zip(NAMES, sections if len(fit.parts) > 1 else sections[:1], fit.parts, strict=False):
+    for name, section, noise in zip(NAMES, sections, fit.parts, strict=False):
         found += f"\n{f'[{section}]':34}  # {about}\n" + "".join(f"{line}\n" for line in _lines(noise, fit, name))
     return found
 
@@ -495,13 +495,12 @@ def draw_noise(outcome: NoiseOutcome, source: Path, shown: Convention, folder: P
             plain_numbers(axis)
         low, high = np.nanmin(factor * spectrum.density), np.nanmax(factor * spectrum.density)
         axes.set_ylim(0.3 * low, 3 * high)
-        sides = {"one": "one-sided", "two": "two-sided"}[shown.sided]
         symbol = {"Hz": "$f$", "rad/s": r"$\omega$"}[shown.per]
         label_axes(
             axes,
             {"long_name": "frequency", "symbol": symbol, "units": shown.per},
             {
-                "long_name": f"{sides} density of {words}",
+                "long_name": f"{shown.sided}-sided density of {words}",
                 "symbol": f"$G({symbol.strip('$')})$",
                 "units": shown.unit(noise_in),
             },

@@ -90,12 +90,12 @@ class Sweep:
         results: what is known of them.
         known: how many an earlier run had finished.
         failed: how many sets have failed, also in part, once the tables are written.
-        is_empty: whether no number was found, then.
+        fails: whether some have, or no number was found, then.
         notes: what is said of all sets, then.
     """
 
     failed = 0
-    is_empty = False
+    fails = False
     notes: tuple[Note, ...] = ()
 
     def __init__(self, case: Case, folder: Path, *, is_fresh: bool = False) -> None:
@@ -179,6 +179,7 @@ class Sweep:
         table = self.results.table
         write_dataset(self.case, table, self.folder, self.facts)
         numbers = [each.values for each in table.values() if each.quantity not in (*COUNTS, STATUS, SECONDS)]
-        self.is_empty = bool(numbers) and not any(np.isfinite(each).any() for each in numbers)
+        is_empty = bool(numbers) and not any(np.isfinite(each).any() for each in numbers)
         self.failed = int(np.isin(table[STATUS.name].values, [each for each in Status if each.fails]).sum())
+        self.fails = is_empty or self.failed > 0
         self.notes = tuple(notes(self.case, self.results.telling, count=len(self.results)))

@@ -204,7 +204,7 @@ def is_finished(found: Simulation) -> bool:
 
 def write_simulation(case: Case, simulated: SimulatedCurve, folder: Path) -> None:
     """monte_carlo.json of a curve, and where there is a response, monte_carlo_response.csv, .vti, .png and .pdf."""
-    suffix, result, response = simulated.curve.suffix, simulated.result, simulated.response
+    result, response = simulated.result, simulated.response
     content = {
         **head(case),
         **parameters_of(simulated.curve),
@@ -219,31 +219,27 @@ def write_simulation(case: Case, simulated: SimulatedCurve, folder: Path) -> Non
         },
         "warnings": in_case_words(simulated.warnings),
     }
-    write_json(folder / f"monte_carlo{suffix}.json", content)
-    if response is None:
-        return
-    edges = response.amplitude_edges
-    columns = (edges[:-1], edges[1:], response.amplitude_density, response.amplitude_error)
-    rows = (map(float, row) for row in zip(*columns, strict=True))
-    header = ["amplitude_from", "amplitude_to", "density", "standard_error"]
-    write_csv(folder / f"monte_carlo_response{suffix}.csv", header, rows)
-    write_simulated_response(simulated, folder)
-    simulated_response_figure(case, simulated).write(folder)
+    write_json(folder / f"monte_carlo{simulated.curve.suffix}.json", content)
+    if response is not None:
+        _write_response(simulated, response, folder)
+        simulated_response_figure(case, simulated).write(folder)
 
 
 def _with_errors(numbers: Mapping[str, tuple[float, float]]) -> dict[str, dict[str, float]]:
     return {name: {"value": value, "standard_error": error} for name, (value, error) in numbers.items()}
 
 
-def write_simulated_response(simulated: SimulatedCurve, folder: Path) -> None:
-    """Write the joint density of x and ẋ, if there is one, as cell data `density` of monte_carlo_response.vti.
+def _write_response(simulated: SimulatedCurve, response: Response, folder: Path) -> None:
+    """Write the density of the amplitude, and the joint density of x and ẋ as cell data `density` of a .vti file.
 
     Field data: `lyapunov_exponent` and its standard error, `lyapunov_exponent_error`, and the parameters as in
     `write_eigenfunctions`.
     """
-    response, curve, found = simulated.response, simulated.curve, simulated.result
-    if response is None:
-        return
+    curve, found, edges = simulated.curve, simulated.result, response.amplitude_edges
+    columns = (edges[:-1], edges[1:], response.amplitude_density, response.amplitude_error)
+    rows = (map(float, row) for row in zip(*columns, strict=True))
+    header = ["amplitude_from", "amplitude_to", "density", "standard_error"]
+    write_csv(folder / f"monte_carlo_response{curve.suffix}.csv", header, rows)
     path, x, v = folder / f"monte_carlo_response{curve.suffix}.vti", response.x_edges, response.v_edges
     size, spacing = (x.size, v.size, 1), (x[1] - x[0], v[1] - v[0], 1.0)
     grid = pyvista_module().ImageData(dimensions=size, spacing=spacing, origin=(x[0], v[0], 0.0))
@@ -273,14 +269,14 @@ def _draw_response(simulated: SimulatedCurve, paths: Sequence[Path], heading: st
 
 def show(case: Case, simulated: Sequence[SimulatedCurve], results: Sequence[CurveResult] = ()) -> Iterator[Block]:
     """The simulated curves, one by one or a row each."""
-    solved = {result.curve.key: result for result in results}
+    solved = {result.curve.number: result for result in results}
     is_short, over_p = len(simulated) <= EACH, case.figure.x == "p"
     if not (is_short and over_p):
         yield exponent_grid(case, simulated, solved)
         if not is_short:
             yield Sentence(f"{len(simulated)} curves; all numbers are in {MONTE_CARLO}, one for each curve")
     for each in simulated if is_short else ():
-        result = solved.get(each.curve.key)
+        result = solved.get(each.curve.number)
         yield Sentence("", case.heading(each.curve) if over_p else each.curve.label)
         found, unit = each.result, case.units.time
         if result is None:
@@ -322,11 +318,11 @@ def number_grid(case: Case, simulated: SimulatedCurve, result: CurveResult | Non
     return filled("", columns, rows, units)
 
 
-def exponent_grid(case: Case, simulated: Sequence[SimulatedCurve], solved: Mapping[Any, CurveResult]) -> Grid:
+def exponent_grid(case: Case, simulated: Sequence[SimulatedCurve], solved: Mapping[int, CurveResult]) -> Grid:
     """λ of each curve by both methods."""
 
     def cell(i: int, each: SimulatedCurve) -> str:
-        result, found = solved.get(each.curve.key), each.result
+        result, found = solved.get(each.curve.number), each.result
         known = result.lyapunov_exponent.value if result and result.lyapunov_exponent else None
         return _cells(found.lyapunov_exponent, found.lyapunov_exponent_error, known)[i]
 
