@@ -294,9 +294,9 @@ DEFECTS: tuple[Defect, ...] = (
     ),
     Defect(
         "R5 a value of a sweep is taken for a section",
-        "case/sections.py",
-        "is_section = inner and key not in whole and",
-        "is_section = inner or key not in whole and",
+        "case/keys.py",
+        "if inner and section + name not in is_value and",
+        "if inner or section + name not in is_value and",
         "vary",
     ),
     Defect(
