@@ -10,9 +10,8 @@ import warnings
 from collections.abc import Sequence
 from io import TextIOWrapper
 from pathlib import Path
-from textwrap import fill
 
-from cyclopts import App, CycloptsError, CycloptsPanel
+from cyclopts import App, CycloptsError, CycloptsPanel, Group
 
 from fpsolve import __version__
 from fpsolve.arrays import shown
@@ -22,35 +21,43 @@ from fpsolve.errors import FpsolveError, NotConverged, WorkersDied
 from fpsolve.messages import escaped, short
 from fpsolve.signals import INTERRUPTED, ended_by_signals
 
-COMMANDS = {
-    "new": "Copy a case that comes with fpsolve.",
-    "run": "Solve cases; write tables, figures and ParaView files.",
-    "check": "Compare results with the values that cases expect.",
-    "chart": "Trace where stability ends in a plane of two parameters.",
-    "explore": "Look at a case in the browser, with a slider for every parameter.",
-    "design": "Find parameters with which λ, Λ(p) or δ_p has a wanted value.",
-    "noise": "Fit a noise to what was measured; say what it means for stability.",
-    "simulate": "Estimate the exponents from simulated paths.",
-    "prove": "Prove bounds on the exponents that hold with certainty.",
-    "mesh": "Write a mesh that a case can name.",
-    "schema": "Print what editors need to complete and check cases.",
-}
-"""What the commands do; each is a function in a file of its name in fpsolve/commands, read when it is called."""
+COMMANDS = "new", "run", "check", "chart", "explore", "design", "noise", "simulate", "prove", "mesh", "schema"
+"""Each is a function in a file of its name in fpsolve/commands, read when it is called."""
 CLOSED_PIPE = 141
 TRACEBACK = "--traceback"
 """What any command takes to print also where an error was raised."""
 
 app = App(
     name="fpsolve",
-    help="""Moment Lyapunov exponents of linear systems under random loads, by finite elements.
+    help="""Moment Lyapunov exponents of linear systems under random loads, by finite
+    elements.
 
-    A case file states a vibro-impact oscillator, [oscillator], or any other linear system, [system].
+    A case file states a vibro-impact oscillator, [oscillator], or any other
+    linear system, [system].
 
     Example: fpsolve run cases/fig1.toml
 
-    Exit codes: 0 success, 1 a checked value differs or a design is out of reach, 2 bad input, 3 not converged
-    or nothing found, 130 interrupted""",
+    Exit codes: 0 success, 1 a checked value differs or a design is out of
+    reach, 2 bad input, 3 not converged or nothing found, 130 interrupted
+
+    Commands:
+      new       Copy a case that comes with fpsolve.
+      run       Solve cases; write tables, figures and ParaView files.
+      check     Compare results with the values that cases expect.
+      chart     Trace where stability ends in a plane of two parameters.
+      explore   Look at a case in the browser, with a slider for every parameter.
+      design    Find parameters with which λ, Λ(p) or δ_p has a wanted value.
+      noise     Fit a noise to what was measured; say what it means for stability.
+      simulate  Estimate the exponents from simulated paths.
+      prove     Prove bounds on the exponents that hold with certainty.
+      mesh      Write a mesh that a case can name.
+      schema    Print what editors need to complete and check cases.
+
+    fpsolve COMMAND --help tells of its arguments, fpsolve --version of the version.
+    With --traceback a command also prints where an error was raised.""",
+    usage="Usage: fpsolve COMMAND",
     version=lambda: f"fpsolve {__version__}",
+    group_commands=Group(show=False),
     help_format="plaintext",
     suppress_keyboard_interrupt=False,
     error_formatter=lambda error: CycloptsPanel(escaped(short(str(error)))),
@@ -108,10 +115,7 @@ def _run(argv: Sequence[str] | None) -> int:
 
 
 def _called(arguments: Sequence[str]) -> int | None:
-    """The exit code of the command that is named; without one all are listed, without rich, whose import takes long."""
-    if not arguments or [*arguments] in (["--help"], ["-h"]):
-        print(_overview())
-        return 0
+    """The exit code of the command that is named; without one all are listed."""
     if split := [each for each in arguments if "\n" in each and "=" not in each]:  # values may have line ends
         raise FpsolveError(f"got {shown(split[0])}; a file's name may have no line ends here; rename the file")
     from rich.console import Console
@@ -119,20 +123,6 @@ def _called(arguments: Sequence[str]) -> int | None:
     errors = Console(stderr=True)
     code: int | None = app(arguments, result_action="return_value", exit_on_error=False, error_console=errors)
     return code
-
-
-def _overview() -> str:
-    """What fpsolve is for, and what each command does."""
-
-    def filled(text: str, first: str = "", rest: str = "") -> str:
-        return fill(" ".join(text.split()), initial_indent=first, subsequent_indent=rest)
-
-    width = max(map(len, COMMANDS))
-    about = [filled(part) for part in ["Usage: fpsolve COMMAND", *app.help.split("\n\n")]]
-    told = [filled(text, f"  {name:{width}}  ", " " * (width + 4)) for name, text in COMMANDS.items()]
-    told += ["", "fpsolve COMMAND --help tells of its arguments, fpsolve --version of the version."]
-    told += ["With --traceback a command also prints where an error was raised."]
-    return "\n".join(["\n\n".join(about), "", "Commands:", *told])
 
 
 if __name__ == "__main__":
