@@ -124,6 +124,11 @@ def shown(value: Any) -> str:
         text = " ".join(repr(value).split())
     except ValueError:  # of a whole number with thousands of digits
         return "a number too long to show"
+    return shortened(text)
+
+
+def shortened(text: str) -> str:
+    """A text cut to a readable length."""
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 

@@ -176,7 +176,7 @@ def title_of(attributes: Mapping[str, Any]) -> str:
 def label_of(attributes: Mapping[str, Any], letters: int = 40) -> str:
     """The title of a variable in several lines, of at most so many letters each, where it is long."""
     words, rest = str(attributes["long_name"]), title_of({**attributes, "long_name": ""})
-    drawn = re.sub(r"\\[A-Za-z]+ ?", "x", rest).translate(dict.fromkeys(map(ord, "${}^_")))
+    drawn = re.sub(r"\\[A-Za-z]+ ?|[${}^_]", "", rest)
     return f"{fill(words, letters)}{' ' if len(words) + 1 + len(drawn) <= letters else chr(10)}{rest}".strip()
 
 
@@ -199,17 +199,15 @@ def scale_axis(axis: Any, scale: str, limits: tuple[float, float] | None) -> Non
 
 def plain_numbers(axis: Any) -> None:
     """Numbers such as 0.5, 1, 2 on a logarithmic axis of a few decades."""
-    from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter, NullLocator, StrMethodFormatter
+    from matplotlib.ticker import LogLocator, MaxNLocator
 
     start, stop = axis.get_view_interval()
     decades = math.log10(stop / start)
     if decades < 4:
-        subs = (1, 1.5, 2, 3, 4, 5, 7) if decades < 0.7 else (1, 2, 5) if decades < 2.2 else (1,)
-        axis.set_major_locator(MaxNLocator(4) if decades < 0.4 else LogLocator(subs=subs))
-        if decades < 0.7:
-            axis.set_minor_locator(NullLocator())
-        axis.set_major_formatter(StrMethodFormatter("{x:g}"))
-        axis.set_minor_formatter(NullFormatter())
+        subs = (1, 2, 5) if decades < 2.2 else (1,)
+        axis.set_major_locator(MaxNLocator(4) if decades < 0.7 else LogLocator(subs=subs))
+        axis.set_major_formatter("{x:g}")
+        axis.set_minor_formatter("")
 
 
 def _font_size(name: str) -> float:

@@ -13,6 +13,7 @@ from pydantic import Discriminator, ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails, InitErrorDetails, PydanticCustomError
 
+from fpsolve.arrays import shortened
 from fpsolve.messages import is_control
 from fpsolve.model.faults import accepted, choices, entry_of, fields_of, written_path
 from fpsolve.model.parameters import Section, example_of, meaning_of, parameter, without_unit
@@ -108,11 +109,6 @@ def shown(value: Any) -> str:
 def shown_with_kind(value: Any, *, but: type | None = None) -> str:
     """A value as TOML writes it with what it is, but for one kind: "3 (a number)"."""
     return shown(value) if type(value) is but else f"{shown(value)} ({_KINDS.get(type(value), 'a date or time')})"
-
-
-def shortened(text: str) -> str:
-    """A text cut to a readable length."""
-    return text if len(text) <= 60 else f"{text[:57]}..."
 
 
 def _toml(value: Any) -> str:

@@ -200,15 +200,17 @@ def cluster(address: str) -> Pool:
     client.close()
 
     def start() -> Any:
-        return _client(address).get_executor(pure=False)
+        nonlocal client
+        client = _client(address)
+        return client.get_executor(pure=False)
 
     def stop(executor: Any) -> None:
         executor.shutdown(wait=False)  # cancels what is not done
-        executor._client.close()
+        client.close()
 
-    def has_workers(executor: Any) -> bool:
+    def has_workers(_: Any) -> bool:
         try:
-            return bool(executor._client.nthreads())
+            return bool(client.nthreads())
         except OSError:  # it stopped while it was asked
             raise WorkersDied(STOPPED) from None
 

@@ -13,6 +13,7 @@ from typing import Annotated, Any
 from pydantic import Field, TypeAdapter, ValidationError, ValidationInfo
 from pydantic.fields import FieldInfo
 
+from fpsolve.arrays import shortened
 from fpsolve.case.kinds import parameters_of
 from fpsolve.case.sections import MAX_MOMENTS, Sweep, Values, flat
 from fpsolve.case.vary import Column, Columns, Vary, assignments, repeats
@@ -25,7 +26,6 @@ from fpsolve.explain import (
     nearest,
     quoted,
     refuse,
-    shortened,
     shown,
     shown_with_kind,
     too_long,

@@ -17,6 +17,7 @@ from functools import lru_cache, partial
 from keyword import iskeyword
 from operator import add
 
+from fpsolve.arrays import shortened
 from fpsolve.model.parameters import without_unit
 
 Series = tuple[float, ...]
@@ -286,11 +287,6 @@ def _chain(node: ast.expr, *kinds: type[ast.operator]) -> list[tuple[float, ast.
         parts.append((-1.0 if isinstance(node.op, _MINUS) else 1.0, node.right))
         node = node.left
     return [(1.0, node), *reversed(parts)]
-
-
-def shortened(text: str) -> str:
-    """What is written, cut to a readable length."""
-    return text if len(text) <= 60 else f"{text[:57]}..."
 
 
 class _Walk:

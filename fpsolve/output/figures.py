@@ -7,9 +7,8 @@ value of a key.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -78,8 +77,8 @@ class Series:
     varied: Varied
     x: FloatArray
     y: FloatArray
-    line_x: FloatArray = field(default_factory=lambda: np.zeros(0))
-    line_y: FloatArray = field(default_factory=lambda: np.zeros(0))
+    line_x: FloatArray
+    line_y: FloatArray
     simulated: FloatArray | None = None
     root: float | None = None
     slope: float | None = None
@@ -147,64 +146,61 @@ def main_figure(
     """
     over = "p" if case.figure.x == "p" else case.about(case.figure.x).words
     title = f"The {case.figure.quantity.words}, {case.figure.quantity.symbol}, over {over}"
-    return Drawing(title, partial(_draw, case, results, simulated, table), "figure", case.caption)
+    setting = case.figure
+    curves = partial(_draw_curves, case, results, simulated, table)
+    other = map_key(setting, case.vary)
+    draw = partial(_draw_map, case, table, (setting.x, other)) if other else curves
+    return Drawing(title, partial(_draw, case, results, setting.needed, draw), "figure", case.caption)
 
 
 def _draw(
     case: Case,
     results: Sequence[CurveResult],
-    simulated: Sequence[SimulatedCurve],
-    table: Table,
+    needed: str,
+    draw: Callable[[Any], None],
     paths: Sequence[Path],
     heading: str,
 ) -> None:
-    setting = case.figure
-    if not case.output.figure or setting.needed not in case.asked or not results:
-        return
-    with _axes(case, results, paths, heading) as axes:
-        if other := map_key(setting, case.vary):
-            _draw_map(axes, case, table, (setting.x, other))
-            return
-        samples = {each.curve.number: each for each in simulated}
-        pairs = [(result, samples.get(result.curve.number)) for result in results]
-        if setting.x == "p":
-            shown = _some(len(pairs))
-            series = [_moment_series(case, *pair, with_theory=i in shown) for i, pair in enumerate(pairs)]
-        else:
-            series = _over_parameter(case, pairs, _numbers(case, table))
-        over = P if setting.x == "p" else case.about(setting.x)
-        colours = draw_series(axes, case, series, over, setting.quantity)
-        places = np.concatenate([item.x for item in series])
-        is_short = setting.x == "p" and places.size and places.max() < 10 * places.min()
-        scale_axis(axes.xaxis, "linear" if is_short else scale_of(places), setting.xlim)
-        scale_axis(axes.yaxis, "linear", setting.ylim)
-        axes.ticklabel_format(axis="y", style="sci", scilimits=(-2, 3), useMathText=True)
-        _mark(axes, series, colours)
+    """A figure of all curves, if there are any and the case asks for it and for the quantity that it needs."""
+    if case.output.figure and needed in case.asked and results:
+        held = results[0].curve.held(case.units.time, case.vary.keys)
+        with figure_for(paths, heading, held, FORMATS[case.figure.width]) as figure:
+            draw(figure.add_subplot())
 
 
-@contextmanager
-def _axes(case: Case, results: Sequence[CurveResult], paths: Sequence[Path], heading: str) -> Iterator[Any]:
-    """Those of a figure of all curves."""
-    held = results[0].curve.held(case.units.time, case.vary.keys)
-    with figure_for(paths, heading, held, FORMATS[case.figure.width]) as figure:
-        yield figure.add_subplot()
+def _draw_curves(
+    case: Case, results: Sequence[CurveResult], simulated: Sequence[SimulatedCurve], table: Table, axes: Any
+) -> None:
+    setting, samples = case.figure, {each.curve.number: each for each in simulated}
+    pairs = [(result, samples.get(result.curve.number)) for result in results]
+    if setting.x == "p":
+        shown = _some(len(pairs))
+        series = [_moment_series(case, *pair, with_theory=i in shown) for i, pair in enumerate(pairs)]
+    else:
+        series = _over_parameter(case, pairs, _numbers(case, table))
+    over = P if setting.x == "p" else case.about(setting.x)
+    colours = draw_series(axes, case, series, over, setting.quantity)
+    places = np.concatenate([item.x for item in series])
+    is_short = setting.x == "p" and places.size and places.max() < 10 * places.min()
+    scale_axis(axes.xaxis, "linear" if is_short else scale_of(places), setting.xlim)
+    scale_axis(axes.yaxis, "linear", setting.ylim)
+    axes.ticklabel_format(axis="y", style="sci", scilimits=(-2, 3), useMathText=True)
+    _mark(axes, series, colours)
 
 
 def rate_figure(case: Case, results: Sequence[CurveResult]) -> Drawing:
     """rate_function.png and .pdf, if the case asks for it."""
     title = f"The {RATE_FUNCTION.words}, {RATE_FUNCTION.symbol}"
-    return Drawing(title, partial(_draw_rates, case, results), "rate_function", case.headline)
+    draw = partial(_draw, case, results, RATE_FUNCTION.name, partial(_draw_rates, case, results))
+    return Drawing(title, draw, "rate_function", case.headline)
 
 
-def _draw_rates(case: Case, results: Sequence[CurveResult], paths: Sequence[Path], heading: str) -> None:
+def _draw_rates(case: Case, results: Sequence[CurveResult], axes: Any) -> None:
     """I(s) at s = Λ′(p) of every p, 0 at s = λ."""
-    if RATE_FUNCTION.name not in case.asked or not case.output.figure or not results:
-        return
     shown = _some(len(results))
     series = [_rates(result, with_theory=i in shown) for i, result in enumerate(results)]
-    with _axes(case, results, paths, heading) as axes:
-        draw_series(axes, case, series, GROWTH, RATE_FUNCTION)
-        axes.ticklabel_format(style="sci", scilimits=(-2, 3), useMathText=True)
+    draw_series(axes, case, series, GROWTH, RATE_FUNCTION)
+    axes.ticklabel_format(style="sci", scilimits=(-2, 3), useMathText=True)
 
 
 def _some(count: int) -> set[int]:
@@ -398,14 +394,11 @@ def _mark(axes: Any, series: Sequence[Series], colours: Any) -> None:
         axes.add_collection(LineCollection(lines, rasterized=rasterized, **look), autolim=False)
 
 
-def _draw_map(axes: Any, case: Case, table: Table, keys: tuple[str, str]) -> None:
+def _draw_map(case: Case, table: Table, keys: tuple[str, str], axes: Any) -> None:
     """A quantity over two keys in colours around zero, hatched where it is not known, grey where there is none.
 
     The line of its zeros is dashed between the values.
     """
-    from matplotlib.collections import PatchCollection
-    from matplotlib.patches import Rectangle
-
     setting = case.figure
     (x, column), (y, row) = (
         np.unique(np.array([each[key] for each in case.vary.sets], dtype=float), return_inverse=True) for key in keys
@@ -425,10 +418,9 @@ def _draw_map(axes: Any, case: Case, table: Table, keys: tuple[str, str]) -> Non
         (failed, unsolved, "failed or not solved"),
         (np.isnan(values) & ~failed, {"facecolor": "0.8"}, f"no {setting.quantity.words}{sought}"),
     ):
-        (left, low), (width, height) = edges, map(np.diff, edges)
-        cells = [Rectangle((left[j], low[i]), width[j], height[i]) for i, j in np.argwhere(where)]
-        if cells:
-            axes.add_collection(PatchCollection(cells, linewidth=0, label=label, **style))
+        (i, j), (left, low), (width, height) = np.nonzero(where), edges, map(np.diff, edges)
+        if i.size:
+            axes.bar(left[j], height[i], width[j], low[i], align="edge", linewidth=0, label=label, **style)
     finite = values[np.isfinite(values)]
     if finite.size and finite.min() < 0 < finite.max():
         look: dict[str, Any] = {"linestyles": "--", "linewidths": points(1.5), "zorder": 3}

@@ -54,12 +54,9 @@ class Screen:
 
     def __init__(self, *, errors: bool = False) -> None:
         self.console = Console(stderr=errors)
-        if not self.console.file.isatty():
-            self.console = Console(stderr=errors, width=ENDLESS)
-        elif self.console.is_dumb_terminal:  # of which rich takes 80 columns
-            width, height = get_terminal_size()
-            self.console = Console(stderr=errors, width=width, height=height)
-        self.width = self.console.width
+        width, height = get_terminal_size(self.console.size)  # of a dumb terminal rich takes 80 columns
+        self.width = width if self.console.file.isatty() else ENDLESS
+        self.console.size = self.width, height
 
     def say(self, text: str, style: str = "") -> None:
         """Print a text in lines that fit, indented from the second one on; its own line ends remain."""

@@ -16,7 +16,7 @@ import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field
 from pydantic.fields import FieldInfo
 
-from fpsolve.arrays import ROUNDED, Constant, FloatArray, Linear, identity, one, real_number, shown
+from fpsolve.arrays import ROUNDED, Constant, FloatArray, Linear, identity, one, real_number, shortened, shown
 from fpsolve.drawing import is_math
 from fpsolve.messages import Code, Message, is_control
 from fpsolve.model.expressions import (
@@ -34,7 +34,6 @@ from fpsolve.model.expressions import (
     name_fault,
     names_in,
     product,
-    shortened,
     summands,
 )
 from fpsolve.model.faults import TableError, table_of
