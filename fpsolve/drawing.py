@@ -23,7 +23,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")  # Okabe and Ito
-STYLE: dict[Any, Any] = {"font.size": 13, "mathtext.fontset": "cm", "axes.titlesize": 12}
+STYLE: dict[Any, Any] = {
+    "font.size": 13, "mathtext.fontset": "cm", "axes.titlesize": 12, "axes.prop_cycle": f"cycler(color={COLOURS})",
+}  # fmt: skip
 SIZE = (7.2, 5.0)
 """Width and height of a figure of `plot`, in inches."""
 DOTS: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 5, "elinewidth": 1.3, "capsize": 4}
@@ -126,15 +128,16 @@ def figure_for(
 
 def _add_legend(figure: Any) -> None:
     """A legend below the axes of what has a label, in as many columns as fit."""
-    found = [each.get_legend_handles_labels() for each in figure.axes if each.get_legend() is None]
+    found = [each.get_legend_handles_labels() for each in figure.axes]
     handles, labels = ([item for each in found for item in each[k]] for k in (0, 1))
     if not labels:
         return
     room, size = 0.98 * figure.get_figwidth(), _font_size("legend.fontsize")
     labels = [in_lines(label.split(", "), letters_in(0.9 * room, size)) for label in labels]
     for columns in (4, 3, 2, 1):
-        style = {"ncols": columns, "columnspacing": 1.2, "handlelength": 1.8}
-        legend = figure.legend(handles, labels, loc="outside lower center", **style)
+        legend = figure.legend(
+            handles, labels, loc="outside lower center", ncols=columns, columnspacing=1.2, handlelength=1.8
+        )
         if columns == 1 or legend.get_window_extent(figure.canvas.get_renderer()).width <= room * figure.dpi:
             return
         legend.remove()
@@ -242,7 +245,7 @@ def draw_line(axes: Axes, main: xarray.DataArray, error: xarray.DataArray | None
     order = np.argsort(x.values, kind="stable")
     places, values = x.values[order], main.values[order]
     marker = {"marker": "o", "markersize": 4} if places.size <= MARKED else {}
-    [line] = axes.plot(places, values, **{"linewidth": 1.6, **marker, **coloured(axes, kwargs)})
+    [line] = axes.plot(places, values, **{"linewidth": 1.6, **marker, **in_full(kwargs)})
     if error is not None and marker:
         axes.errorbar(places, values, error.values[order], fmt="none", ecolor=line.get_color(), capsize=4)
     elif error is not None:
@@ -253,14 +256,14 @@ def draw_line(axes: Axes, main: xarray.DataArray, error: xarray.DataArray | None
 
 def draw_dots(axes: Axes, x: FloatArray, y: FloatArray, error: FloatArray, **kwargs: Any) -> None:
     """Dots with bars of ± two standard errors."""
-    axes.errorbar(x, y, 2 * error, **{**DOTS, **coloured(axes, kwargs)})
+    axes.errorbar(x, y, 2 * error, **{**DOTS, **in_full(kwargs)})
 
 
 def draw_point(axes: Axes, main: xarray.DataArray, error: xarray.DataArray | None, **kwargs: Any) -> None:
     """One number with a bar of ± its error, above its symbol; several stand side by side."""
     name = str(main.attrs.get("symbol", main.name))
     size = None if error is None else [error.item()]
-    axes.errorbar([name], [main.item()], size, **{**DOTS, **coloured(axes, kwargs)})
+    axes.errorbar([name], [main.item()], size, **{**DOTS, **in_full(kwargs)})
     axes.set_ylabel(label_of(main.attrs))
     mark_zero(axes)
     axes.margins(x=0.3)
@@ -287,21 +290,17 @@ def draw_bars(
     height, middles = 0.8 / max(len(bars), 1), np.arange(len(names))
     for i, (label, values) in enumerate(bars.items()):
         places = middles + (i - 0.5 * (len(bars) - 1)) * height
-        style = {"color": COLOURS[i % len(COLOURS)], "label": label, **kwargs}
-        axes.barh(places, values, 0.9 * height, **style)
+        axes.barh(places, values, 0.9 * height, **{"label": label, **kwargs})
     axes.set_yticks(middles, names)
     axes.invert_yaxis()
 
 
-def coloured(axes: Axes, kwargs: Mapping[str, Any]) -> dict[str, Any]:
-    """What matplotlib is told of a line, with a colour that no other line has unless it has one."""
+def in_full(kwargs: dict[str, Any]) -> dict[str, Any]:
+    """What matplotlib is told of a line, by the full names: "linewidth" for "lw"."""
     from matplotlib.cbook import normalize_kwargs
-    from matplotlib.colors import to_hex
     from matplotlib.lines import Line2D
 
-    taken = {to_hex(line.get_color()).upper() for line in axes.lines}
-    free = next((colour for colour in COLOURS if colour not in taken), COLOURS[0])
-    return {"color": free, **normalize_kwargs(dict(kwargs), Line2D)}
+    return normalize_kwargs(kwargs, Line2D)
 
 
 def mark_zero(axes: Axes) -> None:

@@ -23,7 +23,7 @@ from fpsolve.analysis.target import Distance, Target, is_none, target_of
 from fpsolve.arrays import FloatArray, is_whole, real_number, shown
 from fpsolve.budget import Meter, OverBudget
 from fpsolve.data import Result, brief, dataset
-from fpsolve.drawing import add_legend, coloured, label_axes, scale_axis
+from fpsolve.drawing import add_legend, in_full, label_axes, scale_axis
 from fpsolve.errors import FpsolveError, NotConverged
 from fpsolve.exponent.kinds import choose
 from fpsolve.exponent.method import Budget
@@ -238,12 +238,10 @@ class Boundary(Result):
         return found
 
     def _draw(self, found: xarray.Dataset, axes: Axes, **kwargs: Any) -> None:
-        style = {"linewidth": 2, "label": self.target.latex, **coloured(axes, kwargs)}
-        for branch in self.branches:
-            axes.plot(*branch.path, **style)
-            style.pop("label", None)
-        if "label" in style:
-            axes.plot([], [], **style)
+        style = {"linewidth": 2, "label": self.target.latex, **in_full(kwargs)}
+        for path in [branch.path for branch in self.branches] or [(np.zeros(0), np.zeros(0))]:
+            [line] = axes.plot(*path, **style)
+            style |= {"color": line.get_color(), "label": None}
         label_axes(axes, found.x.attrs, found.y.attrs)
         for side, axis in ((axes.xaxis, self.x), (axes.yaxis, self.y)):
             scale_axis(side, axis.scale, (axis.start, axis.stop))

@@ -61,7 +61,6 @@ def write_dataset(case: Case, table: Table, folder: Path, facts: Mapping[str, An
         facts: on the run, see `facts_of`; they become attributes, tables as JSON.
     """
     import h5netcdf
-    import h5py
 
     variables, coordinates = _arrays(case, table)
     beside = " ".join(name for name, each in coordinates.items() if each.dims != (name,))
@@ -71,9 +70,8 @@ def write_dataset(case: Case, table: Table, folder: Path, facts: Mapping[str, An
         sizes = (zip(each.dims, each.values.shape, strict=True) for each in whole.values())
         file.dimensions = dict(chain.from_iterable(sizes))
         for name, each in whole.items():
-            is_text, is_number = each.values.dtype == object, each.values.dtype.kind == "f"
-            kind = h5py.string_dtype() if is_text else each.values.dtype
-            fill = math.nan if is_number else None
+            kind = each.values.dtype
+            fill = math.nan if kind.kind == "f" else None
             made = file.create_variable(name, each.dims, kind, data=each.values, fillvalue=fill)
             made.attrs.update(each.attributes)
             if beside and SET in each.dims and name in variables:
@@ -86,6 +84,8 @@ def write_dataset(case: Case, table: Table, folder: Path, facts: Mapping[str, An
 
 def _arrays(case: Case, table: Table) -> tuple[dict[str, Variable], dict[str, Variable]]:
     """The numbers of all sets; the varied values and p."""
+    import h5py
+
     vary = case.vary
     is_list = bool(vary) and vary.mode != "product"
     over, shape = (
@@ -94,7 +94,7 @@ def _arrays(case: Case, table: Table) -> tuple[dict[str, Variable], dict[str, Va
     coordinates, variables = dict[str, Variable](), dict[str, Variable]()
     for key in vary.keys:
         values, is_text = vary.columns[key] if is_list else vary.values(key), vary.is_text(key)
-        array = np.array(values, dtype=object if is_text else float)
+        array = np.array(values, dtype=h5py.string_dtype() if is_text else float)
         coordinates[key] = Variable((SET if is_list else key,), array, {} if is_text else case.about(key).attributes)
     if MOMENT.name in case.asked:
         coordinates["p"] = Variable(("p",), case.p, P.attributes)

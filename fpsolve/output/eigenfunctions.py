@@ -11,7 +11,7 @@ from typing import Any, Literal
 import numpy as np
 
 from fpsolve.arrays import FloatArray, shown
-from fpsolve.drawing import COLOURS, MOST_LINES, QUARTERS, SIZE, STYLE, add_legend, draw_colours, label_axes
+from fpsolve.drawing import MOST_LINES, QUARTERS, SIZE, STYLE, add_legend, draw_colours, label_axes
 from fpsolve.exponent.density import Grid, on_nodes
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.kinds import choose
@@ -122,7 +122,7 @@ def _draw_lines(axes: Any, nodes: Nodes, values: FloatArray, *, is_log: bool) ->
     for number, xi in enumerate(nodes.xi):
         blocks = values[:, number].reshape(nodes.phi.shape)
         padded = np.pad(blocks, ((0, 0), (0, 1)), constant_values=math.nan).ravel()
-        axes.plot(phi, padded, color=COLOURS[number % len(COLOURS)], linewidth=1.6, label=rf"$\xi$ = {xi:g}")
+        axes.plot(phi, padded, linewidth=1.6, label=rf"$\xi$ = {xi:g}")
     axes.set_xlim(0, 2 * math.pi)
     if is_log:
         axes.set_yscale("log")

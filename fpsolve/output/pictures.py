@@ -12,11 +12,10 @@ import numpy as np
 from fpsolve.analysis.sensitivity import Sensitivities
 from fpsolve.case.case import Case, Curve
 from fpsolve.case.sections import RESPONSE, SENSITIVITIES
-from fpsolve.drawing import COLOURS, Format, draw_bars, draw_colours, draw_dots, figure_for, label_axes, points
+from fpsolve.drawing import Format, draw_bars, draw_colours, draw_dots, figure_for, label_axes, points
 from fpsolve.exponent.density import direction_grid
 from fpsolve.exponent.method import DIRECTIONS, PHASE_AND_NOISE
 from fpsolve.model.plane import System
-from fpsolve.model.quantity import ResponseQuantities
 from fpsolve.output.eigenfunctions import draw_eigenfunction
 from fpsolve.page.page import Drawing
 from fpsolve.parts.directions import directions_file
@@ -26,8 +25,6 @@ from fpsolve.theory.perturbation import scale_of
 from fpsolve.vtk import name_at
 
 if TYPE_CHECKING:
-    import xarray
-
     from fpsolve.simulation.response import Response
 
 
@@ -52,7 +49,12 @@ def _draw_response(
         plane, radial = figure.subplots(1, 2)
         figure.get_layout_engine().set(wspace=0.1)
         _draw_joint_density(plane, found, density, system, case)
-        _draw_amplitudes(radial, found, density, system.response, case)
+        radial.plot(density.amplitude, density.of_amplitude, label="finite elements")
+        about = system.response.amplitude, system.response.amplitude_density
+        label_axes(radial, *(each.timed(case.units.time).attributes for each in about))
+        end = density.amplitude[0] + density.amplitude[-1]
+        radial.set(xlim=(0, end), ylim=(0, 1.1 * float(density.of_amplitude.max())))
+        radial.set_title(_at_rest("a hump away from rest", found.stability_index, -1))
         if sample:
             x = 0.5 * (sample.amplitude_edges[1:] + sample.amplitude_edges[:-1])
             look: dict[str, Any] = {"marker": ".", "color": "black", "markersize": points(4), "capsize": points(2)}
@@ -71,17 +73,6 @@ def _draw_joint_density(axes: Any, found: CurveResponse, density: ResponseDensit
     draw_colours(axes, a * np.cos(phi), -system.aspect * a * np.sin(phi), shown, about, **look)
     label_axes(axes, x, v)
     axes.set_title(_at_rest("a crater around rest", found.stability_index, -2))
-
-
-def _draw_amplitudes(
-    axes: Any, found: CurveResponse, density: ResponseDensity, about: ResponseQuantities, case: Case
-) -> None:
-    """ρ(a) as a line."""
-    axes.plot(density.amplitude, density.of_amplitude, color=COLOURS[0], label="finite elements")
-    label_axes(axes, *(each.timed(case.units.time).attributes for each in (about.amplitude, about.amplitude_density)))
-    end = density.amplitude[0] + density.amplitude[-1]
-    axes.set(xlim=(0, end), ylim=(0, 1.1 * float(density.of_amplitude.max())))
-    axes.set_title(_at_rest("a hump away from rest", found.stability_index, -1))
 
 
 def _at_rest(words: str, index: float | None, limit: int) -> str:
@@ -129,11 +120,7 @@ def _draw_directions(case: Case, curve: Curve, source: Path, paths: Sequence[Pat
     """The stationary density, and some tilted ones."""
     import xarray  # with pandas, which takes half a second
 
-    with xarray.open_dataset(source, engine="h5netcdf") as found:
-        _draw_panels(case, curve, found, paths, heading)
-
-
-def _draw_panels(case: Case, curve: Curve, found: xarray.Dataset, paths: Sequence[Path], heading: str) -> None:
+    found = xarray.load_dataset(source, engine="h5netcdf")
     grid = direction_grid(curve.problem, min(found["T"].shape[1:]))
     panels = []
     if "stationary_density" in found:

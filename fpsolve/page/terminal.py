@@ -24,8 +24,6 @@ STYLES = {"good": "green", "bad": "bold red"}
 """The styles of cells that stand out."""
 COLOURS = {Severity.FAILURE: "bold red", Severity.WARNING: "yellow", Severity.NOTE: "cyan"}
 """The styles of notes."""
-SEVERAL_WORDS = 18
-"""Letters of a line of a text in a table, at least where it has as many."""
 
 
 def print_blocks(blocks: Iterable[Block], severities: Collection[Severity] = tuple(Severity)) -> None:
@@ -103,8 +101,7 @@ class Screen:
             is_broken = columns[i].is_text and not columns[i].rank
             heading = columns[i].heading.split() if is_folded or is_broken else [columns[i].heading]
             parts = [part for row in rows for part in row[i].plain.split(None if is_broken else "\n")]
-            whole = max((cell_len(row[i].plain) for row in rows), default=0) if is_broken else 0
-            return max([min(whole, SEVERAL_WORDS), *map(cell_len, [*heading, *parts])])
+            return max(map(cell_len, [*heading, *parts]))
 
         kept = list(range(len(columns)))
         leaving = sorted((i for i in kept if columns[i].rank), key=lambda i: columns[i].rank)
