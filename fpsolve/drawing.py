@@ -207,8 +207,8 @@ def plain_numbers(axis: Any) -> None:
     start, stop = axis.get_view_interval()
     decades = math.log10(stop / start)
     if decades < 4:
-        subs = (1, 2, 5) if decades < 2.2 else (1,)
-        axis.set_major_locator(MaxNLocator(4) if decades < 0.7 else LogLocator(subs=subs))
+        subs = (1, 1.5, 2, 3, 4, 5, 7) if decades < 0.7 else (1, 2, 5) if decades < 2.2 else (1,)
+        axis.set_major_locator(MaxNLocator(4) if decades < 0.4 else LogLocator(subs=subs))
         axis.set_major_formatter("{x:g}")
         axis.set_minor_formatter("")
 
