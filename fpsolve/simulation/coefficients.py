@@ -48,7 +48,7 @@ _DELAYS = 8.0
 _PARALLEL = 100.0
 """The condition of the modes from which on they are no coordinates."""
 _ONE_WAY = 1e-12
-"""The ratio of two entries below which one of them is none but for rounding."""
+"""Share of the largest product a_ij a_ji below which one of the two is none but for rounding."""
 _FORGOTTEN, _LONGEST = 6.0, 1000
 """Of a rate, the times that it needs; half-turns in which that of modes which hardly mix is taken to be over."""
 _PARTS = 64
@@ -447,10 +447,13 @@ def _modal_coordinates(free: FloatArray, every: FloatArray) -> FloatArray:
 
 
 def _balance(matrix: FloatArray, least: float = _ONE_WAY) -> FloatArray:
-    """The scales d for which entries a_ij d_j/d_i and a_ji d_i/d_j are alike, where their ratio is above the least."""
+    """The scales d for which entries a_ij d_j/d_i and a_ji d_i/d_j are alike.
+
+    Pairs count whose product, which is a rate squared whatever the units, is above a least share of the largest one.
+    """
     size = np.abs(matrix)
-    small, large = np.minimum(size, size.T), np.maximum(size, size.T)
-    pairs = [(i, j) for i, j in zip(*np.nonzero(small > least * large), strict=True) if i < j]
+    products = size * size.T
+    pairs = [*zip(*np.nonzero(np.triu(products > least * products.max(), 1)), strict=True)]
     sides, gaps = np.zeros((len(pairs), len(size))), np.zeros(len(pairs))
     for k, (i, j) in enumerate(pairs):
         sides[k, i], sides[k, j], gaps[k] = 1.0, -1.0, 0.5 * math.log(size[i, j] / size[j, i])

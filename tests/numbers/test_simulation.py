@@ -437,6 +437,20 @@ def test_steps_and_times_are_in_the_unit_of_the_system():
     assert period / found.step == pytest.approx(round(period / found.step), rel=1e-12)
 
 
+@pytest.mark.slow
+def test_chatter_is_the_same_in_every_unit_of_time():
+    """A mass that a second one presses to a wall: in units of 1 µs the stiffness is 10¹² times larger."""
+    text = "q' = v; v' = -k*q - d*v - 1.5*k*y - k*xi*y; y' = w; w' = -2*k*y - d*w - k*xi*q"
+    wall = [{"at": "q = 0", "restitution": 0.5}]
+    one, *others = (
+        unit * simulate(
+            rates(text, Telegraph(0.5, 0.7 / unit), wall, k=unit**-2, d=0.2 / unit), [], paths=32, time=160 * unit
+        ).lyapunov_exponent
+        for unit in (1.0, 1e-6, 1e5)
+    )  # fmt: skip
+    assert others == pytest.approx([one, one], rel=1e-9)
+
+
 def test_the_largest_good_step_is_named_and_good():
     with pytest.raises(ValueError, match="must be > 0 and <= ") as refused:
         simulate(paper(), [1.0], step=0.9)
