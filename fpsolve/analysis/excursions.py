@@ -193,8 +193,8 @@ def excursion(
     return solve_excursion(solver, phi=phi, xi=xi)
 
 
-def solve_excursion(solver: ExponentSolver, *, phi: Start, xi: StartOfNoise, root: float | None = None) -> Excursion:
-    """The excursions of a solver's problem; `root` is near δ_p, if that is known."""
+def solve_excursion(solver: ExponentSolver, *, phi: Start, xi: StartOfNoise) -> Excursion:
+    """The excursions of a solver's problem."""
     problem = solver.problem
     if solver.mesh:  # which need not reach the ends of the noise
         solver = replace(solver, mesh=None)
@@ -208,7 +208,7 @@ def solve_excursion(solver: ExponentSolver, *, phi: Start, xi: StartOfNoise, roo
     if exponent.value > 0:
         return replace(found, is_certain=True)
     refuse(solver.method.reason(1.0, SYMBOL))
-    index = nonzero_root(solver, guess=root)
+    index = nonzero_root(solver)
     if not index:
         return replace(found, notes=(_without_index(index.reason),))
     found = replace(found, stability_index=index)

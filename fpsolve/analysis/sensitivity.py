@@ -162,7 +162,6 @@ def solve_sensitivities(
     along: Mapping[str, ParameterDerivative],
     *,
     indices: Iterable[str],
-    root: float | None = None,
     progress: Callable[[], None] = lambda: None,
 ) -> Sensitivities:
     """The sensitivities of a solver's problem along some directions.
@@ -172,7 +171,6 @@ def solve_sensitivities(
         p: the moments, shape (n,), for which Λ is finite.
         along: the directions, by name.
         indices: those wanted.
-        root: near δ_p, if it is known.
         progress: called once for each p and each index, also where it fails.
     """
     problem, parameters = solver.problem, solver.problem.parameters
@@ -198,7 +196,7 @@ def solve_sensitivities(
         return {}
 
     def of_root() -> Slopes:
-        index = nonzero_root(solver, guess=root)
+        index = nonzero_root(solver)
         return found.root(index) if index else {}
 
     moments = tuple(tried(moment_at(each), partial(found.moment, each), each) for each in p.tolist())

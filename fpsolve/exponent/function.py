@@ -121,8 +121,8 @@ class MomentLyapunovFunction(Result):
         return self.solver.variance_rate()
 
     def stability_index(self, search: tuple[float, float] = SEARCH_INTERVAL) -> Estimate | Absent:
-        """δ_p, see `nonzero_root`, from `root` on, or why there is none. Raises `NotConverged`."""
-        return nonzero_root(self.solver, search, self.root())
+        """δ_p, see `nonzero_root`, or why there is none. Raises `NotConverged`."""
+        return nonzero_root(self.solver, search)
 
     def to_xarray(self, p: ArrayLike | None = None) -> xarray.Dataset:
         """Λ(p) with its derivatives and errors at some p, `SHOWN` of the interval if none are given."""

@@ -195,20 +195,19 @@ class Index(Quantity):
     """A quantity that is one number, and not one for each p.
 
     Attributes:
-        solve: finds it, from a solver and the `root` of its `MomentLyapunov`, or says why there is none in `interval`.
-            Raises `NotConverged`.
+        solve: finds it, from a solver, or says why there is none in `interval`. Raises `NotConverged`.
         theory: what perturbation theory makes of it; it may be infinite, or NaN where that does not apply.
         interval: where it is sought.
     """
 
-    solve: Callable[[ExponentSolver, float | None], Estimate | Absent] = field(kw_only=True)
+    solve: Callable[[ExponentSolver], Estimate | Absent] = field(kw_only=True)
     theory: Callable[[Problem], float] = field(kw_only=True)
     interval: tuple[float, float] = field(default=(-math.inf, math.inf), kw_only=True)
 
 
 def _index(
     quantity: Quantity,
-    solve: Callable[[ExponentSolver, float | None], Estimate | Absent],
+    solve: Callable[[ExponentSolver], Estimate | Absent],
     interval: tuple[float, float] = (-math.inf, math.inf),
 ) -> Index:
     """The theory is the number of this name of second-order perturbation theory; NaN where that does not apply."""
@@ -224,16 +223,14 @@ def _restitution_by_theory(problem: Problem) -> float:
     return system.restitution_at(theory.critical_log_factor)[1] if theory and len(system.jumps) == 1 else math.nan
 
 
-LYAPUNOV_EXPONENT: Index = _index(quantity.LYAPUNOV_EXPONENT, lambda solver, _: solver.lyapunov_exponent())
-STABILITY_INDEX: Index = _index(
-    quantity.STABILITY_INDEX, lambda solver, guess: nonzero_root(solver, guess=guess), SEARCH_INTERVAL
-)
-VARIANCE_RATE = _index(quantity.VARIANCE_RATE, lambda solver, _: solver.variance_rate())
-IMPACT_RATE = _index(quantity.IMPACT_RATE, lambda solver, _: impact_rate(solver))
-CRITICAL_IMPACT_FACTOR = _index(quantity.CRITICAL_IMPACT_FACTOR, lambda solver, _: critical_impact_factor(solver))
+LYAPUNOV_EXPONENT: Index = _index(quantity.LYAPUNOV_EXPONENT, ExponentSolver.lyapunov_exponent)
+STABILITY_INDEX: Index = _index(quantity.STABILITY_INDEX, nonzero_root, SEARCH_INTERVAL)
+VARIANCE_RATE = _index(quantity.VARIANCE_RATE, ExponentSolver.variance_rate)
+IMPACT_RATE = _index(quantity.IMPACT_RATE, impact_rate)
+CRITICAL_IMPACT_FACTOR = _index(quantity.CRITICAL_IMPACT_FACTOR, critical_impact_factor)
 CRITICAL_RESTITUTION = Index(
     **vars(quantity.CRITICAL_RESTITUTION),
-    solve=lambda solver, _: critical_restitution(solver),
+    solve=critical_restitution,
     theory=_restitution_by_theory,
     interval=(0.0, 1.0),
 )

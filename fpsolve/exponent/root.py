@@ -24,9 +24,7 @@ PRECISE = 0.5
 """Of what rtol allows δ_p, for the error of the last Λ(p)/p."""
 
 
-def nonzero_root(
-    solver: ExponentSolver, interval: tuple[float, float] = SEARCH_INTERVAL, guess: float | None = None
-) -> Estimate | Absent:
+def nonzero_root(solver: ExponentSolver, interval: tuple[float, float] = SEARCH_INTERVAL) -> Estimate | Absent:
     """δ_p, the non-zero root of Λ(p), or why Λ has none in the interval.
 
     Λ is convex, so Λ(p)/p increases and has one root at most, see `increasing_root`. The last solve is as accurate as
@@ -60,16 +58,14 @@ def nonzero_root(
         return Value(ratio, slope, 0.1 * error)
 
     signed: tuple[float, ...] = ()
-    if guess is None:
-        ratio, slope, error = method.ratio(0.0)
-        if slope <= error and _is_linear(solver, low, high):
-            return Absent(Message(Code.LINEAR, value=ratio if abs(ratio) > error else 0.0))
-        guess = -ratio / slope if slope > 0 else math.copysign(1.0, -ratio)
-        guess = min(max(guess, -OUTWARD), OUTWARD)
-        if abs(ratio) > 2 * error and low < 0 < high:
-            (low, high), signed = (0.0, high) if ratio < 0 else (low, 0.0), (0.0,)
+    ratio, slope, error = method.ratio(0.0)
+    if slope <= error and _is_linear(solver, low, high):
+        return Absent(Message(Code.LINEAR, value=ratio if abs(ratio) > error else 0.0))
+    start = -ratio / slope if slope > 0 else math.copysign(1.0, -ratio)
+    if abs(ratio) > 2 * error and low < 0 < high:
+        (low, high), signed = (0.0, high) if ratio < 0 else (low, 0.0), (0.0,)
     try:
-        p = increasing_root(at, guess, (low, high), signed, OUTWARD)
+        p = increasing_root(at, min(max(start, -OUTWARD), OUTWARD), (low, high), signed, OUTWARD)
         found = _index(p, *solved[p])
         if found.relative_error > solver.rtol and method.adapts:
             tolerance = partial(share_of, PRECISE * solver.rtol * solved[p][1] * max(1.0, abs(p)))

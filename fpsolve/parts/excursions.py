@@ -19,7 +19,7 @@ def _solve(job: Job, settings: Settings) -> Excursion:
         check_start(job.curve.problem, settings["phi"], settings["xi"])
     except ValueError as error:  # of sets after the first one
         raise FpsolveError(str(error)) from None
-    return solve_excursion(job.solver, phi=settings["phi"], xi=settings["xi"], root=job.root)
+    return solve_excursion(job.solver, phi=settings["phi"], xi=settings["xi"])
 
 
 QUESTION: Question = Question(EXCURSIONS, _settings, _solve, Excursion, SYMBOL, said=lambda found, *_: found.notes)

@@ -11,7 +11,6 @@ from fpsolve.errors import NoSuchExponent
 from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.quantities import (
     INDICES,
-    MOMENT,
     STABILITY_INDEX,
     Index,
 )
@@ -28,9 +27,8 @@ def question_of(index: Index) -> Question:
         return {} if index.name in case.asked else None
 
     def solve(job: Job, settings: Settings) -> Estimate | Reason:
-        moments = job.found(MOMENT.name)
         try:
-            found = index.solve(job.solver, moments.root if moments else None)
+            found = index.solve(job.solver)
         except NoSuchExponent as failure:
             return Reason("impossible", failure.message, index.symbol)
         if found:

@@ -23,7 +23,7 @@ from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.problem import Problem
-from fpsolve.model.quantity import MOMENT, STABILITY_INDEX
+from fpsolve.model.quantity import MOMENT
 from fpsolve.results.curve import CurveResult, MomentColumns
 from fpsolve.signals import is_interrupt
 
@@ -185,11 +185,6 @@ class Job:
     def found(self, name: str) -> Any:
         """What was found; None where that is nothing."""
         return entry.found if (entry := self.entries.get(name)) else None
-
-    @property
-    def root(self) -> float | None:
-        """δ_p, if it is known."""
-        return None if (index := self.found(STABILITY_INDEX.name)) is None else float(index.value)
 
     def add(self, name: str, entry: Entry) -> None:
         """Take what became of a question."""

@@ -24,7 +24,7 @@ def _solve(job: Job, settings: Settings) -> Sensitivities:
     solved = job.columns.p
     p = np.array([p for p in settings["p"] if np.any(solved == p)])
     names = [name for name in settings["indices"] if job.found(name) is not None]
-    return solve_sensitivities(job.solver, p, job.curve.problem.derivatives(), indices=names, root=job.root)
+    return solve_sensitivities(job.solver, p, job.curve.problem.derivatives(), indices=names)
 
 
 def _lacks(found: Sensitivities, settings: Settings) -> list[Message]:

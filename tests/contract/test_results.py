@@ -230,7 +230,7 @@ def test_data_hold_the_numbers_of_python(results):
 
 @pytest.mark.parametrize("name", INDICES)
 def test_an_index_knows_what_it_is(name):
-    estimate = INDICES[name].solve(fpsolve.ExponentSolver(HIT), None)
+    estimate = INDICES[name].solve(fpsolve.ExponentSolver(HIT))
     found = estimate.to_xarray()
     assert found[name].attrs == INDICES[name].attributes
     same(found, name, estimate.value, estimate.error_estimate)

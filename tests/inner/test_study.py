@@ -44,7 +44,7 @@ def test_quantity_and_question_of_the_page_on_contributing_are_solved_and_tabula
         assert result.parts[chance.name].value == pytest.approx(expected, rel=1e-8)
         row, solver = columns.row_of(case, result), ExponentSolver(case.problem)
         assert {each.name for each in columns.columns_of(case)} >= {index.name, f"{index.name}_error", chance.name}
-        assert row[index.name] == pytest.approx(index.solve(solver, None).value, rel=1e-6)
+        assert row[index.name] == pytest.approx(index.solve(solver).value, rel=1e-6)
 
 
 RESULT = MonteCarlo(
