@@ -195,12 +195,8 @@ def solve_sensitivities(
         notes.append(Message(Code.NO_SENSITIVITIES, p=p, symbol=symbol, reason=reason))
         return {}
 
-    def of_root() -> Slopes:
-        index = nonzero_root(solver)
-        return found.root(index) if index else {}
-
     moments = tuple(tried(moment_at(each), partial(found.moment, each), each) for each in p.tolist())
-    solves: Any = dict(zip(RECORDS, (partial(found.ratio, 0.0), of_root, found.variance_rate), strict=True))
+    solves: Any = dict(zip(RECORDS, (partial(found.ratio, 0.0), found.root, found.variance_rate), strict=True))
     slopes = {name: tried(RECORDS[name], solves[name]) for name in indices}
     values = problem.values
     noises: list[Any] = [*problem.sections.items()][1:]
@@ -227,7 +223,7 @@ class Gradient:
     """
 
     def __init__(self, solver: ExponentSolver, along: Mapping[str, ParameterDerivative]) -> None:
-        self._method, self._along = solver.method, along
+        self._solver, self._method, self._along = solver, solver.method, along
 
     def moment(self, p: float) -> Slopes:
         """∂Λ(p)/∂θ. Raises `NotConverged`, `NoSuchExponent`."""
@@ -253,8 +249,13 @@ class Gradient:
         share = self._method.variance_rate().relative_error
         return self._compared(0.0, share, lambda _, changed: changed.curvature)
 
-    def root(self, index: Estimate) -> Slopes:
-        """∂δ_p/∂θ: that of Λ(p)/p over that by p at δ_p, with twice the relative error of δ_p."""
+    def root(self) -> Slopes:
+        """∂δ_p/∂θ: that of Λ(p)/p over that by p at δ_p, with twice the relative error of δ_p; none without δ_p.
+
+        Raises `NotConverged`, `NoSuchExponent`.
+        """
+        if not (index := nonzero_root(self._solver)):
+            return {}
         p = index.value
 
         def of(at: PairDerivatives, changed: Changed) -> Estimate:

@@ -13,7 +13,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import partial
 from itertools import repeat
 from typing import TYPE_CHECKING, Any
 
@@ -28,7 +27,7 @@ from fpsolve.data import Result, dataset
 from fpsolve.errors import NotConverged
 from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.method import Budget, checked_moments
-from fpsolve.exponent.root import nonzero_root
+from fpsolve.exponent.quantities import INDICES
 from fpsolve.exponent.solver import solver_of
 from fpsolve.model.problem import Problem
 from fpsolve.model.quantity import LYAPUNOV_EXPONENT, MOMENT, STABILITY_INDEX, P, Quantity
@@ -238,11 +237,8 @@ def uncertainty(
     laws = laws_of(problem, uncertain)
     solver = solver_of(problem, rtol=rtol, budget=budget)
     points = checked_moments(p, solver.method, may_be_empty=True)
-    solves: Any = {
-        LYAPUNOV_EXPONENT.name: solver.lyapunov_exponent,
-        STABILITY_INDEX.name: partial(nonzero_root, solver),
-    }
-    found = {name: each for name, solve in solves.items() if solver.method.has_pairs and (each := solve())}
+    indices = UNCERTAIN if solver.method.has_pairs else ()
+    found = {name: each for name in indices if (each := INDICES[name].solve(solver))}
     along = {key: problem.derivative(key) for key in laws}
     slopes = solve_sensitivities(solver, points, along, indices=[*found])
     solved = solver.moments(points)

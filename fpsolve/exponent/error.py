@@ -19,10 +19,9 @@ import numpy as np
 
 from fpsolve.arrays import FloatArray
 from fpsolve.data import Quantity, Result, brief, dataset
-from fpsolve.errors import NotConverged
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.fem.axis import ModeEffects, along
-from fpsolve.messages import Code, Message, Remedy
+from fpsolve.messages import Message
 from fpsolve.model.quantity import UNNAMED
 
 if TYPE_CHECKING:
@@ -158,15 +157,6 @@ class Failure:
 
     p: float | None
     reason: Message
-
-
-def checked(estimate: Estimate, remedy: Remedy, p: float | None = None) -> Estimate:
-    """An estimate, such as that of Λ(p), whose error leaves it a meaning. Raises `NotConverged`."""
-    if not estimate.relative_error <= MEANINGLESS:
-        number = {"value": estimate.value, "size": estimate.error_estimate}
-        symbol = estimate.quantity.symbol if p is None else "Λ(p)"
-        raise NotConverged(Message(Code.MEANINGLESS, p=p, symbol=symbol, **number), estimate, remedy)
-    return estimate
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,7 +19,7 @@ from fpsolve.budget import Meter, OverBudget, charge, unless_over_budget
 from fpsolve.errors import FpsolveError, MeshError, NoHierarchy, NoSuchExponent, NotConverged, SingularMatrix
 from fpsolve.exponent.changed import Changed
 from fpsolve.exponent.eigen import PairDerivatives, PrincipalPair
-from fpsolve.exponent.error import Absent, Estimate, Moment, checked
+from fpsolve.exponent.error import MEANINGLESS, Absent, Estimate, Moment
 from fpsolve.fem.factors import one_thread
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.fem.space import Space
@@ -244,14 +244,17 @@ class Method:
         rtol, of_value = self.settings.rtol, self.settings.of_value
         return max(rtol * self.scale(p), max(rtol, of_value) * abs(value))
 
-    @property
-    def missed(self) -> Remedy | None:
-        """What to do where an index misses rtol; None where that is found for each p as well as it can be."""
-        return None if self.adapts else Remedy.MESH
-
     def check(self, p: float, value: float, error: float) -> None:
         """Refuse a value of Λ(p) of which its error leaves nothing. Raises `NotConverged`."""
-        checked(Estimate(value, error, self.scale(p)), self.refinement, p)
+        self.checked(Estimate(value, error, self.scale(p)), p)
+
+    def checked(self, estimate: Estimate, p: float | None = None) -> Estimate:
+        """An estimate, such as that of Λ(p), whose error leaves it a meaning. Raises `NotConverged`."""
+        if not estimate.relative_error <= MEANINGLESS:
+            number = {"value": estimate.value, "size": estimate.error_estimate}
+            symbol = estimate.quantity.symbol if p is None else "Λ(p)"
+            raise NotConverged(Message(Code.MEANINGLESS, p=p, symbol=symbol, **number), estimate, self.refinement)
+        return estimate
 
     @property
     def refinement(self) -> Remedy:
@@ -324,7 +327,7 @@ class Method:
         """λ, Eq. (2), the growth rate of almost every path: Λ′(0) but for algebraic tails. Raises `NotConverged`."""
         value, error = self.ratio_alone(0.0)
         meaning = ALMOST_EVERY if self.lacks_moments else ""
-        return checked(Estimate(value, error, self.scales.linear, meaning, LYAPUNOV_EXPONENT), self.refinement)
+        return self.checked(Estimate(value, error, self.scales.linear, meaning, LYAPUNOV_EXPONENT))
 
     def finer_pair(self, pair: PrincipalPair) -> PrincipalPair:
         """That at the same p on a finer discretisation, where there are pairs. Raises `NotConverged`."""
@@ -358,7 +361,7 @@ class Method:
             finest = PairDerivatives(self.finer_pair(self.finer_around_zero.pair)).second_derivative
             error, better = abs(finest - better) + 0.5 * error, finest
         error += 10 * sys.float_info.epsilon * max(scale, abs(better))
-        return checked(Estimate(better, error, scale, quantity=VARIANCE_RATE), self.refinement)
+        return self.checked(Estimate(better, error, scale, quantity=VARIANCE_RATE))
 
     def gradient(self, p: float, keys: Sequence[str]) -> FloatArray:
         """∂/∂θ of Λ(p)/p, at p = 0 of λ, by parameters. Raises `NotConverged`, `NoSuchExponent`."""

@@ -32,7 +32,7 @@ from typing import Literal
 
 from fpsolve.arrays import is_whole, shown
 from fpsolve.exponent.eigen import PrincipalPair
-from fpsolve.exponent.error import Absent, Estimate, checked
+from fpsolve.exponent.error import Absent, Estimate
 from fpsolve.exponent.method import Budget
 from fpsolve.exponent.root import SEARCH_INTERVAL, nonzero_root
 from fpsolve.exponent.solver import ExponentSolver, solver_of
@@ -76,7 +76,7 @@ def impact_rate(solver: ExponentSolver, jump: int | None = None) -> Estimate | A
     usual = generator.framed.unit_rate / math.pi
     rounding, lost = 10 * _EPS * max(usual, better), _EPS * generator.rounding_growth * usual
     error = abs(better - value) + (rounding if better > lost else lost)
-    return checked(Estimate(better, error, usual, quantity=quantity.IMPACT_RATE), solver.method.refinement)
+    return solver.method.checked(Estimate(better, error, usual, quantity=quantity.IMPACT_RATE))
 
 
 def critical_impact_factor(solver: ExponentSolver, jump: int | None = None) -> Estimate | Absent:
@@ -97,7 +97,7 @@ def critical_impact_factor(solver: ExponentSolver, jump: int | None = None) -> E
     value = math.exp(log.value)
     error = value * math.expm1(min(log.error_estimate, LARGEST_LOG))
     found = Estimate(value, error, value * max(1.0, log.scale), quantity=quantity.CRITICAL_IMPACT_FACTOR)
-    return checked(found, solver.method.refinement)
+    return solver.method.checked(found)
 
 
 def critical_restitution(solver: ExponentSolver, jump: int | None = None) -> Estimate | Absent:
@@ -123,7 +123,7 @@ def critical_restitution(solver: ExponentSolver, jump: int | None = None) -> Est
     if value <= 0:
         return Absent(Message(Code.ALWAYS_UNSTABLE, symbol=symbol, value=value))
     error, scale = slope * log.error_estimate + _EPS, max(1.0, slope * log.scale)
-    return checked(Estimate(value, error, scale, quantity=quantity.CRITICAL_RESTITUTION), solver.method.refinement)
+    return solver.method.checked(Estimate(value, error, scale, quantity=quantity.CRITICAL_RESTITUTION))
 
 
 def _flux(pair: PrincipalPair, number: int) -> float:

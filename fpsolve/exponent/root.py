@@ -10,7 +10,7 @@ import numpy as np
 
 from fpsolve.budget import unless_over_budget
 from fpsolve.errors import NotConverged
-from fpsolve.exponent.error import Absent, Estimate, checked
+from fpsolve.exponent.error import Absent, Estimate
 from fpsolve.exponent.method import Tolerance, refuse
 from fpsolve.exponent.solver import ExponentSolver, contradiction, share_of
 from fpsolve.messages import Code, Message
@@ -59,8 +59,10 @@ def nonzero_root(solver: ExponentSolver, interval: tuple[float, float] = SEARCH_
 
     signed: tuple[float, ...] = ()
     ratio, slope, error = method.ratio(0.0)
-    if slope <= error and _is_linear(solver, low, high):
-        return Absent(Message(Code.LINEAR, value=ratio if abs(ratio) > error else 0.0))
+    if slope <= error:  # where Λ(p)/p is the same far out on both sides, to its errors, it has no root
+        sides = [method.ratio_alone(float(np.clip(p, low, high))) for p in (-OUTWARD, OUTWARD)]
+        if abs(sides[1][0] - sides[0][0]) <= sides[0][1] + sides[1][1]:
+            return Absent(Message(Code.LINEAR, value=ratio if abs(ratio) > error else 0.0))
     start = -ratio / slope if slope > 0 else math.copysign(1.0, -ratio)
     if abs(ratio) > 2 * error and low < 0 < high:
         (low, high), signed = (0.0, high) if ratio < 0 else (low, 0.0), (0.0,)
@@ -84,13 +86,7 @@ def nonzero_root(solver: ExponentSolver, interval: tuple[float, float] = SEARCH_
     place, value, steep, off = (np.array([number]) for number in (p, p * ratio, ratio + p * slope, abs(p) * error))
     if obstacle := contradiction(solver, place, value, steep, off, lambda: np.array([solver.slope_error(p)])):
         raise NotConverged(obstacle, remedy=method.refinement)
-    return checked(found, method.refinement)
-
-
-def _is_linear(solver: ExponentSolver, low: float, high: float) -> bool:
-    """Whether Λ(p)/p, which increases, is the same far out on both sides, to its errors."""
-    sides = [solver.method.ratio_alone(float(np.clip(p, low, high))) for p in (-OUTWARD, OUTWARD)]
-    return abs(sides[1][0] - sides[0][0]) <= sides[0][1] + sides[1][1]
+    return method.checked(found)
 
 
 def _index(p: float, ratio: float, slope: float, error: float) -> Estimate:

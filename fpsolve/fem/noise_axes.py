@@ -358,7 +358,7 @@ class PolynomialAxis(CountedAxis, LineAxis):
         logs, a = super()._changed_logs(change), self.noise.end_exponent
         if change.end_exponent and a < SHARP_ENDS:  # no rule of Gauss takes its ln(1 − x²) near ±1 as it stands
             x = self.rule.points / self.rule.scale
-            logs = logs + change.end_exponent * (_end_logarithm(x.size, self._ends[0], a) - np.log1p(-(x**2)))
+            logs = logs + change.end_exponent * (logarithm(x, a, x.size) - np.log1p(-(x**2)))
         return logs
 
     def values_at(self, z: FloatArray) -> FloatArray:
@@ -499,12 +499,6 @@ def _hermite_table(count: int) -> tuple[Polynomials, FloatArray, FloatArray, Flo
 @lru_cache(maxsize=64)
 def _gegenbauer_rule(count: int, exponent: float) -> tuple[FloatArray, FloatArray]:
     return gegenbauer(count, exponent).rule()
-
-
-@lru_cache(maxsize=64)
-def _end_logarithm(count: int, exponent: float, a: float) -> FloatArray:
-    """ln(1 − x²) at the points of a rule, as the polynomials of the exponent a have it."""
-    return logarithm(_gegenbauer_rule(count, exponent)[0], a, count)
 
 
 def slope_along(g: Coefficient, xi: FloatArray, moved: FloatArray) -> FloatArray:

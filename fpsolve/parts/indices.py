@@ -14,7 +14,7 @@ from fpsolve.exponent.quantities import (
     STABILITY_INDEX,
     Index,
 )
-from fpsolve.messages import Code, Message
+from fpsolve.messages import Code, Message, Remedy
 from fpsolve.parts.question import Job, Numerics, Question, Reason, Settings
 from fpsolve.results.curve import CurveResult
 
@@ -46,7 +46,7 @@ def question_of(index: Index) -> Question:
                 error=found.error_estimate,
                 size=found.relative_error,
                 rtol=numerics.rtol,
-                remedy=numerics.solver(curve.problem).method.missed,
+                remedy=None if numerics.solver(curve.problem).method.adapts else Remedy.MESH,
             )
 
     def numbers(case: Case, result: CurveResult | None) -> Mapping[Quantity, Any]:
