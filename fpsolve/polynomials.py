@@ -6,7 +6,7 @@ They follow from their three-term recurrence b_(k+1) P_(k+1) = (x âˆ’ a_k) P_k â
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 from scipy.linalg import eigh_tridiagonal
@@ -37,6 +37,7 @@ class Polynomials:
             found[k + 1] /= b
         return found[:-1, 0].T, found[:-1, 1].T
 
+    @cached_property
     def rule(self) -> tuple[FloatArray, FloatArray]:
         """Gauss points by the method of Golub and Welsch, and weights, each to its own relative accuracy."""
         x = eigh_tridiagonal(finite(self.a), finite(self.b[:-1]), eigvals_only=True)

@@ -409,5 +409,11 @@ def xi_marginal(pair: PrincipalPair, at: Samples) -> FloatArray:
 
 def refuse_more(pair: PrincipalPair) -> None:
     """Raises `OutputError` where T depends on more than φ and ξ."""
-    if why := choose(pair.generator.problem).no_surface:
-        raise OutputError(why)
+    method = choose(pair.generator.problem)
+    if not method.pictures.is_seen:
+        why = f"T of {method.problem.dimension} variables is no function of phase and noise"
+        raise OutputError(
+            f"{why}; use `draw_eigenfunction`, `tilted_density`, or a case, whose run writes files for ParaView"
+        )
+    if method.no_picture:
+        raise OutputError(method.no_picture)

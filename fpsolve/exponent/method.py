@@ -198,11 +198,6 @@ class Method:
         return infinite(self.problem, p, symbol)
 
     @property
-    def no_surface(self) -> str:
-        """Why functions of it cannot be drawn over phase and noise; empty where they can."""
-        return self.no_picture
-
-    @property
     def has_pairs(self) -> bool:
         """Whether there are eigenfunctions, and what follows from them, as λ."""
         return self.reason(0.0) is None

@@ -283,10 +283,5 @@ class Directions(Elements):
         else:
             yield self.stage.at(self.problem, p, self.settings.rtol, self.spaces)
 
-    @property
-    def no_surface(self) -> str:
-        why = f"T of {self.problem.dimension} variables is no function of phase and noise"
-        return f"{why}; use `draw_eigenfunction`, `tilted_density`, or a case, whose run writes files for ParaView"
-
     def is_dear(self, p: float) -> bool:
         return p <= 0 or p % 2 != 0

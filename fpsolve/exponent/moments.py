@@ -277,11 +277,8 @@ class EvenMoment:
     @cached_property
     def is_positive(self) -> bool:
         """Whether E x^α are moments, and T is positive, as far as it is seen: both but for a common sign."""
-        form, t = (
-            moment_form(self.moments, self.equations.dimension, self.equations.p),
-            self._polynomial_values(),
-        )
-        return _has_one_sign(np.asarray(np.linalg.eigvalsh(form))) and _has_one_sign(t)
+        form = moment_form(self.moments, self.equations.dimension, self.equations.p)
+        return _has_one_sign(np.asarray(np.linalg.eigvalsh(form))) and _has_one_sign(self._polynomial_values())
 
     def _polynomial_values(self) -> FloatArray:
         """T at some directions; of p = 2 the eigenvalues of its matrix."""

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import Any, NamedTuple, Self
 
 import numpy as np
@@ -321,13 +321,14 @@ class PolynomialAxis(CountedAxis, LineAxis):
     def rule(self) -> Table:  # type: ignore[override]
         tilt, end = self.tilt, self.noise.half_width / self.unit
         if math.isinf(end):
-            polynomials, x, values, slopes, weights = _hermite_table(self.count)
+            polynomials, (x, weights) = hermite(self.count), hermite(self.count + MORE_POINTS).rule
+            values, slopes = polynomials.at(x)
             slopes, log_mass = slopes + tilt * values, 2 * tilt**2
             return Table(x + 2 * tilt, weights, values, slopes, log_mass, polynomials, 2 * tilt, 1.0)
         exponent, missing = self._ends
         more = min(abs(tilt) * end, 4 * tilt**2)
         points = 16 * math.ceil((2 * self.count + MORE_POINTS + more) / 16)  # few rules serve many spaces
-        x, weights = _gegenbauer_rule(points, exponent)
+        x, weights = gegenbauer(points, exponent).rule
         damping, logs = (1 - x**2) ** missing, np.log(weights) + 2 * tilt * end * x
         tilted = np.exp(logs - logs.max())
         polynomials = stieltjes(x, tilted, self.count) if tilt else gegenbauer(self.count, exponent)
@@ -486,19 +487,6 @@ class StateAxis(NoiseAxis):
 
     def samples(self) -> Samples:
         return Samples(self.xi, self.rule.measure, np.ones(self.size), self.rule.values, np.ones(self.size))
-
-
-@lru_cache(maxsize=64)
-def _hermite_table(count: int) -> tuple[Polynomials, FloatArray, FloatArray, FloatArray, FloatArray]:
-    """The polynomials, points of a rule, values and slopes there, weights."""
-    x, weights = hermite(count + MORE_POINTS).rule()
-    polynomials = hermite(count)
-    return polynomials, x, *polynomials.at(x), weights
-
-
-@lru_cache(maxsize=64)
-def _gegenbauer_rule(count: int, exponent: float) -> tuple[FloatArray, FloatArray]:
-    return gegenbauer(count, exponent).rule()
 
 
 def slope_along(g: Coefficient, xi: FloatArray, moved: FloatArray) -> FloatArray:

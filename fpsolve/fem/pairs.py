@@ -64,7 +64,7 @@ class PairAxis(CountedAxis):
 
     @cached_property
     def rule(self) -> Rule:
-        x, weights = hermite(self.count).rule()
+        x, weights = hermite(self.count).rule
         table, (_, first, second) = hermite(self.count).at(x)[0], self._degrees
         points = np.array([np.repeat(x, x.size), np.tile(x, x.size)])
         values = (table[:, None, first] * table[None, :, second]).reshape(-1, self.size)
@@ -73,7 +73,7 @@ class PairAxis(CountedAxis):
     @cached_property
     def _fine(self) -> Rule:
         """The polynomials at the points ξ of a rule for u₁."""
-        x, weights = hermite(self.count + MORE_POINTS).rule()
+        x, weights = hermite(self.count + MORE_POINTS).rule
         unit = self.noise.standard_deviation
         return Rule(unit * (x + self.center), weights, hermite(self.count).at(x)[0])
 

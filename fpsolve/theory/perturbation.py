@@ -113,7 +113,6 @@ class SecondOrder:
         return Scale(sum(map(abs, self.linear_terms)), self.quadratic)
 
 
-@lru_cache(8)  # a set asks for it five times: scales, columns and notes
 def second_order(problem: Problem) -> SecondOrder:
     """ε²Λ₂(p) of a problem.
 
@@ -133,7 +132,7 @@ def harmonic_loads(problem: Problem) -> Sequence[str]:
     return [f"{section} with sigma = 0" if noise.values else "cos(nu*t)" for section, noise in loads]
 
 
-@lru_cache(8)
+@lru_cache(8)  # a set asks for it five times: scales, columns and notes
 def _of_random_noise(problem: Problem) -> SecondOrder:
     """ε²Λ₂(p) without what harmonic loads change."""
     (system, diffusions, impulses), noises = problem.noise.motion(problem.system), problem.noise.parts
