@@ -223,9 +223,9 @@ def _restitution_by_theory(problem: Problem) -> float:
     return system.restitution_at(theory.critical_log_factor)[1] if theory and len(system.jumps) == 1 else math.nan
 
 
-LYAPUNOV_EXPONENT: Index = _index(quantity.LYAPUNOV_EXPONENT, ExponentSolver.lyapunov_exponent)
+LYAPUNOV_EXPONENT: Index = _index(quantity.LYAPUNOV_EXPONENT, lambda solver: solver.lyapunov_exponent())
 STABILITY_INDEX: Index = _index(quantity.STABILITY_INDEX, nonzero_root, SEARCH_INTERVAL)
-VARIANCE_RATE = _index(quantity.VARIANCE_RATE, ExponentSolver.variance_rate)
+VARIANCE_RATE = _index(quantity.VARIANCE_RATE, lambda solver: solver.variance_rate())
 IMPACT_RATE = _index(quantity.IMPACT_RATE, impact_rate)
 CRITICAL_IMPACT_FACTOR = _index(quantity.CRITICAL_IMPACT_FACTOR, critical_impact_factor)
 CRITICAL_RESTITUTION = Index(
