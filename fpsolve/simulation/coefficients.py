@@ -16,7 +16,6 @@ from scipy.linalg import expm
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import FpsolveError
 from fpsolve.model.noise import Noise
-from fpsolve.model.noises.bounded import NoiseOfAngle
 from fpsolve.model.noises.steps import ChainStep
 from fpsolve.model.plane import (
     SAME_DELAY,
@@ -375,10 +374,8 @@ def _mixing_time(free: FloatArray, loads: Sequence[Load], half_turn: float) -> f
     memory, about, see `_exchanged`. What turns meanwhile is forgotten sooner, as it averages out. With harmonic loads
     it is that from period to period.
     """
-    n, waves = len(free), list[tuple[FloatArray, NoiseOfAngle]]()
-    for load in loads:
-        if isinstance(load.noise, NoiseOfAngle) and load.noise.period:
-            waves.append((load.driven, load.noise))
+    n = len(free)
+    waves: list[tuple[FloatArray, Any]] = [(load.driven, load.noise) for load in loads if load.noise.period]
     if n <= 2 and not waves:
         return 0.0
     pairs = [(i, j) for i in range(n) for j in range(i + 1)]
