@@ -307,7 +307,7 @@ class PlaneElements(Elements):
         if len(noise.parts) > 1:
             several = "an eigenfunction of the phase and of several noises that are not white cannot be drawn"
             return f"{several}; make all of these noises white but one"
-        if noise.is_drawn:
+        if noise.is_markov:
             return ""
         return (
             f"{noise.kind} noise is no Markov process by itself, so that an eigenfunction is not a function of phase "

@@ -142,8 +142,8 @@ class Noise(Parametrised):
         return self.basis in ("polynomials", "cells")
 
     @property
-    def is_drawn(self) -> bool:
-        """Whether the eigenfunction T can be drawn, as a surface over (φ, ξ) or as a line for each state."""
+    def is_markov(self) -> bool:
+        """Whether ξ is a Markov process by itself, so that T is a function of φ and ξ."""
         return self.is_diffusion or self.has_states
 
     @property
@@ -190,7 +190,7 @@ class Noise(Parametrised):
 
     def misfit(self, xi: float) -> str:
         """Why no path that is told by ξ alone starts there, after a sentence "got xi = 1"; empty where one does."""
-        if not self.is_drawn:
+        if not self.is_markov:
             return f", but its value alone does not tell how it goes on; {STAY}"
         return "" if abs(xi) < self.half_width else f"; must be between -{self.half_width:g} and {self.half_width:g}"
 

@@ -255,9 +255,9 @@ def _enlarged(
     while (
         idle < (PATIENCE_FAR if delta > FAR * abs(value) else PATIENCE) and (2 * waves + 1) * degrees <= MOST_UNKNOWNS
     ):
-        begun = timer.elapsed
+        start = timer.elapsed
         cost, unknowns = cost * ((2 * waves + 1) * degrees / unknowns) ** 1.5, (2 * waves + 1) * degrees
-        if begun + cost > timer.seconds:
+        if start + cost > timer.seconds:
             break
         try:
             pair, basis = _solved(noise, basis, p, guess, waves, degrees)
@@ -268,7 +268,7 @@ def _enlarged(
             break
         edges = pair.edges if noise.states is None else (pair.edges[0], 0.0)
         before, edge = edge, max(edges)
-        if ROUGH * width < edge < PROGRESS * before and begun < EARLY * timer.seconds:
+        if ROUGH * width < edge < PROGRESS * before and start < EARLY * timer.seconds:
             passed = basis, pair, waves, degrees
         else:
             passed = None
@@ -280,7 +280,7 @@ def _enlarged(
                 yield certificate, waves, degrees
             elif delta < math.inf:
                 idle += 1
-        cost = timer.elapsed - begun
+        cost = timer.elapsed - start
         waves, degrees = (
             min(math.ceil(GROWTH * n) + 1, MOST) if of_it > 0.1 * edge else n
             for n, of_it in zip((waves, degrees), edges, strict=True)

@@ -98,18 +98,18 @@ def _crossings(rays, j, x, u, x1, u1):
 
 
 @compiled
-def crossed(rays, begun, state, tally):
+def crossed(rays, start, state, tally):
     """Count the lines that are crossed from one state to another, which is not far; returns the growth at them."""
     log = 0.0
     for j in range(rays.logs.size):
-        count = _crossings(rays, j, begun[0], begun[1], state[0], state[1])
+        count = _crossings(rays, j, start[0], start[1], state[0], state[1])
         log += count * rays.logs[j]
         tally[0] += count
     return log
 
 
 @compiled
-def flow(rays, matrix, t, size, state, tally, other, begun):
+def flow(rays, matrix, t, size, state, tally, other, start):
     """exp(A t) x in place, ‖A‖ ≤ size, in parts; returns the growth of the norm beyond that of the state."""
     reach, log, n = abs(t) * size, 0.0, state.size
     if not reach < _LIMIT * _MOST_PARTS:
@@ -118,12 +118,12 @@ def flow(rays, matrix, t, size, state, tally, other, begun):
     s, terms = t / parts, _terms(reach / parts)
     for _ in range(parts):
         for r in range(n):
-            begun[r] = state[r]
+            start[r] = state[r]
         for k in range(terms, 0, -1):
             image_of(matrix, state, other)
             for r in range(n):
-                state[r] = begun[r] + s / k * other[r]
-        log += crossed(rays, begun, state, tally) + tamed(state)
+                state[r] = start[r] + s / k * other[r]
+        log += crossed(rays, start, state, tally) + tamed(state)
     return log
 
 
@@ -139,8 +139,8 @@ def step_driven(matrices, wall, h, y, mean, rise, log_norm, tally, rng):
         tally: takes in how often lines were crossed, as its first number.
         rng: what other walls draw from.
     """
-    begun, sizes = np.empty(y.shape), np.zeros(mean.size)
-    _step(matrices, wall, h, y, mean, rise, log_norm, tally, begun, sizes, _LIMIT)
+    start, sizes = np.empty(y.shape), np.zeros(mean.size)
+    _step(matrices, wall, h, y, mean, rise, log_norm, tally, start, sizes, _LIMIT)
     xi, change = np.empty(1), np.empty(1)
     for i in range(mean.size):
         if sizes[i] < _LIMIT * _LIMIT:
@@ -156,22 +156,22 @@ def step_driven(matrices, wall, h, y, mean, rise, log_norm, tally, rng):
         for part in range(parts):
             xi[0], change[0] = mean[i] + rise[i] * ((2 * part + 1) / parts - 1), rise[i] / parts
             _step(
-                matrices, wall, h / parts, y[:, path], xi, change, log_norm[path], tally, begun[:, path], sizes[path],
+                matrices, wall, h / parts, y[:, path], xi, change, log_norm[path], tally, start[:, path], sizes[path],
                 math.inf,
             )  # fmt: skip
             log_norm[i] += tamed(y[:, i])
 
 
 @compiled
-def _step(matrices, rays, h, y, mean, rise, log_norm, tally, begun, sizes, most):
-    """One step of the paths whose ‖Ω‖ is below the most; where it was begun, and ‖Ω‖² of all, in the last arrays."""
+def _step(matrices, rays, h, y, mean, rise, log_norm, tally, start, sizes, most):
+    """One step of the paths whose ‖Ω‖ is below the most; where it was start, and ‖Ω‖² of all, in the last arrays."""
     n, paths, lever = y.shape[0], y.shape[1], -h * h / 6
     omega, after = np.empty((n, n, paths)), np.empty((n, paths))
     for i in range(paths):
         sizes[i] = 0.0
     for r in range(n):
         for i in range(paths):
-            begun[r, i] = y[r, i]
+            start[r, i] = y[r, i]
         for c in range(n):
             steady, driven = h * matrices[0, r, c], h * matrices[1, r, c]
             turned, twice = lever * matrices[2, r, c], 0.6 * lever * lever / h * matrices[3, r, c]
@@ -184,18 +184,18 @@ def _step(matrices, rays, h, y, mean, rise, log_norm, tally, begun, sizes, most)
             largest = max(largest, sizes[i])
         else:
             omega[:, :, i] = 0.0
-    _summed(omega, _terms(math.sqrt(largest)), begun, y, after)
+    _summed(omega, _terms(math.sqrt(largest)), start, y, after)
     for j in range(rays.logs.size):
         for i in range(paths):
-            count = _crossings(rays, j, begun[0, i], begun[1, i], y[0, i], y[1, i])
+            count = _crossings(rays, j, start[0, i], start[1, i], y[0, i], y[1, i])
             log_norm[i] += count * rays.logs[j]
             tally[0] += count
 
 
 @compiled
-def _summed(omega, terms, begun, now, after):
-    """exp Ω of all paths times what was begun with, by so many terms of its series; now is that in the beginning."""
-    n, paths = begun.shape
+def _summed(omega, terms, start, now, after):
+    """exp Ω of all paths times what was start with, by so many terms of its series; now is that in the beginning."""
+    n, paths = start.shape
     for k in range(terms, 0, -1):
         for r in range(n):
             for i in range(paths):
@@ -205,4 +205,4 @@ def _summed(omega, terms, begun, now, after):
                     after[r, i] += omega[r, c, i] * now[c, i]
         for r in range(n):
             for i in range(paths):
-                now[r, i] = begun[r, i] + after[r, i] / k
+                now[r, i] = start[r, i] + after[r, i] / k

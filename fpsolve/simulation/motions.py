@@ -126,13 +126,13 @@ class Switched(NamedTuple):
     def move(m, h, y, xi, log_norm, push, tally, rng):
         """One step, of the length h of `whole`, as that of a `Driven`, with the number of a state in place of ξ."""
         states, chain, n = xi[m.rows], m.step, y.shape[0]
-        state, other, begun = np.empty(n), np.empty(n), np.empty(n)
+        state, other, start = np.empty(n), np.empty(n), np.empty(n)
         for i in range(y.shape[1]):
             k, left = int(states[i]), h
             load(y, i, state)
             while left > 0:
                 stay = rng.standard_exponential() / chain.leaving[k]
-                log_norm[i] += _flow(m.wall, m, k, min(stay, left), h, state, tally, other, begun)
+                log_norm[i] += _flow(m.wall, m, k, min(stay, left), h, state, tally, other, start)
                 left -= stay
                 if left > 0:
                     k = _picked(chain.reached[k], rng)
@@ -152,25 +152,25 @@ def _step_by_wall(matrices, wall, h, y, mean, rise, log_norm, tally, rng):
     return (step_to_floor if wall.instance_class is Floor else step_driven).py_func
 
 
-def _flow(wall, m, k, t, h, state, tally, other, begun):
+def _flow(wall, m, k, t, h, state, tally, other, start):
     """The motion in a state of a chain; this is what numba replaces by what the wall needs."""
     raise NotImplementedError
 
 
 @overload(_flow)
-def _flow_by_wall(wall, m, k, t, h, state, tally, other, begun):
+def _flow_by_wall(wall, m, k, t, h, state, tally, other, start):
     if wall.instance_class is Floor:
-        return lambda wall, m, k, t, h, state, tally, other, begun: flow_to_floor(
+        return lambda wall, m, k, t, h, state, tally, other, start: flow_to_floor(
             wall, m.matrices[k], t, m.sizes[k], state, tally
         )
 
-    def over_rays(wall, m, k, t, h, state, tally, other, begun):
+    def over_rays(wall, m, k, t, h, state, tally, other, start):
         if t < h or m.sizes[k] * h > 1:
-            return flow(wall, m.matrices[k], t, m.sizes[k], state, tally, other, begun)
+            return flow(wall, m.matrices[k], t, m.sizes[k], state, tally, other, start)
         for r in range(state.size):
-            begun[r] = state[r]
+            start[r] = state[r]
         multiplied(m.whole[k], state, other)
-        return crossed(wall, begun, state, tally)
+        return crossed(wall, start, state, tally)
 
     return over_rays
 

@@ -242,7 +242,7 @@ def first_order_eigenfunction(problem: Problem, p: float, phi: ArrayLike, xi: Ar
         raise NoPerturbationTheory(f"T₁ is for noise of mean 0, but it has {problem.noise.mean:g}")
     if len(problem.noise.parts) > 1:
         raise NoPerturbationTheory("T₁ is a function of one noise, but there are several")
-    if not problem.noise.is_drawn:
+    if not problem.noise.is_markov:
         raise NoPerturbationTheory(f"T₁ is for noise that is a Markov process by itself, but not {problem.noise.kind}")
     frame, omega = _rotating_frame(matrix_at(problem.system, 0.0, slice(0, 1)))
     if not np.array_equal(frame, np.eye(2)):
