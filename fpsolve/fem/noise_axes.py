@@ -325,7 +325,10 @@ class PolynomialAxis(CountedAxis, LineAxis):
             values, slopes = polynomials.at(x)
             slopes, log_mass = slopes + tilt * values, 2 * tilt**2
             return Table(x + 2 * tilt, weights, values, slopes, log_mass, polynomials, 2 * tilt, 1.0)
-        exponent, missing = self._ends
+        # the exponent a + b − 1 of the weight, and 1 − b, by which P_s falls more; b < 1 counts as 0, for a ≤ 0 as 1
+        middle, near = self.noise.squared_diffusion(self.noise.half_width * np.array([0.0, 1 - NEAR_END]))
+        missing = float(self.noise.end_exponent > 0 and near >= VANISHES * middle)  # the weight must be integrable
+        exponent = self.noise.end_exponent - missing
         more = min(abs(tilt) * end, 4 * tilt**2)
         points = 16 * math.ceil((2 * self.count + MORE_POINTS + more) / 16)  # few rules serve many spaces
         x, weights = gegenbauer(points, exponent).rule
@@ -336,14 +339,6 @@ class PolynomialAxis(CountedAxis, LineAxis):
         log_mass = math.log((tilted @ damping) / (weights @ damping)) + float(logs.max())
         measure, slopes = tilted * damping / (tilted @ damping), slopes / end + tilt * values
         return Table(end * x, measure, values, slopes, log_mass, polynomials, 0.0, end)
-
-    @cached_property
-    def _ends(self) -> tuple[float, float]:
-        """a + b − 1, and 1 − b: by so much more does P_s fall at the ends. b < 1 is taken for 0, for a ≤ 0 for 1."""
-        middle, near = self.noise.squared_diffusion(self.noise.half_width * np.array([0.0, 1 - NEAR_END]))
-        a = self.noise.end_exponent
-        missing = float(a > 0 and near >= VANISHES * middle)  # the weight must be integrable
-        return a - missing, missing
 
     @property
     def _log_mass(self) -> float:

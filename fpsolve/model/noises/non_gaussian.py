@@ -54,19 +54,16 @@ class TreatedNoise(Noise):
         return math.sqrt(2 * self.D0) / self.tau0
 
     @property
-    def _bracket(self) -> float:
-        """5 − 3r₀ of Eqs. (10) and (12), which rounding makes 0 for an r₀ just below 5/3."""
-        return 5 - 3 * self.r0
-
-    @property
     def variance(self) -> float:
-        """⟨ξ²⟩ of Eq. (10): 2D₀/(τ₀(5 − 3r₀)) for r₀ < 5/3, otherwise ∞."""
-        return 2 * self.D0 / (self.tau0 * self._bracket) if self._bracket > 0 else math.inf
+        """⟨ξ²⟩ of Eq. (10): 2D₀/(τ₀(5 − 3r₀)) for r₀ < 5/3, otherwise ∞; rounding may make the bracket 0."""
+        bracket = 5 - 3 * self.r0
+        return 2 * self.D0 / (self.tau0 * bracket) if bracket > 0 else math.inf
 
     @property
     def correlation_time(self) -> float:
         """τ₁ of Eq. (12), that of the reduced noise, for r₀ < 5/3, otherwise ∞."""
-        return 2 * (2 - self.r0) / self._bracket * self.tau0 if self._bracket > 0 else math.inf
+        bracket = 5 - 3 * self.r0
+        return 2 * (2 - self.r0) / bracket * self.tau0 if bracket > 0 else math.inf
 
     @classmethod
     def from_table(cls, table: Table) -> TreatedNoise:
@@ -185,7 +182,7 @@ class NonGaussianNoise(TreatedNoise):
         Raises:
             ValueError: r₀ ≥ 5/3, where ⟨ξ²⟩ is infinite and Eq. (11) has no meaning.
         """
-        if self._bracket <= 0:
+        if math.isinf(self.variance):
             raise ValueError(
                 f"r0 = {self.r0} has an infinite variance (10), and no Ornstein-Uhlenbeck reduction, Eqs. (11)-(12); "
                 "choose r0 < 5/3"
