@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from fpsolve.arrays import FloatArray, real_array, real_numbers
 from fpsolve.data import Result, dataset
+from fpsolve.errors import NotConverged
 from fpsolve.exponent.curve import Values, values
 from fpsolve.exponent.error import Absent, Estimate
 from fpsolve.exponent.method import Budget, checked_moments
@@ -16,6 +17,7 @@ from fpsolve.exponent.root import SEARCH_INTERVAL, nonzero_root
 from fpsolve.exponent.solver import (
     ExponentSolver,
     MomentLyapunov,
+    broken_convexity,
     interpolated,
     sign_change,
     solver_of,
@@ -81,7 +83,9 @@ class MomentLyapunovFunction(Result):
         self.interval = low, high
         self._curves = self.solver.curves(low, high, MOST_PARTS)
         self.nodes = np.unique([p for curve in self._curves for p in curve.nodes])
-        interpolated(self.solver, self._curves, self.nodes)  # refuses nodes that contradict each other
+        at = self._values(self.nodes)
+        if obstacle := broken_convexity(self.nodes, at.value, at.derivative, at.error, lambda: at.derivative_error):
+            raise NotConverged(obstacle, remedy=self.solver.method.refinement)
 
     def __call__(self, p: ArrayLike) -> FloatArray:
         """Λ(p), per unit time, of the shape of p. Raises `ValueError` outside the interval."""

@@ -434,6 +434,9 @@ class Stage(Protocol):
     def judged(self, found: Any, allowed: float) -> Any:
         """What is found with its error, of which no part much less than what is allowed need be known."""
 
+    def is_enough(self, found: Any) -> bool:
+        """Whether what is found within the tolerance needs no more, as for its slope."""
+
     def doubled(self, failure: Exception | None) -> Stage | None:
         """More functions, where nothing is found among these; None where that is no use."""
 
@@ -492,7 +495,7 @@ class Search:
                     continue
                 allowed = self.allowed(near)
                 self.judged = found = stage.judged(near, allowed)
-                if found.error <= allowed:
+                if found.error <= allowed and stage.is_enough(found):
                     return found
                 if found.error / allowed < self.share:
                     self.best, self.share = found, found.error / allowed
@@ -500,6 +503,8 @@ class Search:
                     raise NotConverged(Message(Code.ROUNDED, size=near.rounding))
                 stage = stage.refined(found, allowed)
         except NotConverged as failure:  # no stage may follow
+            if self.share <= 1 and not isinstance(failure, OverBudget):  # within the tolerance, but not its slope
+                return self.best
             return self._stop(failure)
 
     def _begun(self, stage: Stage | None) -> Stage:

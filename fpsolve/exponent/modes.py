@@ -54,6 +54,10 @@ WORST_CONDITION = 100.0
 """Of the eigenvectors of the motion without noise, up to which they are the coordinates."""
 OF_CHANGES = 3.0
 """What is left after the correction, over that and the last change of the corrected value."""
+SETTLED_SLOPE = 3e-3
+"""Share of Λ′ by which it may change from one level to the next."""
+MOST_FOR_SLOPES = 4
+"""Number of levels after which a slope is taken as it is."""
 MINOR = 0.25
 """Share of the tolerance that elements, or polynomials of a noise, may lack where others are made finer."""
 MEASURED = 1.5
@@ -251,6 +255,12 @@ class SphereStart(DirectionStart):
         pair = replace(pair, correction=self.change(pair))
         change = pair.value - self.before[-1].pair.value if self.before else math.inf
         return Solution(pair, OF_CHANGES * (abs(change) + abs(pair.correction)), of_axes, start)
+
+    def is_enough(self, found: Solution) -> bool:
+        """Whether Λ′, which is not corrected, has settled, or after so many levels is what it is; λ is corrected."""
+        change = abs(found.derivative - self.before[-1].derivative)
+        is_settled = change <= SETTLED_SLOPE * abs(found.derivative) or len(self.before) >= MOST_FOR_SLOPES
+        return is_settled or abs(found.pair.p) <= SMALL_P
 
     def doubled(self, failure: Exception | None) -> SphereStart:
         return self.of_waves(self.space.phi.waves + 2)

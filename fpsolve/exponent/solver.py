@@ -190,7 +190,7 @@ class ExponentSolver:
                 raise TypeError(f"got {name} = {shown(getattr(self, name))}; must be {words}")
         if not (self.problem.noise.is_white or math.isfinite(self.problem.noise.standard_deviation)):
             raise NoSuchExponent(Message(Code.INFINITE_VARIANCE))
-        if not RTOLS["gt"] < self.rtol < RTOLS["lt"]:
+        if not (math.isfinite(self.rtol) and RTOLS["gt"] < self.rtol < RTOLS["lt"]):
             limits = f"must be > {RTOLS['gt']:g} and < 1; write, for example, 1e-8"
             raise ValueError(f"got rtol = {shown(self.rtol)}; {limits}")
         _ = self.method  # refuses a mesh of three variables
