@@ -252,13 +252,17 @@ class Elements(Method):
 
         As the variance is finite, an interval twice as wide leaves less than half of λ that the noise makes beyond it.
         """
-        finer, ends = self.pair_among(pair.generator.chosen.enriched(), pair), pair.space.xi.lines[[0, -1]]
-        lacked = 2 * abs(finer.derivative - pair.derivative) + slope_rounding(pair)
+        lacked, ends = self._lacked(pair), pair.space.xi.lines[[0, -1]]
         change = math.inf if np.any(pair.space.xi.weight(ends) * ends**2 > sys.float_info.epsilon) else 0.0
         while change > (WIDER - 1) * self.tolerance(SMALL_P, 0.0) / SMALL_P:
             wider = self.pair_among(widened(pair.generator), pair)
             change, pair = abs(wider.derivative - pair.derivative), wider
         return pair.derivative, change / (WIDER - 1) + lacked
+
+    def _lacked(self, pair: PrincipalPair) -> float:
+        """Estimate of |error of Λ′| on the interval of a noise: twice what a finer discretisation changes."""
+        finer = self.pair_among(pair.generator.chosen.enriched(), pair)
+        return 2 * abs(finer.derivative - pair.derivative) + slope_rounding(pair)
 
     def slope_error(self, p: float) -> float:
         """1.5 times the larger of two changes by finer discretisations over 1 − r, r their ratio if they have one sign.
@@ -411,6 +415,11 @@ class GivenMesh(PlaneElements):
 
     def allowed(self, tolerance: Tolerance, pair: PrincipalPair) -> float:
         return math.inf
+
+    def _among_tails(self, pair: PrincipalPair) -> tuple[float, float]:
+        """λ, on the interval of the mesh, and what a wider one would change."""
+        change = abs(self.pair_among(widened(pair.generator), pair).derivative - pair.derivative)
+        return pair.derivative, change * WIDER / (WIDER - 1) + self._lacked(pair)
 
     def doubts(self, p: Sequence[float]) -> tuple[Message, ...]:
         """That slow noise may carry a moment elsewhere, where the mesh does not show it."""
