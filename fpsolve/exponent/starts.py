@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from fpsolve.exponent.eigen import PrincipalPair, principal_pair
-from fpsolve.exponent.error import Solution
+from fpsolve.exponent.eigen import BACKWARD_ERROR_LIMIT, PrincipalPair, principal_pair
+from fpsolve.exponent.error import Solution, mode_effects
 from fpsolve.fem.axis import MOST_DEGREE
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.noise_axes import CellAxis, NoiseAxis
@@ -69,8 +69,10 @@ class Start:
         return True
 
     def doubled(self, failure: Exception | None) -> Start | None:
-        """Twice as many functions along every axis."""
-        found = self.space.doubled()
+        """More functions along the axes that lack most, by the pair that a failed search has reached, if any."""
+        pair: Any = getattr(failure, "partial", None)
+        is_pair = pair is not None and pair.residual <= BACKWARD_ERROR_LIMIT
+        found = self.space.doubled(mode_effects(pair) if is_pair else ())
         return replace(self, space=found) if found.size > self.space.size else None
 
     def refined(self, solution: Solution, goal: float) -> Start:

@@ -21,6 +21,8 @@ from fpsolve.model.noise import Noise
 
 MOST_BYTES = 1e9
 """Of the factors of a generator: with what else is held, and libraries, a process takes about 1.5 GB."""
+LITTLE = 1e-2
+"""Share of the largest effect of an axis below which others are left as they are, while nothing is resolved."""
 BASES: dict[str, Callable[[Noise, int], NoiseAxis]] = {
     "polynomials": PolynomialAxis,
     "waves": CircleAxis,
@@ -94,9 +96,11 @@ class Space:
         """A finer one: two degrees more each way; where there are none left, cells are halved."""
         return Space(tuple(axis.enriched() for axis in self.axes))
 
-    def doubled(self) -> Space:
-        """Twice as many functions along every axis, where nothing is known."""
-        return Space(tuple(axis.doubled() for axis in self.axes))
+    def doubled(self, effects: Sequence[ModeEffects | None] = ()) -> Space:
+        """Twice as many functions along the axes that lack most by their effects; along all where nothing is known."""
+        errors = [each.error if each else 0.0 for each in effects] or [1.0] * len(self.axes)
+        are_coarse = [error > LITTLE * max(errors) for error in errors]
+        return Space(tuple(axis.doubled() if each else axis for axis, each in zip(self.axes, are_coarse, strict=True)))
 
     def raised(self) -> Space:
         """One more function each way, where what a cell lacks harms others."""
