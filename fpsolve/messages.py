@@ -483,7 +483,7 @@ class Message(str):
         )
 
     def to_data(self) -> dict[str, Any]:
-        """What JSON can hold, from which `from_data` makes it again."""
+        """What Python's JSON can hold, from which `from_data` makes it again."""
         return {"code": self.code.name, "data": {key: _plain(value) for key, value in self.data.items()}}
 
     @classmethod
@@ -491,7 +491,7 @@ class Message(str):
         """The inverse of `to_data`. Raises `ValueError` where it is none."""
         try:
             return cls(Code[data["code"]], **{key: _made(value) for key, value in data["data"].items()})
-        except (KeyError, TypeError) as failure:
+        except (KeyError, TypeError, AttributeError) as failure:
             raise ValueError(f"this is no message: {failure!r}") from failure
 
 

@@ -92,7 +92,7 @@ class Pool:
     stop: Callable[[Executor], None] = lambda executor: executor.shutdown(cancel_futures=True)
     size: int = 1
     own_seconds: float = 0.0
-    has_workers: Callable[[Executor], bool] = lambda executor: True
+    has_workers: Callable[[], bool] = lambda: True
     is_elsewhere: bool = False
     _executor: Any = field(default=None, init=False, repr=False)
     _waiting: dict[Future[Any], Any] = field(default_factory=dict, init=False, repr=False)
@@ -154,7 +154,7 @@ class Pool:
         """Those that are done first."""
         until = math.inf
         while not (found := futures.wait(waiting, LOOK_SECONDS, futures.FIRST_COMPLETED).done):
-            until = math.inf if self.has_workers(self._executor) else min(until, time.monotonic() + CONNECT_SECONDS)
+            until = math.inf if self.has_workers() else min(until, time.monotonic() + CONNECT_SECONDS)
             if time.monotonic() >= until:
                 raise WorkersDied(f"no worker is left at the scheduler; {ANEW}")
         return found
@@ -208,7 +208,7 @@ def cluster(address: str) -> Pool:
         executor.shutdown(wait=False)  # cancels what is not done
         client.close()
 
-    def has_workers(_: Any) -> bool:
+    def has_workers() -> bool:
         try:
             return bool(client.nthreads())
         except OSError:  # it stopped while it was asked

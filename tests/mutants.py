@@ -358,8 +358,8 @@ DEFECTS: tuple[Defect, ...] = (
     Defect(
         "R14 the variance of noise (7) has 2/D₀",
         "model/noises/non_gaussian.py",
-        "return 2 * self.D0 / (self.tau0 * self._bracket)",
-        "return 2 / self.D0 / (self.tau0 * self._bracket)",
+        "return 2 * self.D0 / (self.tau0 * bracket)",
+        "return 2 / self.D0 / (self.tau0 * bracket)",
         "non_gaussian",
     ),
     Defect(

@@ -103,18 +103,23 @@ class Scan:
     def seeds(self) -> Iterator[Sample]:
         """Points on the lines F = 0 of the interpolated F, each with a gradient that tells their direction.
 
-        Beside missing nodes they are also those of linear interpolation in halves of cells.
+        Where nodes are missing they are also those on the edges between two nodes.
         """
         from contourpy import contour_generator  # not before it is needed, as it takes a while
 
         finer = np.linspace(0, 1, FINE * (self.nodes.size - 1) + 1)
-        grids = [(finer, self.on(finer)), (self.nodes, self.values)][: 1 + bool(np.isnan(self.values).any())]
-        for nodes, values in grids:
-            filled = np.ma.masked_invalid(values.T)
-            lines: Any = contour_generator(nodes, nodes, filled, line_type="Separate", corner_mask=True).lines(0.0)
-            for start, end in chain.from_iterable(map(pairwise, lines)):
-                if (along := end - start).any():
-                    yield Sample(0.5 * (start + end), 0.0, np.array([-along[1], along[0]]), 0.0, 0.0)
+        values = np.ma.masked_invalid(self.on(finer))
+        lines: Any = contour_generator(finer, finer, values.T, line_type="Separate").lines(0.0)
+        for start, end in chain.from_iterable(map(pairwise, lines)):
+            if (along := end - start).any():
+                yield Sample(0.5 * (start + end), 0.0, np.array([-along[1], along[0]]), 0.0, 0.0)
+        for axis in (0, 1) if np.isnan(self.values).any() else ():
+            for one in np.argwhere(np.abs(np.diff(np.sign(self.values), axis=axis)) > 0):
+                other = one + np.eye(2, dtype=int)[axis]
+                (f, g), (slope, more) = ([of[*each] for each in (one, other)] for of in (self.values, self.gradients))
+                yield Sample(
+                    self.nodes[one] + f / (f - g) * (self.nodes[other] - self.nodes[one]), 0.0, slope + more, 0.0, 0.0
+                )
 
 
 @dataclass(frozen=True)

@@ -205,7 +205,7 @@ class Boundary(Result):
         is_empty = not np.isfinite(scan.values).any()
         obstacles += [each for each in scan.reasons if is_of_line(each) or (is_empty and not is_none(each))]
         seconds = now.seconds + zero_field.seconds
-        yield replace(now, seconds=seconds, obstacles=tuple(obstacles), complete=not obstacles)
+        yield replace(now, seconds=seconds, obstacles=tuple(obstacles), complete=not obstacles, recall=solved_anew)
 
     def _special(self, zero_field: ZeroField, trace: Trace) -> Trace:
         """A branch with its folds, and the points that the axes ask for."""

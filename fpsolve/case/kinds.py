@@ -107,9 +107,12 @@ def made_of(half: Half, table: Mapping[str, Any]) -> Parametrised:
             made = kind.from_table(known)
         except ValidationError as error:
             faults += details_of(error)
+        except TableError as error:
+            if not faults:
+                refuse([(error.path, None, error.text)])
         except (ValueError, TypeError) as error:
             if not faults:
-                raise (error if isinstance(error, TableError) else ValueError(str(error))) from None
+                raise ValueError(str(error)) from None
     refuse([], faults)
     return made
 

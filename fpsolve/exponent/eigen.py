@@ -25,7 +25,7 @@ from fpsolve.arrays import FloatArray, finite, one
 from fpsolve.data import brief
 from fpsolve.errors import NotConverged, NumericalFailure, SingularMatrix
 from fpsolve.exponent.rightmost import NEAR_ENOUGH, NEARER
-from fpsolve.fem.axis import KroneckerSum
+from fpsolve.fem.axis import FEW_UNKNOWNS, KroneckerSum
 from fpsolve.fem.factors import Factors, one_thread
 from fpsolve.fem.generator import Generator, Pencil
 from fpsolve.fem.space import Space
@@ -184,10 +184,14 @@ def _rightmost_pair(pencil: Pencil, generator: Generator, reached: PrincipalPair
         limits = {"limit": BACKWARD_ERROR_LIMIT, "most": POSITIVE}
         told = Message(Code.NO_EIGENVALUE, p=p, residual=pair.residual, size=defect, **limits)
         raise NotConverged(told, pair, Remedy.BOTH_AXES)
-    if not reached or reached.residual > BACKWARD_ERROR_LIMIT or not _has_other_positive(generator, p):
+    if not _has_other_positive(generator, p):
         return pair
-    if reached.value - pair.value > 1e-6 * max(abs(reached.value), unit):
-        told = Message(Code.LARGER_EIGENVALUE, p=p, rightmost=reached.value, value=pair.value)
+    others = [reached.value] if reached and reached.residual <= BACKWARD_ERROR_LIMIT else []
+    if generator.left_in_phase and generator.size <= FEW_UNKNOWNS:  # of a chain
+        others.append(float(spectrum(generator, p, 1)[0].real))
+    rightmost = max(others, default=-math.inf)
+    if rightmost - pair.value > 1e-6 * max(abs(rightmost), unit):
+        told = Message(Code.LARGER_EIGENVALUE, p=p, rightmost=rightmost, value=pair.value)
         raise NotConverged(told, pair, Remedy.PHASE)
     return pair
 
@@ -292,7 +296,7 @@ def _from_the_right(pencil: Pencil, generator: Generator) -> tuple[FloatArray, F
         factor: Any = None  # there is room for the next ones
         factor, last = pencil.factorised(shift), value
         right, value = _nearest(lambda v, lu=factor: -lu.solve(space.weighed(v)), right, shift, pencil.p)
-        if abs(value - last) <= NEAR_ENOUGH * (shift - value):
+        if abs(value - last) <= NEAR_ENOUGH * (shift - value) and shift - value <= generator.framed.unit_rate:
             break
     left, _ = _nearest(lambda v: -factor.solve(space.weighed(v), transposed=True), left, shift, pencil.p, value)
     return right, left, value, 0.5 * (shift - value)

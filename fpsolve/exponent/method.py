@@ -440,8 +440,8 @@ class Stage(Protocol):
     def doubled(self, failure: Exception | None) -> Stage | None:
         """More functions, where nothing is found among these; None where that is no use."""
 
-    def refined(self, found: Any, goal: float) -> Stage | None:
-        """Functions that should have an error of about a goal, or less."""
+    def refined(self, found: Any, goal: float, most: int) -> Stage | None:
+        """Functions that should have an error of about a goal, or less, with so many unknowns at most."""
 
 
 @dataclass
@@ -501,7 +501,7 @@ class Search:
                     self.best, self.share = found, found.error / allowed
                 if near.rounding > allowed:
                     raise NotConverged(Message(Code.ROUNDED, size=near.rounding))
-                stage = stage.refined(found, allowed)
+                stage = stage.refined(found, allowed, self.budget.most(stage))
         except NotConverged as failure:  # no stage may follow
             if self.share <= 1 and not isinstance(failure, OverBudget):  # within the tolerance, but not its slope
                 return self.best

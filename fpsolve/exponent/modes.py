@@ -265,7 +265,7 @@ class SphereStart(DirectionStart):
     def doubled(self, failure: Exception | None) -> SphereStart:
         return self.of_waves(self.space.phi.waves + 2)
 
-    def refined(self, solution: Solution, goal: float) -> SphereStart:
+    def refined(self, solution: Solution, goal: float, most: int) -> SphereStart:
         """Waves of the next degree; or other elements and functions of the noise, with waves of the degree before."""
         of_axes = solution.measured or ()
         phi, share = self.space.phi, MINOR * goal
@@ -289,7 +289,7 @@ class Directions(Elements):
         if abs(p) < SMALL_P:
             yield from super().places(p, tolerance, found)
         elif known := self.spaces.get(p):
-            yield known.start.refined(known, tolerance(p, known.value)), known.pair
+            yield known.start.refined(known, tolerance(p, known.value), 0), known.pair
         else:
             yield self.stage.at(self.problem, p, self.settings.rtol, self.spaces)
 

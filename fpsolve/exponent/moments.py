@@ -21,7 +21,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache, reduce
 from itertools import combinations_with_replacement
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.polynomial.polynomial import polyfit
@@ -220,7 +220,7 @@ class EvenMoment:
     polynomial: FloatArray
     change: float = 0.0
     finer: int = 0
-    derivative: float = math.nan
+    derivative: ClassVar[float] = math.nan
 
     def __repr__(self) -> str:
         return brief(self, f"Λ({self.equations.p}) = {self.value:.10g} ± {self.error:.0e}, {self.x.size} equations")
@@ -340,7 +340,7 @@ class Level:
     def doubled(self, failure: Exception | None) -> None:
         """Where these are not solved, more are not."""
 
-    def refined(self, found: EvenMoment, goal: float) -> Level | None:
+    def refined(self, found: EvenMoment, goal: float, most: int) -> Level | None:
         """More functions of the noises of which the next ones change most; None where there are no others."""
         if not (worst := max(map(abs, found.effects), default=0.0)):
             return None

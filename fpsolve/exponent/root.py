@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from functools import partial
 from typing import Any
 
@@ -71,7 +72,8 @@ def nonzero_root(solver: ExponentSolver, interval: tuple[float, float] = SEARCH_
         found = _index(p, *solved[p])
         if found.relative_error > solver.rtol and method.adapts:
             tolerance = partial(share_of, PRECISE * solver.rtol * solved[p][1] * max(1.0, abs(p)))
-            p = increasing_root(partial(at, tolerance=tolerance), p, ends)
+            with suppress(Missing, NoRoot):  # where that is out of reach the first one does
+                p = increasing_root(partial(at, tolerance=tolerance), p, ends)
             found = _index(p, *solved[p])
     except Missing as missing:
         cause = missing.__cause__

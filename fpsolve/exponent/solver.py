@@ -239,14 +239,14 @@ class ExponentSolver:
 
         Args:
             low, high: the interval; it falls in two where a saddle has a corner.
-            most: number of polynomials, and one more where it falls in two.
+            most: number of polynomials, twice as many where it falls in two.
 
         Raises:
             NotConverged: there are none.
         """
         intervals = [(low, high)]
         if low < -1 < high and not eigenvalues_at(self.problem, 0.0)[2]:
-            intervals, most = [(low, -1.0), (-1.0, high)], most + 1
+            intervals, most = [(low, -1.0), (-1.0, high)], 2 * most
         parts = polynomials(self._node, intervals, self._allowed, most) if self.method.is_function else []
         if not parts:
             raise NotConverged(Message(Code.NO_FUNCTION, low=low, high=high))

@@ -29,6 +29,8 @@ REACH = 12.0
 """Standard deviations on both sides, up to which the first cells of noise with algebraic tails are."""
 SHARE = 0.05
 """Share of the tolerance that a new discretisation is made for in each direction, so that it serves other p too."""
+ALONE = 0.5
+"""Share of the tolerance in each direction of a discretisation that serves one p only."""
 ROUND = 360
 """Number of φ at which it is asked which way the phase turns."""
 COMPARABLE = 0.6
@@ -75,14 +77,20 @@ class Start:
         found = self.space.doubled(mode_effects(pair) if is_pair else ())
         return replace(self, space=found) if found.size > self.space.size else None
 
-    def refined(self, solution: Solution, goal: float) -> Start:
-        """More functions where those of a solution lack more than their share of an error, fewer where less."""
-        share = SHARE * goal
-        found = self.space.refined(solution.effects, share)
-        if found.xi.lines.size:
-            lower, upper = solution.truncation
-            found = found.with_axis(1, found.xi.reaching(lower > share, upper > share))
-        return replace(self, space=found if found.size > self.space.size else found.raised())
+    def refined(self, solution: Solution, goal: float, most: int) -> Start:
+        """More functions where those of a solution lack more than their share of an error, fewer where less.
+
+        Where these are more unknowns than most, they are those that do for this p alone.
+        """
+        for share in (SHARE * goal, ALONE * goal):
+            found = self.space.refined(solution.effects, share)
+            if found.xi.lines.size:
+                lower, upper = solution.truncation
+                found = found.with_axis(1, found.xi.reaching(lower > share, upper > share))
+            found = found if found.size > self.space.size else found.raised()
+            if found.size <= most:
+                break
+        return replace(self, space=found)
 
 
 def first(problem: Problem, p: float, rtol: float, center: float | None = None) -> Space:

@@ -136,7 +136,7 @@ class StopStart(DirectionStart):
     def doubled(self, failure: Exception | None) -> StopStart:
         return StopStart(self.problem, self.space.with_axis(0, self.space.phi.enriched()))
 
-    def refined(self, solution: Solution, goal: float) -> StopStart:
+    def refined(self, solution: Solution, goal: float, most: int) -> StopStart:
         """Two degrees more where they change most, if they are to, and other functions of the noise."""
         assert solution.measured is not None
         phi, changes, tried = self.space.phi, np.array(solution.start.changes), ()

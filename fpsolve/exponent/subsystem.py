@@ -19,7 +19,7 @@ from scipy.linalg import cdf2rdf
 from fpsolve.arrays import ROUNDED, FloatArray
 from fpsolve.model.coordinates import framed
 from fpsolve.model.expressions import TIME
-from fpsolve.model.plane import BELOW, CoefficientMatrix, Jump, ParameterDerivative, System, as_plane, by_noise
+from fpsolve.model.plane import BELOW, CoefficientMatrix, Jump, ParameterDerivative, System, as_plane, by_noise, rows_of
 from fpsolve.model.problem import Problem
 from fpsolve.model.quantity import Quantity
 
@@ -79,7 +79,7 @@ class Subsystem(System):
         for term in terms:
             matrix = self.inside(term.matrix)[np.ix_(self.own, self.own)]
             if np.any(matrix):
-                found.append(replace(term, matrix=matrix.tolist()))
+                found.append(replace(term, matrix=matrix))
         return tuple(found)
 
     @property
@@ -152,7 +152,7 @@ def blocks_of(problem: Problem) -> tuple[Subsystem, ...]:
         if len(groups) == 1:
             own, groups, rounded = hidden_blocks([np.linalg.inv(frame) @ each @ frame for each in matrices])
             basis, names = frame @ own, [f"y{str(k + 1).translate(BELOW)}" for k in range(n)]
-    sides = tuple(map(tuple, basis.tolist()))
+    sides = rows_of(basis)
     return tuple(
         Subsystem(
             system,

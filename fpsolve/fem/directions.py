@@ -558,7 +558,7 @@ class DirectionTerms(Terms):
     def _mean(self) -> FloatArray:
         """The matrix of the motion of y in the mean over the noise."""
         mean = mean_matrix(self._framed.problem, self.system)
-        return self.phi.inside(CoefficientMatrix(0, mean.tolist()))
+        return self.phi.inside(CoefficientMatrix(0, mean))
 
     def _loads(self) -> Iterator[Term]:
         """The penalty, as slopes jump by the error of the elements alone."""
@@ -571,6 +571,10 @@ class DirectionTerms(Terms):
 
 class StopTerms(DirectionTerms):
     """L(p) of four variables with a stop. Args as those of `Terms`."""
+
+    def growth_bound(self, p: float, noises: Sequence[Any]) -> float:
+        stop: Any = self._framed.problem.system.stop
+        return super().growth_bound(p, noises) + abs(p * math.log(stop.restitution) * self._mean[0, 1])
 
     def _loads(self) -> Iterator[Term]:
         yield from super()._loads()

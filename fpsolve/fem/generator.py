@@ -52,7 +52,6 @@ class Generator:
         chosen: on the half circle (its principal eigenvalue is that of the full circle) or the full circle.
 
     Attributes:
-        terms: those of Eq. (19).
         keeps_constants: see `Terms`.
 
     Raises:
@@ -68,11 +67,16 @@ class Generator:
         self._changes: dict[ParameterDerivative, tuple[Term, ...]] = {}
         self._last: Pencil | None = None
         self._maker: Terms = chosen.phi.terms(self.framed, self.space(0.0).noises)
-        self.terms, self.keeps_constants = self._maker.all(), self._maker.keeps_constants
+        self.keeps_constants = self._maker.keeps_constants
 
     def __reduce__(self) -> tuple[Any, ...]:
         """What it is made of; the matrices are assembled again when they are needed."""
         return type(self), (self.problem, self.chosen)
+
+    @cached_property
+    def terms(self) -> list[Term]:
+        """Those of Eq. (19)."""
+        return self._maker.all()
 
     def __str__(self) -> str:
         where = "" if self.framed.frame.is_itself else " in coordinates of its own,"

@@ -110,7 +110,7 @@ class PhaseAxis(DividedAxis):
         """Weights of the points, shape (n,)."""
         return self.finer_rule(1)[1]
 
-    @property
+    @cached_property
     def values(self) -> Matrix:
         """The functions at the points, shape (n, size)."""
         return self.at(self.points)
@@ -133,7 +133,7 @@ class PhaseAxis(DividedAxis):
 
     @cached_property
     def turns(self) -> int:  # type: ignore[override]
-        return round(2 * math.pi / np.ptp(self.lines))
+        return round(2 * math.pi / self.span)
 
     @cached_property
     def traces(self) -> tuple[Matrix, Matrix]:
@@ -201,7 +201,7 @@ class PhaseAxis(DividedAxis):
 
     def struck(self, of: Impulse) -> Struck:
         """What an impulse does at the points of a rule between the lines and the phases that it takes to lines."""
-        back = replace(of, exponent=(-np.array(of.exponent)).tolist())
+        back = replace(of, exponent=-np.array(of.exponent))
         even = self.lines[0] + self.span * np.arange(STRIPS) / STRIPS
         _, before = back.stretched(np.concatenate([even, self.lines[:-1]]))
         cuts = np.unique(np.concatenate([even, self.lines, self.folded(before)]))
@@ -254,7 +254,9 @@ class PhaseAxis(DividedAxis):
 
     def _of_cells(self, cells: IntArray, table: FloatArray) -> Matrix:
         """The matrix of which each row is that of a table, by degree, at the functions of one cell, and else 0."""
-        rows, columns = np.nonzero(np.equal.outer(cells, self.cells))
+        counts = self.degrees[cells] + 1
+        rows, firsts = np.repeat(np.arange(cells.size), counts), np.searchsorted(self.cells, cells)
+        columns = np.arange(rows.size) + np.repeat(firsts + counts - np.cumsum(counts), counts)
         entries, shape = table[rows, self.modes[columns]], (cells.size, self.size)
         if self.size > FEW_UNKNOWNS:
             return csr_matrix((entries, (rows, columns)), shape=shape)
@@ -291,7 +293,7 @@ class PlaneTerms(Terms):
     they take φ, see `PhaseAxis.impulses`.
     """
 
-    words = "{0}{h} ∂φ", "{0}{q}", "½ (h ∂φ + p q)² of white noise, h = {h}, q = {q}"
+    words = "{0}{1.h} ∂φ", "{0}{1.q}", "½ (h ∂φ + p q)² of white noise, h = {1.h}, q = {1.q}"
 
     def __init__(self, framed: Framed, phi: PhaseAxis, noises: Sequence[Any]) -> None:
         super().__init__(framed, phi, noises)

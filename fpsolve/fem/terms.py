@@ -22,7 +22,7 @@ import numpy as np
 
 from fpsolve.arrays import Coefficient, Matrix, one
 from fpsolve.model.coordinates import Framed
-from fpsolve.model.plane import CoefficientMatrix, Harmonics, written_coefficient
+from fpsolve.model.plane import CoefficientMatrix, written_coefficient
 from fpsolve.model.problem import ParameterDerivative
 
 Noises = tuple[Coefficient | None, ...]
@@ -76,7 +76,7 @@ class Term:
         of_p: the coefficient.
         phase: the matrix of the first axis; where p is in more than the coefficient, a function of p that gives it.
         noises: its functions of the noises.
-        text: what it does, as a reader would write it, with {0} for its coefficient, {h} and {q}.
+        text: what it does, as a reader would write it, with {0} for its coefficient, {1} for `of`.
         of: that of the motion, or of white noise, that the text names.
         is_wall: whether it is R^p of a wall, which is 1 where nothing is lost: forcing is R^p − 1.
     """
@@ -93,7 +93,7 @@ class Term:
         power, text = power_of_epsilon(self.order), self.text
         if self.of:
             size = f"{power} " * (self.order > 0) + written_coefficient(self.of.g)
-            text = text.format(size, h=_written(self.of.h), q=_written(self.of.q))
+            text = text.format(size, self.of)
         return f"{power:<2}  {('', 'p ', 'p² ')[self.of_p.n]}{text}"
 
     def at(self, p: float, derivative: int = 0, is_forcing: bool = False) -> Matrix | None:
@@ -205,16 +205,6 @@ class Terms:
     def place(self, name: str) -> int:
         """The place of a noise among those that have values; the first one for others."""
         return self._names.index(name) if name in self._names else 0
-
-
-def _written(of: Harmonics) -> str:
-    """(0.5 − 0.5 cos 2φ), or one number."""
-    text = ""
-    for value, name in ((of.mean, ""), (of.cosine, " cos 2φ"), (of.sine, " sin 2φ")):
-        if value:
-            text += f" {'−' if value < 0 else '+'} {abs(value):g}{name}"
-    text = text.removeprefix(" + ").removeprefix(" ")
-    return text if of.mean and not of.amplitude else f"({text})"
 
 
 def power_of_epsilon(order: int) -> str:

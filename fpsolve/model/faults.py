@@ -62,7 +62,7 @@ def strict_dataclass(kind: type[Kind]) -> type[Kind]:
     made = changed.__init__
 
     @wraps(made)
-    def __init__(self: Any, *arguments: Any, **named: Any) -> None:
+    def __init__(self: Any, /, *arguments: Any, **named: Any) -> None:
         try:
             made(self, *arguments, **named)
             return

@@ -86,6 +86,15 @@ class Harmonics:
     def vanishes(self) -> bool:
         return not np.any([self.mean, self.cosine, self.sine])
 
+    def __str__(self) -> str:
+        """(0.5 − 0.5 cos 2φ), or one number."""
+        text = ""
+        for value, name in ((self.mean, ""), (self.cosine, " cos 2φ"), (self.sine, " sin 2φ")):
+            if value:
+                text += f" {'−' if value < 0 else '+'} {abs(value):g}{name}"
+        text = text.removeprefix(" + ").removeprefix(" ")
+        return text if self.mean and not self.amplitude else f"({text})"
+
 
 def stretching(a: FloatArray) -> Harmonics:
     """eᵀA e, d ln a/dt, for matrices of shape (…, 2, 2)."""

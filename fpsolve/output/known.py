@@ -61,13 +61,13 @@ def record_of(job: Job) -> Entries:
 def read_into(job: Job, record: Entries, names: Mapping[str, str], *, is_all: bool = False) -> Job:
     """Give a job what its record has of what is asked: what is settled, or all; what cannot be read is not there."""
     for name in job.asked:
-        with suppress(ValueError, KeyError):
+        with suppress(ValueError, KeyError, TypeError):
             found, *beside = record[names[name]]
             entry = Entry(made(BY_NAME[name].kind | None, found), *made(_BESIDE, beside))
             if is_all or job.numerics.settles(entry.limit):
                 job.entries[name] = entry
     for p in job.asked[MOMENTS.name]["p"]:
-        with suppress(ValueError, KeyError):
+        with suppress(ValueError, KeyError, TypeError):
             row, limit = made(_ROW, record[f"{names[ROW]} {p!r}"])
             if is_all or job.numerics.settles(limit):
                 job.rows[p] = row

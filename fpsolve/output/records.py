@@ -62,8 +62,10 @@ class Records:
     def get(self, key: str) -> Entries:
         """All entries of a key; none where nothing is known, or can be read."""
         entries = Entries()
-        with suppress(OSError, ValueError), self.path.open("rb") as file:
-            for start in self._starts.get(key, ()):
+        if not (starts := self._starts.get(key)):
+            return entries
+        with suppress(OSError, ValueError, zlib.error), self.path.open("rb") as file:
+            for start in starts:
                 file.seek(start)
                 if found := _parsed(file.readline()):
                     entries |= json.loads(found[1], object_hook=unpacked)

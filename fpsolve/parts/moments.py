@@ -25,13 +25,11 @@ class Moments:
     """What is found of Λ(p), beside the rows of the p at which it did not fail.
 
     Attributes:
-        root: near δ_p, see `MomentLyapunov`.
         failures: why some p are missing.
         warnings: what limits the numbers.
         notes: on them, and where the theories compared with are not valid.
     """
 
-    root: float | None = None
     failures: tuple[Failure, ...] = ()
     warnings: tuple[Message, ...] = ()
     notes: tuple[Message, ...] = ()
@@ -76,7 +74,6 @@ def _solve(job: Job, settings: Settings) -> Moments:
     job.rows |= {p: row for p, *row in np.column_stack([*vars(columns).values()]).tolist()}
     notes = *found.notes, *problem.remarks, weak_noise_note(problem, found.p, found.value)
     return Moments(
-        found.root,
         (*(Failure(p, reason) for p, reason in refused.items()), *found.failures),
         tuple(found.warnings),
         tuple(note for note in notes if note is not None),

@@ -226,7 +226,7 @@ class Bounds:
 
 @dataclass(frozen=True)
 class FrozenBounds:
-    """Where T may be frozen beyond, each below and above, on the right or mirrored onto it.
+    """Beyond which T may be frozen, each below and above, on the right or mirrored onto it.
 
     Attributes:
         steep: around u_z/u; for λ around f_z.
@@ -280,7 +280,7 @@ class Bounder:
         return Bounds(mismatch, (inward[0] - slack[0], inward[1] + slack[1]))
 
     def frozen(self, z: FloatArray, sign: int) -> list[FrozenBounds]:
-        """Where T may be frozen beyond, on the right or, with sign −1, on the left."""
+        """Beyond which T may be frozen, on the right or, with sign −1, on the left."""
         trial, cells, at = self.trial, Cells(self.trial.basis, z, z, self._rest), balls(z)
         divisor = self._divisor(cells)
         drifts = (trial.noise.drift(at), trial.noise.drift_slope(at))

@@ -39,7 +39,7 @@ ROUGH, EARLY = 30.0, 0.1
 such trials are passed over."""
 WHOLE_BELOW = 6.0
 """End exponents a below which the ends of the support carry too much weight to be cut off."""
-CELLS, REACH, HELD_FROM, CANDIDATES = 480, 10.0, 3.5, 24
+CELLS, REACH, FROZEN_FROM, CANDIDATES = 480, 10.0, 3.5, 24
 REST = 1e-8
 """What Taylor's formula may leave over; verification leaves less, so that it finds all that is found here."""
 SLACK = 1e-6
@@ -365,7 +365,7 @@ class Half:
         mismatch: above e on each cell.
         inward: below B on each cell.
         beta: β.
-        frozen: what is known at the nodes where T may be frozen beyond; None where u serves to the end of the support.
+        frozen: what is known at the nodes beyond which T may be frozen; None where u serves to the end of the support.
         nu: floats below and above ν.
         sense: q.
         square: q in front of W²; 0 for the drift of ln‖x‖.
@@ -494,7 +494,7 @@ def _frozen(
     basis, bad = bounder.trial.basis, np.flatnonzero(~bounds.is_positive)
     first = bad[bad < middle].max(initial=-1) + 1
     last = bad[bad >= middle].min(initial=len(nodes) - 1)
-    far = np.abs(nodes - basis.centre) > HELD_FROM * basis.scale
+    far = np.abs(nodes - basis.centre) > FROZEN_FROM * basis.scale
     inside = np.flatnonzero(far & (np.arange(len(nodes)) >= first) & (np.arange(len(nodes)) <= last))
     found: list[dict[int, FrozenBounds]] = []
     for sign, chosen in ((-1, inside[inside < middle]), (1, inside[inside > middle])):

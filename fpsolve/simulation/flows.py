@@ -164,7 +164,7 @@ def step_driven(matrices, wall, h, y, mean, rise, log_norm, tally, rng):
 
 @compiled
 def _step(matrices, rays, h, y, mean, rise, log_norm, tally, start, sizes, most):
-    """One step of the paths whose ‖Ω‖ is below the most; where it was start, and ‖Ω‖² of all, in the last arrays."""
+    """One step of the paths whose ‖Ω‖ is below the most; where it started, and ‖Ω‖² of all, in the last arrays."""
     n, paths, lever = y.shape[0], y.shape[1], -h * h / 6
     omega, after = np.empty((n, n, paths)), np.empty((n, paths))
     for i in range(paths):
@@ -194,7 +194,7 @@ def _step(matrices, rays, h, y, mean, rise, log_norm, tally, start, sizes, most)
 
 @compiled
 def _summed(omega, terms, start, now, after):
-    """exp Ω of all paths times what was start with, by so many terms of its series; now is that in the beginning."""
+    """exp Ω of all paths times the start, by so many terms of its series; now is that in the beginning."""
     n, paths = start.shape
     for k in range(terms, 0, -1):
         for r in range(n):

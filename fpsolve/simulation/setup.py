@@ -70,8 +70,8 @@ def obstacles(
     """Why a simulation with this length and this step would not be right: a sentence for each of "time" and "step"."""
     found, known = {}, coefficients(oscillator, noise)
     largest, reason = known.largest_step
-    burn_in = known.transient()
-    h, least, unit = known.default_step, burn_in / _LONGEST, known.repeated / ROUGHER
+    transient = known.transient()
+    h, least, unit = known.default_step, transient / _LONGEST, known.repeated / ROUGHER
     if step is not None and not step > 0:
         found["step"] = f"got {step:g}; must be > 0 and <= {largest:.4g}; make it positive, or leave it out"
     elif step is not None and step > largest * (1 + 1e-12):
@@ -83,18 +83,19 @@ def obstacles(
         found["step"] = f"got {step:.10g}; must be a third, a sixth, … of the delay, such as {near:.10g}"
     elif step is not None and step < least <= largest:
         found["step"] = (
-            f"got {step:g}, too small: a transient, {burn_in:.3g}, must take at most {_LONGEST:.0e} steps; must be >= "
-            f"{least:.4g} and <= {largest:.4g}; increase it, or leave it out"
+            f"got {step:g}, too small: a transient, {transient:.3g}, must take at most {_LONGEST:.0e} steps; must be "
+            f">= {least:.4g} and <= {largest:.4g}; increase it, or leave it out"
         )
     elif (h if step is None else step) < least:
         found["step"] = (
-            f"one transient, {burn_in:.3g}, takes {burn_in / h:.2g} steps of {h:.3g}, which {reason} requires; must "
-            f"be at most {_LONGEST:.0e}; bring the times of noise and oscillator nearer to each other"
+            f"one transient, {transient:.3g}, takes {transient / h:.2g} steps of {h:.3g}, which {reason} requires; "
+            f"must be at most {_LONGEST:.0e}; bring the times of noise and oscillator nearer to each other"
         )
-    if time is not None and not 2 * burn_in * (1 - 1e-12) <= time:
+    if time is not None and not 2 * transient * (1 - 1e-12) <= time:
         found["time"] = (
-            f"got {time:g}; must be >= {2 * burn_in:.4g}, two transients, as growth is measured after one; increase it"
+            f"got {time:g}; must be >= {2 * transient:.4g}, two transients, as growth is measured after one; "
+            "increase it"
         )
-    elif time is not None and time > _LONGEST * burn_in:
-        found["time"] = f"got {time:g}; must be <= {_LONGEST * burn_in:.4g}, a million transients; reduce it"
+    elif time is not None and time > _LONGEST * transient:
+        found["time"] = f"got {time:g}; must be <= {_LONGEST * transient:.4g}, a million transients; reduce it"
     return found

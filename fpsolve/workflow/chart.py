@@ -351,8 +351,9 @@ def _shade(axes: Any, regions: Regions, frame: tuple[Axis, Axis]) -> dict[str, s
         parts, size = name.split(", "), np.array(regions.index.shape)
         for lines in (parts, [line for part in parts for line in ([part] if "$" in part else wrap(part, 14))]):
             half = 0.5 * np.array([max(map(len, lines)) * LETTER[0], len(lines) * LETTER[1]])
-            (left, low), (right, high) = (((each.at + end * half) * size).astype(int) for end in (-1, 1))
-            if min(left, low) >= 0 and (regions.index[left : right + 1, low : high + 1] == number).all():
+            (left, low), (right, high) = (np.floor((each.at + end * half) * size).astype(int) for end in (-1, 1))
+            covered = regions.index[left : right + 1, low : high + 1]
+            if min(left, low) >= 0 and right < size[0] and high < size[1] and (covered == number).all():
                 words, height = "\n".join(lines), 9.5
                 break
         else:

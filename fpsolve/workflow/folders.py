@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from hashlib import sha256
 from pathlib import Path
 
 from fpsolve.case.case import Case
 from fpsolve.errors import FpsolveError, OutputError, Remedy
 from fpsolve.files import TEMPORARY, alone, plain_text, writable, write_text
-from fpsolve.output.records import key_of
 from fpsolve.signals import is_interrupt
 
 AGAIN, ANEW = "run it again to go on", "run it again to start over"
@@ -25,8 +26,8 @@ REPORT = r"report\.html"
 """Pattern of the name of the report of what was done last, which whatever is done next makes stale."""
 CHART, PROVEN, DESIGNED = r"chart\.(csv|json|png|pdf)", r"proof\.json", r"design\.(json|toml)"
 """Patterns of the names of the files that a run writes, a simulation, a chart, proofs, and a design."""
-_UNFINISHED = rf"(eigenfunctions(-\d+)?/)?{TEMPORARY}"
 _FOLDERS = r"records|eigenfunctions(-\d+)?"
+_UNFINISHED = rf"(({_FOLDERS})/)?{TEMPORARY}"
 _PARAMETERS = "records/parameters"
 """The file that tells of which parameter sets all others are."""
 
@@ -49,7 +50,8 @@ def own_folder(case: Case, out: str | Path, replaced: Sequence[str]) -> Iterator
                     raise OutputError(f"{path} cannot be written to: it is no folder, or a link to one", Remedy.FOLDER)
                 if re.fullmatch("|".join([*replaced, REPORT]), name) and is_folder:
                     raise OutputError(f"{path} cannot be written: Is a directory", Remedy.FOLDER)
-            parameters, stated = key_of(case.curve({}).digest, case.vary.mode, case.vary.columns), ""
+            sets = json.dumps([case.curve({}).digest, case.vary.mode, case.vary.columns])
+            parameters, stated = sha256(sets.encode()).hexdigest(), ""
             with suppress(OSError, ValueError):
                 stated = plain_text(folder / _PARAMETERS)
             kinds = replaced if stated == parameters else (SOLVED, SIMULATED, CHART, PROVEN, DESIGNED)

@@ -186,7 +186,7 @@ class Simulations:
                     if not is_finished(found):
                         break
             except KeyboardInterrupt:
-                if not self.simulated:
+                if len(self.simulated) in (0, case.planned):  # nothing is found, or all, but not written
                     raise
         whole = len(self.simulated) - self.simulated[-1].interrupted
         if whole < case.planned:

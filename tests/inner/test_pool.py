@@ -75,7 +75,7 @@ def test_cluster_without_workers_is_given_up_after_a_while(monkeypatch):
     monkeypatch.setattr(pool, "LOOK_SECONDS", 0.02)
     there, begun = iter([True] * 5), time.monotonic()
     with (
-        Pool(Deserted, has_workers=lambda _: next(there, False)) as workers,
+        Pool(Deserted, has_workers=lambda: next(there, False)) as workers,
         pytest.raises(WorkersDied, match="no worker is left"),
     ):
         list(workers.run(square, range(3)))

@@ -146,6 +146,17 @@ def test_log_density_of_eq_9_is_exact_to_rounding_next_to_r0_1():
         assert_allclose(noise.log_density(xi), known, rtol=1e-14, atol=1e-14)
 
 
+@pytest.mark.parametrize("r0", [0.5, 0.9, 1 + 1e-9, 1.1, 1.5])
+def test_derivative_of_eq_9_by_r0_is_exact_from_the_middle_to_far_out(r0):
+    noise = NonGaussianNoise(D0=0.3, tau0=1.7, r0=r0)
+    xi = np.array([1e-9, 1e-4, 0.01, 0.5, 0.99]) * noise.half_width if r0 < 1 else np.logspace(-9, 14, 24)
+    with mpmath.workdps(60):
+        u = [mpmath.mpf(0.5) * mpmath.mpf(noise.tau0) / mpmath.mpf(noise.D0) * mpmath.mpf(x) ** 2 for x in xi]
+        q = [(mpmath.mpf(r0) - 1) * each for each in u]
+        known = [float((mpmath.log1p(b) - b / (1 + b)) * (a / b) ** 2) for a, b in zip(u, q, strict=True)]
+    assert_allclose(noise.derivative("r0").log_density(xi), known, rtol=1e-13, atol=0)
+
+
 def test_density_and_drift_of_eq_7_at_r0_1_are_those_of_ornstein_uhlenbeck_noise():
     xi, limit = np.linspace(-4, 4, 9), OrnsteinUhlenbeck(alpha=2.0, sigma=math.sqrt(0.6) * 2)
     for r0 in (1 - 1e-12, 1.0, 1 + 1e-12):

@@ -237,4 +237,9 @@ class NonGaussianNoise(TreatedNoise):
             case "tau0":
                 return NoiseDerivative(-1 / self.tau0, lambda xi: by_log_tau0(xi) / self.tau0)
         end_exponent = 1 / (1 - self.r0) ** 2 if math.isfinite(self.half_width) else 0.0
-        return NoiseDerivative(0.0, lambda xi: 0.5 * u(xi) ** 2 * hyp2f1(2, 2, 3, (1 - self.r0) * u(xi)), end_exponent)
+
+        def by_r0(xi: FloatArray) -> FloatArray:
+            # of complex numbers, as hyp2f1 of large real ones loses digits, and is infinite in the end
+            return np.asarray(0.5 * u(xi) ** 2 * hyp2f1(2, 2, 3, (1 - self.r0) * u(xi) + 0j).real)
+
+        return NoiseDerivative(0.0, by_r0, end_exponent)

@@ -633,7 +633,7 @@ class EquationSystem(System):
         """
         name = "".join(self._in_walls - {EPSILON})
         value, known, step, slope = 1.0, math.inf, 0.0, 0.0
-        with suppress(TableError):
+        with suppress(TableError, IndexError):  # there may be no wall
             known, slope, _ = self._log_factor(name, value)
         if name in self._used or abs(known) > ROUNDED or not slope > 0:
             return super().restitution_at(log_factor)
@@ -645,7 +645,7 @@ class EquationSystem(System):
             except (TableError, ZeroDivisionError):  # R is not positive there, or does not change
                 step /= 2
                 value -= step
-        is_found = abs(known - log_factor) <= ROUNDED * max(1.0, abs(log_factor))
+        is_found = slope != 0 and abs(known - log_factor) <= ROUNDED * max(1.0, abs(log_factor))
         return (name, value, 1 / slope) if is_found else (name, math.nan, math.nan)
 
 
