@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import sys
+from abc import abstractmethod
 from collections.abc import Iterator, Sequence
 from contextlib import nullcontext
 from dataclasses import replace
@@ -101,7 +102,8 @@ class Elements(Method):
             NotConverged: the mesh does not resolve the problem, or the budget does not suffice to find one, or the even
                 moment of this p contradicts it.
         """
-        p = p if abs(p) >= NEGLIGIBLE_P else 0.0
+        if abs(p) < SMALL_P:
+            return self._beside_zero(p if abs(p) >= NEGLIGIBLE_P else 0.0, tolerance)
         if tolerance is None and p in self._failed:
             kind, message = self._failed[p]
             raise kind(message)
@@ -124,12 +126,20 @@ class Elements(Method):
         self.spaces[p], self._accepted[p] = solution, allowed(solution.pair)
         return solution
 
-    def places(self, p: float, tolerance: Tolerance, found: Sequence[Solution]) -> Iterator[tuple[Stage, Any]]:
-        """The first stages of the places where Λ(p) may be carried, and what each begins with, after those before.
+    def _beside_zero(self, p: float, tolerance: Tolerance | None) -> Solution:
+        """The pair at a small p, on the functions of that at ±`SMALL_P`, which has the error."""
+        generator, known = self.near_zero(p, tolerance).pair.generator, self.spaces.get(p)
+        if not known or known.pair.generator is not generator:
+            with self.solving(p):
+                self.spaces[p] = known = Solution(self.pair_on(generator, p, self._near(p)))
+        return known
 
-        A small p has the functions of `SMALL_P`.
+    @abstractmethod
+    def places(self, p: float, tolerance: Tolerance, found: Sequence[Solution]) -> Iterator[tuple[Stage, Any]]:
+        """The first stages of the places where Λ(p) may be carried, and what each begins with.
+
+        `found` has what was found at those before.
         """
-        yield Start(self.problem, self.near_zero(p, tolerance).pair.generator.chosen), self._near(p)
 
     def confirmed(self, search: Search, found: Sequence[Solution]) -> Solution:
         """The largest of those at all places."""
@@ -140,8 +150,8 @@ class Elements(Method):
         return False
 
     def allowed(self, tolerance: Tolerance, pair: PrincipalPair) -> float:
-        """The largest error of Λ(p); any for small p, where it has no scale."""
-        return tolerance(pair.p, pair.value) if abs(pair.p) >= SMALL_P else math.inf
+        """The largest error of Λ(p)."""
+        return tolerance(pair.p, pair.value)
 
     def pair_on(self, generator: Generator, p: float, start: PrincipalPair | Sequence[PrincipalPair]) -> PrincipalPair:
         """The principal pair; where it is not found, the failure has the remedy of this place."""
@@ -322,9 +332,6 @@ class PlaneElements(Elements):
         """The first one is that of the nearest p, if its functions serve this one, too, else where slow noise carries
         the moment, or the mean of other noise. Others are far from there.
         """
-        if abs(p) < SMALL_P:
-            yield from super().places(p, tolerance, found)
-            return
         near = self._near(p)
         if near and self._serves(near[0], p):
             yield Start(self.problem, near[0].generator.chosen), near
@@ -356,7 +363,7 @@ class PlaneElements(Elements):
                 pair = self.pair_among(halves, best.pair)
                 return replace(best, unresolved=2 * abs(pair.value - best.value))
             return self.confirmed(search, [search.settle(Start(self.problem, halves))])
-        if self.settings.rtol <= SURELY_SEEN or abs(p) < SMALL_P:
+        if self.settings.rtol <= SURELY_SEEN:
             return best
         halved = chosen.with_axis(0, chosen.phi.doubled())
         if halved.size > min(MOST_HALVED, self.settings.budget.most(halved)):

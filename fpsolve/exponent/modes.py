@@ -286,9 +286,7 @@ class Directions(Elements):
 
     def places(self, p: float, tolerance: Tolerance, found: Sequence[Solution]) -> Iterator[tuple[Stage, Any]]:
         """One: that of the nearest p; where it is p itself, a finer one than before."""
-        if abs(p) < SMALL_P:
-            yield from super().places(p, tolerance, found)
-        elif known := self.spaces.get(p):
+        if known := self.spaces.get(p):
             yield known.start.refined(known, tolerance(p, known.value), 0), known.pair
         else:
             yield self.stage.at(self.problem, p, self.settings.rtol, self.spaces)

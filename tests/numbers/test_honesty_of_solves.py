@@ -97,6 +97,15 @@ def test_a_tolerance_out_of_reach_harms_no_other():
     assert solver.pair(2.0).value == pytest.approx(series(paper(), WEAK, 2.0), rel=1e-10)
 
 
+def test_lambda_that_is_asked_again_after_a_tighter_moment_beside_it_has_its_own_error():
+    problem = Problem(paper(0.5), UNIT)
+    solver, exact = ExponentSolver(problem, rtol=0.01), ExponentSolver(problem, rtol=1e-11).lyapunov_exponent()
+    before = solver.lyapunov_exponent()
+    solver.solution(0.01, lambda p, value: 1e-12)
+    for found in (before, solver.lyapunov_exponent()):
+        assert abs(found.value - exact.value) <= found.error_estimate + exact.error_estimate
+
+
 def test_lambda_after_a_moment_far_away_is_found_without_a_warning():
     """The eigenfunctions of slow noise at p = 8, carried to those near p = 0, are next to orthogonal."""
     noise = NonGaussianNoise(D0=2.0, tau0=50.0, r0=0.95).ou_reduction()
