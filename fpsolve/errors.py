@@ -27,7 +27,7 @@ class FpsolveError(Exception):
 
 
 class NoSuchExponent(FpsolveError):
-    """Λ(p) does not exist for this noise and this p: it is infinite."""
+    """Λ(p) does not exist for this noise and this p, as where it is infinite, or is not computed for such a system."""
 
 
 class NoPerturbationTheory(FpsolveError):
@@ -51,7 +51,7 @@ class WorkersDied(FpsolveError):
 
 
 class NotConverged(FpsolveError):
-    """The eigenvalue iteration did not settle.
+    """A number is not resolved: the iteration did not settle, or a budget or the elements do not suffice.
 
     >>> moment_lyapunov(problem, 60.0, budget=Budget(unknowns=100))
     Traceback (most recent call last):

@@ -258,7 +258,7 @@ class ZeroField:
     Args:
         line: the target, the frame, and what a solve may cost.
         rtol: of F, relative to its scale.
-        seconds: of the processor for all values together; each may take half of what is left.
+        seconds: of the processor for all values together; each may take half of what is left, and what a set may.
         spent: what is said where they do not suffice.
 
     Attributes:
@@ -287,14 +287,15 @@ class ZeroField:
         """F, or why there is none."""
         sides = list(zip((self._line.x, self._line.y), at.tolist(), strict=True))
         theta, slopes = np.array([(axis.value(share), axis.slope(share)) for axis, share in sides]).T
-        meter = Meter(0.5 * (self._most - self.seconds), number=self._line.target.symbol)
+        left = 0.5 * (self._most - self.seconds)
+        meter = Meter(min(left, self._line.budget.seconds), number=self._line.target.symbol)
         try:
             with meter.running():
                 found = self._distance(theta)
-        except OverBudget:
-            self.stopped = self._spent
-            return self.stopped
         except FpsolveError as failure:
+            if isinstance(failure, OverBudget) and meter.seconds == left:
+                self.stopped = self._spent
+                return self.stopped
             return failure.message
         finally:
             self.seconds += meter.spent

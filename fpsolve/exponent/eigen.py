@@ -6,7 +6,7 @@ two-sided Rayleigh quotient iteration converges cubically. That it found the pri
 property that no other pair has: T > 0 and T* > 0 (Perron-Frobenius; one of the two is enough), as far as a mesh can
 tell. It cannot where slow noise has two places between which it hardly ever passes: both are looked at, see `starts`.
 Nor can it for noise with states, or where the phase rests, so that every search begins on the right there, or at the
-pair of a neighbouring p and must reach its tangent: Λ is convex.
+pair of a neighbouring p and must reach its tangent: Λ is convex. Under chains and white noise (σ − L)⁻¹1 > 0 decides.
 """
 
 from __future__ import annotations
@@ -284,8 +284,8 @@ def spectrum(generator: Generator, p: float, k: int = 10) -> Any:
 def _from_the_right(pencil: Pencil, generator: Generator) -> tuple[FloatArray, FloatArray, float, float]:
     """Vectors T and T*, and the value, of the rightmost real eigenvalue, seen from the right; and half its distance.
 
-    For a real shift σ > Λ no eigenvalue of L is nearer to σ than Λ. The first shift is beyond a bound on Λ; each next
-    one keeps `NEARER` of the distance. Complex pairs that come of the truncation may be nearer; they are passed over.
+    For a real shift σ > Λ no eigenvalue of L is nearer to σ than Λ. The first shift is an estimate of Λ from above;
+    each next one keeps `NEARER` of the distance. Complex pairs of the truncation may be nearer; they are passed over.
     """
     space, value = pencil.space, math.inf
     right = left = space.constant

@@ -163,7 +163,7 @@ class Elements(Method):
     def finer_pair(self, pair: PrincipalPair) -> PrincipalPair:
         """That at the same p on a finer discretisation, which tells the errors of what the other says.
 
-        It has two degrees more each way; for algebraic tails its interval is wider, too. Raises as `pair_among`.
+        Each axis is finer; for algebraic tails its interval is wider, too. Raises as `pair_among`.
         """
         return self.pair_among(widened(pair.generator).enriched(), pair)
 
@@ -216,7 +216,7 @@ class Elements(Method):
         return self.solution(p).pair
 
     def row(self, p: float) -> Moment:
-        """Λ(p) on the scale of the terms of Eq. (37) before they cancel.
+        """Λ(p), of which enough is left on its scale; of an even p that of the equations where elements do not have it.
 
         Near p = 0, where rounding is not proportional to p, it is that of Λ(p)/p.
         """
@@ -402,7 +402,7 @@ class GivenMesh(PlaneElements):
 
     @cached_property
     def generators(self) -> tuple[Generator, Generator]:
-        """That of the mesh, and one of four degrees more, whose error hardly counts beside it. Raises `MeshError`."""
+        """That of the mesh, and one that is finer twice, whose error hardly counts beside it. Raises `MeshError`."""
         assert self.settings.mesh is not None
         generator = Generator(self.problem, self.settings.mesh)
         return generator, Generator(self.problem, generator.chosen.enriched().enriched())

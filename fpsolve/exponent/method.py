@@ -199,7 +199,7 @@ class Method:
 
     @property
     def has_pairs(self) -> bool:
-        """Whether there are eigenfunctions, and what follows from them, as λ."""
+        """Whether there is λ."""
         return self.reason(0.0) is None
 
     @property
@@ -209,7 +209,7 @@ class Method:
 
     @property
     def interval(self) -> tuple[float, float]:
-        """The p for which Λ(p) is computed, as a closed interval."""
+        """The interval of p in which every Λ(p) is computed; 0 alone where only some are."""
         return (0.0, 0.0) if self.lacks_moments else (-math.inf, math.inf)
 
     @property
@@ -227,11 +227,11 @@ class Method:
 
     @cached_property
     def scales(self) -> Scale:
-        """What errors are measured by: the sizes of the terms of Eq. (37) before they cancel."""
+        """What errors are measured by, see `scale_of`: in weak noise the sizes of the terms of Eq. (37)."""
         return scale_of(self.problem)
 
     def scale(self, p: float) -> float:
-        """The sum of the absolute values of the terms of Eq. (37)."""
+        """What the error of Λ(p) is measured by: in weak noise the sum of the sizes of the terms of Eq. (37)."""
         return float(self.scales.moment(p))
 
     def tolerance(self, p: float, value: float) -> float:

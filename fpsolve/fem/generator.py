@@ -99,7 +99,7 @@ class Generator:
         return self._last
 
     def growth_bound(self, p: float) -> float:
-        """About a bound on Λ(p)."""
+        """An estimate of Λ(p) from above, by the sizes of the terms at the quadrature points."""
         return self._maker.growth_bound(p, self.space(p).noises)
 
     @cached_property

@@ -38,7 +38,7 @@ STEP = 1e-5
 MORE_POINTS = 16
 """Number of points of a quadrature beyond the number of polynomials."""
 MAX_COUNT = 200
-"""Largest number of polynomials, or highest degree of other functions: beyond, none are added."""
+"""Largest number of polynomials, or highest degree of other functions; beyond, some are added for an error only."""
 
 
 class Samples(NamedTuple):

@@ -93,7 +93,7 @@ class Space:
         return Space((*self.axes[:k], axis, *self.axes[k + 1 :]))
 
     def enriched(self) -> Space:
-        """A finer one: two degrees more each way; where there are none left, cells are halved."""
+        """A finer one each way, see each axis: two degrees more, or some polynomials, or half cells."""
         return Space(tuple(axis.enriched() for axis in self.axes))
 
     def doubled(self, effects: Sequence[ModeEffects | None] = ()) -> Space:

@@ -140,7 +140,7 @@ class Terms:
         return [*found, *self._loads()]
 
     def growth_bound(self, p: float, noises: Sequence[Any]) -> float:
-        """About a bound on Λ(p): (|p| + n) ‖A‖ max |g| for each term of the motion of n variables, and so on."""
+        """Λ(p) from above, about: (|p| + n) ‖A‖ max |g| for each term of the motion of n variables, and so on."""
         total, power = 0.0, abs(p) + self._framed.problem.dimension
         for term in self.system.terms:
             size = power * self.system.epsilon**term.order * float(np.linalg.norm(term.matrix, 2))

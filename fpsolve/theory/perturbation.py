@@ -260,7 +260,7 @@ def scale_of(problem: Problem) -> Scale:
     Perturbation theory overstates strong noise.
 
     In the sum the constant terms, with the mean of the noise, count by the largest |Re| of their eigenvalues. Noise of
-    strength c and correlation time τ counts by c min(1, c τ). White noise counts by the largest ½(h q′ + q²) and ½q².
+    strength c and correlation time τ counts by c min(1, c τ). White noise counts by ½ q max(h, q), the largest of each.
     A jump counts once in a half-turn. Impulses that stretch by e^s count by their rate times s min(1, s).
     """
     own, of_noises = framed(problem), dict[str, float]()

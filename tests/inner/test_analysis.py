@@ -1,14 +1,18 @@
 """Internals of lines of stability: curves F(u, v) = 0 whose lengths, ends, folds and crossings are known."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from fpsolve import NotConverged
+from fpsolve.analysis import Axis, boundary
 from fpsolve.analysis.continuation import LONGEST, PIECES, find_branches
 from fpsolve.analysis.scan import Row, Sample, scan_row, scanned
 from fpsolve.analysis.special_points import crossings, with_folds, with_values
+from fpsolve.exponent import Budget
+from tests.numbers.test_honesty import GAUSSIAN
 
 
 def field(f, hole=(0, 0, -1)):
@@ -92,3 +96,12 @@ def test_folds_values_and_crossings_of_a_curve_are_exact():
     [first], [second] = (list(find_branches(each, scan_of(each))) for each in (one, other))
     met = sorted(tuple(point.at) for (_, point), _ in crossings(first, second, (one, other)))
     assert np.allclose(met, [(0.5, 0.5 - math.sqrt(0.08)), (0.5, 0.5 + math.sqrt(0.08))], atol=1e-9)
+
+
+def test_seconds_of_a_set_end_a_point_of_a_line_and_not_the_line():
+    x, y = Axis("oscillator.c1", -1.0, 1.0), Axis("noise.sigma", 0.5, 1.0)
+    line = boundary(GAUSSIAN, "lyapunov_exponent = 0", x, y, nodes=3)
+    found = replace(line, budget=Budget(seconds=1e-9)).zero_field
+    with pytest.raises(NotConverged, match="budget"):
+        found(np.array([0.3, 0.6]))
+    assert found.stopped is None
