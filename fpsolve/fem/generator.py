@@ -80,7 +80,9 @@ class Generator:
 
     def __str__(self) -> str:
         where = "" if self.framed.frame.is_itself else " in coordinates of its own,"
-        return "\n  ".join([f"L(p), Eq. (19){where} the sum of", *map(str, self.terms)])
+        return "\n  ".join(
+            [f"L(p), Eq. (19){where} the sum of these terms, each with its order", *map(str, self.terms)]
+        )
 
     def space(self, p: float) -> Space:
         """Trial and test functions; the tilt of those of ξ moves with p, and each axis has tables of its own."""

@@ -94,7 +94,7 @@ class Term:
         if self.of:
             size = f"{power} " * (self.order > 0) + written_coefficient(self.of.g)
             text = text.format(size, self.of)
-        return f"{power:<2}  {('', 'p ', 'p² ')[self.of_p.n]}{text}"
+        return f"{power + ':':<4} {('', 'p ', 'p² ')[self.of_p.n]}{text}"
 
     def at(self, p: float, derivative: int = 0, is_forcing: bool = False) -> Matrix | None:
         """The k-th derivative by p of the matrix of φ with its coefficient, or of its forcing; None where that is 0."""

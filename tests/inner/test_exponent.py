@@ -23,7 +23,7 @@ def on_sphere(problem, waves=4, **changes):
 
 def test_generator_of_many_variables_prints_its_terms():
     text = str(on_sphere(random_system(0, 3)).generator)
-    assert all(f"  {term}\n" in text for term in ("ε⁰  h·∇", "ε⁰  p q", "ε⁰  L_ξ, the generator of the noise")), text
+    assert all(f"  {term}\n" in text for term in ("ε⁰:  h·∇", "ε⁰:  p q", "ε⁰:  L_ξ, the generator of the noise")), text
 
 
 def test_what_finer_waves_change_is_told_to_first_order():
