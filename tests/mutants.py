@@ -151,8 +151,8 @@ DEFECTS: tuple[Defect, ...] = (
     Defect(
         "T15 moments close at a wall",
         "exponent/moments.py",
-        "if any(wall.changes_state for wall in problem.system.barriers):",
-        "if problem.system.stop:",
+        "if any(wall.changes_state for wall in problem.linear.barriers):",
+        "if problem.linear.stop:",
         "moment",
     ),
     Defect(

@@ -177,7 +177,7 @@ def excursion(
 ) -> Excursion:
     """Bounds of the probability that ‖x‖ ever exceeds A ‖x₀‖, for every A > 1; for unbounded noise its exponent δ_p.
 
-    ‖x‖ is √(x₁² + x₂²) in the variables of the system, `problem.system.states`.
+    ‖x‖ is √(x₁² + x₂²) in the variables of the system, `problem.linear.states`.
 
     Args:
         problem: a motion and its noise.
@@ -214,7 +214,7 @@ def solve_excursion(solver: ExponentSolver, *, phi: Start, xi: StartOfNoise) -> 
     found = replace(found, stability_index=index)
     if unseen := solver.method.unseen():
         return replace(found, notes=(unseen,))
-    moved = problem.noise.motion(problem.system)
+    moved = problem.noise.motion(problem.linear)
     overshoot, is_smooth = moved.overshoot, moved.rises_smoothly
     p, pairs, notes = index.value, [solver.pair(index.value)], list[Message]()
     if problem.noise.is_bounded:
@@ -290,7 +290,7 @@ def _growth(pair: PrincipalPair, psi: FloatArray, xi: Sequence[FloatArray]) -> t
     """q over φ and values of the noises, and ρ^p as a factor of such tables."""
     problem, columns = pair.generator.problem, (-1, *[1] * len(xi))
     phi, stretch = own_phases(pair, psi)
-    rate: Harmonics = growth_rate(problem.noise.motion(problem.system).drift, problem.valued.combined(xi))
+    rate: Harmonics = growth_rate(problem.noise.motion(problem.linear).drift, problem.valued.combined(xi))
     return rate(phi.reshape(columns)), stretch.reshape(columns)
 
 

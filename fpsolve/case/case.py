@@ -303,7 +303,7 @@ class Case(Section):
             has_all = self.output.lists_quantities or self.method.has_pairs
             return self.output.names if has_all else (MOMENT.name, SENSITIVITIES)
         named = {*CHEAP} if self.method.has_pairs else {MOMENT.name}
-        named |= {*(CHEAP_OF_WALLS if self.problem.system.jumps else ())}
+        named |= {*(CHEAP_OF_WALLS if self.problem.linear.jumps else ())}
         named |= {RESPONSE if each.of_response else each.quantity for each in self.expect}
         named |= self.model_fields_set & {EXCURSIONS, RESPONSE}
         usual = {
@@ -320,7 +320,7 @@ class Case(Section):
         if self.output.names is not None:
             return ()
         is_there = {RESPONSE: False, DERIVATIVE.name: False, EIGENFUNCTIONS: not self.method.no_picture}
-        is_there |= dict.fromkeys(OF_IMPACTS, bool(self.problem.system.jumps))
+        is_there |= dict.fromkeys(OF_IMPACTS, bool(self.problem.linear.jumps))
         if not self.method.has_pairs:
             is_there |= dict.fromkeys({*QUANTITY_NAMES} - {MOMENT.name, SENSITIVITIES}, False)
         known = {*self.asked} - ({EIGENFUNCTIONS} if not self.output.asks_for_eigenfunctions else set())
@@ -359,7 +359,8 @@ class Case(Section):
     @cached_property
     def responds(self) -> bool:
         """Whether some of the first curves are."""
-        return any(each.is_possible and each.problem.system.responds for each in self.curves(0, MOST_DRAWN))
+        known = (each.problem.linear for each in self.curves(0, MOST_DRAWN) if each.is_possible)
+        return any(each.cubic or each.forced for each in known)
 
     @property
     def differentiated(self) -> FloatArray:

@@ -93,7 +93,7 @@ def obstacle(base: Problem, varied: Varied, p: FloatArray, *, with_moments: bool
     try:
         problem = base.at(varied)
         with np.errstate(all="ignore"):
-            factors = [math.exp(each * jump.log_factor) for jump in problem.system.jumps for each in extremes]
+            factors = [math.exp(each * jump.log_factor) for jump in problem.linear.jumps for each in extremes]
             theory = second_order_or_none(problem)
             if theory is not None:
                 factors += [*theory.scale.moment(p), theory.stability_index if theory.quadratic else 0.0]
@@ -221,7 +221,7 @@ def _of_expect(expect: tuple[Expectation, ...], valid: Known, context: Known) ->
     orders = (((i, "p"), item.p) for i, item in enumerate(expect) if item.p is not None)
     yield from _of_orders(valid, orders, f"choose one of them, {_without('expect')}")
     problem = problem_of(valid)
-    numbers = problem.system.response.numbers if problem else {}
+    numbers = problem.linear.response.numbers if problem else {}
     for i, name in ((i, each.of_response) for i, each in enumerate(expect) if each.of_response and problem):
         if name not in numbers:
             names = quoted(f"{RESPONSE}.{each}" for each in numbers)

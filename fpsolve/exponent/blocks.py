@@ -192,7 +192,7 @@ class Blocks(Method):
         """The least of theirs, as for p > 0 Λ(p) is the largest of them."""
         if len(self.parts) > 1 and self.lyapunov_exponent().value > 0:
             return Absent(self.refused)
-        found = [index(part) for part in self.parts if part.problem.system.driven_by]
+        found = [index(part) for part in self.parts if part.problem.linear.driven_by]
         least = min((each for each in found if each), key=lambda each: each.value, default=nowhere)
         unknown = [each for each in found if not each and each.reason.code is Code.NO_ROOT_REACHED]
         beyond = {each.reason.data["high"]: each for each in unknown}  # where these may have one

@@ -332,7 +332,7 @@ def _circle(count: int) -> tuple[FloatArray, FloatArray]:
 
 def _longitude_and_latitude(problem: Problem, count: int) -> DirectionGrid:
     """Of three variables; the weights of the latitude are those of its sine."""
-    (x, y, z), (first, turn), (sine, weights) = problem.system.states, _circle(count), _line(count)
+    (x, y, z), (first, turn), (sine, weights) = problem.linear.states, _circle(count), _line(count)
     longitude = Quantity("longitude", "longitude", f"longitude, from {x} towards {y}", "", "rad", ("longitude",))
     latitude = Quantity("latitude", "latitude", f"latitude, towards {z}", "", "rad", ("latitude",))
     nodes, (turned, height) = (first, np.arcsin(sine), turn, weights), np.meshgrid(first, sine, indexing="ij")
@@ -344,7 +344,7 @@ def _longitude_and_latitude(problem: Problem, count: int) -> DirectionGrid:
 def _share_and_phase(problem: Problem, count: int) -> DirectionGrid:
     """η and θ₁ − θ₂, at a stop θ₁, of four variables in two pairs."""
     (read, is_half), own = reading_coordinates(problem), oscillators(problem)
-    states = read.names(problem.system.states)
+    states = read.names(problem.linear.states)
     one, two = (states[k] if k in own else f"({states[k]}, {states[k + 1]})" for k in (0, 2))
     words = f"angle whose squared sine is the share of {two}"
     eta = Quantity("eta", "η", words, r"$\eta$", "rad", ("eta",))
@@ -377,7 +377,7 @@ def direction_grid(problem: Problem, count: int) -> DirectionGrid:
 
 def oscillators(problem: Problem) -> dict[int, float]:
     """√(k/c) of each oscillator q̇ = cv, v̇ = −kq + …, by the place of q among the variables; pairs begin at 0 and 2."""
-    system, (at, _) = problem.system, reading_coordinates(problem)
+    system, (at, _) = problem.linear, reading_coordinates(problem)
     free = at.inside(mean_matrix(problem, system))
     driven = 0.0 * free
     for term in system.terms:

@@ -57,12 +57,12 @@ def stationary_moments(problem: Problem, rtol: float = 1e-6) -> StationaryMoment
         NoHierarchy: the equations do not close, or are too many.
         NotConverged: the error does not become that small.
     """
-    if problem.system.forced is None:
+    if problem.linear.forced is None:
         raise FpsolveError(Message(Code.RESPONSE_LINEAR))
     growth = even_moment(problem, 2)
     if not growth.value < -growth.error:
         raise FpsolveError(Message(Code.RESPONSE_UNSTABLE, value=growth.value, error=growth.error))
-    equations = Equations(Problem(problem.system.forced, problem.noise), 2)
+    equations = Equations(Problem(problem.linear.forced, problem.noise), 2)
     before, _ = _solved(equations, 0)
     for finer in range(1, MOST_FINER + 1):
         found, rounding = _solved(equations, finer)

@@ -32,11 +32,11 @@ def choose(problem: Problem, settings: Settings | None = None) -> Method:
 
 def kind_of(problem: Problem) -> type[Method]:
     """The method of a problem, if it is none of one's own."""
-    is_in_plane, stop = problem.dimension <= 2, problem.system.stop
-    impulses = problem.noise.motion(problem.system).impulses
+    is_in_plane, stop = problem.dimension <= 2, problem.linear.stop
+    impulses = problem.noise.motion(problem.linear).impulses
     if stop and (problem.dimension != MOST_BY_DIRECTIONS or impulses):
         return NotComputed
-    if problem.system.pasts:
+    if problem.linear.pasts:
         return DelayMoments
     if problem.dimension > MOST_BY_DIRECTIONS:
         return EvenMoments

@@ -157,8 +157,8 @@ def even_moment(
 
 def constant_scale(problem: Problem) -> Scale:
     """The scale of Λ(p) where even p alone are computed: constant terms, with the mean of the noise."""
-    now = problem.dimension - len(problem.system.pasts)
-    mean = mean_matrix(problem, problem.noise.motion(problem.system).drift)[:now, :now]
+    now = problem.dimension - len(problem.linear.pasts)
+    mean = mean_matrix(problem, problem.noise.motion(problem.linear).drift)[:now, :now]
     abscissa = abs(float(np.max(np.linalg.eigvals(mean).real)))
     is_moved = abscissa > ROUNDED * float(np.linalg.norm(mean))
     return Scale(abscissa if is_moved else framed(problem).unit_rate, 0.0)
@@ -173,12 +173,12 @@ def refuse_open_hierarchy(problem: Problem, p: float) -> None:
             raise NoHierarchy(
                 f"moments of even order are infinite under {noise.kind} noise with algebraic tails; take r0 <= 1"
             )
-    if any(wall.changes_state for wall in problem.system.barriers):
+    if any(wall.changes_state for wall in problem.linear.barriers):
         raise NoHierarchy(
             "the equations of the moments do not close where a wall changes the state, as that happens at one phase; "
             f"{REMEDY}, or remove the wall"
         )
-    if problem.system.pasts and p != 2:
+    if problem.linear.pasts and p != 2:
         raise NoHierarchy(f"got p = {p:g}; with a delay the equations of the moments are for p = 2; {REMEDY}")
     moments = math.comb(int(p) + problem.dimension - 1, problem.dimension - 1)
     count = moments
@@ -370,11 +370,11 @@ class Equations:
     """
 
     def __init__(self, problem: Problem, p: int, units: FloatArray | None = None) -> None:
-        self.problem, self.p, self.pasts = problem, p, problem.system.pasts
+        self.problem, self.p, self.pasts = problem, p, problem.linear.pasts
         self.dimension = problem.dimension - len(self.pasts)
         named = problem.valued.parts
         self.noises, names = list(named.values()), list(named)
-        drift, diffusions, impulses = problem.noise.motion(problem.system)
+        drift, diffusions, impulses = problem.noise.motion(problem.linear)
         steady, self._loads = np.zeros(2 * (problem.dimension,)), list[tuple[Any, int]]()
         loads = list[FloatArray]()
         for term in drift.terms:

@@ -65,7 +65,7 @@ def impact_rate(solver: ExponentSolver, jump: int | None = None) -> Estimate | A
         NotConverged: it is not resolved.
         ValueError: there is no such jump.
     """
-    count = len(solver.problem.system.jumps)
+    count = len(solver.problem.linear.jumps)
     if jump is None and count != 1:
         return Absent(Message(Code.NOT_ONE_RAY, count=count or None))
     number = 0 if jump is None else jump
@@ -128,7 +128,7 @@ def critical_restitution(solver: ExponentSolver, jump: int | None = None) -> Est
 
 def _flux(pair: PrincipalPair, number: int) -> float:
     """⟨T*, ∂L′(0)/∂ ln R 1⟩ of a pair at p = 0, R that of one of the jumps."""
-    jumps = pair.generator.problem.system.jumps
+    jumps = pair.generator.problem.linear.jumps
     if not jumps:  # of a part beside a ray that the phase never passes, and so no jump twice
         return 0.0
     changes = tuple(float(i == number) for i in range(len(jumps)))
@@ -143,7 +143,7 @@ def _critical_log_factor(solver: ExponentSolver, jump: int | None) -> Estimate |
         return rate
     if rate.value <= rate.error_estimate:
         return Absent(Message(Code.RARE_IMPACTS, most=rate.value + rate.error_estimate))
-    exponent, own = solver.lyapunov_exponent(), solver.problem.system.jumps[jump or 0].log_factor
+    exponent, own = solver.lyapunov_exponent(), solver.problem.linear.jumps[jump or 0].log_factor
     change = exponent.value / rate.value
     size = abs(own) + max(abs(change), exponent.scale / rate.value)
     error = (exponent.error_estimate + abs(change) * rate.error_estimate) / (rate.value - rate.error_estimate)

@@ -21,7 +21,7 @@ from fpsolve.fem.noise_axes import CellAxis, NoiseAxis
 from fpsolve.fem.phase import PhaseAxis
 from fpsolve.fem.space import Space, first_axis
 from fpsolve.model.coordinates import framed
-from fpsolve.model.plane import System, Xi, phase_speed
+from fpsolve.model.plane import LinearMotion, Xi, phase_speed
 from fpsolve.model.problem import Problem
 from fpsolve.theory.frozen import frozen_noise, steady_places, swing
 
@@ -137,7 +137,7 @@ AXES = {"cells": _of_tails, "pairs": _of_filter, "polynomials": _of_diffusion}
 """The first functions of one noise by its `basis`, and ξ about which the phase is looked at; of others any will do."""
 
 
-def _phase(system: System, xi: Xi, digits: float, is_smooth: bool = False) -> PhaseAxis:
+def _phase(system: LinearMotion, xi: Xi, digits: float, is_smooth: bool = False) -> PhaseAxis:
     """Equal cells on a half circle from one jump to where it comes again, and a line at every other jump.
 
     There are more where the speed of the phase changes much for some of the ξ; but one, of a higher degree, where

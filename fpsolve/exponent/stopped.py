@@ -64,7 +64,7 @@ def reading_coordinates(problem: Problem) -> tuple[Stop, bool]:
 
     Without a stop they are x itself.
     """
-    stop = problem.system.stop
+    stop = problem.linear.stop
     return stop or Stop(np.eye(problem.dimension).tolist(), 1.0), stop is not None
 
 
@@ -92,7 +92,7 @@ class StopStart(DirectionStart):
 
     @staticmethod
     def directions(problem: Problem) -> HalfSphereAxis:
-        (at, _), system = reading_coordinates(problem), problem.system
+        (at, _), system = reading_coordinates(problem), problem.linear
         free, smooth = at.inside(mean_matrix(problem, system)), LinearMotion(system.terms, epsilon=system.epsilon)
         own = scipy.linalg.block_diag(_rotating(free[:2, :2]), _rotating(free[2:, 2:]))
         own = np.linalg.solve(np.array(at.coordinates), own)

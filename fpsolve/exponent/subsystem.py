@@ -19,7 +19,17 @@ from scipy.linalg import cdf2rdf
 from fpsolve.arrays import ROUNDED, FloatArray
 from fpsolve.model.coordinates import framed
 from fpsolve.model.expressions import TIME
-from fpsolve.model.plane import BELOW, CoefficientMatrix, Jump, ParameterDerivative, System, as_plane, by_noise, rows_of
+from fpsolve.model.plane import (
+    BELOW,
+    CoefficientMatrix,
+    Jump,
+    LinearMotion,
+    ParameterDerivative,
+    System,
+    as_plane,
+    by_noise,
+    rows_of,
+)
 from fpsolve.model.problem import Problem
 from fpsolve.model.quantity import Quantity
 
@@ -49,17 +59,11 @@ class Subsystem(System):
     size: float = 1.0
     jumps: tuple[Jump, ...] = ()
 
-    @property
-    def epsilon(self) -> float:
-        return self.whole.epsilon
-
-    @cached_property
-    def terms(self) -> Sequence[CoefficientMatrix]:
-        return as_plane(self.part(self.whole.terms), self.size or 1.0)
-
-    @property
-    def clock(self) -> Any:
-        return self.whole.clock if TIME in self.driven_by else None
+    def linear(self) -> LinearMotion:
+        whole = self.whole.linear()
+        terms = as_plane(self.part(whole.terms), self.size or 1.0)
+        clock = whole.clock if any(term.noise == TIME for term in terms) else None
+        return LinearMotion(terms, self.jumps, whole.epsilon, clock=clock)
 
     @cached_property
     def _sides(self) -> tuple[FloatArray, FloatArray]:
@@ -96,7 +100,7 @@ class Subsystem(System):
         known = self.whole.noise_sections
         if len(known) == 1:
             return known
-        return [each for each in known if each.removeprefix("noise.") in self.driven_by] or known[:1]
+        return [each for each in known if each.removeprefix("noise.") in self.linear().driven_by] or known[:1]
 
     @property
     def values(self) -> Mapping[str, float | str]:
@@ -116,7 +120,7 @@ class Subsystem(System):
     def derivative(self, name: str) -> ParameterDerivative:
         """The derivative of the whole system, in the coordinates of this block."""
         whole = self.whole.derivative(name)
-        jumps, clock = whole.jumps if self.jumps else (), whole.noise if self.clock else None
+        jumps, clock = whole.jumps if self.jumps else (), whole.noise if self.linear().clock else None
         return replace(whole, terms=as_plane(self.part(whole.terms)), jumps=jumps, noise=clock)
 
 
@@ -129,7 +133,7 @@ def blocks_of(problem: Problem) -> tuple[Subsystem, ...]:
     two variables ‖x‖ on the first of the rays that the phase never leaves, and on the second one, or else the distance
     from the first.
     """
-    system, motion = problem.system, framed(problem)
+    system, motion = problem.linear, framed(problem)
     frame, resting = motion.frame.array, motion.resting_phases
     matrices, n, stop = [*by_noise(system, system.terms).values()], system.dimension, system.stop
     jumps, rounded, names, groups = tuple[Jump, ...](), 0.0, system.states, list[tuple[int, ...]]()
@@ -155,7 +159,7 @@ def blocks_of(problem: Problem) -> tuple[Subsystem, ...]:
     sides = rows_of(basis)
     return tuple(
         Subsystem(
-            system,
+            problem.system,
             sides,
             own,
             tuple(names[k] for k in own),
@@ -178,8 +182,8 @@ def couples(blocks: Sequence[Subsystem], name: str) -> bool:
     Then the derivative of Λ(p) by it is not that of one block. By one that lets uncoupled blocks drive each other it
     is, as −V_k in place of V_k gives the opposite derivative of the couplings: Λ(p) is even in them.
     """
-    whole = blocks[0].whole
-    changes = by_noise(whole, whole.derivative(name).terms).values()
+    whole = blocks[0].whole.linear()
+    changes = by_noise(whole, blocks[0].whole.derivative(name).terms).values()
     if len(blocks) == 1:  # all rays are invariant
         return any(map(_turns, changes))
     drives = reached(couplings(blocks, by_noise(whole, whole.terms).values()))

@@ -573,7 +573,7 @@ class StopTerms(DirectionTerms):
     """L(p) of four variables with a stop. Args as those of `Terms`."""
 
     def growth_bound(self, p: float, noises: Sequence[Any]) -> float:
-        stop: Any = self._framed.problem.system.stop
+        stop: Any = self._framed.problem.linear.stop
         return super().growth_bound(p, noises) + abs(p * math.log(stop.restitution) * self._mean[0, 1])
 
     def _loads(self) -> Iterator[Term]:
@@ -586,7 +586,7 @@ class StopTerms(DirectionTerms):
             yield self._stop(self.phi.changed_impacts, "∂/∂θ", log_factor)
 
     def _stop(self, struck: Callable[[float, float, int], Matrix], text: str, size: float = 1.0) -> Term:
-        stop: Any = self._framed.problem.system.stop
+        stop: Any = self._framed.problem.linear.stop
         omega = self._mean[0, 1]
         words = f"{text}, ω = {omega:.6g}, R = {stop.restitution:.6g}"
         return self._term(lambda p, k: size * omega * struck(math.log(stop.restitution), p, k), one, words)

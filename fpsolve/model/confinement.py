@@ -18,7 +18,7 @@ from scipy.optimize import brentq
 from fpsolve.arrays import ROUNDED, FloatArray
 from fpsolve.messages import Code, Message
 from fpsolve.model.coordinates import Frame
-from fpsolve.model.plane import CoefficientMatrix, System, matrix_at
+from fpsolve.model.plane import CoefficientMatrix, LinearMotion, matrix_at
 from fpsolve.model.problem import Problem
 
 LEVEL = 1e6
@@ -38,14 +38,14 @@ MOST_STEPS = 2000
 Field = Callable[[float, FloatArray], tuple[float, float]]
 
 
-def amplitude_frame(system: System) -> Frame:
-    """The frame in which ‖y‖ is the amplitude of a system with cubic terms, see `System.aspect`."""
+def amplitude_frame(system: LinearMotion) -> Frame:
+    """The frame in which ‖y‖ is the amplitude of a system with cubic terms, see `LinearMotion.aspect`."""
     return Frame(((1.0, 0.0), (0.0, system.aspect / system.second_unit)))
 
 
 def no_response(problem: Problem) -> Message | None:
     """Why there is no stationary response, or none is computed, whatever λ is."""
-    system = problem.system
+    system = problem.linear
     if system.cubic is None:
         return Message(Code.RESPONSE_LINEAR)
     if len(problem.noise.parts) > 1 or problem.noise.has_states:
@@ -59,7 +59,7 @@ def no_response(problem: Problem) -> Message | None:
 
 def mean_terms(problem: Problem) -> tuple[FloatArray, FloatArray]:
     """The linear terms with the noise at its mean and the cubic terms, shapes (2, 2) and (2, 4), where ‖y‖ is a."""
-    system, frame = problem.system, amplitude_frame(problem.system)
+    system, frame = problem.linear, amplitude_frame(problem.linear)
     assert system.cubic is not None
     linear = frame.term(CoefficientMatrix(0, matrix_at(system, problem.valued.mean)))
     return np.array(linear.matrix), np.array(frame.cubic(system.cubic).matrix)
@@ -67,11 +67,11 @@ def mean_terms(problem: Problem) -> tuple[FloatArray, FloatArray]:
 
 def comes_down(problem: Problem) -> bool:
     """Whether all of the paths come lower; a system without cubic terms has none to do so."""
-    if problem.system.cubic is None:
+    if problem.linear.cubic is None:
         return False
     linear, cubic = mean_terms(problem)
     begin = 0.5 * math.log(LEVEL)
-    most = begin - LEAST - math.fsum(jump.log_factor for jump in problem.system.jumps)
+    most = begin - LEAST - math.fsum(jump.log_factor for jump in problem.linear.jumps)
     field = _field(linear / (np.linalg.norm(linear) or 1.0), cubic / np.linalg.norm(cubic))  # in units of their own
     with warnings.catch_warnings(action="ignore"):  # of a path that goes to infinity
         return all(_falls(field, begin, most, math.pi * k / PHASES) for k in range(PHASES))

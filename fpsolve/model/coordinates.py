@@ -28,7 +28,6 @@ from fpsolve.model.plane import (
     LinearMotion,
     Matrix,
     Motion,
-    System,
     angular_frequency,
     by_noise,
     is_driven,
@@ -94,7 +93,7 @@ class Frame:
         """An impulse, or its derivative, for y."""
         return replace(of, exponent=self._inverse @ np.array(of.exponent) @ self.array)
 
-    def motion(self, system: System) -> System:
+    def motion(self, system: LinearMotion) -> LinearMotion:
         """A system for y, the terms of order 0 that no noise drives as one; a rotation is one exactly."""
         if self.is_itself:
             return system
@@ -142,7 +141,7 @@ class Framed:
     """
 
     def __init__(self, problem: Problem) -> None:
-        moved = problem.noise.motion(problem.system)
+        moved = problem.noise.motion(problem.linear)
         self.frame, self.rate_bound = frame, _ = own_frame(problem, moved)
         self.problem, self.motion = problem, frame.motion(moved.drift)
         self.diffusions = [frame.term(each) for each in moved.diffusions]
@@ -158,7 +157,7 @@ class Framed:
         """Its own unit of rates: ω or the size of the order 0, or of all where there is none."""
         return angular_frequency(self.motion) or self.rate_bound or 1.0
 
-    def wall_speeds(self, motion: System) -> list[float]:
+    def wall_speeds(self, motion: LinearMotion) -> list[float]:
         """dφ/dt of a motion at the ray of each jump, which no noise changes."""
         extremes = self.problem.valued.extremes
         return [float(np.ravel(phase_speed(motion, extremes)(jump.phase))[0]) for jump in self.motion.jumps]
@@ -191,12 +190,12 @@ def infinite(problem: Problem, p: float, symbol: str = "") -> Message | None:
     """
     if p and problem.noise.has_algebraic_tails and problem.is_driven:
         return Message(Code.TAILS, what=symbol or moment_at(p).symbol, remedy=Remedy.REDUCTION)
-    if any(jump.log_factor for jump in problem.system.jumps) and (rays := framed(problem).invariant_rays):
+    if any(jump.log_factor for jump in problem.linear.jumps) and (rays := framed(problem).invariant_rays):
         return Message(Code.INVARIANT_RAY, p=p, phase=rays[0])
     return None
 
 
-def mean_matrix(problem: Problem, motion: System) -> FloatArray:
+def mean_matrix(problem: Problem, motion: LinearMotion) -> FloatArray:
     """Σ ε^n ⟨g⟩ A of the terms of a motion, in the mean over the noise."""
     means = [motion.epsilon**term.order * problem.named_noise(term.noise).mean_of(term.g) for term in motion.terms]
     return np.tensordot(np.array(means), np.array([term.matrix for term in motion.terms]), 1)

@@ -19,15 +19,17 @@ def equations_of(system: System) -> list[str]:
     >>> equations_of(VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=0.1))
     ['ẍ = −x + 0.001 ẋ + 0.1 ξ ẋ', '|ẋ|⁺ = 0.9980019987 |ẋ|⁻ at x = 0']
     """
-    whole, named = system.forced or system, len(system.noise_sections) > 1
+    linear, named = system.linear(), len(system.noise_sections) > 1
+    whole, states = linear.forced or linear, linear.states
     n = whole.dimension
     sums, driven = by_noise(whole, whole.terms), dict[str, FloatArray]()
     still = sums.pop(STEADY)
     for (noise, g), matrix in sums.items():
         letter, wave = f"ξ_{noise}" if named and noise else "ξ", g.f if isinstance(g, Function) else None
-        name = letter if wave is None else wave.at(system.clock.nu) if isinstance(wave, Wave) else f"g({letter})"
+        name = letter if wave is None else wave.at(linear.clock.nu) if isinstance(wave, Wave) else f"g({letter})"
         driven[name] = driven.get(name, 0.0) + matrix
-    cubic, names = np.array(system.cubic.matrix) if system.cubic else np.zeros((n, 4)), system.columns
+    cubic = np.array(linear.cubic.matrix) if linear.cubic else np.zeros((n, 4))
+    names = [*states, *[""] * bool(linear.forced), *(f"{states[k]}(t − {delay:.10g})" for k, delay in linear.pasts)]
 
     def rate(i: int, names: Sequence[str], speed: float = 1.0) -> str:
         """That of a variable, what is constant first: "−x + 0.001 ẋ − 0.2 x² ẋ + 0.1 ξ ẋ"; of x₂ over a speed."""
@@ -42,11 +44,11 @@ def equations_of(system: System) -> list[str]:
     speed, x = float(still[0, 1]), names[0].removesuffix("₁")
     first = [still[0, 0], *cubic[0], *(each for matrix in driven.values() for each in matrix[0])]
     if n == 2 and speed != 0 and not any(first) and len(x) == 1:
-        names = x, _dotted(x, 1)
+        names = [x, _dotted(x, 1)]
         told = [f"{_dotted(x, 2)} = {rate(1, names, speed)}"]
     else:
-        told = [f"d{name}/dt = {rate(i, names)}" for i, name in enumerate(system.states)]
-    return told + [line for wall in system.barriers for line in wall.told(names)]
+        told = [f"d{name}/dt = {rate(i, names)}" for i, name in enumerate(states)]
+    return told + [line for wall in linear.barriers for line in wall.told(names)]
 
 
 def _dotted(letter: str, count: int) -> str:

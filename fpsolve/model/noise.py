@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from fpsolve.arrays import Coefficient, FloatArray
 from fpsolve.model.parameters import Parametrised
-from fpsolve.model.plane import Motion, ParameterDerivative, System, Xi
+from fpsolve.model.plane import LinearMotion, Motion, ParameterDerivative, System, Xi
 from fpsolve.model.plane import NoiseDerivative as NoiseDerivative
 
 STAY = 'write xi = "stationary"'
@@ -255,7 +255,7 @@ class Noise(Parametrised):
         """Whether a simulation may add σ²b to the drift and weigh paths: σ is constant, and exp(b ξ) has a mean."""
         return self.may_tilt and type(self).squared_diffusion is Noise.squared_diffusion
 
-    def motion(self, system: System, name: str | None = None) -> Motion:
+    def motion(self, system: LinearMotion, name: str | None = None) -> Motion:
         """How this noise moves a system whose terms call it so, with None whatever; by default along a path of ξ.
 
         Raises:
@@ -273,7 +273,7 @@ class Noise(Parametrised):
         return self
 
     def changed_motion(
-        self, system: System, changed: ParameterDerivative, by: str = "", name: str | None = None
+        self, system: LinearMotion, changed: ParameterDerivative, by: str = "", name: str | None = None
     ) -> ParameterDerivative:
         """The derivative ∂/∂θ of the `motion`.
 

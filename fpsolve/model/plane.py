@@ -11,12 +11,11 @@ from __future__ import annotations
 
 import math
 import re
-from abc import abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import KW_ONLY, dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -368,7 +367,7 @@ class Jump:
     def second_order(self) -> float:
         return self.log_factor if self.leading is None else self.leading
 
-    def refuse(self, system: System, noise: Any) -> None:
+    def refuse(self, system: LinearMotion, noise: Any) -> None:
         """Refuse it where a noise moves the phase across the ray, or nothing does. Raises `ValueError`."""
         ray = f"the ray of a jump, phi = {self.phase:.6g}"
         x, u = (0.0 if abs(each) < 1e-15 else each for each in (math.cos(self.phase), -math.sin(self.phase)))
@@ -475,7 +474,7 @@ class Stop:
         rows = [k for k, row in enumerate(moved - np.eye(len(moved))) if row.any()]
         return [f"{names[k]}⁺ = {written(moved[k])} at {at} = 0" for k in rows]
 
-    def refuse(self, system: System, noise: Any) -> None:
+    def refuse(self, system: LinearMotion, noise: Any) -> None:
         """Refuse coordinates that are none of a wall, and one that no law says how to leave. Raises `ValueError`."""
         n, total, size = system.dimension, 0.0, 0.0
         if len(self.coordinates) != n:
@@ -549,109 +548,34 @@ class ParameterDerivative:
 
 
 class System(Parametrised):
-    """What solvers ask of a linear system in the plane.
+    """A linear system by its parameters: a kind of a case file, or one's own.
 
     Attributes:
-        epsilon: ε.
-        terms: the terms of the motion, one at least.
-        jumps: the rays at which the state is stretched.
         noise_unit: the unit of ξ.
         noise_sections: the sections of a case file that state the noises, with which the keys of their parameters
             begin: "noise", or, for one that terms call axial, "noise.axial".
-        cubic: what is of degree 3 in its rates, on which the stationary response depends alone; None for nothing.
-        stop: the wall of one coordinate of more than two variables; None without one.
-        forced: it with its terms of degree 0, which multiply a last variable, 1; None without such terms.
-        clock: what its periodic coefficients are functions of; terms name this noise t.
-        pasts: which variable each of the last columns of the terms stands for, and how long ago; none without a delay.
-        second_unit: its second variable over the second coordinate of the terms.
     """
 
     section: ClassVar[str] = "system"
     noise_unit: ClassVar[str] = "unknown"
 
-    if TYPE_CHECKING:  # a field, a constant or a property
-
-        @property
-        @abstractmethod
-        def epsilon(self) -> float: ...
-        @property
-        @abstractmethod
-        def terms(self) -> Sequence[CoefficientMatrix]: ...
-        @property
-        @abstractmethod
-        def jumps(self) -> Sequence[Jump]: ...
-
-    @property
-    def cubic(self) -> CubicTerms | None:
-        return None
-
-    @property
-    def stop(self) -> Stop | None:
-        return None
-
-    @property
-    def forced(self) -> System | None:
-        return None
-
-    @property
-    def clock(self) -> Any:
-        return None
-
-    @property
-    def pasts(self) -> Sequence[tuple[int, float]]:
-        return ()
-
-    @property
-    def second_unit(self) -> float:
-        return 1.0
-
-    @property
-    def barriers(self) -> Sequence[Jump | Stop]:
-        """Its jumps, or its stop."""
-        return self.jumps if self.stop is None else (self.stop,)
+    def linear(self) -> LinearMotion:
+        """The linear system that it is for these parameters."""
+        raise NotImplementedError(f"{type(self).__name__} states no linear()")
 
     @cached_property
-    def dimension(self) -> int:
-        """n, that of the state with its `pasts`."""
-        return max((len(term.matrix) for term in self.terms), default=2)
+    def terms(self) -> Sequence[CoefficientMatrix]:
+        """The terms of the motion."""
+        return self.linear().terms
 
-    @property
-    def states(self) -> Sequence[str]:
-        """The names of its variables."""
-        return tuple(f"x{str(k + 1).translate(BELOW)}" for k in range(self.dimension))
-
-    @property
-    def columns(self) -> Sequence[str]:
-        """What the columns of its terms multiply: its variables, 1 with no name where it is forced, what is past."""
-        return self.states
-
-    @property
-    def driven_by(self) -> frozenset[str]:
-        """The names that its terms give the noises that drive it."""
-        return frozenset(term.noise for term in (self.forced or self).terms if is_driven(term.g))
+    @cached_property
+    def jumps(self) -> Sequence[Jump]:
+        """The rays at which the state is stretched."""
+        return self.linear().jumps
 
     def derivative(self, name: str) -> ParameterDerivative:
         """∂/∂θ of the sum of the terms, of ln R of every jump, and of ν of the clock."""
         raise NotImplementedError(f"{type(self).__name__} states no derivative by {name}")
-
-    @property
-    def responds(self) -> bool:
-        """Whether there is more to it than its terms, so that it may have a stationary response."""
-        return self.cubic is not None or self.forced is not None
-
-    @property
-    def response(self) -> ResponseQuantities:
-        """The quantities of its stationary response."""
-        return response_quantities(self.states, has_wall=bool(self.jumps), is_linear=self.forced is not None)
-
-    @property
-    def aspect(self) -> float:
-        """s in the amplitude a = √(x₁² + x₂²/s²) of its response: x₁ = a cos φ and x₂ = −s a sin φ.
-
-        Where the matrix A of its terms at ξ = 0 has A₁₂A₂₁ < 0, s² = −A₂₁/A₁₂, ω² for ẋ = v, v̇ = −ω²x + …, and else 1.
-        """
-        (_, b), (c, _) = matrix_at(self, 0.0).tolist()
-        return self.second_unit * (math.sqrt(-c / b) if b * c < 0 else 1.0)
 
     @property
     def noise_sections(self) -> Sequence[str]:
@@ -668,12 +592,73 @@ class System(Parametrised):
 
 @dataclass(frozen=True)
 class LinearMotion(System):
-    """Matrices alone: what is left of a system beside white noise, or in other coordinates, or its ∂/∂θ."""
+    """Matrices, walls and delays: what solvers ask of a system, of it beside white noise or in other coordinates.
 
-    terms: Sequence[CoefficientMatrix]
+    Attributes:
+        terms: the terms of the motion.
+        jumps: the rays at which the state is stretched.
+        epsilon: ε.
+        stop: the wall of one coordinate of more than two variables; None without one.
+        pasts: which variable each of the last columns of the terms stands for, and how long ago; none without a delay.
+        clock: what its periodic coefficients are functions of; terms name this noise t.
+        cubic: what is of degree 3 in its rates, on which the stationary response depends alone; None for nothing.
+        forced: it with its terms of degree 0, which multiply a last variable, 1; None without such terms.
+        names: of its variables; x₁, x₂, … without.
+        second_unit: its second variable over the second coordinate of the terms.
+        quantities: those of its stationary response, where they have names of their own.
+    """
+
+    terms: Sequence[CoefficientMatrix] = field()
     jumps: Sequence[Jump] = ()
     epsilon: float = 1.0
-    pasts: Sequence[tuple[int, float]] = field(default=(), kw_only=True)
+    stop: Stop | None = None
+    _: KW_ONLY
+    pasts: Sequence[tuple[int, float]] = ()
+    clock: Any = None
+    cubic: CubicTerms | None = None
+    forced: LinearMotion | None = None
+    names: Sequence[str] = ()
+    second_unit: float = 1.0
+    quantities: ResponseQuantities | None = None
+
+    def linear(self) -> LinearMotion:
+        return self
+
+    @property
+    def barriers(self) -> Sequence[Jump | Stop]:
+        """Its jumps, or its stop."""
+        return self.jumps if self.stop is None else (self.stop,)
+
+    @cached_property
+    def dimension(self) -> int:
+        """n, that of the state with its `pasts`."""
+        return max((len(term.matrix) for term in self.terms), default=2)
+
+    @property
+    def states(self) -> Sequence[str]:
+        """The names of its variables."""
+        return self.names or tuple(f"x{str(k + 1).translate(BELOW)}" for k in range(self.dimension))
+
+    @property
+    def driven_by(self) -> frozenset[str]:
+        """The names that its terms give the noises that drive it."""
+        return frozenset(term.noise for term in (self.forced or self).terms if is_driven(term.g))
+
+    @property
+    def response(self) -> ResponseQuantities:
+        """The quantities of its stationary response."""
+        return self.quantities or response_quantities(
+            self.states, has_wall=bool(self.jumps), is_linear=self.forced is not None
+        )
+
+    @property
+    def aspect(self) -> float:
+        """s in the amplitude a = √(x₁² + x₂²/s²) of its response: x₁ = a cos φ and x₂ = −s a sin φ.
+
+        Where the matrix A of its terms at ξ = 0 has A₁₂A₂₁ < 0, s² = −A₂₁/A₁₂, ω² for ẋ = v, v̇ = −ω²x + …, and else 1.
+        """
+        (_, b), (c, _) = matrix_at(self, 0.0).tolist()
+        return self.second_unit * (math.sqrt(-c / b) if b * c < 0 else 1.0)
 
 
 class Motion(NamedTuple):
@@ -685,7 +670,7 @@ class Motion(NamedTuple):
         impulses: what multiplies the state at random times.
     """
 
-    drift: System
+    drift: LinearMotion
     diffusions: Sequence[CoefficientMatrix] = ()
     impulses: Sequence[Impulse] = ()
 
@@ -702,7 +687,7 @@ class Motion(NamedTuple):
 
 
 def split_by_noise(
-    system: System, terms: Sequence[CoefficientMatrix], name: str | None
+    system: LinearMotion, terms: Sequence[CoefficientMatrix], name: str | None
 ) -> tuple[list[CoefficientMatrix], FloatArray]:
     """Terms without what a noise that has no value multiplies, and the sum of that, with the powers of ε.
 
@@ -732,7 +717,7 @@ def split_by_noise(
     return steady, driven
 
 
-def by_noise(system: System, terms: Sequence[CoefficientMatrix]) -> dict[Driver, FloatArray]:
+def by_noise(system: LinearMotion, terms: Sequence[CoefficientMatrix]) -> dict[Driver, FloatArray]:
     """Sums, with the powers of ε, of what is steady, and of what each noise drives by each function."""
     found: dict[Driver, FloatArray] = {STEADY: np.zeros((system.dimension, system.dimension))}
     for term in terms:
@@ -795,7 +780,7 @@ def by_epsilon(system: System) -> tuple[CoefficientMatrix, ...]:
     )
 
 
-def matrix_at(system: System, xi: Xi, orders: slice = slice(None)) -> FloatArray:
+def matrix_at(system: LinearMotion, xi: Xi, orders: slice = slice(None)) -> FloatArray:
     """A(ξ) = Σ ε^k g(ξ) A over the terms of some orders, shape (*ξ.shape, n, n).
 
     With several noises ξ is a mapping from their names to arrays, and its shape that of these broadcast together.
@@ -811,12 +796,12 @@ def matrix_at(system: System, xi: Xi, orders: slice = slice(None)) -> FloatArray
     return total
 
 
-def phase_speed(system: System, xi: Xi) -> Harmonics:
+def phase_speed(system: LinearMotion, xi: Xi) -> Harmonics:
     """dφ/dt at ξ as a function of φ: in Eq. (17) ω + ε h₁ξ + ε² h₂."""
     return turning(matrix_at(system, xi))
 
 
-def growth_rate(system: System, xi: Xi) -> Harmonics:
+def growth_rate(system: LinearMotion, xi: Xi) -> Harmonics:
     """d ln a/dt at ξ as a function of φ: in Eq. (17) ε q₁ξ + ε² q₂ between the impacts."""
     return stretching(matrix_at(system, xi))
 
@@ -837,7 +822,7 @@ def rotating_coordinates(a: FloatArray) -> FloatArray | None:
     return np.array([[a[0, 1], 0.0], [half - a[0, 0], math.sqrt(square)]])
 
 
-def angular_frequency(system: System) -> float:
+def angular_frequency(system: LinearMotion) -> float:
     """The system's own unit of rates: ω where its order 0 rotates, else the norm of the order 0.
 
     ω is the imaginary part of the eigenvalues of the matrix of order 0, beyond the plane the largest.

@@ -16,8 +16,8 @@ from fpsolve.model.expressions import TIME
 from fpsolve.model.noise import Noise
 from fpsolve.model.noises.several import noises_of
 from fpsolve.model.parameters import DERIVED, Parameter, Parametrised
+from fpsolve.model.plane import LinearMotion, System, is_driven
 from fpsolve.model.plane import ParameterDerivative as ParameterDerivative
-from fpsolve.model.plane import System, is_driven
 from fpsolve.model.quantity import NOISE, Quantity
 
 RATE = "1/time"
@@ -54,31 +54,37 @@ class Problem:
         for half, kind, needed in ((self.system, "motion", System), (self.noise, "noise", Noise)):
             if not isinstance(half, needed):
                 raise TypeError(f"got {shown(half)} as a {kind}; must be a system and a noise: Problem(system, noise)")
-        if self.system.clock:
-            object.__setattr__(self, "noise", noises_of({**self.noise.parts, TIME: self.system.clock}))
+        linear = self.linear
+        if linear.clock:
+            object.__setattr__(self, "noise", noises_of({**self.noise.parts, TIME: linear.clock}))
         # beyond, squares leave the range of numbers
-        sizes = [("coefficient", float(np.abs(term.matrix).max()), 0.0) for term in self.system.terms]
-        for name, size, least in (*sizes, *(("delay", delay, DERIVED["ge"]) for _, delay in self.system.pasts)):
+        sizes = [("coefficient", float(np.abs(term.matrix).max()), 0.0) for term in linear.terms]
+        for name, size, least in (*sizes, *(("delay", delay, DERIVED["ge"]) for _, delay in linear.pasts)):
             if not least <= size <= DERIVED["le"]:
                 must = f"must be from {least:g} to {DERIVED['le']:g}; take another unit of time, or of a variable"
                 raise ValueError(f"got a {name} of {size:g} in the motion; {must}")
         wanted, given = self.system.noise_sections, self.noise.parts
         if len(wanted) > 1 or len(given) > 1:
-            names = self.system.driven_by
+            names = linear.driven_by
             if names != set(given):
                 told = f"the terms name the noises {', '.join(map(shown, sorted(names)))}"
                 stated = ", ".join(map(shown, given)) if len(given) > 1 else "one without a name"
                 remedy = 'give one for each name, such as Problem(system, {"axial": ..., "lateral": ...})'
                 raise ValueError(f"{told}, but the noises given are {stated}; {remedy}")
-        self.noise.motion(self.system)  # refuses what has no meaning
-        for wall in self.system.barriers:
-            wall.refuse(self.system, self.noise)
+        self.noise.motion(linear)  # refuses what has no meaning
+        for wall in linear.barriers:
+            wall.refuse(linear, self.noise)
         if not self.noise.is_random:
             raise ValueError(
                 "only the start of this noise is random, as of a harmonic load, so that Λ(p) is p times the largest "
                 "real part of the Floquet exponents: compute these from the equation over one period, or add a random "
                 "noise"
             )
+
+    @cached_property
+    def linear(self) -> LinearMotion:
+        """The linear system, which solvers ask."""
+        return self.system.linear()
 
     @cached_property
     def valued(self) -> Noise:
@@ -92,12 +98,12 @@ class Problem:
     @cached_property
     def dimension(self) -> int:
         """The number of variables of the state, with those of the past that move it."""
-        return self.system.dimension
+        return self.linear.dimension
 
     @property
     def is_driven(self) -> bool:
         """Whether a noise moves the state; one of strength 0 does not, and Λ(p) is p times the growth rate."""
-        return any(is_driven(term.g) and np.any(term.matrix) for term in self.system.terms)
+        return any(is_driven(term.g) and np.any(term.matrix) for term in self.linear.terms)
 
     @property
     def sections(self) -> Mapping[str, Parametrised]:
@@ -176,7 +182,7 @@ class Problem:
             by = ".".join(filter(None, (part, name)))
             if not (own := self.named_noise(part)).is_white:
                 changed = replace(changed, noise=own.derivative(name))
-        moved, axes = self.noise.changed_motion(self.system, changed, by), [*self.valued.parts]
+        moved, axes = self.noise.changed_motion(self.linear, changed, by), [*self.valued.parts]
         return replace(moved, theta=float(self.values[key]), part=axes.index(part) if part in axes else 0)
 
     def derivatives(self) -> Mapping[str, ParameterDerivative]:

@@ -64,7 +64,7 @@ class Flow:
     @cached_property
     def half_turn(self) -> FloatArray:
         """The first and last φ of the half-turn that is solved for; it ends at the wall, if there is one."""
-        system = self.problem.system
+        system = self.problem.linear
         if not system.jumps:
             return HALF_TURN
         return amplitude_frame(system).phase(np.array(system.jumps[0].phase)) + np.array([-math.pi, 0.0])
@@ -75,7 +75,7 @@ class Flow:
 
     @property
     def has_wall(self) -> bool:
-        return bool(self.problem.system.jumps)
+        return bool(self.problem.linear.jumps)
 
     def is_positive(self, k: int) -> bool:
         """Whether a variable is nowhere negative, as the wall is where it is 0."""
@@ -93,7 +93,7 @@ class Flow:
     @cached_property
     def log_factor(self) -> float:
         """The jump of ln a at the wall from below φ_w to above: ±ln R."""
-        return self.sense * float(sum(jump.log_factor for jump in self.problem.system.jumps))
+        return self.sense * float(sum(jump.log_factor for jump in self.problem.linear.jumps))
 
     def gauge(self, phi: FloatArray) -> FloatArray:
         """γ(φ), for φ in the half-turn."""
@@ -108,15 +108,15 @@ class Flow:
     @cached_property
     def linear(self) -> Sequence[Rate]:
         """The rates by the terms that do not depend on a."""
-        system, frame = self.problem.system, amplitude_frame(self.problem.system)
+        system, frame = self.problem.linear, amplitude_frame(self.problem.linear)
         return [_scaled(frame.term(term), system.epsilon**term.order) for term in system.terms]
 
     @cached_property
     def cubic(self) -> Rate:
         """h₃ and q₃ with e^{2γ}: what e^{2u} multiplies."""
-        cubic = self.problem.system.cubic
+        cubic = self.problem.linear.cubic
         assert cubic is not None
-        terms = amplitude_frame(self.problem.system).cubic(cubic)
+        terms = amplitude_frame(self.problem.linear).cubic(cubic)
 
         def size(phi: FloatArray) -> FloatArray:
             return np.asarray(np.exp(2 * self.gauge(phi)))

@@ -112,13 +112,13 @@ class StationaryResponse(Result, NearRest):
         """The density of ½ẋ² + ½ω²x² of an oscillator at e > 0; the shape of `e`. Raises `ValueError` for others."""
         if "energy" not in self.means:
             raise ValueError("the energy is that of a VibroImpactOscillator; take amplitude_density")
-        e, omega = np.asarray(e, dtype=float), self.problem.system.aspect
+        e, omega = np.asarray(e, dtype=float), self.problem.linear.aspect
         a = np.sqrt(2 * e) / omega
         return self.amplitude_density(a) / (omega**2 * a)
 
     def joint_density(self, x: ArrayLike, v: ArrayLike) -> FloatArray:
         """ρ(x₁, x₂), 0 beyond a wall; x and v broadcast."""
-        x, v = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(v, dtype=float) / self.problem.system.aspect)
+        x, v = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(v, dtype=float) / self.problem.linear.aspect)
         first = self.flow.half_turn[0]
         turns = (np.arctan2(-v, x) - first) / math.pi
         beyond = np.where(turns == 0, 0, np.ceil(turns) - 1)  # both ends are in the half-turn
@@ -130,7 +130,7 @@ class StationaryResponse(Result, NearRest):
         a, phi = np.asarray(a, dtype=float), np.asarray(phi, dtype=float)
         with np.errstate(divide="ignore", invalid="ignore"):
             found = self._at(np.maximum(np.log(a) - self.flow.gauge(phi), -300.0), phi)
-            return np.asarray(found / ((1 if self.flow.has_wall else 2) * self.problem.system.aspect * a**2))
+            return np.asarray(found / ((1 if self.flow.has_wall else 2) * self.problem.linear.aspect * a**2))
 
     def density(self, a: ArrayLike, phi: ArrayLike, xi: ArrayLike) -> FloatArray:
         """ρ(a, φ, ξ) on the grid of three lists, φ in the half-turn, shape (len(a), len(phi), len(xi)).
@@ -164,7 +164,7 @@ class StationaryResponse(Result, NearRest):
 
     def to_xarray(self, *, points: int = 100) -> xarray.Dataset:
         """The densities of both variables and of the amplitude on grids of so many points, and the means."""
-        about, aspect = self.problem.system.response, self.problem.system.aspect
+        about, aspect = self.problem.linear.response, self.problem.linear.aspect
         a = (np.arange(points) + 0.5) * self.reach / points
         both = (np.arange(2 * points) + 0.5 - points) * self.reach / points
         x, v = (a if self.flow.is_positive(k) else both for k in (0, 1))
@@ -233,7 +233,7 @@ def stationary_response(problem: Problem, *, rtol: float = 1e-6, budget: Budget 
     scales = np.append(np.abs(found[:-1]), rate)
     errors[-1] *= AT_ONE_PHASE
     estimates = list(map(Estimate, found.tolist(), errors.tolist(), scales.tolist()))
-    numbers = dict(zip(problem.system.response.numbers, estimates, strict=False))
+    numbers = dict(zip(problem.linear.response.numbers, estimates, strict=False))
     lines = settled.solution.height.lines + search.flow.log_unit
     return StationaryResponse(
         problem, rtol, numbers, numbers.pop("impact_rate", None), estimates[-1], index, search.unknowns,
@@ -262,7 +262,7 @@ def _linear(problem: Problem, budget: Budget) -> tuple[float, float]:
 def _moment(solution: Solution, n: int, m: int, of: Callable[[FloatArray], FloatArray] = np.asarray) -> float:
     """E x₁ⁿ x₂ᵐ, or that of a function of cosⁿφ sinᵐφ in place of it."""
     plane, phi = solution.plane, solution.plane.circle.points
-    aspect = plane.flow.problem.system.aspect
+    aspect = plane.flow.problem.linear.aspect
     return solution.mean(n + m, _scaled(solution, n + m) * of(np.cos(phi) ** n * (-aspect * np.sin(phi)) ** m), one)
 
 
@@ -274,7 +274,7 @@ def _scaled(solution: Solution, n: int) -> FloatArray:
 def _numbers(solution: Solution) -> FloatArray:
     """The numbers of the response in the order of their names, and E q + ln R times the flux of ρ at the wall."""
     flow, phi = solution.plane.flow, solution.plane.circle.points
-    system = flow.problem.system
+    system = flow.problem.linear
     found = [solution.mean(n, _scaled(solution, n), one) for n in (1, 2, 4)]
     squares = [_moment(solution, 2, 0), _moment(solution, 0, 2)]
     found += squares

@@ -15,7 +15,7 @@ from fpsolve.case.sections import RESPONSE, SENSITIVITIES
 from fpsolve.drawing import Format, draw_bars, draw_colours, draw_dots, figure_for, label_axes, points
 from fpsolve.exponent.density import direction_grid
 from fpsolve.exponent.method import DIRECTIONS, PHASE_AND_NOISE
-from fpsolve.model.plane import System
+from fpsolve.model.plane import LinearMotion
 from fpsolve.output.eigenfunctions import draw_eigenfunction
 from fpsolve.page.page import Drawing
 from fpsolve.parts.directions import directions_file
@@ -42,7 +42,7 @@ def _draw_response(
 
     Beside that of the amplitude stands a simulated one, where there is one.
     """
-    found, system = result.response, result.curve.problem.system
+    found, system = result.response, result.curve.problem.linear
     if found is None or (density := found.density) is None:
         return
     with figure_for(paths, heading, result.curve.held(case.units.time), Format(width=10.5)) as figure:
@@ -62,7 +62,9 @@ def _draw_response(
             draw_dots(radial, x, sample.amplitude_density, sample.amplitude_error, label=words, **look)
 
 
-def _draw_joint_density(axes: Any, found: CurveResponse, density: ResponseDensity, system: System, case: Case) -> None:
+def _draw_joint_density(
+    axes: Any, found: CurveResponse, density: ResponseDensity, system: LinearMotion, case: Case
+) -> None:
     """ρ of both variables in colours over four decades; what is below has the colour of the lowest."""
     from matplotlib.colors import LogNorm
 

@@ -106,7 +106,7 @@ def _said_of_classes(classes: Sequence[InvariantClass], curve: Curve, numerics: 
         return
     problem, rates = curve.problem, [each.lyapunov_exponent.value for each in classes]
     if classes[0].phase is None:
-        is_hidden = not set(classes[0].variables) <= set(problem.system.states)
+        is_hidden = not set(classes[0].variables) <= set(problem.linear.states)
         yield Message(
             Code.BLOCKS, blocks=[f"({', '.join(each.variables)})" for each in classes], is_hidden=is_hidden, rates=rates
         )

@@ -122,7 +122,7 @@ class Nodes:
     @property
     def impacts(self) -> list[float]:
         """The phases at which T jumps, increasing."""
-        jumps, turns = self.problem.system.jumps, (0, math.pi)
+        jumps, turns = self.problem.linear.jumps, (0, math.pi)
         return sorted({round((jump.phase + turn) % (2 * math.pi), 12) for jump in jumps for turn in turns})
 
     def seen(self, pair: PrincipalPair) -> Nodes:

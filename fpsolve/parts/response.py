@@ -37,11 +37,11 @@ SPREAD = 4.0
 
 def solve_response(problem: Problem, rtol: float, grid: Grid | None, budget: Budget) -> CurveResponse:
     """The stationary response, with its density if a grid is given, or by moments; raises as what it is found by."""
-    if problem.system.forced:
+    if problem.linear.forced:
         moments = stationary_moments(problem, rtol)
         squares = zip(np.diag(moments.square).tolist(), np.diag(moments.error_estimate).tolist(), strict=True)
         estimates = [Estimate(value, error, abs(value)) for value, error in squares]
-        return CurveResponse(dict(zip(problem.system.response.means, estimates, strict=True)))
+        return CurveResponse(dict(zip(problem.linear.response.means, estimates, strict=True)))
     from fpsolve.nonlinear.response import stationary_response  # which takes a while to import
 
     found = stationary_response(problem, rtol=rtol, budget=budget)
@@ -91,7 +91,7 @@ def _solve(job: Job, settings: Settings) -> CurveResponse:
 
 
 def _numbers(case: Case, result: CurveResult | None) -> Mapping[Quantity, Any]:
-    about = case.system.response.numbers if case.has_response else {}
+    about = case.problem.linear.response.numbers if case.has_response else {}
     found = result.response.numbers if result and result.response else {}
     return {key: value for name, each in about.items() for key, value in estimated(each, found.get(name)).items()}
 
@@ -105,7 +105,7 @@ def write_response(found: CurveResponse, curve: Curve, folder: Path) -> None:
     """
     if found.density is None:
         return
-    density, system = found.density, curve.problem.system
+    density, system = found.density, curve.problem.linear
     rows = zip(density.amplitude.tolist(), density.of_amplitude.tolist(), strict=True)
     write_csv(folder / f"response{curve.suffix}.csv", ["amplitude", "density"], rows)
     about = system.response.numbers

@@ -39,7 +39,7 @@ from fpsolve.model.noises.white import Interpretation, White
 from fpsolve.model.plane import (
     STEADY,
     CoefficientMatrix,
-    System,
+    LinearMotion,
     by_noise,
     matrix_at,
     rotating_coordinates,
@@ -185,7 +185,7 @@ class Statement(Record):
             TypeError: a coefficient is not a + bξ, or no proof is known for such a noise.
             ValueError: the speed of the phase at the ray of a jump has no one sign.
         """
-        system, noise = problem.system, problem.noise
+        system, noise = problem.linear, problem.noise
         sums = by_noise(system, system.terms)
         still = sums.pop(STEADY)
         for _, g in sums:
@@ -243,9 +243,9 @@ class LinearRecord(Record):
     @classmethod
     def of(cls, problem: Problem) -> LinearRecord:
         """The matrices of a problem. Raises `TypeError` where its noise is not white."""
-        if problem.system.barriers:
+        if problem.linear.barriers:
             raise TypeError("got a wall of more than two variables, where moments obey no closed equations; remove it")
-        drift, diffusions, _ = problem.noise.motion(problem.system)
+        drift, diffusions, _ = problem.noise.motion(problem.linear)
         parts, noisy = (
             [drift.epsilon**each.order * np.array(each.matrix) for each in terms] for terms in (drift.terms, diffusions)
         )
@@ -287,7 +287,7 @@ def ray_of(phase: float) -> list[float]:
     return [math.cos(phase), -math.sin(phase)]
 
 
-def _rotating(system: System) -> list[list[float]]:
+def _rotating(system: LinearMotion) -> list[list[float]]:
     """P for which P⁻¹A₀P is growth and a rotation, or the identity where the order 0 does not rotate."""
     found = rotating_coordinates(matrix_at(system, 0.0, slice(0, 1)))
     return (np.eye(2) if found is None else found).tolist()

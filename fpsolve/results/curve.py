@@ -83,7 +83,7 @@ class ResponseDensity:
     Attributes:
         amplitude, phi, xi: the places, shapes (n,), (m,) and (k,).
         of_amplitude: ρ(a), shape (n,).
-        of_plane: that of both variables at x₁ = a cos φ, x₂ = −s a sin φ, see `System.aspect`, shape (n, m).
+        of_plane: that of both variables at x₁ = a cos φ, x₂ = −s a sin φ, see `LinearMotion.aspect`, shape (n, m).
         whole: ρ(a, φ, ξ), shape (n, m, k), to the seven digits of a number of four bytes, which are what records and
             files hold of it.
     """

@@ -142,7 +142,7 @@ def _quantities(case: Case, table: Table) -> Iterator[Shown]:
             lambda result: bounds_text(result.excursion, level) if result.excursion else "",
         )
     if case.has_response:
-        means = case.system.response.means
+        means = case.problem.linear.response.means
         for name in {"amplitude_squared"} & means.keys() or means:
             yield Shown(Column(means[name].symbol, 1), partial(_mean, name))
 

@@ -79,7 +79,7 @@ def excursions(case: Case, result: CurveResult) -> Iterator[Sentence]:
         return
     phi = "uniform φ₀" if isinstance(found.phi, str) else f"φ₀ = {found.phi:.6g}"
     start = f"{phi}, {'stationary noise' if isinstance(found.xi, str) else f'ξ₀ = {found.xi:.6g}'}"
-    norm = f"‖x‖ is the length of ({', '.join(result.curve.problem.system.states)})"
+    norm = f"‖x‖ is the length of ({', '.join(result.curve.problem.linear.states)})"
     yield Sentence(f"Start with {start}: {', '.join(told)}; {norm}, and ‖x₀‖ = 1.")
 
 
@@ -114,7 +114,7 @@ def response(case: Case, result: CurveResult) -> Iterator[Block]:
     """The means and the impacts with their errors, and where the densities are largest."""
     if result.response is None:
         return
-    about = case.system.response
+    about = case.problem.linear.response
     rows = [row_of(about.numbers[name], each, case.units.time) for name, each in result.response.numbers.items()]
     yield filled(f"Stationary response{result.curve.of}", NUMBER_COLUMNS, rows)
     if result.response.balance is not None:

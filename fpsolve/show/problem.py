@@ -16,7 +16,7 @@ def show(case: Case) -> Iterator[Block]:
     """The noises, what the equation leaves out, and the parameters."""
     curve = next(case.curves(0, 1))
     yield from map(Sentence, noise_sentences(curve.problem))
-    if case.system.cubic:
+    if case.problem.linear.cubic:
         yield Sentence(
             "Terms of degree 3 act on the stationary response only: Λ(p), λ and δ_p are of the linear system."
         )

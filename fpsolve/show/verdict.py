@@ -79,7 +79,7 @@ def verdict(case: Case, result: CurveResult) -> str:
             told.append(fate(what, rate.value, sign := sign_of(rate.value, rate.error_estimate), case.units.time))
             if what == PATH and sign > 0:
                 settles = ", and settles into the stationary response" * (result.response is not None)
-                is_bounded = result.curve.problem.system.cubic
+                is_bounded = result.curve.problem.linear.cubic
                 told[0] += f" near rest{settles}" if is_bounded else ", and passes every level in the end"
     return _sentence(told)
 

@@ -25,7 +25,7 @@ import numpy as np
 
 from fpsolve.arrays import FloatArray
 from fpsolve.model.confinement import amplitude_frame
-from fpsolve.model.plane import System, affine
+from fpsolve.model.plane import LinearMotion, affine
 from fpsolve.simulation.compiled import compiled, inlined
 from fpsolve.simulation.kernels import advance
 from fpsolve.simulation.motions import drawn
@@ -60,11 +60,11 @@ class CubicMotion(NamedTuple):
         tally[0] += move(m, h, y, mean, rise)
 
 
-def motion_of(system: System, step: Any, rows: int | slice = 0) -> tuple[CubicMotion, int]:
+def motion_of(system: LinearMotion, step: Any, rows: int | slice = 0) -> tuple[CubicMotion, int]:
     """The motion of a system with its cubic terms under a noise, and which of its variables, 0 or 1, is x.
 
     x is the variable of the wall, or else the one whose rate grows with the other. u is the other one, and both are in
-    the unit of the first variable, so that √(x² + u²) is the amplitude, see `System.aspect`.
+    the unit of the first variable, so that √(x² + u²) is the amplitude, see `LinearMotion.aspect`.
     """
     frame, steady, driven = amplitude_frame(system), np.zeros((2, 2)), np.zeros((2, 2))
     for term in system.terms:

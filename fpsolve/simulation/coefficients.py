@@ -21,7 +21,6 @@ from fpsolve.model.plane import (
     SAME_DELAY,
     CoefficientMatrix,
     LinearMotion,
-    System,
     affine,
     common_unit,
     is_driven,
@@ -240,7 +239,7 @@ class Coefficients:
         return self.repeated * math.ceil(needed / self.repeated)
 
 
-def refuse(system: System, noise: Noise) -> None:
+def refuse(system: LinearMotion, noise: Noise) -> None:
     """Refuse what no scheme moves. Raises `FpsolveError`."""
     try:
         repeated_delay(system.pasts)
@@ -268,7 +267,7 @@ def repeated_delay(pasts: Sequence[tuple[int, float]]) -> float:
     return common_unit([delay for _, delay in pasts], "delays")[0] if pasts else math.inf
 
 
-def coefficients(system: System, noise: Noise) -> Coefficients:
+def coefficients(system: LinearMotion, noise: Noise) -> Coefficients:
     """The matrices of a system under noises that can be simulated."""
     terms, loads = noise.motion(system).drift.terms, _loads(system, noise)
     steady = _without_noise(system, terms)
@@ -299,18 +298,18 @@ def coefficients(system: System, noise: Noise) -> Coefficients:
     return Coefficients(noise, loads, steady, wall, half_turn, mixing, system.pasts)
 
 
-def _without_noise(system: System, terms: Sequence[CoefficientMatrix]) -> FloatArray:
+def _without_noise(system: LinearMotion, terms: Sequence[CoefficientMatrix]) -> FloatArray:
     """The sum of terms without what noises multiply."""
     zero = np.zeros((system.dimension, system.dimension))
     return sum((line[0] * _matrix(system, term) for term in terms if (line := affine(term.g))), zero)
 
 
-def _matrix(system: System, term: CoefficientMatrix) -> FloatArray:
+def _matrix(system: LinearMotion, term: CoefficientMatrix) -> FloatArray:
     """ε^order A."""
     return system.epsilon**term.order * np.array(term.matrix)
 
 
-def _loads(system: System, noise: Noise) -> list[Load]:
+def _loads(system: LinearMotion, noise: Noise) -> list[Load]:
     """How each noise moves a system, in its own coordinates."""
     found, row, rng, zero = list[Load](), 0, np.random.default_rng(0), np.zeros((system.dimension, system.dimension))
     parts: Mapping[str, Any] = noise.parts
@@ -457,7 +456,7 @@ def _balance(matrix: FloatArray, least: float = _ONE_WAY) -> FloatArray:
     return np.exp(np.linalg.lstsq(sides, gaps, rcond=None)[0])
 
 
-def _rays(system: System, even: FloatArray, mean: FloatArray) -> Rays:
+def _rays(system: LinearMotion, even: FloatArray, mean: FloatArray) -> Rays:
     """The lines of the jumps, of the plane alone, in even coordinates, in which this is the mean of A(ξ)."""
     phases = np.array([jump.phase for jump in system.jumps])
     along = np.stack([np.cos(phases), -np.sin(phases)], axis=1) @ even.T[:2, :2]

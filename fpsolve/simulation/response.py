@@ -16,7 +16,7 @@ from fpsolve.drawing import canvas_of, draw_line, draw_plane, finish
 from fpsolve.errors import FpsolveError
 from fpsolve.messages import Code, Message
 from fpsolve.model.confinement import amplitude_frame, no_response
-from fpsolve.model.plane import Jump, System, angular_frequency, matrix_at
+from fpsolve.model.plane import Jump, LinearMotion, angular_frequency, matrix_at
 from fpsolve.model.problem import Problem
 from fpsolve.model.quantity import IMPACT_RATE, OSCILLATOR_RESPONSE, ResponseQuantities
 from fpsolve.simulation.batches import STEP_SECONDS, advance_all, standard_error
@@ -230,12 +230,12 @@ def simulated_response(
 def no_simulation(problem: Problem) -> Message | None:
     """Why the response of a problem is not simulated, or there is none."""
     reason = no_response(problem)
-    if reason is None and any(not _is_wall(problem.system, jump) for jump in problem.system.jumps):
+    if reason is None and any(not _is_wall(problem.linear, jump) for jump in problem.linear.jumps):
         reason = Message(Code.RESPONSE_WALLS)
     return reason
 
 
-def _is_wall(system: System, jump: Jump) -> bool:
+def _is_wall(system: LinearMotion, jump: Jump) -> bool:
     """Whether a variable is 0 where a jump is, whose rate there grows with the other one."""
     matrix = matrix_at(system, 0.0)
     at = np.array([math.cos(jump.phase), math.sin(jump.phase)])
@@ -243,14 +243,14 @@ def _is_wall(system: System, jump: Jump) -> bool:
     return abs(at[k]) < 1e-12 and matrix[k, 1 - k] > 0
 
 
-def _damping(system: System) -> float:
+def _damping(system: LinearMotion) -> float:
     """κ of the averaged equation (ln A)˙ = λ − κA² of a uniform phase; at least a share of the largest damping."""
     assert system.cubic is not None
     rates = amplitude_frame(system).cubic(system.cubic).q(2 * math.pi * np.arange(PHASES) / PHASES)
     return max(-float(rates.mean()), LEAST_DAMPING * float(np.max(np.abs(rates))))
 
 
-def _means(system: System, first: int, sums: FloatArray) -> dict[str, FloatArray]:
+def _means(system: LinearMotion, first: int, sums: FloatArray) -> dict[str, FloatArray]:
     """The means by their names, for each batch."""
     about, scales = system.response, (1.0, system.aspect)
     x, xx, uu, amplitude = sums
@@ -262,7 +262,7 @@ def _means(system: System, first: int, sums: FloatArray) -> dict[str, FloatArray
 
 
 def _in_variables(
-    system: System, first: int, reach: float, cells: FloatArray
+    system: LinearMotion, first: int, reach: float, cells: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """The edges of the variables, and their density, from that of x ≥ 0 and u; without a wall both sides have half."""
     sides = [np.linspace(0, reach, BINS + 1), np.linspace(-reach, reach, 2 * BINS + 1)]

@@ -11,7 +11,7 @@ from fpsolve.errors import FpsolveError, NoSuchExponent
 from fpsolve.model.coordinates import infinite
 from fpsolve.model.noise import Noise
 from fpsolve.model.noises.clock import waves_apart
-from fpsolve.model.plane import System
+from fpsolve.model.plane import LinearMotion
 from fpsolve.model.problem import Problem, checked_problem
 from fpsolve.simulation.coefficients import ROUGHER, coefficients, refuse
 
@@ -27,13 +27,13 @@ _LONGEST = 1_000_000
 """Steps in a transient, and transients in all; with more, a simulation would not end."""
 
 
-def simulated_parts(problem: Problem) -> tuple[System, Noise]:
+def simulated_parts(problem: Problem) -> tuple[LinearMotion, Noise]:
     """The system and the noise of a problem, if they can be simulated.
 
     Raises:
         FpsolveError: they cannot.
     """
-    system, noise = checked_problem(problem).system, problem.noise
+    system, noise = checked_problem(problem).linear, problem.noise
     if not noise.is_simulated:
         need = f"noise that states a step of its paths, but this is a {type(noise).__name__}"
         raise FpsolveError(f"simulation is for {need}; use the finite elements")
@@ -65,7 +65,7 @@ def check_settings(problem: Problem, p: float | Sequence[float], estimator: Esti
 
 
 def obstacles(
-    oscillator: System, noise: Noise, *, time: float | None = None, step: float | None = None
+    oscillator: LinearMotion, noise: Noise, *, time: float | None = None, step: float | None = None
 ) -> dict[str, str]:
     """Why a simulation with this length and this step would not be right: a sentence for each of "time" and "step"."""
     found, known = {}, coefficients(oscillator, noise)

@@ -37,7 +37,7 @@ def eigenvalues_at(problem: Problem, xi: ArrayLike) -> tuple[FloatArray, FloatAr
     a = matrix_at(framed(problem).motion, xi)
     half, square = 0.5 * (a[..., 0, 0] + a[..., 1, 1]), squared_frequency(a)
     root, turns = np.sqrt(np.abs(square)), square > 0
-    turning = half + root / math.pi * sum(jump.log_factor for jump in problem.system.jumps)
+    turning = half + root / math.pi * sum(jump.log_factor for jump in problem.linear.jumps)
     larger = half + np.copysign(root, half)  # in size; the other one from the determinant, without cancellation
     determinant = a[..., 0, 0] * a[..., 1, 1] - a[..., 0, 1] * a[..., 1, 0]
     other = np.divide(determinant, larger, out=np.zeros_like(larger), where=larger != 0)

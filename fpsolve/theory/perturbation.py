@@ -135,7 +135,7 @@ def harmonic_loads(problem: Problem) -> Sequence[str]:
 @lru_cache(8)  # a set asks for it five times: scales, columns and notes
 def _of_random_noise(problem: Problem) -> SecondOrder:
     """ε²Λ₂(p) without what harmonic loads change."""
-    (system, diffusions, impulses), noises = problem.noise.motion(problem.system), problem.noise.parts
+    (system, diffusions, impulses), noises = problem.noise.motion(problem.linear), problem.noise.parts
     if problem.dimension > 2:
         raise NoPerturbationTheory("perturbation theory is for two variables only")
     if impulses:
@@ -244,14 +244,14 @@ def first_order_eigenfunction(problem: Problem, p: float, phi: ArrayLike, xi: Ar
         raise NoPerturbationTheory("T₁ is a function of one noise, but there are several")
     if not problem.noise.is_markov:
         raise NoPerturbationTheory(f"T₁ is for noise that is a Markov process by itself, but not {problem.noise.kind}")
-    frame, omega = _rotating_frame(matrix_at(problem.system, 0.0, slice(0, 1)))
+    frame, omega = _rotating_frame(matrix_at(problem.linear, 0.0, slice(0, 1)))
     if not np.array_equal(frame, np.eye(2)):
         raise NoPerturbationTheory("T₁ is for a uniform rotation; choose coordinates in which the order 0 is one")
-    q = stretching(matrix_at(problem.system, 1.0, slice(1, 2)))
-    omega = math.copysign(omega, turning(matrix_at(problem.system, 0.0, slice(0, 1))).mean)
+    q = stretching(matrix_at(problem.linear, 1.0, slice(1, 2)))
+    omega = math.copysign(omega, turning(matrix_at(problem.linear, 0.0, slice(0, 1))).mean)
     alpha, xi = 1 / problem.noise.correlation_time, np.asarray(xi, dtype=float)
     wave = (q.cosine - 1j * q.sine) * np.exp(2j * np.asarray(phi, dtype=float)) / (alpha - 2j * omega)
-    return p / problem.system.epsilon * xi * (q.mean / alpha + wave.real)
+    return p / problem.linear.epsilon * xi * (q.mean / alpha + wave.real)
 
 
 def scale_of(problem: Problem) -> Scale:

@@ -14,7 +14,7 @@ from scipy.special import chdtri
 
 from fpsolve import __version__
 from fpsolve.analysis.spreads import LEVEL, Spread
-from fpsolve.arrays import FloatArray, one
+from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case
 from fpsolve.case.kinds import made_of
 from fpsolve.case.remedies import CASE_WORDS
@@ -46,7 +46,7 @@ from fpsolve.measured.stability import STEPS
 from fpsolve.measured.weak import Where
 from fpsolve.messages import Code, Message
 from fpsolve.model import Noise, Problem
-from fpsolve.model.plane import System
+from fpsolve.model.plane import STEADY, LinearMotion, System, by_noise
 from fpsolve.page.page import Block, Column, Grid, Sentence
 from fpsolve.results.text import likely, sampled
 from fpsolve.show.notes import note_on
@@ -135,12 +135,9 @@ class NoiseOutcome:
     failure: Message | None = None
 
 
-def natural_frequencies(system: System) -> tuple[float, ...]:
+def natural_frequencies(system: LinearMotion) -> tuple[float, ...]:
     """The moduli of the complex pairs of eigenvalues without noise, increasing: ω of an oscillator, in rad/time."""
-    still: FloatArray = np.sum(
-        [system.epsilon**each.order * np.array(each.matrix) for each in system.terms if each.g == one], axis=0
-    )
-    values = np.linalg.eigvals(still)
+    values = np.linalg.eigvals(by_noise(system, system.terms)[STEADY])
     return tuple(sorted(float(abs(each)) for each in values if each.imag > STILL * abs(each)))
 
 
@@ -229,8 +226,8 @@ def _factor(wanted: Wanted) -> float:
     if system is None:
         return of_relative_stiffness(wanted.modes.omega[0]) if wanted.noise_in == "stiffness" else 1.0
     if system.noise_unit == "1/time²":
-        return of_relative_stiffness(natural_frequencies(system)[0])
-    return 1 / system.epsilon if system.noise_unit == "1/time" else 1.0
+        return of_relative_stiffness(natural_frequencies(system.linear())[0])
+    return 1 / system.linear().epsilon if system.noise_unit == "1/time" else 1.0
 
 
 def _system(wanted: Wanted, terms: int) -> System | None:

@@ -56,7 +56,7 @@ COMPARED = Column("finite elements", 2), Column("s.e. away", 1)
 
 def simulation_steps(curve: Curve) -> int:
     """How often the simulation of a curve reports progress."""
-    return PROGRESS_STEPS * (3 if curve.problem.system.cubic else 1)
+    return PROGRESS_STEPS * (3 if curve.problem.linear.cubic else 1)
 
 
 def refuse_obstacles(case: Case) -> None:
@@ -105,7 +105,7 @@ def simulation_of(
         curve.problem, orders, estimator=setting.estimator,
         paths=setting.paths, time=setting.time, step=setting.step, seed=setting.seed, progress=progress,
     )  # fmt: skip
-    if not curve.problem.system.cubic or result.interrupted:
+    if not curve.problem.linear.cubic or result.interrupted:
         return result, None, result.warnings, result.interrupted
     from fpsolve.simulation.response import no_simulation, simulated_response
 

@@ -195,5 +195,5 @@ def paths_of(case: Case, look: Callable[[], None]) -> Answer:
     return {
         "time": time, "logs": np.array(logs).T.tolist(), "short": short,
         "motion": np.abs(first).tolist() if has_wall else first,
-        "name": case.problem.system.states[0].removesuffix("₁"), "told": part_of_page([said, grid]),
+        "name": case.problem.linear.states[0].removesuffix("₁"), "told": part_of_page([said, grid]),
     }  # fmt: skip

@@ -139,7 +139,7 @@ def numbers_of_responses(
             continue
         break
     rate, spread = lyapunov_exponent(problem).value, ExponentSolver(problem).variance_rate().value
-    response, noise = problem.system.response, problem.valued
+    response, noise = problem.linear.response, problem.valued
     step = 0.05 * min(1 / problem.values[f"{problem.system.section}.omega"], 1.0, 2 * noise.tau0)
     made = simulated_response(problem, rate, spread, paths=paths, time=duration, step=step, seed=seed)
     of_wall = [int(each == "x") for each in (response.first.name, response.second.name)]

@@ -1,8 +1,6 @@
 """What calls of analysis and of stationary responses refuse, in the words that they say."""
 
 import math
-from dataclasses import dataclass
-from typing import ClassVar
 
 import pytest
 
@@ -19,7 +17,7 @@ from fpsolve import (
     stationary_response,
 )
 from fpsolve.analysis import Axis, excursion, furstenberg_khasminskii, latin_hypercube, laws_of
-from fpsolve.model import Bounded, CoefficientMatrix, CubicTerms, Jump, MarkovChain, System, Telegraph, White
+from fpsolve.model import Bounded, CoefficientMatrix, CubicTerms, Jump, MarkovChain, PlaneSystem, Telegraph, White
 from fpsolve.output import draw_eigenfunction
 from tests.kit import itself, rates
 
@@ -185,21 +183,10 @@ def test_systems_without_a_stationary_response(problem, words):
         stationary_response(problem, rtol=0.1)
 
 
-@dataclass(frozen=True)
-class Walled(System):
-    """ẋ = v, v̇ = −x + 0.1 v − x³ − x²v − ξv, stretched at some rays."""
-
-    jumps: tuple[Jump, ...]
-    epsilon: ClassVar[float] = 1.0
-    terms: ClassVar[tuple[CoefficientMatrix, ...]] = (
-        CoefficientMatrix(0, ((0.0, 1.0), (-1.0, 0.1))),
-        CoefficientMatrix(1, ((0.0, 0.0), (0.0, -1.0)), itself),
-    )
-    cubic: ClassVar[CubicTerms] = CubicTerms(((0.0, 0.0, 0.0, 0.0), (-1.0, -1.0, 0.0, 0.0)))
-
-
 @pytest.mark.parametrize("phases", [(0.0, math.pi / 2), (0.0,)])
 def test_walls_that_a_response_is_not_for(phases):
-    """Two of them, and one that the cubic terms move the phase across."""
+    """Two of them, and one that the cubic terms move the phase across: v̇ = −x + 0.1 v − x³ − x²v − ξv."""
+    terms = [CoefficientMatrix(0, ((0.0, 1.0), (-1.0, 0.1))), CoefficientMatrix(1, ((0, 0), (0, -1.0)), itself)]
+    cubic, jumps = CubicTerms(((0.0, 0.0, 0.0, 0.0), (-1.0, -1.0, 0.0, 0.0))), [Jump(phase, -0.1) for phase in phases]
     with pytest.raises(FpsolveError, match="for one wall at most"):
-        stationary_response(Problem(Walled(tuple(Jump(phase, -0.1) for phase in phases)), NOISE), rtol=0.1)
+        stationary_response(Problem(PlaneSystem(terms, jumps, cubic=cubic), NOISE), rtol=0.1)

@@ -55,7 +55,7 @@ def test_moments_with_the_noise_do_not_change():
     force = f"-{omega}**2*x + 2*{zeta}*{omega}*v - {k}*x**3 - {c}*x**2*v - {d}*v**3 - xi*x"
     found = response(rates(f"x' = v; v' = {force}", NOISE), rtol=0.1)
     phi = found.solution.plane.circle.points
-    cos, sin = np.cos(phi), -found.problem.system.aspect * np.sin(phi)
+    cos, sin = np.cos(phi), -found.problem.linear.aspect * np.sin(phi)
     square = np.exp(2 * found.flow.gauge(phi))  # a² over e^{2u}
     terms = (
         (cos, (1, 0, 2), (-(omega**2), 2, 0), (2 * zeta * omega, 1, 1), (-k, 4, 0), (-c, 3, 1), (-d, 1, 3)),

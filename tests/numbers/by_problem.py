@@ -12,7 +12,7 @@ from tests.numbers.values import Quantity, Row, moment
 
 def matrices_of(problem: Problem):
     """A₀, and A of each noise by its name, for terms that are linear in ξ."""
-    terms = [(each, problem.system.epsilon**each.order * np.array(each.matrix)) for each in problem.system.terms]
+    terms = [(each, problem.linear.epsilon**each.order * np.array(each.matrix)) for each in problem.linear.terms]
     driven = {}
     for term, matrix in terms:
         if term.noise or term.g(1.0) != term.g(0.0):

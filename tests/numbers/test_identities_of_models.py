@@ -231,7 +231,7 @@ def test_impact_of_modes_obeys_the_law_of_impulses_and_keeps_energy_at_restituti
         )  # fmt: skip
         assert equations_of(system)[-1].endswith("at q1 − 0.5 q2 = 0")
         assert system.differentiable == (("R",) if r < 1 else ())
-        return system.stop
+        return system.linear().stop
 
     jump = np.array(stop(0.6).matrix)
     assert_allclose(jump[1::2, 1::2], np.eye(2) - 1.6 * np.outer(push, c) / (c @ push), atol=1e-14)

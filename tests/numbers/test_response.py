@@ -68,7 +68,7 @@ def test_response_without_a_wall_is_alike_on_both_sides():
     found = solved(duffing(), rtol=0.1)
     assert found.impact_rate is None
     assert (found.moment(1, 0).value, found.moment(2, 1).value) == (0, 0)
-    x, v = (np.linspace(-most, most, 81) for most in (3.0, 3.0 * found.problem.system.aspect))
+    x, v = (np.linspace(-most, most, 81) for most in (3.0, 3.0 * found.problem.linear.aspect))
     density, cell = found.joint_density(x[:, None], v), (x[1] - x[0]) * (v[1] - v[0])
     np.testing.assert_allclose(density, density[::-1, ::-1], rtol=1e-9, atol=1e-12)
     density[40, 40] = 0  # at rest, where it vanishes

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from copy import copy
 from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
@@ -15,7 +14,7 @@ from fpsolve.model.expressions import TIME
 from fpsolve.model.noise import Noise
 from fpsolve.model.noises.bounded import NoiseOfAngle
 from fpsolve.model.noises.several import Noises
-from fpsolve.model.plane import Function, System
+from fpsolve.model.plane import Function, LinearMotion
 
 
 @dataclass(frozen=True)
@@ -44,7 +43,7 @@ class Wave:
 
 @dataclass(frozen=True)
 class Clock(NoiseOfAngle):
-    """θ itself as a noise, θ₀ uniform, which a `System` with periodic coefficients brings along.
+    """θ itself as a noise, θ₀ uniform, which a system with periodic coefficients brings along.
 
     Attributes:
         nu: ν, of which all frequencies are multiples.
@@ -99,13 +98,11 @@ class _ManyNoises(Noises):
         pass
 
 
-def waves_apart(system: System, noise: Noise) -> tuple[System, Noise]:
+def waves_apart(system: LinearMotion, noise: Noise) -> tuple[LinearMotion, Noise]:
     """A system with a clock, and all noises, with each wave as a noise that drives terms of its own."""
     noises, terms = {name: each for name, each in noise.parts.items() if name != TIME}, list(system.terms)
     for k, term in enumerate(terms):
         if term.noise == TIME and isinstance(term.g, Function) and isinstance(wave := term.g.f, Wave):
             noises[wave.__name__] = ClockWave(system.clock, wave)
             terms[k] = replace(term, g=identity, noise=wave.__name__)
-    system = copy(system)
-    system.__dict__["terms"] = tuple(terms)
-    return system, _ManyNoises(tuple(noises.items()))
+    return replace(system, terms=tuple(terms)), _ManyNoises(tuple(noises.items()))

@@ -19,7 +19,6 @@ from fpsolve.model.plane import (
     LinearMotion,
     Motion,
     ParameterDerivative,
-    System,
     split_by_noise,
 )
 
@@ -103,7 +102,7 @@ class Poisson(Memoryless):
         reached = np.tile(np.append(np.cumsum(self.shares)[:-1], 1.0), (sizes.size, 1))
         return ChainStep(np.full(sizes.size, self.rate), reached, np.zeros(sizes.size), sizes)
 
-    def motion(self, system: System, name: str | None = None) -> Motion:
+    def motion(self, system: LinearMotion, name: str | None = None) -> Motion:
         """The motion between impulses, and one impulse for each size, in their order, by which the simulation draws.
 
         Raises:
@@ -122,7 +121,7 @@ class Poisson(Memoryless):
         return Motion(drift, (), impulses)
 
     def changed_motion(
-        self, system: System, changed: ParameterDerivative, by: str = "", name: str | None = None
+        self, system: LinearMotion, changed: ParameterDerivative, by: str = "", name: str | None = None
     ) -> ParameterDerivative:
         drift, change = split_by_noise(system, changed.terms, name)
         by_rate, known = 1.0 / self.rate if by == "rate" else 0.0, self.motion(system, name).impulses

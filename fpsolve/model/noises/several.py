@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from fpsolve.arrays import FloatArray, shown
 from fpsolve.model.noise import STAY, Noise
-from fpsolve.model.plane import Motion, ParameterDerivative, System, Xi
+from fpsolve.model.plane import LinearMotion, Motion, ParameterDerivative, System, Xi
 
 MOST_WITH_AXES = 2
 """Noises that have values at most: each of them is a dimension more."""
@@ -147,7 +147,7 @@ class Noises(Noise):
     def largest_step(self) -> float:
         return min(noise.largest_step for _, noise in self.named)
 
-    def motion(self, system: System, name: str | None = None) -> Motion:
+    def motion(self, system: LinearMotion, name: str | None = None) -> Motion:
         """The motion besides the white noises, and what all white noises add, each in its own `sense`."""
         whole = Motion(system)
         for own, noise in self._white:
@@ -157,11 +157,11 @@ class Noises(Noise):
 
     def driving(self, system: System) -> Noise:
         first = system.noise_sections[0].removeprefix("noise.")
-        known = {name: noise for name, noise in self.named if name in system.driven_by}
+        known = {name: noise for name, noise in self.named if name in system.linear().driven_by}
         return noises_of(known or {first: self.parts[first]})
 
     def changed_motion(
-        self, system: System, changed: ParameterDerivative, by: str = "", name: str | None = None
+        self, system: LinearMotion, changed: ParameterDerivative, by: str = "", name: str | None = None
     ) -> ParameterDerivative:
         part, _, parameter = by.rpartition(".")
         for own, noise in self._white:

@@ -21,7 +21,6 @@ from fpsolve.model.plane import (
     LinearMotion,
     Motion,
     ParameterDerivative,
-    System,
     is_driven,
     split_by_noise,
 )
@@ -104,7 +103,7 @@ class White(Memoryless):
         """One step of dW, without a bias; s is in the matrix that the noise drives."""
         return WhiteStep(1 / math.sqrt(h), math.sqrt(3 / h))
 
-    def motion(self, system: System, name: str | None = None) -> Motion:
+    def motion(self, system: LinearMotion, name: str | None = None) -> Motion:
         """The drift in the sense of Stratonovich, and s A of the term that the noise drives, as one matrix.
 
         Raises:
@@ -118,7 +117,7 @@ class White(Memoryless):
         return Motion(LinearMotion(tuple(drift), system.jumps, system.epsilon), diffusions)
 
     def changed_motion(
-        self, system: System, changed: ParameterDerivative, by: str = "", name: str | None = None
+        self, system: LinearMotion, changed: ParameterDerivative, by: str = "", name: str | None = None
     ) -> ParameterDerivative:
         _, driven = split_by_noise(system, system.terms, name)
         drift, change = split_by_noise(system, changed.terms, name)
@@ -130,5 +129,5 @@ class White(Memoryless):
         return replace(changed, terms=tuple(drift), diffusions=changed.diffusions + moved)
 
 
-def _term(system: System, matrix: FloatArray, order: int) -> CoefficientMatrix:
+def _term(system: LinearMotion, matrix: FloatArray, order: int) -> CoefficientMatrix:
     return CoefficientMatrix(order, matrix / system.epsilon**order)

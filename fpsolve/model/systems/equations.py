@@ -242,17 +242,17 @@ class EquationSystem(System):
                 raise TableError(f"got {shown(section)}; {must}; rename it", "noises", name)
             if fault := self._unused(name, section):
                 raise TableError(fault, "noises", name)
-        if not self.terms:
-            raise TableError("no rate has a term; write terms with the variables", "drift")
-        for i, name in enumerate(self.variables if self.cubic is not None else ()):
-            if name.startswith(AMPLITUDE.name) or name == JOINT_DENSITY.name:
-                what = "which has another meaning in the stationary response of terms of degree 3; rename it"
-                raise TableError(f"got the name {name}, {what}", "variables", i)
         if self.walls and (self.pasts or len(self.walls) > 1 or len(self.variables) < 2):
             found = f"{len(self.walls)} for {len(self.variables)} variables{' with a delay' * bool(self.pasts)}"
             why = "must be one at most, none of one variable, and none with a delay"
             raise TableError(f"got {found}; {why}; leave out walls", "walls")
-        _ = self.stop, self.jumps  # refuse what they cannot be
+        linear = self.linear()  # refuses what it cannot be
+        if not linear.terms:
+            raise TableError("no rate has a term; write terms with the variables", "drift")
+        for i, name in enumerate(self.variables if linear.cubic else ()):
+            if name.startswith(AMPLITUDE.name) or name == JOINT_DENSITY.name:
+                what = "which has another meaning in the stationary response of terms of degree 3; rename it"
+                raise TableError(f"got the name {name}, {what}", "variables", i)
 
     def _given_names(self) -> Iterator[tuple[object, Place]]:
         """All names with their places."""
@@ -345,16 +345,6 @@ class EquationSystem(System):
     @property
     def noise_sections(self) -> Sequence[str]:
         return tuple(section for _, section in self.noises)
-
-    @property
-    def states(self) -> Sequence[str]:
-        is_plane = len(self.variables) == 1 and not self.pasts
-        return (*self.variables, f"{self.variables[0]}*") if is_plane else self.variables  # as `as_plane` has it
-
-    @property
-    def columns(self) -> Sequence[str]:
-        past = (f"{self.states[k]}(t − {delay:.10g})" for k, delay in self.pasts)
-        return *self.states, *[""] * bool(self.forced), *past
 
     @property
     def values(self) -> Mapping[str, float | str]:
@@ -497,18 +487,28 @@ class EquationSystem(System):
             return Function(Wave(wave, round(float(speed) / self.clock.nu))), TIME
         return identity if noise else one, names.get(noise, "")
 
-    @cached_property
-    def terms(self) -> tuple[CoefficientMatrix, ...]:
-        return self._terms_of(self._read.rates, 0)
+    def linear(self) -> LinearMotion:
+        return self._linear
 
     @cached_property
-    def forced(self) -> System | None:
-        if not any(not states for form in self._read.rates for states, _, _ in form.parts):
-            return None
-        return LinearMotion(self._terms_of(self._read.rates, 0, [""]), (), self.epsilon, pasts=self.pasts)
+    def _linear(self) -> LinearMotion:
+        rates, names = self._read.rates, self.variables
+        terms, is_forced = self._terms_of(rates, 0), any(not states for form in rates for states, _, _ in form.parts)
+        return LinearMotion(
+            terms,
+            self._jumps(),
+            self.epsilon,
+            self._stop(),
+            pasts=self.pasts,
+            clock=self.clock,
+            cubic=self._cubic(),
+            forced=LinearMotion(self._terms_of(rates, 0, [""]), epsilon=self.epsilon, pasts=self.pasts)
+            if is_forced
+            else None,
+            names=(*names, f"{names[0]}*") if len(names) == 1 and not self.pasts else names,  # as `as_plane` has it
+        )
 
-    @cached_property
-    def cubic(self) -> CubicTerms | None:
+    def _cubic(self) -> CubicTerms | None:
         """The terms of degree 3; None where there are none, or all are 0."""
         matrix = np.zeros((2, HIGHEST_DEGREE + 1))
         for i, form in enumerate(self._read.rates):
@@ -517,8 +517,7 @@ class EquationSystem(System):
                     matrix[i, states.count(self.variables[1])] += self.epsilon**power * series[0]
         return CubicTerms(matrix) if matrix.any() else None
 
-    @cached_property
-    def jumps(self) -> tuple[Jump, ...]:
+    def _jumps(self) -> tuple[Jump, ...]:
         """Where the phase passes the ray of the wall: x = 0 is φ = π/2, v = 0 is φ = 0."""
         if not self.walls or len(self.variables) > 2:
             return ()
@@ -530,8 +529,7 @@ class EquationSystem(System):
                 leading = zeroth + first * self.epsilon + second * self.epsilon**2
         return (Jump(math.pi / 2 if place == 0 else 0.0, log_factor, leading),)
 
-    @cached_property
-    def stop(self) -> Stop | None:
+    def _stop(self) -> Stop | None:
         """The wall of more than two variables. Raises `TableError`."""
         if not self.walls or len(self.variables) == 2:
             return None
@@ -611,9 +609,8 @@ class EquationSystem(System):
         recurring = [delay for _, delay in read.delays.values()], [*read.speeds.values()]
         rates = [[slope / value for value, slope in each] for each in recurring if each]
         alike = all(np.ptp(each) <= ROUNDED * max(map(abs, each)) for each in rates)
-        is_moved = self.stop and (
-            self._moves_wall(name) or (self.stop.restitution == 1 and self._derivatives[name].jumps)
-        )
+        stop = self.linear().stop
+        is_moved = stop and (self._moves_wall(name) or (stop.restitution == 1 and self._derivatives[name].jumps))
         return alike and not is_moved
 
     def _moves_wall(self, name: str) -> bool:

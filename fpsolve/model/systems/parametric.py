@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import Annotated, ClassVar
 
 from fpsolve.arrays import identity
 from fpsolve.model.faults import strict_dataclass
 from fpsolve.model.parameters import ANY_SIGN, parameter
-from fpsolve.model.plane import CoefficientMatrix, Jump, ParameterDerivative, System
+from fpsolve.model.plane import CoefficientMatrix, Jump, LinearMotion, ParameterDerivative, System
 
 
 @strict_dataclass
@@ -46,18 +45,12 @@ class ParametricOscillator(System):
 
     kind: ClassVar[str] = "parametric"
     noise_unit: ClassVar[str] = "1/time²"
-    epsilon: ClassVar[float] = 1.0
 
-    @property
-    def terms(self) -> Sequence[CoefficientMatrix]:
-        """The oscillator without noise, of order 0, and ξ times the displacement, of order 1."""
-        free = ((0.0, 1.0), (-self.stiffness, -2 * self.damping))
-        return CoefficientMatrix(0, free), CoefficientMatrix(1, ((0.0, 0.0), (-1.0, 0.0)), identity)
-
-    @property
-    def jumps(self) -> Sequence[Jump]:
-        """The wall, which the phase passes at speed 1."""
-        return (Jump(math.pi / 2, math.log(self.restitution)),)
+    def linear(self) -> LinearMotion:
+        """Its terms without noise, of order 0, and ξ times x, of order 1; and the wall, passed at speed 1."""
+        free = CoefficientMatrix(0, ((0.0, 1.0), (-self.stiffness, -2 * self.damping)))
+        driven = CoefficientMatrix(1, ((0.0, 0.0), (-1.0, 0.0)), identity)
+        return LinearMotion((free, driven), (Jump(math.pi / 2, math.log(self.restitution)),))
 
     def derivative(self, name: str) -> ParameterDerivative:
         match name:

@@ -18,7 +18,6 @@ from fpsolve.model.plane import (
     Jump,
     LinearMotion,
     ParameterDerivative,
-    Stop,
     as_plane,
     by_epsilon,
     is_driven,
@@ -29,7 +28,7 @@ from fpsolve.model.systems.equations import EquationSystem, walls_of
 
 @dataclass(frozen=True)
 class PlaneSystem(LinearMotion):
-    """A linear system in the plane from its parts, see `System`.
+    """A linear system in the plane from its parts, see `LinearMotion`.
 
     >>> from fpsolve.model import CoefficientMatrix
     >>> PlaneSystem([CoefficientMatrix(0, ((0.0, 1.0), (-1.0, -0.2)))]).dimension
@@ -151,7 +150,5 @@ class LinearSystem(PlaneSystem):
     Raises:
         ValueError: as `PlaneSystem`, or the matrices differ in their size, or there are jumps beyond the plane.
     """
-
-    stop: Stop | None = None
 
     dimensions: ClassVar[Sequence[int]] = range(1, MOST_VARIABLES + 1)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from enum import StrEnum
-from functools import cached_property
 from typing import Annotated, ClassVar, Self
 
 import numpy as np
@@ -15,8 +14,16 @@ from fpsolve.arrays import identity
 from fpsolve.messages import Code, Message
 from fpsolve.model.faults import strict_dataclass
 from fpsolve.model.parameters import ANY_SIGN, SIZE, parameter
-from fpsolve.model.plane import CoefficientMatrix, CubicTerms, Jump, ParameterDerivative, System, by_epsilon
-from fpsolve.model.quantity import OSCILLATOR_RESPONSE, ResponseQuantities
+from fpsolve.model.plane import (
+    CoefficientMatrix,
+    CubicTerms,
+    Jump,
+    LinearMotion,
+    ParameterDerivative,
+    System,
+    by_epsilon,
+)
+from fpsolve.model.quantity import OSCILLATOR_RESPONSE
 
 
 class ImpactLaw(StrEnum):
@@ -103,42 +110,31 @@ class VibroImpactOscillator(System):
         """R^p: the eigenfunction obeys T(φ⁻, ξ) = R^p T(φ⁺, ξ) at φ = π/2 and 3π/2."""
         return math.exp(p * self.log_impact_factor)
 
-    @cached_property
-    def terms(self) -> tuple[CoefficientMatrix, ...]:
-        """Free oscillation, noise and damping in (x, ẋ/ω): dφ = ω dt; ε ξ (h₁, q₁); ε² c₁ (h₁, q₁), Eqs. (17)-(18)."""
-        rotation = ((0.0, self.omega), (-self.omega, 0.0))
-        return (
-            CoefficientMatrix(0, rotation),
-            CoefficientMatrix(1, DAMPING, identity),
-            CoefficientMatrix(2, ((0.0, 0.0), (0.0, self.c1))),
-        )
+    def linear(self) -> LinearMotion:
+        """In (x, ẋ/ω) free oscillation dφ = ω dt, noise ε ξ (h₁, q₁), damping ε² c₁ (h₁, q₁), Eqs. (17)-(18); impacts.
 
-    @cached_property
-    def jumps(self) -> tuple[Jump, ...]:
-        """The impacts, where cos φ = 0; to the order ε² both laws lose 1 − r."""
-        return (Jump(math.pi / 2, self.log_impact_factor, -self._loss),)
+        These are where cos φ = 0; to the order ε² both laws lose 1 − r. Of degree 3 is −ε²(c₂x² + c₃ẋ²) ẋ.
+        """
+        square = self.epsilon**2
+        bent = (0.0, -square * self.c2, 0.0, -square * self.c3 * self.omega**2)
+        return LinearMotion(
+            (
+                CoefficientMatrix(0, ((0.0, self.omega), (-self.omega, 0.0))),
+                CoefficientMatrix(1, DAMPING, identity),
+                CoefficientMatrix(2, ((0.0, 0.0), (0.0, self.c1))),
+            ),
+            (Jump(math.pi / 2, self.log_impact_factor, -self._loss),),
+            self.epsilon,
+            cubic=CubicTerms(((0.0, 0.0, 0.0, 0.0), bent)) if any(bent) else None,
+            second_unit=self.omega,
+            quantities=OSCILLATOR_RESPONSE,
+        )
 
     @property
     def remarks(self) -> Sequence[Message]:
         """A remark on the delta law where the bounce of Eq. (3) cannot be: 1 − ε²(1 − r) ≤ 0."""
         left = 1 - self._loss
         return () if left > 0 else (Message(Code.IMPOSSIBLE_BOUNCE, left=left, factor=self.impact_factor()),)
-
-    @cached_property
-    def cubic(self) -> CubicTerms | None:
-        """The damping −ε²(c₂x² + c₃ẋ²) of ẋ, in (x, ẋ/ω); None for c₂ = c₃ = 0."""
-        square = self.epsilon**2
-        damping = (0.0, -square * self.c2, 0.0, -square * self.c3 * self.omega**2)
-        return CubicTerms(((0.0, 0.0, 0.0, 0.0), damping)) if any(damping) else None
-
-    @property
-    def response(self) -> ResponseQuantities:
-        return OSCILLATOR_RESPONSE
-
-    @property
-    def second_unit(self) -> float:
-        """ω: the terms are those of (x, ẋ/ω)."""
-        return self.omega
 
     def derivative(self, name: str) -> ParameterDerivative:
         """∂/∂θ of the terms and of ln R, θ = ω, r, c₁ or ε."""

@@ -42,7 +42,7 @@ def spring(zeta=0.08, noise=None):
 
 def states(problem, a):
     """A(ξ) at ξ = ∓a."""
-    terms = [(each.g, problem.system.epsilon**each.order * np.array(each.matrix)) for each in problem.system.terms]
+    terms = [(each.g, problem.linear.epsilon**each.order * np.array(each.matrix)) for each in problem.linear.terms]
     return [sum(g(xi) * matrix for g, matrix in terms) for xi in (-a, a)]
 
 
