@@ -29,7 +29,7 @@ def equations_of(system: System) -> list[str]:
         name = letter if wave is None else wave.at(linear.clock.nu) if isinstance(wave, Wave) else f"g({letter})"
         driven[name] = driven.get(name, 0.0) + matrix
     cubic = np.array(linear.cubic.matrix) if linear.cubic else np.zeros((n, 4))
-    names = [*states, *[""] * bool(linear.forced), *(f"{states[k]}(t − {delay:.10g})" for k, delay in linear.pasts)]
+    names = linear.columns or states
 
     def rate(i: int, names: Sequence[str], speed: float = 1.0) -> str:
         """That of a variable, what is constant first: "−x + 0.001 ẋ − 0.2 x² ẋ + 0.1 ξ ẋ"; of x₂ over a speed."""
@@ -44,7 +44,7 @@ def equations_of(system: System) -> list[str]:
     speed, x = float(still[0, 1]), names[0].removesuffix("₁")
     first = [still[0, 0], *cubic[0], *(each for matrix in driven.values() for each in matrix[0])]
     if n == 2 and speed != 0 and not any(first) and len(x) == 1:
-        names = [x, _dotted(x, 1)]
+        names = x, _dotted(x, 1)
         told = [f"{_dotted(x, 2)} = {rate(1, names, speed)}"]
     else:
         told = [f"d{name}/dt = {rate(i, names)}" for i, name in enumerate(states)]

@@ -604,6 +604,7 @@ class LinearMotion(System):
         cubic: what is of degree 3 in its rates, on which the stationary response depends alone; None for nothing.
         forced: it with its terms of degree 0, which multiply a last variable, 1; None without such terms.
         names: of its variables; x₁, x₂, … without.
+        columns: what the columns of terms multiply: variables, 1 with no name where it is forced, what is past.
         second_unit: its second variable over the second coordinate of the terms.
         quantities: those of its stationary response, where they have names of their own.
     """
@@ -618,6 +619,7 @@ class LinearMotion(System):
     cubic: CubicTerms | None = None
     forced: LinearMotion | None = None
     names: Sequence[str] = ()
+    columns: Sequence[str] = ()
     second_unit: float = 1.0
     quantities: ResponseQuantities | None = None
 

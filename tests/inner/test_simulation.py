@@ -65,7 +65,7 @@ def test_a_coarse_step_under_white_noise_keeps_the_mean_to_second_order(n):
 
 def moved(R, h, u, gain, steps):
     """x, ẋ and the impacts at a wall of ẍ + x = g ẋ, from x = 0 on."""
-    m, _ = motion_of(VibroImpactOscillator(1.0, R, gain, 1.0, impact="restitution"), None)
+    m, _ = motion_of(VibroImpactOscillator(1.0, R, gain, 1.0, impact="restitution").linear(), None)
     y, none = np.array([[0.0], [u]]), np.zeros(1)
     count = sum(move(m, h, y, none, none) for _ in range(steps))
     return *np.copysign(1.0, y[0]) * y[:, 0], count

@@ -493,19 +493,22 @@ class EquationSystem(System):
     @cached_property
     def _linear(self) -> LinearMotion:
         rates, names = self._read.rates, self.variables
-        terms, is_forced = self._terms_of(rates, 0), any(not states for form in rates for states, _, _ in form.parts)
+        forced, is_forced = None, any(not states for form in rates for states, _, _ in form.parts)
+        if is_forced:
+            forced = LinearMotion(self._terms_of(rates, 0, [""]), epsilon=self.epsilon, pasts=self.pasts)
+        past = (f"{names[k]}(t − {delay:.10g})" for k, delay in self.pasts)
+        names = (*names, f"{names[0]}*") if len(names) == 1 and not self.pasts else names  # as `as_plane` has it
         return LinearMotion(
-            terms,
+            self._terms_of(rates, 0),
             self._jumps(),
             self.epsilon,
             self._stop(),
             pasts=self.pasts,
             clock=self.clock,
             cubic=self._cubic(),
-            forced=LinearMotion(self._terms_of(rates, 0, [""]), epsilon=self.epsilon, pasts=self.pasts)
-            if is_forced
-            else None,
-            names=(*names, f"{names[0]}*") if len(names) == 1 and not self.pasts else names,  # as `as_plane` has it
+            forced=forced,
+            names=names,
+            columns=(*names, *[""] * is_forced, *past),
         )
 
     def _cubic(self) -> CubicTerms | None:
