@@ -27,7 +27,6 @@ from fpsolve.model.plane import (
     ParameterDerivative,
     System,
     as_plane,
-    by_noise,
     rows_of,
 )
 from fpsolve.model.problem import Problem
@@ -47,7 +46,6 @@ class Subsystem(System):
         own: the columns that are V_k.
         names: what its coordinates are called.
         rounded: share of a matrix in these coordinates that is rounding: 0 where they are variables of the system.
-        size: about how fast the system moves, the speed of that rotation is a power of four below it.
         jumps: that of a stop of the whole, whose coordinate and its rate it has.
     """
 
@@ -56,12 +54,11 @@ class Subsystem(System):
     own: tuple[int, ...]
     names: tuple[str, ...]
     rounded: float = 0.0
-    size: float = 1.0
     jumps: tuple[Jump, ...] = ()
 
     def linear(self) -> LinearMotion:
         whole = self.whole.linear()
-        terms = as_plane(self.part(whole.terms), self.size or 1.0)
+        terms = as_plane(self.part(whole.terms))
         clock = whole.clock if any(term.noise == TIME for term in terms) else None
         return LinearMotion(terms, self.jumps, whole.epsilon, clock=clock)
 
@@ -121,7 +118,7 @@ class Subsystem(System):
         """The derivative of the whole system, in the coordinates of this block."""
         whole = self.whole.derivative(name)
         jumps, clock = whole.jumps if self.jumps else (), whole.noise if self.linear().clock else None
-        return replace(whole, terms=as_plane(self.part(whole.terms)), jumps=jumps, noise=clock)
+        return replace(whole, terms=as_plane(self.part(whole.terms), has_turn=False), jumps=jumps, noise=clock)
 
 
 @lru_cache(maxsize=64)
@@ -135,7 +132,7 @@ def blocks_of(problem: Problem) -> tuple[Subsystem, ...]:
     """
     system, motion = problem.linear, framed(problem)
     frame, resting = motion.frame.array, motion.resting_phases
-    matrices, n, stop = [*by_noise(system, system.terms).values()], system.dimension, system.stop
+    matrices, n, stop = [*system.by_noise().values()], system.dimension, system.stop
     jumps, rounded, names, groups = tuple[Jump, ...](), 0.0, system.states, list[tuple[int, ...]]()
     if n == 2:
         if not resting:
@@ -164,7 +161,6 @@ def blocks_of(problem: Problem) -> tuple[Subsystem, ...]:
             own,
             tuple(names[k] for k in own),
             rounded,
-            motion.rate_bound,
             jumps if own == (0, 1) else (),
         )
         for own in (groups if n == 2 or len(groups) > 1 else ())
@@ -183,10 +179,10 @@ def couples(blocks: Sequence[Subsystem], name: str) -> bool:
     is, as −V_k in place of V_k gives the opposite derivative of the couplings: Λ(p) is even in them.
     """
     whole = blocks[0].whole.linear()
-    changes = by_noise(whole, blocks[0].whole.derivative(name).terms).values()
+    changes = whole.by_noise(blocks[0].whole.derivative(name).terms).values()
     if len(blocks) == 1:  # all rays are invariant
         return any(map(_turns, changes))
-    drives = reached(couplings(blocks, by_noise(whole, whole.terms).values()))
+    drives = reached(couplings(blocks, whole.by_noise().values()))
     return bool(np.any(drives.T & couplings(blocks, changes)))
 
 

@@ -29,7 +29,6 @@ from fpsolve.model.plane import (
     Matrix,
     Motion,
     angular_frequency,
-    by_noise,
     is_driven,
     kept_phases,
     phase_speed,
@@ -98,7 +97,7 @@ class Frame:
         if self.is_itself:
             return system
         others = [self.term(term) for term in system.terms if not is_free(term)]
-        free = by_noise(system, [*filter(is_free, system.terms)])[STEADY]
+        free = system.by_noise([*filter(is_free, system.terms)])[STEADY]
         a = self._inverse @ free @ self.array
         turned = 0.5 * (np.trace(a) * np.eye(len(a)) + a - a.T)
         is_turn = np.all(abs(a - turned) <= OF_PRODUCTS * (abs(self._inverse) @ abs(free) @ abs(self.array)))
@@ -166,7 +165,7 @@ class Framed:
     def resting_phases(self) -> tuple[float, ...]:
         """Phases of rays of a plane that are never left, nor reached; one, 0, where all rays are."""
         jolts = [each.matrix for each in self.diffusions] + [each.exponent for each in self.impulses]
-        return kept_phases([*map(np.array, jolts), *by_noise(self.motion, self.motion.terms).values()])
+        return kept_phases([*map(np.array, jolts), *self.motion.by_noise().values()])
 
     @cached_property
     def invariant_rays(self) -> tuple[float, ...]:
@@ -220,7 +219,7 @@ def own_frame(problem: Problem, moved: Motion) -> tuple[Frame, float]:
         moved: how the noise moves it.
     """
     (drift, diffusions, impulses), epsilon, n = moved, moved.drift.epsilon, problem.dimension
-    sums = by_noise(drift, drift.terms)
+    sums = drift.by_noise()
     parts = [(sums.pop(STEADY), *FOREVER)]
     parts += [(epsilon**each.order * np.array(each.matrix), *WHITE) for each in diffusions]
     parts += [(each.rate * np.array(each.exponent), *FOREVER) for each in impulses]
@@ -253,7 +252,7 @@ def own_frame(problem: Problem, moved: Motion) -> tuple[Frame, float]:
         else:  # as what is nilpotent, which is as small as one likes
             least, best = size(own), own
         choice.append(best)
-    free = by_noise(drift, [*filter(is_free, drift.terms)])[STEADY]
+    free = drift.by_noise([*filter(is_free, drift.terms)])[STEADY]
     if n == 2 and (rotating := rotating_coordinates(free)) is not None:
         (first, _), (lower, last) = rotating
         choice.insert(0, np.array([[1.0, 0.0], [lower / first, last / abs(first)]]))

@@ -9,7 +9,7 @@ import numpy as np
 
 from fpsolve.arrays import FloatArray
 from fpsolve.model.noises.clock import Wave
-from fpsolve.model.plane import STEADY, Function, System, by_noise, written_sum
+from fpsolve.model.plane import STEADY, Function, System, written_sum
 
 
 def equations_of(system: System) -> list[str]:
@@ -22,7 +22,7 @@ def equations_of(system: System) -> list[str]:
     linear, named = system.linear(), len(system.noise_sections) > 1
     whole, states = linear.forced or linear, linear.states
     n = whole.dimension
-    sums, driven = by_noise(whole, whole.terms), dict[str, FloatArray]()
+    sums, driven = whole.by_noise(), dict[str, FloatArray]()
     still = sums.pop(STEADY)
     for (noise, g), matrix in sums.items():
         letter, wave = f"ξ_{noise}" if named and noise else "ξ", g.f if isinstance(g, Function) else None

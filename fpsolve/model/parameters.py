@@ -7,7 +7,6 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from enum import Enum
-from functools import cache
 from typing import Annotated, Any, ClassVar, NamedTuple, Self, cast
 
 from pydantic import BaseModel, ConfigDict, Field
@@ -165,7 +164,10 @@ class Parametrised:
 
     def quantity_of(self, name: str) -> Quantity:
         """The name, the words and the unit of a parameter."""
-        return quantities_of(type(self))[name]  # type: ignore[arg-type]
+        key, field = f"{self.section}.{name}", self.fields().get(name)
+        if field is None:
+            return unknown_parameter(key)
+        return Quantity(key, key, field.title or key, symbol_of(field), unit_of(field) or "1")
 
     @property
     def values(self) -> Mapping[str, float | str]:
@@ -196,18 +198,6 @@ class Parametrised:
         """A system or a noise with other values of some parameters. Raises `ValueError` where one is out of range."""
         made: Self = replace(cast("Any", self), **values)
         return made
-
-
-@cache
-def quantities_of(kind: type[Parametrised]) -> Mapping[str, Quantity]:
-    """The names, words and units of the parameters of a kind, by their names."""
-    known = {
-        name: Quantity(
-            key := f"{kind.section}.{name}", key, field.title or key, symbol_of(field), unit_of(field) or "1"
-        )
-        for name, field in kind.fields().items()
-    }
-    return known | {name: unknown_parameter(f"{kind.section}.{name}") for name in kind.words}
 
 
 def unknown_parameter(key: str) -> Quantity:

@@ -372,7 +372,7 @@ class Jump:
         ray = f"the ray of a jump, phi = {self.phase:.6g}"
         x, u = (0.0 if abs(each) < 1e-15 else each for each in (math.cos(self.phase), -math.sin(self.phase)))
         shares = np.array([[u * x, u * u], [-x * x, -x * u]])  # h = e′ᵀA e is Σ of these times the entries of A
-        sums = by_noise(system, system.terms)
+        sums = system.by_noise()
         total, size = float(np.sum(shares * sums[STEADY])), sum(float(np.sum(abs(shares * a))) for a in sums.values())
         for name in dict.fromkeys(name for name, g in sums if g != one):
             own = {g: a for (each, g), a in sums.items() if each == name and g != one}
@@ -641,6 +641,16 @@ class LinearMotion(System):
         """The names of its variables."""
         return self.names or tuple(f"x{str(k + 1).translate(BELOW)}" for k in range(self.dimension))
 
+    def by_noise(self, terms: Sequence[CoefficientMatrix] | None = None) -> dict[Driver, FloatArray]:
+        """Sums, with the powers of ε, of what is steady, and of what each noise drives by each function; of its terms,
+        or of others.
+        """
+        found: dict[Driver, FloatArray] = {STEADY: np.zeros((self.dimension, self.dimension))}
+        for term in self.terms if terms is None else terms:
+            for driver, c in term.drivers:
+                found[driver] = found.get(driver, 0.0) + c * self.epsilon**term.order * np.array(term.matrix)
+        return found
+
     @property
     def driven_by(self) -> frozenset[str]:
         """The names that its terms give the noises that drive it."""
@@ -719,15 +729,6 @@ def split_by_noise(
     return steady, driven
 
 
-def by_noise(system: LinearMotion, terms: Sequence[CoefficientMatrix]) -> dict[Driver, FloatArray]:
-    """Sums, with the powers of ε, of what is steady, and of what each noise drives by each function."""
-    found: dict[Driver, FloatArray] = {STEADY: np.zeros((system.dimension, system.dimension))}
-    for term in terms:
-        for driver, c in term.drivers:
-            found[driver] = found.get(driver, 0.0) + c * system.epsilon**term.order * np.array(term.matrix)
-    return found
-
-
 def kept_phases(matrices: Sequence[FloatArray]) -> tuple[float, ...]:
     """φ of the rays of a plane that all matrices keep, none or two, or one; 0 where they keep all rays."""
     if len(matrices[0]) > 2:
@@ -745,20 +746,21 @@ def kept_phases(matrices: Sequence[FloatArray]) -> tuple[float, ...]:
     return tuple(phi for phi in sorted(found) if all(abs(float(speed(phi))) <= limit for speed, limit in turns))
 
 
-def as_plane(terms: Sequence[CoefficientMatrix], size: float = 0.0) -> tuple[CoefficientMatrix, ...]:
+def as_plane(terms: Sequence[CoefficientMatrix], *, has_turn: bool = True) -> tuple[CoefficientMatrix, ...]:
     """Terms ax of one variable as (a + J)x of two, J a uniform rotation: others as they are.
 
     ‖x‖ grows by a alone, whatever the phase is, so that T and P are functions of the noise alone, and Λ(p) is the same.
 
     Args:
         terms: of one variable, or of more.
-        size: about how fast it moves, the speed of J is a power of four below it; 0 for no J.
+        has_turn: whether J is added, whose speed is a power of four below the largest a; False for derivatives.
     """
     if any(len(term.matrix) > 1 for term in terms):
         return tuple(terms)
-    speed = 4.0 ** math.floor(math.log(size, 4)) if size else 0.0
-    turn = (CoefficientMatrix(0, ((0.0, speed), (-speed, 0.0))),) if speed else ()
-    return *turn, *(replace(term, matrix=term.matrix[0][0] * np.eye(2)) for term in terms)
+    size = max((abs(term.matrix[0][0]) for term in terms), default=0.0) or 1.0
+    speed = 4.0 ** math.floor(math.log(size, 4))
+    turn = CoefficientMatrix(0, ((0.0, speed), (-speed, 0.0)))
+    return *[turn] * has_turn, *(replace(term, matrix=term.matrix[0][0] * np.eye(2)) for term in terms)
 
 
 def common_unit(values: Sequence[float], name: str) -> tuple[float, int]:

@@ -40,7 +40,6 @@ from fpsolve.model.plane import (
     STEADY,
     CoefficientMatrix,
     LinearMotion,
-    by_noise,
     matrix_at,
     rotating_coordinates,
     written_coefficient,
@@ -186,7 +185,7 @@ class Statement(Record):
             ValueError: the speed of the phase at the ray of a jump has no one sign.
         """
         system, noise = problem.linear, problem.noise
-        sums = by_noise(system, system.terms)
+        sums = system.by_noise()
         still = sums.pop(STEADY)
         for _, g in sums:
             if g != identity:

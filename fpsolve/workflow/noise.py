@@ -46,7 +46,7 @@ from fpsolve.measured.stability import STEPS
 from fpsolve.measured.weak import Where
 from fpsolve.messages import Code, Message
 from fpsolve.model import Noise, Problem
-from fpsolve.model.plane import STEADY, LinearMotion, System, by_noise
+from fpsolve.model.plane import STEADY, LinearMotion, System
 from fpsolve.page.page import Block, Column, Grid, Sentence
 from fpsolve.results.text import likely, sampled
 from fpsolve.show.notes import note_on
@@ -137,7 +137,7 @@ class NoiseOutcome:
 
 def natural_frequencies(system: LinearMotion) -> tuple[float, ...]:
     """The moduli of the complex pairs of eigenvalues without noise, increasing: ω of an oscillator, in rad/time."""
-    values = np.linalg.eigvals(by_noise(system, system.terms)[STEADY])
+    values = np.linalg.eigvals(system.by_noise()[STEADY])
     return tuple(sorted(float(abs(each)) for each in values if each.imag > STILL * abs(each)))
 
 

@@ -351,7 +351,7 @@ class EquationSystem(System):
         return dict(self.named)
 
     def quantity_of(self, name: str) -> Quantity:
-        return dict(self.quantities).get(name) or _quantity(name, StatedParameter(value=0.0))
+        return dict(self.quantities).get(name) or super().quantity_of(name)
 
     def at(self, values: Mapping[str, float | str]) -> Self:
         known = self.values
@@ -478,7 +478,7 @@ class EquationSystem(System):
             for (order, noise), matrix in sorted(matrices.items(), key=itemgetter(0))
             if at == 0 or matrix.any()
         ]
-        return as_plane(terms, 0.0 if at else max((abs(matrix).max() for matrix in matrices.values()), default=0.0))
+        return as_plane(terms, has_turn=not at)
 
     def _coefficient(self, noise: str, names: Mapping[str, str]) -> tuple[Constant | Linear | Function, str]:
         """The coefficient of a noise, or of "cos 0.5", a wave of the clock, and the name of the noise in terms."""

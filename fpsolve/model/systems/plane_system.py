@@ -11,7 +11,6 @@ import numpy as np
 
 from fpsolve.arrays import real_number, shown
 from fpsolve.model.faults import TableError
-from fpsolve.model.parameters import unknown_parameter
 from fpsolve.model.plane import (
     MOST_VARIABLES,
     CoefficientMatrix,
@@ -22,7 +21,6 @@ from fpsolve.model.plane import (
     by_epsilon,
     is_driven,
 )
-from fpsolve.model.quantity import Quantity
 from fpsolve.model.systems.equations import EquationSystem, walls_of
 
 
@@ -66,9 +64,7 @@ class PlaneSystem(LinearMotion):
                 f"got matrices of {' and '.join(map(str, sizes))} rows; {type(self).__name__} takes {known}, the same "
                 "for all terms" + ("; take LinearSystem for more" if max(sizes) > max(self.dimensions) else "")
             )
-        if sizes == [1]:
-            size = max(abs(term.matrix[0][0]) for term in self.terms)
-            object.__setattr__(self, "terms", as_plane(self.terms, size or 1.0))
+        object.__setattr__(self, "terms", as_plane(self.terms))
         if self.jumps and sizes[0] != 2:
             raise ValueError(
                 f"got {len(self.jumps)} jumps of a system of {sizes[0]} variables; jumps are for two "
@@ -118,9 +114,6 @@ class PlaneSystem(LinearMotion):
     @property
     def values(self) -> Mapping[str, float | str]:
         return {"epsilon": float(self.epsilon)}
-
-    def quantity_of(self, name: str) -> Quantity:
-        return unknown_parameter(f"{self.section}.{name}")
 
     def at(self, values: Mapping[str, float | str]) -> Self:
         for name in values:
