@@ -30,7 +30,6 @@ from fpsolve.model.plane import (
     rows_of,
 )
 from fpsolve.model.problem import Problem
-from fpsolve.model.quantity import Quantity
 
 WORST_CONDITION = 100.0
 """Largest condition of eigenvectors in which blocks are looked for."""
@@ -88,10 +87,6 @@ class Subsystem(System):
         return self.whole.section
 
     @property
-    def noise_unit(self) -> str:  # type: ignore[override]
-        return self.whole.noise_unit
-
-    @property
     def noise_sections(self) -> Sequence[str]:
         """The sections of the noises that drive it; the first one of the whole where none does."""
         known = self.whole.noise_sections
@@ -106,9 +101,6 @@ class Subsystem(System):
     @property
     def differentiable(self) -> Sequence[str]:
         return self.whole.differentiable
-
-    def quantity_of(self, name: str) -> Quantity:
-        return self.whole.quantity_of(name)
 
     def at(self, values: Mapping[str, float | str]) -> Subsystem:
         """The same block of the whole with other values, which leave it one."""
