@@ -197,9 +197,9 @@ def furstenberg_khasminskii(pair: PrincipalPair) -> float:
     framed = pair.generator.framed
     system, phi, at = framed.motion, axis.points[:, None], _of_zero(pair).space.xi.samples()
     rate = growth_rate(system, at.xi)(phi)
-    for each in framed.diffusions:  # ½ h q′, by which q ∘ dW has a mean
+    for each in system.diffusions:  # ½ h q′, by which q ∘ dW has a mean
         rate = rate + 0.5 * system.epsilon ** (2 * each.order) * each.h(phi) * each.q.slope(phi)
-    for struck in framed.impulses:
+    for struck in system.impulses:
         rate = rate + struck.rate * np.log(struck.stretched(phi)[0])
     growth = float(axis.weights @ (rate * evaluated(pair, axis.values, at).T_adjoint) @ at.measure)
     for jump, speed in zip(system.jumps, framed.wall_speeds(system), strict=True):

@@ -290,7 +290,7 @@ def _growth(pair: PrincipalPair, psi: FloatArray, xi: Sequence[FloatArray]) -> t
     """q over φ and values of the noises, and ρ^p as a factor of such tables."""
     problem, columns = pair.generator.problem, (-1, *[1] * len(xi))
     phi, stretch = own_phases(pair, psi)
-    rate: Harmonics = growth_rate(problem.noise.motion(problem.linear).drift, problem.valued.combined(xi))
+    rate: Harmonics = growth_rate(problem.noise.motion(problem.linear), problem.valued.combined(xi))
     return rate(phi.reshape(columns)), stretch.reshape(columns)
 
 

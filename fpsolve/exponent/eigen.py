@@ -406,7 +406,7 @@ def _reached(generator: Generator, pencil: Pencil, x: FloatArray, y: FloatArray)
             value, rounding = float((constant @ (forcing @ x) + of_noise @ x) / total), bound
     if p == 0:  # where Λ = 0
         rounding = max(rounding, abs(value))
-    for each in generator.framed.diffusions:  # of growth ½p²q² − ½pq², which cancels beside p = 1
+    for each in generator.framed.motion.diffusions:  # of growth ½p²q² − ½pq², which cancels beside p = 1
         rounding += _EPS * (abs(p) + p * p) * (generator.problem.linear.epsilon**each.order * each.fastest[1]) ** 2
     return PrincipalPair(
         p=p,

@@ -158,7 +158,7 @@ def even_moment(
 def constant_scale(problem: Problem) -> Scale:
     """The scale of Λ(p) where even p alone are computed: constant terms, with the mean of the noise."""
     now = problem.dimension - len(problem.linear.pasts)
-    mean = mean_matrix(problem, problem.noise.motion(problem.linear).drift)[:now, :now]
+    mean = mean_matrix(problem, problem.noise.motion(problem.linear))[:now, :now]
     abscissa = abs(float(np.max(np.linalg.eigvals(mean).real)))
     is_moved = abscissa > ROUNDED * float(np.linalg.norm(mean))
     return Scale(abscissa if is_moved else framed(problem).unit_rate, 0.0)
@@ -374,18 +374,18 @@ class Equations:
         self.dimension = problem.dimension - len(self.pasts)
         named = problem.valued.parts
         self.noises, names = list(named.values()), list(named)
-        drift, diffusions, impulses = problem.noise.motion(problem.linear)
+        moved = problem.noise.motion(problem.linear)
         steady, self._loads = np.zeros(2 * (problem.dimension,)), list[tuple[Any, int]]()
         loads = list[FloatArray]()
-        for term in drift.terms:
-            matrix = drift.epsilon**term.order * np.array(term.matrix)
+        for term in moved.terms:
+            matrix = moved.epsilon**term.order * np.array(term.matrix)
             if term.g == one:
                 steady += matrix
                 continue
             self._loads.append((term.g, names.index(term.noise) if term.noise in named else 0))
             loads.append(matrix)
-        squares = [drift.epsilon**each.order * np.array(each.matrix) for each in diffusions]
-        jolts = [(each.rate, np.array(each.exponent)) for each in impulses]
+        squares = [moved.epsilon**each.order * np.array(each.matrix) for each in moved.diffusions]
+        jolts = [(each.rate, np.array(each.exponent)) for each in moved.impulses]
         moving, sizes = Moving(steady, loads, squares, jolts), _sizes(self.over_noise([2] * len(self.noises))[1])
         self.units = moving.balance(sizes, [variable for variable, _ in self.pasts]) if units is None else units
         self.moving = moving.over(self.units)

@@ -330,21 +330,21 @@ class PlaneTerms(Terms):
 
     @property
     def keeps_constants(self) -> bool:  # type: ignore[override]
-        for term in (*self.system.terms, *self._framed.diffusions):
+        for term in (*self.system.terms, *self.system.diffusions):
             if term.order == 0 and (term.h.amplitude or not term.q.vanishes):
                 return False
         return True
 
     def growth_bound(self, p: float, noises: Sequence[Any]) -> float:
         total = super().growth_bound(p, noises)
-        for each in self._framed.impulses:
+        for each in self.system.impulses:
             total += each.rate * math.exp(abs(p) * each.strength)
         for ray, v, _ in self._walls:
             total += abs(p * ray.log_factor * v)
         return total
 
     def _loads(self) -> Iterator[Term]:
-        for struck in self._framed.impulses:
+        for struck in self.system.impulses:
             yield self._struck(struck)
         # −½ ∫ P_s θ [w] [T] at the φ-vertices where the phase runs both ways, or θ is not |v|
         text, jump = "upwind loads between cells", self._jump
@@ -358,7 +358,7 @@ class PlaneTerms(Terms):
     def _changed_loads(self, by: ParameterDerivative) -> Iterator[Term]:
         """Upwinding is held: [T] = 0 at a vertex but for the error of the elements."""
         text, moved = "∂/∂θ", LinearMotion(by.terms, epsilon=self.system.epsilon)
-        for struck, moved_by in zip(self._framed.impulses, by.impulses, strict=bool(by.impulses)):
+        for struck, moved_by in zip(self.system.impulses, by.impulses, strict=bool(by.impulses)):
             yield self._struck(struck, moved_by)
         faster = self._framed.wall_speeds(moved)
         for k, (ray, v, delta) in enumerate(self._walls):

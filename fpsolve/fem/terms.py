@@ -135,7 +135,7 @@ class Terms:
             found.append(self._term(self.phi.matrix(one), None, text, name=name))
         for term in self.system.terms:
             found += self._driven(term)
-        for each in self._framed.diffusions:
+        for each in self.system.diffusions:
             found += self._diffused([(0.5, each, each)])
         return [*found, *self._loads()]
 
@@ -145,7 +145,7 @@ class Terms:
         for term in self.system.terms:
             size = power * self.system.epsilon**term.order * float(np.linalg.norm(term.matrix, 2))
             total += size * float(np.max(np.abs(term.g(noises[self.place(term.noise)].xi))))
-        for each in self._framed.diffusions:
+        for each in self.system.diffusions:
             total += 0.5 * (power * self.system.epsilon**each.order * float(np.linalg.norm(each.matrix, 2))) ** 2
         return total
 
@@ -154,7 +154,7 @@ class Terms:
         by = self._framed.changed(by)
         for term in by.terms:
             yield from self._driven(term)
-        for own, other in zip(self._framed.diffusions, by.diffusions, strict=bool(by.diffusions)):
+        for own, other in zip(self.system.diffusions, by.diffusions, strict=bool(by.diffusions)):
             yield from self._diffused([(0.5, own, other), (0.5, other, own)])
         yield from self._changed_loads(by)
 

@@ -27,7 +27,6 @@ from fpsolve.model.plane import (
     Impulse,
     LinearMotion,
     Matrix,
-    Motion,
     angular_frequency,
     is_driven,
     kept_phases,
@@ -103,7 +102,8 @@ class Frame:
         is_turn = np.all(abs(a - turned) <= OF_PRODUCTS * (abs(self._inverse) @ abs(free) @ abs(self.array)))
         steady = CoefficientMatrix(0, turned if is_turn and len(a) == 2 else a)
         jumps = [replace(jump, phase=float(self.phase(np.array(jump.phase)))) for jump in system.jumps]
-        return LinearMotion((steady, *others), tuple(jumps), system.epsilon)
+        diffusions, impulses = map(self.term, system.diffusions), map(self.exponent, system.impulses)
+        return LinearMotion((steady, *others), jumps, system.epsilon, diffusions=[*diffusions], impulses=[*impulses])
 
     @property
     def parts(self) -> int:
@@ -135,16 +135,12 @@ class Framed:
         frame: S.
         rate_bound: how fast it moves there at most, about, by all that moves it.
         motion: the system along a path of ξ: what is left of it beside white noise.
-        diffusions: ε^order B of every Bx ∘ dW by which white noise moves the state.
-        impulses: what multiplies the state at random times.
     """
 
     def __init__(self, problem: Problem) -> None:
         moved = problem.noise.motion(problem.linear)
         self.frame, self.rate_bound = frame, _ = own_frame(problem, moved)
-        self.problem, self.motion = problem, frame.motion(moved.drift)
-        self.diffusions = [frame.term(each) for each in moved.diffusions]
-        self.impulses = [frame.exponent(each) for each in moved.impulses]
+        self.problem, self.motion = problem, frame.motion(moved)
 
     def changed(self, by: ParameterDerivative) -> ParameterDerivative:
         """A derivative of the problem in the same coordinates, as L(p) is smooth in parameters in one frame only."""
@@ -164,7 +160,7 @@ class Framed:
     @cached_property
     def resting_phases(self) -> tuple[float, ...]:
         """Phases of rays of a plane that are never left, nor reached; one, 0, where all rays are."""
-        jolts = [each.matrix for each in self.diffusions] + [each.exponent for each in self.impulses]
+        jolts = [each.matrix for each in self.motion.diffusions] + [each.exponent for each in self.motion.impulses]
         return kept_phases([*map(np.array, jolts), *self.motion.by_noise().values()])
 
     @cached_property
@@ -205,7 +201,7 @@ def is_free(term: CoefficientMatrix) -> bool:
     return term.order == 0 and not is_driven(term.g)
 
 
-def own_frame(problem: Problem, moved: Motion) -> tuple[Frame, float]:
+def own_frame(problem: Problem, moved: LinearMotion) -> tuple[Frame, float]:
     """The frame in which a motion is small, x itself where that is hardly worse; and its size there, a rate.
 
     That is Σ min(s‖D‖, τs²‖D‖²), D of noise with the standard deviation s and the correlation time τ: what the rates of
@@ -218,11 +214,10 @@ def own_frame(problem: Problem, moved: Motion) -> tuple[Frame, float]:
         problem: the system and its noise.
         moved: how the noise moves it.
     """
-    (drift, diffusions, impulses), epsilon, n = moved, moved.drift.epsilon, problem.dimension
-    sums = drift.by_noise()
+    sums, n = moved.by_noise(), problem.dimension
     parts = [(sums.pop(STEADY), *FOREVER)]
-    parts += [(epsilon**each.order * np.array(each.matrix), *WHITE) for each in diffusions]
-    parts += [(each.rate * np.array(each.exponent), *FOREVER) for each in impulses]
+    parts += [(moved.epsilon**each.order * np.array(each.matrix), *WHITE) for each in moved.diffusions]
+    parts += [(each.rate * np.array(each.exponent), *FOREVER) for each in moved.impulses]
     for (name, _), each in sums.items():
         noise = problem.named_noise(name)
         if each.any():
@@ -252,7 +247,7 @@ def own_frame(problem: Problem, moved: Motion) -> tuple[Frame, float]:
         else:  # as what is nilpotent, which is as small as one likes
             least, best = size(own), own
         choice.append(best)
-    free = drift.by_noise([*filter(is_free, drift.terms)])[STEADY]
+    free = moved.by_noise([*filter(is_free, moved.terms)])[STEADY]
     if n == 2 and (rotating := rotating_coordinates(free)) is not None:
         (first, _), (lower, last) = rotating
         choice.insert(0, np.array([[1.0, 0.0], [lower / first, last / abs(first)]]))

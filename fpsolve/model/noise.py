@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from fpsolve.arrays import Coefficient, FloatArray
 from fpsolve.model.parameters import Parametrised
-from fpsolve.model.plane import LinearMotion, Motion, ParameterDerivative, System, Xi
+from fpsolve.model.plane import LinearMotion, ParameterDerivative, System, Xi
 from fpsolve.model.plane import NoiseDerivative as NoiseDerivative
 
 STAY = 'write xi = "stationary"'
@@ -255,7 +255,7 @@ class Noise(Parametrised):
         """Whether a simulation may add σ²b to the drift and weigh paths: σ is constant, and exp(b ξ) has a mean."""
         return self.may_tilt and type(self).squared_diffusion is Noise.squared_diffusion
 
-    def motion(self, system: LinearMotion, name: str | None = None) -> Motion:
+    def motion(self, system: LinearMotion, name: str | None = None) -> LinearMotion:
         """How this noise moves a system whose terms call it so, with None whatever; by default along a path of ξ.
 
         Raises:
@@ -266,7 +266,7 @@ class Noise(Parametrised):
                 f"got {self.kind} noise for {system.dimension} variables; noise with algebraic tails is for two "
                 "variables only: take another kind, or r0 <= 1"
             )
-        return Motion(system)
+        return system
 
     def driving(self, system: System) -> Noise:
         """The noises of these that drive a part of the system; the first one where none does."""

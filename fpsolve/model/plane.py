@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import KW_ONLY, dataclass, field, replace
 from functools import cached_property
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -599,6 +599,8 @@ class LinearMotion(System):
         jumps: the rays at which the state is stretched.
         epsilon: ε.
         stop: the wall of one coordinate of more than two variables; None without one.
+        diffusions: ε^order B of every Bx ∘ dW by which white noise moves the state, see `Noise.motion`.
+        impulses: what multiplies the state at random times.
         pasts: which variable each of the last columns of the terms stands for, and how long ago; none without a delay.
         clock: what its periodic coefficients are functions of; terms name this noise t.
         cubic: what is of degree 3 in its rates, on which the stationary response depends alone; None for nothing.
@@ -614,6 +616,8 @@ class LinearMotion(System):
     epsilon: float = 1.0
     stop: Stop | None = None
     _: KW_ONLY
+    diffusions: Sequence[CoefficientMatrix] = ()
+    impulses: Sequence[Impulse] = ()
     pasts: Sequence[tuple[int, float]] = ()
     clock: Any = None
     cubic: CubicTerms | None = None
@@ -664,6 +668,17 @@ class LinearMotion(System):
         )
 
     @property
+    def overshoot(self) -> float:
+        """The largest factor by which ‖x‖ jumps upwards, 1 where it does not."""
+        struck = [float(np.linalg.norm(each.matrix, 2)) for each in self.impulses]
+        return max([1.0, *(math.exp(jump.log_factor) for jump in self.jumps), *struck])
+
+    @property
+    def rises_smoothly(self) -> bool:
+        """Whether ‖x‖ is differentiable but where a wall makes it smaller."""
+        return self.overshoot == 1.0 and not self.impulses and all(each.q.vanishes for each in self.diffusions)
+
+    @property
     def aspect(self) -> float:
         """s in the amplitude a = √(x₁² + x₂²/s²) of its response: x₁ = a cos φ and x₂ = −s a sin φ.
 
@@ -671,31 +686,6 @@ class LinearMotion(System):
         """
         (_, b), (c, _) = matrix_at(self, 0.0).tolist()
         return self.second_unit * (math.sqrt(-c / b) if b * c < 0 else 1.0)
-
-
-class Motion(NamedTuple):
-    """How a noise moves a system.
-
-    Attributes:
-        drift: the motion along a path of ξ.
-        diffusions: ε^order B of every Bx ∘ dW by which white noise moves the state.
-        impulses: what multiplies the state at random times.
-    """
-
-    drift: LinearMotion
-    diffusions: Sequence[CoefficientMatrix] = ()
-    impulses: Sequence[Impulse] = ()
-
-    @property
-    def overshoot(self) -> float:
-        """The largest factor by which ‖x‖ jumps upwards, 1 where it does not."""
-        struck = [float(np.linalg.norm(each.matrix, 2)) for each in self.impulses]
-        return max([1.0, *(math.exp(jump.log_factor) for jump in self.drift.jumps), *struck])
-
-    @property
-    def rises_smoothly(self) -> bool:
-        """Whether ‖x‖ is differentiable but where a wall makes it smaller."""
-        return self.overshoot == 1.0 and not self.impulses and all(each.q.vanishes for each in self.diffusions)
 
 
 def split_by_noise(

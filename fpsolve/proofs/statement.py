@@ -244,10 +244,9 @@ class LinearRecord(Record):
         """The matrices of a problem. Raises `TypeError` where its noise is not white."""
         if problem.linear.barriers:
             raise TypeError("got a wall of more than two variables, where moments obey no closed equations; remove it")
-        drift, diffusions, _ = problem.noise.motion(problem.linear)
-        parts, noisy = (
-            [drift.epsilon**each.order * np.array(each.matrix) for each in terms] for terms in (drift.terms, diffusions)
-        )
+        moved = problem.noise.motion(problem.linear)
+        whole = moved.terms, moved.diffusions
+        parts, noisy = ([moved.epsilon**each.order * np.array(each.matrix) for each in terms] for terms in whole)
         steady = sum(parts, np.zeros(2 * (problem.dimension,)))
         is_moved = np.any([steady, *noisy], axis=(0, 2))
         if not is_moved.all() or {*map(type, problem.noise.parts.values())} != {White}:

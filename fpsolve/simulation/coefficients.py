@@ -269,7 +269,7 @@ def repeated_delay(pasts: Sequence[tuple[int, float]]) -> float:
 
 def coefficients(system: LinearMotion, noise: Noise) -> Coefficients:
     """The matrices of a system under noises that can be simulated."""
-    terms, loads = noise.motion(system).drift.terms, _loads(system, noise)
+    terms, loads = noise.motion(system).terms, _loads(system, noise)
     steady = _without_noise(system, terms)
     mean = sum((each.mean for each in loads), np.zeros_like(steady))
     free = _without_noise(system, [term for term in terms if term.order == 0]) + mean
@@ -316,7 +316,7 @@ def _loads(system: LinearMotion, noise: Noise) -> list[Load]:
     for name, part in parts.items():
         own = [term for term in system.terms if is_driven(term.g) and (len(noise.parts) == 1 or term.noise == name)]
         lines, shapes = [affine(term.g) or (0.0, 0.0) for term in own], [_matrix(system, term) for term in own]
-        _, diffusions, impulses = part.motion(LinearMotion(own, epsilon=system.epsilon))
+        moved = part.motion(LinearMotion(own, epsilon=system.epsilon))
         count = len(np.atleast_2d(part.start(1, rng)))
         rows = row if count == 1 else slice(row, row + count)
         row += count
@@ -324,13 +324,13 @@ def _loads(system: LinearMotion, noise: Noise) -> list[Load]:
             driven: FloatArray = np.zeros((step.values.size, *zero.shape))
             for term, (offset, _), shape in zip(own, lines, shapes, strict=True):
                 driven += (term.g(step.values) - offset)[:, None, None] * shape
-            arrivals = np.array([each.matrix for each in impulses] or [np.eye(len(zero))] * step.values.size)
+            arrivals = np.array([each.matrix for each in moved.impulses] or [np.eye(len(zero))] * step.values.size)
             mean = np.tensordot(part.probabilities, driven[: part.probabilities.size], 1)
-            moves = [(each.rate, np.array(each.exponent)) for each in impulses]
+            moves = [(each.rate, np.array(each.exponent)) for each in moved.impulses]
             moves = moves or [*zip(part.probabilities, driven - mean, strict=False)]
             found.append(Load(part, rows, driven, mean, moves, arrivals))
         elif part.is_white:
-            driven = sum((_matrix(system, each) for each in diffusions), zero)
+            driven = sum((_matrix(system, each) for each in moved.diffusions), zero)
             found.append(Load(part, rows, driven, zero, [(1.0, driven)]))
         else:
             driven = sum((slope * shape for (_, slope), shape in zip(lines, shapes, strict=True)), zero)

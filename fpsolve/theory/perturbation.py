@@ -135,10 +135,10 @@ def harmonic_loads(problem: Problem) -> Sequence[str]:
 @lru_cache(8)  # a set asks for it five times: scales, columns and notes
 def _of_random_noise(problem: Problem) -> SecondOrder:
     """ε²Λ₂(p) without what harmonic loads change."""
-    (system, diffusions, impulses), noises = problem.noise.motion(problem.linear), problem.noise.parts
+    system, noises = problem.noise.motion(problem.linear), problem.noise.parts
     if problem.dimension > 2:
         raise NoPerturbationTheory("perturbation theory is for two variables only")
-    if impulses:
+    if system.impulses:
         raise NoPerturbationTheory("perturbation theory is for weak noise, not for impulses")
     driven = {name: np.zeros((2, 2)) for name, noise in noises.items() if not (noise.is_white and len(noises) > 1)}
     steady = matrix_at(system, 0.0, slice(0, 1))
@@ -172,7 +172,7 @@ def _of_random_noise(problem: Problem) -> SecondOrder:
                 f"{noise.standard_deviation:.3g}"
             )
         of_noise.append((q, at_rest, at_twice))
-    for each in diffusions:
+    for each in system.diffusions:
         if each.order != 1:
             raise NoPerturbationTheory(f"perturbation theory is for white noise of order 1, not {each.order}")
         of_noise.append((_growth(each.matrix, frame), 1.0, 1.0))  # beside nothing: no path of white noise drives
@@ -281,10 +281,10 @@ def scale_of(problem: Problem) -> Scale:
     driven = 0.0
     for name, size in of_noises.items():
         driven += size * min(1.0, size * problem.named_noise(name).correlation_time) if size else 0.0
-    for each in own.diffusions:
+    for each in system.diffusions:
         h, q = (system.epsilon**each.order * speed for speed in each.fastest)
         driven += 0.5 * q * max(h, q)
-    driven += sum(each.rate * each.strength * min(1.0, each.strength) for each in own.impulses)
+    driven += sum(each.rate * each.strength * min(1.0, each.strength) for each in system.impulses)
     sizes = Scale(float(np.max(np.abs(np.linalg.eigvals(steady).real))) + jumps + driven, driven)
     theory = None
     with suppress(NoPerturbationTheory):

@@ -17,7 +17,6 @@ from fpsolve.model.parameters import SIZE, parameter
 from fpsolve.model.plane import (
     Impulse,
     LinearMotion,
-    Motion,
     ParameterDerivative,
     split_by_noise,
 )
@@ -102,23 +101,20 @@ class Poisson(Memoryless):
         reached = np.tile(np.append(np.cumsum(self.shares)[:-1], 1.0), (sizes.size, 1))
         return ChainStep(np.full(sizes.size, self.rate), reached, np.zeros(sizes.size), sizes)
 
-    def motion(self, system: LinearMotion, name: str | None = None) -> Motion:
+    def motion(self, system: LinearMotion, name: str | None = None) -> LinearMotion:
         """The motion between impulses, and one impulse for each size, in their order, by which the simulation draws.
 
         Raises:
             ValueError: a coefficient is no a + bξ, or impulses multiply the state by more than numbers hold.
         """
         terms, driven = split_by_noise(system, system.terms, name)
-        drift = LinearMotion(tuple(terms), system.jumps, system.epsilon)
-        if not driven.any():
-            return Motion(drift)
         if float(np.max(np.abs(np.linalg.eigvals(driven)))) * max(map(abs, self.sizes)) > LARGEST:
             raise ValueError(f"an impulse multiplies the state by up to e^{LARGEST:g} or more; use smaller sizes")
-        impulses = [
-            Impulse(self.rate * float(share), size * driven)
-            for size, share in zip(self.sizes, self.shares, strict=True)
-        ]
-        return Motion(drift, (), impulses)
+        impulses = [*system.impulses]
+        if driven.any():
+            shares = zip(self.sizes, self.shares.tolist(), strict=True)
+            impulses += [Impulse(self.rate * share, size * driven) for size, share in shares]
+        return LinearMotion(terms, system.jumps, system.epsilon, diffusions=system.diffusions, impulses=impulses)
 
     def changed_motion(
         self, system: LinearMotion, changed: ParameterDerivative, by: str = "", name: str | None = None

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from fpsolve.arrays import FloatArray, shown
 from fpsolve.model.noise import STAY, Noise
-from fpsolve.model.plane import LinearMotion, Motion, ParameterDerivative, System, Xi
+from fpsolve.model.plane import LinearMotion, ParameterDerivative, System, Xi
 
 MOST_WITH_AXES = 2
 """Noises that have values at most: each of them is a dimension more."""
@@ -147,13 +147,11 @@ class Noises(Noise):
     def largest_step(self) -> float:
         return min(noise.largest_step for _, noise in self.named)
 
-    def motion(self, system: LinearMotion, name: str | None = None) -> Motion:
+    def motion(self, system: LinearMotion, name: str | None = None) -> LinearMotion:
         """The motion besides the white noises, and what all white noises add, each in its own `sense`."""
-        whole = Motion(system)
         for own, noise in self._white:
-            drift, diffusions, impulses = noise.motion(whole.drift, own)
-            whole = Motion(drift, [*whole.diffusions, *diffusions], [*whole.impulses, *impulses])
-        return whole
+            system = noise.motion(system, own)
+        return system
 
     def driving(self, system: System) -> Noise:
         first = system.noise_sections[0].removeprefix("noise.")

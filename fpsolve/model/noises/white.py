@@ -19,7 +19,6 @@ from fpsolve.model.parameters import SIZE, parameter
 from fpsolve.model.plane import (
     CoefficientMatrix,
     LinearMotion,
-    Motion,
     ParameterDerivative,
     is_driven,
     split_by_noise,
@@ -103,7 +102,7 @@ class White(Memoryless):
         """One step of dW, without a bias; s is in the matrix that the noise drives."""
         return WhiteStep(1 / math.sqrt(h), math.sqrt(3 / h))
 
-    def motion(self, system: LinearMotion, name: str | None = None) -> Motion:
+    def motion(self, system: LinearMotion, name: str | None = None) -> LinearMotion:
         """The drift in the sense of Stratonovich, and s A of the term that the noise drives, as one matrix.
 
         Raises:
@@ -114,7 +113,8 @@ class White(Memoryless):
         diffusions = [_term(system, self.s * driven, min(orders))] if driven.any() else []
         if self.interpretation == Interpretation.ITO and diffusions:
             drift.append(_term(system, -0.5 * self.s**2 * driven @ driven, 2 * min(orders)))
-        return Motion(LinearMotion(tuple(drift), system.jumps, system.epsilon), diffusions)
+        diffusions = [*system.diffusions, *diffusions]
+        return LinearMotion(drift, system.jumps, system.epsilon, diffusions=diffusions, impulses=system.impulses)
 
     def changed_motion(
         self, system: LinearMotion, changed: ParameterDerivative, by: str = "", name: str | None = None
