@@ -66,9 +66,7 @@ def mean_terms(problem: Problem) -> tuple[FloatArray, FloatArray]:
 
 
 def comes_down(problem: Problem) -> bool:
-    """Whether all of the paths come lower; a system without cubic terms has none to do so."""
-    if problem.linear.cubic is None:
-        return False
+    """Whether all of the paths come lower."""
     linear, cubic = mean_terms(problem)
     begin = 0.5 * math.log(LEVEL)
     most = begin - LEAST - math.fsum(jump.log_factor for jump in problem.linear.jumps)

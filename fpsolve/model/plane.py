@@ -239,12 +239,6 @@ class CoefficientMatrix:
         object.__setattr__(self, "matrix", rows_of(entries))
         object.__setattr__(self, "g", coefficient(self.g))
 
-    @property
-    def drivers(self) -> Sequence[tuple[Driver, float]]:
-        """What drives it, the noise and a function of it, each with a factor: nothing and ξ for a + bξ."""
-        (offset, slope), g = (line, identity) if (line := affine(self.g)) else ((0.0, 1.0), self.g)
-        return [(driver, c) for driver, c in ((STEADY, offset), ((self.noise, g), slope)) if c]
-
     @cached_property
     def h(self) -> Harmonics:
         """h(φ) = e′ᵀA e, the phase speed."""
@@ -651,14 +645,16 @@ class LinearMotion(System):
         """
         found: dict[Driver, FloatArray] = {STEADY: np.zeros((self.dimension, self.dimension))}
         for term in self.terms if terms is None else terms:
-            for driver, c in term.drivers:
-                found[driver] = found.get(driver, 0.0) + c * self.epsilon**term.order * np.array(term.matrix)
+            (offset, slope), g = (line, identity) if (line := affine(term.g)) else ((0.0, 1.0), term.g)
+            for driver, c in ((STEADY, offset), ((term.noise, g), slope)):
+                if c:
+                    found[driver] = found.get(driver, 0.0) + c * self.epsilon**term.order * np.array(term.matrix)
         return found
 
     @property
-    def driven_by(self) -> frozenset[str]:
-        """The names that its terms give the noises that drive it."""
-        return frozenset(term.noise for term in (self.forced or self).terms if is_driven(term.g))
+    def driven_by(self) -> Sequence[str]:
+        """The names that its terms give the noises that drive it, in their order."""
+        return tuple(dict.fromkeys(term.noise for term in (self.forced or self).terms if is_driven(term.g)))
 
     @property
     def response(self) -> ResponseQuantities:

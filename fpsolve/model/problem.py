@@ -66,7 +66,7 @@ class Problem:
         wanted, given = self.system.noise_sections, self.noise.parts
         if len(wanted) > 1 or len(given) > 1:
             names = linear.driven_by
-            if names != set(given):
+            if {*names} != {*given}:
                 told = f"the terms name the noises {', '.join(map(shown, sorted(names)))}"
                 stated = ", ".join(map(shown, given)) if len(given) > 1 else "one without a name"
                 remedy = 'give one for each name, such as Problem(system, {"axial": ..., "lateral": ...})'

@@ -19,7 +19,6 @@ from fpsolve.model.plane import (
     ParameterDerivative,
     as_plane,
     by_epsilon,
-    is_driven,
 )
 from fpsolve.model.systems.equations import EquationSystem, walls_of
 
@@ -36,6 +35,7 @@ class PlaneSystem(LinearMotion):
         terms: one at least.
         jumps: stretches at rays that are passed with a speed which no noise changes, as x = 0 is where ẋ = v.
         epsilon: ε > 0.
+        cubic: what is of degree 3 in its rates, by which it has a stationary response; None for nothing.
 
     Raises:
         ValueError: there is no term, or ε is not a positive number.
@@ -108,8 +108,7 @@ class PlaneSystem(LinearMotion):
     @property
     def noise_sections(self) -> Sequence[str]:
         """The sections of the noises that the terms name."""
-        names = dict.fromkeys(term.noise for term in self.terms if is_driven(term.g))
-        return tuple(f"noise.{name}" if name else "noise" for name in names) or super().noise_sections
+        return tuple(f"noise.{name}" if name else "noise" for name in self.driven_by) or super().noise_sections
 
     @property
     def values(self) -> Mapping[str, float | str]:
