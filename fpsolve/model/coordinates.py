@@ -193,7 +193,8 @@ def infinite(problem: Problem, p: float, symbol: str = "") -> Message | None:
 def mean_matrix(problem: Problem, motion: LinearMotion) -> FloatArray:
     """Σ ε^n ⟨g⟩ A of the terms of a motion, in the mean over the noise."""
     means = [motion.epsilon**term.order * problem.named_noise(term.noise).mean_of(term.g) for term in motion.terms]
-    return np.tensordot(np.array(means), np.array([term.matrix for term in motion.terms]), 1)
+    matrices = np.reshape([term.matrix for term in motion.terms], (-1, motion.dimension, motion.dimension))
+    return np.tensordot(np.array(means), matrices, 1)
 
 
 def is_free(term: CoefficientMatrix) -> bool:

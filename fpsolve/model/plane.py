@@ -632,7 +632,7 @@ class LinearMotion(System):
     @cached_property
     def dimension(self) -> int:
         """n, that of the state with its `pasts`."""
-        return max((len(term.matrix) for term in self.terms), default=2)
+        return max((len(each.matrix) for each in (*self.terms, *self.diffusions, *self.impulses)), default=2)
 
     @property
     def states(self) -> Sequence[str]:
