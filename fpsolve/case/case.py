@@ -359,8 +359,7 @@ class Case(Section):
     @cached_property
     def responds(self) -> bool:
         """Whether some of the first curves are."""
-        known = (each.problem.linear for each in self.curves(0, MOST_DRAWN) if each.is_possible)
-        return any(each.cubic or each.forced for each in known)
+        return any(each.is_possible and each.problem.linear.responds for each in self.curves(0, MOST_DRAWN))
 
     @property
     def differentiated(self) -> FloatArray:

@@ -246,7 +246,7 @@ def _modes(stated: Statement, of: str, case: Case | None) -> Modes:
             raise FpsolveError(f"got --length {stated.length}; must be > 0, in m, and is for --of acceleration")
         found["--length"] = (math.sqrt(GRAVITY / stated.length) / (2 * math.pi),)
     if case:
-        found["--case"] = tuple(each / (2 * math.pi) for each in natural_frequencies(case.system.linear())[:2])
+        found["--case"] = tuple(each / (2 * math.pi) for each in natural_frequencies(case.system)[:2])
         if not found["--case"]:
             raise FpsolveError(f"{case.path}: does not oscillate without noise, so that no frequency matters most")
     table = modes_from(stated.modes, stated.mode or (), restitution) if stated.modes else None

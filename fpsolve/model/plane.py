@@ -657,6 +657,11 @@ class LinearMotion(System):
         return tuple(dict.fromkeys(term.noise for term in (self.forced or self).terms if is_driven(term.g)))
 
     @property
+    def responds(self) -> bool:
+        """Whether there is more to it than its terms, so that it may have a stationary response."""
+        return self.cubic is not None or self.forced is not None
+
+    @property
     def response(self) -> ResponseQuantities:
         """The quantities of its stationary response."""
         return self.quantities or response_quantities(

@@ -108,15 +108,15 @@ def write_response(found: CurveResponse, curve: Curve, folder: Path) -> None:
     density, system = found.density, curve.problem.linear
     rows = zip(density.amplitude.tolist(), density.of_amplitude.tolist(), strict=True)
     write_csv(folder / f"response{curve.suffix}.csv", ["amplitude", "density"], rows)
-    about = system.response.numbers
-    known = {about[name].name: each.value for name, each in found.numbers.items()}
+    about = system.response
+    known = {about.numbers[name].name: each.value for name, each in found.numbers.items()}
     facts = {
         **known,
         "stability_index": found.stability_index,
         "curve": float(curve.number),
         **field_data(curve.parameters, curve.varied, curve.problem),
     }
-    phases, of_plane = density.plane(system.response.has_wall)
+    phases, of_plane = density.plane(about.has_wall)
     a, phi = np.meshgrid(density.amplitude, phases, indexing="ij")
     plane = {"density": of_plane, "amplitude": a, "phi": phi}
     places = [a * np.cos(phi), -a * system.aspect * np.sin(phi), 0 * a]

@@ -112,13 +112,13 @@ def _rounded(bound: float, side: int) -> str:
 
 def response(case: Case, result: CurveResult) -> Iterator[Block]:
     """The means and the impacts with their errors, and where the densities are largest."""
-    if result.response is None:
+    found, about = result.response, case.problem.linear.response
+    if found is None:
         return
-    about = case.problem.linear.response
-    rows = [row_of(about.numbers[name], each, case.units.time) for name, each in result.response.numbers.items()]
+    rows = [row_of(about.numbers[name], each, case.units.time) for name, each in found.numbers.items()]
     yield filled(f"Stationary response{result.curve.of}", NUMBER_COLUMNS, rows)
-    if result.response.balance is not None:
-        yield Sentence(shape(result.response, about))
+    if found.balance is not None:
+        yield Sentence(shape(found, about))
 
 
 def shape(found: CurveResponse, about: ResponseQuantities) -> str:

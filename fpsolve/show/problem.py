@@ -14,9 +14,9 @@ from fpsolve.page.page import Block, Column, Sentence, filled
 
 def show(case: Case) -> Iterator[Block]:
     """The noises, what the equation leaves out, and the parameters."""
-    curve = next(case.curves(0, 1))
-    yield from map(Sentence, noise_sentences(curve.problem))
-    if case.problem.linear.cubic:
+    problem = next(case.curves(0, 1)).problem
+    yield from map(Sentence, noise_sentences(problem))
+    if problem.linear.cubic:
         yield Sentence(
             "Terms of degree 3 act on the stationary response only: Λ(p), λ and δ_p are of the linear system."
         )
@@ -24,7 +24,7 @@ def show(case: Case) -> Iterator[Block]:
         keys = ", ".join(case.vary.keys)
         yield Sentence(f"{case.planned} curves, over {keys}; the equation above is that of the first one.")
     rows = []
-    for key, each in curve.problem.parameters.items():
+    for key, each in problem.parameters.items():
         quantity = each.quantity.timed(case.units.time)
         values = dict.fromkeys(case.vary.values(key)) if key in case.vary.keys else [each.value]
         shown = ", ".join(map(written, values)) if len(values) <= EACH else f"{len(values)} values"

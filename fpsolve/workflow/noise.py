@@ -46,7 +46,7 @@ from fpsolve.measured.stability import STEPS
 from fpsolve.measured.weak import Where
 from fpsolve.messages import Code, Message
 from fpsolve.model import Noise, Problem
-from fpsolve.model.plane import STEADY, LinearMotion, System
+from fpsolve.model.plane import STEADY, System
 from fpsolve.page.page import Block, Column, Grid, Sentence
 from fpsolve.results.text import likely, sampled
 from fpsolve.show.notes import note_on
@@ -135,9 +135,9 @@ class NoiseOutcome:
     failure: Message | None = None
 
 
-def natural_frequencies(system: LinearMotion) -> tuple[float, ...]:
+def natural_frequencies(system: System) -> tuple[float, ...]:
     """The moduli of the complex pairs of eigenvalues without noise, increasing: ω of an oscillator, in rad/time."""
-    values = np.linalg.eigvals(system.by_noise()[STEADY])
+    values = np.linalg.eigvals(system.linear().by_noise()[STEADY])
     return tuple(sorted(float(abs(each)) for each in values if each.imag > STILL * abs(each)))
 
 
@@ -226,7 +226,7 @@ def _factor(wanted: Wanted) -> float:
     if system is None:
         return of_relative_stiffness(wanted.modes.omega[0]) if wanted.noise_in == "stiffness" else 1.0
     if system.noise_unit == "1/time²":
-        return of_relative_stiffness(natural_frequencies(system.linear())[0])
+        return of_relative_stiffness(natural_frequencies(system)[0])
     return 1 / system.linear().epsilon if system.noise_unit == "1/time" else 1.0
 
 

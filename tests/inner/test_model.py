@@ -92,8 +92,8 @@ def test_coefficients_that_are_affine_are_seen():
 
 def test_polar_form_and_frequency_of_a_system_are_those_of_its_motion(rng):
     """A small step of ẋ = A x moves φ by h dt and ln a by q dt."""
-    free, load = [[0.0, 1.3], [-1.3, 0.0]], rng.normal(size=(2, 2))
-    system = PlaneSystem([CoefficientMatrix(0, free), CoefficientMatrix(1, load, itself)], epsilon=0.7)
+    driven = CoefficientMatrix(1, rng.normal(size=(2, 2)), itself)
+    system = PlaneSystem([CoefficientMatrix(0, [[0.0, 1.3], [-1.3, 0.0]]), driven], epsilon=0.7)
     xi, phi, dt = 0.9, 2.1, 1e-6
     x = np.array([math.cos(phi), -math.sin(phi)])
     moved = x + dt * matrix_at(system, xi) @ x
