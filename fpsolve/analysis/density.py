@@ -17,7 +17,6 @@ from fpsolve.exponent.density import GRIDS, MOST_NEGATIVE, DirectionGrid, Grid, 
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.fem.phase import vertices_at
 from fpsolve.messages import Code, Message, Remedy
-from fpsolve.model.plane import growth_rate
 
 if TYPE_CHECKING:
     import xarray
@@ -196,7 +195,7 @@ def furstenberg_khasminskii(pair: PrincipalPair) -> float:
         raise ValueError("the formula is for one noise that is not white, but there are several; use lyapunov_exponent")
     framed = pair.generator.framed
     system, phi, at = framed.motion, axis.points[:, None], _of_zero(pair).space.xi.samples()
-    rate = growth_rate(system, at.xi)(phi)
+    rate = system.growth_rate(at.xi)(phi)
     for each in system.diffusions:  # ½ h q′, by which q ∘ dW has a mean
         rate = rate + 0.5 * system.epsilon ** (2 * each.order) * each.h(phi) * each.q.slope(phi)
     for struck in system.impulses:

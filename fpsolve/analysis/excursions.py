@@ -45,7 +45,7 @@ from fpsolve.exponent.solver import ExponentSolver, solver_of
 from fpsolve.fem.axis import along
 from fpsolve.fem.element import middles
 from fpsolve.messages import Code, Message, Remedy
-from fpsolve.model.plane import Harmonics, growth_rate
+from fpsolve.model.plane import Harmonics
 from fpsolve.model.problem import Problem
 from fpsolve.model.quantity import LEAST_PROBABLE, LEVEL, MOST_PROBABLE, UPCROSSINGS
 
@@ -290,7 +290,7 @@ def _growth(pair: PrincipalPair, psi: FloatArray, xi: Sequence[FloatArray]) -> t
     """q over φ and values of the noises, and ρ^p as a factor of such tables."""
     problem, columns = pair.generator.problem, (-1, *[1] * len(xi))
     phi, stretch = own_phases(pair, psi)
-    rate: Harmonics = growth_rate(problem.noise.motion(problem.linear), problem.valued.combined(xi))
+    rate: Harmonics = problem.noise.motion(problem.linear).growth_rate(problem.valued.combined(xi))
     return rate(phi.reshape(columns)), stretch.reshape(columns)
 
 

@@ -30,7 +30,6 @@ from fpsolve.fem.factors import Factors, one_thread
 from fpsolve.fem.generator import Generator, Pencil
 from fpsolve.fem.space import Space
 from fpsolve.messages import Code, Message, Remedy
-from fpsolve.model.plane import phase_speed
 from fpsolve.model.problem import Problem
 from fpsolve.theory.frozen import frozen_noise
 
@@ -237,7 +236,7 @@ def _has_other_positive(generator: Generator, p: float) -> bool:
     if (frozen := frozen_noise(problem)) is None:
         values = [each.reached for each in problem.valued.parts.values()]
         every = [each[:: max(each.size // 100, 1)] for each in values]  # a state of a chain, and any other tenth value
-        speed = phase_speed(generator.framed.motion, problem.valued.combined(every))
+        speed = generator.framed.motion.phase_speed(problem.valued.combined(every))
         return bool(np.any(np.abs(speed.mean) <= speed.amplitude))
     lines = generator.chosen.xi.lines
     return frozen.rests(p, lines[0], lines[-1]) if lines.size else frozen.rests(p)

@@ -21,7 +21,7 @@ from fpsolve.fem.noise_axes import CellAxis, NoiseAxis
 from fpsolve.fem.phase import PhaseAxis
 from fpsolve.fem.space import Space, first_axis
 from fpsolve.model.coordinates import framed
-from fpsolve.model.plane import LinearMotion, Xi, phase_speed
+from fpsolve.model.plane import LinearMotion, Xi
 from fpsolve.model.problem import Problem
 from fpsolve.theory.frozen import frozen_noise, steady_places, swing
 
@@ -143,7 +143,7 @@ def _phase(system: LinearMotion, xi: Xi, digits: float, is_smooth: bool = False)
     There are more where the speed of the phase changes much for some of the ξ; but one, of a higher degree, where
     several numbers move it, which leave T smoother, and each function of φ is a thousand unknowns.
     """
-    speed = phase_speed(system, xi)
+    speed = system.phase_speed(xi)
     widest = float(np.max(speed.amplitude / np.maximum(np.abs(speed.mean), 1e-300)))
     cells = 1 if is_smooth else 8 if widest > 1 else 4 if widest > 0.5 else 2
     rays = [jump.phase for jump in system.jumps] or [math.pi / 2]
@@ -205,5 +205,5 @@ def has_cones(problem: Problem) -> bool:
     if not noise.is_bounded or len(noise.parts) > 1 or noise.is_white:
         return False
     phi = np.linspace(0, math.pi, ROUND, endpoint=False)
-    turns = phase_speed(framed(problem).motion, noise.reached)(phi[:, None])
+    turns = framed(problem).motion.phase_speed(noise.reached)(phi[:, None])
     return bool(np.any(np.all(turns > 0, axis=1)) and np.any(np.all(turns < 0, axis=1)))

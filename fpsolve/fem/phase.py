@@ -35,8 +35,6 @@ from fpsolve.model.plane import (
     LinearMotion,
     changed_exponential,
     is_driven,
-    matrix_at,
-    phase_speed,
     turning,
 )
 from fpsolve.model.problem import ParameterDerivative
@@ -312,7 +310,7 @@ class PlaneTerms(Terms):
         # where θ = |v| for every ξ, and the sign of v where that is the same for all ξ, otherwise 0
         is_pointwise, direction = np.full(self._vertices.size, False), np.zeros(self._vertices.size)
         if all(axis.is_local for axis in noises):
-            rates = matrix_at(system, framed.problem.valued.combined([axis.xi for axis in noises]))
+            rates = system.matrix_at(framed.problem.valued.combined([axis.xi for axis in noises]))
             speed = turning(rates.reshape(-1, 1, 2, 2))(self._vertices)
             is_pointwise, direction = ~is_pointwise, 1.0 * np.all(speed > 0, axis=0) - np.all(speed < 0, axis=0)
         self._walls = list[Wall]()
@@ -397,7 +395,7 @@ class PlaneTerms(Terms):
                 held = dict(zip(others, values, strict=True))
 
                 def of_first(xi: Any, phi: float = phi, held: dict[str, float] = held) -> Any:
-                    return np.abs(phase_speed(self.system, {**held, first: xi} if held else xi)(phi))
+                    return np.abs(self.system.phase_speed({**held, first: xi} if held else xi)(phi))
 
                 yield Term(0, OfMoment(0), phase, (of_first, *map(At, values)), text)
 

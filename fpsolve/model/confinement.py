@@ -18,7 +18,7 @@ from scipy.optimize import brentq
 from fpsolve.arrays import ROUNDED, FloatArray
 from fpsolve.messages import Code, Message
 from fpsolve.model.coordinates import Frame
-from fpsolve.model.plane import CoefficientMatrix, LinearMotion, matrix_at
+from fpsolve.model.plane import CoefficientMatrix, LinearMotion
 from fpsolve.model.problem import Problem
 
 LEVEL = 1e6
@@ -61,7 +61,7 @@ def mean_terms(problem: Problem) -> tuple[FloatArray, FloatArray]:
     """The linear terms with the noise at its mean and the cubic terms, shapes (2, 2) and (2, 4), where ‖y‖ is a."""
     system, frame = problem.linear, amplitude_frame(problem.linear)
     assert system.cubic is not None
-    linear = frame.term(CoefficientMatrix(0, matrix_at(system, problem.valued.mean)))
+    linear = frame.term(CoefficientMatrix(0, system.matrix_at(problem.valued.mean)))
     return np.array(linear.matrix), np.array(frame.cubic(system.cubic).matrix)
 
 

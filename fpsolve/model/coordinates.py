@@ -27,10 +27,8 @@ from fpsolve.model.plane import (
     Impulse,
     LinearMotion,
     Matrix,
-    angular_frequency,
     is_driven,
     kept_phases,
-    phase_speed,
     rotating_coordinates,
     rows_of,
 )
@@ -150,12 +148,12 @@ class Framed:
     @cached_property
     def unit_rate(self) -> float:
         """Its own unit of rates: ω or the size of the order 0, or of all where there is none."""
-        return angular_frequency(self.motion) or self.rate_bound or 1.0
+        return self.motion.angular_frequency() or self.rate_bound or 1.0
 
     def wall_speeds(self, motion: LinearMotion) -> list[float]:
         """dφ/dt of a motion at the ray of each jump, which no noise changes."""
         extremes = self.problem.valued.extremes
-        return [float(np.ravel(phase_speed(motion, extremes)(jump.phase))[0]) for jump in self.motion.jumps]
+        return [float(np.ravel(motion.phase_speed(extremes)(jump.phase))[0]) for jump in self.motion.jumps]
 
     @cached_property
     def resting_phases(self) -> tuple[float, ...]:

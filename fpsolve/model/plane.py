@@ -571,6 +571,14 @@ class System(Parametrised):
         """∂/∂θ of the sum of the terms, of ln R of every jump, and of ν of the clock."""
         raise NotImplementedError(f"{type(self).__name__} states no derivative by {name}")
 
+    def by_epsilon(self) -> tuple[CoefficientMatrix, ...]:
+        """∂/∂ε of Σ ε^n g(ξ) A x, as terms."""
+        return tuple(
+            CoefficientMatrix(term.order - 1, term.order * np.array(term.matrix), term.g, term.noise)
+            for term in self.terms
+            if term.order
+        )
+
     @property
     def noise_sections(self) -> Sequence[str]:
         return ("noise",)
@@ -632,7 +640,8 @@ class LinearMotion(System):
     @cached_property
     def dimension(self) -> int:
         """n, that of the state with its `pasts`."""
-        return max((len(each.matrix) for each in (*self.terms, *self.diffusions, *self.impulses)), default=2)
+        every: Sequence[CoefficientMatrix | Impulse] = (*self.terms, *self.diffusions, *self.impulses)
+        return max((len(each.matrix) for each in every), default=2)
 
     @property
     def states(self) -> Sequence[str]:
@@ -650,6 +659,67 @@ class LinearMotion(System):
                 if c:
                     found[driver] = found.get(driver, 0.0) + c * self.epsilon**term.order * np.array(term.matrix)
         return found
+
+    def split_by_noise(
+        self, terms: Sequence[CoefficientMatrix], name: str | None
+    ) -> tuple[list[CoefficientMatrix], FloatArray]:
+        """Terms without what a noise that has no value multiplies, and the sum of that, with the powers of ε.
+
+        Args:
+            terms: its own, or derivatives of these.
+            name: what they call the noise; None for any.
+
+        Raises:
+            ValueError: a coefficient is no a + bξ.
+        """
+        steady, driven = [], np.zeros((self.dimension, self.dimension))
+        for term in terms:
+            if is_driven(term.g) and name not in (None, term.noise):
+                steady.append(term)
+                continue
+            line = affine(term.g)
+            if line is None:
+                raise ValueError(
+                    f"white noise has no value, so that g = {written_coefficient(term.g).strip()} of it has no "
+                    "meaning; g must be a + b*xi"
+                )
+            offset, slope = line
+            if offset:
+                steady.append(CoefficientMatrix(term.order, offset * np.array(term.matrix)))
+            driven += slope * self.epsilon**term.order * np.array(term.matrix)
+        return steady, driven
+
+    def matrix_at(self, xi: Xi, orders: slice = slice(None)) -> FloatArray:
+        """A(ξ) = Σ ε^k g(ξ) A over the terms of some orders, shape (*ξ.shape, n, n).
+
+        With several noises ξ is a mapping from their names to arrays, and its shape that of these broadcast together.
+        """
+        named, others = (xi, 0.0) if isinstance(xi, Mapping) else ({}, xi)
+        shape = np.broadcast_shapes(np.shape(others), *map(np.shape, named.values()))
+        total = np.zeros((*shape, self.dimension, self.dimension))
+        wanted = range(1 + max((term.order for term in self.terms), default=0))[orders]
+        for term in self.terms:
+            if term.order in wanted:
+                values = np.asarray(term.g(np.asarray(named.get(term.noise, others), dtype=float)))
+                total += self.epsilon**term.order * values[..., None, None] * np.array(term.matrix)
+        return total
+
+    def phase_speed(self, xi: Xi) -> Harmonics:
+        """dφ/dt at ξ as a function of φ: in Eq. (17) ω + ε h₁ξ + ε² h₂."""
+        return turning(self.matrix_at(xi))
+
+    def growth_rate(self, xi: Xi) -> Harmonics:
+        """d ln a/dt at ξ as a function of φ: in Eq. (17) ε q₁ξ + ε² q₂ between the impacts."""
+        return stretching(self.matrix_at(xi))
+
+    def angular_frequency(self) -> float:
+        """The system's own unit of rates: ω where its order 0 rotates, else the norm of the order 0.
+
+        ω is the imaginary part of the eigenvalues of the matrix of order 0, beyond the plane the largest.
+        """
+        a = self.matrix_at(0.0, slice(0, 1))
+        square = float(squared_frequency(a)) if len(a) == 2 else float(np.max(np.linalg.eigvals(a).imag)) ** 2
+        return math.sqrt(square) if square > 0 else float(np.linalg.norm(a))
 
     @property
     def driven_by(self) -> Sequence[str]:
@@ -685,39 +755,8 @@ class LinearMotion(System):
 
         Where the matrix A of its terms at ξ = 0 has A₁₂A₂₁ < 0, s² = −A₂₁/A₁₂, ω² for ẋ = v, v̇ = −ω²x + …, and else 1.
         """
-        (_, b), (c, _) = matrix_at(self, 0.0).tolist()
+        (_, b), (c, _) = self.matrix_at(0.0).tolist()
         return self.second_unit * (math.sqrt(-c / b) if b * c < 0 else 1.0)
-
-
-def split_by_noise(
-    system: LinearMotion, terms: Sequence[CoefficientMatrix], name: str | None
-) -> tuple[list[CoefficientMatrix], FloatArray]:
-    """Terms without what a noise that has no value multiplies, and the sum of that, with the powers of ε.
-
-    Args:
-        system: whose terms they are, or are derivatives of.
-        terms: these.
-        name: what they call the noise; None for any.
-
-    Raises:
-        ValueError: a coefficient is no a + bξ.
-    """
-    steady, driven = [], np.zeros((system.dimension, system.dimension))
-    for term in terms:
-        if is_driven(term.g) and name not in (None, term.noise):
-            steady.append(term)
-            continue
-        line = affine(term.g)
-        if line is None:
-            raise ValueError(
-                f"white noise has no value, so that g = {written_coefficient(term.g).strip()} of it has no meaning; "
-                "g must be a + b*xi"
-            )
-        offset, slope = line
-        if offset:
-            steady.append(CoefficientMatrix(term.order, offset * np.array(term.matrix)))
-        driven += slope * system.epsilon**term.order * np.array(term.matrix)
-    return steady, driven
 
 
 def kept_phases(matrices: Sequence[FloatArray]) -> tuple[float, ...]:
@@ -766,41 +805,6 @@ def common_unit(values: Sequence[float], name: str) -> tuple[float, int]:
     return float(numbers[-1]) / count, count
 
 
-def by_epsilon(system: System) -> tuple[CoefficientMatrix, ...]:
-    """∂/∂ε of Σ ε^n g(ξ) A x, as terms."""
-    return tuple(
-        CoefficientMatrix(term.order - 1, term.order * np.array(term.matrix), term.g, term.noise)
-        for term in system.terms
-        if term.order
-    )
-
-
-def matrix_at(system: LinearMotion, xi: Xi, orders: slice = slice(None)) -> FloatArray:
-    """A(ξ) = Σ ε^k g(ξ) A over the terms of some orders, shape (*ξ.shape, n, n).
-
-    With several noises ξ is a mapping from their names to arrays, and its shape that of these broadcast together.
-    """
-    named, others = (xi, 0.0) if isinstance(xi, Mapping) else ({}, xi)
-    shape = np.broadcast_shapes(np.shape(others), *map(np.shape, named.values()))
-    total = np.zeros((*shape, system.dimension, system.dimension))
-    wanted = range(1 + max((term.order for term in system.terms), default=0))[orders]
-    for term in system.terms:
-        if term.order in wanted:
-            values = np.asarray(term.g(np.asarray(named.get(term.noise, others), dtype=float)))
-            total += system.epsilon**term.order * values[..., None, None] * np.array(term.matrix)
-    return total
-
-
-def phase_speed(system: LinearMotion, xi: Xi) -> Harmonics:
-    """dφ/dt at ξ as a function of φ: in Eq. (17) ω + ε h₁ξ + ε² h₂."""
-    return turning(matrix_at(system, xi))
-
-
-def growth_rate(system: LinearMotion, xi: Xi) -> Harmonics:
-    """d ln a/dt at ξ as a function of φ: in Eq. (17) ε q₁ξ + ε² q₂ between the impacts."""
-    return stretching(matrix_at(system, xi))
-
-
 def squared_frequency(a: FloatArray) -> FloatArray:
     """det A − (tr A/2)² for matrices of shape (…, 2, 2): ω² where the eigenvalues are complex, negative where real."""
     half = 0.5 * (a[..., 0, 0] + a[..., 1, 1])
@@ -815,13 +819,3 @@ def rotating_coordinates(a: FloatArray) -> FloatArray | None:
     if a[0, 1] == -a[1, 0] and a[0, 0] == a[1, 1]:
         return np.eye(2)
     return np.array([[a[0, 1], 0.0], [half - a[0, 0], math.sqrt(square)]])
-
-
-def angular_frequency(system: LinearMotion) -> float:
-    """The system's own unit of rates: ω where its order 0 rotates, else the norm of the order 0.
-
-    ω is the imaginary part of the eigenvalues of the matrix of order 0, beyond the plane the largest.
-    """
-    a = matrix_at(system, 0.0, slice(0, 1))
-    square = float(squared_frequency(a)) if len(a) == 2 else float(np.max(np.linalg.eigvals(a).imag)) ** 2
-    return math.sqrt(square) if square > 0 else float(np.linalg.norm(a))

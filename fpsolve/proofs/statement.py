@@ -40,7 +40,6 @@ from fpsolve.model.plane import (
     STEADY,
     CoefficientMatrix,
     LinearMotion,
-    matrix_at,
     rotating_coordinates,
     written_coefficient,
 )
@@ -287,7 +286,7 @@ def ray_of(phase: float) -> list[float]:
 
 def _rotating(system: LinearMotion) -> list[list[float]]:
     """P for which P⁻¹A₀P is growth and a rotation, or the identity where the order 0 does not rotate."""
-    found = rotating_coordinates(matrix_at(system, 0.0, slice(0, 1)))
+    found = rotating_coordinates(system.matrix_at(0.0, slice(0, 1)))
     return (np.eye(2) if found is None else found).tolist()
 
 

@@ -16,7 +16,7 @@ from fpsolve.drawing import canvas_of, draw_line, draw_plane, finish
 from fpsolve.errors import FpsolveError
 from fpsolve.messages import Code, Message
 from fpsolve.model.confinement import amplitude_frame, no_response
-from fpsolve.model.plane import Jump, LinearMotion, angular_frequency, matrix_at
+from fpsolve.model.plane import Jump, LinearMotion
 from fpsolve.model.problem import Problem
 from fpsolve.model.quantity import IMPACT_RATE, OSCILLATOR_RESPONSE, ResponseQuantities
 from fpsolve.simulation.batches import STEP_SECONDS, advance_all, standard_error
@@ -184,7 +184,7 @@ def simulated_response(
         raise FpsolveError(reason)
     [load] = coefficients(system, noise).loads
     motion, first = motion_of(system, noise.step(step), load.rows)
-    rate = angular_frequency(system) or float(np.linalg.norm(matrix_at(system, 0.0))) or 1.0
+    rate = system.angular_frequency() or float(np.linalg.norm(system.matrix_at(0.0))) or 1.0
     steps = max(1, round(math.pi / (rate * step * _LOOKS)))
     between = steps * step
     memory = max(1 / exponent, 2 * variance_rate / exponent**2)
@@ -237,7 +237,7 @@ def no_simulation(problem: Problem) -> Message | None:
 
 def _is_wall(system: LinearMotion, jump: Jump) -> bool:
     """Whether a variable is 0 where a jump is, whose rate there grows with the other one."""
-    matrix = matrix_at(system, 0.0)
+    matrix = system.matrix_at(0.0)
     at = np.array([math.cos(jump.phase), math.sin(jump.phase)])
     k = int(np.argmin(np.abs(at)))
     return abs(at[k]) < 1e-12 and matrix[k, 1 - k] > 0

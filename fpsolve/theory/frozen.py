@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from fpsolve.arrays import FloatArray, IntArray
 from fpsolve.model.coordinates import framed
-from fpsolve.model.plane import matrix_at, squared_frequency
+from fpsolve.model.plane import squared_frequency
 from fpsolve.model.problem import Problem
 
 SAMPLES = 601
@@ -34,7 +34,7 @@ def eigenvalues_at(problem: Problem, xi: ArrayLike) -> tuple[FloatArray, FloatAr
     Where A(ξ) has real eigenvalues they are the rates; where the phase turns, their common real part and the jumps,
     each once in half a turn.
     """
-    a = matrix_at(framed(problem).motion, xi)
+    a = framed(problem).motion.matrix_at(xi)
     half, square = 0.5 * (a[..., 0, 0] + a[..., 1, 1]), squared_frequency(a)
     root, turns = np.sqrt(np.abs(square)), square > 0
     turning = half + root / math.pi * sum(jump.log_factor for jump in problem.linear.jumps)

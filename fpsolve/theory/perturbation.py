@@ -30,7 +30,6 @@ from fpsolve.model.coordinates import framed
 from fpsolve.model.plane import (
     Harmonics,
     affine,
-    matrix_at,
     rotating_coordinates,
     squared_frequency,
     stretching,
@@ -141,7 +140,7 @@ def _of_random_noise(problem: Problem) -> SecondOrder:
     if system.impulses:
         raise NoPerturbationTheory("perturbation theory is for weak noise, not for impulses")
     driven = {name: np.zeros((2, 2)) for name, noise in noises.items() if not (noise.is_white and len(noises) > 1)}
-    steady = matrix_at(system, 0.0, slice(0, 1))
+    steady = system.matrix_at(0.0, slice(0, 1))
     for term in system.terms if has_mean(problem) else ():
         mean = problem.named_noise(term.noise).mean
         steady += mean * (affine(term.g) or (0.0, 0.0))[1] * system.epsilon**term.order * np.array(term.matrix)
@@ -244,11 +243,11 @@ def first_order_eigenfunction(problem: Problem, p: float, phi: ArrayLike, xi: Ar
         raise NoPerturbationTheory("T₁ is a function of one noise, but there are several")
     if not problem.noise.is_markov:
         raise NoPerturbationTheory(f"T₁ is for noise that is a Markov process by itself, but not {problem.noise.kind}")
-    frame, omega = _rotating_frame(matrix_at(problem.linear, 0.0, slice(0, 1)))
+    frame, omega = _rotating_frame(problem.linear.matrix_at(0.0, slice(0, 1)))
     if not np.array_equal(frame, np.eye(2)):
         raise NoPerturbationTheory("T₁ is for a uniform rotation; choose coordinates in which the order 0 is one")
-    q = stretching(matrix_at(problem.linear, 1.0, slice(1, 2)))
-    omega = math.copysign(omega, turning(matrix_at(problem.linear, 0.0, slice(0, 1))).mean)
+    q = stretching(problem.linear.matrix_at(1.0, slice(1, 2)))
+    omega = math.copysign(omega, turning(problem.linear.matrix_at(0.0, slice(0, 1))).mean)
     alpha, xi = 1 / problem.noise.correlation_time, np.asarray(xi, dtype=float)
     wave = (q.cosine - 1j * q.sine) * np.exp(2j * np.asarray(phi, dtype=float)) / (alpha - 2j * omega)
     return p / problem.linear.epsilon * xi * (q.mean / alpha + wave.real)

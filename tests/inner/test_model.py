@@ -13,7 +13,7 @@ from fpsolve.model import Bounded, CoefficientMatrix, Filter, SineWiener
 from fpsolve.model.noise import NoiseDerivative
 from fpsolve.model.noises.markov_chain import Chain
 from fpsolve.model.parameters import parameter
-from fpsolve.model.plane import affine, angular_frequency, coefficient, growth_rate, matrix_at, phase_speed
+from fpsolve.model.plane import affine, coefficient
 from fpsolve.simulation.motions import draw
 from tests.kit import itself, rates
 from tests.numbers.second import LOAD, slope_of, spring
@@ -96,14 +96,13 @@ def test_polar_form_and_frequency_of_a_system_are_those_of_its_motion(rng):
     system = PlaneSystem([CoefficientMatrix(0, [[0.0, 1.3], [-1.3, 0.0]]), driven], epsilon=0.7)
     xi, phi, dt = 0.9, 2.1, 1e-6
     x = np.array([math.cos(phi), -math.sin(phi)])
-    moved = x + dt * matrix_at(system, xi) @ x
-    assert (math.atan2(-moved[1], moved[0]) - phi) / dt == pytest.approx(float(phase_speed(system, xi)(phi)), rel=1e-5)
-    assert math.log(np.linalg.norm(moved)) / dt == pytest.approx(float(growth_rate(system, xi)(phi)), rel=1e-5)
+    moved = x + dt * system.matrix_at(xi) @ x
+    assert (math.atan2(-moved[1], moved[0]) - phi) / dt == pytest.approx(float(system.phase_speed(xi)(phi)), rel=1e-5)
+    assert math.log(np.linalg.norm(moved)) / dt == pytest.approx(float(system.growth_rate(xi)(phi)), rel=1e-5)
     for order, matrix, expected in (
         (0, ((0, 2), (-0.5, 0)), 1.0),
         (0, ((0, 3), (0, 0)), 3.0),
         (1, ((0, 3), (0, 0)), 0.0),
     ):
-        assert angular_frequency(PlaneSystem([CoefficientMatrix(order, matrix)], epsilon=0.5)) == pytest.approx(
-            expected
-        )
+        system = PlaneSystem([CoefficientMatrix(order, matrix)], epsilon=0.5)
+        assert system.angular_frequency() == pytest.approx(expected)

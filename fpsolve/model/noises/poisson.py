@@ -18,7 +18,6 @@ from fpsolve.model.plane import (
     Impulse,
     LinearMotion,
     ParameterDerivative,
-    split_by_noise,
 )
 
 
@@ -107,7 +106,7 @@ class Poisson(Memoryless):
         Raises:
             ValueError: a coefficient is no a + bξ, or impulses multiply the state by more than numbers hold.
         """
-        terms, driven = split_by_noise(system, system.terms, name)
+        terms, driven = system.split_by_noise(system.terms, name)
         if float(np.max(np.abs(np.linalg.eigvals(driven)))) * max(map(abs, self.sizes)) > LARGEST:
             raise ValueError(f"an impulse multiplies the state by up to e^{LARGEST:g} or more; use smaller sizes")
         impulses = [*system.impulses]
@@ -119,7 +118,7 @@ class Poisson(Memoryless):
     def changed_motion(
         self, system: LinearMotion, changed: ParameterDerivative, by: str = "", name: str | None = None
     ) -> ParameterDerivative:
-        drift, change = split_by_noise(system, changed.terms, name)
+        drift, change = system.split_by_noise(changed.terms, name)
         by_rate, known = 1.0 / self.rate if by == "rate" else 0.0, self.motion(system, name).impulses
         impulses = [  # none of what is not driven
             Impulse(by_rate * each.rate, size * change) for each, size in zip(known, self.sizes, strict=False)

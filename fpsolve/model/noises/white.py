@@ -21,7 +21,6 @@ from fpsolve.model.plane import (
     LinearMotion,
     ParameterDerivative,
     is_driven,
-    split_by_noise,
 )
 
 
@@ -108,7 +107,7 @@ class White(Memoryless):
         Raises:
             ValueError: a coefficient is no a + bξ.
         """
-        drift, driven = split_by_noise(system, system.terms, name)
+        drift, driven = system.split_by_noise(system.terms, name)
         orders = [term.order for term in system.terms if is_driven(term.g) and name in (None, term.noise)]
         diffusions = [_term(system, self.s * driven, min(orders))] if driven.any() else []
         if self.interpretation == Interpretation.ITO and diffusions:
@@ -119,8 +118,8 @@ class White(Memoryless):
     def changed_motion(
         self, system: LinearMotion, changed: ParameterDerivative, by: str = "", name: str | None = None
     ) -> ParameterDerivative:
-        _, driven = split_by_noise(system, system.terms, name)
-        drift, change = split_by_noise(system, changed.terms, name)
+        _, driven = system.split_by_noise(system.terms, name)
+        drift, change = system.split_by_noise(changed.terms, name)
         by_s = 1.0 if by == "s" else 0.0
         if self.interpretation == Interpretation.ITO:
             square = change @ driven + driven @ change

@@ -51,7 +51,6 @@ from fpsolve.model.plane import (
     Stop,
     System,
     as_plane,
-    by_epsilon,
     common_unit,
 )
 from fpsolve.model.quantity import AMPLITUDE, JOINT_DENSITY, Quantity
@@ -590,7 +589,7 @@ class EquationSystem(System):
         for name, _ in self.named:
             with suppress(TableError):
                 read = self._read_by(name)
-                terms = by_epsilon(self) if name == EPSILON else self._terms_of(read.rates, 1)
+                terms = self.by_epsilon() if name == EPSILON else self._terms_of(read.rates, 1)
                 jumps = (self._log_factor(name)[1],) if self.walls else ()
                 speed, slope = next(iter(read.speeds.values()), (1.0, 0.0))
                 clock = NoiseDerivative(turning=slope / speed * self.clock.nu) if slope and self.clock else None

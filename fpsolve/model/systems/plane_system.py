@@ -18,7 +18,6 @@ from fpsolve.model.plane import (
     LinearMotion,
     ParameterDerivative,
     as_plane,
-    by_epsilon,
 )
 from fpsolve.model.systems.equations import EquationSystem, walls_of
 
@@ -121,7 +120,7 @@ class PlaneSystem(LinearMotion):
         return replace(self, epsilon=cast("float", values.get("epsilon", self.epsilon)))
 
     def derivative(self, name: str) -> ParameterDerivative:
-        return ParameterDerivative(terms=by_epsilon(self))
+        return ParameterDerivative(terms=self.by_epsilon())
 
 
 @dataclass(frozen=True)

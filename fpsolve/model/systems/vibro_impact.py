@@ -21,7 +21,6 @@ from fpsolve.model.plane import (
     LinearMotion,
     ParameterDerivative,
     System,
-    by_epsilon,
 )
 from fpsolve.model.quantity import OSCILLATOR_RESPONSE
 
@@ -147,7 +146,7 @@ class VibroImpactOscillator(System):
             case "restitution":
                 return ParameterDerivative(jumps=(self.epsilon**2 * bounce,))
         slope = -2 * self.epsilon * (1 - self.restitution) * bounce
-        return ParameterDerivative(terms=by_epsilon(self), jumps=(slope,))
+        return ParameterDerivative(terms=self.by_epsilon(), jumps=(slope,))
 
     def restitution_at(self, log_factor: float) -> tuple[str, float, float]:
         """r, the value for which this law, with this ε, has a given ln R, and dr/d ln R; it may be out of its range."""
