@@ -45,11 +45,6 @@ class Outcome:
     sweep: Sweep
     simulations: Simulations
 
-    @property
-    def failures(self) -> tuple[Message, ...]:
-        """Why some p or indices of some curves are missing."""
-        return tuple(failure.reason for result in self.sweep.results for failure in result.failures)
-
 
 def run(
     case: Case | str | Path,
@@ -89,11 +84,10 @@ def run(
             progress()
 
     watch = Watch(bar=lambda phase: nullcontext(advance if phase.unit else ignore))
-    outcome = run_case(read, out, pool=pool, is_fresh=fresh, watch=watch)
-    results = tuple(outcome.sweep.results)
-    if outcome.failures:
-        raise NotConverged(Message(Code.SEVERAL, reasons=outcome.failures), results)
-    return results
+    solved = tuple(run_case(read, out, pool=pool, is_fresh=fresh, watch=watch).sweep.results)
+    if reasons := tuple(failure.reason for each in solved for failure in each.failures):
+        raise NotConverged(Message(Code.SEVERAL, reasons=reasons), solved)
+    return solved
 
 
 def run_case(
