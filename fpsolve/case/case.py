@@ -241,13 +241,6 @@ class Case(Section):
         """What a parameter is, in the time unit of [units]."""
         return self.parameters[key].quantity.timed(self.units.time)
 
-    def model_copy(self, **changes: Any) -> Case:
-        """A copy with other values, without what follows from the old ones."""
-        made = super().model_copy(**changes)
-        for name in made.__dict__.keys() - type(made).model_fields.keys():
-            del made.__dict__[name]
-        return made
-
     @property
     def path(self) -> Path:
         return self._path
@@ -389,7 +382,7 @@ class Case(Section):
         """The headline of its figure, which may have a title of its own."""
         return self._with_changes(self.figure.title or self.title)
 
-    @property
+    @cached_property
     def theory_reduces_noise(self) -> bool:
         """Whether perturbation theory takes the reduction in place of the noise of some curve."""
         texts = [key for key in self.vary.keys if self.vary.is_text(key)]
