@@ -21,6 +21,7 @@ from fpsolve.errors import FpsolveError
 from fpsolve.exponent.quantities import MOMENT
 from fpsolve.files import atomic
 from fpsolve.model.quantity import STATUS, P
+from fpsolve.output.known import Results
 from fpsolve.results.curve import Status
 from fpsolve.results.table import Table
 
@@ -49,20 +50,21 @@ class Variable:
     attributes: Mapping[str, Any]
 
 
-def write_dataset(case: Case, table: Table, folder: Path, facts: Mapping[str, Any]) -> None:
-    """results.nc, for xarray and whatever reads netCDF-4; what is missing or failed is NaN.
+def write_dataset(case: Case, results: Results, path: Path, facts: Mapping[str, Any]) -> None:
+    """Write the numbers of all sets, for xarray and whatever reads netCDF-4; what is missing or failed is NaN.
 
     There is a dimension for each varied key, or `set` for those of a list, and p.
 
     xarray would write the same, but takes with pandas and Dask as long to import as small cases take in all.
 
     Args:
-        table: the numbers of all curves.
+        results: of all curves.
+        path: the file.
         facts: on the run, see `facts_of`; they become attributes, tables as JSON.
     """
     import h5netcdf
 
-    variables, coordinates = _arrays(case, table)
+    variables, coordinates = _arrays(case, results.table)
     beside = " ".join(name for name, each in coordinates.items() if each.dims != (name,))
     content = io.BytesIO()  # HDF5 does not survive a full disk
     with h5netcdf.File(content, "w") as file:
@@ -78,7 +80,7 @@ def write_dataset(case: Case, table: Table, folder: Path, facts: Mapping[str, An
                 made.attrs["coordinates"] = beside
         is_whole = not np.any(variables[STATUS.name].values == Status.MISSING)
         file.attrs.update({**_origin(case, facts), "complete": int(is_whole)})
-    with atomic(folder / RESULTS) as draft:
+    with atomic(path) as draft:
         draft.write_bytes(content.getvalue())
 
 

@@ -10,8 +10,8 @@ import numpy as np
 
 from fpsolve.case.case import Case, Curve
 from fpsolve.model.quantity import STATUS
+from fpsolve.output.beyond import says_more
 from fpsolve.output.records import Entries, Records, key_of, made, plain
-from fpsolve.output.tables import says_more
 from fpsolve.parts.every import QUESTIONS
 from fpsolve.parts.moments import QUESTION as MOMENTS
 from fpsolve.parts.question import Asked, Entry, Job, Limit, Numerics, Reason
@@ -149,9 +149,14 @@ class Results(Sequence[CurveResult]):
         return bool(np.isfinite(self.table[STATUS.name].values[number - 1]))
 
     @property
+    def places(self) -> list[int]:
+        """Those in the table of the curves of which anything is known."""
+        return np.flatnonzero(np.isfinite(self.table[STATUS.name].values)).tolist()
+
+    @property
     def numbers(self) -> list[int]:
         """Those of the curves of which anything is known."""
-        return (np.flatnonzero(np.isfinite(self.table[STATUS.name].values)) + 1).tolist()
+        return [place + 1 for place in self.places]
 
     def __len__(self) -> int:
         return len(self.numbers)

@@ -13,6 +13,7 @@ from fpsolve.case.remedies import CASE_WORDS
 from fpsolve.errors import FpsolveError, NotConverged, WorkersDied
 from fpsolve.files import writable
 from fpsolve.messages import Code, Message
+from fpsolve.output.tables import TABLES
 from fpsolve.pool import SERIAL, Pool, cluster, parallel
 from fpsolve.results.curve import CurveResult
 from fpsolve.show import results
@@ -28,7 +29,7 @@ from fpsolve.workflow.folders import (
 )
 from fpsolve.workflow.progress import SILENT, Phase, Watch, ignore
 from fpsolve.workflow.reports import shown_at_the_end, write_report
-from fpsolve.workflow.sets import TABLES, Sweep
+from fpsolve.workflow.sets import Sweep
 from fpsolve.workflow.simulate import SIMULATION, Simulations, refuse_obstacles
 from fpsolve.workflow.simulate import show as show_simulated
 
@@ -133,7 +134,7 @@ def run_case(
                     sweep.notes,
                     notes(case, simulated, MONTE_CARLO),
                 )
-                files = TABLES + SIMULATION * bool(simulated)
+                files = *TABLES, *SIMULATION * bool(simulated)
                 is_whole &= sweep.done == case.planned
                 write_report(case, folder, watch, blocks, started=sweep.started, files=files, complete=is_whole)
 

@@ -12,15 +12,12 @@ from pathlib import Path
 from fpsolve.case.case import Case
 from fpsolve.errors import FpsolveError, OutputError, Remedy
 from fpsolve.files import TEMPORARY, alone, plain_text, writable, write_text
+from fpsolve.output.tables import TABLES
+from fpsolve.parts.every import QUESTIONS
 from fpsolve.signals import is_interrupt
 
 AGAIN, ANEW = "run it again to go on", "run it again to start over"
-SOLVED = (
-    r"summary\.json|(moments|curves)\.csv|curves\.pvd|results\.nc"
-    r"|(figure|rate_function|(sensitivities|densities)(-\d+)?)\.(png|pdf)"
-    r"|density\.vtu|densities(-\d+)?\.nc|show\.py|eigenfunctions(-\d+)?(\.pvd|/p[+-][\d.e+-]+\.vtu)"
-    r"|response(_3d)?(-\d+)?\.(csv|vtu|png|pdf)"
-)
+SOLVED = "|".join([*map(re.escape, TABLES), r"figure\.(png|pdf)", *(each.names for each in QUESTIONS if each.names)])
 SIMULATED = r"monte_carlo(-\d+)?\.json|monte_carlo_response(-\d+)?\.(csv|vti|png|pdf)"
 REPORT = r"report\.html"
 """Pattern of the name of the report of what was done last, which whatever is done next makes stale."""
