@@ -7,9 +7,7 @@ from __future__ import annotations
 
 import math
 import re
-from bisect import bisect_left
 from collections.abc import Iterable, Mapping
-from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -218,19 +216,13 @@ class Moments(Section):
         """All p, in the file's order."""
         return self.p.values if isinstance(self.p, Sweep) else np.array(self.p)
 
-    @cached_property
-    def increasing(self) -> tuple[float, ...]:
-        """All p, sorted."""
-        return tuple(np.sort(self.values).tolist())
-
     def has(self, p: float) -> bool:
         """Whether p is one of them."""
-        at = bisect_left(self.increasing, p)
-        return any(abs(each - p) <= SAME for each in self.increasing[max(at - 1, 0) : at + 1])
+        return bool(np.any(np.abs(self.values - p) <= SAME))
 
     @model_validator(mode="after")
     def _distinct(self) -> Self:
-        values = np.array(self.increasing)
+        values = np.sort(self.values)
         with np.errstate(over="ignore"):
             close = values[1:][np.diff(values) <= SAME]
         if close.size:
