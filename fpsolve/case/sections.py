@@ -62,7 +62,7 @@ SENSITIVITIES = "sensitivities"
 EIGENFUNCTIONS = "eigenfunctions"
 OF_MOMENTS = DERIVATIVE.name, RATE_FUNCTION.name
 """What follows from Λ(p)."""
-PARTS = EXCURSIONS, RESPONSE, SENSITIVITIES, EIGENFUNCTIONS
+PARTS: tuple[str, ...] = EXCURSIONS, RESPONSE, SENSITIVITIES, EIGENFUNCTIONS
 """What else may be asked for: the names of files of `fpsolve/parts`, each with a question, in the order of work."""
 QUANTITY_NAMES = (MOMENT.name, *OF_MOMENTS, *INDICES, *PARTS)
 """What may be asked for."""

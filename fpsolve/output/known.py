@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
+from types import GenericAlias
 from typing import Any
 
 import numpy as np
@@ -30,7 +31,9 @@ _ROW = tuple[tuple[float, ...], Limit | None]
 
 
 _ENTRIES: Mapping[str, Any] = {
-    each.name: tuple[each.kind | None, Reason | None, float, Limit | None] for each in QUESTIONS if each.solve
+    each.name: GenericAlias(tuple, (each.kind | None, Reason | None, float, Limit | None))
+    for each in QUESTIONS
+    if each.solve
 }
 """The form of an `Entry` of each question in a record."""
 
@@ -128,8 +131,8 @@ class Results(Sequence[CurveResult]):
                 self.add(job)
 
     def _jobs(self, *, is_all: bool = False) -> Iterator[Job]:
-        numbers = range(1, self._case.planned + 1) if self._records else ()
-        return (self.job(number, is_all=is_all) for number in numbers if not self.has(number))
+        left = {*range(1, self._case.planned + 1)}.difference(self.numbers) if self._records else ()
+        return (self.job(number, is_all=is_all) for number in sorted(left))
 
     def asked(self, number: int) -> Asked:
         """What is asked of the curve with a number."""
@@ -143,10 +146,6 @@ class Results(Sequence[CurveResult]):
     def of(self, number: int) -> CurveResult:
         """That of the curve with a number."""
         return self._kept.get(number) or result_of(self.job(number, is_all=True))
-
-    def has(self, number: int) -> bool:
-        """Whether anything is known of the curve with a number."""
-        return bool(np.isfinite(self.table[STATUS.name].values[number - 1]))
 
     @property
     def places(self) -> list[int]:

@@ -86,7 +86,7 @@ def write_summary(case: Case, results: Results, path: Path, facts: Facts) -> Non
     write_json(path, content, indent=1 if case.planned <= MOST_INDENTED else None)
 
 
-TABLES: Mapping[str, Callable[[Case, Results, Path, Facts], None]] = {
+TABLES: dict[str, Callable[[Case, Results, Path, Facts], None]] = {
     "summary.json": write_summary,
     "curves.csv": write_numbers,
     "moments.csv": write_moments,
