@@ -61,7 +61,9 @@ def write_dataset(case: Case, results: Results, path: Path, facts: Mapping[str, 
             kind = values.dtype
             fill = math.nan if kind.kind == "f" else None
             file.create_variable(name, dims, kind, data=values, fillvalue=fill).attrs.update(attributes)
-        file.attrs.update({**_origin(case, facts), "complete": int(len(results) == case.planned)})
+        about = {"title": case.title, "case": case.name, "Conventions": "CF-1.11", "rtol": case.rtol, **case.constants}
+        about |= {key: each if isinstance(each, str | float | int) else json.dumps(each) for key, each in facts.items()}
+        file.attrs.update({**about, "complete": int(len(results) == case.planned)})
     with atomic(path) as draft:
         draft.write_bytes(content.getvalue())
 
@@ -93,19 +95,6 @@ def _arrays(case: Case, table: Table) -> dict[str, Variable]:
     if MOMENT.name in case.asked:
         found["p"] = ("p",), case.p, P.attributes
     return found
-
-
-def _origin(case: Case, facts: Mapping[str, Any]) -> dict[str, str | float | int]:
-    """The case, the parameters that are not varied, and where the numbers come from."""
-    origin = {name: each if isinstance(each, str | float | int) else json.dumps(each) for name, each in facts.items()}
-    return {
-        "title": case.title,
-        "case": case.name,
-        "Conventions": "CF-1.11",
-        "rtol": case.rtol,
-        **case.constants,
-        **origin,
-    }
 
 
 def open_results(*places: str | Path) -> xr.Dataset:

@@ -85,6 +85,7 @@ class Results(Sequence[CurveResult]):
         records: those of its folder.
 
     Attributes:
+        asked: what is asked of the first curve, and of each other one.
         table: the numbers of all that are known.
         says: whether anything is said of a curve beyond its numbers, shape (curves,).
         whole: the numbers of the curves of which all is known that is asked for.
@@ -92,8 +93,8 @@ class Results(Sequence[CurveResult]):
 
     def __init__(self, case: Case, records: Records) -> None:
         self._case, self._records, self._numerics = case, records, Numerics.of(case)
-        self._asked = everything(case, 1), everything(case, 2)
-        self._names = [names_of(each, self._numerics) for each in self._asked]
+        self.asked = everything(case, 1), everything(case, 2)
+        self._names = [names_of(each, self._numerics) for each in self.asked]
         self.table, self.says = table_of(case), np.ones(case.planned, dtype=bool)
         self.whole = set[int]()
         self._kept: dict[int, CurveResult] = {}
@@ -105,7 +106,7 @@ class Results(Sequence[CurveResult]):
         """The work on the curve with a number, with what is known of it; or also with what is to be sought again."""
         vary, place = self._case.vary, number > 1
         curve = Curve(self._case.problem, vary.sets[number - 1], number)
-        job = Job(curve, self._asked[place], self._numerics, vary.line_of(number))
+        job = Job(curve, self.asked[place], self._numerics, vary.line_of(number))
         return read_into(job, self._records.get(curve.digest), self._names[place], is_all=is_all)
 
     def add(self, job: Job) -> CurveResult:
@@ -133,10 +134,6 @@ class Results(Sequence[CurveResult]):
     def _jobs(self, *, is_all: bool = False) -> Iterator[Job]:
         left = {*range(1, self._case.planned + 1)}.difference(self.numbers) if self._records else ()
         return (self.job(number, is_all=is_all) for number in sorted(left))
-
-    def asked(self, number: int) -> Asked:
-        """What is asked of the curve with a number."""
-        return self._asked[number > 1]
 
     @property
     def telling(self) -> Iterator[CurveResult]:

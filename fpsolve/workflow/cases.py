@@ -119,8 +119,7 @@ def run_case(
         refuse_obstacles(case)
     simulations = Simulations(case)
     simulated = simulations.simulated
-    replaced = (SOLVED, SIMULATED) if monte_carlo else (SOLVED,)
-    with own_folder(case, out, replaced) as folder:
+    with own_folder(case, out, [SOLVED, *[SIMULATED] * monte_carlo]) as folder:
         sweep = _solve(case, folder, pool, watch, is_fresh=is_fresh)
 
         def show() -> None:

@@ -124,7 +124,7 @@ class Sweep:
         """Solve what is not known yet, and draw; tables are written first, if anything is missing, and as they grow."""
         if self.done < self.case.planned:
             self.write_tables()
-        draws = [any(BY_NAME[name].files for name in self.results.asked(number)) for number in (1, 2)]
+        draws = [any(BY_NAME[name].files for name in asked) for asked in self.results.asked]
         numbers = range(1, self.case.planned + 1)
         left = [number for number in numbers if draws[number > 1] or number not in self.results.whole]
         if len(left) < self.case.planned:
@@ -170,7 +170,7 @@ class Sweep:
         """Write the tables, the series over the curves, and the files of what records hold."""
         self.write_tables()
         write_curves(self.case, self.folder)
-        for result in self.results if RESPONSE in self.results.asked(1) else ():
+        for result in self.results if RESPONSE in self.results.asked[0] else ():
             if result.response:
                 write_response(result.response, result.curve, self.folder)
         table = self.results.table
