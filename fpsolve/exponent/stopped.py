@@ -27,9 +27,10 @@ import scipy.linalg
 from fpsolve.arrays import FloatArray
 from fpsolve.exponent.eigen import PrincipalPair, slope_rounding
 from fpsolve.exponent.error import Solution
-from fpsolve.exponent.modes import Directions, DirectionStart, inside_frame, second_moments
+from fpsolve.exponent.modes import Directions, DirectionStart, first_order_changes, inside_frame, second_moments
 from fpsolve.exponent.starts import SHARE
 from fpsolve.fem.directions import HalfSphereAxis
+from fpsolve.fem.generator import Generator
 from fpsolve.model.coordinates import mean_matrix
 from fpsolve.model.plane import LinearMotion, Stop, rotating_coordinates
 from fpsolve.model.problem import Problem
@@ -108,6 +109,7 @@ class StopStart(DirectionStart):
         )
 
     def again(self) -> StopStart:
+        """The functions with which another p begins."""
         coarser = (*(each.start for each in self.before), self)[0]
         return StopStart(self.problem, coarser.space, is_first=coarser.is_first)
 
@@ -115,7 +117,7 @@ class StopStart(DirectionStart):
         _, *of_noises = self.errors_of_axes(pair, allowed)
         phi, found = self.space.phi, list[float]()
         for finer in map(phi.deeper, phi.ways):
-            changes = self.changes_by(pair, 0, finer)
+            changes = first_order_changes(pair, Generator(self.problem, self.space.with_axis(0, finer)), 0)
             found.append(math.sqrt(float(abs(np.sum(changes)) * np.sum(np.abs(changes)))))
         left = float(self._left(found) @ found)
         for each in self.before:

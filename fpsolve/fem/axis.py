@@ -262,10 +262,6 @@ class DividedAxis(FunctionAxis):
 
 def along(factors: Sequence[Matrix | None], tables: FloatArray) -> FloatArray:
     """Tables, in the last axes of an array, with a matrix applied along each axis; None leaves one as it is."""
-    if tables.ndim == 2:  # by far the most products of a solve
-        first, last = factors
-        tables = tables if last is None else np.asarray(tables @ last.T)
-        return tables if first is None else first @ tables
     for axis, factor in enumerate(factors, tables.ndim - len(factors)):
         if factor is not None:
             moved = tables.swapaxes(0, axis)
@@ -319,13 +315,11 @@ class KroneckerSum:
 
     def toarray(self) -> FloatArray:
         """The dense matrix, shape (size, size)."""
-        *firsts, lasts = [np.stack(list(map(dense, factors))) for factors in zip(*self.terms, strict=True)]
-        found = np.ones((len(lasts), 1, 1))
-        for factors in firsts:
-            found = np.einsum("tij,tkl->tikjl", found, factors)
-            found = found.reshape(len(found), found.shape[1] * found.shape[2], -1)
-        products = np.tensordot(found, lasts, (0, 0))
-        return products.swapaxes(1, 2).reshape(self.size, self.size)
+        factors = [np.stack([*map(dense, each)]) for each in zip(*self.terms, strict=True)]
+        rows = np.arange(1, 2 * len(factors), 2).tolist()
+        operands = [each for k, of_axis in zip(rows, factors, strict=True) for each in (of_axis, [0, k, k + 1])]
+        found = np.einsum(*operands, [*rows, *(k + 1 for k in rows)], optimize="greedy")
+        return np.asarray(found.reshape(self.size, self.size))
 
     def tocsc(self) -> csc_matrix:
         """The sparse matrix."""

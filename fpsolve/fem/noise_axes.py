@@ -20,7 +20,7 @@ import numpy as np
 
 from fpsolve.arrays import Coefficient, FloatArray, IntArray, Matrix, dense, one
 from fpsolve.fem.axis import DividedAxis, FunctionAxis, ModeEffects, Rule
-from fpsolve.fem.element import middles
+from fpsolve.fem.element import located, middles
 from fpsolve.fem.line import LineSpace
 from fpsolve.model.noise import Noise, NoiseDerivative
 from fpsolve.polynomials import Polynomials, gegenbauer, hermite, logarithm, stieltjes
@@ -175,17 +175,18 @@ class CountedAxis(NoiseAxis):
 
 
 class LineAxis(NoiseAxis):
-    """What functions on the line of a diffusion share; the points of their rule are z."""
+    """What functions on the line of a diffusion share; the points of their rule are z.
+
+    Attributes:
+        log_mass: ln ∫ P_s exp(2s z).
+    """
+
+    log_mass = 0.0
 
     @cached_property
     def unit(self) -> float:
         """ξ/z."""
         return float(self.noise.standard_deviation)
-
-    @property
-    def _log_mass(self) -> float:
-        """ln ∫ P_s exp(2s z)."""
-        return 0.0
 
     def rate(self, z: FloatArray) -> FloatArray:
         """½σ²/std², the diffusion of z."""
@@ -238,7 +239,7 @@ class LineAxis(NoiseAxis):
 
     def weight(self, z: FloatArray) -> FloatArray:
         """P_s exp(2s z) as a density of z: its integral is 1."""
-        logs = self.noise.log_density(self.unit * z) + 2 * self.tilt * z - self._log_mass
+        logs = self.noise.log_density(self.unit * z) + 2 * self.tilt * z - self.log_mass
         return np.asarray(self.unit * np.exp(logs))
 
     def at(self, z: FloatArray, measure: Any = 0.0) -> Samples:
@@ -341,7 +342,7 @@ class PolynomialAxis(CountedAxis, LineAxis):
         return Table(end * x, measure, values, slopes, log_mass, polynomials, 0.0, end)
 
     @property
-    def _log_mass(self) -> float:
+    def log_mass(self) -> float:  # type: ignore[override]
         return self.rule.log_mass
 
     def product(self, f: FloatArray) -> FloatArray:
@@ -373,8 +374,7 @@ class CellAxis(DividedAxis, LineAxis):
 
     @property
     def facts(self) -> dict[str, Any]:
-        interval = {"xi_min": float(self.lines[0]), "xi_max": float(self.lines[-1])}
-        return {"xi": self.word, "xi_size": self.size, **interval, "tilt": 0.0}
+        return super().facts | {"xi_min": float(self.lines[0]), "xi_max": float(self.lines[-1])}
 
     @cached_property
     def line(self) -> LineSpace:
@@ -402,7 +402,7 @@ class CellAxis(DividedAxis, LineAxis):
 
     def between(self, lines: FloatArray) -> CellAxis:
         """Those between other lines, each with the degree of the cell that its middle is in, or is next to."""
-        own = np.clip(np.searchsorted(self.lines, middles(lines)) - 1, 0, self.degrees.size - 1)
+        own, _ = located(self.lines, middles(lines), None)
         return self.on(lines, self.degrees[own])
 
     def reaching(self, below: bool, above: bool) -> CellAxis:

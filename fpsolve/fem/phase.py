@@ -73,198 +73,6 @@ class Struck(NamedTuple):
     end: csr_matrix
 
 
-@dataclass(frozen=True, eq=False)
-class PhaseAxis(DividedAxis):
-    """Discontinuous elements on the circle or half circle; in each cell the basis is orthonormal, by degree.
-
-    The first and the last line are one, and degrees are from 1 on.
-    """
-
-    @cached_property
-    def size(self) -> int:
-        return int(np.sum(self.degrees + 1))
-
-    @property
-    def facts(self) -> dict[str, Any]:
-        return {"phi_cells": self.lines.size - 1, "phi_degrees": [int(degree) for degree in self.degrees]}
-
-    @cached_property
-    def _sizes(self) -> FloatArray:
-        return np.diff(self.lines)
-
-    @cached_property
-    def cells(self) -> IntArray:
-        return np.repeat(np.arange(self.degrees.size), self.degrees + 1)
-
-    @cached_property
-    def modes(self) -> IntArray:
-        return np.arange(self.size) - np.searchsorted(self.cells, self.cells)
-
-    @cached_property
-    def points(self) -> FloatArray:
-        """The points of a rule, so many in each cell, shape (n,)."""
-        return self.finer_rule(1)[0]
-
-    @cached_property
-    def weights(self) -> FloatArray:
-        """Weights of the points, shape (n,)."""
-        return self.finer_rule(1)[1]
-
-    @cached_property
-    def values(self) -> Matrix:
-        """The functions at the points, shape (n, size)."""
-        return self.at(self.points)
-
-    @cached_property
-    def _local(self) -> tuple[FloatArray, FloatArray]:
-        """The polynomials of each cell and their derivatives at its points, shapes (m, n/m, largest degree + 1)."""
-        degree, size = int(self.degrees.max()), self._sizes[:, None, None]
-        values = legendre(degree, gauss_legendre(degree + EXTRA_POINTS)[0]) / np.sqrt(size)
-        return values, values @ differentiation(degree) / size
-
-    @cached_property
-    def constant(self) -> FloatArray:
-        return np.where(self.modes == 0, np.sqrt(self._sizes)[self.cells], 0.0)
-
-    @property
-    def span(self) -> float:
-        """π or 2π."""
-        return float(self.lines[-1] - self.lines[0])
-
-    @cached_property
-    def turns(self) -> int:  # type: ignore[override]
-        return round(2 * math.pi / self.span)
-
-    @cached_property
-    def traces(self) -> tuple[Matrix, Matrix]:
-        """T(φⱼ⁻) and T(φⱼ⁺) at lines[:-1], shapes (m, size); below the seam is the last cell."""
-        inside = middles(self.lines)
-        return self.at(np.roll(self.lines[1:], 1), np.roll(inside, 1)), self.at(self.lines[:-1], inside)
-
-    def mass(self, f: Any = one) -> Matrix:
-        """∫ f u v of `Harmonics` f, or of 1."""
-        if f == one:
-            return self.stored(identity(self.size, format="csr"))
-        wave = self._integral(f(self.points) - f.mean, *2 * self._local[:1])
-        return f.mean * self.matrix(one) + wave  # exact without a wave
-
-    def convection(self, f: Harmonics) -> Matrix:
-        """∫ f u′ v, cell by cell."""
-        return self._integral(f(self.points), *self._local)
-
-    def _integral(self, f: Any, test: FloatArray, trial: FloatArray) -> Matrix:
-        """∫ f v u, cell by cell, from f at the points, and test and trial functions of each cell there."""
-        weights = np.reshape(self.weights * f, trial.shape[:2])
-        blocks = np.swapaxes(test, 1, 2) @ by_rows(weights, trial)
-        return self._of_cells(self.cells, blocks[self.cells, self.modes])
-
-    def diffusion(self, a: CoefficientMatrix, b: CoefficientMatrix) -> tuple[Matrix, Matrix, Matrix]:
-        """∫ w D_a D_b T, D = h ∂φ + p q of two matrices: the coefficients of p⁰, p¹ and p².
-
-        With D* w = −(h w)′ + p q w it is, cell by cell and at the vertices,
-
-            ∫ D_a* w D_b T − Σ h_a [w] {D_b T} + Σ h_b [T] {D_a* w} − Σ η h_a h_b [w] [T],
-
-        the interior penalty method, in which η grows like degree²/size of the smaller cell. What h and q do not change
-        at a vertex, as h = 0 at the ray of a jump, is not there.
-        """
-        left, right = self.traces
-        jump, mean, vertices = right - left, 0.5 * (left + right), self.lines[:-1]
-        sharpness = (self.degrees + 1) ** 2 / self._sizes
-        penalty = PENALTY * np.maximum(sharpness, np.roll(sharpness, 1))
-
-        def both(phi: FloatArray, values: Any, slopes: Any) -> Any:
-            """D_a* w and D_b T by p⁰ and p¹, from values and slopes at φ."""
-            steady = by_rows(a.h(phi), slopes) + by_rows(a.h.slope(phi), values)
-            return (-steady, by_rows(a.q(phi), values)), (by_rows(b.h(phi), slopes), by_rows(b.q(phi), values))
-
-        adjoint, image = both(self.points.reshape(self._sizes.size, -1), *self._local)
-        first, second, third, last = (self._integral(1.0, w, u) for w in adjoint for u in image)
-        adjoint, image = both(vertices, mean, mean @ self._derivative)
-        of_a, of_b = by_rows(a.h(vertices), jump), by_rows(b.h(vertices), jump)
-        loads = [w.T @ of_b - of_a.T @ u for w, u in zip(adjoint, image, strict=True)]
-        return first + loads[0] - of_a.T @ by_rows(penalty, of_b), second + third + loads[1], last
-
-    def impulses(self, struck: Struck, p: float, derivative: int = 0) -> Matrix:
-        """∂ᵏ/∂pᵏ of ∫ w |exp(B)e|^p T(ψ(φ)), ψ being where an impulse takes φ."""
-        return self.stored(struck.at.T @ diags(OfMoment(0, struck.logs)(p, derivative)) @ struck.end)
-
-    def changed_impulses(self, struck: Struck, of: Impulse, by: Impulse, p: float, derivative: int = 0) -> Matrix:
-        """∂/∂θ of what `impulses` gives, where B depends on θ."""
-        logs, e = struck.logs, np.stack([np.cos(struck.points), -np.sin(struck.points)])
-        (x, u), (dx, du) = (matrix @ e for matrix in (of.matrix, changed_exponential(of.exponent, by.exponent)))
-        size = np.exp(-2 * logs)
-        longer = size * (x * dx + u * du) * OfMoment(1, logs)(p, derivative)
-        turned = size * (u * dx - x * du) * OfMoment(0, logs)(p, derivative)
-        slope = struck.end @ csr_matrix(self._derivative)
-        return self.stored(struck.at.T @ (diags(longer) @ struck.end + diags(turned) @ slope))
-
-    def struck(self, of: Impulse) -> Struck:
-        """What an impulse does at the points of a rule between the lines and the phases that it takes to lines."""
-        back = replace(of, exponent=-np.array(of.exponent))
-        even = self.lines[0] + self.span * np.arange(STRIPS) / STRIPS
-        _, before = back.stretched(np.concatenate([even, self.lines[:-1]]))
-        cuts = np.unique(np.concatenate([even, self.lines, self.folded(before)]))
-        local, weights = gauss_legendre(int(self.degrees.max()) + EXTRA_POINTS)
-        sizes = np.diff(cuts)[:, None]
-        points = (cuts[:-1, None] + sizes * local).ravel()
-        stretch, end = of.stretched(points)
-        at, end = (csr_matrix(self.at(phi)) for phi in (points, self.folded(end)))
-        return Struck(points, np.log(stretch), diags((sizes * weights).ravel()) @ at, end)
-
-    def folded(self, phi: FloatArray) -> FloatArray:
-        """The points of the domain that are φ but for whole turns of it."""
-        return np.asarray(self.lines[0] + np.mod(phi - self.lines[0], self.span))
-
-    @cached_property
-    def _derivative(self) -> Matrix:
-        """The matrix to the coefficients of T′ in each cell."""
-        blocks = differentiation(int(self.degrees.max()))[self.modes] / self._sizes[self.cells, None]
-        return self._of_cells(self.cells, blocks)
-
-    def at(self, phi: FloatArray, inside: FloatArray | None = None) -> Matrix:
-        """Values at points of the domain, as rows of E with u(φ) = E @ coefficients, shape (len(φ), size).
-
-        A point on a line between cells is seen from the cell that holds its entry of `inside`, without it from the
-        cell above.
-        """
-        cell, local = located(self.lines, phi, inside)
-        return self._of_cells(cell, legendre(int(self.degrees.max()), local) / np.sqrt(self._sizes[cell])[:, None])
-
-    def finer_rule(self, parts: int) -> tuple[FloatArray, FloatArray]:
-        """Points and weights of the rule where every cell is cut into so many parts, shapes (parts n,)."""
-        sizes = np.repeat(self._sizes / parts, parts)
-        starts = (self.lines[:-1, None] + self._sizes[:, None] * np.arange(parts) / parts).ravel()
-        local, weights = gauss_legendre(int(self.degrees.max()) + EXTRA_POINTS)
-        return (starts[:, None] + sizes[:, None] * local).ravel(), (sizes[:, None] * weights).ravel()
-
-    @cached_property
-    def rule(self) -> Rule:
-        """At five points inside each cell."""
-        points = (self.lines[:-1, None] + self._sizes[:, None] * np.linspace(0.1, 0.9, 5)).ravel()
-        return Rule(points, np.repeat(self._sizes / 5, 5), self.at(points))
-
-    def projection(self, other: PhaseAxis) -> Matrix:
-        """The matrix that takes a function of another space to its projection on this one, shape (size, other.size)."""
-        return self.values.T @ (diags(self.weights) @ other.at(self.points))
-
-    def terms(self, framed: Framed, noises: Sequence[Any]) -> PlaneTerms:
-        """L(p) on these functions times those of each noise."""
-        return PlaneTerms(framed, self, noises)
-
-    def _of_cells(self, cells: IntArray, table: FloatArray) -> Matrix:
-        """The matrix of which each row is that of a table, by degree, at the functions of one cell, and else 0."""
-        counts = self.degrees[cells] + 1
-        rows, firsts = np.repeat(np.arange(cells.size), counts), np.searchsorted(self.cells, cells)
-        columns = np.arange(rows.size) + np.repeat(firsts + counts - np.cumsum(counts), counts)
-        entries, shape = table[rows, self.modes[columns]], (cells.size, self.size)
-        if self.size > FEW_UNKNOWNS:
-            return csr_matrix((entries, (rows, columns)), shape=shape)
-        matrix = np.zeros(shape)
-        matrix[rows, columns] = entries
-        return matrix
-
-
 class Wall(NamedTuple):
     """A jump, the speed v of the phase at its ray φ_j, and δ(φ − φ_j): w(φ⁻) T(φ⁺) for v > 0, else w(φ⁺) T(φ⁻)."""
 
@@ -400,6 +208,196 @@ class PlaneTerms(Terms):
                     return np.abs(phase_speed(self.system, {**held, first: xi} if held else xi)(phi))
 
                 yield Term(0, OfMoment(0), phase, (of_first, *map(At, values)), text)
+
+
+@dataclass(frozen=True, eq=False)
+class PhaseAxis(DividedAxis):
+    """Discontinuous elements on the circle or half circle; in each cell the basis is orthonormal, by degree.
+
+    The first and the last line are one, and degrees are from 1 on.
+    """
+
+    terms = PlaneTerms
+
+    @cached_property
+    def size(self) -> int:
+        return int(np.sum(self.degrees + 1))
+
+    @property
+    def facts(self) -> dict[str, Any]:
+        return {"phi_cells": self.lines.size - 1, "phi_degrees": [int(degree) for degree in self.degrees]}
+
+    @cached_property
+    def _sizes(self) -> FloatArray:
+        return np.diff(self.lines)
+
+    @cached_property
+    def cells(self) -> IntArray:
+        return np.repeat(np.arange(self.degrees.size), self.degrees + 1)
+
+    @cached_property
+    def modes(self) -> IntArray:
+        return np.arange(self.size) - np.searchsorted(self.cells, self.cells)
+
+    @cached_property
+    def points(self) -> FloatArray:
+        """The points of a rule, so many in each cell, shape (n,)."""
+        return self.finer_rule(1)[0]
+
+    @cached_property
+    def weights(self) -> FloatArray:
+        """Weights of the points, shape (n,)."""
+        return self.finer_rule(1)[1]
+
+    @cached_property
+    def values(self) -> Matrix:
+        """The functions at the points, shape (n, size)."""
+        return self.at(self.points)
+
+    @cached_property
+    def _local(self) -> tuple[FloatArray, FloatArray]:
+        """The polynomials of each cell and their derivatives at its points, shapes (m, n/m, largest degree + 1)."""
+        degree, size = int(self.degrees.max()), self._sizes[:, None, None]
+        values = legendre(degree, gauss_legendre(degree + EXTRA_POINTS)[0]) / np.sqrt(size)
+        return values, values @ differentiation(degree) / size
+
+    @cached_property
+    def constant(self) -> FloatArray:
+        return np.where(self.modes == 0, np.sqrt(self._sizes)[self.cells], 0.0)
+
+    @property
+    def span(self) -> float:
+        """π or 2π."""
+        return float(self.lines[-1] - self.lines[0])
+
+    @cached_property
+    def turns(self) -> int:  # type: ignore[override]
+        return round(2 * math.pi / self.span)
+
+    @cached_property
+    def traces(self) -> tuple[Matrix, Matrix]:
+        """T(φⱼ⁻) and T(φⱼ⁺) at lines[:-1], shapes (m, size); below the seam is the last cell."""
+        inside = middles(self.lines)
+        return self.at(np.roll(self.lines[1:], 1), np.roll(inside, 1)), self.at(self.lines[:-1], inside)
+
+    def mass(self, f: Any = one) -> Matrix:
+        """∫ f u v of `Harmonics` f, or of 1."""
+        if f == one:
+            return self.stored(identity(self.size, format="csr"))
+        wave = self._integral(f(self.points) - f.mean, *2 * self._local[:1])
+        return f.mean * self.matrix(one) + wave  # exact without a wave
+
+    def convection(self, f: Harmonics) -> Matrix:
+        """∫ f u′ v, cell by cell."""
+        return self._integral(f(self.points), *self._local)
+
+    def _integral(self, f: Any, test: FloatArray, trial: FloatArray) -> Matrix:
+        """∫ f v u, cell by cell, from f at the points, and test and trial functions of each cell there."""
+        weights = np.reshape(self.weights * f, trial.shape[:2])
+        blocks = np.swapaxes(test, 1, 2) @ by_rows(weights, trial)
+        return self._of_cells(self.cells, blocks[self.cells, self.modes])
+
+    def diffusion(self, a: CoefficientMatrix, b: CoefficientMatrix) -> tuple[Matrix, Matrix, Matrix]:
+        """∫ w D_a D_b T, D = h ∂φ + p q of two matrices: the coefficients of p⁰, p¹ and p².
+
+        With D* w = −(h w)′ + p q w it is, cell by cell and at the vertices,
+
+            ∫ D_a* w D_b T − Σ h_a [w] {D_b T} + Σ h_b [T] {D_a* w} − Σ η h_a h_b [w] [T],
+
+        the interior penalty method, in which η grows like degree²/size of the smaller cell. What h and q do not change
+        at a vertex, as h = 0 at the ray of a jump, is not there.
+        """
+        left, right = self.traces
+        jump, mean, vertices = right - left, 0.5 * (left + right), self.lines[:-1]
+        sharpness = (self.degrees + 1) ** 2 / self._sizes
+        penalty = PENALTY * np.maximum(sharpness, np.roll(sharpness, 1))
+
+        def both(phi: FloatArray, values: Any, slopes: Any) -> Any:
+            """D_a* w and D_b T by p⁰ and p¹, from values and slopes at φ."""
+            steady = by_rows(a.h(phi), slopes) + by_rows(a.h.slope(phi), values)
+            return (-steady, by_rows(a.q(phi), values)), (by_rows(b.h(phi), slopes), by_rows(b.q(phi), values))
+
+        adjoint, image = both(self.points.reshape(self._sizes.size, -1), *self._local)
+        first, second, third, last = (self._integral(1.0, w, u) for w in adjoint for u in image)
+        adjoint, image = both(vertices, mean, mean @ self._derivative)
+        of_a, of_b = by_rows(a.h(vertices), jump), by_rows(b.h(vertices), jump)
+        loads = [w.T @ of_b - of_a.T @ u for w, u in zip(adjoint, image, strict=True)]
+        return first + loads[0] - of_a.T @ by_rows(penalty, of_b), second + third + loads[1], last
+
+    def impulses(self, struck: Struck, p: float, derivative: int) -> Matrix:
+        """∂ᵏ/∂pᵏ of ∫ w |exp(B)e|^p T(ψ(φ)), ψ being where an impulse takes φ."""
+        return self.stored(struck.at.T @ diags(OfMoment(0, struck.logs)(p, derivative)) @ struck.end)
+
+    def changed_impulses(self, struck: Struck, of: Impulse, by: Impulse, p: float, derivative: int = 0) -> Matrix:
+        """∂/∂θ of what `impulses` gives, where B depends on θ."""
+        logs, e = struck.logs, np.stack([np.cos(struck.points), -np.sin(struck.points)])
+        (x, u), (dx, du) = (matrix @ e for matrix in (of.matrix, changed_exponential(of.exponent, by.exponent)))
+        size = np.exp(-2 * logs)
+        longer = size * (x * dx + u * du) * OfMoment(1, logs)(p, derivative)
+        turned = size * (u * dx - x * du) * OfMoment(0, logs)(p, derivative)
+        slope = struck.end @ csr_matrix(self._derivative)
+        return self.stored(struck.at.T @ (diags(longer) @ struck.end + diags(turned) @ slope))
+
+    def struck(self, of: Impulse) -> Struck:
+        """What an impulse does at the points of a rule between the lines and the phases that it takes to lines."""
+        back = replace(of, exponent=-np.array(of.exponent))
+        even = self.lines[0] + self.span * np.arange(STRIPS) / STRIPS
+        _, before = back.stretched(np.concatenate([even, self.lines[:-1]]))
+        cuts = np.unique(np.concatenate([even, self.lines, self.folded(before)]))
+        local, weights = gauss_legendre(int(self.degrees.max()) + EXTRA_POINTS)
+        sizes = np.diff(cuts)[:, None]
+        points = (cuts[:-1, None] + sizes * local).ravel()
+        stretch, end = of.stretched(points)
+        at, end = (csr_matrix(self.at(phi)) for phi in (points, self.folded(end)))
+        return Struck(points, np.log(stretch), diags((sizes * weights).ravel()) @ at, end)
+
+    def folded(self, phi: FloatArray) -> FloatArray:
+        """The points of the domain that are φ but for whole turns of it."""
+        return np.asarray(self.lines[0] + np.mod(phi - self.lines[0], self.span))
+
+    @cached_property
+    def _derivative(self) -> Matrix:
+        """The matrix to the coefficients of T′ in each cell."""
+        blocks = differentiation(int(self.degrees.max()))[self.modes] / self._sizes[self.cells, None]
+        return self._of_cells(self.cells, blocks)
+
+    def at(self, phi: FloatArray, inside: FloatArray | None = None) -> Matrix:
+        """Values at points of the domain, as rows of E with u(φ) = E @ coefficients, shape (len(φ), size).
+
+        A point on a line between cells is seen from the cell that holds its entry of `inside`, without it from the
+        cell above.
+        """
+        cell, local = located(self.lines, phi, inside)
+        return self._of_cells(cell, legendre(int(self.degrees.max()), local) / np.sqrt(self._sizes[cell])[:, None])
+
+    def finer_rule(self, parts: int) -> tuple[FloatArray, FloatArray]:
+        """Points and weights of the rule where every cell is cut into so many parts, shapes (parts n,)."""
+        sizes = np.repeat(self._sizes / parts, parts)
+        starts = (self.lines[:-1, None] + self._sizes[:, None] * np.arange(parts) / parts).ravel()
+        local, weights = gauss_legendre(int(self.degrees.max()) + EXTRA_POINTS)
+        return (starts[:, None] + sizes[:, None] * local).ravel(), (sizes[:, None] * weights).ravel()
+
+    @cached_property
+    def rule(self) -> Rule:
+        """At five points inside each cell."""
+        points = (self.lines[:-1, None] + self._sizes[:, None] * np.linspace(0.1, 0.9, 5)).ravel()
+        return Rule(points, np.repeat(self._sizes / 5, 5), self.at(points))
+
+    def projection(self, other: PhaseAxis) -> Matrix:
+        """The matrix that takes a function of another space to its projection on this one, shape (size, other.size)."""
+        return self.values.T @ (diags(self.weights) @ other.at(self.points))
+
+    def _of_cells(self, cells: IntArray, table: FloatArray) -> Matrix:
+        """The matrix of which each row is that of a table, by degree, at the functions of one cell, and else 0."""
+        counts = self.degrees[cells] + 1
+        rows, firsts = np.repeat(np.arange(cells.size), counts), np.searchsorted(self.cells, cells)
+        columns = np.arange(rows.size) + np.repeat(firsts + counts - np.cumsum(counts), counts)
+        entries, shape = table[rows, self.modes[columns]], (cells.size, self.size)
+        if self.size > FEW_UNKNOWNS:
+            return csr_matrix((entries, (rows, columns)), shape=shape)
+        matrix = np.zeros(shape)
+        matrix[rows, columns] = entries
+        return matrix
 
 
 def by_rows(factors: FloatArray, matrix: Matrix) -> Matrix:
