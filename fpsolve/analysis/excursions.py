@@ -311,8 +311,8 @@ def _mean_functions(axis: Any, xi: StartOfNoise) -> FloatArray:
     """The means of the functions of a noise over its start, shape (size,)."""
     if xi == STATIONARY:
         at = axis.samples()
-        return np.asarray((axis.law() * at.factor) @ at.values)
-    return np.asarray(axis.started(xi))
+        return (axis.law() * at.factor) @ at.values
+    return axis.started(xi)
 
 
 def _extremes(pair: PrincipalPair, is_smooth: bool) -> FloatArray:

@@ -146,7 +146,7 @@ def design(
     if isinstance(found, Absent):
         return found
     scaled = found.gradient * unit
-    errors = (abs(found.value) + found.error) * np.abs(scaled) / float(scaled @ scaled) * unit
+    errors = (abs(found.value) + found.error) * np.abs(scaled) / (scaled @ scaled) * unit
     if len(axes) > 1:  # how near to the nearest point of F = 0
         errors += SAME * np.maximum(unit, np.abs(found.at))
     parameters, solved = problem.parameters, distance.at(found.at)
@@ -283,7 +283,7 @@ def _nearest(
         _approach(tried, best, axes, units)
         others = tried.beyond(best)
     if others:
-        other = min(others, key=lambda each: float(np.linalg.norm((each.at - best.at) / units)))
+        other = min(others, key=lambda each: np.linalg.norm((each.at - best.at) / units))
         if (found := _nearest_from(tried, _root(tried, best.at, other.at), axes, here, units)) is not None:
             return found
     return _unreached(tried, target, axes, bool(others))

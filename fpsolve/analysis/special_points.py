@@ -115,7 +115,7 @@ def _roots(
     """The places of a branch where a component passes a level, from what it is above that at the points, or 0."""
 
     def value(place: float) -> float:
-        return float(at(place)[axis]) - level
+        return at(place)[axis] - level
 
     signed = np.flatnonzero(values)
     ahead = [*signed[1:], *(signed[:1] + values.size)] if trace.closed else signed[1:]

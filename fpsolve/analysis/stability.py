@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from itertools import combinations, product
 from typing import TYPE_CHECKING, Any
 
@@ -26,7 +26,7 @@ from fpsolve.data import Result, brief, dataset
 from fpsolve.drawing import add_legend, in_full, label_axes, scale_axis
 from fpsolve.errors import FpsolveError, NotConverged
 from fpsolve.exponent.kinds import choose
-from fpsolve.exponent.method import Budget
+from fpsolve.exponent.method import BUDGET, Budget
 from fpsolve.messages import Code, Message
 from fpsolve.model.problem import Problem
 from fpsolve.model.quantity import POINTS
@@ -115,7 +115,7 @@ class Boundary(Result):
     scan: Scan
     traces: tuple[Trace, ...] = ()
     step: float = LONGEST
-    budget: Budget = field(default_factory=Budget)
+    budget: Budget = BUDGET
     seconds: float = 0.0
     obstacles: tuple[Message, ...] = ()
     complete: bool = False

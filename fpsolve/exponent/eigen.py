@@ -396,12 +396,12 @@ def _reached(generator: Generator, pencil: Pencil, x: FloatArray, y: FloatArray)
     weight, norm = space.weighed(constant), 1 / space.turns
     x = found.x * ((constant @ weight) / (weight @ found.x))
     y = found.y * (norm / (found.y @ space.weighed(x)))
-    rounding = _EPS * float(abs(y) @ (abs(operator) @ abs(x))) / norm
+    rounding = _EPS * abs(y) @ (abs(operator) @ abs(x)) / norm
     if generator.keeps_constants:
         forcing, total = generator.matrix(p, is_forcing=True), weight @ x
         of_noise = _of_noises(space)
         doubtful = abs(x) + generator.rounding_growth * abs(x - constant)
-        bound = _EPS * float((constant @ (abs(forcing) @ doubtful) + abs(of_noise) @ doubtful) / total)
+        bound = _EPS * (constant @ (abs(forcing) @ doubtful) + abs(of_noise) @ doubtful) / total
         if bound < rounding:
             value, rounding = float((constant @ (forcing @ x) + of_noise @ x) / total), bound
     if p == 0:  # where Λ = 0

@@ -217,7 +217,7 @@ def mode_effects(pair: PrincipalPair) -> tuple[ModeEffects | None, ...]:
     both = np.reshape([pair.right, pair.left], (2, *space.shape))  # the smooth one first
     if pair.p < -1:
         both, operator = both[::-1], operator.T
-    norm = abs(float(pair.left @ space.weighed(pair.right)))
+    norm = abs(pair.left @ space.weighed(pair.right))
     count, found = len(space.axes), list[ModeEffects | None]()
     for k, axis in enumerate(space.axes):
         inside = axis.cells >= 0

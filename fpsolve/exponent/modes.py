@@ -119,7 +119,7 @@ def first_order_changes(pair: PrincipalPair, finer: Generator, k: int) -> FloatA
     )
     factors = factorised(operator.on(k, new), space.chain)
     found = left * factors.solve(right.ravel()).reshape(right.shape) / -(pair.left @ old.weighed(pair.right))
-    return np.asarray(found.sum(axis=tuple(each for each in range(found.ndim) if each != k)))
+    return found.sum(axis=tuple(each for each in range(found.ndim) if each != k))
 
 
 @dataclass(frozen=True, eq=False)

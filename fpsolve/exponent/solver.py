@@ -180,7 +180,7 @@ class ExponentSolver:
     _: KW_ONLY
     rtol: float = 1e-8
     of_value: float = 0.0
-    budget: Budget = field(default_factory=Budget)
+    budget: Budget = BUDGET
     slope_errors: dict[float, float] = field(init=False, default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:
@@ -308,7 +308,7 @@ class ExponentSolver:
     def slope(self, p: float) -> float:
         """Λ′(p) by eigenfunctions; NaN where these are not found, or there are none."""
         with suppress(NotConverged, NoSuchExponent):
-            return float(self.solution(p).derivative)
+            return self.solution(p).derivative
         return math.nan
 
     def slope_error(self, p: float) -> float:

@@ -15,6 +15,7 @@ import numpy as np
 
 from fpsolve.exponent.eigen import BACKWARD_ERROR_LIMIT, PrincipalPair, principal_pair
 from fpsolve.exponent.error import Solution, mode_effects
+from fpsolve.exponent.method import Stage
 from fpsolve.fem.axis import MOST_DEGREE
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.noise_axes import CellAxis, NoiseAxis
@@ -38,7 +39,7 @@ COMPARABLE = 0.6
 
 
 @dataclass(frozen=True, eq=False)
-class Start:
+class Start(Stage):
     """A `Stage` at a place of two variables, by the functions that Λ(p) is sought among.
 
     Attributes:
@@ -66,9 +67,6 @@ class Start:
     def judged(self, pair: PrincipalPair, allowed: float) -> Solution:
         """The pair with its error by its highest modes."""
         return Solution(pair)
-
-    def is_enough(self, found: Solution) -> bool:
-        return True
 
     def doubled(self, failure: Exception | None) -> Start | None:
         """More functions along the axes that lack most, by the pair that a failed search has reached, if any."""
@@ -144,7 +142,7 @@ def _phase(system: System, xi: Xi, digits: float, is_smooth: bool = False) -> Ph
     several numbers move it, which leave T smoother, and each function of φ is a thousand unknowns.
     """
     speed = phase_speed(system, xi)
-    widest = float(np.max(speed.amplitude / np.maximum(np.abs(speed.mean), 1e-300)))
+    widest = np.max(speed.amplitude / np.maximum(np.abs(speed.mean), 1e-300))
     cells = 1 if is_smooth else 8 if widest > 1 else 4 if widest > 0.5 else 2
     rays = [jump.phase for jump in system.jumps] or [math.pi / 2]
     lines = rays[0] + np.linspace(0, math.pi, cells + 1)

@@ -74,7 +74,7 @@ def _rotating(block: FloatArray) -> FloatArray:
     if (found := rotating_coordinates(block)) is None:
         _, found = scipy.linalg.matrix_balance(block, permute=False)
     lower = np.linalg.qr(found.T)[1].T
-    return np.asarray(lower * np.sign(np.diagonal(lower)))
+    return lower * np.sign(np.diagonal(lower))
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +118,7 @@ class StopStart(DirectionStart):
         phi, found = self.space.phi, list[float]()
         for finer in map(phi.deeper, phi.ways):
             changes = first_order_changes(pair, Generator(self.problem, self.space.with_axis(0, finer)), 0)
-            found.append(math.sqrt(float(abs(np.sum(changes)) * np.sum(np.abs(changes)))))
+            found.append(math.sqrt(abs(np.sum(changes)) * np.sum(np.abs(changes))))
         left = float(self._left(found) @ found)
         for each in self.before:
             step, lacked = abs(pair.value - each.pair.value), sum(each.start.changes)
@@ -146,7 +146,7 @@ class StopStart(DirectionStart):
             left, raised = OF_ONE * changes, changes >= WORTH * np.max(changes)
             for at in np.argsort(-changes):
                 left[at] *= FALL
-                if float(np.sum(left)) <= goal:
+                if np.sum(left) <= goal:
                     raised &= changes >= changes[at]
                     break
             tried = tuple(compress(phi.ways, raised))

@@ -138,7 +138,7 @@ def blocks_of(problem: Problem) -> tuple[Subsystem, ...]:
             return ()
         phases = np.array(resting if len(resting) == 2 else (resting[0], resting[0] + math.pi / 2))
         rays, names = np.stack([np.cos(phases), -np.sin(phases)]), ("", "")
-        basis, rounded = frame @ rays, ROUNDED * float(np.linalg.cond(rays))
+        basis, rounded = frame @ rays, ROUNDED * np.linalg.cond(rays)
         groups = [(0,), (1,)] if any(map(_turns, matrices)) else [(0,)]
     elif stop is not None:  # in its coordinates, of which the first two must be one block, as a part has no stop
         basis, rounded, names = np.linalg.inv(np.array(stop.coordinates)), ROUNDED, stop.names(names)
@@ -223,7 +223,7 @@ def hidden_blocks(matrices: Sequence[FloatArray]) -> tuple[FloatArray, list[tupl
     mixed = np.tensordot(np.random.default_rng(0).standard_normal(len(words)), words, 1)
     values, vectors = np.linalg.eig(mixed)
     (_, basis), sizes = cdf2rdf(values, vectors), [1 + bool(each.imag) for each in values if each.imag >= 0]
-    if not (condition := float(np.linalg.cond(basis))) < WORST_CONDITION:
+    if not (condition := np.linalg.cond(basis)) < WORST_CONDITION:
         return np.eye(len(basis)), [(*range(len(basis)),)], 0.0
     least = ROUNDED * condition
     inside = [np.linalg.solve(basis, a @ basis) for a in scaled]

@@ -207,7 +207,7 @@ class FunctionAxis:
 
     def new_in(self, coarse: Any) -> Mask:
         """Which functions one of lower degrees does not have, shape (size,)."""
-        return np.asarray(self.modes > np.max(coarse.modes))
+        return self.modes > np.max(coarse.modes)
 
     def enriched(self) -> Self:
         """The next finer one."""
@@ -317,9 +317,9 @@ class KroneckerSum:
         """The dense matrix, shape (size, size)."""
         factors = [np.stack([*map(dense, each)]) for each in zip(*self.terms, strict=True)]
         rows = np.arange(1, 2 * len(factors), 2).tolist()
-        operands = [each for k, of_axis in zip(rows, factors, strict=True) for each in (of_axis, [0, k, k + 1])]
-        found = np.einsum(*operands, [*rows, *(k + 1 for k in rows)], optimize="greedy")
-        return np.asarray(found.reshape(self.size, self.size))
+        pairs: list[Any] = [each for k, of_axis in zip(rows, factors, strict=True) for each in (of_axis, [0, k, k + 1])]
+        found = np.einsum(*pairs, [*rows, *(k + 1 for k in rows)], optimize="greedy")
+        return found.reshape(self.size, self.size)
 
     def tocsc(self) -> csc_matrix:
         """The sparse matrix."""

@@ -55,7 +55,7 @@ class CircleAxis(CountedAxis):
 
     @cached_property
     def xi(self) -> FloatArray:
-        return np.asarray(self.noise.of_angle(self.rule.points))
+        return self.noise.of_angle(self.rule.points)
 
     def values_at(self, theta: FloatArray) -> FloatArray:
         """The waves at any θ, shape (len(θ), size)."""
@@ -87,7 +87,7 @@ class CircleAxis(CountedAxis):
     def _turning(self) -> FloatArray:
         """∫ v ∂u."""
         beside = np.where(np.arange(self.size - 1) % 2, self._waves[1:], 0.0)
-        return np.asarray(np.diag(beside, 1) - np.diag(beside, -1))
+        return np.diag(beside, 1) - np.diag(beside, -1)
 
     def _diffusing(self) -> FloatArray:
         return np.diag(-0.5 * self.noise.sigma**2 * self._waves**2)

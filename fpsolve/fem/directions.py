@@ -142,7 +142,7 @@ ANGLES = {1: signs, 2: circle}
 
 def arc(lines: FloatArray, degree: int) -> Angle:
     """Elements on a part of a circle, with the constant in place of the function of the last vertex."""
-    line, length = LineSpace(lines, degree), float(lines[-1] - lines[0])
+    line, length = LineSpace(lines, degree), lines[-1] - lines[0]
     own = np.column_stack([line.constant(), np.delete(np.eye(line.size), line.ends[1], axis=1)])
     root = np.sqrt(line.measure / length)[:, None]
     unit = np.stack([np.cos(line.points), np.sin(line.points)])
@@ -163,7 +163,7 @@ def _jumps(line: LineSpace, speeds: FloatArray) -> FloatArray:
     inside = middles(line.lines)
     above, below = (line.at(ends, 1, inside).toarray() for ends in (line.lines[:-1], line.lines[1:]))
     jump, weights = above[1:] - below[:-1], SLOPE_PENALTY * np.diff(inside) ** 2 / line.degree**3 * speeds
-    return np.asarray(jump.T @ (weights[:, None] * jump))
+    return jump.T @ (weights[:, None] * jump)
 
 
 class DirectionTerms(Terms):
@@ -174,12 +174,11 @@ class DirectionTerms(Terms):
     @cached_property
     def _mean(self) -> FloatArray:
         """The matrix of the motion of y in the mean over the noise."""
-        mean = mean_matrix(self._framed.problem, self.system)
-        return self.phi.inside(CoefficientMatrix(0, mean))
+        return self.phi.inside(mean_matrix(self._framed.problem, self.system))
 
     def _loads(self) -> Iterator[Term]:
         """The penalty, as slopes jump by the error of the elements alone."""
-        size = float(np.linalg.norm(self._mean + self._mean.T, 2)) / 2
+        size = np.linalg.norm(self._mean + self._mean.T, 2) / 2
         yield self._term(size * self.phi.penalty(), one, "penalty on jumps of ∂u/∂η")
 
 
@@ -280,7 +279,7 @@ class DirectionAxis(FunctionAxis):
 
     def new_in(self, coarse: DirectionAxis) -> Mask:
         pairs = zip(self.ways, self.levels, strict=True)
-        return np.asarray(np.any([level > getattr(coarse, way) for way, level in pairs], axis=0))
+        return np.any([level > getattr(coarse, way) for way, level in pairs], axis=0)
 
     @cached_property
     def line(self) -> LineSpace:
@@ -389,19 +388,19 @@ class DirectionAxis(FunctionAxis):
         """Σ A ⊗ B of matrices in η and in both angles, on the functions that there are."""
         return csr_matrix(KroneckerSum(terms).tocsc()[:, self._kept])[self._kept]
 
-    def inside(self, term: CoefficientMatrix) -> FloatArray:
+    def inside(self, matrix: Any) -> FloatArray:
         """S⁻¹AS."""
-        return np.asarray(np.linalg.solve(self.coordinates, np.array(term.matrix) @ self.coordinates))
+        return np.asarray(np.linalg.solve(self.coordinates, matrix @ self.coordinates))
 
     def motion(self, term: CoefficientMatrix) -> tuple[Matrix, Matrix]:
         """∫ v h·∇u and ∫ v q u."""
-        moved, growth = self._moved(self.inside(term))
+        moved, growth = self._moved(self.inside(term.matrix))
         return self._form((self._itself, moved)), self._form((self._itself, growth))
 
     def diffusion(self, a: CoefficientMatrix, b: CoefficientMatrix) -> tuple[Matrix, Matrix, Matrix]:
         """∫ v D_a D_b u, D = h·∇ + p q of two matrices, D* v = −h·∇v − tr v + (p + n) q v: by p⁰, p¹ and p²."""
-        (moved, growth), (right, grown) = (self._moved(self.inside(each)) for each in (a, b))
-        factors = (-1.0, moved), (len(self.coordinates), growth), (-float(np.trace(a.matrix)), self._itself)
+        (moved, growth), (right, grown) = (self._moved(self.inside(each.matrix)) for each in (a, b))
+        factors = (-1.0, moved), (len(self.coordinates), growth), (-np.trace(a.matrix), self._itself)
         adjoint = [(factor * of_eta, image) for factor, parts in factors for of_eta, image in parts]
         return (
             self._form((adjoint, right)),
@@ -437,7 +436,7 @@ class DirectionAxis(FunctionAxis):
 
     def projection(self, other: DirectionAxis) -> LinearOperator:
         mixed = self.line.values.T @ diags(self.line.measure) @ other.line.at(self.line.points)
-        of_eta = np.asarray(np.linalg.solve(self.line.mass().toarray(), mixed.toarray()))
+        of_eta = np.linalg.solve(self.line.mass().toarray(), mixed.toarray())
         of_theta = np.kron(
             *(
                 np.linalg.pinv(new.at(new.points)) @ old.at(new.points)

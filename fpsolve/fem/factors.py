@@ -86,7 +86,7 @@ class ArrayFactors:
 
     def solve(self, b: FloatArray, *, transposed: bool = False) -> FloatArray:
         """x of A x = b, or of Aᵀx = b; several b are columns."""
-        return np.asarray(dgetrs(self._lu, self._pivots, b, trans=transposed)[0])
+        return dgetrs(self._lu, self._pivots, b, trans=transposed)[0]
 
 
 class SparseFactors:

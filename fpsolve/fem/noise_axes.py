@@ -133,7 +133,7 @@ class NoiseAxis(FunctionAxis):
     def law(self) -> FloatArray:
         """The stationary law as weights of the `samples`, shape (n,)."""
         weights = self.rule.measure / self.samples().factor ** 2
-        return np.asarray(weights / weights.sum())
+        return weights / weights.sum()
 
     def everywhere(self, count: int) -> tuple[FloatArray, Matrix]:
         """ξ that cover a bounded support, the ends included, some `count`, and the functions there with their factor.
@@ -170,7 +170,7 @@ class CountedAxis(NoiseAxis):
         return replace(self, count=min(self.count + 2, MAX_COUNT))
 
     def refined(self, effects: ModeEffects, share: float) -> Self:
-        needed = math.ceil(float(effects.needed(share)[0]) + 1.3)
+        needed = math.ceil(effects.needed(share)[0] + 1.3)
         return replace(self, count=max(self.count // 2, 3, min(needed, 3 * self.count // 2 + 3, MAX_COUNT)))
 
 
@@ -210,11 +210,11 @@ class LineAxis(NoiseAxis):
 
     def _changed_law(self, change: NoiseDerivative) -> FloatArray:
         logs, measure = self._changed_logs(change), self.rule.measure
-        return np.asarray(logs - measure @ logs / measure.sum())
+        return logs - measure @ logs / measure.sum()
 
     def _changed_logs(self, change: NoiseDerivative) -> FloatArray:
         """∂ ln P_s/∂θ at the points of the rule, but for a constant."""
-        return np.asarray(change.log_density(self.xi))
+        return change.log_density(self.xi)
 
     def values_at(self, z: FloatArray) -> Matrix:
         """The functions at any z, shape (len(z), size)."""
@@ -240,7 +240,7 @@ class LineAxis(NoiseAxis):
     def weight(self, z: FloatArray) -> FloatArray:
         """P_s exp(2s z) as a density of z: its integral is 1."""
         logs = self.noise.log_density(self.unit * z) + 2 * self.tilt * z - self.log_mass
-        return np.asarray(self.unit * np.exp(logs))
+        return self.unit * np.exp(logs)
 
     def at(self, z: FloatArray, measure: Any = 0.0) -> Samples:
         """At any z, with what each stands for, in ξ."""
@@ -251,7 +251,7 @@ class LineAxis(NoiseAxis):
     def started(self, xi: float) -> FloatArray:
         """The functions with their factor at one ξ, shape (size,)."""
         at = self.at(np.array([xi]) / self.unit)
-        return np.asarray(dense(at.values)[0] * at.factor[0])
+        return dense(at.values)[0] * at.factor[0]
 
     def samples(self) -> Samples:
         z, measure, _ = self.rule[:3]
@@ -261,7 +261,7 @@ class LineAxis(NoiseAxis):
         z, measure, values = self.rule[:3]
         exponent = other.tilt * (z - other.center) - self.tilt * (z - self.center)
         scaled = (measure * np.exp(np.clip(exponent, -600, 600)))[:, None] * dense(other.values_at(z))
-        return np.asarray(np.linalg.solve(dense(self.matrix(one)), values.T @ scaled))
+        return np.linalg.solve(dense(self.matrix(one)), values.T @ scaled)
 
 
 class Table(NamedTuple):
@@ -337,7 +337,7 @@ class PolynomialAxis(CountedAxis, LineAxis):
         tilted = np.exp(logs - logs.max())
         polynomials = stieltjes(x, tilted, self.count) if tilt else gegenbauer(self.count, exponent)
         values, slopes = polynomials.at(x)
-        log_mass = math.log((tilted @ damping) / (weights @ damping)) + float(logs.max())
+        log_mass = math.log((tilted @ damping) / (weights @ damping)) + logs.max()
         measure, slopes = tilted * damping / (tilted @ damping), slopes / end + tilt * values
         return Table(end * x, measure, values, slopes, log_mass, polynomials, 0.0, end)
 
@@ -463,14 +463,14 @@ class StateAxis(NoiseAxis):
 
     def _changed_generator(self, change: NoiseDerivative) -> FloatArray:
         logs = self._changed_law(change)[:, None]
-        return np.asarray(self.rule.measure[:, None] * (logs * self._rates + self._changed_rates(change)))
+        return self.rule.measure[:, None] * (logs * self._rates + self._changed_rates(change))
 
     def _changed_law(self, change: NoiseDerivative) -> FloatArray:
         """With ∂π from πQ = 0: (∂π)Q = −π ∂Q, of the sum 0."""
         unit = np.abs(self._rates).max()
         equations = np.vstack([self._rates.T / unit, np.ones(self.size)])
         right = np.append(-self.rule.measure @ self._changed_rates(change) / unit, 0.0)
-        return np.asarray(np.linalg.lstsq(equations, right, rcond=None)[0] / self.rule.measure)
+        return np.linalg.lstsq(equations, right, rcond=None)[0] / self.rule.measure
 
     def _moved(self, change: NoiseDerivative) -> FloatArray:
         return np.array(change.states) if change.states else np.zeros(self.size)
@@ -478,7 +478,7 @@ class StateAxis(NoiseAxis):
     def started(self, xi: float) -> FloatArray:
         """The functions at one ξ, shape (size,): their mean over the states that have this value."""
         chosen = np.isclose(self.xi, xi, rtol=1e-9, atol=0) * self.rule.measure
-        return np.asarray(chosen / chosen.sum())
+        return chosen / chosen.sum()
 
     def samples(self) -> Samples:
         return Samples(self.xi, self.rule.measure, np.ones(self.size), self.rule.values, np.ones(self.size))
@@ -487,7 +487,7 @@ class StateAxis(NoiseAxis):
 def slope_along(g: Coefficient, xi: FloatArray, moved: FloatArray) -> FloatArray:
     """g′(ξ) ∂ξ/∂θ, from the points ξ and ∂ξ/∂θ there."""
     step = STEP * (np.abs(xi).max() or 1.0) / (np.abs(moved).max() or 1.0)
-    return np.asarray((g(xi + step * moved) - g(xi - step * moved)) / (2 * step))
+    return (g(xi + step * moved) - g(xi - step * moved)) / (2 * step)
 
 
 def form(values: FloatArray, measure: FloatArray) -> FloatArray:

@@ -353,7 +353,7 @@ class PhaseAxis(DividedAxis):
 
     def folded(self, phi: FloatArray) -> FloatArray:
         """The points of the domain that are φ but for whole turns of it."""
-        return np.asarray(self.lines[0] + np.mod(phi - self.lines[0], self.span))
+        return self.lines[0] + np.mod(phi - self.lines[0], self.span)
 
     @cached_property
     def _derivative(self) -> Matrix:

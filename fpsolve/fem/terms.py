@@ -169,8 +169,7 @@ class Terms:
 
     def _matrices(self, term: CoefficientMatrix) -> tuple[Matrix, Matrix]:
         """h·∇ and q of a term of the motion."""
-        found: tuple[Matrix, Matrix] = self.phi.motion(term)
-        return found
+        return self.phi.motion(term)
 
     def _driven(self, term: CoefficientMatrix) -> Iterator[Term]:
         """h·∇ + p q of a term of the motion."""
