@@ -218,7 +218,7 @@ class FunctionAxis:
         return self
 
     def raised(self) -> Self:
-        """One function more in each cell, where what a cell lacks harms others."""
+        """One degree more, or two, to tell by a change to first order what is lacking."""
         return self
 
     def refined(self, effects: ModeEffects, share: float) -> Self:
@@ -252,9 +252,6 @@ class DividedAxis(FunctionAxis):
 
     def doubled(self) -> Self:
         return self.on(halved(self.lines), np.repeat(self.degrees, 2))
-
-    def raised(self) -> Self:
-        return self.on(self.lines, np.minimum(self.degrees + 1, MAX_DEGREE))
 
     def refined(self, effects: ModeEffects, share: float) -> Self:
         return self.on(*split(self.lines, effects, share))
