@@ -33,7 +33,7 @@ from numpy.typing import ArrayLike
 
 from fpsolve.arrays import FloatArray, dense, real_array, real_number, real_numbers, shown
 from fpsolve.budget import unless_over_budget
-from fpsolve.data import Quantity, Result, dataset
+from fpsolve.data import Result, dataset
 from fpsolve.drawing import add_legend, in_full, label_axes
 from fpsolve.errors import NotConverged
 from fpsolve.exponent.density import mean_functions, own_phases, phase_functions
@@ -134,7 +134,7 @@ class Excursion(Result):
         """The bounds, and the asymptotic number of upcrossings, over some A."""
         levels = real_numbers(level, "level")
         low, high = self.bounds(levels)
-        numbers: dict[Quantity, Any] = {LEAST_PROBABLE: low, MOST_PROBABLE: high}
+        numbers = {LEAST_PROBABLE: low, MOST_PROBABLE: high}
         if self.upcrossings is not None:
             numbers[UPCROSSINGS] = self.expected_upcrossings(levels)
         more = {"phi": self.phi, "xi": self.xi}

@@ -35,7 +35,6 @@ from fpsolve.exponent.kinds import choose
 from fpsolve.exponent.method import Budget
 from fpsolve.messages import Code, Message
 from fpsolve.model.problem import Problem
-from fpsolve.model.quantity import Quantity
 
 if TYPE_CHECKING:
     import xarray
@@ -92,7 +91,7 @@ class Design(Result):
 
     def to_xarray(self) -> xarray.Dataset:
         """The values of the parameters, with their errors, and the quantity."""
-        numbers: dict[Quantity, Any] = {
+        numbers = {
             quantity: number
             for each in (*self.values.values(), self.found)
             for quantity, number in ((each.quantity, each.value), (each.quantity.error(), each.error_estimate))
@@ -186,7 +185,7 @@ def axes_of(problem: Problem, by: str | Axis | Sequence[str | Axis]) -> tuple[Ax
 
 def units_of(problem: Problem, axes: Sequence[Axis], stated: Mapping[str, float]) -> dict[str, float]:
     """What a change of each parameter is measured by. Raises `ValueError`."""
-    found = dict[str, float]()
+    found = {}
     for axis in axes:
         unit = real_number(stated.get(axis.key, abs(float(problem.values[axis.key])) or axis.stop - axis.start), "unit")
         if not unit > 0:

@@ -156,7 +156,7 @@ def scanned(count: int, found: Iterator[Scan], progress: Callable[[], None] = la
 
     `progress` is called for each node.
     """
-    results = list[Scan]()
+    results = []
     for result in islice(found, count):
         results.append(result)
         for _ in range(count):

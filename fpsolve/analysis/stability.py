@@ -124,7 +124,7 @@ class Boundary(Result):
     @property
     def branches(self) -> tuple[Branch, ...]:
         """The branches in the parameters themselves."""
-        found = list[Branch]()
+        found = []
         for trace in self.traces:
             u, v, width = np.array([(*point.at, point.width) for point in trace.points]).T
             labels = tuple(point.label for point in trace.points)

@@ -228,7 +228,7 @@ def mode_effects(pair: PrincipalPair) -> tuple[ModeEffects | None, ...]:
         np.maximum.at(degrees, axis.cells[inside], axis.modes[inside])
         masks = inside & (degrees[axis.cells] - axis.modes == np.arange(4)[:, None])  # from the highest mode on
         others = tuple({*range(1, count + 1)} - {k + 1})
-        nested: list[Any] = count * [None]
+        nested = count * [None]
         nested[k] = axis.nested
         smooth, rough = along(nested, both)
         parts = rough * np.cumsum(operator @ (smooth * np.expand_dims(masks, others)), axis=0)

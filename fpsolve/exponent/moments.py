@@ -370,7 +370,7 @@ class Equations:
         self.noises, names = list(named.values()), list(named)
         drift, diffusions, impulses = problem.noise.motion(problem.system)
         steady, self._loads = np.zeros(2 * (problem.dimension,)), list[tuple[Any, int]]()
-        loads = list[FloatArray]()
+        loads = []
         for term in drift.terms:
             matrix = drift.epsilon**term.order * np.array(term.matrix)
             if term.g == one:

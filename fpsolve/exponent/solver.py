@@ -283,7 +283,7 @@ class ExponentSolver:
         for q, row in rows.items():
             if not math.isnan(row.derivative_error):
                 self.slope_errors.setdefault(q, row.derivative_error)
-        failures = dict[float, Failure]()
+        failures = {}
         inwards = np.lexsort((-np.abs(points), points < 0))  # as a mesh for a large |p| serves smaller ones
         for q in points[inwards].tolist():
             begin(f"Λ({q:g})")

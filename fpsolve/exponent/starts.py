@@ -168,7 +168,7 @@ def other_centers(pair: PrincipalPair) -> list[float]:
 def _of_filters(pair: PrincipalPair, least: float) -> list[float]:
     problem, center = pair.generator.problem, pair.space.xi.center
     z, rate = steady_places(problem, pair.p)
-    found: list[float] = z[(np.abs(z - center) > 5) & (rate > least)][:1].tolist()
+    found = z[(np.abs(z - center) > 5) & (rate > least)][:1].tolist()
     if center:
         amplitude, swinging = swing(problem, pair.p)
         found += [0.0] * (amplitude > 5 and swinging > least)

@@ -75,12 +75,8 @@ class Subsystem(System):
 
     def part(self, terms: Sequence[CoefficientMatrix]) -> tuple[CoefficientMatrix, ...]:
         """W_k A V_k of some terms of the whole, without those of which nothing is left."""
-        found = list[CoefficientMatrix]()
-        for term in terms:
-            matrix = self.inside(term.matrix)[np.ix_(self.own, self.own)]
-            if np.any(matrix):
-                found.append(replace(term, matrix=matrix))
-        return tuple(found)
+        found = [(term, self.inside(term.matrix)[np.ix_(self.own, self.own)]) for term in terms]
+        return tuple(replace(term, matrix=matrix) for term, matrix in found if np.any(matrix))
 
     @property
     def section(self) -> str:  # type: ignore[override]

@@ -8,7 +8,7 @@ from contextlib import contextmanager, suppress
 from functools import lru_cache, partial, reduce
 from itertools import pairwise
 from threading import RLock
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 from scipy.linalg.lapack import dgetrf, dgetrs
@@ -97,9 +97,7 @@ class SparseFactors:
     """
 
     def __init__(self, operator: KroneckerSum) -> None:
-        patterns: list[Any] = [
-            sum(abs(csc_matrix(each)) for each in axis) for axis in zip(*operator.terms, strict=True)
-        ]
+        patterns = [sum(abs(csc_matrix(each)) for each in axis) for axis in zip(*operator.terms, strict=True)]
         coupled = [k for k, each in enumerate(patterns) if each.nnz > 0.5 * each.shape[0] ** 2]
         order, rule = np.arange(operator.size).reshape(operator.shape), "MMD_AT_PLUS_A"
         if coupled:

@@ -135,7 +135,7 @@ class Generator:
         axes = self.space(p).noises
         if by not in self._changes:
             self._changes[by] = tuple(self._maker.changed(by))
-        parts: list[tuple[Matrix, ...]] = [
+        parts = [
             (phase, *map(NoiseAxis.matrix, axes, term.noises))
             for term in self._changes[by]
             if (phase := term.at(p, derivative)) is not None

@@ -123,7 +123,7 @@ class PlaneTerms(Terms):
             rates = matrix_at(system, framed.problem.valued.combined([axis.xi for axis in noises]))
             speed = turning(rates.reshape(-1, 1, 2, 2))(self._vertices)
             is_pointwise, direction = ~is_pointwise, 1.0 * np.all(speed > 0, axis=0) - np.all(speed < 0, axis=0)
-        self._walls = list[Wall]()
+        self._walls = []
         for jump, v in zip(system.jumps, framed.wall_speeds(system), strict=True):
             at = vertices_at(phi.lines, jump.phase)
             is_pointwise[at], direction[at] = True, math.copysign(1.0, v)

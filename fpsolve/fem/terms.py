@@ -130,7 +130,7 @@ class Terms:
 
     def all(self) -> list[Term]:
         """L(p) of Eq. (19)."""
-        found = list[Term]()
+        found = []
         for name in self._names:
             text = f"L_ξ, the generator of the noise{f' {name}' if name else ''}"
             found.append(self._term(self.phi.matrix(one), None, text, name=name))
