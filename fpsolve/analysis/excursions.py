@@ -137,9 +137,8 @@ class Excursion(Result):
         numbers = {LEAST_PROBABLE: low, MOST_PROBABLE: high}
         if self.upcrossings is not None:
             numbers[UPCROSSINGS] = self.expected_upcrossings(levels)
-        more = {"phi": self.phi, "xi": self.xi}
-        title = "probability of excursions"
-        return dataset(title, "finite elements", numbers, {LEVEL: levels}, self.parameters, notes=self.notes, **more)
+        about, notes = ("probability of excursions", "finite elements"), self.notes
+        return dataset(*about, numbers, {LEVEL: levels}, self.parameters, notes=notes, phi=self.phi, xi=self.xi)
 
     def _draw(self, found: xarray.Dataset, axes: Axes, **kwargs: Any) -> None:
         """Both bounds over A, and what lies between them."""

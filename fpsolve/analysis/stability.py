@@ -232,8 +232,16 @@ class Boundary(Result):
         }
         held = {key: value for key, value in self.problem.values.items() if key not in (self.x.key, self.y.key)}
         closed = ", ".join(str(number) for number, branch in enumerate(branches, start=1) if branch.closed)
-        more = {"line": self.target.equation, "closed_branches": closed, "remark": self.remark()}
-        found = dataset("line of stability", "finite elements", variables, coordinates, held, **more)
+        found = dataset(
+            "line of stability",
+            "finite elements",
+            variables,
+            coordinates,
+            held,
+            line=self.target.equation,
+            closed_branches=closed,
+            remark=self.remark(),
+        )
         found.x.attrs["key"], found.y.attrs["key"] = self.x.key, self.y.key
         return found
 
@@ -268,8 +276,8 @@ class ZeroField:
 
     def __init__(self, line: Boundary, rtol: float, seconds: float, spent: Message) -> None:
         self._line, self._rtol, self._most, self._spent = line, rtol, seconds, spent
-        settings = {"rtol": rtol, "of_value": line.of_value, "budget": line.budget}
-        self._distance = Distance(line.problem, line.target, [line.x.key, line.y.key], **settings)
+        keys, of_value = [line.x.key, line.y.key], line.of_value
+        self._distance = Distance(line.problem, line.target, keys, rtol=rtol, of_value=of_value, budget=line.budget)
         self.seconds, self.stopped = 0.0, None if seconds > 0 else spent
 
     def __call__(self, at: FloatArray) -> Sample:

@@ -181,8 +181,8 @@ def _rightmost_pair(pencil: Pencil, generator: Generator, reached: PrincipalPair
     pair = _reached(generator, pencil, right, left)
     defect = min(pair.sign_defects)
     if not (pair.residual <= BACKWARD_ERROR_LIMIT and defect <= POSITIVE and abs(pair.value - value) < distance):
-        limits = {"limit": BACKWARD_ERROR_LIMIT, "most": POSITIVE}
-        told = Message(Code.NO_EIGENVALUE, p=p, residual=pair.residual, size=defect, **limits)
+        limit, most = BACKWARD_ERROR_LIMIT, POSITIVE
+        told = Message(Code.NO_EIGENVALUE, p=p, residual=pair.residual, size=defect, limit=limit, most=most)
         raise NotConverged(told, pair, Remedy.BOTH_AXES)
     if not _has_other_positive(generator, p):
         return pair

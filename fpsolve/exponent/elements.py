@@ -182,8 +182,8 @@ class Elements(Method):
     def _witness(self, p: float, value: float, error: float) -> None:
         """Refuse a value with this error that contradicts the even moment of the same p."""
         if (known := self.even(p)) and abs(value - known.value) > doubt(error, known):
-            told = {"p": p, "value": value, "other": p, "expected": known.value}
-            raise NotConverged(Message(Code.NOT_PRINCIPAL, **told), remedy=self.refinement)
+            told = Message(Code.NOT_PRINCIPAL, p=p, value=value, other=p, expected=known.value)
+            raise NotConverged(told, remedy=self.refinement)
 
     def even(self, p: float) -> EvenMoment | None:
         """Λ(p) of an even p > 0 by the equations of the moments; None where these do not close, or are too many.

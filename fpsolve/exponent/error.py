@@ -166,14 +166,14 @@ class Solution:
     Attributes:
         pair: the principal pair.
         unresolved: what is left of a correction by finer functions of directions, or shown by halved cells of φ.
-        measured: what finer functions of each axis, or of all, change; None where the effects of the highest modes
+        measured: what finer functions of each axis, or of all, change; none where the effects of the highest modes
             tell.
         start: the place where it was found, and its functions; None where these are just those of the pair.
     """
 
     pair: PrincipalPair
     unresolved: float = 0.0
-    measured: tuple[float, ...] | None = None
+    measured: tuple[float, ...] = ()
     start: Any = None
 
     @property
@@ -201,9 +201,7 @@ class Solution:
     @cached_property
     def error(self) -> float:
         """Estimate of the error of `value`: by functions that the space lacks, the ends of an interval, rounding."""
-        of_axes = self.measured
-        if of_axes is None:
-            of_axes = tuple(each.error for each in self.effects if each)
+        of_axes = self.measured or [each.error for each in self.effects if each]
         return sum(of_axes) + sum(self.truncation) + self.pair.rounding + self.unresolved
 
 

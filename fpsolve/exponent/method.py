@@ -246,9 +246,9 @@ class Method:
     def checked(self, estimate: Estimate, p: float | None = None) -> Estimate:
         """An estimate, such as that of Λ(p), whose error leaves it a meaning. Raises `NotConverged`."""
         if not estimate.relative_error <= MEANINGLESS:
-            number = {"value": estimate.value, "size": estimate.error_estimate}
-            symbol = estimate.quantity.symbol if p is None else "Λ(p)"
-            raise NotConverged(Message(Code.MEANINGLESS, p=p, symbol=symbol, **number), estimate, self.refinement)
+            symbol, size = estimate.quantity.symbol if p is None else "Λ(p)", estimate.error_estimate
+            told = Message(Code.MEANINGLESS, p=p, symbol=symbol, value=estimate.value, size=size)
+            raise NotConverged(told, estimate, self.refinement)
         return estimate
 
     @property

@@ -176,7 +176,7 @@ class DirectionStart(Start):
 
     def finer(self, phi: DirectionAxis, solution: Solution, share: float) -> Space:
         """That with some functions of directions, and more of each noise that lacks more than a share."""
-        noises, errors = list(self.space.noises), (solution.measured or ())[1:]
+        noises, errors = list(self.space.noises), solution.measured[1:]
         for k, (axis, effects, error) in enumerate(zip(noises, solution.effects[1:], errors, strict=True)):
             if effects is not None and error > share:
                 noises[k] = axis.enriched() if error < effects.error else axis.refined(effects, share)
@@ -245,8 +245,7 @@ class SphereStart(DirectionStart):
 
     def refined(self, solution: Solution, goal: float, most: int) -> SphereStart:
         """Waves of the next degree; or other elements and functions of the noise, with waves of the degree before."""
-        of_axes = solution.measured or ()
-        phi, share = self.space.phi, MINOR * goal
+        of_axes, phi, share = solution.measured, self.space.phi, MINOR * goal
         if sum(of_axes) <= 0.5 * goal:
             return self.of_waves(phi.waves + 2, (solution,))
         found = self.finer(phi.finer(["degree"]) if of_axes[0] > share else phi, solution, share)

@@ -99,8 +99,10 @@ class MomentLyapunov(Result):
         if not (count := np.count_nonzero(shares > rtol)):
             return found
         worst, remedy = int(np.argmax(shares)), Remedy.ROUNDING if method.adapts else Remedy.MESH
-        at = {"p": p[worst], "size": shares[worst]}
-        return Message(Code.RTOL_MISSED, rtol=rtol, count=count, of=p.size, **at, remedy=remedy), *found
+        told = Message(
+            Code.RTOL_MISSED, rtol=rtol, count=count, of=p.size, p=p[worst], size=shares[worst], remedy=remedy
+        )
+        return told, *found
 
     @cached_property
     def notes(self) -> tuple[Message, ...]:
@@ -140,10 +142,17 @@ class MomentLyapunov(Result):
         columns = {name: getattr(self, name) for name in ("value", "error_estimate", "residual")}
         columns |= {"derivative": self.slope, "derivative_error": self.errors_of(self.slope)}
         numbers = {quantity.OVER_P[name]: each for name, each in columns.items()}
-        failures, values = [each.reason for each in self.failures], self.solver.problem.values
-        more = {"warnings": self.warnings, "notes": self.notes, "failures": failures}
-        title, places = quantity.MOMENT.words, {quantity.P: self.p}
-        return dataset(title, self.solver.method.name, numbers, places, values, rtol=self.solver.rtol, **more)
+        return dataset(
+            quantity.MOMENT.words,
+            self.solver.method.name,
+            numbers,
+            {quantity.P: self.p},
+            self.solver.problem.values,
+            rtol=self.solver.rtol,
+            warnings=self.warnings,
+            notes=self.notes,
+            failures=[each.reason for each in self.failures],
+        )
 
     def _said(self) -> str:
         if not self.p.size:

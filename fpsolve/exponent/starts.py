@@ -122,8 +122,8 @@ def _of_filter(problem: Problem, p: float, digits: float, center: float | None) 
 
 def _of_diffusion(problem: Problem, p: float, digits: float, center: float | None) -> tuple[NoiseAxis, Xi]:
     """Polynomials with the tilt that has its peak at z."""
-    noise, frozen = problem.valued, frozen_noise(problem)
-    assert frozen is not None
+    noise = problem.valued
+    frozen: Any = frozen_noise(problem)
     unit, end = noise.standard_deviation, noise.half_width / noise.standard_deviation
     center = frozen.center(p) if center is None else center
     slope = frozen.tilt(center) / p if noise.may_tilt else 0.0
@@ -176,8 +176,7 @@ def _of_filters(pair: PrincipalPair, least: float) -> list[float]:
 
 
 def _of_diffusions(pair: PrincipalPair, least: float) -> list[float]:
-    frozen = frozen_noise(pair.generator.problem)
-    assert frozen is not None
+    frozen: Any = frozen_noise(pair.generator.problem)
     z, rate = frozen.peaks(pair.p)
     if z.size < 2:
         return []

@@ -140,7 +140,6 @@ class StopStart(DirectionStart):
 
     def refined(self, solution: Solution, goal: float, most: int) -> StopStart:
         """Two degrees more where they change most, if they are to, and other functions of the noise."""
-        assert solution.measured is not None
         phi, changes, tried = self.space.phi, np.array(solution.start.changes), ()
         if not self.before or solution.measured[0] > 0.5 * goal:
             left, raised = OF_ONE * changes, changes >= WORTH * np.max(changes)

@@ -224,8 +224,15 @@ def weak_noise_note(problem: Problem, p: FloatArray, value: FloatArray) -> Messa
     if not np.any(beyond):
         return None
     worst, first = int(np.argmax(shares)), np.min(np.abs(p[beyond]))
-    found = {"first": first, "p": p[worst], "rest": rest[worst], "size": shares[worst]}
-    return Message(Code.STRONG_NOISE, is_reduced=problem.noise.approximates_spectrum, most=STRONG, **found)
+    return Message(
+        Code.STRONG_NOISE,
+        is_reduced=problem.noise.approximates_spectrum,
+        most=STRONG,
+        first=first,
+        p=p[worst],
+        rest=rest[worst],
+        size=shares[worst],
+    )
 
 
 def first_order_eigenfunction(problem: Problem, p: float, phi: ArrayLike, xi: ArrayLike) -> FloatArray:
