@@ -149,7 +149,7 @@ class Boundary(Result):
     @property
     def zero_field(self) -> ZeroField:
         """F over the unit square, with the time that is left for the line."""
-        most = math.inf if self.budget.line_seconds is None else self.budget.line_seconds
+        most = self.budget.line_seconds or math.inf
         return ZeroField(self, self.rtol, most - self.seconds, Message(Code.LINE_SPENT, most=most))
 
     def remark(self) -> str:
@@ -175,8 +175,8 @@ class Boundary(Result):
 
     def rows(self) -> list[Row]:
         """The rows of its scan, tasks for `scan_row`, each of which begins anew; they pickle small."""
-        count, most = self.nodes, self.budget.line_seconds
-        share = math.inf if most is None else SCAN_SHARE * most / count
+        count = self.nodes
+        share = SCAN_SHARE * (self.budget.line_seconds or math.inf) / count
         seconds, key = min((self.budget.seconds, "budget.seconds"), (share, LINE_KEY))
         spent = Message(Code.ROW_SPENT, most=seconds, key=key)
         return [Row(ZeroField(self, self.scan_rtol, seconds, spent), count, number) for number in range(count)]
@@ -355,8 +355,8 @@ def untraced(
     y: Axis,
     problem: Problem,
     *,
-    step: float | None = None,
-    nodes: int | None = None,
+    step: float | None,
+    nodes: int | None,
     **more: Any,
 ) -> Boundary:
     """A line of which nothing is traced, with the usual step and nodes where they are None. Raises `ValueError`."""

@@ -80,7 +80,7 @@ class Elements(Method):
         has_witness: whether the equations of even moments are independent of L(p), and quick.
     """
 
-    has_witness: bool = True
+    has_witness = True
     remedy = Remedy.BUDGET
 
     def __init__(self, *args: Any) -> None:
@@ -169,7 +169,7 @@ class Elements(Method):
         with self.solving(pair.p):
             return self.pair_on(Generator(self.problem, chosen), pair.p, pair)
 
-    def near_zero(self, p: float, tolerance: Tolerance | None = None) -> Solution:
+    def near_zero(self, p: float, tolerance: Tolerance | None) -> Solution:
         """The solution at ±`SMALL_P` that a smaller p goes with."""
         side = p or (-1.0 if self.lacks_moments else 1.0)  # on which Λ is finite
         q = math.copysign(SMALL_P, side)

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
 from types import MappingProxyType
-from typing import Annotated, Any, ClassVar, NamedTuple, Protocol
+from typing import Annotated, Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -89,7 +89,7 @@ class Budget:
 
     def most(self, stage: Stage | Space) -> int:
         """Number of unknowns that a space, or a stage, may have."""
-        return stage.most_unknowns if self.unknowns is None else self.unknowns
+        return self.unknowns or stage.most_unknowns
 
     def meter(self) -> Meter:
         """For the numbers of a parameter set."""
@@ -163,16 +163,16 @@ class Method:
         remedy: what to do where it is not resolved, or a budget does not suffice.
     """
 
-    name: ClassVar[str] = "finite elements"
-    usual_rtol: float = RTOL
-    pictures: Pictures = DIRECTIONS
-    no_picture: str = ""
-    adapts: bool = True
-    is_function: bool = False
-    is_quick: bool = False
-    by_moments: bool = False
+    name = "finite elements"
+    usual_rtol = RTOL
+    pictures = DIRECTIONS
+    no_picture = ""
+    adapts = True
+    is_function = False
+    is_quick = False
+    by_moments = False
     ray: float | None = None
-    is_computed: bool = True
+    is_computed = True
     spaces: Mapping[float, Any] = MappingProxyType({})
     remedy: Remedy | None = None
 

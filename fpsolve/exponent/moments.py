@@ -141,10 +141,8 @@ def even_moment(
         return max(min(loosest * found.scale, math.inf if tolerance is None else tolerance), 2 * found.rounding)
 
     search = Search(p, allowed, budget, Remedy.BUDGET)
-    last: EvenMoment | None
     with unless_over_budget():
-        last = search.settle(Level(equations, (FIRST,) * len(equations.noises), most))
-        return last
+        return search.settle(Level(equations, (FIRST,) * len(equations.noises), most))
     if (last := search.judged) and last.error <= (LARGEST_ERROR * last.scale if tolerance is None else tolerance):
         return last
     if search.failure:
@@ -181,9 +179,7 @@ def refuse_open_hierarchy(problem: Problem, p: float) -> None:
     if problem.system.pasts and p != 2:
         raise NoHierarchy(f"got p = {p:g}; with a delay the equations of the moments are for p = 2; {REMEDY}")
     moments = math.comb(int(p) + problem.dimension - 1, problem.dimension - 1)
-    count = moments
-    for noise in problem.valued.parts.values():
-        count *= BASES[noise.basis](noise, FIRST).size
+    count = moments * math.prod(BASES[noise.basis](noise, FIRST).size for noise in problem.valued.parts.values())
     limits = (MOST_MOMENTS, MOST) if p > 2 else (math.inf, MOST_NUMBERS)
     for number, what, limit in zip((moments, count), ("moments", "equations"), limits, strict=True):
         if number > limit:

@@ -135,7 +135,7 @@ AXES = {"cells": _of_tails, "pairs": _of_filter, "polynomials": _of_diffusion}
 """The first functions of one noise by its `basis`, and ξ about which the phase is looked at; of others any will do."""
 
 
-def _phase(system: System, xi: Xi, digits: float, is_smooth: bool = False) -> PhaseAxis:
+def _phase(system: System, xi: Xi, digits: float, is_smooth: bool) -> PhaseAxis:
     """Equal cells on a half circle from one jump to where it comes again, and a line at every other jump.
 
     There are more where the speed of the phase changes much for some of the ξ; but one, of a higher degree, where

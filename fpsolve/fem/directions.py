@@ -221,7 +221,7 @@ class DirectionAxis(FunctionAxis):
     lines: FloatArray = field()
     degree: int
     waves: int
-    terms: ClassVar[type[DirectionTerms]] = DirectionTerms
+    terms = DirectionTerms
     ways: ClassVar[tuple[str, ...]] = "degree", "waves"
     is_followed = True
 
@@ -273,8 +273,7 @@ class DirectionAxis(FunctionAxis):
         found = self.deeper(*ways)
         for way, lines in (("degree", "lines"), ("first_degree", "first_lines")):
             if way in ways and (way in halved_ways or getattr(found, way) > HALVED_DEGREE):
-                halves = {way: getattr(found, way) // 2, lines: halved(getattr(self, lines))}
-                found = replace(found, **halves)
+                found = replace(found, **{way: getattr(found, way) // 2, lines: halved(getattr(self, lines))})
         return found
 
     def new_in(self, coarse: DirectionAxis) -> Mask:
@@ -544,13 +543,13 @@ class HalfSphereAxis(DirectionAxis):
     def _speeds(self, c: FloatArray, s: FloatArray) -> FloatArray:
         return c * s**3
 
-    def struck(self, log_factor: float, p: float, derivative: int = 0) -> Matrix:
+    def struck(self, log_factor: float, p: float, derivative: int) -> Matrix:
         """∂ᵏ/∂pᵏ of ∫ v (ρ^p u(η′, π/2, θ₂) − u) over θ₁ = −π/2."""
         eta, weights, after, logs = self._impacts(log_factor)
         found = self._at_wall(eta, weights * OfMoment(0, logs)(p, derivative), self.line.at(after), 1)
         return found if derivative else found - self._at_wall(eta, weights, self.line.at(eta), 0)
 
-    def changed_impacts(self, log_factor: float, p: float, derivative: int = 0) -> Matrix:
+    def changed_impacts(self, log_factor: float, p: float, derivative: int) -> Matrix:
         """The derivative by ln R of what `struck` gives."""
         eta, weights, after, logs = self._impacts(log_factor)
         longer = np.cos(after) ** 2 * OfMoment(1, logs)(p, derivative)

@@ -8,7 +8,6 @@ from contextlib import contextmanager, suppress
 from functools import lru_cache, partial, reduce
 from itertools import pairwise
 from threading import RLock
-from typing import Protocol
 
 import numpy as np
 from scipy.linalg.lapack import dgetrf, dgetrs
@@ -47,13 +46,6 @@ def one_thread() -> Iterator[None]:
 def _pools(modules: int) -> ThreadpoolController:
     """Those of the libraries that are loaded with so many modules: a later one may bring another."""
     return ThreadpoolController()
-
-
-class Factors(Protocol):
-    """LU factors of a matrix A."""
-
-    def solve(self, b: FloatArray, *, transposed: bool = False) -> FloatArray:
-        """x of A x = b, or of Aᵀx = b."""
 
 
 def factorised(operator: KroneckerSum, noise: int | None) -> Factors:
@@ -184,3 +176,7 @@ class LevelFactors:
             if transposed:
                 rest[own] = self._pivots[k].solve(rest[own], transposed=True)
         return np.moveaxis(rest.reshape(table.shape), 0, self._axis).reshape(b.shape)
+
+
+Factors = ArrayFactors | SparseFactors | LevelFactors
+"""LU factors of a matrix A; `solve` gives x of A x = b, or of Aᵀx = b."""

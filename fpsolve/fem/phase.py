@@ -328,7 +328,7 @@ class PhaseAxis(DividedAxis):
         """∂ᵏ/∂pᵏ of ∫ w |exp(B)e|^p T(ψ(φ)), ψ being where an impulse takes φ."""
         return self.stored(struck.at.T @ diags(OfMoment(0, struck.logs)(p, derivative)) @ struck.end)
 
-    def changed_impulses(self, struck: Struck, of: Impulse, by: Impulse, p: float, derivative: int = 0) -> Matrix:
+    def changed_impulses(self, struck: Struck, of: Impulse, by: Impulse, p: float, derivative: int) -> Matrix:
         """∂/∂θ of what `impulses` gives, where B depends on θ."""
         logs, e = struck.logs, np.stack([np.cos(struck.points), -np.sin(struck.points)])
         (x, u), (dx, du) = (matrix @ e for matrix in (of.matrix, changed_exponential(of.exponent, by.exponent)))
