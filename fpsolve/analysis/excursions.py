@@ -346,18 +346,19 @@ def _extremes(pair: PrincipalPair, is_smooth: bool) -> FloatArray:
 
 def _between(values: FloatArray, axes: Sequence[int]) -> FloatArray:
     """How far a function may be beyond its values at three neighbours: an eighth of their second difference."""
-    ends = [[(int(k == axis),) * 2 for k in range(values.ndim)] for axis in axes]
-    bent = (np.abs(np.diff(values, n=2, axis=axis)) / 8 for axis in axes)
-    return np.sum([np.pad(each, end, mode="edge") for each, end in zip(bent, ends, strict=True)], axis=0)
+    total = np.zeros_like(values)
+    for axis in axes:
+        ends = [(int(k == axis),) * 2 for k in range(values.ndim)]
+        total += np.pad(np.abs(np.diff(values, n=2, axis=axis)) / 8, ends, mode="edge")
+    return total
 
 
 def _where_positive(values: FloatArray, rate: FloatArray, axes: Sequence[int]) -> FloatArray:
     """The values where a rate is not negative, also where it is 0 between two points, shape (n,)."""
     found = [values[rate >= 0]]
     for axis in axes:
-        (here, there), (own, other) = (
-            (each[:-1], each[1:]) for each in (np.moveaxis(t, axis, 0) for t in (rate, values))
-        )
+        both = np.moveaxis(np.stack([rate, values]), axis + 1, 1)
+        (here, own), (there, other) = both[:, :-1], both[:, 1:]
         crosses = (here >= 0) != (there >= 0)
         share = here[crosses] / (here[crosses] - there[crosses])
         found.append(own[crosses] + share * (other[crosses] - own[crosses]))

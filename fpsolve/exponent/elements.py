@@ -396,8 +396,8 @@ class GivenMesh(PlaneElements):
     @cached_property
     def generators(self) -> tuple[Generator, Generator]:
         """That of the mesh, and one of four degrees more, whose error hardly counts beside it. Raises `MeshError`."""
-        assert self.settings.mesh is not None
-        generator = Generator(self.problem, self.settings.mesh)
+        mesh: Any = self.settings.mesh
+        generator = Generator(self.problem, mesh)
         return generator, Generator(self.problem, generator.chosen.enriched().enriched())
 
     def solution(self, p: float, tolerance: Tolerance | None = None) -> Solution:

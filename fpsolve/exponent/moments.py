@@ -214,8 +214,8 @@ class EvenMoment:
     y: FloatArray
     moments: FloatArray
     polynomial: FloatArray
-    change: float = 0.0
-    finer: int = 0
+    change: float
+    finer: int
     derivative: ClassVar[float] = math.nan
 
     def __repr__(self) -> str:

@@ -27,7 +27,7 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import KW_ONLY, dataclass
 from typing import Any, Literal
 
 from fpsolve.arrays import is_whole, shown
@@ -200,9 +200,10 @@ class Index(Quantity):
         interval: where it is sought.
     """
 
-    solve: Callable[[ExponentSolver], Estimate | Absent] = field(kw_only=True)
-    theory: Callable[[Problem], float] = field(kw_only=True)
-    interval: tuple[float, float] = field(default=(-math.inf, math.inf), kw_only=True)
+    _: KW_ONLY
+    solve: Callable[[ExponentSolver], Estimate | Absent]
+    theory: Callable[[Problem], float]
+    interval: tuple[float, float] = (-math.inf, math.inf)
 
 
 def _index(

@@ -81,7 +81,7 @@ class MomentLyapunov(Result):
     error_estimate: FloatArray
     residual: FloatArray
     solver: ExponentSolver
-    curves: tuple[Curve, ...] = field(default=(), repr=False)
+    curves: tuple[Curve, ...] = ()
     root: float | None = None
     failures: tuple[Failure, ...] = ()
 

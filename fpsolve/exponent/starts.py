@@ -147,7 +147,7 @@ def _phase(system: System, xi: Xi, digits: float, is_smooth: bool) -> PhaseAxis:
     rays = [jump.phase for jump in system.jumps] or [math.pi / 2]
     lines = rays[0] + np.linspace(0, math.pi, cells + 1)
     others = rays[0] + np.mod(np.array(rays[1:]) - rays[0], math.pi)
-    near = np.min(np.abs(lines[1:-1, None] - others[None]), axis=1, initial=math.inf) < 0.3 * math.pi / cells
+    near = np.min(np.abs(lines[1:-1, None] - others), axis=1, initial=math.inf) < 0.3 * math.pi / cells
     lines = np.sort(np.concatenate([lines[:1], lines[1:-1][~near], lines[-1:], others]))
     degree = round(np.clip(digits + (4 if is_smooth else -2 if widest > 0.5 else 2), 4, MOST_DEGREE))
     return PhaseAxis(lines, np.full(lines.size - 1, degree))

@@ -13,7 +13,7 @@ from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 from scipy.linalg import cdf2rdf
 
 from fpsolve.arrays import ROUNDED, FloatArray
@@ -45,9 +45,9 @@ class Subsystem(System):
     basis: tuple[tuple[float, ...], ...]
     own: tuple[int, ...]
     names: tuple[str, ...]
-    rounded: float = 0.0
-    size: float = 1.0
-    jumps: tuple[Jump, ...] = ()
+    rounded: float
+    size: float
+    jumps: tuple[Jump, ...]
 
     @property
     def epsilon(self) -> float:
@@ -67,10 +67,10 @@ class Subsystem(System):
         basis = np.array(self.basis)
         return np.linalg.inv(basis), basis
 
-    def inside(self, matrix: ArrayLike) -> FloatArray:
+    def inside(self, matrix: Any) -> FloatArray:
         """A matrix in the coordinates of all blocks, without what is rounding."""
         rows, columns = self._sides
-        found = rows @ np.asarray(matrix) @ columns
+        found = rows @ matrix @ columns
         return np.where(np.abs(found) > self.rounded * np.linalg.norm(found), found, 0.0)
 
     def part(self, terms: Sequence[CoefficientMatrix]) -> tuple[CoefficientMatrix, ...]:
@@ -195,8 +195,7 @@ def couplings(blocks: Sequence[Subsystem], matrices: Iterable[FloatArray]) -> ND
 def reached(pattern: NDArray[Any]) -> NDArray[np.bool_]:
     """Which variable, the row, feels which, the column, through any number of others; every one feels itself."""
     count = len(pattern)
-    steps = np.linalg.matrix_power((np.asarray(pattern) != 0) | np.eye(count, dtype=bool), count)
-    return np.asarray(steps, dtype=bool)
+    return np.linalg.matrix_power((pattern != 0) | np.eye(count, dtype=bool), count)
 
 
 def components(pattern: NDArray[Any]) -> list[tuple[int, ...]]:

@@ -201,10 +201,6 @@ class FunctionAxis:
     def _matrices(self) -> dict[tuple[Coefficient | None, NoiseDerivative | None], Matrix]:
         return {}
 
-    def projection(self, other: Any) -> Matrix:
-        """The matrix that takes a function on another axis to its projection on this one, shape (size, other.size)."""
-        raise NotImplementedError
-
     def new_in(self, coarse: Any) -> Mask:
         """Which functions one of lower degrees does not have, shape (size,)."""
         return self.modes > np.max(coarse.modes)

@@ -128,6 +128,7 @@ class NoiseAxis(FunctionAxis):
         return self.samples()
 
     def projection(self, other: Any) -> Matrix:
+        """The matrix that takes a function on another axis to its projection on this one, shape (size, other.size)."""
         return np.eye(self.size, other.size)
 
     def law(self) -> FloatArray:
