@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from io import TextIOWrapper
 from pathlib import Path
 
-from cyclopts import App, CycloptsError, CycloptsPanel, Group
+from cyclopts import App, CycloptsError, CycloptsPanel, Group, Parameter
 
 from fpsolve import __version__
 from fpsolve.arrays import shown
@@ -59,6 +59,7 @@ app = App(
     version=lambda: f"fpsolve {__version__}",
     group_commands=Group(show=False),
     help_format="plaintext",
+    default_parameter=Parameter(negative=""),  # no --no-json, and no --empty-by
     suppress_keyboard_interrupt=False,
     error_formatter=lambda error: CycloptsPanel(escaped(short(str(error)))),
 )

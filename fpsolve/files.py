@@ -6,7 +6,6 @@ import csv
 import errno
 import json
 import os
-import stat
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -100,14 +99,6 @@ def alone(folder: Path) -> Iterator[None]:
         with suppress(OSError):
             path.unlink()
         lock.release()
-
-
-def plain_text(path: Path) -> str:
-    """The text of a file. Raises OSError or ValueError where it is a pipe or a device, too large, or not in UTF-8."""
-    about = path.stat()
-    if not stat.S_ISREG(about.st_mode) or about.st_size > LARGEST:
-        raise ValueError(f"{path} is no plain file, or larger than {LARGEST} bytes")
-    return path.read_text(encoding="utf-8")
 
 
 def write_json(path: Path, data: Any, indent: int | None = 1) -> None:

@@ -95,9 +95,9 @@ class Trace:
 def cubic(start: FloatArray, end: FloatArray, out: FloatArray, into: FloatArray, share: float) -> FloatArray:
     """On the cubic from a point to another with unit tangents there; shares beyond 1 continue it."""
     rise = end - start
-    length = float(np.linalg.norm(rise))
+    length = np.linalg.norm(rise)
     quadratic, third = 3 * rise - length * (2 * out + into), length * (out + into) - 2 * rise
-    return np.asarray(start + share * (length * out + share * (quadratic + share * third)))
+    return start + share * (length * out + share * (quadratic + share * third))
 
 
 def find_branches(

@@ -33,7 +33,7 @@ from numpy.typing import ArrayLike
 
 from fpsolve.arrays import FloatArray, dense, real_array, real_number, real_numbers, shown
 from fpsolve.budget import unless_over_budget
-from fpsolve.data import Quantity, Result, dataset
+from fpsolve.data import Result, dataset
 from fpsolve.drawing import add_legend, in_full, label_axes
 from fpsolve.errors import NotConverged
 from fpsolve.exponent.density import mean_functions, own_phases, phase_functions
@@ -134,12 +134,11 @@ class Excursion(Result):
         """The bounds, and the asymptotic number of upcrossings, over some A."""
         levels = real_numbers(level, "level")
         low, high = self.bounds(levels)
-        numbers: dict[Quantity, Any] = {LEAST_PROBABLE: low, MOST_PROBABLE: high}
+        numbers = {LEAST_PROBABLE: low, MOST_PROBABLE: high}
         if self.upcrossings is not None:
             numbers[UPCROSSINGS] = self.expected_upcrossings(levels)
-        more = {"phi": self.phi, "xi": self.xi}
-        title = "probability of excursions"
-        return dataset(title, "finite elements", numbers, {LEVEL: levels}, self.parameters, notes=self.notes, **more)
+        about, notes = ("probability of excursions", "finite elements"), self.notes
+        return dataset(*about, numbers, {LEVEL: levels}, self.parameters, notes=notes, phi=self.phi, xi=self.xi)
 
     def _draw(self, found: xarray.Dataset, axes: Axes, **kwargs: Any) -> None:
         """Both bounds over A, and what lies between them."""
@@ -311,8 +310,8 @@ def _mean_functions(axis: Any, xi: StartOfNoise) -> FloatArray:
     """The means of the functions of a noise over its start, shape (size,)."""
     if xi == STATIONARY:
         at = axis.samples()
-        return np.asarray((axis.law() * at.factor) @ at.values)
-    return np.asarray(axis.started(xi))
+        return (axis.law() * at.factor) @ at.values
+    return axis.started(xi)
 
 
 def _extremes(pair: PrincipalPair, is_smooth: bool) -> FloatArray:
@@ -347,18 +346,19 @@ def _extremes(pair: PrincipalPair, is_smooth: bool) -> FloatArray:
 
 def _between(values: FloatArray, axes: Sequence[int]) -> FloatArray:
     """How far a function may be beyond its values at three neighbours: an eighth of their second difference."""
-    ends = [[(int(k == axis),) * 2 for k in range(values.ndim)] for axis in axes]
-    bent = (np.abs(np.diff(values, n=2, axis=axis)) / 8 for axis in axes)
-    return np.sum([np.pad(each, end, mode="edge") for each, end in zip(bent, ends, strict=True)], axis=0)
+    total = np.zeros_like(values)
+    for axis in axes:
+        ends = [(int(k == axis),) * 2 for k in range(values.ndim)]
+        total += np.pad(np.abs(np.diff(values, n=2, axis=axis)) / 8, ends, mode="edge")
+    return total
 
 
 def _where_positive(values: FloatArray, rate: FloatArray, axes: Sequence[int]) -> FloatArray:
     """The values where a rate is not negative, also where it is 0 between two points, shape (n,)."""
     found = [values[rate >= 0]]
     for axis in axes:
-        (here, there), (own, other) = (
-            (each[:-1], each[1:]) for each in (np.moveaxis(t, axis, 0) for t in (rate, values))
-        )
+        both = np.moveaxis(np.stack([rate, values]), axis + 1, 1)
+        (here, own), (there, other) = both[:, :-1], both[:, 1:]
         crosses = (here >= 0) != (there >= 0)
         share = here[crosses] / (here[crosses] - there[crosses])
         found.append(own[crosses] + share * (other[crosses] - own[crosses]))

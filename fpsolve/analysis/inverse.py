@@ -35,7 +35,6 @@ from fpsolve.exponent.kinds import choose
 from fpsolve.exponent.method import Budget
 from fpsolve.messages import Code, Message
 from fpsolve.model.problem import Problem
-from fpsolve.model.quantity import Quantity
 
 if TYPE_CHECKING:
     import xarray
@@ -92,7 +91,7 @@ class Design(Result):
 
     def to_xarray(self) -> xarray.Dataset:
         """The values of the parameters, with their errors, and the quantity."""
-        numbers: dict[Quantity, Any] = {
+        numbers = {
             quantity: number
             for each in (*self.values.values(), self.found)
             for quantity, number in ((each.quantity, each.value), (each.quantity.error(), each.error_estimate))
@@ -146,7 +145,7 @@ def design(
     if isinstance(found, Absent):
         return found
     scaled = found.gradient * unit
-    errors = (abs(found.value) + found.error) * np.abs(scaled) / float(scaled @ scaled) * unit
+    errors = (abs(found.value) + found.error) * np.abs(scaled) / (scaled @ scaled) * unit
     if len(axes) > 1:  # how near to the nearest point of F = 0
         errors += SAME * np.maximum(unit, np.abs(found.at))
     parameters, solved = problem.parameters, distance.at(found.at)
@@ -186,7 +185,7 @@ def axes_of(problem: Problem, by: str | Axis | Sequence[str | Axis]) -> tuple[Ax
 
 def units_of(problem: Problem, axes: Sequence[Axis], stated: Mapping[str, float]) -> dict[str, float]:
     """What a change of each parameter is measured by. Raises `ValueError`."""
-    found = dict[str, float]()
+    found = {}
     for axis in axes:
         unit = real_number(stated.get(axis.key, abs(float(problem.values[axis.key])) or axis.stop - axis.start), "unit")
         if not unit > 0:
@@ -283,7 +282,7 @@ def _nearest(
         _approach(tried, best, axes, units)
         others = tried.beyond(best)
     if others:
-        other = min(others, key=lambda each: float(np.linalg.norm((each.at - best.at) / units)))
+        other = min(others, key=lambda each: np.linalg.norm((each.at - best.at) / units))
         if (found := _nearest_from(tried, _root(tried, best.at, other.at), axes, here, units)) is not None:
             return found
     return _unreached(tried, target, axes, bool(others))

@@ -54,7 +54,7 @@ class Sample(NamedTuple):
     def tangent(self) -> FloatArray:
         """Along the curve, F > 0 on its left, of length 1."""
         along = np.array([self.gradient[1], -self.gradient[0]])
-        return np.asarray(along / np.linalg.norm(along))
+        return along / np.linalg.norm(along)
 
     @property
     def width(self) -> float:
@@ -98,7 +98,7 @@ class Scan:
         order: Any = min(2, self.nodes.size - 1)
         twists = (np.gradient(each, self.nodes, axis=k, edge_order=order) for k, each in enumerate((by_v, by_u)))
         mixed = np.nan_to_num(0.5 * sum(twists))
-        return np.asarray(along(along(self.values, by_u).T, along(by_v, mixed).T).T)
+        return along(along(self.values, by_u).T, along(by_v, mixed).T).T
 
     def seeds(self) -> Iterator[Sample]:
         """Points on the lines F = 0 of the interpolated F, each with a gradient that tells their direction.
@@ -156,7 +156,7 @@ def scanned(count: int, found: Iterator[Scan], progress: Callable[[], None] = la
 
     `progress` is called for each node.
     """
-    results = list[Scan]()
+    results = []
     for result in islice(found, count):
         results.append(result)
         for _ in range(count):

@@ -83,7 +83,7 @@ class Sensitivities(Result):
 
     def to_xarray(self) -> xarray.Dataset:
         """The derivatives over p and θ, and their errors; NaN where there is none."""
-        numbers: dict[Quantity, FloatArray] = {}
+        numbers = {}
         single = [(RECORDS[name], (self.indices[name],)) for name in RECORDS if name in self.indices]
         for record, rows in [(MOMENT, self.moments), *single]:
             slope = record.by(THETA)

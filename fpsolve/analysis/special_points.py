@@ -30,7 +30,7 @@ Placed = tuple[float, Sample]
 
 def with_folds(field: Field, trace: Trace, names: tuple[str, str]) -> Trace:
     """A branch with the points at which it turns back in u, or in v, for which it has names."""
-    new: list[Placed] = []
+    new = []
     for axis in (0, 1):
         tangents = np.array([point.tangent[axis] for point in trace.points])
         tangents[np.abs(tangents) < FLAT] = 0
@@ -42,7 +42,7 @@ def with_folds(field: Field, trace: Trace, names: tuple[str, str]) -> Trace:
 
 def with_values(field: Field, trace: Trace, axis: int, values: Sequence[tuple[float, str]]) -> Trace:
     """A branch with its points where u, or v, has certain values, each with its label."""
-    new: list[Placed] = []
+    new = []
     for value, label in values:
         beyond = np.array([point.at[axis] for point in trace.points]) - value
         beyond[np.abs(beyond) < EQUAL] = 0
@@ -57,7 +57,7 @@ def with_values(field: Field, trace: Trace, axis: int, values: Sequence[tuple[fl
 
 def crossings(one: Trace, other: Trace, fields: tuple[Field, Field]) -> Iterator[tuple[Placed, Placed]]:
     """The points that two branches have in common: the place and F on each of them, without labels."""
-    known: list[FloatArray] = []
+    known = list[FloatArray]()
     for i, j in _meetings(one.fine, other.fine):
         guess = one.between(i)
         samples = _or_none(_crossing, fields, guess)
@@ -70,7 +70,7 @@ def crossings(one: Trace, other: Trace, fields: tuple[Field, Field]) -> Iterator
 
 def with_points(trace: Trace, new: Sequence[Placed]) -> Trace:
     """A branch with further points; one that is there already only gets its label."""
-    placed: list[Placed] = [(float(i), point) for i, point in enumerate(trace.points)]
+    placed = [(float(i), point) for i, point in enumerate(trace.points)]
     for place, point in new:
         k = int(np.argmin([np.linalg.norm(each.at - point.at) for _, each in placed]))
         if np.linalg.norm(placed[k][1].at - point.at) < EQUAL:
@@ -115,7 +115,7 @@ def _roots(
     """The places of a branch where a component passes a level, from what it is above that at the points, or 0."""
 
     def value(place: float) -> float:
-        return float(at(place)[axis]) - level
+        return at(place)[axis] - level
 
     signed = np.flatnonzero(values)
     ahead = [*signed[1:], *(signed[:1] + values.size)] if trace.closed else signed[1:]

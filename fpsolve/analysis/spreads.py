@@ -30,7 +30,7 @@ from fpsolve.exponent.method import Budget, checked_moments
 from fpsolve.exponent.quantities import INDICES
 from fpsolve.exponent.solver import solver_of
 from fpsolve.model.problem import Problem
-from fpsolve.model.quantity import LYAPUNOV_EXPONENT, MOMENT, STABILITY_INDEX, P, Quantity
+from fpsolve.model.quantity import LYAPUNOV_EXPONENT, MOMENT, STABILITY_INDEX, P
 
 if TYPE_CHECKING:
     import xarray
@@ -138,7 +138,7 @@ def laws_of(problem: Problem, uncertain: Mapping[str, Any]) -> dict[str, Law]:
     Raises:
         ValueError: a key is none of a parameter by which Λ can be differentiated, or a deviation is 0 or none.
     """
-    found = dict[str, Law]()
+    found = {}
     for key, stated in uncertain.items():
         check_key(problem, key)
         value = float(problem.values[key])
@@ -195,7 +195,7 @@ class Uncertainty(Result):
 
     def to_xarray(self) -> xarray.Dataset:
         """The values, and the ends of their intervals."""
-        numbers = dict[Quantity, Any]()
+        numbers = {}
         rows = [(RECORDS[name], [spread]) for name, spread in self.indices.items()]
         for quantity, spreads in [(MOMENT, self.moments), *rows]:
             ends = {which: quantity.end(which, LEVEL) for which in ("low", "high")}

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from itertools import combinations, product
 from typing import TYPE_CHECKING, Any
 
@@ -26,7 +26,7 @@ from fpsolve.data import Result, brief, dataset
 from fpsolve.drawing import add_legend, in_full, label_axes, scale_axis
 from fpsolve.errors import FpsolveError, NotConverged
 from fpsolve.exponent.kinds import choose
-from fpsolve.exponent.method import Budget
+from fpsolve.exponent.method import BUDGET, Budget
 from fpsolve.messages import Code, Message
 from fpsolve.model.problem import Problem
 from fpsolve.model.quantity import POINTS
@@ -115,7 +115,7 @@ class Boundary(Result):
     scan: Scan
     traces: tuple[Trace, ...] = ()
     step: float = LONGEST
-    budget: Budget = field(default_factory=Budget)
+    budget: Budget = BUDGET
     seconds: float = 0.0
     obstacles: tuple[Message, ...] = ()
     complete: bool = False
@@ -124,7 +124,7 @@ class Boundary(Result):
     @property
     def branches(self) -> tuple[Branch, ...]:
         """The branches in the parameters themselves."""
-        found = list[Branch]()
+        found = []
         for trace in self.traces:
             u, v, width = np.array([(*point.at, point.width) for point in trace.points]).T
             labels = tuple(point.label for point in trace.points)
@@ -149,7 +149,7 @@ class Boundary(Result):
     @property
     def zero_field(self) -> ZeroField:
         """F over the unit square, with the time that is left for the line."""
-        most = math.inf if self.budget.line_seconds is None else self.budget.line_seconds
+        most = self.budget.line_seconds or math.inf
         return ZeroField(self, self.rtol, most - self.seconds, Message(Code.LINE_SPENT, most=most))
 
     def remark(self) -> str:
@@ -175,8 +175,8 @@ class Boundary(Result):
 
     def rows(self) -> list[Row]:
         """The rows of its scan, tasks for `scan_row`, each of which begins anew; they pickle small."""
-        count, most = self.nodes, self.budget.line_seconds
-        share = math.inf if most is None else SCAN_SHARE * most / count
+        count = self.nodes
+        share = SCAN_SHARE * (self.budget.line_seconds or math.inf) / count
         seconds, key = min((self.budget.seconds, "budget.seconds"), (share, LINE_KEY))
         spent = Message(Code.ROW_SPENT, most=seconds, key=key)
         return [Row(ZeroField(self, self.scan_rtol, seconds, spent), count, number) for number in range(count)]
@@ -232,8 +232,16 @@ class Boundary(Result):
         }
         held = {key: value for key, value in self.problem.values.items() if key not in (self.x.key, self.y.key)}
         closed = ", ".join(str(number) for number, branch in enumerate(branches, start=1) if branch.closed)
-        more = {"line": self.target.equation, "closed_branches": closed, "remark": self.remark()}
-        found = dataset("line of stability", "finite elements", variables, coordinates, held, **more)
+        found = dataset(
+            "line of stability",
+            "finite elements",
+            variables,
+            coordinates,
+            held,
+            line=self.target.equation,
+            closed_branches=closed,
+            remark=self.remark(),
+        )
         found.x.attrs["key"], found.y.attrs["key"] = self.x.key, self.y.key
         return found
 
@@ -268,8 +276,8 @@ class ZeroField:
 
     def __init__(self, line: Boundary, rtol: float, seconds: float, spent: Message) -> None:
         self._line, self._rtol, self._most, self._spent = line, rtol, seconds, spent
-        settings = {"rtol": rtol, "of_value": line.of_value, "budget": line.budget}
-        self._distance = Distance(line.problem, line.target, [line.x.key, line.y.key], **settings)
+        keys, of_value = [line.x.key, line.y.key], line.of_value
+        self._distance = Distance(line.problem, line.target, keys, rtol=rtol, of_value=of_value, budget=line.budget)
         self.seconds, self.stopped = 0.0, None if seconds > 0 else spent
 
     def __call__(self, at: FloatArray) -> Sample:
@@ -348,8 +356,8 @@ def untraced(
     y: Axis,
     problem: Problem,
     *,
-    step: float | None = None,
-    nodes: int | None = None,
+    step: float | None,
+    nodes: int | None,
     **more: Any,
 ) -> Boundary:
     """A line of which nothing is traced, with the usual step and nodes where they are None. Raises `ValueError`."""

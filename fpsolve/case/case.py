@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import cached_property, partial
 from hashlib import sha256
 from pathlib import Path
@@ -90,20 +90,6 @@ MOST_FAULTS = 1000
 USUAL_P = 2.0
 
 
-def _form(problem: Problem) -> str:
-    """All that it is but for the values of its parameters, as text.
-
-    The class of a kind that has words follows from these, which are among the values.
-    """
-    found, sections = list[tuple[str, str, dict[str, str]]](), dict[str, Any](problem.sections)
-    for section, half in sections.items():
-        values, name = repr(tuple(half.values.items())), "" if half.words else type(half).__qualname__
-        others = {each.name: repr(vars(half)[each.name]) for each in fields(half) if each.repr}
-        kept = {name: text for name, text in others.items() if name not in half.values and text != values}
-        found.append((section, name, kept))
-    return repr(found)
-
-
 @dataclass(frozen=True)
 class Curve:
     """One parameter set of a case; its problem is made when it is asked for, which may raise `ValueError`.
@@ -149,7 +135,7 @@ class Curve:
     @property
     def digest(self) -> str:
         """What tells it from all parameter sets of all cases, in 64 letters; its problem is not made for that."""
-        stated = [_form(self.base), sorted(self.parameters.items())]
+        stated = [self.base.form, sorted(self.parameters.items())]
         return sha256(json.dumps(stated).encode()).hexdigest()
 
     @property
@@ -254,13 +240,6 @@ class Case(Section):
     def about(self, key: str) -> Quantity:
         """What a parameter is, in the time unit of [units]."""
         return self.parameters[key].quantity.timed(self.units.time)
-
-    def model_copy(self, **changes: Any) -> Case:
-        """A copy with other values, without what follows from the old ones."""
-        made = super().model_copy(**changes)
-        for name in made.__dict__.keys() - type(made).model_fields.keys():
-            del made.__dict__[name]
-        return made
 
     @property
     def path(self) -> Path:
@@ -403,7 +382,7 @@ class Case(Section):
         """The headline of its figure, which may have a title of its own."""
         return self._with_changes(self.figure.title or self.title)
 
-    @property
+    @cached_property
     def theory_reduces_noise(self) -> bool:
         """Whether perturbation theory takes the reduction in place of the noise of some curve."""
         texts = [key for key in self.vary.keys if self.vary.is_text(key)]

@@ -7,9 +7,7 @@ from __future__ import annotations
 
 import math
 import re
-from bisect import bisect_left
 from collections.abc import Iterable, Mapping
-from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -64,7 +62,9 @@ SENSITIVITIES = "sensitivities"
 EIGENFUNCTIONS = "eigenfunctions"
 OF_MOMENTS = DERIVATIVE.name, RATE_FUNCTION.name
 """What follows from Λ(p)."""
-QUANTITY_NAMES = (MOMENT.name, *OF_MOMENTS, *INDICES, EXCURSIONS, RESPONSE, SENSITIVITIES, EIGENFUNCTIONS)
+PARTS: tuple[str, ...] = EXCURSIONS, RESPONSE, SENSITIVITIES, EIGENFUNCTIONS
+"""What else may be asked for: the names of files of `fpsolve/parts`, each with a question, in the order of work."""
+QUANTITY_NAMES = (MOMENT.name, *OF_MOMENTS, *INDICES, *PARTS)
 """What may be asked for."""
 EVERYTHING = "all"
 """What stands for all of these."""
@@ -216,19 +216,13 @@ class Moments(Section):
         """All p, in the file's order."""
         return self.p.values if isinstance(self.p, Sweep) else np.array(self.p)
 
-    @cached_property
-    def increasing(self) -> tuple[float, ...]:
-        """All p, sorted."""
-        return tuple(np.sort(self.values).tolist())
-
     def has(self, p: float) -> bool:
         """Whether p is one of them."""
-        at = bisect_left(self.increasing, p)
-        return any(abs(each - p) <= SAME for each in self.increasing[max(at - 1, 0) : at + 1])
+        return bool(np.any(np.abs(self.values - p) <= SAME))
 
     @model_validator(mode="after")
     def _distinct(self) -> Self:
-        values = np.array(self.increasing)
+        values = np.sort(self.values)
         with np.errstate(over="ignore"):
             close = values[1:][np.diff(values) <= SAME]
         if close.size:

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from fpsolve.arrays import shortened
 from fpsolve.case.keys import get, put
 from fpsolve.errors import CaseError, Fault
 from fpsolve.messages import is_control
@@ -218,7 +219,10 @@ def read_document(
         raise CaseError(str(path), [Fault("", None, _TOO_DEEP)]) from None
     except ValueError as error:
         raise CaseError(str(path), [_syntax_fault(text, str(error))]) from None
-    for typed, change in [*((f"--set {_cut(f'{each}')}", each) for each in overrides), *(options or {}).items()]:
+    for typed, change in [
+        *((f"--set {shortened(str(each), LONGEST_SHOWN)}", each) for each in overrides),
+        *(options or {}).items(),
+    ]:
         document.override(change, typed)
     return document
 
@@ -232,11 +236,6 @@ def document_of(text: str) -> Document:
 def loads(text: str) -> dict[str, Any]:
     """The data of TOML, 0 without a sign. Raises ValueError where it is none."""
     return tomllib.loads(text, parse_float=lambda number: float(number) + 0.0)
-
-
-def _cut(text: str) -> str:
-    """A text as messages repeat it."""
-    return text if len(text) <= LONGEST_SHOWN else f"{text[: LONGEST_SHOWN - 3]}..."
 
 
 def _syntax_fault(text: str, message: str) -> Fault:

@@ -17,8 +17,7 @@ def check(
         bool,
         Parameter(
             help="Compare Λ of the even p of [moments] with the moment hierarchy instead, the equations of moments; "
-            "without walls, under all noise but that with algebraic tails.",
-            negative="",
+            "without walls, under all noise but that with algebraic tails."
         ),
     ] = False,
     options: Working = OPTIONS_OF_WORK,

@@ -13,32 +13,17 @@ from fpsolve.commands.options import CHECK_FAILED, NOT_CONVERGED, OPTIONS_OF_FIL
 def design(
     cases: Cases,
     *,
-    target: Annotated[
-        str | None,
-        Parameter(
-            name="--for",
-            help="What is wanted: 'stability_index = 1', 'lyapunov_exponent = -0.01' or 'moment(2) = 0'.",
-        ),
-    ] = None,
+    target: Annotated[str | None, Parameter(name="--for")] = None,
     by: Annotated[
         list[str] | None,
         Parameter(
             help="A parameter that may change, such as oscillator.c1. With several the nearest point is found: that "
-            "with the smallest relative changes.",
-            negative="",
+            "with the smallest relative changes."
         ),
     ] = None,
-    start: Annotated[
-        list[float] | None,
-        Parameter(
-            name="--from", help="Its smallest value, one for each --by; half of its value if omitted.", negative=""
-        ),
-    ] = None,
-    stop: Annotated[
-        list[float] | None,
-        Parameter(name="--to", help="Its largest value, one for each --by; twice its value if omitted.", negative=""),
-    ] = None,
-    json: Annotated[bool, Parameter(help="Print design.json, one line for each case.", negative="")] = False,
+    start: Annotated[list[float] | None, Parameter(name="--from")] = None,
+    stop: Annotated[list[float] | None, Parameter(name="--to")] = None,
+    json: bool = False,
     options: Writing = OPTIONS_OF_FILES,
 ) -> int:
     """Find the values of parameters with which λ, Λ(p) or δ_p has a wanted value.
@@ -48,6 +33,12 @@ def design(
     Exit codes: 0 found, 1 it cannot be reached in the range, 2 bad input, 3 not converged.
 
     Example: fpsolve design cases/theorem.toml --for "stability_index = 1" --by oscillator.c1 --from -1 --to 1
+
+    Args:
+        target: What is wanted: 'stability_index = 1', 'lyapunov_exponent = -0.01' or 'moment(2) = 0'.
+        start: Its smallest value, one for each --by; half of its value if omitted.
+        stop: Its largest value, one for each --by; twice its value if omitted.
+        json: Print design.json, one line for each case.
     """
     from fpsolve.page.page import Note
     from fpsolve.page.terminal import print_blocks

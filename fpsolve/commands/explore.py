@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
-
-from cyclopts import Parameter
 
 from fpsolve.commands.options import Options
 from fpsolve.signals import INTERRUPTED
@@ -14,9 +11,9 @@ PLAIN = Options()
 
 
 def explore(
-    case: Annotated[Path, Parameter(help="A case file.")],
+    case: Path,
     *,
-    no_open: Annotated[bool, Parameter(help="Open no browser; the address is printed.", negative="")] = False,
+    no_open: bool = False,
     options: Options = PLAIN,
 ) -> int:
     """Show a case in the browser, with a slider for every parameter; end it with Ctrl-C.
@@ -24,6 +21,10 @@ def explore(
     The page is served to this machine alone. It writes nothing: cases and reports are downloads.
 
     Example: fpsolve explore cases/fig1.toml
+
+    Args:
+        case: A case file.
+        no_open: Open no browser; the address is printed.
     """
     import webbrowser
 

@@ -3,33 +3,37 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
-
-from cyclopts import Parameter
 
 from fpsolve.commands.options import Count
 from fpsolve.messages import escaped
 
 
 def mesh(
-    output: Annotated[Path, Parameter(help="The file to write: .vtu for ParaView, .msh for Gmsh.")],
+    output: Path,
     *,
-    phi_cells: Annotated[Count, Parameter(help="Cells in the phase, from one impact to the next.")] = 2,
-    phi_degree: Annotated[Count, Parameter(help="Degree of the elements in the phase.")] = 10,
-    xi_cells: Annotated[Count, Parameter(help="Cells in the noise.")] = 4,
-    xi_degree: Annotated[Count, Parameter(help="Degree of the elements in the noise.")] = 9,
-    xi_min: Annotated[float, Parameter(help="Lower end of the noise, in standard deviations.")] = -8.0,
-    xi_max: Annotated[float, Parameter(help="Upper end of the noise, in standard deviations.")] = 8.0,
-    grading: Annotated[
-        float, Parameter(help="Size of the outermost noise cells divided by that of the innermost; 1 is uniform.")
-    ] = 1.0,
-    full_circle: Annotated[
-        bool, Parameter(help="Mesh the whole circle of phases instead of one half.", negative="")
-    ] = False,
+    phi_cells: Count = 2,
+    phi_degree: Count = 10,
+    xi_cells: Count = 4,
+    xi_degree: Count = 9,
+    xi_min: float = -8.0,
+    xi_max: float = 8.0,
+    grading: float = 1.0,
+    full_circle: bool = False,
 ) -> int:
     """Write a mesh that a case can name as [mesh] file.
 
     Example: fpsolve mesh meshes/graded.vtu --phi-cells 3 --xi-cells 8 --grading 2
+
+    Args:
+        output: The file to write: .vtu for ParaView, .msh for Gmsh.
+        phi_cells: Cells in the phase, from one impact to the next.
+        phi_degree: Degree of the elements in the phase.
+        xi_cells: Cells in the noise.
+        xi_degree: Degree of the elements in the noise.
+        xi_min: Lower end of the noise, in standard deviations.
+        xi_max: Upper end of the noise, in standard deviations.
+        grading: Size of the outermost noise cells divided by that of the innermost; 1 is uniform.
+        full_circle: Mesh the whole circle of phases instead of one half.
     """
     from fpsolve.fem.mesh import make_mesh, write_mesh
 

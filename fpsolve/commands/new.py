@@ -8,9 +8,6 @@ from collections.abc import Mapping
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
-from typing import Annotated
-
-from cyclopts import Parameter
 
 from fpsolve.case.matrices import KEYS
 from fpsolve.case.schema import SCHEMA, schema_text
@@ -76,17 +73,18 @@ def copy_case(name: str, target: Path | None) -> Path:
 
 
 def new(
-    name: Annotated[
-        str,
-        Parameter(help="A case that comes with fpsolve; if omitted, all are listed."),
-    ] = "",
-    file: Annotated[Path | None, Parameter(help="The new file, or its folder; if omitted, NAME.toml here.")] = None,
+    name: str = "",
+    file: Path | None = None,
 ) -> int:
     """Copy a case that comes with fpsolve, or list these cases with their titles.
 
     Beside the new case is fpsolve.schema.json, with which editors complete and check it.
 
     Example: fpsolve new fig1 my_case.toml
+
+    Args:
+        name: A case that comes with fpsolve; if omitted, all are listed.
+        file: The new file, or its folder; if omitted, NAME.toml here.
     """
     if name:
         print(f"written: {escaped(str(copy_case(name, file)))}")

@@ -27,45 +27,48 @@ CLOSE = 0.02
 @Parameter(name="*")
 @dataclass(frozen=True)
 class Statement:
-    """The options of `fpsolve noise`."""
+    """The options of `fpsolve noise`.
 
-    record: Annotated[
-        Path | None,
-        Parameter(
-            help="A record of values over time instead, also .wav; beside a spectrum its variance is compared with it."
-        ),
-    ] = None
-    per: Annotated[
-        Literal["Hz", "rad/s"] | None,
-        Parameter(help="The unit of the frequencies; if omitted that of the file, which must state it."),
-    ] = None
-    sided: Annotated[
-        Literal["one", "two"] | None,
-        Parameter(help="Whether the integral over f > 0 is the variance, one, or half of it, two."),
-    ] = None
-    frequency: Annotated[
-        list[float] | None,
-        Parameter(
-            help="Natural frequency in the unit of --per, Hz if that is omitted; of two modes twice.", negative=""
-        ),
-    ] = None
-    damping_ratio: Annotated[
-        float | None,
-        Parameter(help="Damping as a share of critical damping: states an oscillator, whose verdict is told."),
-    ] = None
-    restitution: Annotated[
-        float | None, Parameter(help="Speed after a bounce off its wall over that before; no wall if omitted.")
-    ] = None
-    case: Annotated[Path | None, Parameter(help="A case instead, whose noise is replaced.")] = None
-    modes: Annotated[
-        Path | None,
-        Parameter(help="A table of natural frequencies and damping ratios, Fn and Xi, as pyOMA writes it."),
-    ] = None
-    mode: Annotated[list[Count] | None, Parameter(help="A row of this table; of two modes twice.", negative="")] = None
-    noise_in: Annotated[
-        Literal["stiffness", "damping"] | None,
-        Parameter(help="Where the noise is; stiffness if neither this nor --of is stated."),
-    ] = None
+    Attributes:
+        record: A record of values over time instead, also .wav; beside a spectrum its variance is compared with it.
+        per: The unit of the frequencies; if omitted that of the file, which must state it.
+        sided: Whether the integral over f > 0 is the variance, one, or half of it, two.
+        frequency: Natural frequency in the unit of --per, Hz if that is omitted; of two modes twice.
+        damping_ratio: Damping as a share of critical damping: states an oscillator, whose verdict is told.
+        restitution: Speed after a bounce off its wall over that before; no wall if omitted.
+        case: A case instead, whose noise is replaced.
+        modes: A table of natural frequencies and damping ratios, Fn and Xi, as pyOMA writes it.
+        mode: A row of this table; of two modes twice.
+        noise_in: Where the noise is; stiffness if neither this nor --of is stated.
+        length: Length of the pendulum in m, from which its natural frequency follows.
+        gm: Mean metacentric height in m, for --of height.
+        kind: The kind of noise.
+        terms: How many noises of the kind are added, 1 or 2.
+        column: The column of values, if the file has several.
+        rate: Values of the record per second, if the file states no times.
+        over: The column of frequencies or times, if its name does not tell.
+        unit: The unit of the signal, such as g, or of its density, if the file states none.
+        scale: What the signal is multiplied by; a density by its square.
+        skip: Rows of the file that are left out at its beginning; of a text lines.
+        row: Which of several spectra in the rows of a file; their mean if omitted.
+        log_log: The file has break points, with straight lines in the logarithms between.
+        parameters: Those of the named density, such as Hs=2,Tp=9.
+        segment: Seconds of a segment of a record; as the natural frequency needs if omitted.
+        rtol: Tolerance of the exponents of the system, relative; 1e-4 if omitted.
+        seconds: Processor time for each exponent of the system; 20 if omitted.
+        averages: How many independent periodograms the spectrum is the mean of: tells its errors.
+    """
+
+    record: Path | None = None
+    per: Literal["Hz", "rad/s"] | None = None
+    sided: Literal["one", "two"] | None = None
+    frequency: list[float] | None = None
+    damping_ratio: float | None = None
+    restitution: float | None = None
+    case: Path | None = None
+    modes: Path | None = None
+    mode: list[Count] | None = None
+    noise_in: Literal["stiffness", "damping"] | None = None
     of: Annotated[
         Literal["stiffness", "damping", "acceleration", "height"] | None,
         Parameter(
@@ -73,30 +76,18 @@ class Statement:
             "support of a pendulum in m/s^2, or the metacentric height of a ship in m; that of --noise-in if omitted."
         ),
     ] = None
-    length: Annotated[
-        float | None, Parameter(help="Length of the pendulum in m, from which its natural frequency follows.")
-    ] = None
-    gm: Annotated[float | None, Parameter(help="Mean metacentric height in m, for --of height.")] = None
-    kind: Annotated[
-        Literal["ornstein-uhlenbeck", "filter", "bounded", "non-gaussian"], Parameter(help="The kind of noise.")
-    ] = "ornstein-uhlenbeck"
-    terms: Annotated[Count, Parameter(help="How many noises of the kind are added, 1 or 2.")] = 1
-    column: Annotated[str | None, Parameter(help="The column of values, if the file has several.")] = None
-    rate: Annotated[float | None, Parameter(help="Values of the record per second, if the file states no times.")] = (
-        None
-    )
-    over: Annotated[str | None, Parameter(help="The column of frequencies or times, if its name does not tell.")] = None
-    unit: Annotated[
-        str | None, Parameter(help="The unit of the signal, such as g, or of its density, if the file states none.")
-    ] = None
-    scale: Annotated[float, Parameter(help="What the signal is multiplied by; a density by its square.")] = 1.0
-    skip: Annotated[Count, Parameter(help="Rows of the file that are left out at its beginning; of a text lines.")] = 0
-    row: Annotated[
-        Count | None, Parameter(help="Which of several spectra in the rows of a file; their mean if omitted.")
-    ] = None
-    log_log: Annotated[
-        bool, Parameter(help="The file has break points, with straight lines in the logarithms between.", negative="")
-    ] = False
+    length: float | None = None
+    gm: float | None = None
+    kind: Literal["ornstein-uhlenbeck", "filter", "bounded", "non-gaussian"] = "ornstein-uhlenbeck"
+    terms: Count = 1
+    column: str | None = None
+    rate: float | None = None
+    over: str | None = None
+    unit: str | None = None
+    scale: float = 1.0
+    skip: Count = 0
+    row: Count | None = None
+    log_log: bool = False
     named: Annotated[
         str | None,
         Parameter(
@@ -104,20 +95,11 @@ class Statement:
             "kanai-tajimi."
         ),
     ] = None
-    parameters: Annotated[str, Parameter(help="Those of the named density, such as Hs=2,Tp=9.")] = ""
-    segment: Annotated[
-        float | None,
-        Parameter(help="Seconds of a segment of a record; as the natural frequency needs if omitted."),
-    ] = None
-    rtol: Annotated[
-        float | None, Parameter(help="Tolerance of the exponents of the system, relative; 1e-4 if omitted.")
-    ] = None
-    seconds: Annotated[
-        float | None, Parameter(help="Processor time for each exponent of the system; 20 if omitted.")
-    ] = None
-    averages: Annotated[
-        float | None, Parameter(help="How many independent periodograms the spectrum is the mean of: tells its errors.")
-    ] = None
+    parameters: str = ""
+    segment: float | None = None
+    rtol: float | None = None
+    seconds: float | None = None
+    averages: float | None = None
 
 
 def measurement_of(
@@ -297,16 +279,11 @@ NOTHING_STATED = Statement()
 
 
 def noise(
-    spectrum: Annotated[
-        Path | None,
-        Parameter(
-            help="A spectral density: .csv, .txt, .npy, .npz, .mat, .uff or .nc, with a column of frequencies.",
-        ),
-    ] = None,
+    spectrum: Path | None = None,
     *,
     stated: Statement = NOTHING_STATED,
-    out: Annotated[Path, Parameter(help="Folder for the results.")] = Path("results"),
-    json: Annotated[bool, Parameter(help="Print noise.json in one line.", negative="")] = False,
+    out: Path = Path("results"),
+    json: bool = False,
 ) -> int:
     """Fit a noise to what was measured, most of all at twice the natural frequency; say what it means for stability.
 
@@ -317,6 +294,11 @@ def noise(
     Example: fpsolve noise spectrum.csv --per Hz --sided one --frequency 2.0 --damping-ratio 0.01 --averages 64
 
     Example: fpsolve noise --record shaking.csv --of acceleration --length 0.5 --damping-ratio 0.02 --kind filter
+
+    Args:
+        spectrum: A spectral density: .csv, .txt, .npy, .npz, .mat, .uff or .nc, with a column of frequencies.
+        out: Folder for the results.
+        json: Print noise.json in one line.
     """
     from fpsolve.page.terminal import print_blocks
     from fpsolve.show.results import last_line

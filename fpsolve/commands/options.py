@@ -36,8 +36,8 @@ def _whole(_: type, tokens: Sequence[Token]) -> int:
 
 
 Count = Annotated[int, Parameter(converter=_whole)]
-Cases = Annotated[list[Path], Parameter(help="Case files.", consume_multiple=True, negative="")]
-Fresh = Annotated[bool, Parameter(help="Also solve or simulate again what an earlier run has finished.", negative="")]
+Cases = Annotated[list[Path], Parameter(help="Case files.", consume_multiple=True)]
+Fresh = Annotated[bool, Parameter(help="Also solve or simulate again what an earlier run has finished.")]
 SET = (
     "Another value for a key of the case, e.g. oscillator.omega=2.0 or system.zeta=0.1. Units: omega in rad/time, c1 "
     "in 1/time, D0 in 1/time, tau0 in time."
@@ -53,11 +53,10 @@ class Options:
         bool,
         Parameter(
             help='Print only the last line, and on the standard error only errors and what is "not converged". Tables, '
-            "notes and warnings are in the files.",
-            negative="",
+            "notes and warnings are in the files."
         ),
     ] = False
-    overrides: Annotated[list[str] | None, Parameter(name="--set", help=SET, negative="")] = None
+    overrides: Annotated[list[str] | None, Parameter(name="--set", help=SET)] = None
 
     def load(self, paths: Sequence[Path], typed: Mapping[str, str] = MappingProxyType({})) -> list[Case]:
         """All cases. Raises one `FpsolveError` with the faults of all of them.
@@ -97,9 +96,13 @@ class Options:
 @Parameter(name="*")
 @dataclass(frozen=True)
 class Writing(Options):
-    """What commands take that write files."""
+    """What commands take that write files.
 
-    out: Annotated[Path, Parameter(help="Folder for the results.")] = Path("results")
+    Attributes:
+        out: Folder for the results.
+    """
+
+    out: Path = Path("results")
 
     def load(self, paths: Sequence[Path], typed: Mapping[str, str] = MappingProxyType({})) -> list[Case]:
         """All cases, or an error also where two would write into one folder."""
@@ -120,12 +123,15 @@ class Writing(Options):
 @Parameter(name="*")
 @dataclass(frozen=True)
 class Working(Options):
-    """What commands take that several processes may share."""
+    """What commands take that several processes may share.
 
-    jobs: Annotated[Count | None, Parameter(help="Number of processes; if omitted, the number of processors.")] = None
-    scheduler: Annotated[
-        str, Parameter(help="Address of a Dask scheduler whose workers do the work, e.g. tcp://host:8786.")
-    ] = ""
+    Attributes:
+        jobs: Number of processes; if omitted, the number of processors.
+        scheduler: Address of a Dask scheduler whose workers do the work, e.g. tcp://host:8786.
+    """
+
+    jobs: Count | None = None
+    scheduler: str = ""
 
     def pool(self, cases: Sequence[Case] = ()) -> Pool:
         """Who does the work; no more processes than a case has sets, where cases are given."""
@@ -143,11 +149,13 @@ class Working(Options):
 @Parameter(name="*")
 @dataclass(frozen=True)
 class Reporting(Writing, Working):
-    """What commands take that can write a report."""
+    """What commands take that can write a report.
 
-    report: Annotated[
-        bool, Parameter(help="Also write report.html: one page with all results and figures.", negative="")
-    ] = False
+    Attributes:
+        report: Also write report.html: one page with all results and figures.
+    """
+
+    report: bool = False
 
     def watch(self, *, is_json: bool = False) -> Watch:
         return replace(super().watch(is_json=is_json), has_report=self.report)

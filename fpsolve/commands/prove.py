@@ -13,19 +13,14 @@ from fpsolve.commands.options import ALL_OPTIONS, CHECK_FAILED, NOT_CONVERGED, R
 from fpsolve.errors import FpsolveError
 from fpsolve.messages import escaped
 
-ProvenCases = Annotated[list[Path] | None, Parameter(help="Case files.", consume_multiple=True, negative="")]
+ProvenCases = Annotated[list[Path] | None, Parameter(help="Case files.", consume_multiple=True)]
 
 
 def prove(
     cases: ProvenCases = None,
     *,
-    width: Annotated[
-        float | None,
-        Parameter(help="Wanted distance of the bounds, in 1/time; if omitted, 1e-7 of the scale of each number."),
-    ] = None,
-    check: Annotated[
-        Path | None, Parameter(help="Prove nothing, but verify a proof.json from its certificates alone.")
-    ] = None,
+    width: float | None = None,
+    check: Path | None = None,
     options: Reporting = ALL_OPTIONS,
 ) -> int:
     """Prove bounds on the exponents that hold with certainty; write them with certificates into OUT/<case>/proof.json.
@@ -37,6 +32,10 @@ def prove(
     Exit codes: 0 proven, 3 bounds are farther apart than wanted; with --check 0 accepted, 1 rejected, 2 malformed.
 
     Example: fpsolve prove cases/fig1.toml --width 1e-9
+
+    Args:
+        width: Wanted distance of the bounds, in 1/time; if omitted, 1e-7 of the scale of each number.
+        check: Prove nothing, but verify a proof.json from its certificates alone.
     """
     from fpsolve.page.terminal import print_blocks
     from fpsolve.show.results import done_of

@@ -15,19 +15,11 @@ from fpsolve.signals import INTERRUPTED
 def run(
     cases: Cases,
     *,
-    monte_carlo: Annotated[
-        bool, Parameter(help="Also simulate, as [monte_carlo] of the case says, and draw both.", negative="")
-    ] = False,
+    monte_carlo: bool = False,
     fresh: Fresh = False,
-    json: Annotated[
-        bool, Parameter(help="Print the summaries, one line of JSON for each case, instead of tables.", negative="")
-    ] = False,
-    everything: Annotated[
-        bool, Parameter(name="--all", help='Compute everything, as quantities = "all" in [output].', negative="")
-    ] = False,
-    table: Annotated[
-        bool, Parameter(help="Print every number of up to ten curves, also Λ(p) at more than 12 p.", negative="")
-    ] = False,
+    json: bool = False,
+    everything: Annotated[bool, Parameter(name="--all")] = False,
+    table: bool = False,
     options: Reporting = ALL_OPTIONS,
 ) -> int:
     """Solve case files; write tables, figures and ParaView files into OUT/<case>/.
@@ -40,6 +32,12 @@ def run(
     eigenfunctions with densities, rate_function, excursions, and moment_derivative where it takes long, too.
 
     Example: fpsolve run cases/fig1.toml --out results --set oscillator.omega=2.0
+
+    Args:
+        monte_carlo: Also simulate, as [monte_carlo] of the case says, and draw both.
+        json: Print the summaries, one line of JSON for each case, instead of tables.
+        everything: Compute everything, as quantities = "all" in [output].
+        table: Print every number of up to ten curves, also Λ(p) at more than 12 p.
     """
     from fpsolve.output.tables import whole_summary
     from fpsolve.page.terminal import print_blocks

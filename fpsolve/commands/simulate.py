@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 from time import monotonic
-from typing import Annotated
-
-from cyclopts import Parameter
 
 from fpsolve.commands.errors import print_error
 from fpsolve.commands.options import ALL_OPTIONS, Cases, Count, Fresh, Reporting
@@ -15,20 +12,10 @@ from fpsolve.signals import INTERRUPTED
 def simulate(
     cases: Cases,
     *,
-    paths: Annotated[Count | None, Parameter(help="Number of paths; 32768 if the case does not state it.")] = None,
-    time: Annotated[
-        float | None,
-        Parameter(
-            help="Length of the paths; if the case does not state it, 64 transients, or 16 for more than two variables."
-        ),
-    ] = None,
-    seed: Annotated[
-        Count | None, Parameter(help="Seed of the random numbers; 0 if the case does not state it.")
-    ] = None,
-    estimator: Annotated[
-        str | None,
-        Parameter(help="direct, or population for strong noise or large |p|; chosen if the case does not state it."),
-    ] = None,
+    paths: Count | None = None,
+    time: float | None = None,
+    seed: Count | None = None,
+    estimator: str | None = None,
     fresh: Fresh = False,
     options: Reporting = ALL_OPTIONS,
 ) -> int:
@@ -38,6 +25,12 @@ def simulate(
     Curves that an earlier simulation has finished are not simulated again.
 
     Example: fpsolve simulate cases/fig1.toml --paths 100000 --seed 1 --estimator population
+
+    Args:
+        paths: Number of paths; 32768 if the case does not state it.
+        time: Length of the paths; if the case does not state it, 64 transients, or 16 for more than two variables.
+        seed: Seed of the random numbers; 0 if the case does not state it.
+        estimator: direct, or population for strong noise or large |p|; chosen if the case does not state it.
     """
     from fpsolve.show.results import done_of, known_of
     from fpsolve.workflow.simulate import refuse_obstacles, simulate_case

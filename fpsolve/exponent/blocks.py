@@ -179,7 +179,7 @@ class Blocks(Method):
         found = list[InvariantClass]()
         for name, block, part in zip(self.names, blocks_of(self.problem), self.parts, strict=True):
             rows = np.array([part.row(point) for point in p.tolist()]).reshape(-1, len(Moment._fields))
-            phase = None if not self._rays else self._rays[min(len(found), len(self._rays) - 1)]
+            phase = (self._rays * 2)[len(found)] if self._rays else None
             variables = () if self._rays else block.names
             told = ", ".join(variables) or name
             found.append(InvariantClass(told, phase, variables, part.lyapunov_exponent(), p, rows[:, 0], rows[:, 3]))

@@ -28,15 +28,14 @@ class Changed:
 
     def __init__(self, around: PairDerivatives, by: ParameterDerivative) -> None:
         self._around, self._pair, self._by = around, around.pair, by
-        self._operators: dict[int, KroneckerSum] = {}
 
     @cached_property
     def value(self) -> Estimate:
         """∂Λ/∂θ with the error of rounding, also in T and T*; the scale is that of the terms of L − Λ."""
-        pair = self._pair
+        pair, operator = self._pair, self._operator(0)
         x, y, turns = pair.right, pair.left, pair.space.turns
-        parts = turns * np.array([y @ (KroneckerSum([term]) @ x) for term in self._operator(0).terms])
-        sizes, scale = turns * float(abs(y) @ (abs(self._operator(0)) @ abs(x))), float(np.sum(np.abs(parts)))
+        parts = turns * np.array([y @ (KroneckerSum([term]) @ x) for term in operator.terms])
+        sizes, scale = turns * float(abs(y) @ (abs(operator) @ abs(x))), float(np.sum(np.abs(parts)))
         of_pair = (pair.residual + _EPS) * self._around.size / pair.generator.framed.unit_rate
         return Estimate(float(np.sum(parts)), _EPS * sizes + of_pair * scale, scale)
 
@@ -76,11 +75,9 @@ class Changed:
 
     def _operator(self, k: int) -> KroneckerSum:
         """∂L⁽ᵏ⁾ − Λ⁽ᵏ⁾∂M."""
-        if k not in self._operators:
-            pair = self._pair
-            rate = (pair.eigenvalue, pair.derivative)[k] if k < 2 else self._around.second_derivative
-            self._operators[k] = pair.generator.changed(self._by, pair.p, rate, derivative=k)
-        return self._operators[k]
+        pair = self._pair
+        rate = (pair.eigenvalue, pair.derivative)[k] if k < 2 else self._around.second_derivative
+        return pair.generator.changed(self._by, pair.p, rate, derivative=k)
 
 
 def _summed(parts: Sequence[Any], norm: float) -> Estimate:

@@ -35,8 +35,8 @@ class EvenMoments(Method):
     def reason(self, p: float, symbol: str = "") -> Message | None:
         if not self.has(p):
             symbol = symbol or (moment_at(p).symbol if p else "λ")
-            about = {"count": self.problem.dimension, "is_struck": self.is_struck}
-            return Message(self.code, what=symbol, **about, remedy=Remedy.SIMULATION)
+            count, remedy = self.problem.dimension, Remedy.SIMULATION
+            return Message(self.code, what=symbol, count=count, is_struck=self.is_struck, remedy=remedy)
         return infinite(self.problem, p, symbol)
 
     def line_rtol(self, p: float) -> float:

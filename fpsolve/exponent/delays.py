@@ -135,7 +135,7 @@ class DelayRates:
     def sizes(self, sigma: float) -> FloatArray:
         """Σ |terms| that Z(σ) is the sum of."""
         even = np.abs(self._even)
-        return np.asarray(even.T @ sum(map(np.abs, self._terms(sigma))) @ even)
+        return even.T @ sum(map(np.abs, self._terms(sigma))) @ even
 
     @property
     def _count(self) -> int:
@@ -196,8 +196,8 @@ class DelayRates:
             NoHierarchy: there are too many values.
         """
         count, width = self._count, len(own)
-        slow = SHARE * float(np.linalg.norm(sum(map(np.abs, moving)), 2)) * self.unit
-        slow += math.sqrt(float(np.max(np.abs(own))) * self.unit)
+        slow = SHARE * np.linalg.norm(sum(map(np.abs, moving)), 2) * self.unit
+        slow += math.sqrt(np.max(np.abs(own)) * self.unit)
         x, slopes, _ = _polynomials(math.ceil((FEWEST + slow) * GROWTH**self.finer))
         if (size := count * x.size * width) > MOST_SIZE:
             raise NoHierarchy(f"{size} second moments over a delay are more than {MOST_SIZE}; {REMEDY}")
@@ -232,7 +232,7 @@ class DelayRates:
         """
         moving, found = self._acting(np.eye(1)), 0j
         size, one, last = len(moving[0]), np.eye(len(self.drift[0])), self._last
-        degree = FEWEST + last * float(np.linalg.norm(sum(map(np.abs, moving)), 2))
+        degree = FEWEST + last * np.linalg.norm(sum(map(np.abs, moving)), 2)
         moving = moving @ np.kron(expm(np.multiply.outer(self.unit * np.arange(len(moving)), self.generator)), one)
         moving[0] += np.kron(self.generator, one)
         while size * degree <= MOST_ROOTS:
@@ -309,7 +309,7 @@ class DelayRates:
                     f"second moments fall by more than e^(-{2 * LARGEST:g}) in a delay; use a shorter one"
                 )
             finer = replace(at, finer=at.finer + 1)
-            change = abs(float(y @ finer.matrix(sigma) @ x))
+            change = abs(y @ finer.matrix(sigma) @ x)
             if change <= ROUNDED * size or not change < 0.5 * last:
                 return Eigenpair(sigma, x, y, max(change, ROUNDED * size), size, at.finer)
             at, last = finer, change

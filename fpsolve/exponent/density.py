@@ -251,7 +251,7 @@ def mean_functions(pair: PrincipalPair) -> FloatArray:
     axis, frame = pair.space.phi, pair.generator.framed.frame
     psi, weights = axis.finer_rule(frame.parts)
     phi, stretch = own_phases(pair, psi)
-    return np.asarray(weights / frame.density(phi) * stretch @ axis.at(psi) / axis.span)
+    return weights / frame.density(phi) * stretch @ axis.at(psi) / axis.span
 
 
 def own_phases(pair: PrincipalPair, psi: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -404,7 +404,7 @@ def direction_map(pair: PrincipalPair) -> FloatArray:
 def xi_marginal(pair: PrincipalPair, at: Samples) -> FloatArray:
     """∫ T T* dφ over the mesh at points of ξ, shape (n,)."""
     phi = pair.space.phi
-    return np.asarray(phi.weights @ evaluated(pair, phi.values, at).tilted_density)
+    return phi.weights @ evaluated(pair, phi.values, at).tilted_density
 
 
 def refuse_more(pair: PrincipalPair) -> None:

@@ -30,7 +30,6 @@ from fpsolve.fem.factors import Factors, one_thread
 from fpsolve.fem.generator import Generator, Pencil
 from fpsolve.fem.space import Space
 from fpsolve.messages import Code, Message, Remedy
-from fpsolve.model.problem import Problem
 from fpsolve.theory.frozen import frozen_noise
 
 BACKWARD_ERROR_GOAL = 1e-14
@@ -161,7 +160,7 @@ def _is_principal(pair: PrincipalPair, pairs: Sequence[PrincipalPair], continues
     Where other pairs may seem positive, too, it must go on from the others, or reach the tangent of Λ at their p. At
     p = 0 it has Λ = 0 and T = 1.
     """
-    generator, tangent = pair.generator, _tangents(pair.generator.problem, pair.p, pairs)
+    generator, tangent = pair.generator, _tangent(pair, pairs)
     most = POSITIVE if continues else SURELY_POSITIVE
     if pair.residual > BACKWARD_ERROR_LIMIT or pair.value < tangent or min(pair.sign_defects) > most:
         return False
@@ -180,8 +179,8 @@ def _rightmost_pair(pencil: Pencil, generator: Generator, reached: PrincipalPair
     pair = _reached(generator, pencil, right, left)
     defect = min(pair.sign_defects)
     if not (pair.residual <= BACKWARD_ERROR_LIMIT and defect <= POSITIVE and abs(pair.value - value) < distance):
-        limits = {"limit": BACKWARD_ERROR_LIMIT, "most": POSITIVE}
-        told = Message(Code.NO_EIGENVALUE, p=p, residual=pair.residual, size=defect, **limits)
+        limit, most = BACKWARD_ERROR_LIMIT, POSITIVE
+        told = Message(Code.NO_EIGENVALUE, p=p, residual=pair.residual, size=defect, limit=limit, most=most)
         raise NotConverged(told, pair, Remedy.BOTH_AXES)
     if not _has_other_positive(generator, p):
         return pair
@@ -248,13 +247,13 @@ def _share(space: Space, pair: PrincipalPair, x: FloatArray, y: FloatArray) -> f
     return float((y @ of_right) * (pair.left @ of_x) / ((y @ of_x) * (pair.left @ of_right)))
 
 
-def _tangents(problem: Problem, p: float, pairs: Sequence[PrincipalPair]) -> float:
-    """What Λ(p) is at least, as it is convex, by the pairs of this problem at other p; −∞ where there is none."""
+def _tangent(pair: PrincipalPair, others: Sequence[PrincipalPair]) -> float:
+    """What Λ is at least at the p of a pair, as it is convex, by those of this problem at other p; −∞ without any."""
     least = -math.inf
-    for pair in pairs:
-        if pair.generator.problem is problem and pair.p != p:
-            rise = pair.derivative * (p - pair.p)
-            least = max(least, pair.value + rise - DOUBT * (abs(pair.value) + abs(rise)))
+    for each in others:
+        if each.generator.problem is pair.generator.problem and each.p != pair.p:
+            rise = each.derivative * (pair.p - each.p)
+            least = max(least, each.value + rise - DOUBT * (abs(each.value) + abs(rise)))
     return least
 
 
@@ -395,12 +394,12 @@ def _reached(generator: Generator, pencil: Pencil, x: FloatArray, y: FloatArray)
     weight, norm = space.weighed(constant), 1 / space.turns
     x = found.x * ((constant @ weight) / (weight @ found.x))
     y = found.y * (norm / (found.y @ space.weighed(x)))
-    rounding = _EPS * float(abs(y) @ (abs(operator) @ abs(x))) / norm
+    rounding = _EPS * abs(y) @ (abs(operator) @ abs(x)) / norm
     if generator.keeps_constants:
         forcing, total = generator.matrix(p, is_forcing=True), weight @ x
         of_noise = _of_noises(space)
         doubtful = abs(x) + generator.rounding_growth * abs(x - constant)
-        bound = _EPS * float((constant @ (abs(forcing) @ doubtful) + abs(of_noise) @ doubtful) / total)
+        bound = _EPS * (constant @ (abs(forcing) @ doubtful) + abs(of_noise) @ doubtful) / total
         if bound < rounding:
             value, rounding = float((constant @ (forcing @ x) + of_noise @ x) / total), bound
     if p == 0:  # where Λ = 0

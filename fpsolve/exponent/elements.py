@@ -81,7 +81,7 @@ class Elements(Method):
         has_witness: whether the equations of even moments are independent of L(p), and quick.
     """
 
-    has_witness: bool = True
+    has_witness = True
     remedy = Remedy.BUDGET
 
     def __init__(self, *args: Any) -> None:
@@ -179,7 +179,7 @@ class Elements(Method):
         with self.solving(pair.p):
             return self.pair_on(Generator(self.problem, chosen), pair.p, pair)
 
-    def near_zero(self, p: float, tolerance: Tolerance | None = None) -> Solution:
+    def near_zero(self, p: float, tolerance: Tolerance | None) -> Solution:
         """The solution at ±`SMALL_P` that a smaller p goes with."""
         side = p or (-1.0 if self.lacks_moments else 1.0)  # on which Λ is finite
         q = math.copysign(SMALL_P, side)
@@ -192,8 +192,8 @@ class Elements(Method):
     def _witness(self, p: float, value: float, error: float) -> None:
         """Refuse a value with this error that contradicts the even moment of the same p."""
         if (known := self.even(p)) and abs(value - known.value) > doubt(error, known):
-            told = {"p": p, "value": value, "other": p, "expected": known.value}
-            raise NotConverged(Message(Code.NOT_PRINCIPAL, **told), remedy=self.refinement)
+            told = Message(Code.NOT_PRINCIPAL, p=p, value=value, other=p, expected=known.value)
+            raise NotConverged(told, remedy=self.refinement)
 
     def even(self, p: float) -> EvenMoment | None:
         """Λ(p) of an even p > 0 by the equations of the moments; None where these do not close, or are too many.

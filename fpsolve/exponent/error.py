@@ -166,14 +166,14 @@ class Solution:
     Attributes:
         pair: the principal pair.
         unresolved: what is left of a correction by finer functions of directions, or shown by halved cells of φ.
-        measured: what finer functions of each axis, or of all, change; None where the effects of the highest modes
+        measured: what finer functions of each axis, or of all, change; none where the effects of the highest modes
             tell.
         start: the place where it was found, and its functions; None where these are just those of the pair.
     """
 
     pair: PrincipalPair
     unresolved: float = 0.0
-    measured: tuple[float, ...] | None = None
+    measured: tuple[float, ...] = ()
     start: Any = None
 
     @property
@@ -201,9 +201,7 @@ class Solution:
     @cached_property
     def error(self) -> float:
         """Estimate of the error of `value`: by functions that the space lacks, the ends of an interval, rounding."""
-        of_axes = self.measured
-        if of_axes is None:
-            of_axes = tuple(each.error for each in self.effects if each)
+        of_axes = self.measured or [each.error for each in self.effects if each]
         return sum(of_axes) + sum(self.truncation) + self.pair.rounding + self.unresolved
 
 
@@ -217,7 +215,7 @@ def mode_effects(pair: PrincipalPair) -> tuple[ModeEffects | None, ...]:
     both = np.reshape([pair.right, pair.left], (2, *space.shape))  # the smooth one first
     if pair.p < -1:
         both, operator = both[::-1], operator.T
-    norm = abs(float(pair.left @ space.weighed(pair.right)))
+    norm = abs(pair.left @ space.weighed(pair.right))
     count, found = len(space.axes), list[ModeEffects | None]()
     for k, axis in enumerate(space.axes):
         inside = axis.cells >= 0
@@ -228,7 +226,7 @@ def mode_effects(pair: PrincipalPair) -> tuple[ModeEffects | None, ...]:
         np.maximum.at(degrees, axis.cells[inside], axis.modes[inside])
         masks = inside & (degrees[axis.cells] - axis.modes == np.arange(4)[:, None])  # from the highest mode on
         others = tuple({*range(1, count + 1)} - {k + 1})
-        nested: list[Any] = count * [None]
+        nested = count * [None]
         nested[k] = axis.nested
         smooth, rough = along(nested, both)
         parts = rough * np.cumsum(operator @ (smooth * np.expand_dims(masks, others)), axis=0)

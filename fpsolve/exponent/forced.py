@@ -42,7 +42,7 @@ class StationaryMoments:
     @property
     def covariance(self) -> FloatArray:
         """E x xᵀ − E x E xᵀ."""
-        return np.asarray(self.square - np.outer(self.mean, self.mean))
+        return self.square - np.outer(self.mean, self.mean)
 
 
 def stationary_moments(problem: Problem, rtol: float = 1e-6) -> StationaryMoments:

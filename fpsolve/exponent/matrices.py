@@ -115,12 +115,12 @@ class MatrixRates(Rates):
             start = h._alone(sigma, h._forms(x))
             moved = image(x)
             guess = (moved @ start) / (moved @ moved) * x  # next to an eigenvector little else is left
-            least = ROUNDING * float(np.linalg.norm(guess))
+            least = ROUNDING * np.linalg.norm(guess)
             found, missed = gmres(operator, start, guess, rtol=tolerance, atol=least, restart=MOST_VECTORS, maxiter=1)
             if missed and np.linalg.norm(image(found) - start) > ROUGHLY * np.linalg.norm(start):
                 told = f"{x.size} second moments under noise so strong are not found by iteration"
                 raise NoHierarchy(f"{told}; {REMEDY}")
-            return np.asarray(found)
+            return found
 
         return solve
 

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
 from types import MappingProxyType
-from typing import Annotated, Any, ClassVar, NamedTuple, NoReturn, Protocol
+from typing import Annotated, Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -89,7 +89,7 @@ class Budget:
 
     def most(self, stage: Stage | Space) -> int:
         """Number of unknowns that a space, or a stage, may have."""
-        return stage.most_unknowns if self.unknowns is None else self.unknowns
+        return self.unknowns or stage.most_unknowns
 
     def meter(self) -> Meter:
         """For the numbers of a parameter set."""
@@ -163,16 +163,16 @@ class Method:
         remedy: what to do where it is not resolved, or a budget does not suffice.
     """
 
-    name: ClassVar[str] = "finite elements"
-    usual_rtol: float = RTOL
-    pictures: Pictures = DIRECTIONS
-    no_picture: str = ""
-    adapts: bool = True
-    is_function: bool = False
-    is_quick: bool = False
-    by_moments: bool = False
+    name = "finite elements"
+    usual_rtol = RTOL
+    pictures = DIRECTIONS
+    no_picture = ""
+    adapts = True
+    is_function = False
+    is_quick = False
+    by_moments = False
     ray: float | None = None
-    is_computed: bool = True
+    is_computed = True
     spaces: Mapping[float, Any] = MappingProxyType({})
     remedy: Remedy | None = None
 
@@ -246,9 +246,9 @@ class Method:
     def checked(self, estimate: Estimate, p: float | None = None) -> Estimate:
         """An estimate, such as that of Λ(p), whose error leaves it a meaning. Raises `NotConverged`."""
         if not estimate.relative_error <= MEANINGLESS:
-            number = {"value": estimate.value, "size": estimate.error_estimate}
-            symbol = estimate.quantity.symbol if p is None else "Λ(p)"
-            raise NotConverged(Message(Code.MEANINGLESS, p=p, symbol=symbol, **number), estimate, self.refinement)
+            symbol, size = estimate.quantity.symbol if p is None else "Λ(p)", estimate.error_estimate
+            told = Message(Code.MEANINGLESS, p=p, symbol=symbol, value=estimate.value, size=size)
+            raise NotConverged(told, estimate, self.refinement)
         return estimate
 
     @property
@@ -436,9 +436,11 @@ class Stage(Protocol):
 
     def is_enough(self, found: Any) -> bool:
         """Whether what is found within the tolerance needs no more, as for its slope."""
+        return True
 
     def doubled(self, failure: Exception | None) -> Stage | None:
         """More functions, where nothing is found among these; None where that is no use."""
+        return None
 
     def refined(self, found: Any, goal: float, most: int) -> Stage | None:
         """Functions that should have an error of about a goal, or less, with so many unknowns at most."""
@@ -455,8 +457,6 @@ class Search:
         remedy: what to do where the budget does not suffice.
         stages: how many stages were solved.
         failure: why the last stage had no solution.
-        best: what the last place has that is nearest to the tolerance.
-        share: its error over what is allowed.
         judged: what the last stage has.
     """
 
@@ -466,8 +466,6 @@ class Search:
     remedy: Remedy
     stages: int = 0
     failure: Exception | None = None
-    best: Any = None
-    share: float = math.inf
     judged: Any = None
 
     def settle(self, stage: Stage | None, near: Any = None) -> Any:
@@ -478,10 +476,11 @@ class Search:
             near: what was found elsewhere, to begin with.
 
         Raises:
-            NotConverged: the budget does not suffice, or rounding is larger than the tolerance; `partial` is the best
-                that is found, or None.
+            NotConverged: the budget does not suffice, or rounding is larger than the tolerance; `partial` is what is
+                nearest to the tolerance, or None.
         """
-        self.best, self.judged, self.failure, self.share = None, None, None, math.inf
+        best, share = None, math.inf  # what is nearest to the tolerance, and its error over what is allowed
+        self.judged, self.failure = None, None
         try:
             while True:
                 stage = self._begun(stage)
@@ -497,15 +496,23 @@ class Search:
                 self.judged = found = stage.judged(near, allowed)
                 if found.error <= allowed and stage.is_enough(found):
                     return found
-                if found.error / allowed < self.share:
-                    self.best, self.share = found, found.error / allowed
+                if found.error / allowed < share:
+                    best, share = found, found.error / allowed
                 if near.rounding > allowed:
                     raise NotConverged(Message(Code.ROUNDED, size=near.rounding))
                 stage = stage.refined(found, allowed, self.budget.most(stage))
-        except NotConverged as failure:  # no stage may follow
-            if self.share <= 1 and not isinstance(failure, OverBudget):  # within the tolerance, but not its slope
-                return self.best
-            return self._stop(failure)
+        except NotConverged as ended:  # no stage may follow
+            if share <= 1 and not isinstance(ended, OverBudget):  # within the tolerance, but not its slope
+                return best
+            about = {"p": self.p, "reason": ended.reason}
+            if best is not None:
+                told = Message(Code.BUDGET_SPENT, value=best.value, error=best.error, size=share, **about)
+            else:
+                last, is_thin = self.failure, isinstance(self.failure, NotConverged)
+                said = last.message.advising(None) if isinstance(last, FpsolveError) else last and str(last)
+                told = Message(Code.NOTHING_RESOLVED, is_thin=is_thin, last=said, **about)
+            remedy = None if ended.reason.code is Code.ROUNDED else self.remedy
+            raise type(ended)(told, best, remedy) from None
 
     def _begun(self, stage: Stage | None) -> Stage:
         """A stage, which is counted. Raises `NotConverged`: it is beyond the budget, or there is none."""
@@ -517,16 +524,3 @@ class Search:
         charge(size)
         self.stages += 1
         return stage
-
-    def _stop(self, ended: NotConverged) -> NoReturn:
-        """Raise `NotConverged`, or `OverBudget`, with the best that is found."""
-        reason = ended.reason
-        if self.best is not None:
-            number = {"value": self.best.value, "error": self.best.error, "size": self.share}
-            told = Message(Code.BUDGET_SPENT, p=self.p, reason=reason, **number)
-        else:
-            last, is_thin = self.failure, isinstance(self.failure, NotConverged)
-            said = last.message.advising(None) if isinstance(last, FpsolveError) else last and str(last)
-            told = Message(Code.NOTHING_RESOLVED, p=self.p, reason=reason, is_thin=is_thin, last=said)
-        remedy = None if reason.code is Code.ROUNDED else self.remedy
-        raise type(ended)(told, self.best, remedy)

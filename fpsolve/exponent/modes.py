@@ -14,9 +14,9 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar
 
 import numpy as np
 import scipy.linalg
@@ -119,7 +119,7 @@ def first_order_changes(pair: PrincipalPair, finer: Generator, k: int) -> FloatA
     )
     factors = factorised(operator.on(k, new), space.chain)
     found = left * factors.solve(right.ravel()).reshape(right.shape) / -(pair.left @ old.weighed(pair.right))
-    return np.asarray(found.sum(axis=tuple(each for each in range(found.ndim) if each != k)))
+    return found.sum(axis=tuple(each for each in range(found.ndim) if each != k))
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,26 +137,9 @@ class DirectionStart(Start):
         """L(p) on the space."""
         return Generator(self.problem, self.space)
 
-    @classmethod
-    def at(
-        cls, problem: Problem, p: float, rtol: float, known: Mapping[float, Solution]
-    ) -> tuple[Self, PrincipalPair | None]:
-        """The coarsest functions, or some of the nearest p if one is known, and the pair there."""
-        nearest = min(
-            (each for each in known.values() if each.start), key=lambda each: abs(each.pair.p - p), default=None
-        )
-        if nearest:
-            return nearest.start.again(), nearest.pair
-        noises = (first_axis(noise, -math.log10(rtol)) for noise in problem.valued.parts.values())
-        return cls(problem, Space((cls.directions(problem), *noises))), None
-
     @staticmethod
     def directions(problem: Problem) -> DirectionAxis:
         """The coarsest functions of directions."""
-        raise NotImplementedError
-
-    def again(self) -> Self:
-        """The functions with which another p begins."""
         raise NotImplementedError
 
     def solved(self, p: float, near: PrincipalPair | None) -> PrincipalPair:
@@ -169,15 +152,12 @@ class DirectionStart(Start):
         rounding = 2 * self.problem.dimension * sys.float_info.epsilon * abs(p) * framed(self.problem).unit_rate
         return replace(pair, rounding=pair.rounding + rounding)  # an entry of S⁻¹AS is a sum of products twice
 
-    def changes_by(self, pair: PrincipalPair, k: int, finer: Any) -> FloatArray:
-        """What each of the new functions of a finer axis changes in Λ(p), to first order."""
-        return first_order_changes(pair, Generator(self.problem, self.space.with_axis(k, finer)), k)
-
     def lacking(self, pair: PrincipalPair, k: int, finer: Any) -> float:
         """What is left without them, by the sizes of these changes, as their sum may be small by chance."""
         if finer.size == self.space.axes[k].size:  # there are no more
             return math.inf
-        return MEASURED * float(np.sum(np.abs(self.changes_by(pair, k, finer))))
+        changes = first_order_changes(pair, Generator(self.problem, self.space.with_axis(k, finer)), k)
+        return MEASURED * float(np.sum(np.abs(changes)))
 
     def errors_of_axes(self, pair: PrincipalPair, allowed: float) -> tuple[float, ...]:
         """Of the elements and of each noise: the effects of the highest modes, or what is lacking if that is less.
@@ -196,7 +176,7 @@ class DirectionStart(Start):
 
     def finer(self, phi: DirectionAxis, solution: Solution, share: float) -> Space:
         """That with some functions of directions, and more of each noise that lacks more than a share."""
-        noises, errors = list(self.space.noises), (solution.measured or ())[1:]
+        noises, errors = list(self.space.noises), solution.measured[1:]
         for k, (axis, effects, error) in enumerate(zip(noises, solution.effects[1:], errors, strict=True)):
             if effects is not None and error > share:
                 noises[k] = axis.enriched() if error < effects.error else axis.refined(effects, share)
@@ -232,16 +212,13 @@ class SphereStart(DirectionStart):
         return self.generators[waves]
 
     def again(self) -> SphereStart:
+        """The functions with which another p begins."""
         return self.of_waves(FIRST_WAVES)
 
     def of_waves(self, waves: int, before: tuple[Solution, ...] = ()) -> SphereStart:
         """That with waves up to another degree, after solutions with those of lower ones."""
         space = self.space.with_axis(0, replace(self.space.phi, waves=max(waves, FIRST_WAVES)))
         return replace(self, space=space, before=before)
-
-    def change(self, pair: PrincipalPair) -> float:
-        """What waves of the next degree change in Λ(p), to first order."""
-        return float(np.sum(first_order_changes(pair, self.of_waves(self.space.phi.waves + 2).generator, 0)))
 
     def judged(self, pair: PrincipalPair, allowed: float) -> Solution:
         """The pair, corrected by what the next waves change, with what is left then; first the other parts of it.
@@ -252,7 +229,8 @@ class SphereStart(DirectionStart):
         of_axes, start = self.errors_of_axes(pair, allowed), replace(self, before=())
         if sum(of_axes) > 0.5 * allowed:
             return Solution(pair, math.inf, of_axes, start)
-        pair = replace(pair, correction=self.change(pair))
+        changes = first_order_changes(pair, self.of_waves(self.space.phi.waves + 2).generator, 0)
+        pair = replace(pair, correction=float(np.sum(changes)))
         change = pair.value - self.before[-1].pair.value if self.before else math.inf
         return Solution(pair, OF_CHANGES * (abs(change) + abs(pair.correction)), of_axes, start)
 
@@ -267,8 +245,7 @@ class SphereStart(DirectionStart):
 
     def refined(self, solution: Solution, goal: float, most: int) -> SphereStart:
         """Waves of the next degree; or other elements and functions of the noise, with waves of the degree before."""
-        of_axes = solution.measured or ()
-        phi, share = self.space.phi, MINOR * goal
+        of_axes, phi, share = solution.measured, self.space.phi, MINOR * goal
         if sum(of_axes) <= 0.5 * goal:
             return self.of_waves(phi.waves + 2, (solution,))
         found = self.finer(phi.finer(["degree"]) if of_axes[0] > share else phi, solution, share)
@@ -285,11 +262,16 @@ class Directions(Elements):
     preferred_even = Elements.even
 
     def places(self, p: float, tolerance: Tolerance, found: Sequence[Solution]) -> Iterator[tuple[Stage, Any]]:
-        """One: that of the nearest p; where it is p itself, a finer one than before."""
+        """One: the coarsest functions, or some of the nearest p; where that is p itself, finer ones than before."""
         if known := self.spaces.get(p):
             yield known.start.refined(known, tolerance(p, known.value), 0), known.pair
+        elif started := [each for each in self.spaces.values() if each.start]:
+            nearest = min(started, key=lambda each: abs(each.pair.p - p))
+            yield nearest.start.again(), nearest.pair
         else:
-            yield self.stage.at(self.problem, p, self.settings.rtol, self.spaces)
+            digits, noises = -math.log10(self.settings.rtol), self.problem.valued.parts.values()
+            axes = (self.stage.directions(self.problem), *(first_axis(noise, digits) for noise in noises))
+            yield self.stage(self.problem, Space(axes)), None
 
     def is_dear(self, p: float) -> bool:
         return p <= 0 or p % 2 != 0

@@ -35,7 +35,7 @@ from fpsolve.data import brief
 from fpsolve.errors import NoHierarchy, NoSuchExponent
 from fpsolve.exponent.delays import DelayRates
 from fpsolve.exponent.matrices import MatrixRates
-from fpsolve.exponent.method import BUDGET, Budget, Search
+from fpsolve.exponent.method import BUDGET, Budget, Search, Stage
 from fpsolve.exponent.powers import Moving, PowerRates, moment_form, moves, multi_indices, multinomials, of_signs
 from fpsolve.exponent.rightmost import REMEDY, ROUNDING
 from fpsolve.fem.space import BASES
@@ -141,10 +141,8 @@ def even_moment(
         return max(min(loosest * found.scale, math.inf if tolerance is None else tolerance), 2 * found.rounding)
 
     search = Search(p, allowed, budget, Remedy.BUDGET)
-    last: EvenMoment | None
     with unless_over_budget():
-        last = search.settle(Level(equations, (FIRST,) * len(equations.noises), most))
-        return last
+        return search.settle(Level(equations, (FIRST,) * len(equations.noises), most))
     if (last := search.judged) and last.error <= (LARGEST_ERROR * last.scale if tolerance is None else tolerance):
         return last
     if search.failure:
@@ -160,7 +158,7 @@ def constant_scale(problem: Problem) -> Scale:
     now = problem.dimension - len(problem.linear.pasts)
     mean = mean_matrix(problem, problem.noise.motion(problem.linear))[:now, :now]
     abscissa = abs(float(np.max(np.linalg.eigvals(mean).real)))
-    is_moved = abscissa > ROUNDED * float(np.linalg.norm(mean))
+    is_moved = abscissa > ROUNDED * np.linalg.norm(mean)
     return Scale(abscissa if is_moved else framed(problem).unit_rate, 0.0)
 
 
@@ -181,9 +179,7 @@ def refuse_open_hierarchy(problem: Problem, p: float) -> None:
     if problem.linear.pasts and p != 2:
         raise NoHierarchy(f"got p = {p:g}; with a delay the equations of the moments are for p = 2; {REMEDY}")
     moments = math.comb(int(p) + problem.dimension - 1, problem.dimension - 1)
-    count = moments
-    for noise in problem.valued.parts.values():
-        count *= BASES[noise.basis](noise, FIRST).size
+    count = moments * math.prod(BASES[noise.basis](noise, FIRST).size for noise in problem.valued.parts.values())
     limits = (MOST_MOMENTS, MOST) if p > 2 else (math.inf, MOST_NUMBERS)
     for number, what, limit in zip((moments, count), ("moments", "equations"), limits, strict=True):
         if number > limit:
@@ -218,8 +214,8 @@ class EvenMoment:
     y: FloatArray
     moments: FloatArray
     polynomial: FloatArray
-    change: float = 0.0
-    finer: int = 0
+    change: float
+    finer: int
     derivative: ClassVar[float] = math.nan
 
     def __repr__(self) -> str:
@@ -278,27 +274,27 @@ class EvenMoment:
     def is_positive(self) -> bool:
         """Whether E x^α are moments, and T is positive, as far as it is seen: both but for a common sign."""
         form = moment_form(self.moments, self.equations.dimension, self.equations.p)
-        return _has_one_sign(np.asarray(np.linalg.eigvalsh(form))) and _has_one_sign(self._polynomial_values())
+        return _has_one_sign(np.linalg.eigvalsh(form)) and _has_one_sign(self._polynomial_values())
 
-    def _polynomial_values(self) -> FloatArray:
+    def _polynomial_values(self) -> Any:
         """T at some directions; of p = 2 the eigenvalues of its matrix."""
         n, p = self.equations.dimension, self.equations.p
         if p == 2:
-            return np.asarray(np.linalg.eigvalsh(moment_form(self.polynomial, n, 2)))
+            return np.linalg.eigvalsh(moment_form(self.polynomial, n, 2))
         x = np.random.default_rng(0).standard_normal((200, n))
         x /= np.linalg.norm(x, axis=1)[:, None]
         alphas = multi_indices(n, p)
         return np.prod(x[:, None] ** alphas, axis=2) @ (self.polynomial * np.sqrt(multinomials(alphas)))
 
 
-def _has_one_sign(values: FloatArray) -> bool:
+def _has_one_sign(values: Any) -> bool:
     values = values * np.sign(values[np.argmax(np.abs(values))])
     return bool(values.min() >= -NEGATIVE * values.max())
 
 
 @dataclass(frozen=True)
-class Level:
-    """The functions of each noise of degrees below some counts, as a `Stage`.
+class Level(Stage):
+    """The functions of each noise of degrees below some counts; where these do not settle, more do not.
 
     Attributes:
         equations: of the moments.
@@ -333,12 +329,6 @@ class Level:
             return replace(found, change=math.inf)
         step = abs(self.before.value - found.value)
         return replace(found, change=found.change + step * (step > found.told + found.change + self.before.told))
-
-    def is_enough(self, found: EvenMoment) -> bool:
-        return True
-
-    def doubled(self, failure: Exception | None) -> None:
-        """Where these are not solved, more are not."""
 
     def refined(self, found: EvenMoment, goal: float, most: int) -> Level | None:
         """More functions of the noises of which the next ones change most; None where there are no others."""
@@ -376,7 +366,7 @@ class Equations:
         self.noises, names = list(named.values()), list(named)
         moved = problem.noise.motion(problem.linear)
         steady, self._loads = np.zeros(2 * (problem.dimension,)), list[tuple[Any, int]]()
-        loads = list[FloatArray]()
+        loads = []
         for term in moved.terms:
             matrix = moved.epsilon**term.order * np.array(term.matrix)
             if term.g == one:

@@ -51,7 +51,7 @@ def multinomials(alphas: IntArray) -> FloatArray:
     """p!/α!."""
     from scipy.special import gammaln
 
-    return np.asarray(np.exp(gammaln(alphas.sum(axis=1) + 1) - gammaln(alphas + 1).sum(axis=1)))
+    return np.exp(gammaln(alphas.sum(axis=1) + 1) - gammaln(alphas + 1).sum(axis=1))
 
 
 def of_signs(n: int, p: int) -> FloatArray:
@@ -73,7 +73,7 @@ def _half(n: int) -> tuple[IntArray, IntArray, FloatArray]:
 def upper(forms: FloatArray) -> FloatArray:
     """The moments of order 2 of forms E xxᵀ, as vectors."""
     i, j, sizes = _half(forms.shape[-1])
-    return np.asarray(forms[..., i, j] * sizes)
+    return forms[..., i, j] * sizes
 
 
 def moment_form(moments: FloatArray, n: int, p: int) -> FloatArray:
@@ -87,7 +87,7 @@ def moment_form(moments: FloatArray, n: int, p: int) -> FloatArray:
     places = {tuple(each): k for k, each in enumerate(alphas.tolist())}
     at = np.array([[places[tuple(each)] for each in (half + halves).tolist()] for half in halves])
     sizes = np.sqrt(multinomials(halves))
-    return np.asarray((moments / np.sqrt(multinomials(alphas)))[at] * np.outer(sizes, sizes))
+    return (moments / np.sqrt(multinomials(alphas)))[at] * np.outer(sizes, sizes)
 
 
 class Moving(NamedTuple):
@@ -114,7 +114,7 @@ class Moving(NamedTuple):
         """
         slow = (1.0, self.steady), *zip(sizes, self.loads, strict=True), *self.impulses
         linear: Any = sum(size * abs(each) for size, each in slow)
-        rate = float(np.max(np.abs(np.linalg.eigvals(linear)))) or 1.0
+        rate = np.max(np.abs(np.linalg.eigvals(linear))) or 1.0
         squares = linear**2 / rate + sum(each**2 for each in self.squares)
         squares = squares + sum(often * each**2 for often, each in self.impulses)
         now = len(squares) - len(same)
@@ -188,7 +188,7 @@ class PowerRates(Rates):
         return cls((sparse.kron(generator, sparse.eye_array(unit)) + driven).tocsc(), unit)
 
     def __matmul__(self, x: FloatArray) -> FloatArray:
-        return np.asarray(self.matrix @ x)
+        return self.matrix @ x
 
     @property
     def T(self) -> PowerRates:
@@ -204,4 +204,4 @@ class PowerRates(Rates):
     def solver(self, sigma: float, tolerance: float = EXACTLY) -> Solve:
         one = sparse.eye_array(self.matrix.shape[0], format="csc")
         factors = sparse_lu(sigma * one - self.matrix, permc_spec="COLAMD")
-        return lambda x, trans=0: np.asarray(factors.solve(x, "T" if trans else "N"))
+        return lambda x, trans=0: factors.solve(x, "T" if trans else "N")

@@ -27,8 +27,8 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
-from typing import Literal
+from dataclasses import KW_ONLY, dataclass
+from typing import Any, Literal
 
 from fpsolve.arrays import is_whole, shown
 from fpsolve.exponent.eigen import PrincipalPair
@@ -200,22 +200,23 @@ class Index(Quantity):
         interval: where it is sought.
     """
 
-    solve: Callable[[ExponentSolver], Estimate | Absent] = field(kw_only=True)
-    theory: Callable[[Problem], float] = field(kw_only=True)
-    interval: tuple[float, float] = field(default=(-math.inf, math.inf), kw_only=True)
+    _: KW_ONLY
+    solve: Callable[[ExponentSolver], Estimate | Absent]
+    theory: Callable[[Problem], float]
+    interval: tuple[float, float] = (-math.inf, math.inf)
 
 
 def _index(
     quantity: Quantity,
     solve: Callable[[ExponentSolver], Estimate | Absent],
-    interval: tuple[float, float] = (-math.inf, math.inf),
+    **more: Any,
 ) -> Index:
     """The theory is the number of this name of second-order perturbation theory; NaN where that does not apply."""
 
     def theory(problem: Problem) -> float:
         return float(getattr(second_order_or_none(problem), quantity.name, math.nan))
 
-    return Index(**vars(quantity), solve=solve, theory=theory, interval=interval)
+    return Index(**vars(quantity), solve=solve, theory=theory, **more)
 
 
 def _restitution_by_theory(problem: Problem) -> float:
@@ -224,7 +225,7 @@ def _restitution_by_theory(problem: Problem) -> float:
 
 
 LYAPUNOV_EXPONENT: Index = _index(quantity.LYAPUNOV_EXPONENT, lambda solver: solver.lyapunov_exponent())
-STABILITY_INDEX: Index = _index(quantity.STABILITY_INDEX, nonzero_root, SEARCH_INTERVAL)
+STABILITY_INDEX: Index = _index(quantity.STABILITY_INDEX, nonzero_root, interval=SEARCH_INTERVAL)
 VARIANCE_RATE = _index(quantity.VARIANCE_RATE, lambda solver: solver.variance_rate())
 IMPACT_RATE = _index(quantity.IMPACT_RATE, impact_rate)
 CRITICAL_IMPACT_FACTOR = _index(quantity.CRITICAL_IMPACT_FACTOR, critical_impact_factor)

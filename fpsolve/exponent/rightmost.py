@@ -89,7 +89,7 @@ class Rates(Protocol):
 
         def asked(x: FloatArray, trans: int = 0) -> FloatArray:
             with timed(size):
-                return np.asarray(solve(x, trans))
+                return solve(x, trans)
 
         return asked
 
@@ -124,11 +124,11 @@ class Rates(Protocol):
             except SingularMatrix:  # it is an eigenvalue to the last digit
                 break
             for _ in range(2):
-                x, y = (each / float(np.max(np.abs(each))) for each in (solve(x), solve(y, 1)))
+                x, y = (each / np.max(np.abs(each)) for each in (solve(x), solve(y, 1)))
             last, value = value, float(y @ (self @ x)) / float(y @ x)
             size = self.sizes(x, y) / abs(float(y @ x))
             change = abs(value - last)
-            turned = max(float(np.max(np.abs(new - old))) for new, old in zip((x, y), before, strict=True))
+            turned = max(np.max(np.abs(new - old)) for new, old in zip((x, y), before, strict=True))
             if change <= 0.1 * ROUNDING * size and turned <= STILL:
                 break
             sigma = value + max(1e-3 * ROUNDING * size, NEARER * (sigma - value))

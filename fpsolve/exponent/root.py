@@ -40,10 +40,9 @@ def nonzero_root(solver: ExponentSolver, interval: tuple[float, float] = SEARCH_
     refuse(method.reason(0.0, STABILITY_INDEX.symbol))
     if told := method.reason(1.0, STABILITY_INDEX.symbol):
         return Absent(told)
-    noise = solver.problem.noise
     low, high = (float(end) for end in np.clip(interval, *method.interval))
     ends = low, high
-    nowhere = Absent(Message(Code.NO_ROOT, low=low, high=high, is_bounded=noise.is_bounded))
+    nowhere = Absent(Message(Code.NO_ROOT, low=low, high=high, is_bounded=solver.problem.noise.is_bounded))
     of_parts = method.index_of_parts(lambda part: nonzero_root(solver.of(part), interval), nowhere)
     if of_parts is not None:
         return of_parts

@@ -81,7 +81,7 @@ class MomentLyapunov(Result):
     error_estimate: FloatArray
     residual: FloatArray
     solver: ExponentSolver
-    curves: tuple[Curve, ...] = field(default=(), repr=False)
+    curves: tuple[Curve, ...] = ()
     root: float | None = None
     failures: tuple[Failure, ...] = ()
 
@@ -99,8 +99,10 @@ class MomentLyapunov(Result):
         if not (count := np.count_nonzero(shares > rtol)):
             return found
         worst, remedy = int(np.argmax(shares)), Remedy.ROUNDING if method.adapts else Remedy.MESH
-        at = {"p": p[worst], "size": shares[worst]}
-        return Message(Code.RTOL_MISSED, rtol=rtol, count=count, of=p.size, **at, remedy=remedy), *found
+        told = Message(
+            Code.RTOL_MISSED, rtol=rtol, count=count, of=p.size, p=p[worst], size=shares[worst], remedy=remedy
+        )
+        return told, *found
 
     @cached_property
     def notes(self) -> tuple[Message, ...]:
@@ -140,10 +142,17 @@ class MomentLyapunov(Result):
         columns = {name: getattr(self, name) for name in ("value", "error_estimate", "residual")}
         columns |= {"derivative": self.slope, "derivative_error": self.errors_of(self.slope)}
         numbers = {quantity.OVER_P[name]: each for name, each in columns.items()}
-        failures, values = [each.reason for each in self.failures], self.solver.problem.values
-        more = {"warnings": self.warnings, "notes": self.notes, "failures": failures}
-        title, places = quantity.MOMENT.words, {quantity.P: self.p}
-        return dataset(title, self.solver.method.name, numbers, places, values, rtol=self.solver.rtol, **more)
+        return dataset(
+            quantity.MOMENT.words,
+            self.solver.method.name,
+            numbers,
+            {quantity.P: self.p},
+            self.solver.problem.values,
+            rtol=self.solver.rtol,
+            warnings=self.warnings,
+            notes=self.notes,
+            failures=[each.reason for each in self.failures],
+        )
 
     def _said(self) -> str:
         if not self.p.size:
@@ -180,7 +189,7 @@ class ExponentSolver:
     _: KW_ONLY
     rtol: float = 1e-8
     of_value: float = 0.0
-    budget: Budget = field(default_factory=Budget)
+    budget: Budget = BUDGET
     slope_errors: dict[float, float] = field(init=False, default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:
@@ -283,7 +292,7 @@ class ExponentSolver:
         for q, row in rows.items():
             if not math.isnan(row.derivative_error):
                 self.slope_errors.setdefault(q, row.derivative_error)
-        failures = dict[float, Failure]()
+        failures = {}
         inwards = np.lexsort((-np.abs(points), points < 0))  # as a mesh for a large |p| serves smaller ones
         for q in points[inwards].tolist():
             begin(f"Λ({q:g})")
@@ -308,7 +317,7 @@ class ExponentSolver:
     def slope(self, p: float) -> float:
         """Λ′(p) by eigenfunctions; NaN where these are not found, or there are none."""
         with suppress(NotConverged, NoSuchExponent):
-            return float(self.solution(p).derivative)
+            return self.solution(p).derivative
         return math.nan
 
     def slope_error(self, p: float) -> float:

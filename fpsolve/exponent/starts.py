@@ -15,6 +15,7 @@ import numpy as np
 
 from fpsolve.exponent.eigen import BACKWARD_ERROR_LIMIT, PrincipalPair, principal_pair
 from fpsolve.exponent.error import Solution, mode_effects
+from fpsolve.exponent.method import Stage
 from fpsolve.fem.axis import MOST_DEGREE
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.noise_axes import CellAxis, NoiseAxis
@@ -38,7 +39,7 @@ COMPARABLE = 0.6
 
 
 @dataclass(frozen=True, eq=False)
-class Start:
+class Start(Stage):
     """A `Stage` at a place of two variables, by the functions that Λ(p) is sought among.
 
     Attributes:
@@ -67,9 +68,6 @@ class Start:
         """The pair with its error by its highest modes."""
         return Solution(pair)
 
-    def is_enough(self, found: Solution) -> bool:
-        return True
-
     def doubled(self, failure: Exception | None) -> Start | None:
         """More functions along the axes that lack most, by the pair that a failed search has reached, if any."""
         pair: Any = getattr(failure, "partial", None)
@@ -87,7 +85,7 @@ class Start:
             if found.xi.lines.size:
                 lower, upper = solution.truncation
                 found = found.with_axis(1, found.xi.reaching(lower > share, upper > share))
-            found = found if found.size > self.space.size else found.raised()
+            found = found if found.size > self.space.size else found.enriched()
             if found.size <= most:
                 break
         return replace(self, space=found)
@@ -124,8 +122,8 @@ def _of_filter(problem: Problem, p: float, digits: float, center: float | None) 
 
 def _of_diffusion(problem: Problem, p: float, digits: float, center: float | None) -> tuple[NoiseAxis, Xi]:
     """Polynomials with the tilt that has its peak at z."""
-    noise, frozen = problem.valued, frozen_noise(problem)
-    assert frozen is not None
+    noise = problem.valued
+    frozen: Any = frozen_noise(problem)
     unit, end = noise.standard_deviation, noise.half_width / noise.standard_deviation
     center = frozen.center(p) if center is None else center
     slope = frozen.tilt(center) / p if noise.may_tilt else 0.0
@@ -137,19 +135,19 @@ AXES = {"cells": _of_tails, "pairs": _of_filter, "polynomials": _of_diffusion}
 """The first functions of one noise by its `basis`, and ξ about which the phase is looked at; of others any will do."""
 
 
-def _phase(system: LinearMotion, xi: Xi, digits: float, is_smooth: bool = False) -> PhaseAxis:
+def _phase(system: LinearMotion, xi: Xi, digits: float, is_smooth: bool) -> PhaseAxis:
     """Equal cells on a half circle from one jump to where it comes again, and a line at every other jump.
 
     There are more where the speed of the phase changes much for some of the ξ; but one, of a higher degree, where
     several numbers move it, which leave T smoother, and each function of φ is a thousand unknowns.
     """
     speed = system.phase_speed(xi)
-    widest = float(np.max(speed.amplitude / np.maximum(np.abs(speed.mean), 1e-300)))
+    widest = np.max(speed.amplitude / np.maximum(np.abs(speed.mean), 1e-300))
     cells = 1 if is_smooth else 8 if widest > 1 else 4 if widest > 0.5 else 2
     rays = [jump.phase for jump in system.jumps] or [math.pi / 2]
     lines = rays[0] + np.linspace(0, math.pi, cells + 1)
     others = rays[0] + np.mod(np.array(rays[1:]) - rays[0], math.pi)
-    near = np.min(np.abs(lines[1:-1, None] - others[None]), axis=1, initial=math.inf) < 0.3 * math.pi / cells
+    near = np.min(np.abs(lines[1:-1, None] - others), axis=1, initial=math.inf) < 0.3 * math.pi / cells
     lines = np.sort(np.concatenate([lines[:1], lines[1:-1][~near], lines[-1:], others]))
     degree = round(np.clip(digits + (4 if is_smooth else -2 if widest > 0.5 else 2), 4, MOST_DEGREE))
     return PhaseAxis(lines, np.full(lines.size - 1, degree))
@@ -170,7 +168,7 @@ def other_centers(pair: PrincipalPair) -> list[float]:
 def _of_filters(pair: PrincipalPair, least: float) -> list[float]:
     problem, center = pair.generator.problem, pair.space.xi.center
     z, rate = steady_places(problem, pair.p)
-    found: list[float] = z[(np.abs(z - center) > 5) & (rate > least)][:1].tolist()
+    found = z[(np.abs(z - center) > 5) & (rate > least)][:1].tolist()
     if center:
         amplitude, swinging = swing(problem, pair.p)
         found += [0.0] * (amplitude > 5 and swinging > least)
@@ -178,8 +176,7 @@ def _of_filters(pair: PrincipalPair, least: float) -> list[float]:
 
 
 def _of_diffusions(pair: PrincipalPair, least: float) -> list[float]:
-    frozen = frozen_noise(pair.generator.problem)
-    assert frozen is not None
+    frozen: Any = frozen_noise(pair.generator.problem)
     z, rate = frozen.peaks(pair.p)
     if z.size < 2:
         return []

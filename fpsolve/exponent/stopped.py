@@ -27,9 +27,10 @@ import scipy.linalg
 from fpsolve.arrays import FloatArray
 from fpsolve.exponent.eigen import PrincipalPair, slope_rounding
 from fpsolve.exponent.error import Solution
-from fpsolve.exponent.modes import Directions, DirectionStart, inside_frame, second_moments
+from fpsolve.exponent.modes import Directions, DirectionStart, first_order_changes, inside_frame, second_moments
 from fpsolve.exponent.starts import SHARE
 from fpsolve.fem.directions import HalfSphereAxis
+from fpsolve.fem.generator import Generator
 from fpsolve.model.coordinates import mean_matrix
 from fpsolve.model.plane import LinearMotion, Stop, rotating_coordinates
 from fpsolve.model.problem import Problem
@@ -73,7 +74,7 @@ def _rotating(block: FloatArray) -> FloatArray:
     if (found := rotating_coordinates(block)) is None:
         _, found = scipy.linalg.matrix_balance(block, permute=False)
     lower = np.linalg.qr(found.T)[1].T
-    return np.asarray(lower * np.sign(np.diagonal(lower)))
+    return lower * np.sign(np.diagonal(lower))
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,6 +109,7 @@ class StopStart(DirectionStart):
         )
 
     def again(self) -> StopStart:
+        """The functions with which another p begins."""
         coarser = (*(each.start for each in self.before), self)[0]
         return StopStart(self.problem, coarser.space, is_first=coarser.is_first)
 
@@ -115,8 +117,8 @@ class StopStart(DirectionStart):
         _, *of_noises = self.errors_of_axes(pair, allowed)
         phi, found = self.space.phi, list[float]()
         for finer in map(phi.deeper, phi.ways):
-            changes = self.changes_by(pair, 0, finer)
-            found.append(math.sqrt(float(abs(np.sum(changes)) * np.sum(np.abs(changes)))))
+            changes = first_order_changes(pair, Generator(self.problem, self.space.with_axis(0, finer)), 0)
+            found.append(math.sqrt(abs(np.sum(changes)) * np.sum(np.abs(changes))))
         left = float(self._left(found) @ found)
         for each in self.before:
             step, lacked = abs(pair.value - each.pair.value), sum(each.start.changes)
@@ -138,13 +140,12 @@ class StopStart(DirectionStart):
 
     def refined(self, solution: Solution, goal: float, most: int) -> StopStart:
         """Two degrees more where they change most, if they are to, and other functions of the noise."""
-        assert solution.measured is not None
         phi, changes, tried = self.space.phi, np.array(solution.start.changes), ()
         if not self.before or solution.measured[0] > 0.5 * goal:
             left, raised = OF_ONE * changes, changes >= WORTH * np.max(changes)
             for at in np.argsort(-changes):
                 left[at] *= FALL
-                if float(np.sum(left)) <= goal:
+                if np.sum(left) <= goal:
                     raised &= changes >= changes[at]
                     break
             tried = tuple(compress(phi.ways, raised))

@@ -13,7 +13,7 @@ from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 from scipy.linalg import cdf2rdf
 
 from fpsolve.arrays import ROUNDED, FloatArray
@@ -52,8 +52,8 @@ class Subsystem(System):
     basis: tuple[tuple[float, ...], ...]
     own: tuple[int, ...]
     names: tuple[str, ...]
-    rounded: float = 0.0
-    jumps: tuple[Jump, ...] = ()
+    rounded: float
+    jumps: tuple[Jump, ...]
 
     def linear(self) -> LinearMotion:
         whole = self.whole.linear()
@@ -67,20 +67,16 @@ class Subsystem(System):
         basis = np.array(self.basis)
         return np.linalg.inv(basis), basis
 
-    def inside(self, matrix: ArrayLike) -> FloatArray:
+    def inside(self, matrix: Any) -> FloatArray:
         """A matrix in the coordinates of all blocks, without what is rounding."""
         rows, columns = self._sides
-        found = rows @ np.asarray(matrix) @ columns
+        found = rows @ matrix @ columns
         return np.where(np.abs(found) > self.rounded * np.linalg.norm(found), found, 0.0)
 
     def part(self, terms: Sequence[CoefficientMatrix]) -> tuple[CoefficientMatrix, ...]:
         """W_k A V_k of some terms of the whole, without those of which nothing is left."""
-        found = list[CoefficientMatrix]()
-        for term in terms:
-            matrix = self.inside(term.matrix)[np.ix_(self.own, self.own)]
-            if np.any(matrix):
-                found.append(replace(term, matrix=matrix))
-        return tuple(found)
+        found = [(term, self.inside(term.matrix)[np.ix_(self.own, self.own)]) for term in terms]
+        return tuple(replace(term, matrix=matrix) for term, matrix in found if np.any(matrix))
 
     @property
     def section(self) -> str:  # type: ignore[override]
@@ -131,7 +127,7 @@ def blocks_of(problem: Problem) -> tuple[Subsystem, ...]:
             return ()
         phases = np.array(resting if len(resting) == 2 else (resting[0], resting[0] + math.pi / 2))
         rays, names = np.stack([np.cos(phases), -np.sin(phases)]), ("", "")
-        basis, rounded = frame @ rays, ROUNDED * float(np.linalg.cond(rays))
+        basis, rounded = frame @ rays, ROUNDED * np.linalg.cond(rays)
         groups = [(0,), (1,)] if any(map(_turns, matrices)) else [(0,)]
     elif stop is not None:  # in its coordinates, of which the first two must be one block, as a part has no stop
         basis, rounded, names = np.linalg.inv(np.array(stop.coordinates)), ROUNDED, stop.names(names)
@@ -191,8 +187,7 @@ def couplings(blocks: Sequence[Subsystem], matrices: Iterable[FloatArray]) -> ND
 def reached(pattern: NDArray[Any]) -> NDArray[np.bool_]:
     """Which variable, the row, feels which, the column, through any number of others; every one feels itself."""
     count = len(pattern)
-    steps = np.linalg.matrix_power((np.asarray(pattern) != 0) | np.eye(count, dtype=bool), count)
-    return np.asarray(steps, dtype=bool)
+    return np.linalg.matrix_power((pattern != 0) | np.eye(count, dtype=bool), count)
 
 
 def components(pattern: NDArray[Any]) -> list[tuple[int, ...]]:
@@ -215,7 +210,7 @@ def hidden_blocks(matrices: Sequence[FloatArray]) -> tuple[FloatArray, list[tupl
     mixed = np.tensordot(np.random.default_rng(0).standard_normal(len(words)), words, 1)
     values, vectors = np.linalg.eig(mixed)
     (_, basis), sizes = cdf2rdf(values, vectors), [1 + bool(each.imag) for each in values if each.imag >= 0]
-    if not (condition := float(np.linalg.cond(basis))) < WORST_CONDITION:
+    if not (condition := np.linalg.cond(basis)) < WORST_CONDITION:
         return np.eye(len(basis)), [(*range(len(basis)),)], 0.0
     least = ROUNDED * condition
     inside = [np.linalg.solve(basis, a @ basis) for a in scaled]

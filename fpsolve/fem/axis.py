@@ -201,13 +201,9 @@ class FunctionAxis:
     def _matrices(self) -> dict[tuple[Coefficient | None, NoiseDerivative | None], Matrix]:
         return {}
 
-    def projection(self, other: Any) -> Matrix:
-        """The matrix that takes a function on another axis to its projection on this one, shape (size, other.size)."""
-        raise NotImplementedError
-
     def new_in(self, coarse: Any) -> Mask:
         """Which functions one of lower degrees does not have, shape (size,)."""
-        return np.asarray(self.modes > np.max(coarse.modes))
+        return self.modes > np.max(coarse.modes)
 
     def enriched(self) -> Self:
         """The next finer one."""
@@ -218,7 +214,7 @@ class FunctionAxis:
         return self
 
     def raised(self) -> Self:
-        """One function more in each cell, where what a cell lacks harms others."""
+        """One degree more, or two, to tell by a change to first order what is lacking."""
         return self
 
     def refined(self, effects: ModeEffects, share: float) -> Self:
@@ -253,19 +249,12 @@ class DividedAxis(FunctionAxis):
     def doubled(self) -> Self:
         return self.on(halved(self.lines), np.repeat(self.degrees, 2))
 
-    def raised(self) -> Self:
-        return self.on(self.lines, np.minimum(self.degrees + 1, MAX_DEGREE))
-
     def refined(self, effects: ModeEffects, share: float) -> Self:
         return self.on(*split(self.lines, effects, share))
 
 
 def along(factors: Sequence[Matrix | None], tables: FloatArray) -> FloatArray:
     """Tables, in the last axes of an array, with a matrix applied along each axis; None leaves one as it is."""
-    if tables.ndim == 2:  # by far the most products of a solve
-        first, last = factors
-        tables = tables if last is None else np.asarray(tables @ last.T)
-        return tables if first is None else first @ tables
     for axis, factor in enumerate(factors, tables.ndim - len(factors)):
         if factor is not None:
             moved = tables.swapaxes(0, axis)
@@ -319,13 +308,11 @@ class KroneckerSum:
 
     def toarray(self) -> FloatArray:
         """The dense matrix, shape (size, size)."""
-        *firsts, lasts = [np.stack(list(map(dense, factors))) for factors in zip(*self.terms, strict=True)]
-        found = np.ones((len(lasts), 1, 1))
-        for factors in firsts:
-            found = np.einsum("tij,tkl->tikjl", found, factors)
-            found = found.reshape(len(found), found.shape[1] * found.shape[2], -1)
-        products = np.tensordot(found, lasts, (0, 0))
-        return products.swapaxes(1, 2).reshape(self.size, self.size)
+        factors = [np.stack([*map(dense, each)]) for each in zip(*self.terms, strict=True)]
+        rows = np.arange(1, 2 * len(factors), 2).tolist()
+        pairs: list[Any] = [each for k, of_axis in zip(rows, factors, strict=True) for each in (of_axis, [0, k, k + 1])]
+        found = np.einsum(*pairs, [*rows, *(k + 1 for k in rows)], optimize="greedy")
+        return found.reshape(self.size, self.size)
 
     def tocsc(self) -> csc_matrix:
         """The sparse matrix."""

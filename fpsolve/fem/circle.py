@@ -50,12 +50,12 @@ class CircleAxis(CountedAxis):
     @cached_property
     def rule(self) -> Rule:
         count = 2 * (self.size - 1) + MOST_HARMONICS
-        theta = np.asarray(np.arange(count) * (2 * np.pi / count), dtype=float)
+        theta = np.linspace(0, 2 * np.pi, count, endpoint=False)
         return Rule(theta, np.full(count, 1 / count), self.values_at(theta))
 
     @cached_property
     def xi(self) -> FloatArray:
-        return np.asarray(self.noise.of_angle(self.rule.points))
+        return self.noise.of_angle(self.rule.points)
 
     def values_at(self, theta: FloatArray) -> FloatArray:
         """The waves at any θ, shape (len(θ), size)."""
@@ -76,8 +76,8 @@ class CircleAxis(CountedAxis):
 
     def samples(self) -> Samples:
         """At equidistant θ; weight and measure are those of θ."""
-        weight, turn = np.full(self.rule.measure.size, 0.5 / np.pi), 2 * np.pi
-        return Samples(self.xi, weight, turn * self.rule.measure, self.rule.values, np.ones(self.rule.measure.size))
+        ones = np.ones(self.rule.measure.size)
+        return Samples(self.xi, 0.5 / np.pi * ones, 2 * np.pi * self.rule.measure, self.rule.values, ones)
 
     def everywhere(self, count: int) -> tuple[FloatArray, Matrix]:
         """At equidistant θ of the whole circle, the first one twice."""
@@ -87,7 +87,7 @@ class CircleAxis(CountedAxis):
     def _turning(self) -> FloatArray:
         """∫ v ∂u."""
         beside = np.where(np.arange(self.size - 1) % 2, self._waves[1:], 0.0)
-        return np.asarray(np.diag(beside, 1) - np.diag(beside, -1))
+        return np.diag(beside, 1) - np.diag(beside, -1)
 
     def _diffusing(self) -> FloatArray:
         return np.diag(-0.5 * self.noise.sigma**2 * self._waves**2)

@@ -47,7 +47,7 @@ from fpsolve.fem.axis import FunctionAxis, KroneckerSum, Rule, along
 from fpsolve.fem.element import EXTRA_POINTS, gauss_legendre, halved, middles
 from fpsolve.fem.line import LineSpace
 from fpsolve.fem.terms import OfMoment, Term, Terms
-from fpsolve.model.coordinates import Framed, mean_matrix
+from fpsolve.model.coordinates import mean_matrix
 from fpsolve.model.plane import CoefficientMatrix
 from fpsolve.model.problem import ParameterDerivative
 
@@ -94,11 +94,6 @@ class Angle:
     def tangent(self) -> Sequence[Matrix]:
         """What multiplies images by each component of de/dθ; functions of e = ±1 have no slopes."""
         return [-self.unit[-1], self.unit[0]][: len(self.unit)]
-
-    @property
-    def fitted(self) -> FloatArray:
-        """The matrix from values at `points` to coefficients, shape (size, m)."""
-        return np.asarray(np.linalg.pinv(self.at(self.points)), dtype=float)
 
 
 def signs(_: int) -> Angle:
@@ -147,7 +142,7 @@ ANGLES = {1: signs, 2: circle}
 
 def arc(lines: FloatArray, degree: int) -> Angle:
     """Elements on a part of a circle, with the constant in place of the function of the last vertex."""
-    line, length = LineSpace(lines, degree), float(lines[-1] - lines[0])
+    line, length = LineSpace(lines, degree), lines[-1] - lines[0]
     own = np.column_stack([line.constant(), np.delete(np.eye(line.size), line.ends[1], axis=1)])
     root = np.sqrt(line.measure / length)[:, None]
     unit = np.stack([np.cos(line.points), np.sin(line.points)])
@@ -168,7 +163,46 @@ def _jumps(line: LineSpace, speeds: FloatArray) -> FloatArray:
     inside = middles(line.lines)
     above, below = (line.at(ends, 1, inside).toarray() for ends in (line.lines[:-1], line.lines[1:]))
     jump, weights = above[1:] - below[:-1], SLOPE_PENALTY * np.diff(inside) ** 2 / line.degree**3 * speeds
-    return np.asarray(jump.T @ (weights[:, None] * jump))
+    return jump.T @ (weights[:, None] * jump)
+
+
+class DirectionTerms(Terms):
+    """L(p) of three and four variables. Args as those of `Terms`."""
+
+    words = "{0}h·∇", "{0}q", "½ (h·∇ + p q)² of white noise"
+
+    @cached_property
+    def _mean(self) -> FloatArray:
+        """The matrix of the motion of y in the mean over the noise."""
+        return self.phi.inside(mean_matrix(self._framed.problem, self.system))
+
+    def _loads(self) -> Iterator[Term]:
+        """The penalty, as slopes jump by the error of the elements alone."""
+        size = np.linalg.norm(self._mean + self._mean.T, 2) / 2
+        yield self._term(size * self.phi.penalty(), one, "penalty on jumps of ∂u/∂η")
+
+
+class StopTerms(DirectionTerms):
+    """L(p) of four variables with a stop. Args as those of `Terms`."""
+
+    def growth_bound(self, p: float, noises: Sequence[Any]) -> float:
+        stop: Any = self._framed.problem.linear.stop
+        return super().growth_bound(p, noises) + abs(p * math.log(stop.restitution) * self._mean[0, 1])
+
+    def _loads(self) -> Iterator[Term]:
+        yield from super()._loads()
+        yield self._stop(self.phi.struck, "ω (ρ^p T(η′, π/2, θ₂) − T) δ(θ₁ + π/2)")
+
+    def _changed_loads(self, by: ParameterDerivative) -> Iterator[Term]:
+        """ω is held, as it is that of the coordinates."""
+        for log_factor in by.jumps:
+            yield self._stop(self.phi.changed_impacts, "∂/∂θ", log_factor)
+
+    def _stop(self, struck: Callable[[float, float, int], Matrix], text: str, size: float = 1.0) -> Term:
+        stop: Any = self._framed.problem.linear.stop
+        omega = self._mean[0, 1]
+        words = f"{text}, ω = {omega:.6g}, R = {stop.restitution:.6g}"
+        return self._term(lambda p, k: size * omega * struck(math.log(stop.restitution), p, k), one, words)
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,6 +221,7 @@ class DirectionAxis(FunctionAxis):
     lines: FloatArray = field()
     degree: int
     waves: int
+    terms = DirectionTerms
     ways: ClassVar[tuple[str, ...]] = "degree", "waves"
     is_followed = True
 
@@ -238,13 +273,12 @@ class DirectionAxis(FunctionAxis):
         found = self.deeper(*ways)
         for way, lines in (("degree", "lines"), ("first_degree", "first_lines")):
             if way in ways and (way in halved_ways or getattr(found, way) > HALVED_DEGREE):
-                halves = {way: getattr(found, way) // 2, lines: halved(getattr(self, lines))}
-                found = replace(found, **halves)
+                found = replace(found, **{way: getattr(found, way) // 2, lines: halved(getattr(self, lines))})
         return found
 
     def new_in(self, coarse: DirectionAxis) -> Mask:
         pairs = zip(self.ways, self.levels, strict=True)
-        return np.asarray(np.any([level > getattr(coarse, way) for way, level in pairs], axis=0))
+        return np.any([level > getattr(coarse, way) for way, level in pairs], axis=0)
 
     @cached_property
     def line(self) -> LineSpace:
@@ -353,19 +387,19 @@ class DirectionAxis(FunctionAxis):
         """Σ A ⊗ B of matrices in η and in both angles, on the functions that there are."""
         return csr_matrix(KroneckerSum(terms).tocsc()[:, self._kept])[self._kept]
 
-    def inside(self, term: CoefficientMatrix) -> FloatArray:
+    def inside(self, matrix: Any) -> FloatArray:
         """S⁻¹AS."""
-        return np.asarray(np.linalg.solve(self.coordinates, np.array(term.matrix) @ self.coordinates))
+        return np.asarray(np.linalg.solve(self.coordinates, matrix @ self.coordinates))
 
     def motion(self, term: CoefficientMatrix) -> tuple[Matrix, Matrix]:
         """∫ v h·∇u and ∫ v q u."""
-        moved, growth = self._moved(self.inside(term))
+        moved, growth = self._moved(self.inside(term.matrix))
         return self._form((self._itself, moved)), self._form((self._itself, growth))
 
     def diffusion(self, a: CoefficientMatrix, b: CoefficientMatrix) -> tuple[Matrix, Matrix, Matrix]:
         """∫ v D_a D_b u, D = h·∇ + p q of two matrices, D* v = −h·∇v − tr v + (p + n) q v: by p⁰, p¹ and p²."""
-        (moved, growth), (right, grown) = (self._moved(self.inside(each)) for each in (a, b))
-        factors = (-1.0, moved), (len(self.coordinates), growth), (-float(np.trace(a.matrix)), self._itself)
+        (moved, growth), (right, grown) = (self._moved(self.inside(each.matrix)) for each in (a, b))
+        factors = (-1.0, moved), (len(self.coordinates), growth), (-np.trace(a.matrix), self._itself)
         adjoint = [(factor * of_eta, image) for factor, parts in factors for of_eta, image in parts]
         return (
             self._form((adjoint, right)),
@@ -401,9 +435,12 @@ class DirectionAxis(FunctionAxis):
 
     def projection(self, other: DirectionAxis) -> LinearOperator:
         mixed = self.line.values.T @ diags(self.line.measure) @ other.line.at(self.line.points)
-        of_eta = np.asarray(np.linalg.solve(self.line.mass().toarray(), mixed.toarray()))
+        of_eta = np.linalg.solve(self.line.mass().toarray(), mixed.toarray())
         of_theta = np.kron(
-            *(new.fitted @ old.at(new.points) for new, old in zip(self.angles, other.angles, strict=True))
+            *(
+                np.linalg.pinv(new.at(new.points)) @ old.at(new.points)
+                for new, old in zip(self.angles, other.angles, strict=True)
+            )
         )
         return other._along(of_eta, of_theta[np.ix_(self._own, other._own)], self._kept)
 
@@ -427,10 +464,6 @@ class DirectionAxis(FunctionAxis):
         of_first, of_second = (angle.at(each) for angle, each in zip(self.angles, groups, strict=True))
         of_theta = np.einsum("xi,xj->xij", of_first, of_second).reshape(len(of_eta), -1)[:, self._own]
         return np.einsum("xi,xj->xij", of_eta, of_theta).reshape(len(of_eta), -1)[:, self._kept]
-
-    def terms(self, framed: Framed, noises: Sequence[Any]) -> DirectionTerms:
-        """L(p) on these functions times those of each noise."""
-        return DirectionTerms(framed, self, noises)
 
 
 def group_dimensions(n: int) -> tuple[int, int]:
@@ -481,6 +514,7 @@ class HalfSphereAxis(DirectionAxis):
 
     first_lines: FloatArray
     first_degree: int
+    terms = StopTerms
     ways = "degree", "first_degree", "waves"
     has_adjoint = False
 
@@ -509,16 +543,13 @@ class HalfSphereAxis(DirectionAxis):
     def _speeds(self, c: FloatArray, s: FloatArray) -> FloatArray:
         return c * s**3
 
-    def terms(self, framed: Framed, noises: Sequence[Any]) -> StopTerms:
-        return StopTerms(framed, self, noises)
-
-    def struck(self, log_factor: float, p: float, derivative: int = 0) -> Matrix:
+    def struck(self, log_factor: float, p: float, derivative: int) -> Matrix:
         """∂ᵏ/∂pᵏ of ∫ v (ρ^p u(η′, π/2, θ₂) − u) over θ₁ = −π/2."""
         eta, weights, after, logs = self._impacts(log_factor)
         found = self._at_wall(eta, weights * OfMoment(0, logs)(p, derivative), self.line.at(after), 1)
         return found if derivative else found - self._at_wall(eta, weights, self.line.at(eta), 0)
 
-    def changed_impacts(self, log_factor: float, p: float, derivative: int = 0) -> Matrix:
+    def changed_impacts(self, log_factor: float, p: float, derivative: int) -> Matrix:
         """The derivative by ln R of what `struck` gives."""
         eta, weights, after, logs = self._impacts(log_factor)
         longer = np.cos(after) ** 2 * OfMoment(1, logs)(p, derivative)
@@ -543,50 +574,3 @@ class HalfSphereAxis(DirectionAxis):
         ends = first.at(np.array([[0.0, 0.0], [-1.0, 1.0]])) / math.sqrt(first.length)
         of_theta = kron(np.outer(ends[0], ends[end]), identity(second.size))
         return self._assembled([(self.line.at(eta).T @ diags(weights) @ of_u, of_theta)])
-
-
-class DirectionTerms(Terms):
-    """L(p) of three and four variables. Args as those of `Terms`."""
-
-    words = "{0}h·∇", "{0}q", "½ (h·∇ + p q)² of white noise"
-
-    def _matrices(self, term: CoefficientMatrix) -> tuple[Matrix, Matrix]:
-        found: tuple[Matrix, Matrix] = self.phi.motion(term)
-        return found
-
-    @cached_property
-    def _mean(self) -> FloatArray:
-        """The matrix of the motion of y in the mean over the noise."""
-        mean = mean_matrix(self._framed.problem, self.system)
-        return self.phi.inside(CoefficientMatrix(0, mean))
-
-    def _loads(self) -> Iterator[Term]:
-        """The penalty, as slopes jump by the error of the elements alone."""
-        size = float(np.linalg.norm(self._mean + self._mean.T, 2)) / 2
-        yield self._term(size * self.phi.penalty(), one, "penalty on jumps of ∂u/∂η")
-
-    def _changed_loads(self, by: ParameterDerivative) -> Iterator[Term]:
-        return iter(())
-
-
-class StopTerms(DirectionTerms):
-    """L(p) of four variables with a stop. Args as those of `Terms`."""
-
-    def growth_bound(self, p: float, noises: Sequence[Any]) -> float:
-        stop: Any = self._framed.problem.linear.stop
-        return super().growth_bound(p, noises) + abs(p * math.log(stop.restitution) * self._mean[0, 1])
-
-    def _loads(self) -> Iterator[Term]:
-        yield from super()._loads()
-        yield self._stop(self.phi.struck, "ω (ρ^p T(η′, π/2, θ₂) − T) δ(θ₁ + π/2)")
-
-    def _changed_loads(self, by: ParameterDerivative) -> Iterator[Term]:
-        """ω is held, as it is that of the coordinates."""
-        for log_factor in by.jumps:
-            yield self._stop(self.phi.changed_impacts, "∂/∂θ", log_factor)
-
-    def _stop(self, struck: Callable[[float, float, int], Matrix], text: str, size: float = 1.0) -> Term:
-        stop: Any = self._framed.problem.linear.stop
-        omega = self._mean[0, 1]
-        words = f"{text}, ω = {omega:.6g}, R = {stop.restitution:.6g}"
-        return self._term(lambda p, k: size * omega * struck(math.log(stop.restitution), p, k), one, words)

@@ -45,10 +45,10 @@ def numbered(lines: FloatArray, degrees: IntArray) -> tuple[Mask, IntArray]:
     Returns:
         Arrays of shape (m, degree + 1).
     """
-    fixed, degree = {1: skfem.ElementLineP1, 2: skfem.ElementLineP2}, int(np.max(degrees))
-    dofs = skfem.Dofs(skfem.MeshLine(lines), fixed[degree]() if degree in fixed else skfem.ElementLinePp(degree))
-    numbers = dofs.element_dofs.T
-    own = np.arange(numbers.shape[1]) <= degrees[:, None]
+    degree = int(np.max(degrees))
+    dofs = skfem.Dofs(skfem.MeshLine(lines), skfem.ElementLinePp(max(degree, 3)))  # lower ones warn, see `functions`
+    numbers = dofs.element_dofs.T[:, : degree + 1]
+    own = np.arange(degree + 1) <= degrees[:, None]
     kept = np.zeros(int(dofs.N), dtype=bool)
     kept[numbers[own]] = True
     return own, np.where(own, (np.cumsum(kept) - 1)[numbers], 0)
@@ -64,7 +64,7 @@ def halved(lines: FloatArray) -> FloatArray:
     return np.sort(np.concatenate([lines, middles(lines)]))
 
 
-def located(lines: FloatArray, x: FloatArray, inside: FloatArray | None = None) -> tuple[IntArray, FloatArray]:
+def located(lines: FloatArray, x: FloatArray, inside: FloatArray | None) -> tuple[IntArray, FloatArray]:
     """For each point the cell that holds it, and its place in that cell, from 0 to 1.
 
     A point on a line between two cells is in the one that holds its entry of `inside`, without it in the one above.

@@ -8,7 +8,6 @@ from contextlib import contextmanager, suppress
 from functools import lru_cache, partial, reduce
 from itertools import pairwise
 from threading import RLock
-from typing import Any, Protocol
 
 import numpy as np
 from scipy.linalg.lapack import dgetrf, dgetrs
@@ -49,13 +48,6 @@ def _pools(modules: int) -> ThreadpoolController:
     return ThreadpoolController()
 
 
-class Factors(Protocol):
-    """LU factors of a matrix A."""
-
-    def solve(self, b: FloatArray, *, transposed: bool = False) -> FloatArray:
-        """x of A x = b, or of Aᵀx = b."""
-
-
 def factorised(operator: KroneckerSum, noise: int | None) -> Factors:
     """LU factors of a sum. A pivot that vanishes is made tiny: next to an eigenvalue that is what is wanted.
 
@@ -86,7 +78,7 @@ class ArrayFactors:
 
     def solve(self, b: FloatArray, *, transposed: bool = False) -> FloatArray:
         """x of A x = b, or of Aᵀx = b; several b are columns."""
-        return np.asarray(dgetrs(self._lu, self._pivots, b, trans=transposed)[0])
+        return dgetrs(self._lu, self._pivots, b, trans=transposed)[0]
 
 
 class SparseFactors:
@@ -97,9 +89,7 @@ class SparseFactors:
     """
 
     def __init__(self, operator: KroneckerSum) -> None:
-        patterns: list[Any] = [
-            sum(abs(csc_matrix(each)) for each in axis) for axis in zip(*operator.terms, strict=True)
-        ]
+        patterns = [sum(abs(csc_matrix(each)) for each in axis) for axis in zip(*operator.terms, strict=True)]
         coupled = [k for k, each in enumerate(patterns) if each.nnz > 0.5 * each.shape[0] ** 2]
         order, rule = np.arange(operator.size).reshape(operator.shape), "MMD_AT_PLUS_A"
         if coupled:
@@ -186,3 +176,7 @@ class LevelFactors:
             if transposed:
                 rest[own] = self._pivots[k].solve(rest[own], transposed=True)
         return np.moveaxis(rest.reshape(table.shape), 0, self._axis).reshape(b.shape)
+
+
+Factors = ArrayFactors | SparseFactors | LevelFactors
+"""LU factors of a matrix A; `solve` gives x of A x = b, or of Aᵀx = b."""

@@ -52,6 +52,7 @@ class Generator:
         chosen: on the half circle (its principal eigenvalue is that of the full circle) or the full circle.
 
     Attributes:
+        terms: those of Eq. (19).
         keeps_constants: see `Terms`.
 
     Raises:
@@ -66,17 +67,12 @@ class Generator:
         self._spaces: dict[float, Space] = {}
         self._changes: dict[ParameterDerivative, tuple[Term, ...]] = {}
         self._last: Pencil | None = None
-        self._maker: Terms = chosen.phi.terms(self.framed, self.space(0.0).noises)
-        self.keeps_constants = self._maker.keeps_constants
+        self._maker: Terms = chosen.phi.terms(self.framed, chosen.phi, self.space(0.0).noises)
+        self.terms, self.keeps_constants = self._maker.all(), self._maker.keeps_constants
 
     def __reduce__(self) -> tuple[Any, ...]:
         """What it is made of; the matrices are assembled again when they are needed."""
         return type(self), (self.problem, self.chosen)
-
-    @cached_property
-    def terms(self) -> list[Term]:
-        """Those of Eq. (19)."""
-        return self._maker.all()
 
     def __str__(self) -> str:
         where = "" if self.framed.frame.is_itself else " in coordinates of its own,"
@@ -113,7 +109,7 @@ class Generator:
         """
         return max(noise.left_in_phase for noise in self.problem.noise.parts.values())
 
-    def _phases(self, p: float, derivative: int = 0, is_forcing: bool = False) -> dict[Noises, Matrix]:
+    def _phases(self, p: float, derivative: int, is_forcing: bool = False) -> dict[Noises, Matrix]:
         """For each function of the noises the matrix of φ of dᵏL/dpᵏ, or of its forcing; the first is that of 1."""
         phi, *noises = self.chosen.axes
         found: dict[Noises, Matrix] = {(one,) * len(noises): 0.0 * phi.matrix(one)}
@@ -141,7 +137,7 @@ class Generator:
         axes = self.space(p).noises
         if by not in self._changes:
             self._changes[by] = tuple(self._maker.changed(by))
-        parts: list[tuple[Matrix, ...]] = [
+        parts = [
             (phase, *map(NoiseAxis.matrix, axes, term.noises))
             for term in self._changes[by]
             if (phase := term.at(p, derivative)) is not None

@@ -20,7 +20,7 @@ from fpsolve.messages import Code, Message
 
 
 @lru_cache(maxsize=512)
-def _gauss_rule(count: int, left: float = 0.0, right: float = 0.0) -> tuple[FloatArray, FloatArray]:
+def _gauss_rule(count: int, left: float, right: float) -> tuple[FloatArray, FloatArray]:
     """Gauss-Jacobi rule for integrands like x^left (1 − x)^right times a polynomial; Gauss-Legendre without powers."""
     y, w = roots_jacobi(count, right, left)
     x = 0.5 * (1 + y)
@@ -120,7 +120,7 @@ class LineSpace:
         """∫ w f u v, from f at the points."""
         return self._form(self.values, f)
 
-    def stiffness(self, f: FloatArray | float = 1.0) -> csr_matrix:
+    def stiffness(self, f: FloatArray) -> csr_matrix:
         """∫ w f u′v′, from f at the points."""
         return self._form(self.slopes, f)
 

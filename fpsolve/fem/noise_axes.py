@@ -20,7 +20,7 @@ import numpy as np
 
 from fpsolve.arrays import Coefficient, FloatArray, IntArray, Matrix, dense, one
 from fpsolve.fem.axis import DividedAxis, FunctionAxis, ModeEffects, Rule
-from fpsolve.fem.element import middles
+from fpsolve.fem.element import located, middles
 from fpsolve.fem.line import LineSpace
 from fpsolve.model.noise import Noise, NoiseDerivative
 from fpsolve.polynomials import Polynomials, gegenbauer, hermite, logarithm, stieltjes
@@ -128,12 +128,13 @@ class NoiseAxis(FunctionAxis):
         return self.samples()
 
     def projection(self, other: Any) -> Matrix:
+        """The matrix that takes a function on another axis to its projection on this one, shape (size, other.size)."""
         return np.eye(self.size, other.size)
 
     def law(self) -> FloatArray:
         """The stationary law as weights of the `samples`, shape (n,)."""
         weights = self.rule.measure / self.samples().factor ** 2
-        return np.asarray(weights / weights.sum())
+        return weights / weights.sum()
 
     def everywhere(self, count: int) -> tuple[FloatArray, Matrix]:
         """ξ that cover a bounded support, the ends included, some `count`, and the functions there with their factor.
@@ -170,22 +171,23 @@ class CountedAxis(NoiseAxis):
         return replace(self, count=min(self.count + 2, MAX_COUNT))
 
     def refined(self, effects: ModeEffects, share: float) -> Self:
-        needed = math.ceil(float(effects.needed(share)[0]) + 1.3)
+        needed = math.ceil(effects.needed(share)[0] + 1.3)
         return replace(self, count=max(self.count // 2, 3, min(needed, 3 * self.count // 2 + 3, MAX_COUNT)))
 
 
 class LineAxis(NoiseAxis):
-    """What functions on the line of a diffusion share; the points of their rule are z."""
+    """What functions on the line of a diffusion share; the points of their rule are z.
+
+    Attributes:
+        log_mass: ln ∫ P_s exp(2s z).
+    """
+
+    log_mass = 0.0
 
     @cached_property
     def unit(self) -> float:
         """ξ/z."""
         return float(self.noise.standard_deviation)
-
-    @property
-    def _log_mass(self) -> float:
-        """ln ∫ P_s exp(2s z)."""
-        return 0.0
 
     def rate(self, z: FloatArray) -> FloatArray:
         """½σ²/std², the diffusion of z."""
@@ -209,11 +211,11 @@ class LineAxis(NoiseAxis):
 
     def _changed_law(self, change: NoiseDerivative) -> FloatArray:
         logs, measure = self._changed_logs(change), self.rule.measure
-        return np.asarray(logs - measure @ logs / measure.sum())
+        return logs - measure @ logs / measure.sum()
 
     def _changed_logs(self, change: NoiseDerivative) -> FloatArray:
         """∂ ln P_s/∂θ at the points of the rule, but for a constant."""
-        return np.asarray(change.log_density(self.xi))
+        return change.log_density(self.xi)
 
     def values_at(self, z: FloatArray) -> Matrix:
         """The functions at any z, shape (len(z), size)."""
@@ -238,8 +240,8 @@ class LineAxis(NoiseAxis):
 
     def weight(self, z: FloatArray) -> FloatArray:
         """P_s exp(2s z) as a density of z: its integral is 1."""
-        logs = self.noise.log_density(self.unit * z) + 2 * self.tilt * z - self._log_mass
-        return np.asarray(self.unit * np.exp(logs))
+        logs = self.noise.log_density(self.unit * z) + 2 * self.tilt * z - self.log_mass
+        return self.unit * np.exp(logs)
 
     def at(self, z: FloatArray, measure: Any = 0.0) -> Samples:
         """At any z, with what each stands for, in ξ."""
@@ -250,7 +252,7 @@ class LineAxis(NoiseAxis):
     def started(self, xi: float) -> FloatArray:
         """The functions with their factor at one ξ, shape (size,)."""
         at = self.at(np.array([xi]) / self.unit)
-        return np.asarray(dense(at.values)[0] * at.factor[0])
+        return dense(at.values)[0] * at.factor[0]
 
     def samples(self) -> Samples:
         z, measure, _ = self.rule[:3]
@@ -260,7 +262,7 @@ class LineAxis(NoiseAxis):
         z, measure, values = self.rule[:3]
         exponent = other.tilt * (z - other.center) - self.tilt * (z - self.center)
         scaled = (measure * np.exp(np.clip(exponent, -600, 600)))[:, None] * dense(other.values_at(z))
-        return np.asarray(np.linalg.solve(dense(self.matrix(one)), values.T @ scaled))
+        return np.linalg.solve(dense(self.matrix(one)), values.T @ scaled)
 
 
 class Table(NamedTuple):
@@ -336,12 +338,12 @@ class PolynomialAxis(CountedAxis, LineAxis):
         tilted = np.exp(logs - logs.max())
         polynomials = stieltjes(x, tilted, self.count) if tilt else gegenbauer(self.count, exponent)
         values, slopes = polynomials.at(x)
-        log_mass = math.log((tilted @ damping) / (weights @ damping)) + float(logs.max())
+        log_mass = math.log((tilted @ damping) / (weights @ damping)) + logs.max()
         measure, slopes = tilted * damping / (tilted @ damping), slopes / end + tilt * values
         return Table(end * x, measure, values, slopes, log_mass, polynomials, 0.0, end)
 
     @property
-    def _log_mass(self) -> float:
+    def log_mass(self) -> float:  # type: ignore[override]
         return self.rule.log_mass
 
     def product(self, f: FloatArray) -> FloatArray:
@@ -373,8 +375,7 @@ class CellAxis(DividedAxis, LineAxis):
 
     @property
     def facts(self) -> dict[str, Any]:
-        interval = {"xi_min": float(self.lines[0]), "xi_max": float(self.lines[-1])}
-        return {"xi": self.word, "xi_size": self.size, **interval, "tilt": 0.0}
+        return super().facts | {"xi_min": float(self.lines[0]), "xi_max": float(self.lines[-1])}
 
     @cached_property
     def line(self) -> LineSpace:
@@ -402,7 +403,7 @@ class CellAxis(DividedAxis, LineAxis):
 
     def between(self, lines: FloatArray) -> CellAxis:
         """Those between other lines, each with the degree of the cell that its middle is in, or is next to."""
-        own = np.clip(np.searchsorted(self.lines, middles(lines)) - 1, 0, self.degrees.size - 1)
+        own, _ = located(self.lines, middles(lines), None)
         return self.on(lines, self.degrees[own])
 
     def reaching(self, below: bool, above: bool) -> CellAxis:
@@ -463,14 +464,14 @@ class StateAxis(NoiseAxis):
 
     def _changed_generator(self, change: NoiseDerivative) -> FloatArray:
         logs = self._changed_law(change)[:, None]
-        return np.asarray(self.rule.measure[:, None] * (logs * self._rates + self._changed_rates(change)))
+        return self.rule.measure[:, None] * (logs * self._rates + self._changed_rates(change))
 
     def _changed_law(self, change: NoiseDerivative) -> FloatArray:
         """With ∂π from πQ = 0: (∂π)Q = −π ∂Q, of the sum 0."""
         unit = np.abs(self._rates).max()
         equations = np.vstack([self._rates.T / unit, np.ones(self.size)])
         right = np.append(-self.rule.measure @ self._changed_rates(change) / unit, 0.0)
-        return np.asarray(np.linalg.lstsq(equations, right, rcond=None)[0] / self.rule.measure)
+        return np.linalg.lstsq(equations, right, rcond=None)[0] / self.rule.measure
 
     def _moved(self, change: NoiseDerivative) -> FloatArray:
         return np.array(change.states) if change.states else np.zeros(self.size)
@@ -478,7 +479,7 @@ class StateAxis(NoiseAxis):
     def started(self, xi: float) -> FloatArray:
         """The functions at one ξ, shape (size,): their mean over the states that have this value."""
         chosen = np.isclose(self.xi, xi, rtol=1e-9, atol=0) * self.rule.measure
-        return np.asarray(chosen / chosen.sum())
+        return chosen / chosen.sum()
 
     def samples(self) -> Samples:
         return Samples(self.xi, self.rule.measure, np.ones(self.size), self.rule.values, np.ones(self.size))
@@ -487,7 +488,7 @@ class StateAxis(NoiseAxis):
 def slope_along(g: Coefficient, xi: FloatArray, moved: FloatArray) -> FloatArray:
     """g′(ξ) ∂ξ/∂θ, from the points ξ and ∂ξ/∂θ there."""
     step = STEP * (np.abs(xi).max() or 1.0) / (np.abs(moved).max() or 1.0)
-    return np.asarray((g(xi + step * moved) - g(xi - step * moved)) / (2 * step))
+    return (g(xi + step * moved) - g(xi - step * moved)) / (2 * step)
 
 
 def form(values: FloatArray, measure: FloatArray) -> FloatArray:

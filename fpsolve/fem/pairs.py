@@ -99,7 +99,7 @@ class PairAxis(CountedAxis):
 
     def law(self) -> FloatArray:
         weights = self.rule.measure * np.exp(-self._factors.sum(axis=0) @ self.rule.points)
-        return np.asarray(weights / weights.sum())
+        return weights / weights.sum()
 
     def _drifting(self, drift: FloatArray) -> FloatArray:
         """−Σ M_ij ∫ v (a_j† + l_j)(a_i + r_i) u."""

@@ -71,12 +71,151 @@ class Struck(NamedTuple):
     end: csr_matrix
 
 
+class Wall(NamedTuple):
+    """A jump, the speed v of the phase at its ray φ_j, and δ(φ − φ_j): w(φ⁻) T(φ⁺) for v > 0, else w(φ⁺) T(φ⁻)."""
+
+    jump: Jump
+    speed: float
+    delta: Matrix
+
+
+class PlaneTerms(Terms):
+    """L(p) of two variables. Args as those of `Terms`.
+
+    The motion and the walls add, with the phase speed v = Σ ε^n g h, h = e′ᵀA e, the jump [T] = T(φ⁺) − T(φ⁻) and the
+    mean {T} of the two traces at a φ-vertex,
+
+        Σ over cells:                       ∫∫ P_s w (v ∂φT + p Σ ε^n g q T) dφ dξ
+        Σ over vertices without a wall:     ∫ P_s (v {w} [T] − ½θ [w] [T]) dξ
+        Σ over walls:                       ∫ P_s |v| w (R^p T₊ − T₋) dξ
+
+    Upwinding is θ = |v|; where v has one sign for all ξ the first two loads are v w [T] with w of the cell that paths
+    leave. Polynomials of ξ cannot follow the kink of |v|: θ is then its size for the typical ξ, |Σ ε^n h| over the
+    terms that no noise drives + Σ ε^n |h| (mean of g²)^½ over the others. At a wall v is one number for all ξ. Paths go
+    from the trace T₋ there, also that of w, to T₊, and T₋ = R^p T₊. The load is written as (R^p − 1)|v| δ(φ − φ_j) T₊,
+    but made of R^p alone, as a tiny R^p would be rounded beside 1.
+
+    White noise: see `PhaseAxis.diffusion`. Impulses exp(B) add their rate times |exp(B)e|^p T(ψ) − T, ψ being where
+    they take φ, see `PhaseAxis.impulses`.
+    """
+
+    words = "{0}{1.h} ∂φ", "{0}{1.q}", "½ (h ∂φ + p q)² of white noise, h = {1.h}, q = {1.q}"
+
+    def __init__(self, framed: Framed, phi: PhaseAxis, noises: Sequence[Any]) -> None:
+        super().__init__(framed, phi, noises)
+        system, self._vertices, (left, right) = self.system, phi.lines[:-1], phi.traces
+        self._jump = right - left
+        steady, driven = np.zeros(self._vertices.size), np.zeros(self._vertices.size)
+        for term in system.terms:
+            speed, xi = system.epsilon**term.order * term.h(self._vertices), noises[self.place(term.noise)]
+            if not is_driven(term.g):
+                steady += float(term.g(0.0)) * speed
+            else:
+                square = xi.constant @ (xi.product(term.g(xi.xi) ** 2) @ xi.constant)
+                driven += abs(speed) * math.sqrt(square / (xi.constant @ (xi.matrix(one) @ xi.constant)))
+        self._upwinding = abs(steady) + driven  # for the typical ξ
+        after_walls = 0.0 * self._jump  # |v| T₊ is in the term of the wall
+        # where θ = |v| for every ξ, and the sign of v where that is the same for all ξ, otherwise 0
+        is_pointwise, direction = np.full(self._vertices.size, False), np.zeros(self._vertices.size)
+        if all(axis.is_local for axis in noises):
+            rates = system.matrix_at(framed.problem.valued.combined([axis.xi for axis in noises]))
+            speed = turning(rates.reshape(-1, 1, 2, 2))(self._vertices)
+            is_pointwise, direction = ~is_pointwise, 1.0 * np.all(speed > 0, axis=0) - np.all(speed < 0, axis=0)
+        self._walls = []
+        for jump, v in zip(system.jumps, framed.wall_speeds(system), strict=True):
+            at = vertices_at(phi.lines, jump.phase)
+            is_pointwise[at], direction[at] = True, math.copysign(1.0, v)
+            before, after = (left, right) if v > 0 else (right, left)
+            self._walls.append(Wall(jump, v, before[at].T @ after[at]))
+            at_wall = np.where(np.isin(np.arange(self._vertices.size), at), math.copysign(1.0, v), 0.0)
+            after_walls = after_walls + by_rows(at_wall, after)
+        self._free_jump, self._two_way = self._jump - after_walls, np.flatnonzero(is_pointwise & (direction == 0))
+        self._upwinding[is_pointwise] = 0.0
+        # nothing is left of the other side: where ξ is large that would count
+        self._leaving = 0.5 * (left + right) - by_rows(0.5 * direction, self._jump)
+
+    @property
+    def keeps_constants(self) -> bool:  # type: ignore[override]
+        for term in (*self.system.terms, *self.system.diffusions):
+            if term.order == 0 and (term.h.amplitude or not term.q.vanishes):
+                return False
+        return True
+
+    def growth_bound(self, p: float, noises: Sequence[Any]) -> float:
+        total = super().growth_bound(p, noises)
+        for each in self.system.impulses:
+            total += each.rate * math.exp(abs(p) * each.strength)
+        for ray, v, _ in self._walls:
+            total += abs(p * ray.log_factor * v)
+        return total
+
+    def _loads(self) -> Iterator[Term]:
+        for struck in self.system.impulses:
+            yield self._struck(struck)
+        # −½ ∫ P_s θ [w] [T] at the φ-vertices where the phase runs both ways, or θ is not |v|
+        text, jump = "upwind loads between cells", self._jump
+        if np.any(self._upwinding):
+            yield self._term(-0.5 * jump.T @ by_rows(self._upwinding, jump), one, text)
+        yield from self._upwind(text)
+        for ray, v, delta in self._walls:
+            text = f"(R^p − 1) |dφ/dt| δ(φ − {ray.phase:.6g} mod π), R = {math.exp(ray.log_factor):.6g}"
+            yield self._term(abs(v) * delta, one, text, OfMoment(0, ray.log_factor), order=2, is_wall=True)
+
+    def _changed_loads(self, by: ParameterDerivative) -> Iterator[Term]:
+        """Upwinding is held: [T] = 0 at a vertex but for the error of the elements."""
+        text, moved = "∂/∂θ", LinearMotion(by.terms, epsilon=self.system.epsilon)
+        for struck, moved_by in zip(self.system.impulses, by.impulses, strict=bool(by.impulses)):
+            yield self._struck(struck, moved_by)
+        faster = self._framed.wall_speeds(moved)
+        for k, (ray, v, delta) in enumerate(self._walls):
+            if by.jumps:
+                yield self._term(by.jumps[k] * abs(v) * delta, one, text, OfMoment(1, ray.log_factor), order=2)
+            of_p = OfMoment(0, ray.log_factor)
+            yield self._term(math.copysign(1.0, v) * faster[k] * delta, one, text, of_p, order=2)
+
+    def _matrices(self, term: CoefficientMatrix) -> tuple[Matrix, Matrix]:
+        """h ∂φ with the loads at the φ-vertices, and q."""
+        loads = self._leaving.T @ by_rows(term.h(self._vertices), self._free_jump)
+        return self.phi.convection(term.h) + loads, self.phi.mass(term.q)
+
+    def _struck(self, of: Impulse, by: Impulse | None = None) -> Term:
+        """An impulse, or ∂/∂θ of it."""
+        struck = self.phi.struck(of)
+
+        def phase_at(p: float, derivative: int) -> Matrix:
+            rate = of.rate if by is None else by.rate
+            total = 0.0 if by is None else of.rate * self.phi.changed_impulses(struck, of, by, p, derivative)
+            if rate:
+                total = total + rate * self.phi.impulses(struck, p, derivative)
+                total = total if derivative else total - rate * self.phi.matrix(one)
+            return total
+
+        stretch = ", ".join(f"{size:.3g}" for size in np.linalg.svd(of.matrix, compute_uv=False))
+        text = f"{of.rate:.6g} (|Me|^p T(ψ) − T) of impulses M, which stretch by {stretch}"
+        return self._term(phase_at, one, text, order=1)
+
+    def _upwind(self, text: str) -> Iterator[Term]:
+        """−½ ∫ P_s |v| [w] [T] where the phase runs both ways: of several noises, chains, for each other state."""
+        first, *others = self._names
+        for j in self._two_way:
+            phi, phase = float(self._vertices[j]), -0.5 * self._jump[[j]].T @ self._jump[[j]]
+            for values in product(*(np.unique(axis.xi) for axis in self.noises[1:])):
+                held = dict(zip(others, values, strict=True))
+
+                def of_first(xi: Any, phi: float = phi, held: dict[str, float] = held) -> Any:
+                    return np.abs(self.system.phase_speed({**held, first: xi} if held else xi)(phi))
+
+                yield Term(0, OfMoment(0), phase, (of_first, *map(At, values)), text)
+
+
 @dataclass(frozen=True, eq=False)
 class PhaseAxis(DividedAxis):
     """Discontinuous elements on the circle or half circle; in each cell the basis is orthonormal, by degree.
 
     The first and the last line are one, and degrees are from 1 on.
     """
+
+    terms = PlaneTerms
 
     @cached_property
     def size(self) -> int:
@@ -183,11 +322,11 @@ class PhaseAxis(DividedAxis):
         loads = [w.T @ of_b - of_a.T @ u for w, u in zip(adjoint, image, strict=True)]
         return first + loads[0] - of_a.T @ by_rows(penalty, of_b), second + third + loads[1], last
 
-    def impulses(self, struck: Struck, p: float, derivative: int = 0) -> Matrix:
+    def impulses(self, struck: Struck, p: float, derivative: int) -> Matrix:
         """∂ᵏ/∂pᵏ of ∫ w |exp(B)e|^p T(ψ(φ)), ψ being where an impulse takes φ."""
         return self.stored(struck.at.T @ diags(OfMoment(0, struck.logs)(p, derivative)) @ struck.end)
 
-    def changed_impulses(self, struck: Struck, of: Impulse, by: Impulse, p: float, derivative: int = 0) -> Matrix:
+    def changed_impulses(self, struck: Struck, of: Impulse, by: Impulse, p: float, derivative: int) -> Matrix:
         """∂/∂θ of what `impulses` gives, where B depends on θ."""
         logs, e = struck.logs, np.stack([np.cos(struck.points), -np.sin(struck.points)])
         (x, u), (dx, du) = (matrix @ e for matrix in (of.matrix, changed_exponential(of.exponent, by.exponent)))
@@ -212,7 +351,7 @@ class PhaseAxis(DividedAxis):
 
     def folded(self, phi: FloatArray) -> FloatArray:
         """The points of the domain that are φ but for whole turns of it."""
-        return np.asarray(self.lines[0] + np.mod(phi - self.lines[0], self.span))
+        return self.lines[0] + np.mod(phi - self.lines[0], self.span)
 
     @cached_property
     def _derivative(self) -> Matrix:
@@ -246,10 +385,6 @@ class PhaseAxis(DividedAxis):
         """The matrix that takes a function of another space to its projection on this one, shape (size, other.size)."""
         return self.values.T @ (diags(self.weights) @ other.at(self.points))
 
-    def terms(self, framed: Framed, noises: Sequence[Any]) -> PlaneTerms:
-        """L(p) on these functions times those of each noise."""
-        return PlaneTerms(framed, self, noises)
-
     def _of_cells(self, cells: IntArray, table: FloatArray) -> Matrix:
         """The matrix of which each row is that of a table, by degree, at the functions of one cell, and else 0."""
         counts = self.degrees[cells] + 1
@@ -261,143 +396,6 @@ class PhaseAxis(DividedAxis):
         matrix = np.zeros(shape)
         matrix[rows, columns] = entries
         return matrix
-
-
-class Wall(NamedTuple):
-    """A jump, the speed v of the phase at its ray φ_j, and δ(φ − φ_j): w(φ⁻) T(φ⁺) for v > 0, else w(φ⁺) T(φ⁻)."""
-
-    jump: Jump
-    speed: float
-    delta: Matrix
-
-
-class PlaneTerms(Terms):
-    """L(p) of two variables. Args as those of `Terms`.
-
-    The motion and the walls add, with the phase speed v = Σ ε^n g h, h = e′ᵀA e, the jump [T] = T(φ⁺) − T(φ⁻) and the
-    mean {T} of the two traces at a φ-vertex,
-
-        Σ over cells:                       ∫∫ P_s w (v ∂φT + p Σ ε^n g q T) dφ dξ
-        Σ over vertices without a wall:     ∫ P_s (v {w} [T] − ½θ [w] [T]) dξ
-        Σ over walls:                       ∫ P_s |v| w (R^p T₊ − T₋) dξ
-
-    Upwinding is θ = |v|; where v has one sign for all ξ the first two loads are v w [T] with w of the cell that paths
-    leave. Polynomials of ξ cannot follow the kink of |v|: θ is then its size for the typical ξ, |Σ ε^n h| over the
-    terms that no noise drives + Σ ε^n |h| (mean of g²)^½ over the others. At a wall v is one number for all ξ. Paths go
-    from the trace T₋ there, also that of w, to T₊, and T₋ = R^p T₊. The load is written as (R^p − 1)|v| δ(φ − φ_j) T₊,
-    but made of R^p alone, as a tiny R^p would be rounded beside 1.
-
-    White noise: see `PhaseAxis.diffusion`. Impulses exp(B) add their rate times |exp(B)e|^p T(ψ) − T, ψ being where
-    they take φ, see `PhaseAxis.impulses`.
-    """
-
-    words = "{0}{1.h} ∂φ", "{0}{1.q}", "½ (h ∂φ + p q)² of white noise, h = {1.h}, q = {1.q}"
-
-    def __init__(self, framed: Framed, phi: PhaseAxis, noises: Sequence[Any]) -> None:
-        super().__init__(framed, phi, noises)
-        system, self._vertices, (left, right) = self.system, phi.lines[:-1], phi.traces
-        self._jump = right - left
-        steady, driven = np.zeros(self._vertices.size), np.zeros(self._vertices.size)
-        for term in system.terms:
-            speed, xi = system.epsilon**term.order * term.h(self._vertices), noises[self.place(term.noise)]
-            if not is_driven(term.g):
-                steady += float(term.g(0.0)) * speed
-            else:
-                square = xi.constant @ (xi.product(term.g(xi.xi) ** 2) @ xi.constant)
-                driven += abs(speed) * math.sqrt(square / (xi.constant @ (xi.matrix(one) @ xi.constant)))
-        self._upwinding = abs(steady) + driven  # for the typical ξ
-        after_walls = 0.0 * self._jump  # |v| T₊ is in the term of the wall
-        # where θ = |v| for every ξ, and the sign of v where that is the same for all ξ, otherwise 0
-        is_pointwise, direction = np.full(self._vertices.size, False), np.zeros(self._vertices.size)
-        if all(axis.is_local for axis in noises):
-            rates = system.matrix_at(framed.problem.valued.combined([axis.xi for axis in noises]))
-            speed = turning(rates.reshape(-1, 1, 2, 2))(self._vertices)
-            is_pointwise, direction = ~is_pointwise, 1.0 * np.all(speed > 0, axis=0) - np.all(speed < 0, axis=0)
-        self._walls = list[Wall]()
-        for jump, v in zip(system.jumps, framed.wall_speeds(system), strict=True):
-            at = vertices_at(phi.lines, jump.phase)
-            is_pointwise[at], direction[at] = True, math.copysign(1.0, v)
-            before, after = (left, right) if v > 0 else (right, left)
-            self._walls.append(Wall(jump, v, before[at].T @ after[at]))
-            at_wall = np.where(np.isin(np.arange(self._vertices.size), at), math.copysign(1.0, v), 0.0)
-            after_walls = after_walls + by_rows(at_wall, after)
-        self._free_jump, self._two_way = self._jump - after_walls, np.flatnonzero(is_pointwise & (direction == 0))
-        self._upwinding[is_pointwise] = 0.0
-        # nothing is left of the other side: where ξ is large that would count
-        self._leaving = 0.5 * (left + right) - by_rows(0.5 * direction, self._jump)
-
-    @property
-    def keeps_constants(self) -> bool:  # type: ignore[override]
-        for term in (*self.system.terms, *self.system.diffusions):
-            if term.order == 0 and (term.h.amplitude or not term.q.vanishes):
-                return False
-        return True
-
-    def growth_bound(self, p: float, noises: Sequence[Any]) -> float:
-        total = super().growth_bound(p, noises)
-        for each in self.system.impulses:
-            total += each.rate * math.exp(abs(p) * each.strength)
-        for ray, v, _ in self._walls:
-            total += abs(p * ray.log_factor * v)
-        return total
-
-    def _loads(self) -> Iterator[Term]:
-        for struck in self.system.impulses:
-            yield self._struck(struck)
-        # −½ ∫ P_s θ [w] [T] at the φ-vertices where the phase runs both ways, or θ is not |v|
-        text, jump = "upwind loads between cells", self._jump
-        if np.any(self._upwinding):
-            yield self._term(-0.5 * jump.T @ by_rows(self._upwinding, jump), one, text)
-        yield from self._upwind(text)
-        for ray, v, delta in self._walls:
-            text = f"(R^p − 1) |dφ/dt| δ(φ − {ray.phase:.6g} mod π), R = {math.exp(ray.log_factor):.6g}"
-            yield self._term(abs(v) * delta, one, text, OfMoment(0, ray.log_factor), order=2, is_wall=True)
-
-    def _changed_loads(self, by: ParameterDerivative) -> Iterator[Term]:
-        """Upwinding is held: [T] = 0 at a vertex but for the error of the elements."""
-        text, moved = "∂/∂θ", LinearMotion(by.terms, epsilon=self.system.epsilon)
-        for struck, moved_by in zip(self.system.impulses, by.impulses, strict=bool(by.impulses)):
-            yield self._struck(struck, moved_by)
-        faster = self._framed.wall_speeds(moved)
-        for k, (ray, v, delta) in enumerate(self._walls):
-            if by.jumps:
-                yield self._term(by.jumps[k] * abs(v) * delta, one, text, OfMoment(1, ray.log_factor), order=2)
-            of_p = OfMoment(0, ray.log_factor)
-            yield self._term(math.copysign(1.0, v) * faster[k] * delta, one, text, of_p, order=2)
-
-    def _matrices(self, term: CoefficientMatrix) -> tuple[Matrix, Matrix]:
-        """h ∂φ with the loads at the φ-vertices, and q."""
-        loads = self._leaving.T @ by_rows(term.h(self._vertices), self._free_jump)
-        return self.phi.convection(term.h) + loads, self.phi.mass(term.q)
-
-    def _struck(self, of: Impulse, by: Impulse | None = None) -> Term:
-        """An impulse, or ∂/∂θ of it."""
-        struck = self.phi.struck(of)
-
-        def phase_at(p: float, derivative: int) -> Matrix:
-            rate = of.rate if by is None else by.rate
-            total = 0.0 if by is None else of.rate * self.phi.changed_impulses(struck, of, by, p, derivative)
-            if rate:
-                total = total + rate * self.phi.impulses(struck, p, derivative)
-                total = total if derivative else total - rate * self.phi.matrix(one)
-            return total
-
-        stretch = ", ".join(f"{size:.3g}" for size in np.linalg.svd(of.matrix, compute_uv=False))
-        text = f"{of.rate:.6g} (|Me|^p T(ψ) − T) of impulses M, which stretch by {stretch}"
-        return self._term(phase_at, one, text, order=1)
-
-    def _upwind(self, text: str) -> Iterator[Term]:
-        """−½ ∫ P_s |v| [w] [T] where the phase runs both ways: of several noises, chains, for each other state."""
-        first, *others = self._names
-        for j in self._two_way:
-            phi, phase = float(self._vertices[j]), -0.5 * self._jump[[j]].T @ self._jump[[j]]
-            for values in product(*(np.unique(axis.xi) for axis in self.noises[1:])):
-                held = dict(zip(others, values, strict=True))
-
-                def of_first(xi: Any, phi: float = phi, held: dict[str, float] = held) -> Any:
-                    return np.abs(self.system.phase_speed({**held, first: xi} if held else xi)(phi))
-
-                yield Term(0, OfMoment(0), phase, (of_first, *map(At, values)), text)
 
 
 def by_rows(factors: FloatArray, matrix: Matrix) -> Matrix:

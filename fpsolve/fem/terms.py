@@ -43,7 +43,7 @@ class OfMoment:
     n: int
     log_factor: Any = 0.0
 
-    def __call__(self, p: float, derivative: int = 0) -> Any:
+    def __call__(self, p: float, derivative: int) -> Any:
         """Its k-th derivative, by the rule of Leibniz. Raises `FloatingPointError`: it is beyond all numbers."""
         total = 0.0
         for j in range(min(self.n, derivative) + 1):
@@ -90,7 +90,8 @@ class Term:
     is_wall: bool = False
 
     def __str__(self) -> str:
-        power, text = power_of_epsilon(self.order), self.text
+        exponent = "" if self.order == 1 else str(self.order).translate(str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹"))
+        power, text = f"ε{exponent}", self.text
         if self.of:
             size = f"{power} " * (self.order > 0) + written_coefficient(self.of.g)
             text = text.format(size, self.of)
@@ -129,7 +130,7 @@ class Terms:
 
     def all(self) -> list[Term]:
         """L(p) of Eq. (19)."""
-        found = list[Term]()
+        found = []
         for name in self._names:
             text = f"L_ξ, the generator of the noise{f' {name}' if name else ''}"
             found.append(self._term(self.phi.matrix(one), None, text, name=name))
@@ -163,12 +164,12 @@ class Terms:
         raise NotImplementedError
 
     def _changed_loads(self, by: ParameterDerivative) -> Iterator[Term]:
-        """∂/∂θ of these."""
-        raise NotImplementedError
+        """∂/∂θ of these, but for what makes functions smooth."""
+        return iter(())
 
     def _matrices(self, term: CoefficientMatrix) -> tuple[Matrix, Matrix]:
         """h·∇ and q of a term of the motion."""
-        raise NotImplementedError
+        return self.phi.motion(term)
 
     def _driven(self, term: CoefficientMatrix) -> Iterator[Term]:
         """h·∇ + p q of a term of the motion."""
@@ -205,8 +206,3 @@ class Terms:
     def place(self, name: str) -> int:
         """The place of a noise among those that have values; the first one for others."""
         return self._names.index(name) if name in self._names else 0
-
-
-def power_of_epsilon(order: int) -> str:
-    """ε²."""
-    return "ε" if order == 1 else "ε" + str(order).translate(str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹"))

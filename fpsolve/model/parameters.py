@@ -46,6 +46,13 @@ class Section(BaseModel):
 
     model_config = STRICT | ConfigDict(frozen=True)
 
+    def model_copy(self, **changes: Any) -> Self:
+        """A copy with other values, without what follows from the old ones."""
+        made = super().model_copy(**changes)
+        for name in made.__dict__.keys() - type(made).model_fields.keys():
+            del made.__dict__[name]
+        return made
+
 
 def parameter(
     meaning: str, example: str, symbol: str = "", unit: str = "", *, name: str | None = None, **rules: Any

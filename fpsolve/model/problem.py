@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property, lru_cache
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 
@@ -118,6 +118,21 @@ class Problem:
         return {
             f"{section}.{name}": value for section, half in self.sections.items() for name, value in half.values.items()
         }
+
+    @cached_property
+    def form(self) -> str:
+        """All that it is but for the values of its parameters, as text.
+
+        The class of a kind that has words follows from these, which are among the values.
+        """
+        found, sections = list[tuple[str, str, dict[str, str]]](), dict[str, Any](self.sections)
+        for section, half in sections.items():
+            values, name = half.values, "" if half.words else type(half).__qualname__
+            others = {each.name: repr(vars(half)[each.name]) for each in fields(half) if each.repr}
+            stated = repr(tuple(values.items()))
+            kept = {name: text for name, text in others.items() if name not in values and text != stated}
+            found.append((section, name, kept))
+        return repr(found)
 
     @property
     def parameters(self) -> Mapping[str, Parameter]:

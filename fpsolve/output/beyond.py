@@ -36,6 +36,11 @@ def beyond_tables(case: Case, result: CurveResult) -> dict[str, Any]:
     return found
 
 
+def says_more(case: Case, result: CurveResult) -> bool:
+    """Whether there is more of a curve than its numbers in tables."""
+    return any(result.remarks.values()) or bool(beyond_tables(case, result))
+
+
 def _class(found: InvariantClass) -> dict[str, Any]:
     """λ and Λ(p) of a block or a ray."""
     columns = found.p.tolist(), found.value.tolist(), found.error_estimate.tolist()

@@ -7,7 +7,6 @@ import json
 import math
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
 from glob import glob
 from itertools import chain
 from pathlib import Path
@@ -21,6 +20,7 @@ from fpsolve.errors import FpsolveError
 from fpsolve.exponent.quantities import MOMENT
 from fpsolve.files import atomic
 from fpsolve.model.quantity import STATUS, P
+from fpsolve.output.known import Results
 from fpsolve.results.curve import Status
 from fpsolve.results.table import Table
 
@@ -34,56 +34,42 @@ ROW = "row"
 """The dimension of many runs."""
 
 
-@dataclass(frozen=True)
-class Variable:
-    """What stands in a file under a name.
-
-    Attributes:
-        dims: the names of its dimensions.
-        values: numbers, or texts as objects.
-        attributes: such as its unit.
-    """
-
-    dims: tuple[str, ...]
-    values: NDArray[Any]
-    attributes: Mapping[str, Any]
+Variable = tuple[tuple[str, ...], NDArray[Any], Mapping[str, Any]]
+"""What stands in a file under a name: dimensions, numbers or texts, and attributes such as a unit."""
 
 
-def write_dataset(case: Case, table: Table, folder: Path, facts: Mapping[str, Any]) -> None:
-    """results.nc, for xarray and whatever reads netCDF-4; what is missing or failed is NaN.
+def write_dataset(case: Case, results: Results, path: Path, facts: Mapping[str, Any]) -> None:
+    """Write the numbers of all sets, for xarray and whatever reads netCDF-4; what is missing or failed is NaN.
 
     There is a dimension for each varied key, or `set` for those of a list, and p.
 
     xarray would write the same, but takes with pandas and Dask as long to import as small cases take in all.
 
     Args:
-        table: the numbers of all curves.
+        results: of all curves.
+        path: the file.
         facts: on the run, see `facts_of`; they become attributes, tables as JSON.
     """
     import h5netcdf
 
-    variables, coordinates = _arrays(case, table)
-    beside = " ".join(name for name, each in coordinates.items() if each.dims != (name,))
+    variables = _arrays(case, results.table)
     content = io.BytesIO()  # HDF5 does not survive a full disk
     with h5netcdf.File(content, "w") as file:
-        whole = variables | coordinates
-        sizes = (zip(each.dims, each.values.shape, strict=True) for each in whole.values())
+        sizes = (zip(dims, values.shape, strict=True) for dims, values, _ in variables.values())
         file.dimensions = dict(chain.from_iterable(sizes))
-        for name, each in whole.items():
-            kind = each.values.dtype
+        for name, (dims, values, attributes) in variables.items():
+            kind = values.dtype
             fill = math.nan if kind.kind == "f" else None
-            made = file.create_variable(name, each.dims, kind, data=each.values, fillvalue=fill)
-            made.attrs.update(each.attributes)
-            if beside and SET in each.dims and name in variables:
-                made.attrs["coordinates"] = beside
-        is_whole = not np.any(variables[STATUS.name].values == Status.MISSING)
-        file.attrs.update({**_origin(case, facts), "complete": int(is_whole)})
-    with atomic(folder / RESULTS) as draft:
+            file.create_variable(name, dims, kind, data=values, fillvalue=fill).attrs.update(attributes)
+        about = {"title": case.title, "case": case.name, "Conventions": "CF-1.11", "rtol": case.rtol, **case.constants}
+        about |= {key: each if isinstance(each, str | float | int) else json.dumps(each) for key, each in facts.items()}
+        file.attrs.update({**about, "complete": int(len(results) == case.planned)})
+    with atomic(path) as draft:
         draft.write_bytes(content.getvalue())
 
 
-def _arrays(case: Case, table: Table) -> tuple[dict[str, Variable], dict[str, Variable]]:
-    """The numbers of all sets; the varied values and p."""
+def _arrays(case: Case, table: Table) -> dict[str, Variable]:
+    """The numbers of all sets, then the varied values and p."""
     import h5py
 
     vary = case.vary
@@ -91,13 +77,7 @@ def _arrays(case: Case, table: Table) -> tuple[dict[str, Variable], dict[str, Va
     over, shape = (
         ((SET,), (case.planned,)) if is_list else (vary.keys, tuple(len(vary.values(key)) for key in vary.keys))
     )
-    coordinates, variables = dict[str, Variable](), dict[str, Variable]()
-    for key in vary.keys:
-        values, is_text = vary.columns[key] if is_list else vary.values(key), vary.is_text(key)
-        array = np.array(values, dtype=h5py.string_dtype() if is_text else float)
-        coordinates[key] = Variable((SET if is_list else key,), array, {} if is_text else case.about(key).attributes)
-    if MOMENT.name in case.asked:
-        coordinates["p"] = Variable(("p",), case.p, P.attributes)
+    found = dict[str, Variable]()
     for name, column in table.items():
         numbers: NDArray[Any] = column.values
         attributes: dict[str, Any] = dict(column.quantity.timed(case.units.time).attributes)
@@ -105,22 +85,16 @@ def _arrays(case: Case, table: Table) -> tuple[dict[str, Variable], dict[str, Va
             numbers = np.where(np.isnan(numbers), Status.MISSING, numbers).astype(np.int8)
             attributes["flag_values"] = np.array([*Status], dtype=np.int8)
             attributes["flag_meanings"] = " ".join(each.name.lower() for each in Status)
-        whole = numbers.reshape(shape + numbers.shape[1:])
-        variables[name] = Variable((*over, *column.quantity.dims), whole, attributes)
-    return variables, coordinates
-
-
-def _origin(case: Case, facts: Mapping[str, Any]) -> dict[str, str | float | int]:
-    """The case, the parameters that are not varied, and where the numbers come from."""
-    origin = {name: each if isinstance(each, str | float | int) else json.dumps(each) for name, each in facts.items()}
-    return {
-        "title": case.title,
-        "case": case.name,
-        "Conventions": "CF-1.11",
-        "rtol": case.rtol,
-        **case.constants,
-        **origin,
-    }
+        if is_list:
+            attributes["coordinates"] = " ".join(vary.keys)
+        found[name] = (*over, *column.quantity.dims), numbers.reshape(shape + numbers.shape[1:]), attributes
+    for key in vary.keys:
+        values, is_text = vary.columns[key] if is_list else vary.values(key), vary.is_text(key)
+        array = np.array(values, dtype=h5py.string_dtype() if is_text else float)
+        found[key] = (SET if is_list else key,), array, {} if is_text else case.about(key).attributes
+    if MOMENT.name in case.asked:
+        found["p"] = ("p",), case.p, P.attributes
+    return found
 
 
 def open_results(*places: str | Path) -> xr.Dataset:

@@ -399,6 +399,8 @@ def _draw_map(case: Case, table: Table, keys: tuple[str, str], axes: Any) -> Non
 
     The line of its zeros is dashed between the values.
     """
+    from matplotlib import patches, path
+
     setting = case.figure
     (x, column), (y, row) = (
         np.unique(np.array([each[key] for each in case.vary.sets], dtype=float), return_inverse=True) for key in keys
@@ -412,20 +414,22 @@ def _draw_map(case: Case, table: Table, keys: tuple[str, str], axes: Any) -> Non
     limits = setting.xlim, setting.ylim
     for axis, each, ends, limit in zip((axes.xaxis, axes.yaxis), (x, y), edges, limits, strict=True):
         scale_axis(axis, scale_of(each), limit or (float(ends[0]), float(ends[-1])))
+    finite = values[np.isfinite(values)]
+    if finite.size and finite.min() < 0 < finite.max():
+        look: dict[str, Any] = {"linestyles": "--", "linewidths": points(1.5), "zorder": 3}
+        axes.contour(x, y, np.ma.masked_invalid(values), levels=[0.0], colors=_BETWEEN, **look)
+        axes.plot([], [], "--", color=_BETWEEN, label="zero, interpolated between the values")
     sought = "" if setting.moment is not None else " from {:g} to {:g}".format(*INDICES[setting.needed].interval)
     unsolved: dict[str, Any] = {"facecolor": "white", "edgecolor": "0.45", "hatch": "/////"}
     for where, style, label in (
         (failed, unsolved, "failed or not solved"),
         (np.isnan(values) & ~failed, {"facecolor": "0.8"}, f"no {setting.quantity.words}{sought}"),
     ):
-        (i, j), (left, low), (width, height) = np.nonzero(where), edges, map(np.diff, edges)
+        (i, j), (left, low) = np.nonzero(where), edges
         if i.size:
-            axes.bar(left[j], height[i], width[j], low[i], align="edge", linewidth=0, label=label, **style)
-    finite = values[np.isfinite(values)]
-    if finite.size and finite.min() < 0 < finite.max():
-        look: dict[str, Any] = {"linestyles": "--", "linewidths": points(1.5), "zorder": 3}
-        axes.contour(x, y, np.ma.masked_invalid(values), levels=[0.0], colors=_BETWEEN, **look)
-        axes.plot([], [], "--", color=_BETWEEN, label="zero, interpolated between the values")
+            corners = np.array([(left[j + k], low[i + m]) for k, m in ((0, 0), (1, 0), (1, 1), (0, 1))])
+            cells = path.Path.make_compound_path_from_polys(np.moveaxis(corners, 2, 0))
+            axes.add_patch(patches.PathPatch(cells, linewidth=0, label=label, **style))
 
 
 def _draw_values(axes: Any, values: FloatArray, edges: tuple[FloatArray, FloatArray], about: Mapping[str, Any]) -> None:

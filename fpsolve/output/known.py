@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
+from types import GenericAlias
 from typing import Any
 
 import numpy as np
 
 from fpsolve.case.case import Case, Curve
 from fpsolve.model.quantity import STATUS
+from fpsolve.output.beyond import says_more
 from fpsolve.output.records import Entries, Records, key_of, made, plain
-from fpsolve.output.tables import says_more
-from fpsolve.parts.every import BY_NAME
+from fpsolve.parts.every import QUESTIONS
 from fpsolve.parts.moments import QUESTION as MOMENTS
 from fpsolve.parts.question import Asked, Entry, Job, Limit, Numerics, Reason
 from fpsolve.results.curve import CurveResult
@@ -29,8 +30,12 @@ _ROW = tuple[tuple[float, ...], Limit | None]
 """The form of Λ(p) in a record, see `Job.rows`, and of the budget in which it was found."""
 
 
-_BESIDE = tuple[Reason | None, float, Limit | None]
-"""The form of an `Entry` in a record, beside what was found."""
+_ENTRIES: Mapping[str, Any] = {
+    each.name: GenericAlias(tuple, (each.kind | None, Reason | None, float, Limit | None))
+    for each in QUESTIONS
+    if each.solve
+}
+"""The form of an `Entry` of each question in a record."""
 
 
 def names_of(asked: Asked, numerics: Numerics) -> dict[str, str]:
@@ -49,8 +54,7 @@ def record_of(job: Job) -> Entries:
     names = names_of(job.asked, job.numerics)
     record = Entries()
     for name, each in job.new.items():
-        beside = plain(_BESIDE, (each.reason, each.seconds, each.limit))
-        record[names[name]] = [plain(BY_NAME[name].kind | None, each.found), *beside]
+        record[names[name]] = plain(_ENTRIES[name], (each.found, each.reason, each.seconds, each.limit))
     if MOMENTS.name in job.new or MOMENTS.name not in job.entries:
         limit = job.new[MOMENTS.name].limit if MOMENTS.name in job.new else job.numerics.limit
         known = ((p, job.rows[p]) for p in job.asked[MOMENTS.name]["p"] if p in job.rows)
@@ -62,8 +66,7 @@ def read_into(job: Job, record: Entries, names: Mapping[str, str], *, is_all: bo
     """Give a job what its record has of what is asked: what is settled, or all; what cannot be read is not there."""
     for name in job.asked:
         with suppress(ValueError, KeyError, TypeError):
-            found, *beside = record[names[name]]
-            entry = Entry(made(BY_NAME[name].kind | None, found), *made(_BESIDE, beside))
+            entry = Entry(*made(_ENTRIES[name], record[names[name]]))
             if is_all or job.numerics.settles(entry.limit):
                 job.entries[name] = entry
     for p in job.asked[MOMENTS.name]["p"]:
@@ -82,6 +85,7 @@ class Results(Sequence[CurveResult]):
         records: those of its folder.
 
     Attributes:
+        asked: what is asked of the first curve, and of each other one.
         table: the numbers of all that are known.
         says: whether anything is said of a curve beyond its numbers, shape (curves,).
         whole: the numbers of the curves of which all is known that is asked for.
@@ -89,8 +93,8 @@ class Results(Sequence[CurveResult]):
 
     def __init__(self, case: Case, records: Records) -> None:
         self._case, self._records, self._numerics = case, records, Numerics.of(case)
-        self._asked = everything(case, 1), everything(case, 2)
-        self._names = [names_of(each, self._numerics) for each in self._asked]
+        self.asked = everything(case, 1), everything(case, 2)
+        self._names = [names_of(each, self._numerics) for each in self.asked]
         self.table, self.says = table_of(case), np.ones(case.planned, dtype=bool)
         self.whole = set[int]()
         self._kept: dict[int, CurveResult] = {}
@@ -102,7 +106,7 @@ class Results(Sequence[CurveResult]):
         """The work on the curve with a number, with what is known of it; or also with what is to be sought again."""
         vary, place = self._case.vary, number > 1
         curve = Curve(self._case.problem, vary.sets[number - 1], number)
-        job = Job(curve, self._asked[place], self._numerics, vary.line_of(number))
+        job = Job(curve, self.asked[place], self._numerics, vary.line_of(number))
         return read_into(job, self._records.get(curve.digest), self._names[place], is_all=is_all)
 
     def add(self, job: Job) -> CurveResult:
@@ -128,12 +132,8 @@ class Results(Sequence[CurveResult]):
                 self.add(job)
 
     def _jobs(self, *, is_all: bool = False) -> Iterator[Job]:
-        numbers = range(1, self._case.planned + 1) if self._records else ()
-        return (self.job(number, is_all=is_all) for number in numbers if not self.has(number))
-
-    def asked(self, number: int) -> Asked:
-        """What is asked of the curve with a number."""
-        return self._asked[number > 1]
+        left = {*range(1, self._case.planned + 1)}.difference(self.numbers) if self._records else ()
+        return (self.job(number, is_all=is_all) for number in sorted(left))
 
     @property
     def telling(self) -> Iterator[CurveResult]:
@@ -144,14 +144,15 @@ class Results(Sequence[CurveResult]):
         """That of the curve with a number."""
         return self._kept.get(number) or result_of(self.job(number, is_all=True))
 
-    def has(self, number: int) -> bool:
-        """Whether anything is known of the curve with a number."""
-        return bool(np.isfinite(self.table[STATUS.name].values[number - 1]))
+    @property
+    def places(self) -> list[int]:
+        """Those in the table of the curves of which anything is known."""
+        return np.flatnonzero(np.isfinite(self.table[STATUS.name].values)).tolist()
 
     @property
     def numbers(self) -> list[int]:
         """Those of the curves of which anything is known."""
-        return (np.flatnonzero(np.isfinite(self.table[STATUS.name].values)) + 1).tolist()
+        return [place + 1 for place in self.places]
 
     def __len__(self) -> int:
         return len(self.numbers)

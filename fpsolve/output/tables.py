@@ -7,7 +7,7 @@ import platform
 import shlex
 import socket
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
@@ -22,10 +22,13 @@ from fpsolve.files import write_csv, write_json
 from fpsolve.messages import message_of
 from fpsolve.model.quantity import MOMENT, STATUS, Quantity
 from fpsolve.output.beyond import beyond_tables
+from fpsolve.output.datasets import write_dataset
+from fpsolve.output.known import Results
 from fpsolve.results.curve import CurveResult, Status
 from fpsolve.results.table import Table, plain
-from fpsolve.study.columns import COUNTS, table_of
+from fpsolve.study.columns import COUNTS
 
+Facts = Mapping[str, Any]
 MOST_INDENTED = 100
 """Curves of a summary that is made for eyes, too."""
 MOST_SUMMARISED = 1000
@@ -49,42 +52,47 @@ def facts_of(case: Case, started: datetime) -> dict[str, Any]:
     }
 
 
-def write_results(
-    case: Case,
-    results: Sequence[CurveResult],
-    folder: Path,
-    facts: Mapping[str, Any],
-    finished: int,
-    table: Table,
-    telling: Iterable[CurveResult],
-) -> None:
-    """Write summary.json, which says whether all curves are there, moments.csv and curves.csv.
+def write_moments(case: Case, results: Results, path: Path, facts: Facts) -> None:
+    """Write the numbers of all sets at each p that was solved."""
+    table, sets = results.table, case.vary.sets
+    names = [name for name, each in table.items() if each.quantity.dims]
+    rows = ([*sets[each].values(), *row.values()] for each in results.places for row in _over_p(case, table, each))
+    write_csv(path, [*case.vary.keys, "p", *names], rows)
 
-    Of many curves summary.json has the state, the messages and what no other table has; see `MOST_SUMMARISED`.
 
-    Args:
-        facts: on the run, see `facts_of`.
-        finished: how many of them are.
-        table: their numbers.
-        telling: the curves of which there is more.
+def write_numbers(case: Case, results: Results, path: Path, facts: Facts) -> None:
+    """Write the numbers of all sets that are no function of p."""
+    table, sets = results.table, case.vary.sets
+    names = [name for name, each in table.items() if not (each.quantity.dims or name.endswith("_perturbation"))]
+    rows = ([*sets[each].values(), *map(_numbers(table, each).__getitem__, names)] for each in results.places)
+    write_csv(path, [*case.vary.keys, *names], rows)
+
+
+def write_summary(case: Case, results: Results, path: Path, facts: Facts) -> None:
+    """Write whether all sets are there, their numbers, their messages and what no other table has.
+
+    Of many sets the numbers are left to other files, see `MOST_SUMMARISED`.
     """
-    known, sets = np.flatnonzero(~np.isnan(table[STATUS.name].values)).tolist(), case.vary.sets
-    over_p = [name for name, each in table.items() if each.quantity.dims]
-    of_curve = [name for name in table if name not in over_p and not name.endswith("_perturbation")]
-    by_moment = ([*sets[each].values(), *row.values()] for each in known for row in _over_p(case, table, each))
-    by_curve = ([*sets[each].values(), *map(_numbers(table, each).__getitem__, of_curve)] for each in known)
-    write_csv(folder / "moments.csv", [*case.vary.keys, "p", *over_p], by_moment)
-    write_csv(folder / "curves.csv", [*case.vary.keys, *of_curve], by_curve)
-    content: dict[str, Any] = {**_state(case, finished), **facts}
+    content, table, sets = _head_of(case, results, facts), results.table, case.vary.sets
+    states = table[STATUS.name].values
     if case.planned > MOST_SUMMARISED:
-        told, states = {each.curve.number: _told(case, each) for each in telling}, table[STATUS.name].values
+        told = {each.curve.number: _told(case, each) for each in results.telling}
         content |= {"parameters": dict(case.constants), "curves": [
             {"varied": sets[each], "status": _cell(STATUS, states[each]), **told.get(each + 1, _SILENT)}
-            for each in known
+            for each in results.places
         ]}  # fmt: skip
     else:
         content["curves"] = [_summary(case, each, table) for each in results]
-    write_json(folder / "summary.json", content, indent=1 if case.planned <= MOST_INDENTED else None)
+    write_json(path, content, indent=1 if case.planned <= MOST_INDENTED else None)
+
+
+TABLES: dict[str, Callable[[Case, Results, Path, Facts], None]] = {
+    "summary.json": write_summary,
+    "curves.csv": write_numbers,
+    "moments.csv": write_moments,
+    "results.nc": write_dataset,
+}
+"""What writes each of the files with numbers of all sets, and takes the `facts_of` the run."""
 
 
 def _numbers(table: Table, number: int) -> dict[str, Any]:
@@ -107,19 +115,15 @@ def _over_p(case: Case, table: Table, number: int) -> list[dict[str, Any]]:
     return [{name: plain(float(values[place])) for name, values in columns.items()} for place in solved]
 
 
-def whole_summary(case: Case, results: Sequence[CurveResult], facts: Mapping[str, Any]) -> str:
-    """All numbers and messages of all curves in one line of JSON, as summary.json has them of few curves.
-
-    Args:
-        facts: on the run, see `facts_of`.
-    """
-    table = table_of(case, results)
-    content = {**_state(case, len(results)), **facts, "curves": [_summary(case, each, table) for each in results]}
+def whole_summary(case: Case, results: Results, facts: Facts) -> str:
+    """All numbers and messages of all curves in one line of JSON, as summary.json has them of few curves."""
+    content = {**_head_of(case, results, facts), "curves": [_summary(case, each, results.table) for each in results]}
     return json.dumps(content, allow_nan=False, ensure_ascii=False)
 
 
-def _state(case: Case, done: int) -> dict[str, Any]:
-    return {**head(case), "complete": done == case.planned, "planned": case.planned, "done": done}
+def _head_of(case: Case, results: Results, facts: Facts) -> dict[str, Any]:
+    done = len(results.whole)
+    return {**head(case), "complete": done == case.planned, "planned": case.planned, "done": done, **facts}
 
 
 def in_case_words(messages: Sequence[str]) -> list[str]:
@@ -161,8 +165,3 @@ def _told(case: Case, result: CurveResult) -> dict[str, Any]:
 
 _SILENT: dict[str, Any] = {"warnings": [], "notes": []}
 """What is told of a curve of which there is nothing to tell."""
-
-
-def says_more(case: Case, result: CurveResult) -> bool:
-    """Whether there is more of a curve than its numbers in tables."""
-    return any(result.remarks.values()) or bool(beyond_tables(case, result))

@@ -160,4 +160,6 @@ def _write_plane(path: Path, grid: DirectionGrid, data: Mapping[str, FloatArray]
     write_between(path, places, data, facts)
 
 
-QUESTION: Question = question_of_pictures(DIRECTIONS, "density of directions", _solve, write_directions)
+QUESTION: Question = question_of_pictures(
+    DIRECTIONS, "density of directions", _solve, write_directions, r"densities(-\d+)?\.(nc|png|pdf)"
+)

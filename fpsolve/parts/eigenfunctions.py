@@ -98,12 +98,13 @@ def question_of_pictures(
     symbol: str,
     solve: Callable[[Job, Settings], tuple[Message, ...]],
     files: Callable[[Any, Curve, Path], None],
+    names: str,
 ) -> Question:
     """That of the cases of which there are such pictures; what it finds is what was said when they were solved.
 
     Args:
         pictures: what is drawn.
-        symbol, solve, files: see `Question`.
+        symbol, solve, files, names: see `Question`.
     """
     return Question(
         pictures.part,
@@ -113,6 +114,7 @@ def question_of_pictures(
         symbol,
         said=lambda found, *_: found,
         files=files,
+        names=names,
     )
 
 
@@ -219,4 +221,5 @@ def _write_grid(path: Path, grid: Nodes, data: Mapping[str, FloatArray], facts: 
     write_points(path, pyvista.UnstructuredGrid(cells, grid.points()), shown, {**axes, **facts})
 
 
-QUESTION: Question = question_of_pictures(PHASE_AND_NOISE, EIGENFUNCTIONS, _solve, _files)
+NAMES = r"(curves|eigenfunctions(-\d+)?)\.pvd|eigenfunctions(-\d+)?/p[+-][\d.e+-]+\.vtu|density\.vtu|show\.py"
+QUESTION: Question = question_of_pictures(PHASE_AND_NOISE, EIGENFUNCTIONS, _solve, _files, NAMES)

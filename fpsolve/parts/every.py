@@ -2,18 +2,10 @@
 
 from __future__ import annotations
 
-from fpsolve.parts import (
-    directions,
-    discretisation,
-    eigenfunctions,
-    excursions,
-    indices,
-    intervals,
-    moments,
-    rate_function,
-    response,
-    sensitivities,
-)
+from importlib import import_module
+
+from fpsolve.case.sections import PARTS
+from fpsolve.parts import directions, discretisation, indices, intervals, moments, rate_function
 from fpsolve.parts.question import Question
 
 QUESTIONS: tuple[Question, ...] = (
@@ -22,11 +14,8 @@ QUESTIONS: tuple[Question, ...] = (
     *indices.INDEX_QUESTIONS,
     indices.THEORY,
     moments.CLASSES,
-    excursions.QUESTION,
-    response.QUESTION,
-    sensitivities.QUESTION,
+    *(import_module(f"fpsolve.parts.{name}").QUESTION for name in PARTS),
     intervals.QUESTION,
-    eigenfunctions.QUESTION,
     directions.QUESTION,
     discretisation.QUESTION,
 )

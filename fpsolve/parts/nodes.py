@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 from typing import Any, ClassVar, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fpsolve.arrays import FloatArray
 from fpsolve.exponent.density import Fields, own_phases, plane_fields, refuse_more, xi_marginal
@@ -29,8 +28,6 @@ FAINT = 1e-6
 """Share of the largest values of P_s and of the tilted density below which the noise is not shown."""
 NEGLIGIBLE = 1e-3
 """A picture shows the ξ at which a density exceeds this share of its maximum."""
-FURTHEST = 4.0
-"""Standard deviations of the noise up to which T is shown; beyond, where next to no path is, it only grows."""
 MOST_STATES = 8
 """States of the noise that a picture names."""
 FIELDS = {
@@ -115,11 +112,6 @@ class Nodes:
         return self.axis.replace("ξ", "xi").replace("²", "^2")
 
     @property
-    def is_near(self) -> NDArray[np.bool_]:
-        """Which z are within `FURTHEST`."""
-        return abs(self.z) <= FURTHEST
-
-    @property
     def impacts(self) -> list[float]:
         """The phases at which T jumps, increasing."""
         jumps, turns = self.problem.linear.jumps, (0, math.pi)
@@ -186,10 +178,6 @@ class Strips(Nodes):
         if noise.is_white:
             return f"{noise.kind or 'white'} noise"
         return "; ".join(["states", *(f"xi = {each:g}" for each in self.xi if self.xi.size <= MOST_STATES)])
-
-    @property
-    def is_near(self) -> NDArray[np.bool_]:
-        return np.full(self.z.shape, True)
 
     @property
     def z(self) -> FloatArray:

@@ -223,6 +223,7 @@ class Question:
         lacks: why some of what is asked for is not there.
         numbers: those of a curve that a case asks for, by their quantities; of none, the quantities without numbers.
         files: writes into a folder pictures of a curve, which no record holds, so that it is solved again for them.
+        names: the pattern of the names of all files about it.
     """
 
     name: str
@@ -234,3 +235,4 @@ class Question:
     lacks: Callable[[Any, Settings], Iterable[Message]] = lambda *_: ()
     numbers: Callable[[Case, CurveResult | None], Mapping[Quantity, Any]] = lambda *_: {}
     files: Callable[[Any, Curve, Path], None] | None = None
+    names: str = ""

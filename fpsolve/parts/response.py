@@ -126,4 +126,12 @@ def write_response(found: CurveResponse, curve: Curve, folder: Path) -> None:
     write_between(folder / f"response_3d{curve.suffix}.vtu", places, whole, facts)
 
 
-QUESTION: Question = Question(RESPONSE, _settings, _solve, CurveResponse, RESPONSE, numbers=_numbers)
+QUESTION: Question = Question(
+    RESPONSE,
+    _settings,
+    _solve,
+    CurveResponse,
+    RESPONSE,
+    numbers=_numbers,
+    names=r"response(_3d)?(-\d+)?\.(csv|vtu|png|pdf)",
+)

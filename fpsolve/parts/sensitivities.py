@@ -40,4 +40,5 @@ QUESTION: Question = Question(
     SENSITIVITIES,
     said=lambda found, *_: found.notes,
     lacks=_lacks,
+    names=r"sensitivities(-\d+)?\.(png|pdf)",
 )

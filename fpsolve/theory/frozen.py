@@ -145,7 +145,7 @@ def _noise_strength(problem: Problem) -> float:
     for term in system.terms:
         xi = problem.named_noise(term.noise).reached
         rise = np.abs(term.g(xi) - term.g(0.0)) / np.where(xi, np.abs(xi), np.inf)
-        total += float(np.max(rise)) * system.epsilon**term.order * float(abs(term.q.mean) + term.q.amplitude)
+        total += np.max(rise) * system.epsilon**term.order * float(abs(term.q.mean) + term.q.amplitude)
     return total
 
 

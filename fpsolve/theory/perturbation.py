@@ -203,7 +203,7 @@ def has_mean(problem: Problem) -> bool:
 def perturbed_moments(problem: Problem, p: FloatArray) -> FloatArray:
     """ε²Λ₂(p), Eq. (37), shape (n,); NaN where perturbation theory does not apply."""
     theory = second_order_or_none(problem)
-    return np.full(np.shape(p), math.nan) if theory is None else np.asarray(theory.moment_exponent(p), dtype=float)
+    return np.full(np.shape(p), math.nan) if theory is None else theory.moment_exponent(p)
 
 
 def weak_noise_note(problem: Problem, p: FloatArray, value: FloatArray) -> Message | None:
@@ -223,8 +223,15 @@ def weak_noise_note(problem: Problem, p: FloatArray, value: FloatArray) -> Messa
     if not np.any(beyond):
         return None
     worst, first = int(np.argmax(shares)), np.min(np.abs(p[beyond]))
-    found = {"first": first, "p": p[worst], "rest": rest[worst], "size": shares[worst]}
-    return Message(Code.STRONG_NOISE, is_reduced=problem.noise.approximates_spectrum, most=STRONG, **found)
+    return Message(
+        Code.STRONG_NOISE,
+        is_reduced=problem.noise.approximates_spectrum,
+        most=STRONG,
+        first=first,
+        p=p[worst],
+        rest=rest[worst],
+        size=shares[worst],
+    )
 
 
 def first_order_eigenfunction(problem: Problem, p: float, phi: ArrayLike, xi: ArrayLike) -> FloatArray:
@@ -273,7 +280,7 @@ def scale_of(problem: Problem) -> Scale:
             steady += system.epsilon**term.order * at_mean * np.array(term.matrix)
             driven = size * (line[1] and abs(line[1]) * noise.standard_deviation)
         else:
-            typical = np.asarray(term.g(noise.mean + noise.standard_deviation * np.array([-1.0, 1.0])))
+            typical = term.g(noise.mean + noise.standard_deviation * np.array([-1.0, 1.0]))
             driven = size * float(np.sqrt(np.mean(typical**2)))
         of_noises[term.noise] = of_noises.get(term.noise, 0.0) + driven
     jumps = sum(abs(jump.log_factor) for jump in system.jumps) * own.unit_rate / math.pi
@@ -294,7 +301,7 @@ def scale_of(problem: Problem) -> Scale:
 
 def _growth(matrix: Any, frame: FloatArray) -> Harmonics:
     """q of a matrix in the coordinates in which the order 0 rotates."""
-    return stretching(np.linalg.inv(frame) @ np.asarray(matrix) @ frame)
+    return stretching(np.linalg.inv(frame) @ matrix @ frame)
 
 
 def _rotating_frame(a: FloatArray) -> tuple[FloatArray, float]:

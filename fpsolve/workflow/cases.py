@@ -13,6 +13,7 @@ from fpsolve.case.remedies import CASE_WORDS
 from fpsolve.errors import FpsolveError, NotConverged, WorkersDied
 from fpsolve.files import writable
 from fpsolve.messages import Code, Message
+from fpsolve.output.tables import TABLES
 from fpsolve.pool import SERIAL, Pool, cluster, parallel
 from fpsolve.results.curve import CurveResult
 from fpsolve.show import results
@@ -28,7 +29,7 @@ from fpsolve.workflow.folders import (
 )
 from fpsolve.workflow.progress import SILENT, Phase, Watch, ignore
 from fpsolve.workflow.reports import shown_at_the_end, write_report
-from fpsolve.workflow.sets import TABLES, Sweep
+from fpsolve.workflow.sets import Sweep
 from fpsolve.workflow.simulate import SIMULATION, Simulations, refuse_obstacles
 from fpsolve.workflow.simulate import show as show_simulated
 
@@ -44,11 +45,6 @@ class Outcome:
 
     sweep: Sweep
     simulations: Simulations
-
-    @property
-    def failures(self) -> tuple[Message, ...]:
-        """Why some p or indices of some curves are missing."""
-        return tuple(failure.reason for result in self.sweep.results for failure in result.failures)
 
 
 def run(
@@ -89,11 +85,10 @@ def run(
             progress()
 
     watch = Watch(bar=lambda phase: nullcontext(advance if phase.unit else ignore))
-    outcome = run_case(read, out, pool=pool, is_fresh=fresh, watch=watch)
-    results = tuple(outcome.sweep.results)
-    if outcome.failures:
-        raise NotConverged(Message(Code.SEVERAL, reasons=outcome.failures), results)
-    return results
+    solved = tuple(run_case(read, out, pool=pool, is_fresh=fresh, watch=watch).sweep.results)
+    if reasons := tuple(failure.reason for each in solved for failure in each.failures):
+        raise NotConverged(Message(Code.SEVERAL, reasons=reasons), solved)
+    return solved
 
 
 def run_case(
@@ -124,8 +119,7 @@ def run_case(
         refuse_obstacles(case)
     simulations = Simulations(case)
     simulated = simulations.simulated
-    replaced = (SOLVED, SIMULATED) if monte_carlo else (SOLVED,)
-    with own_folder(case, out, replaced) as folder:
+    with own_folder(case, out, [SOLVED, *[SIMULATED] * monte_carlo]) as folder:
         sweep = _solve(case, folder, pool, watch, is_fresh=is_fresh)
 
         def show() -> None:
@@ -139,7 +133,7 @@ def run_case(
                     sweep.notes,
                     notes(case, simulated, MONTE_CARLO),
                 )
-                files = TABLES + SIMULATION * bool(simulated)
+                files = *TABLES, *SIMULATION * bool(simulated)
                 is_whole &= sweep.done == case.planned
                 write_report(case, folder, watch, blocks, started=sweep.started, files=files, complete=is_whole)
 

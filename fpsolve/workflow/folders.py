@@ -11,16 +11,13 @@ from pathlib import Path
 
 from fpsolve.case.case import Case
 from fpsolve.errors import FpsolveError, OutputError, Remedy
-from fpsolve.files import TEMPORARY, alone, plain_text, writable, write_text
+from fpsolve.files import TEMPORARY, alone, writable, write_text
+from fpsolve.output.tables import TABLES
+from fpsolve.parts.every import QUESTIONS
 from fpsolve.signals import is_interrupt
 
 AGAIN, ANEW = "run it again to go on", "run it again to start over"
-SOLVED = (
-    r"summary\.json|(moments|curves)\.csv|curves\.pvd|results\.nc"
-    r"|(figure|rate_function|(sensitivities|densities)(-\d+)?)\.(png|pdf)"
-    r"|density\.vtu|densities(-\d+)?\.nc|show\.py|eigenfunctions(-\d+)?(\.pvd|/p[+-][\d.e+-]+\.vtu)"
-    r"|response(_3d)?(-\d+)?\.(csv|vtu|png|pdf)"
-)
+SOLVED = "|".join([*map(re.escape, TABLES), r"figure\.(png|pdf)", *(each.names for each in QUESTIONS if each.names)])
 SIMULATED = r"monte_carlo(-\d+)?\.json|monte_carlo_response(-\d+)?\.(csv|vti|png|pdf)"
 REPORT = r"report\.html"
 """Pattern of the name of the report of what was done last, which whatever is done next makes stale."""
@@ -51,17 +48,18 @@ def own_folder(case: Case, out: str | Path, replaced: Sequence[str]) -> Iterator
                 if re.fullmatch("|".join([*replaced, REPORT]), name) and is_folder:
                     raise OutputError(f"{path} cannot be written: Is a directory", Remedy.FOLDER)
             sets = json.dumps([case.curve({}).digest, case.vary.mode, case.vary.columns])
-            parameters, stated = sha256(sets.encode()).hexdigest(), ""
-            with suppress(OSError, ValueError):
-                stated = plain_text(folder / _PARAMETERS)
-            kinds = replaced if stated == parameters else (SOLVED, SIMULATED, CHART, PROVEN, DESIGNED)
+            parameters, stated, is_same = sha256(sets.encode()).hexdigest(), folder / _PARAMETERS, False
+            with suppress(OSError):
+                is_long = stated.is_file() and stated.stat().st_size == len(parameters)
+                is_same = is_long and stated.read_bytes() == parameters.encode()
+            kinds = replaced if is_same else (SOLVED, SIMULATED, CHART, PROVEN, DESIGNED)
             names = "|".join([*kinds, REPORT, _UNFINISHED])
             for name, path in there.items():
                 if re.fullmatch(names, name) and (path.is_symlink() or not path.is_dir()):
                     path.unlink()
                     if path.parent != folder and not any(path.parent.iterdir()):
                         path.parent.rmdir()
-            write_text(folder / _PARAMETERS, parameters)
+            write_text(stated, parameters)
         yield folder
 
 

@@ -17,10 +17,9 @@ from fpsolve.case.sections import RESPONSE
 from fpsolve.errors import WorkersDied
 from fpsolve.files import atomic
 from fpsolve.model.quantity import MOMENT, SECONDS, STATUS
-from fpsolve.output.datasets import write_dataset
 from fpsolve.output.known import Results, record_of
 from fpsolve.output.records import Entries, Records
-from fpsolve.output.tables import facts_of, write_results
+from fpsolve.output.tables import TABLES, facts_of
 from fpsolve.page.page import Note
 from fpsolve.parts.eigenfunctions import write_curves
 from fpsolve.parts.every import BY_NAME
@@ -35,8 +34,6 @@ from fpsolve.workflow.progress import MOMENTS, SETS, Advance, Phase
 
 SOLVED_RECORDS = "records/solved.jsonl"
 """The file of the records of sets."""
-TABLES = "summary.json", "curves.csv", "moments.csv", "results.nc"
-"""The files with all numbers of a run."""
 REST = 50
 """Tables are rewritten when so many times as long has gone by as the last time took, so that all of it costs little."""
 
@@ -127,7 +124,7 @@ class Sweep:
         """Solve what is not known yet, and draw; tables are written first, if anything is missing, and as they grow."""
         if self.done < self.case.planned:
             self.write_tables()
-        draws = [any(BY_NAME[name].files for name in self.results.asked(number)) for number in (1, 2)]
+        draws = [any(BY_NAME[name].files for name in asked) for asked in self.results.asked]
         numbers = range(1, self.case.planned + 1)
         left = [number for number in numbers if draws[number > 1] or number not in self.results.whole]
         if len(left) < self.case.planned:
@@ -163,21 +160,20 @@ class Sweep:
             self.write_tables()
 
     def write_tables(self) -> None:
-        """Write summary.json, moments.csv and curves.csv."""
+        """Write all of `TABLES`, and last that which says whether all sets are there."""
         started, self.facts = monotonic(), facts_of(self.case, self.started)
-        results = self.results
-        write_results(self.case, results, self.folder, self.facts, self.done, results.table, results.telling)
+        for name, write in reversed(TABLES.items()):
+            write(self.case, self.results, self.folder / name, self.facts)
         self._due = monotonic() + REST * (monotonic() - started)
 
     def write_all(self) -> None:
-        """Write the tables, results.nc, the series over the curves, and the files of what records hold."""
+        """Write the tables, the series over the curves, and the files of what records hold."""
         self.write_tables()
         write_curves(self.case, self.folder)
-        for result in self.results if RESPONSE in self.results.asked(1) else ():
+        for result in self.results if RESPONSE in self.results.asked[0] else ():
             if result.response:
                 write_response(result.response, result.curve, self.folder)
         table = self.results.table
-        write_dataset(self.case, table, self.folder, self.facts)
         numbers = [each.values for each in table.values() if each.quantity not in (*COUNTS, STATUS, SECONDS)]
         is_empty = bool(numbers) and not any(np.isfinite(each).any() for each in numbers)
         self.failed = int(np.isin(table[STATUS.name].values, [each for each in Status if each.fails]).sum())

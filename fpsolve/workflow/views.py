@@ -115,14 +115,11 @@ def _panels_of_directions(density: Any, stationary: PrincipalPair, pair: Princip
 
 def _panels_over_noise(density: Any, stationary: PrincipalPair, pair: PrincipalPair) -> Panels:
     """T and the stationary density."""
-    grid = Nodes.of(pair)
-    near, names = grid.is_near, ["phase φ (rad)", grid.axis]
+    grid = Nodes.of(pair).seen(pair)
+    names = ["phase φ (rad)", grid.axis]
     shown = {f"eigenfunction T of p = {pair.p:g}": grid.fields(pair).T}
     shown["stationary density"] = grid.fields(stationary).T_adjoint
-    return [
-        panel(title, grid.phi.ravel(), grid.y[near], values[:, near], names, grid.is_lines)
-        for title, values in shown.items()
-    ], []
+    return [panel(title, grid.phi.ravel(), grid.y, values, names, grid.is_lines) for title, values in shown.items()], []
 
 
 PANELS = {PHASE_AND_NOISE.part: _panels_over_noise, DIRECTIONS.part: _panels_of_directions}

@@ -124,7 +124,7 @@ def fitted(axis, *forms):
 def test_impact_on_the_half_sphere_keeps_the_other_mode():
     """T = ‖x₂‖² has no load, so that ‖x₁‖² has that of ‖x‖²; by p and by ln R it has the slopes of its values."""
     log, step = np.log(0.7), 1e-5
-    load, (first, second) = HALF.struck(log, 2.0), fitted(HALF, np.diag([1, 1, 0, 0]), np.diag([0, 0, 1, 1])).T
+    load, (first, second) = HALF.struck(log, 2.0, 0), fitted(HALF, np.diag([1, 1, 0, 0]), np.diag([0, 0, 1, 1])).T
     assert_allclose(load @ second, 0, atol=1e-7)
     assert_allclose(load @ first, load @ HALF.constant, atol=1e-7)
     for k in (0, 1):

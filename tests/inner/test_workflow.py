@@ -75,7 +75,7 @@ def raising(failure):
         ("fpsolve.study.solve.solve_curve", "run", "interrupted after 0 of 2 curves; run it again to go on"),
         ("fpsolve.study.solve.solve_curve", "check", "interrupted after 0 of 2 curves; run it again to start over"),
         (
-            "fpsolve.workflow.sets.write_dataset",
+            "fpsolve.workflow.sets.write_curves",
             "run",
             "interrupted after 2 of 2 curves; what was done is kept in results/case; run it again to go on",
         ),
