@@ -109,8 +109,8 @@ DEFECTS: tuple[Defect, ...] = (
     Defect(
         "T8 the covariance is the mean square",
         "exponent/forced.py",
-        "np.asarray(self.square - np.outer(self.mean, self.mean))",
-        "np.asarray(self.square)",
+        "self.square - np.outer(self.mean, self.mean)",
+        "self.square",
         "stationary",
     ),
     Defect(

@@ -255,6 +255,10 @@ class DividedAxis(FunctionAxis):
 
 def along(factors: Sequence[Matrix | None], tables: FloatArray) -> FloatArray:
     """Tables, in the last axes of an array, with a matrix applied along each axis; None leaves one as it is."""
+    if tables.ndim == 2:  # by far the most products of a solve
+        first, last = factors
+        tables = tables if last is None else np.asarray(tables @ last.T)
+        return tables if first is None else first @ tables
     for axis, factor in enumerate(factors, tables.ndim - len(factors)):
         if factor is not None:
             moved = tables.swapaxes(0, axis)
