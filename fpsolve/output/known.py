@@ -13,7 +13,7 @@ from fpsolve.case.case import Case, Curve
 from fpsolve.model.quantity import STATUS
 from fpsolve.output.beyond import says_more
 from fpsolve.output.records import Entries, Records, key_of, made, plain
-from fpsolve.parts.every import QUESTIONS
+from fpsolve.parts.every import BY_NAME
 from fpsolve.parts.moments import QUESTION as MOMENTS
 from fpsolve.parts.question import Asked, Entry, Job, Limit, Numerics, Reason
 from fpsolve.results.curve import CurveResult
@@ -30,12 +30,9 @@ _ROW = tuple[tuple[float, ...], Limit | None]
 """The form of Λ(p) in a record, see `Job.rows`, and of the budget in which it was found."""
 
 
-_ENTRIES: Mapping[str, Any] = {
-    each.name: GenericAlias(tuple, (each.kind | None, Reason | None, float, Limit | None))
-    for each in QUESTIONS
-    if each.solve
-}
-"""The form of an `Entry` of each question in a record."""
+def form_of(name: str) -> Any:
+    """The form of an `Entry` of a question in a record."""
+    return GenericAlias(tuple, (BY_NAME[name].kind | None, Reason | None, float, Limit | None))
 
 
 def names_of(asked: Asked, numerics: Numerics) -> dict[str, str]:
@@ -54,7 +51,7 @@ def record_of(job: Job) -> Entries:
     names = names_of(job.asked, job.numerics)
     record = Entries()
     for name, each in job.new.items():
-        record[names[name]] = plain(_ENTRIES[name], (each.found, each.reason, each.seconds, each.limit))
+        record[names[name]] = plain(form_of(name), (each.found, each.reason, each.seconds, each.limit))
     if MOMENTS.name in job.new or MOMENTS.name not in job.entries:
         limit = job.new[MOMENTS.name].limit if MOMENTS.name in job.new else job.numerics.limit
         known = ((p, job.rows[p]) for p in job.asked[MOMENTS.name]["p"] if p in job.rows)
@@ -66,7 +63,7 @@ def read_into(job: Job, record: Entries, names: Mapping[str, str], *, is_all: bo
     """Give a job what its record has of what is asked: what is settled, or all; what cannot be read is not there."""
     for name in job.asked:
         with suppress(ValueError, KeyError, TypeError):
-            entry = Entry(*made(_ENTRIES[name], record[names[name]]))
+            entry = Entry(*made(form_of(name), record[names[name]]))
             if is_all or job.numerics.settles(entry.limit):
                 job.entries[name] = entry
     for p in job.asked[MOMENTS.name]["p"]:
