@@ -85,7 +85,7 @@ class Start(Stage):
             if found.xi.lines.size:
                 lower, upper = solution.truncation
                 found = found.with_axis(1, found.xi.reaching(lower > share, upper > share))
-            found = found if found.size > self.space.size else found.enriched()
+            found = found if found.size > self.space.size else found.raised()
             if found.size <= most:
                 break
         return replace(self, space=found)

@@ -214,7 +214,7 @@ class FunctionAxis:
         return self
 
     def raised(self) -> Self:
-        """One degree more, or two, to tell by a change to first order what is lacking."""
+        """One function more in each cell, where what a cell lacks harms others."""
         return self
 
     def refined(self, effects: ModeEffects, share: float) -> Self:
@@ -248,6 +248,9 @@ class DividedAxis(FunctionAxis):
 
     def doubled(self) -> Self:
         return self.on(halved(self.lines), np.repeat(self.degrees, 2))
+
+    def raised(self) -> Self:
+        return self.on(self.lines, np.minimum(self.degrees + 1, MAX_DEGREE))
 
     def refined(self, effects: ModeEffects, share: float) -> Self:
         return self.on(*split(self.lines, effects, share))

@@ -102,6 +102,10 @@ class Space:
         are_coarse = [error > LITTLE * max(errors) for error in errors]
         return Space(tuple(axis.doubled() if each else axis for axis, each in zip(self.axes, are_coarse, strict=True)))
 
+    def raised(self) -> Space:
+        """One more function each way, where what a cell lacks harms others."""
+        return Space(tuple(axis.raised() for axis in self.axes))
+
     def refined(self, effects: Sequence[ModeEffects | None], share: float) -> Space:
         """One on which every cell should lack no more than its share; the effects are those of every axis."""
         pairs = zip(self.axes, effects, strict=True)
