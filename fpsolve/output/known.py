@@ -13,6 +13,8 @@ from fpsolve.case.case import Case, Curve
 from fpsolve.model.quantity import STATUS
 from fpsolve.output.beyond import says_more
 from fpsolve.output.records import Entries, Records, key_of, made, plain
+from fpsolve.parts.discretisation import QUESTION as DISCRETISATION
+from fpsolve.parts.discretisation import largest_of
 from fpsolve.parts.every import BY_NAME
 from fpsolve.parts.moments import QUESTION as MOMENTS
 from fpsolve.parts.question import Asked, Entry, Job, Limit, Numerics, Reason
@@ -23,9 +25,9 @@ from fpsolve.study.solve import everything, result_of
 KEPT = 100
 """So many results stay in memory, as of few curves all are asked for again."""
 ROW = "row"
-"""What the entries of Λ(p) are called, before their p."""
-
-
+"""What the entries of Λ(p) are called, before their p; without one what the largest p was solved on."""
+_LARGEST = tuple[float, dict[str, Any]]
+"""The form of the p of the largest size in a record, and of what it was solved on."""
 _ROW = tuple[tuple[float, ...], Limit | None]
 """The form of Λ(p) in a record, see `Job.rows`, and of the budget in which it was found."""
 
@@ -56,6 +58,8 @@ def record_of(job: Job) -> Entries:
         limit = job.new[MOMENTS.name].limit if MOMENTS.name in job.new else job.numerics.limit
         known = ((p, job.rows[p]) for p in job.asked[MOMENTS.name]["p"] if p in job.rows)
         record |= {f"{names[ROW]} {p!r}": plain(_ROW, (row, limit)) for p, row in known}
+    if record and DISCRETISATION.name not in job.entries and "solver" in vars(job) and (largest := largest_of(job)):
+        record[names[ROW]] = plain(_LARGEST, largest)
     return record
 
 
@@ -66,6 +70,8 @@ def read_into(job: Job, record: Entries, names: Mapping[str, str], *, is_all: bo
             entry = Entry(*made(form_of(name), record[names[name]]))
             if is_all or job.numerics.settles(entry.limit):
                 job.entries[name] = entry
+    with suppress(ValueError, KeyError):
+        job.largest = made(_LARGEST, record[names[ROW]])
     for p in job.asked[MOMENTS.name]["p"]:
         with suppress(ValueError, KeyError, TypeError):
             row, limit = made(_ROW, record[f"{names[ROW]} {p!r}"])

@@ -86,13 +86,11 @@ def write_summary(case: Case, results: Results, path: Path, facts: Facts) -> Non
     write_json(path, content, indent=1 if case.planned <= MOST_INDENTED else None)
 
 
-TABLES: dict[str, Callable[[Case, Results, Path, Facts], None]] = {
-    "summary.json": write_summary,
-    "curves.csv": write_numbers,
-    "moments.csv": write_moments,
-    "results.nc": write_dataset,
-}
-"""What writes each of the files with numbers of all sets, and takes the `facts_of` the run."""
+Writer = Callable[[Case, Results, Path, Facts], None]
+GROWING: dict[str, Writer] = {"summary.json": write_summary, "curves.csv": write_numbers, "moments.csv": write_moments}
+"""What writes each of the files with numbers of all sets while a run grows; the first says whether all are there."""
+TABLES: dict[str, Writer] = GROWING | {"results.nc": write_dataset}
+"""What writes all files with numbers of all sets at the end, and takes the `facts_of` the run."""
 
 
 def _numbers(table: Table, number: int) -> dict[str, Any]:

@@ -19,7 +19,7 @@ from fpsolve.files import atomic
 from fpsolve.model.quantity import MOMENT, SECONDS, STATUS
 from fpsolve.output.known import Results, record_of
 from fpsolve.output.records import Entries, Records
-from fpsolve.output.tables import TABLES, facts_of
+from fpsolve.output.tables import GROWING, TABLES, Writer, facts_of
 from fpsolve.page.page import Note
 from fpsolve.parts.eigenfunctions import write_curves
 from fpsolve.parts.every import BY_NAME
@@ -159,16 +159,16 @@ class Sweep:
         if monotonic() >= self._due:
             self.write_tables()
 
-    def write_tables(self) -> None:
-        """Write all of `TABLES`, and last that which says whether all sets are there."""
+    def write_tables(self, tables: dict[str, Writer] = GROWING) -> None:
+        """Write tables of all sets, the first one last."""
         started, self.facts = monotonic(), facts_of(self.case, self.started)
-        for name, write in reversed(TABLES.items()):
+        for name, write in reversed(tables.items()):
             write(self.case, self.results, self.folder / name, self.facts)
         self._due = monotonic() + REST * (monotonic() - started)
 
     def write_all(self) -> None:
-        """Write the tables, the series over the curves, and the files of what records hold."""
-        self.write_tables()
+        """Write all tables, the series over the curves, and the files of what records hold."""
+        self.write_tables(TABLES)
         write_curves(self.case, self.folder)
         for result in self.results if RESPONSE in self.results.asked[0] else ():
             if result.response:
