@@ -555,7 +555,9 @@ class System(Parametrised):
 
     def linear(self) -> LinearMotion:
         """The linear system that it is for these parameters."""
-        raise NotImplementedError(f"{type(self).__name__} states no linear()")
+        raise NotImplementedError(
+            f"{type(self).__name__} states no linear(), which gives for example PlaneSystem(terms, jumps)"
+        )
 
     @cached_property
     def terms(self) -> Sequence[CoefficientMatrix]:
