@@ -86,7 +86,7 @@ def test_a_narrow_terminal_cuts_no_word_and_no_number(tmp_path, monkeypatch, com
     monkeypatch.setenv("TERM", "dumb")
     asked = [command[0], "case.toml", *command[1:], "--jobs", "1", *(f"--set={each}" for each in sets)]
     whole = run(tmp_path, *asked, case=TEXT + EXPECTED)
-    for width in (60, 80):
+    for width in (40, 60, 80):
         monkeypatch.setenv("COLUMNS", str(width))
         shown = run(tmp_path, *asked, to=Terminal)
         assert shown.code == whole.code
