@@ -205,7 +205,7 @@ class Boundary(Result):
         is_empty = not np.isfinite(scan.values).any()
         obstacles += [each for each in scan.reasons if is_of_line(each) or (is_empty and not is_none(each))]
         seconds = now.seconds + zero_field.seconds
-        yield replace(now, seconds=seconds, obstacles=tuple(obstacles), complete=not obstacles, recall=solved_anew)
+        yield replace(now, seconds=seconds, obstacles=tuple(obstacles), complete=not obstacles)
 
     def _special(self, zero_field: ZeroField, trace: Trace) -> Trace:
         """A branch with its folds, and the points that the axes ask for."""
@@ -385,6 +385,10 @@ def crossed(lines: Sequence[Boundary]) -> list[Boundary]:
                 for key, (place, point), other in (((i, a), on_first, second), ((j, b), on_second, first)):
                     new[key].append((place, point._replace(label=f"crossing with {other.target}")))
     return [
-        replace(line, traces=tuple(with_points(trace, new[i, a]) for a, trace in enumerate(line.traces)))
+        replace(
+            line,
+            traces=tuple(with_points(trace, new[i, a]) for a, trace in enumerate(line.traces)),
+            recall=solved_anew,  # as records are of this process
+        )
         for i, line in enumerate(lines)
     ]

@@ -129,7 +129,10 @@ class Blocks(Method):
 
     def row(self, p: float) -> Moment:
         rows = [part.row(p) for part in self._parts_at(p)]
-        return max(rows, key=lambda row: row.derivative if abs(p) < TINIEST_P else row.value / p)
+        if abs(p) < TINIEST_P:
+            return max(rows, key=lambda row: row.derivative)
+        best, beyond = max(row.value / p for row in rows), max(row.value / p + row.error / abs(p) for row in rows)
+        return next(row for row in rows if row.value / p == best)._replace(error=abs(p) * (beyond - best))
 
     def pair(self, p: float) -> PrincipalPair:
         if self._rays:
@@ -137,10 +140,13 @@ class Blocks(Method):
         raise NotConverged(Message(Code.NO_EIGENFUNCTION_OF_BLOCKS, p=p, blocks=self.names))
 
     def ratio_alone(self, p: float, tolerance: Tolerance | None = None) -> tuple[float, float]:
-        return self.leading(p, tolerance)[0].ratio_alone(p, tolerance)
+        rates = [part.ratio_alone(p, tolerance) for part in self._parts_at(p)]
+        best, _ = max(rates)
+        return best, max(value + error for value, error in rates) - best
 
     def ratio(self, p: float, tolerance: Tolerance | None = None) -> tuple[float, float, float]:
-        return self.leading(p, tolerance)[0].ratio(p, tolerance)
+        value, slope, _ = self.leading(p, tolerance)[0].ratio(p, tolerance)
+        return value, slope, self.ratio_alone(p, tolerance)[1]
 
     def slope_error(self, p: float) -> float:
         part, is_alone = self.leading(p)

@@ -46,6 +46,7 @@ from fpsolve.exponent.moments import EvenMoment, even_moment
 from fpsolve.exponent.starts import Start, first, has_cones, other_centers
 from fpsolve.fem.axis import FEW_UNKNOWNS
 from fpsolve.fem.generator import Generator
+from fpsolve.fem.noise_axes import CellAxis
 from fpsolve.fem.space import Space
 from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.coordinates import infinite
@@ -102,7 +103,7 @@ class Elements(Method):
             NotConverged: the mesh does not resolve the problem, or the budget does not suffice to find one, or the even
                 moment of this p contradicts it.
         """
-        if abs(p) < SMALL_P:
+        if abs(p) < SMALL_P and self.adapts:
             return self._beside_zero(p if abs(p) >= NEGLIGIBLE_P else 0.0, tolerance)
         if tolerance is None and p in self._failed:
             kind, message = self._failed[p]
@@ -127,11 +128,15 @@ class Elements(Method):
         return solution
 
     def _beside_zero(self, p: float, tolerance: Tolerance | None) -> Solution:
-        """The pair at a small p, on the functions of that at ±`SMALL_P`, which has the error."""
-        generator, known = self.near_zero(p, tolerance).pair.generator, self.spaces.get(p)
-        if not known or known.pair.generator is not generator:
+        """The pair at a small p, on the functions of that at ±`SMALL_P`, with its share of the error there."""
+        near, known = self.near_zero(p, tolerance), self.spaces.get(p)
+        if not known or known.pair.generator is not near.pair.generator:
+            share = p / near.pair.p
             with self.solving(p):
-                self.spaces[p] = known = Solution(self.pair_on(generator, p, self._near(p)))
+                search = Search(p, lambda pair: math.inf, self.settings.budget, self.remedy)
+                pair = search.settle(Start(self.problem, near.pair.generator.chosen), self._near(p)).pair
+            pair = replace(pair, correction=share * near.pair.correction)
+            self.spaces[p] = known = Solution(pair, measured=(share * near.error,))
         return known
 
     @abstractmethod
@@ -262,8 +267,8 @@ class Elements(Method):
 
         As the variance is finite, an interval twice as wide leaves less than half of λ that the noise makes beyond it.
         """
-        lacked, ends = self._lacked(pair), pair.space.xi.lines[[0, -1]]
-        change = math.inf if np.any(pair.space.xi.weight(ends) * ends**2 > sys.float_info.epsilon) else 0.0
+        lacked = self._lacked(pair)
+        change = math.inf if any(are_cut(pair.space.xi)) else 0.0
         while change > (WIDER - 1) * self.tolerance(SMALL_P, 0.0) / SMALL_P:
             wider = self.pair_among(widened(pair.generator), pair)
             change, pair = abs(wider.derivative - pair.derivative), wider
@@ -423,6 +428,13 @@ class GivenMesh(PlaneElements):
     def allowed(self, tolerance: Tolerance, pair: PrincipalPair) -> float:
         return math.inf
 
+    def finer_pair(self, pair: PrincipalPair) -> PrincipalPair:
+        """It reaches further, too, where an end of the interval cuts off what counts."""
+        chosen = widened(pair.generator)
+        if chosen.xi.lines.size:
+            chosen = chosen.with_axis(1, chosen.xi.reaching(*are_cut(chosen.xi)))
+        return self.pair_among(chosen.enriched(), pair)
+
     def _among_tails(self, pair: PrincipalPair) -> tuple[float, float]:
         """λ, on the interval of the mesh, and what a wider one would change."""
         change = abs(self.pair_among(widened(pair.generator), pair).derivative - pair.derivative)
@@ -438,6 +450,12 @@ class GivenMesh(PlaneElements):
 def doubt(error: Any, known: Any) -> Any:
     """The difference beyond which a value with this error, or each of some, contradicts an even moment."""
     return SURELY * (error + known.error) + ROUNDED * abs(known.value)
+
+
+def are_cut(xi: CellAxis) -> list[bool]:
+    """Whether what counts of the variance of a noise lies beyond each of the ends of its cells."""
+    ends = xi.lines[[0, -1]]
+    return (xi.weight(ends) * ends**2 > sys.float_info.epsilon).tolist()
 
 
 def widened(generator: Generator) -> Space:

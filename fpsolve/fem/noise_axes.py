@@ -408,7 +408,9 @@ class CellAxis(DividedAxis, LineAxis):
 
     def reaching(self, below: bool, above: bool) -> CellAxis:
         """With one more cell at the ends whose effect exceeds its share."""
-        lower, upper = [1.6 * self.lines[0]] if below else [], [1.6 * self.lines[-1]] if above else []
+        first, last, end = self.lines[0], self.lines[-1], self.noise.half_width / self.unit * (1 - 1e-12)
+        lower = [max(1.6 * first, -end)] if below and first > -end else []
+        upper = [min(1.6 * last, end)] if above and last < end else []
         return self.between(np.concatenate([lower, self.lines, upper]))
 
     def product(self, f: FloatArray) -> Matrix:

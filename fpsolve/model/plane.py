@@ -87,6 +87,8 @@ class Harmonics:
 
     def __str__(self) -> str:
         """(0.5 − 0.5 cos 2φ), or one number."""
+        if np.ndim(self.mean):
+            return repr(self)
         text = ""
         for value, name in ((self.mean, ""), (self.cosine, " cos 2φ"), (self.sine, " sin 2φ")):
             if value:
@@ -787,9 +789,9 @@ def as_plane(terms: Sequence[CoefficientMatrix], *, has_turn: bool = True) -> tu
         terms: of one variable, or of more.
         has_turn: whether J is added, whose speed is a power of four below the largest a; False for derivatives.
     """
-    if any(len(term.matrix) > 1 for term in terms):
+    if not terms or any(len(term.matrix) > 1 for term in terms):
         return tuple(terms)
-    size = max((abs(term.matrix[0][0]) for term in terms), default=0.0) or 1.0
+    size = max(abs(term.matrix[0][0]) for term in terms) or 1.0
     speed = 4.0 ** math.floor(math.log(size, 4))
     turn = CoefficientMatrix(0, ((0.0, speed), (-speed, 0.0)))
     return *[turn] * has_turn, *(replace(term, matrix=term.matrix[0][0] * np.eye(2)) for term in terms)

@@ -81,6 +81,10 @@ class Problem:
                 "noise"
             )
 
+    def __getstate__(self) -> dict[str, Any]:
+        """What it is made of; the rest follows again."""
+        return {each.name: vars(self)[each.name] for each in fields(self)}
+
     @cached_property
     def linear(self) -> LinearMotion:
         """The linear system, which solvers ask."""

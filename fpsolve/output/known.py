@@ -25,7 +25,7 @@ from fpsolve.study.solve import everything, result_of
 KEPT = 100
 """So many results stay in memory, as of few curves all are asked for again."""
 ROW = "row"
-"""What the entries of Λ(p) are called, before their p; without one what the largest p was solved on."""
+"""What the entries of Λ(p) are called, before their p."""
 _LARGEST = tuple[float, dict[str, Any]]
 """The form of the p of the largest size in a record, and of what it was solved on."""
 _ROW = tuple[tuple[float, ...], Limit | None]
@@ -59,7 +59,7 @@ def record_of(job: Job) -> Entries:
         known = ((p, job.rows[p]) for p in job.asked[MOMENTS.name]["p"] if p in job.rows)
         record |= {f"{names[ROW]} {p!r}": plain(_ROW, (row, limit)) for p, row in known}
     if record and DISCRETISATION.name not in job.entries and "solver" in vars(job) and (largest := largest_of(job)):
-        record[names[ROW]] = plain(_LARGEST, largest)
+        record[f"{names[MOMENTS.name]} largest"] = plain(_LARGEST, largest)
     return record
 
 
@@ -71,7 +71,7 @@ def read_into(job: Job, record: Entries, names: Mapping[str, str], *, is_all: bo
             if is_all or job.numerics.settles(entry.limit):
                 job.entries[name] = entry
     with suppress(ValueError, KeyError):
-        job.largest = made(_LARGEST, record[names[ROW]])
+        job.largest = made(_LARGEST, record[f"{names[MOMENTS.name]} largest"])
     for p in job.asked[MOMENTS.name]["p"]:
         with suppress(ValueError, KeyError, TypeError):
             row, limit = made(_ROW, record[f"{names[ROW]} {p!r}"])

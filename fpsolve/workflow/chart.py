@@ -223,7 +223,7 @@ def recalled(records: Records, key: str, line: Boundary) -> Boundary:
 
 def may_pass(reason: Message) -> bool:
     """Whether a reason may be gone the next time, so that it is not recorded."""
-    return reason.tells_of(Code.NO_MEMORY) or is_of_line(reason)
+    return reason.tells_of(Code.NO_MEMORY) or reason.tells_of(Code.SECONDS_SPENT) or is_of_line(reason)
 
 
 def scans_of(keys: Mapping[str, Boundary], records: Records, pool: Pool) -> Iterator[Scan]:

@@ -206,6 +206,7 @@ BAD = [
     (lambda: PlaneSystem([True]), r"^got terms = \[True\]; must be a list, each a CoefficientMatrix$"),
     (lambda: PlaneSystem([FREE], 3.0), "^got jumps = 3.0; must be a list, each a Jump$"),
     (lambda: PlaneSystem([FREE], epsilon=0.0), "a positive number"),
+    (lambda: PlaneSystem([FREE], stop=1.0), "^got stop; PlaneSystem has terms, jumps, epsilon, cubic; leave it out$"),
     (lambda: PlaneSystem([FREE], epsilon=True), "epsilon must be a finite number"),
     (lambda: PlaneSystem([FREE], [Jump(0.1, 1), Jump(0.1 + math.pi, 1)]), "differ modulo pi"),
     (lambda: SYSTEM.at({"mass": 1.0}), "got mass; the parameter is epsilon"),

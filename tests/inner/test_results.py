@@ -8,7 +8,7 @@ import pytest
 from fpsolve.data import plain_unit
 from fpsolve.drawing import plain_numbers, typeset
 from fpsolve.exponent.error import digits
-from fpsolve.results.text import duration, sampled, sign_of
+from fpsolve.results.text import sampled, sign_of
 from fpsolve.show.numbers import bounds_text
 
 
@@ -25,13 +25,6 @@ from fpsolve.show.numbers import bounds_text
 def test_digits_are_those_that_the_error_leaves(value, error, text):
     assert digits(value, error).startswith(text[:-1])
     assert float(digits(value, error)) == pytest.approx(value, abs=2 * error)
-
-
-@pytest.mark.parametrize(
-    ("seconds", "text"), [(4.23, "4.2 s"), (99.94, "99.9 s"), (750.0, "12 min 30 s"), (7500.0, "2 h 5 min")]
-)
-def test_durations(seconds, text):
-    assert duration(seconds) == text
 
 
 @pytest.mark.parametrize(("low", "high"), [(0.12345, 0.67891), (0.0999999, 0.9999), (0.01, 0.02)])

@@ -93,13 +93,8 @@ def test_a_simulation_comes_back_from_its_record_to_the_last_bit(rng):
         simulated = RESULT, found, RESULT.warnings, False
         assert bits(made(form, read_again(plain(form, simulated)))) == bits(simulated)
     numpy = replace(RESULT, time=np.float64(0.3), paths=np.int64(64))
-    row, *rest = record = read_again(plain(form, (numpy, None, (), False)))
+    record = read_again(plain(form, (numpy, None, (), False)))
     assert bits(made(form, record)) == bits((replace(RESULT, time=0.3), None, (), False))
-    wrong = [[each, *rest] for each in ({}, {**row, "more": 0}, {**row, "paths": [{}]})]
-    wrong += [None, [], *([row, None, each, False] for each in ("a text", [1]))]
-    for each in wrong:
-        with pytest.raises(ValueError, match=r"validation errors? for "):
-            made(form, each)
 
 
 def test_a_simulation_that_fails_keeps_the_curves_before_it(tmp_path, monkeypatch):

@@ -87,6 +87,13 @@ def test_stated_error_of_a_given_mesh_is_the_true_one(problem, p, mesh, low, hig
     assert low * off <= stated <= high * off
 
 
+@pytest.mark.parametrize("of", [partial(slope, 2.0), variance_rate])
+def test_stated_error_of_derivatives_covers_what_a_given_interval_cuts_off(of):
+    value, stated = of(mesh=make_mesh(xi_min=-5, xi_max=5)).solved(GAUSSIAN)
+    off = abs(value - of(rtol=1e-10).solved(GAUSSIAN)[0])
+    assert 1e-9 < off <= stated
+
+
 def odd(seed: int):
     """A set of strong and slow noise, heavy impacts, and p from −8 to 30."""
     rng = np.random.default_rng(seed)

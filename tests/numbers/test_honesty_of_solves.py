@@ -21,6 +21,7 @@ from fpsolve import (
 from fpsolve.exponent import INDICES, Budget, Estimate, critical_impact_factor, critical_restitution, impact_rate
 from fpsolve.model import Jump, ParametricOscillator, White
 from tests.kit import rates
+from tests.numbers.rows.modes import random_system
 from tests.numbers.rows.oscillator import PAPER, UNIT, WEAK, elastic, paper, series, slow
 
 COARSE = make_mesh(phi_cells=1, phi_degree=4, xi_cells=2, xi_degree=5)
@@ -88,6 +89,19 @@ def test_slope_of_a_block_has_its_own_error():
         for text in (f"{first}; y' = w; w' = -2*y - 0.9*w - 0.9*xi*y + x", first)
     )
     assert found.derivative_error == pytest.approx(alone.derivative_error)
+
+
+def test_error_of_the_largest_part_covers_one_that_is_nearly_as_large():
+    text, noise = "x' = v; v' = -x - 0.2*v - xi*x", OrnsteinUhlenbeck(alpha=0.5, sigma=0.7)
+    exact = moment_lyapunov(rates(text, noise), 1.0).value
+    found = moment_lyapunov(rates(f"{text}; z' = a*z", noise, a=float(exact[0]) - 5e-6), 1.0, rtol=5e-3)
+    assert abs(found.value - exact) <= found.error_estimate
+
+
+def test_errors_next_to_p_0_fall_as_p():
+    problem = random_system(1, 3, OrnsteinUhlenbeck(alpha=1.0, sigma=0.3))
+    error = ExponentSolver(problem, rtol=0.1).moments([0.005, 0.01]).error_estimate
+    assert error[0] == pytest.approx(0.5 * error[1], rel=0.01)
 
 
 def test_a_tolerance_out_of_reach_harms_no_other():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import ClassVar, Self, cast
 
 import numpy as np
@@ -14,6 +14,7 @@ from fpsolve.model.faults import TableError
 from fpsolve.model.plane import (
     MOST_VARIABLES,
     CoefficientMatrix,
+    CubicTerms,
     Jump,
     LinearMotion,
     ParameterDerivative,
@@ -41,8 +42,14 @@ class PlaneSystem(LinearMotion):
     """
 
     dimensions: ClassVar[Sequence[int]] = (2,)
+    parts: ClassVar[Sequence[str]] = ("terms", "jumps", "epsilon", "cubic")
 
     def __post_init__(self) -> None:
+        for each in fields(LinearMotion):
+            if each.name not in self.parts and vars(self)[each.name] != each.default:
+                raise TypeError(f"got {each.name}; {type(self).__name__} has {', '.join(self.parts)}; leave it out")
+        if not isinstance(self.cubic, CubicTerms | None):
+            raise TypeError(f"got cubic = {shown(self.cubic)}; must be CubicTerms, or None")
         for name, given, kind in (("terms", self.terms, CoefficientMatrix), ("jumps", self.jumps, Jump)):
             stated = tuple(given) if isinstance(given, Iterable) else (None,)
             if not all(isinstance(each, kind) for each in stated):
@@ -143,3 +150,4 @@ class LinearSystem(PlaneSystem):
     """
 
     dimensions: ClassVar[Sequence[int]] = range(1, MOST_VARIABLES + 1)
+    parts: ClassVar[Sequence[str]] = ("terms", "jumps", "epsilon", "stop")
