@@ -21,8 +21,9 @@ from fpsolve.errors import FpsolveError, NotConverged, WorkersDied
 from fpsolve.messages import escaped, short
 from fpsolve.signals import INTERRUPTED, ended_by_signals
 
-COMMANDS = "new", "run", "check", "chart", "explore", "design", "noise", "simulate", "prove", "mesh", "schema"
-"""Each is a function in a file of its name in fpsolve/commands, read when it is called."""
+_TEXTS = {path.stem: path.read_text(encoding="utf-8") for path in Path(__file__).parent.glob("commands/*.py")}
+COMMANDS = {name: text.split('"""')[1] for name, text in sorted(_TEXTS.items()) if f"\ndef {name}(" in text}
+"""What each does: the first line of a file of its name in fpsolve/commands with a function of it, read when called."""
 CLOSED_PIPE = 141
 TRACEBACK = "--traceback"
 """What any command takes to print also where an error was raised."""
@@ -41,17 +42,9 @@ app = App(
     reach, 2 bad input, 3 not converged or nothing found, 130 interrupted
 
     Commands:
-      new       Copy a case that comes with fpsolve.
-      run       Solve cases; write tables, figures and ParaView files.
-      check     Compare results with the values that cases expect.
-      chart     Trace where stability ends in a plane of two parameters.
-      explore   Look at a case in the browser, with a slider for every parameter.
-      design    Find parameters with which λ, Λ(p) or δ_p has a wanted value.
-      noise     Fit a noise to what was measured; say what it means for stability.
-      simulate  Estimate the exponents from simulated paths.
-      prove     Prove bounds on the exponents that hold with certainty.
-      mesh      Write a mesh that a case can name.
-      schema    Print what editors need to complete and check cases.
+      """
+    + "\n      ".join(f"{name:8}  {does}" for name, does in COMMANDS.items())
+    + """
 
     fpsolve COMMAND --help tells of its arguments, fpsolve --version of the version.
     With --traceback a command also prints where an error was raised.""",

@@ -1,4 +1,4 @@
-"""`fpsolve chart`: where stability ends in a plane."""
+"""Trace where stability ends in a plane of two parameters."""
 
 from __future__ import annotations
 

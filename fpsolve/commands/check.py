@@ -1,4 +1,4 @@
-"""`fpsolve check`: what cases expect beside what is computed."""
+"""Compare results with the values that cases expect."""
 
 from __future__ import annotations
 

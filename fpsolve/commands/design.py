@@ -1,4 +1,4 @@
-"""`fpsolve design`: the parameters with which a number has a wanted value."""
+"""Find parameters with which λ, Λ(p) or δ_p has a wanted value."""
 
 from __future__ import annotations
 

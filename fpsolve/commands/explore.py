@@ -1,4 +1,4 @@
-"""`fpsolve explore`: look at a case in a browser."""
+"""Look at a case in the browser, with a slider for every parameter."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`fpsolve mesh`: a mesh for a case."""
+"""Write a mesh that a case can name."""
 
 from __future__ import annotations
 

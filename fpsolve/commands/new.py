@@ -1,4 +1,4 @@
-"""`fpsolve new`: the cases that come with fpsolve, to start from."""
+"""Copy a case that comes with fpsolve."""
 
 from __future__ import annotations
 

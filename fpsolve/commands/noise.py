@@ -1,4 +1,4 @@
-"""`fpsolve noise`: from a measurement to a noise, and to what it means."""
+"""Fit a noise to what was measured; say what it means for stability."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`fpsolve prove`: bounds that hold with certainty, and the check of those of a file."""
+"""Prove bounds on the exponents that hold with certainty."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`fpsolve run`: solve cases."""
+"""Solve cases; write tables, figures and ParaView files."""
 
 from __future__ import annotations
 

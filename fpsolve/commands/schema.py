@@ -1,4 +1,4 @@
-"""`fpsolve schema`: what editors know of case files."""
+"""Print what editors need to complete and check cases."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`fpsolve simulate`: the witness by paths."""
+"""Estimate the exponents from simulated paths."""
 
 from __future__ import annotations
 
