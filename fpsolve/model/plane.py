@@ -789,9 +789,9 @@ def as_plane(terms: Sequence[CoefficientMatrix], *, has_turn: bool = True) -> tu
         terms: of one variable, or of more.
         has_turn: whether J is added, whose speed is a power of four below the largest a; False for derivatives.
     """
-    if not terms or any(len(term.matrix) > 1 for term in terms):
+    if any(len(term.matrix) > 1 for term in terms):
         return tuple(terms)
-    size = max(abs(term.matrix[0][0]) for term in terms) or 1.0
+    size = max((abs(term.matrix[0][0]) for term in terms), default=0.0) or 1.0
     speed = 4.0 ** math.floor(math.log(size, 4))
     turn = CoefficientMatrix(0, ((0.0, speed), (-speed, 0.0)))
     return *[turn] * has_turn, *(replace(term, matrix=term.matrix[0][0] * np.eye(2)) for term in terms)
