@@ -246,8 +246,6 @@ class EquationSystem(System):
             why = "must be one at most, none of one variable, and none with a delay"
             raise TableError(f"got {found}; {why}; leave out walls", "walls")
         linear = self.linear()  # refuses what it cannot be
-        if not linear.terms:
-            raise TableError("no rate has a term; write terms with the variables", "drift")
         for i, name in enumerate(self.variables if linear.cubic else ()):
             if name.startswith(AMPLITUDE.name) or name == JOINT_DENSITY.name:
                 what = "which has another meaning in the stationary response of terms of degree 3; rename it"
